@@ -29,7 +29,7 @@ def with_the_contacts(text: str) -> str:
     (contacts,) = re.findall(r"^```toml\n(.*?)^```$", PAGE, flags=re.MULTILINE | re.DOTALL)
     changes = {
         r"# A contact joins.*\n(#.*\n)+": contacts,
-        r"# stiffness_proportional_damping.*": "damping_ratio = 0.0005",
+        r"damping_ratio = .*": "damping_ratio = 0.0005",
         r"amplitude = 1\.0.*\nengine_order = 1": "amplitude = 20.0\nengine_order = 4",
         r"band = .*": "band = [150.0, 450.0]",
     }

@@ -33,8 +33,8 @@ def with_the_contact(text: str) -> str:
     """The scene with what the third step puts into it."""
     (contact,) = re.findall(r"^```toml\n(.*?)^```$", PAGE, flags=re.MULTILINE | re.DOTALL)
     text, templates = re.subn(r"# A contact joins.*\n(#.*\n)+", contact, text)
-    text, dampings = re.subn(r"# stiffness_proportional_damping.*", "damping_ratio = 0.001", text)
-    assert (templates, dampings) == (1, 1)
+    assert templates == 1
+    assert text.count("\ndamping_ratio = 0.001\n") == 1
     return text
 
 

@@ -18,7 +18,7 @@ _CONTACT = """
 # mu = 0.3
 # N0 = 100.0   # N
 """
-_DAMPING = "   # of every mode, as the files hold none; or stiffness_proportional_damping [s]"
+_DAMPING = "# The files hold no damping; this is that of every mode. Or: stiffness_proportional_damping [s]"
 
 
 def band(start: float | None, stop: float | None, frequencies: Sequence[float]) -> list[float]:
@@ -48,11 +48,8 @@ def toml(raw: Mapping[str, Any], remarks: Sequence[str] = ()) -> str:
     lines = [f"name = {json.dumps(raw['name'])}", "", *(f"# {remark}" for remark in remarks), "[structure]"]
     for key, value in structure.items():
         if key not in ("dofs", "cyclic"):
-            remark = _DAMPING if key == "damping_ratio" else ""
-            lines.append(f"{key} = {json.dumps(value, ensure_ascii=False)}{remark}")
-    lines += [
-        "# stiffness_proportional_damping = 1e-6   # s; see also mass_proportional_damping, damping_ratio"
-    ] * ("damping_ratio" not in structure)
+            lines += [_DAMPING] * (key == "damping_ratio")
+            lines.append(f"{key} = {json.dumps(value, ensure_ascii=False)}")
     if "cyclic" in structure:
         lines += ["", "[structure.cyclic]"]
         lines += [f"{key} = {json.dumps(value)}" for key, value in structure["cyclic"].items()]

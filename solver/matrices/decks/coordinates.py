@@ -10,11 +10,13 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
+Vector = Sequence[float] | NDArray[Any]
 _NONE = 1e-9  # share of a length that counts as none
 
 
@@ -85,7 +87,7 @@ class System:
 GLOBAL = System(Kind.RECTANGULAR, np.zeros(3), np.eye(3))
 
 
-def axes_by(first: int, along: Sequence[float], second: int, beside: Sequence[float]) -> FloatArray:
+def axes_by(first: int, along: Vector, second: int, beside: Vector) -> FloatArray:
     """Axes (3, 3) of which one lies along a vector, and another on the side of a second vector.
 
     Parameters
@@ -114,13 +116,13 @@ def axes_by(first: int, along: Sequence[float], second: int, beside: Sequence[fl
     return axes
 
 
-def around(axis: Sequence[float]) -> FloatArray:
+def around(axis: Vector) -> FloatArray:
     """Axes (3, 3) with z along a vector, x and y anywhere: of a cylinder whose angles nobody asks for."""
     z = np.asarray(axis, dtype=np.float64)
     return axes_by(2, z, 0, np.eye(3)[int(np.argmin(np.abs(z)))])
 
 
-def about_axis(axis: Sequence[float], angle: float) -> FloatArray:
+def rotation(axis: Vector, angle: float) -> FloatArray:
     """The rotation by an angle [rad] about an axis through the origin, (3, 3) (Rodrigues)."""
     k = np.asarray(axis, dtype=np.float64)
     k = k / np.linalg.norm(k)
@@ -131,7 +133,7 @@ def about_axis(axis: Sequence[float], angle: float) -> FloatArray:
 def ansys_axes(xy: float, yz: float, zx: float) -> FloatArray:
     """Axes (3, 3) turned by Ansys' angles [degrees]: about z, then about the new x, then about the new y."""
     z, x, y = (
-        about_axis(axis, math.radians(angle))
+        rotation(axis, math.radians(angle))
         for axis, angle in (((0, 0, 1), xy), ((1, 0, 0), yz), ((0, 1, 0), zx))
     )
     return np.asarray(z @ x @ y)

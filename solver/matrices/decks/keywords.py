@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from solver.matrices.decks.coordinates import GLOBAL, Kind, System, about_axis, around, axes_by
+from solver.matrices.decks.coordinates import GLOBAL, Kind, System, around, axes_by, rotation
 from solver.matrices.decks.deck import Deck
 from solver.matrices.decks.text import DeckFile, real
 from solver.matrices.readers.numbers_in_text import FormatError
@@ -185,7 +185,7 @@ class KeywordDeck:
             a, b = np.array(second[:3]), np.array(second[3:6])
             if not np.any(a != b):
                 raise block.refusal("must be turned about a line through two points, which are the same")
-            turn = about_axis(b - a, math.radians(second[6]))
+            turn = rotation(b - a, math.radians(second[6]))
             shift = turn @ (shift - a) + a
         moved = {id(system): system.moved(turn, shift) for system in part.systems.values()}
         whole = self._whole

@@ -10,11 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from deck_frames import abaqus, ansys, nastran, turned
-from fe_files import dmig
+from fe_files import coordinate, dmig
 from scipy.linalg import eigh
 from scipy.sparse import coo_array, csr_array
 from sector_files import SECTORS, sector_files
 
+import solver
 from service.cli import main
 from solver.errors import SceneError
 from solver.matrices.decks.coordinates import GLOBAL, Kind, System
@@ -236,3 +237,63 @@ def test_a_stranger_may_not_include_files_in_any_way(text: str, tmp_path: Path) 
     path.write_text(text)
     with pytest.raises(FormatError, match="includes another file"):
         check_alone(path)
+
+
+@pytest.mark.parametrize(
+    ("empty", "reduce"), [("low", False), ("low", True), ("high", False), ("high", True)]
+)
+def test_masses_on_one_boundary_alone_count_for_both(
+    empty: str, reduce: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    M, K, _ = ring()
+    M = M.copy()
+    rows = range(9) if empty == "low" else range(18, 27)
+    M[rows, rows] = 0.0
+    for name, data in sector_files().items():
+        (tmp_path / name).write_bytes(data)
+    (tmp_path / "ring.mas").write_text(coordinate(M))
+    files = [str(tmp_path / name) for name in ("ring.mas", "ring.sti")]
+    args = ["import", *files, "--out", str(tmp_path / "o.toml"), "--sectors", "6", "--low", "LOW",
+            "--high", "HIGH", "--nodes", str(tmp_path / "ring.inp"), "--dof", "tip=2.UZ",
+            "--dof", "hub=4.UX", "--json"]  # fmt: skip
+    assert main([*args, *(["--reduce", "--modes", "8"] if reduce else [])]) == 0
+    said = json.loads(capsys.readouterr().out)["frequencies_hz"][:3]
+    R = turned(np.array([0.0, 0.0, 1.0]), 2 * math.pi / SECTORS)
+    truth = frequencies(M, K, [(0, 6, R), (1, 7, R), (2, 8, R)], 1)
+    assert said == pytest.approx(np.sqrt(truth[:3]) / (2 * math.pi), rel=1e-5 if reduce else 1e-9)
+
+
+def test_rows_without_mass_on_both_boundaries_are_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    M, _, _ = ring()
+    M = M.copy()
+    node = [0, 1, 2, 18, 19, 20]
+    M[node, node] = 0.0
+    for name, data in sector_files().items():
+        (tmp_path / name).write_bytes(data)
+    (tmp_path / "ring.mas").write_text(coordinate(M))
+    files = [str(tmp_path / name) for name in ("ring.mas", "ring.sti")]
+    args = ["import", *files, "--out", str(tmp_path / "o.toml"), "--sectors", "6", "--low", "LOW",
+            "--high", "HIGH", "--nodes", str(tmp_path / "ring.inp"), "--dof", "tip=4.UX"]  # fmt: skip
+    assert main(args) == 2
+    assert "row 0 (1.UX)" in capsys.readouterr().err
+
+
+def test_a_structure_that_refers_to_files_is_turned_whenever_it_is_loaded(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    M, K, places = ring()
+    axes = cylinder(places)
+    Ml, Kl, _, _ = held(axes, [], M, K)
+    numbers = [(i // 3 + 1, i % 3 + 1) for i in range(27)]
+    (tmp_path / "m.pch").write_text(dmig("MAAX", Ml, numbers) + dmig("KAAX", Kl, numbers))
+    deck = nastran_cylinder(tmp_path / "m.bdf", places)
+    args = ["import", str(tmp_path / "m.pch"), "--out", str(tmp_path / "o.toml"), "--nodes", str(deck),
+            "--dof", "x=8.UX", "--dof", "y=8.UY"]  # fmt: skip
+    assert main(args) == 0
+    capsys.readouterr()
+    structure = solver.load_scene(tmp_path / "o.toml").structure
+    rows = structure.dofs.rows
+    np.testing.assert_allclose(structure.K.array[np.ix_(rows, rows)], K[21:23, 21:23], rtol=1e-8)
+    assert abs(Kl[21, 21] / K[21, 21] - 1.0) > 1e-3
