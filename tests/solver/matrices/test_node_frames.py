@@ -26,6 +26,7 @@ from solver.matrices.readers.label import Label
 from solver.matrices.readers.numbers_in_text import FormatError
 from solver.matrices.sectors.decks import check_alone, read_deck
 from solver.matrices.sectors.loading import boundaries
+from solver.scene.scene import MatricesStructure
 
 Array = np.ndarray
 LOW, HIGH = [1, 2, 3], [7, 8, 9]
@@ -55,7 +56,7 @@ def frequencies(M: Array, K: Array, pairs: list[tuple[int, int, Array]], n: int)
         P[3 * high : 3 * high + 3] = 0.0
         P[3 * high : 3 * high + 3, 3 * low : 3 * low + 3] = R * turn
     P = P[:, [i for i in range(len(M)) if not any(3 * h <= i < 3 * h + 3 for _, h, _ in pairs)]]
-    return eigh(P.conj().T @ K @ P, P.conj().T @ M @ P, eigvals_only=True)
+    return np.asarray(eigh(P.conj().T @ K @ P, P.conj().T @ M @ P, eigvals_only=True))
 
 
 def told(path: Path, M: Array, K: Array, axis: Array, labels: list[Label] | None = None) -> list[Array]:
@@ -294,6 +295,8 @@ def test_a_structure_that_refers_to_files_is_turned_whenever_it_is_loaded(
     assert main(args) == 0
     capsys.readouterr()
     structure = solver.load_scene(tmp_path / "o.toml").structure
+    assert isinstance(structure, MatricesStructure)
+    assert structure.K is not None
     rows = structure.dofs.rows
     np.testing.assert_allclose(structure.K.array[np.ix_(rows, rows)], K[21:23, 21:23], rtol=1e-8)
     assert abs(Kl[21, 21] / K[21, 21] - 1.0) > 1e-3
