@@ -12,7 +12,7 @@ import numpy as np
 from solver.balance.kernels.jacobian import factorise, step_back
 from solver.balance.kernels.output import extremes, observed_motion
 from solver.balance.kernels.residual import evaluate
-from solver.balance.more_harmonics import linear_part, more_harmonics, pad
+from solver.balance.more_harmonics import less_harmonics, linear_part, more_harmonics, pad
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.system import (
     by_reference,
@@ -61,7 +61,8 @@ class ErrorEstimator:
     twice the harmonics, they are its residual, beside what Newton's method left on the harmonics kept. One
     Newton step there is the first-order change of the solution, a second one with the same matrix shows what
     the first order misses. Where that is much, as where a stiff contact stops the motion for a while, that
-    balance is solved at fixed λ and its change counts instead, if there is a solution. The estimate is the
+    balance is solved at fixed λ and its change counts instead; if no solution is found, the difference from
+    the one with half of the harmonics, if that is less. The estimate is the
     larger change of the amplitude, at least a tenth of the change
     of the motion at its worst instant, times `SAFETY`. Harmonics still beyond are added with coefficients
     that fall like 1/k², as those of a force with kinks do, weighted by the receptance of the structure with
@@ -132,7 +133,10 @@ class ErrorEstimator:
         largest = np.max(changes, axis=0)
         if not across and steps[1] > _FIRST_ORDER * steps[0] and largest[0] > _FIRST_ORDER * self._size(x):
             solved = self._solved(start, p)
-            largest = largest if solved is None else np.array(self._change(x, solved))
+            if solved is not None:
+                largest = np.array(self._change(x, solved))
+            elif (fewer := self._with_fewer(p)) is not None:
+                largest = np.minimum(largest, self._change(x, fewer))
         max_abs, half_range = more * SAFETY * largest + tail + self._rounding()
         return ErrorEstimate(max_abs=float(max_abs), half_peak_to_peak=float(half_range))
 
@@ -140,6 +144,16 @@ class ErrorEstimator:
         """Return the observed coefficients of the solution with more harmonics near U; None if none is found."""
         found = self._larger.solve_from(p, U)
         return self._motion(self._larger, found.u, p) if found.converged else None
+
+    def _with_fewer(self, p: float) -> Real | None:
+        """Return the observed coefficients of the solution with half of the harmonics; None if none is found."""
+        less = less_harmonics(self._workspace.balance, self._workspace.balance.n_harmonics // 2)
+        if less.system.ks.size in (0, self._workspace.balance.system.ks.size):
+            return None
+        smaller = Workspace.of(less, self._workspace)
+        found = smaller.solve(p)
+        x = self._motion(smaller, found.u, p) if found.converged else None
+        return None if x is None else pad(x, less, self._larger.balance)
 
     def _size(self, x: Real) -> float:
         """Return the amplitude of an observed motion [m]."""
