@@ -34,8 +34,8 @@ _TAIL = 4
 _LOST_BITS = 16.0  # of the sums behind a motion, in units of their rounding
 # Fitted to 600 random scenes, see docs/accuracy.md: 98 % of the true errors are below the estimate.
 SAFETY = 1.7
-# A second step of more than this share of the first, or a motion that moves by more than this share of itself:
-# the first order does not tell what more harmonics do, and the balance with them is solved.
+# A second step above this share of the first, and a change above this share of the amplitude: the first order
+# does not tell what more harmonics do, and the balance with them is solved.
 _FIRST_ORDER = 0.1
 # The change of the motion at its worst instant counts with this share: max|x| may change little by accident.
 _ANYWHERE = 0.1
@@ -64,9 +64,11 @@ class ErrorEstimator:
     balance is solved at fixed λ and its change counts instead; if no solution is found, the difference from
     the one with half of the harmonics, if that is less. The estimate is the
     larger change of the amplitude, at least a tenth of the change
-    of the motion at its worst instant, times `SAFETY`. Harmonics still beyond are added with coefficients
-    that fall like 1/k², as those of a force with kinks do, weighted by the receptance of the structure with
-    the mean stiffness of its contacts, so that a resonance out there is not overlooked. Where these move the contacts more than the harmonics looked at, as they do
+    of the motion at its worst instant, times `SAFETY`.
+
+    Harmonics still beyond are added with coefficients that fall like 1/k², as those of a force with kinks do,
+    weighted by the receptance of the structure with the mean stiffness of its contacts, so that a resonance
+    out there is not overlooked. Where these move the contacts more than the harmonics looked at, as they do
     up to the resonance of a light damper on its stiff contacts, the change counts as many times; up to twice
     where contacts are stiffer than the structure at the highest harmonic looked at: friction jumps there for
     all they can tell, the error falls like 1/H, and what is found up to 2 H is one half of it.
@@ -132,21 +134,24 @@ class ErrorEstimator:
             steps.append(float(np.abs(step[: U.size]).max(initial=0.0)))
         largest = np.max(changes, axis=0)
         if not across and steps[1] > _FIRST_ORDER * steps[0] and largest[0] > _FIRST_ORDER * self._size(x):
-            solved = self._solved(start, p)
-            if solved is not None:
-                largest = np.array(self._change(x, solved))
-            elif (fewer := self._with_fewer(p)) is not None:
-                largest = np.minimum(largest, self._change(x, fewer))
+            largest = self._solved(x, start, p, largest)
         max_abs, half_range = more * SAFETY * largest + tail + self._rounding()
         return ErrorEstimate(max_abs=float(max_abs), half_peak_to_peak=float(half_range))
 
-    def _solved(self, U: Real, p: float) -> Real | None:
-        """Return the observed coefficients of the solution with more harmonics near U; None if none is found."""
+    def _solved(self, x: Real, U: Real, p: float, largest: Real) -> Real:
+        """Return the changes of a motion to the solution with more harmonics near U, or else with fewer.
+
+        The latter are about those of twice the harmonics, if not more; they count if below `largest`.
+        """
         found = self._larger.solve_from(p, U)
-        return self._motion(self._larger, found.u, p) if found.converged else None
+        wider = self._motion(self._larger, found.u, p) if found.converged else None
+        if wider is not None:
+            return np.array(self._change(x, wider))
+        fewer = self._with_fewer(p)
+        return largest if fewer is None else np.minimum(largest, self._change(x, fewer))
 
     def _with_fewer(self, p: float) -> Real | None:
-        """Return the observed coefficients of the solution with half of the harmonics; None if none is found."""
+        """Return the observed coefficients of the solution with half of the harmonics; None without."""
         less = less_harmonics(self._workspace.balance, self._workspace.balance.n_harmonics // 2)
         if less.system.ks.size in (0, self._workspace.balance.system.ks.size):
             return None
@@ -204,14 +209,17 @@ class ErrorEstimator:
     def _tail(self, F: Real, p: float) -> tuple[float, float]:
         """Return what harmonics beyond those of the larger balance do.
 
-        That is the motion of the observed DOF [m], and how many times as much as the harmonics that only the
-        larger balance has they move the contacts, at least 1.
+        That is the motion of the observed DOF [m], NaN where structure and contacts are singular there, and
+        how many times as much as the harmonics that only the larger balance has they move the contacts, at
+        least 1.
         """
         ks, kept = self._larger.balance.system.ks, self._workspace.balance.system.ks
         receptance(self._beyond, p, self._beyond_linear)
         linear = of_all_ports(self._larger.balance.system, receptance_by_value(self._beyond_linear))
-        # δF = F + κ δu and δu = −A δF
-        held = np.linalg.inv(np.eye(F.shape[0]) + self._mean_stiffness()[:, None] * linear.A[0])
+        try:  # δF = F + κ δu and δu = −A δF
+            held = np.linalg.inv(np.eye(F.shape[0]) + self._mean_stiffness()[:, None] * linear.A[0])
+        except np.linalg.LinAlgError:
+            return math.nan, 1.0
         B = np.abs(np.einsum("kd,kdc->kc", linear.B[0], held))
         A = np.abs(linear.A[0] @ held)
         sizes = np.zeros((F.shape[0], ks.size))
@@ -234,12 +242,13 @@ class ErrorEstimator:
         return tail, max(jumps, furthest / nearest) if nearest > 0.0 else 1.0
 
     def _mean_stiffness(self) -> Real:
-        """Return what the contacts add to the structure at high harmonics where last evaluated, (nc,) [N/m]."""
+        """Return what contacts add to the structure at high harmonics where last evaluated, (nc,) [N/m]."""
         system, point = self._larger.balance.system, evaluation_by_value(self._larger.point)
         ports = np.diff(system.first_port)[system.owner]
         port = np.arange(system.owner.size) - system.first_port[system.owner]
         own = system.first_block[system.owner] + port * (ports + 1)
-        slopes: Real = np.maximum(point.dF_dU[own, -1, -1] + point.dF_dU[own, -2, -2], 0.0) / 2.0 - system.shift
+        mean = 0.5 * (point.dF_dU[own, -1, -1] + point.dF_dU[own, -2, -2])  # of cosine and sine
+        slopes: Real = np.maximum(mean, 0.0) - system.shift
         return slopes
 
 
