@@ -12,7 +12,7 @@ import numpy as np
 from solver.balance.kernels.jacobian import factorise, step_back
 from solver.balance.kernels.output import extremes, observed_motion
 from solver.balance.kernels.residual import evaluate
-from solver.balance.more_harmonics import linear_part, more_harmonics, pad
+from solver.balance.more_harmonics import less_harmonics, linear_part, more_harmonics, pad
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.system import (
     by_reference,
@@ -34,6 +34,9 @@ _TAIL = 4
 _LOST_BITS = 16.0  # of the sums behind a motion, in units of their rounding
 # Fitted to 600 random scenes, see docs/accuracy.md: 98 % of the true errors are below the estimate.
 SAFETY = 1.7
+# A second step above this share of the first, and a change above this share of the amplitude: the first order
+# does not tell what more harmonics do, and the balance with them is solved.
+_FIRST_ORDER = 0.1
 # The change of the motion at its worst instant counts with this share: max|x| may change little by accident.
 _ANYWHERE = 0.1
 
@@ -57,11 +60,18 @@ class ErrorEstimator:
     The closed-form contact force of a solution has coefficients beyond H. Put into the balance with about
     twice the harmonics, they are its residual, beside what Newton's method left on the harmonics kept. One
     Newton step there is the first-order change of the solution, a second one with the same matrix shows what
-    the first order misses. The estimate is the larger change of the amplitude, at least a tenth of the change
-    of the motion at its worst instant, times `SAFETY`. Harmonics still beyond are added with coefficients
-    that fall like 1/k², as those of a force with kinks do, weighted by the receptance, so that a resonance
+    the first order misses. Where that is much, as where a stiff contact stops the motion for a while, that
+    balance is solved at fixed λ and its change counts instead; if no solution is found, the difference from
+    the one with half of the harmonics, if that is less. The estimate is the
+    larger change of the amplitude, at least a tenth of the change
+    of the motion at its worst instant, times `SAFETY`.
+
+    Harmonics still beyond are added with coefficients that fall like 1/k², as those of a force with kinks do,
+    weighted by the receptance of the structure with the mean stiffness of its contacts, so that a resonance
     out there is not overlooked. Where these move the contacts more than the harmonics looked at, as they do
-    up to the resonance of a light damper on its stiff contacts, the change counts as many times.
+    up to the resonance of a light damper on its stiff contacts, the change counts as many times; up to twice
+    where contacts are stiffer than the structure at the highest harmonic looked at: friction jumps there for
+    all they can tell, the error falls like 1/H, and what is found up to 2 H is one half of it.
     """
 
     def __init__(self, workspace: Workspace) -> None:
@@ -75,6 +85,7 @@ class ErrorEstimator:
         self._all_ks, self._beyond_ks = beyond.ks, beyond.ks[self._is_beyond]
         self._is_fast = is_fast(balance.scene, self._larger.balance.system.ks)
         self._later_is_fast = is_fast(balance.scene, self._beyond_ks)
+        self._stiffest = np.array([k for each in balance.scene.contacts for k in each.stiffnesses])
         self._beyond = by_reference(beyond)
         self._beyond_linear = new_receptance(self._beyond)
 
@@ -109,7 +120,7 @@ class ErrorEstimator:
         weights = (1.0 / size**2, 1.0 / (p * p if p != 0.0 else 1.0)) if across else (0.0, 0.0)
         if factorise(larger.system, larger.linear, larger.point, tangent, *weights) == 0.0:
             return UNKNOWN
-        changes = []
+        changes, steps, start = [], [], U
         for _ in range(2):
             step = np.append(point.residual, 0.0) if across else point.residual.copy()
             step_back(larger.system, larger.point, step)
@@ -120,9 +131,39 @@ class ErrorEstimator:
             if after is None:
                 return UNKNOWN
             changes.append(self._change(x, after))
+            steps.append(float(np.abs(step[: U.size]).max(initial=0.0)))
         largest = np.max(changes, axis=0)
+        if not across and steps[1] > _FIRST_ORDER * steps[0] and largest[0] > _FIRST_ORDER * self._size(x):
+            largest = self._solved(x, start, p, largest)
         max_abs, half_range = more * SAFETY * largest + tail + self._rounding()
         return ErrorEstimate(max_abs=float(max_abs), half_peak_to_peak=float(half_range))
+
+    def _solved(self, x: Real, U: Real, p: float, largest: Real) -> Real:
+        """Return the changes of a motion to the solution with more harmonics near U, or else with fewer.
+
+        The latter are about those of twice the harmonics, if not more; they count if below `largest`.
+        """
+        found = self._larger.solve_from(p, U)
+        wider = self._motion(self._larger, found.u, p) if found.converged else None
+        if wider is not None:
+            return np.array(self._change(x, wider))
+        fewer = self._with_fewer(p)
+        return largest if fewer is None else np.minimum(largest, self._change(x, fewer))
+
+    def _with_fewer(self, p: float) -> Real | None:
+        """Return the observed coefficients of the solution with half of the harmonics; None without."""
+        less = less_harmonics(self._workspace.balance, self._workspace.balance.n_harmonics // 2)
+        if less.system.ks.size in (0, self._workspace.balance.system.ks.size):
+            return None
+        smaller = Workspace.of(less, self._workspace)
+        found = smaller.solve(p)
+        x = self._motion(smaller, found.u, p) if found.converged else None
+        return None if x is None else pad(x, less, self._larger.balance)
+
+    def _size(self, x: Real) -> float:
+        """Return the amplitude of an observed motion [m]."""
+        high, _, low, _ = extremes(self._larger.system, x)
+        return max(high, -low)
 
     def _rounding(self) -> float:
         """Return what rounding may do to the observed motion where last evaluated [m].
@@ -168,13 +209,19 @@ class ErrorEstimator:
     def _tail(self, F: Real, p: float) -> tuple[float, float]:
         """Return what harmonics beyond those of the larger balance do.
 
-        That is the motion of the observed DOF [m], and how many times as much as the harmonics that only the
-        larger balance has they move the contacts, at least 1.
+        That is the motion of the observed DOF [m], NaN where structure and contacts are singular there, and
+        how many times as much as the harmonics that only the larger balance has they move the contacts, at
+        least 1.
         """
         ks, kept = self._larger.balance.system.ks, self._workspace.balance.system.ks
         receptance(self._beyond, p, self._beyond_linear)
         linear = of_all_ports(self._larger.balance.system, receptance_by_value(self._beyond_linear))
-        B, A = np.abs(linear.B[0]), np.abs(linear.A[0])
+        try:  # δF = F + κ δu and δu = −A δF
+            held = np.linalg.inv(np.eye(F.shape[0]) + self._mean_stiffness()[:, None] * linear.A[0])
+        except np.linalg.LinAlgError:
+            return math.nan, 1.0
+        B = np.abs(np.einsum("kd,kdc->kc", linear.B[0], held))
+        A = np.abs(linear.A[0] @ held)
         sizes = np.zeros((F.shape[0], ks.size))
         moving = ks > 0
         pairs = F[:, int(ks[0] == 0) :].reshape(F.shape[0], int(moving.sum()), 2)
@@ -190,7 +237,19 @@ class ErrorEstimator:
         added = np.isin(self._all_ks, ks[~np.isin(ks, kept)])
         near = np.einsum("kcd,dk->c", A[added], sizes[:, ~np.isin(ks, kept)])
         furthest, nearest = float(far.max(initial=0.0)), float(near.max(initial=0.0))
-        return tail, max(1.0, furthest / nearest) if nearest > 0.0 else 1.0
+        last = np.abs(np.diagonal(linear.A[0, ~self._is_beyond][-1])) * self._stiffest
+        jumps = 1.0 + float(np.max(last / (1.0 + last), initial=0.0))
+        return tail, max(jumps, furthest / nearest) if nearest > 0.0 else 1.0
+
+    def _mean_stiffness(self) -> Real:
+        """Return what contacts add to the structure at high harmonics where last evaluated, (nc,) [N/m]."""
+        system, point = self._larger.balance.system, evaluation_by_value(self._larger.point)
+        ports = np.diff(system.first_port)[system.owner]
+        port = np.arange(system.owner.size) - system.first_port[system.owner]
+        own = system.first_block[system.owner] + port * (ports + 1)
+        mean = 0.5 * (point.dF_dU[own, -1, -1] + point.dF_dU[own, -2, -2])  # of cosine and sine
+        slopes: Real = np.maximum(mean, 0.0) - system.shift
+        return slopes
 
 
 def truncation_error(workspace: Workspace, u: Real, p: float) -> ErrorEstimate:
