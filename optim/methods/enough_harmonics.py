@@ -31,7 +31,7 @@ def honest(result: DesignResult) -> DesignResult:
 
 
 def with_enough(result: DesignResult, should_stop: ShouldStop) -> tuple[Problem | None, int]:
-    """Return the problem to solve instead of that of a doubtful optimum, and the responses that told so.
+    """Return the problem to solve instead of one whose end is doubtful, and the responses that told so.
 
     A response or two at the optimum tell how many harmonics it needs, so that at most one search follows.
 
@@ -40,7 +40,11 @@ def with_enough(result: DesignResult, should_stop: ShouldStop) -> tuple[Problem 
     (problem, responses); None where the harmonics are enough, or more of them do not help.
     """
     problem, evaluation, responses = result.problem, result.evaluation, 0
-    if result.status not in CLAIMS or evaluation is None or well_known(problem, evaluation):
+    if (
+        result.status not in (*CLAIMS, DesignStatus.INFEASIBLE)
+        or evaluation is None
+        or well_known(problem, evaluation)
+    ):
         return None, 0
     harmonics, most = 2 * problem.harmonics, max(_RUNGS * problem.harmonics, _FEW)
     while harmonics <= min(most, MOST_HARMONICS) and not (should_stop is not None and should_stop()):

@@ -32,13 +32,17 @@ def test_several_bands_levels_and_orders_are_judged_together() -> None:
     ]
     result = optim.design(scene, variables=DISK, cases=cases, harmonics=3)
     assert result.reached
+    enough = result.problem.harmonics
+    assert enough > 3  # three leave the peaks open
     N0 = result.optimum["shroud.N0"]
     here = scene.with_values({"shroud.N0": N0})
     from optim.problem.cases import with_engine_order
 
-    second = highest(with_engine_order(here, 2), harmonics=3)
-    third = highest(here.with_values({"excitation.amplitude": 80.0}), start=700.0, stop=800.0, harmonics=3)
-    expected = max(highest(here, harmonics=3), 0.5 * second, 0.6 * third)
+    second = highest(with_engine_order(here, 2), harmonics=enough)
+    third = highest(
+        here.with_values({"excitation.amplitude": 80.0}), start=700.0, stop=800.0, harmonics=enough
+    )
+    expected = max(highest(here, harmonics=enough), 0.5 * second, 0.6 * third)
     assert result.evaluation.objective == pytest.approx(expected, rel=1e-9)  # type: ignore[union-attr]
     for factor in (0.97, 1.03):
         there = evaluate(result.problem, {"shroud.N0": N0 * factor})

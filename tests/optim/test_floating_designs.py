@@ -83,11 +83,14 @@ def test_the_best_load_of_one_contact():
     result = optim.design(blades(), variables={"left.N0": LOADS}, harmonics=H)
     assert result.status is DesignStatus.OPTIMAL
     assert result.evaluation is not None
+    enough = result.problem.harmonics  # three leave half peak to peak open by 7 %
+    assert result.known.measure == "half_peak_to_peak"
+    assert result.known.relative <= 0.05
     best, at = result.evaluation.objective, result.optimum["left.N0"]
-    assert peak({"left.N0": at}) == pytest.approx(best, rel=1e-8)
+    assert peak({"left.N0": at}, harmonics=enough) == pytest.approx(best, rel=1e-8)
     for load in (*np.geomspace(*LOADS, 6), *(at * np.linspace(0.98, 1.02, 4))):
-        assert peak({"left.N0": float(load)}) >= best * (1.0 - 1e-6)
-    least = least_peak(blades(), "left.N0", 50.0, 100.0, harmonics=H)
+        assert peak({"left.N0": float(load)}, harmonics=enough) >= best * (1.0 - 1e-6)
+    least = least_peak(blades(), "left.N0", 50.0, 100.0, harmonics=enough)
     assert least.peak == pytest.approx(best, rel=1e-6)
 
 

@@ -21,6 +21,7 @@ from service.jobs.outputs import JobOutput, OnProgress, ShouldStop
 from service.jobs.parts import Part, PartOutput, Parts, PartStoppedError
 from service.jobs.registry import JobKind, Resolved, SceneSource
 from solver.errors import Issue
+from solver.results.known import Known, worst_of
 from solver.scene.examples import DISK_LOAD
 from solver.scene.scene import Scene
 
@@ -148,6 +149,7 @@ def join(spec: Mapping[str, Any], outputs: Mapping[int, PartOutput]) -> JobOutpu
     result = found.to_json()
     if ridge is not None:
         result["ridge"] = ridge.result["ridge"]
+        result |= worst_of([found.known, Known.of_json(ridge.result["ridge"])]).to_json()
         result["seconds"] = found.seconds + ridge.result["ridge"]["seconds"]
     return JobOutput(
         result=result,
