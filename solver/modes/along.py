@@ -1,7 +1,7 @@
 """Between the points of a nonlinear mode: where its damping ratio has a given value, and where it turns.
 
-Between two points a motion is solved for on the plane across the way from one to the other, so a curve may fold
-in between; the share of the way tells where. Values and slopes at the ends bracket what is looked for.
+Between two points a motion is solved for on the plane across the way from one to the other, so a curve may
+fold in between; the share of the way tells where. Values and slopes at the ends bracket what is looked for.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ class Way:
         return math.nan if tangent is None else float(tangent[-2])
 
     def root(self, of: Callable[[Corrected], float]) -> Corrected | None:
-        """Return where a function of the points is 0; it has different signs at the ends. None if not found."""
+        """Return where a function of the points is 0; its signs differ at the ends. None if not found."""
 
         def value(share: float) -> float:
             point = {0.0: self._one, 1.0: self._other}.get(share) or self.at(share)

@@ -1,8 +1,8 @@
-"""Limit cycles with more harmonics: what those would change, and multipliers of a motion that is periodic enough.
+"""Limit cycles with more harmonics: what those would change, and multipliers of a motion that repeats.
 
-A Floquet multiplier of a cycle is 1, that of a shift in time. How far the nearest is from 1 tells how good the
-others are; where that is too far, or the largest of the others too close to 1 to tell, the cycle is solved with
-more harmonics.
+A Floquet multiplier of a cycle is 1, that of a shift in time. How far the nearest is from 1 tells how good
+the others are; where that is too far, or the largest of the others too close to 1 to tell, the cycle is
+solved with more harmonics.
 """
 
 from __future__ import annotations
@@ -116,7 +116,7 @@ def _most_damping(
 
 
 def _same_cycle(wider: Wider, cycle: Cycle) -> Cycle | None:
-    """Return a cycle with more harmonics: at the same ζ, on the same side of where ζ turns; None if not found."""
+    """Return a cycle with more harmonics: at the same ζ, on the same side of its turn; None if not found."""
     equations, zeta = wider.equations, zeta_of(cycle.point)
     # Newton's method settles the new harmonics first: what it ends with is a better guess, solved or not.
     here = correct(equations, wider.spread(cycle.point.state), most=40)

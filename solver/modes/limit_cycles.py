@@ -53,8 +53,8 @@ class LimitCycle(Piece):
     unknown : str
         Why they are not known, empty if they are.
     amplitude_error, frequency_error, max_abs_error : float
-        Estimates of what more harmonics would change, by the cycle with twice and four times as many; NaN where that was not
-        found, so that nothing is known.
+        Estimates of what more harmonics would change, by the cycle with twice and four times as many;
+        NaN where that was not found, so that nothing is known.
     record : Record
         Motions of contacts and DOFs, and forces, as `solver.NonlinearMode` has them.
     """
@@ -122,8 +122,7 @@ class LimitCycles(Piece):
     most_at_end : bool
         That is an end of the curve: beyond it more may be held.
     unsolved : tuple of (float, float)
-        Ranges of the amplitude [√kg m] within which ζ(a) + ζ_aero changes its sign, or that the curve does not
-        reach, and no cycle was found.
+        Ranges of the amplitude [√kg m] within which ζ(a) + ζ_aero changes its sign and no cycle was found.
     scales : bool
         Whether amplitudes of cycles grow in proportion to the loads.
     """
@@ -221,14 +220,15 @@ def limit_cycles(
     equations, ladder = problem.equations, Ladder(problem.equations)
     missing = stability_left_out(found.scene, stability)
     points = with_turns(equations, points_of(equations, found), -aero_damping)
-    cycles, unsolved = [], []
+    cycles: list[LimitCycle] = []
+    unsolved: list[tuple[float, float]] = []
     for one, other in pairwise(points):
         surplus = zeta_of(one) + aero_damping, zeta_of(other) + aero_damping
         if surplus[0] != 0.0 and not surplus[0] * surplus[1] < 0.0:
             continue
         at = Way(equations, one, other).root(lambda point: zeta_of(point) + aero_damping)
         if at is None:
-            unsolved.append(tuple(math.exp(each.state.log_amplitude) for each in (one, other)))
+            unsolved.append((math.exp(one.state.log_amplitude), math.exp(other.state.log_amplitude)))
         else:
             cycles.append(_cycle(ladder, cycle_at(equations, at), found.scene, aero_damping, missing))
     most = int(np.argmax([zeta_of(each) for each in points])) if points else -1

@@ -8,7 +8,7 @@ import solver
 
 
 def chain(seed: int) -> solver.Scene:
-    """3 to 10 masses in a row with lightly damped springs; 2 to 5 sliders between any two, or to the ground."""
+    """3 to 10 masses in a row, lightly damped; 2 to 5 sliders between any two, or to the ground."""
     r = np.random.default_rng(seed)
     n, sliders = r.integers(3, 11), r.integers(2, 6)
     k = r.uniform(0.5, 3.0, n + 1)

@@ -67,7 +67,8 @@ def report(found: Mapping[str, Any]) -> None:
     if count:
         rows = [_row(found, i) for i in _thinned(count)]
         heads = [
-            "a [√kg m]", f"max |{found['dof']}|", "frequency [Hz]", "damping ratio", "± by harmonics", "contacts",
+            "a [√kg m]", f"max |{found['dof']}|", "frequency [Hz]", "damping ratio", "± by harmonics",
+            "contacts",
         ]  # fmt: skip
         print_table(title, heads, rows, right="01234")
     pairs = [("points", f"{count}, {found['newton_iterations']} Newton iterations")]

@@ -1,9 +1,9 @@
 """Limit cycles near the most that friction can hold: Sinha and Griffin's closed form, errors, stability.
 
-One harmonic of a slider with limit F on a mass m, spring k, x = A cos ωt with A > x_c = F / k_d: it dissipates
-4F (A − x_c) a period, hence ω c_eq = 4F (A − x_c) / (πA²), and ζ(A) = ω c_eq / (2 m ω²) with
-m ω² = k + k_eq. A cycle is where ζ(A) = −ζ_aero (Sinha, Griffin: J. Aircraft 20 (1983) 372): one on either side
-of the maximum of ζ(A), the smaller attracts.
+One harmonic of a slider with limit F on a mass m, spring k, x = A cos ωt, A > x_c = F / k_d: it dissipates
+4F (A − x_c) a period, hence ω c_eq = 4F (A − x_c) / (πA²), and ζ(A) = ω c_eq / (2 m ω²), m ω² = k + k_eq.
+A cycle is where ζ(A) = −ζ_aero (Sinha, Griffin: J. Aircraft 20 (1983) 372): one on either side of the maximum
+of ζ(A), the smaller attracts.
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ def _wrong(seed: int) -> list[str]:
 
 
 def test_both_cycles_lie_on_their_side_of_the_most_damping() -> None:
-    assert [each for seed in range(5, 13) for each in _wrong(seed)] == []
+    assert [each for seed in range(5, 9) for each in _wrong(seed)] == []
 
 
 @pytest.mark.long
@@ -105,7 +105,7 @@ def test_a_curve_that_ends_before_the_most_says_so() -> None:
     blade = Held.of(5)
     unit = math.sqrt(blade.m / 2.0) * blade.slips_from
     scene = blade.mode().scene
-    short = solver.nonlinear_mode(scene, amplitudes=(0.5 * unit, 1.2 * unit), harmonics=1, errors=False)
+    short = solver.nonlinear_mode(scene, amplitudes=(0.5 * unit, 1.8 * unit), harmonics=1, errors=False)
     assert solver.limit_cycles(short, -0.001, stability=False).most_at_end
 
 
@@ -128,7 +128,8 @@ def test_a_cycle_too_coarse_for_multipliers_gets_them_with_more_harmonics(seed: 
     (cycle, *_) = solver.limit_cycles(mode, -0.6 * float(mode.damping_ratio.max())).cycles
     assert cycle.attracts
     assert cycle.stable is False
-    assert abs(cycle.multipliers).max() == pytest.approx(largest, abs=2e-3)
+    assert cycle.multipliers is not None
+    assert np.abs(cycle.multipliers).max() == pytest.approx(largest, abs=2e-3)
 
 
 def test_a_cycle_without_multipliers_is_not_called_stable() -> None:
