@@ -133,29 +133,36 @@ def _same_cycle(wider: Wider, cycle: Cycle) -> Cycle | None:
     return same if same.slope * cycle.slope > 0.0 else None
 
 
-def multipliers_of(scene: Scene, cycles: Sequence[Cycle], mass_damping: float) -> tuple[Complex | None, str]:
+def multipliers_of(
+    scene: Scene, cycles: Sequence[Cycle], mass_damping: float, alone: Complex | None
+) -> tuple[Complex | None, str]:
     """Return the multipliers of the first of the cycles that is good enough, or why there are none.
 
     Parameters
     ----------
     cycles : one and the same with ever more harmonics.
     mass_damping : damping of the gas over ω, 2 ζ_aero, in units of the mass.
+    alone : the mode that it acts on alone.
     """
     unknown = ""
     for cycle in cycles:
-        values, unknown = _multipliers(scene, cycle, mass_damping)
+        values, unknown = _multipliers(scene, cycle, mass_damping, alone)
         if values is not None:
             return values, ""
     return None, unknown
 
 
-def _multipliers(scene: Scene, cycle: Cycle, mass_damping: float) -> tuple[Complex | None, str]:
+def _multipliers(
+    scene: Scene, cycle: Cycle, mass_damping: float, alone: Complex | None
+) -> tuple[Complex | None, str]:
     """Return the Floquet multipliers of a cycle without that of a shift in time, or why there are none."""
     omega = float(cycle.point.state.y[-2])
     ends = np.cumsum([len(contact.end_keys) for contact in scene.contacts])[:-1]
     motions = tuple(np.split(cycle.record.motions, ends))
     try:
-        found = scene_monodromy(scene, omega / PERIOD, motions, mass_damping=mass_damping * omega)
+        found = scene_monodromy(
+            scene, omega / PERIOD, motions, mass_damping=mass_damping * omega, alone=alone
+        )
     except SettingError as error:  # a law or a term without a motion in time
         return None, str(error)
     values = np.linalg.eigvals(found.reduced).astype(np.complex128)

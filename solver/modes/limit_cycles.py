@@ -13,7 +13,7 @@ side of the most that friction can hold, however near.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any, ClassVar
 
@@ -22,11 +22,15 @@ import numpy as np
 from solver.errors import SettingError
 from solver.jit.fourier import Complex, Real
 from solver.modes.along import Way, points_of, with_turns, zeta_of
+from solver.modes.corrector import Corrected
+from solver.modes.curve import walk
+from solver.modes.equations import Equations
 from solver.modes.finer import PERIOD, SAFETY, Cycle, Ladder, cycle_at, multipliers_of
-from solver.modes.nonlinear_mode import pose
+from solver.modes.nonlinear_mode import MOST_POINTS, ModeProblem, pose
 from solver.modes.peaks.performance import grows_together
 from solver.modes.records import Record
 from solver.modes.results import NonlinearMode
+from solver.modes.start import begin
 from solver.response.stability.floquet import GROWS, growth_of
 from solver.results.told import Piece
 from solver.scene.scene import Scene
@@ -125,6 +129,10 @@ class LimitCycles(Piece):
         Ranges of the amplitude [√kg m] within which ζ(a) + ζ_aero changes its sign and no cycle was found.
     scales : bool
         Whether amplitudes of cycles grow in proportion to the loads.
+    mode_alone : bool
+        Whether the gas acts on the one mode alone.
+    completed : bool
+        Whether the curve that they were looked for on reaches its largest amplitude: else there may be more.
     """
 
     UNITS: ClassVar = {"most_at": "√kg m"}
@@ -137,6 +145,8 @@ class LimitCycles(Piece):
     most_at_end: bool
     unsolved: tuple[tuple[float, float], ...]
     scales: bool
+    mode_alone: bool
+    completed: bool
 
     def load_for(self, disturbance: float) -> float:
         """Return the least factor on every load with which a disturbance dies down to the stable cycle.
@@ -183,6 +193,8 @@ class LimitCycles(Piece):
         asked = {} if disturbance is None else {"load_for": self.held_by(disturbance)}
         return asked | {
             "aero_damping": self.aero_damping,
+            "mode_alone": self.mode_alone,
+            "completed": self.completed,
             "most_damping": _number(self.most_damping),
             "most_at": _number(self.most_at),
             "most_error": _number(self.most_error),
@@ -193,7 +205,8 @@ class LimitCycles(Piece):
 
 
 def limit_cycles(
-    found: NonlinearMode, aero_damping: float = 0.0, *, stability: bool | None = None
+    found: NonlinearMode, aero_damping: float = 0.0, *, stability: bool | None = None,
+    mode_alone: bool = False,
 ) -> LimitCycles:  # fmt: skip
     """Return the limit cycles of a mode that gas feeds, each solved with all harmonics.
 
@@ -204,6 +217,8 @@ def limit_cycles(
         what the scene itself says of the gas.
     stability : Floquet multipliers too; of a disk they are of all its sectors. Left out, they are computed of
         structures of at most 200 coordinates: of more they take minutes.
+    mode_alone : the gas acts on the linear mode φ alone, contacts as at rest and φᴴ M φ = 1, as the matrix
+        2 ζ_aero ω (M φ)(M φ)ᴴ; ζ(a) is followed anew with that.
 
     Raises
     ------
@@ -217,9 +232,15 @@ def limit_cycles(
     if not problem.turns:
         names = [c.name for c in found.scene.contacts if c.load is not None and c.load.amplitude != 0.0]
         raise SettingError("N1", names, "must be 0: a limit cycle has no phase that a load could follow")
-    equations, ladder = problem.equations, Ladder(problem.equations)
     missing = stability_left_out(found.scene, stability)
-    points = with_turns(equations, points_of(equations, found), -aero_damping)
+    curve, ended = points_of(problem.equations, found), found.completed
+    if mode_alone:
+        problem = _alone(problem, found)
+        curve, ended = _followed(problem, found)
+        if found.scene.structure.has_sectors:
+            missing = missing or "left out: of a disk whose gas feeds one mode alone they are not computed"
+    equations, ladder = problem.equations, Ladder(problem.equations)
+    points = with_turns(equations, curve, -aero_damping)
     cycles: list[LimitCycle] = []
     unsolved: list[tuple[float, float]] = []
     for one, other in pairwise(points):
@@ -230,15 +251,40 @@ def limit_cycles(
         if at is None:
             unsolved.append((math.exp(one.state.log_amplitude), math.exp(other.state.log_amplitude)))
         else:
-            cycles.append(_cycle(ladder, cycle_at(equations, at), found.scene, aero_damping, missing))
+            cycles.append(_cycle(ladder, cycle_at(equations, at), equations, aero_damping, missing))
     most = int(np.argmax([zeta_of(each) for each in points])) if points else -1
     return LimitCycles(
         aero_damping=float(aero_damping), cycles=tuple(cycles), unsolved=tuple(unsolved),
         most_damping=zeta_of(points[most]) if points else math.nan,
         most_at=math.exp(points[most].state.log_amplitude) if points else math.nan,
         most_error=ladder.most_damping_error(points, most) if points else math.nan,
-        most_at_end=most in (0, len(points) - 1), scales=bool(points) and grows_together(found),
+        most_at_end=most in (0, len(points) - 1), completed=ended, mode_alone=mode_alone,
+        scales=bool(points) and grows_together(found),
     )  # fmt: skip
+
+
+def _alone(problem: ModeProblem, found: NonlinearMode) -> ModeProblem:
+    """Return the problem with −2ζω on the linear mode alone."""
+    whole = problem
+    if problem.equations.structure.is_diagonal:
+        whole = pose(found.scene, found.mode, None, found.n_harmonics, whole=True)
+    shape = whole.all_modes[found.mode - 1].shape
+    return replace(whole, equations=Equations(whole.equations.balance, shape))
+
+
+def _followed(problem: ModeProblem, found: NonlinearMode) -> tuple[list[Corrected], bool]:
+    """Return the points of a curve over the amplitudes of another, and whether it reaches the largest."""
+    if not found.points:
+        return [], False
+    low, high = found.points[0].log_amplitude, found.points[-1].log_amplitude
+    first = begin(problem.equations, problem.mode, problem.rest, low, turns=True)
+    if not first.converged:
+        return [], False
+    walked = walk(
+        problem.equations, first, high, turns=True, most_points=MOST_POINTS, ended=lambda _end: None
+    )
+    points = [each.point for each in walked]
+    return points, points[-1].state.log_amplitude >= high
 
 
 def stability_left_out(scene: Scene, stability: bool | None) -> str:
@@ -252,12 +298,15 @@ def stability_left_out(scene: Scene, stability: bool | None) -> str:
     return ""
 
 
-def _cycle(ladder: Ladder, cycle: Cycle, scene: Scene, aero_damping: float, missing: str) -> LimitCycle:
+def _cycle(
+    ladder: Ladder, cycle: Cycle, equations: Equations, aero_damping: float, missing: str
+) -> LimitCycle:  # fmt: skip
     """Return a cycle with its errors and multipliers."""
     finer = list(ladder.cycles(cycle))
     multipliers, unknown = None, missing
     if not missing:
-        multipliers, unknown = multipliers_of(scene, [cycle, *finer], 2.0 * aero_damping)
+        scene = equations.balance.scene
+        multipliers, unknown = multipliers_of(scene, [cycle, *finer], 2.0 * aero_damping, equations.alone)
     here = _numbers(cycle)
     changes = [np.abs(_numbers(each) - here) for each in finer] or [np.full(3, math.nan)]
     errors = SAFETY * np.max(changes, axis=0)

@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 import solver
 
 
 def chain(seed: int) -> solver.Scene:
+    """The scene of `chain_body`."""
+    return solver.Scene.from_dict(chain_body(seed))
+
+
+def chain_body(seed: int) -> dict[str, Any]:
     """3 to 10 masses in a row, lightly damped; 2 to 5 sliders between any two, or to the ground."""
     r = np.random.default_rng(seed)
     n, sliders = r.integers(3, 11), r.integers(2, 6)
@@ -19,21 +26,19 @@ def chain(seed: int) -> solver.Scene:
         i, j = r.integers(0, n), r.integers(-1, n)
         between.append([f"m{i}", "ground" if j in (-1, i) else f"m{j}"])
     kt, limits = r.uniform(0.2, 2.0, sliders), r.uniform(0.2, 2.0, sliders)
-    return solver.Scene.from_dict(
-        {
-            "name": f"chain-{seed}",
-            "structure": {
-                "kind": "matrices", "M": M.tolist(), "K": K.tolist(), "C": (0.004 * K + 0.002 * M).tolist(),
-                "dofs": [f"m{i}" for i in range(n)],
-            },
-            "contacts": [
-                {"name": f"f{i}", "between": ends, "kt": float(kt[i]), "mu": 1.0, "N0": float(limits[i])}
-                for i, ends in enumerate(between)
-            ],
-            "excitation": {"dof": "m0", "amplitude": 1.0},
-            "observe": {"dof": "m0", "band": [0.02, 0.6]},
-        }
-    )  # fmt: skip
+    return {
+        "name": f"chain-{seed}",
+        "structure": {
+            "kind": "matrices", "M": M.tolist(), "K": K.tolist(), "C": (0.004 * K + 0.002 * M).tolist(),
+            "dofs": [f"m{i}" for i in range(n)],
+        },
+        "contacts": [
+            {"name": f"f{i}", "between": ends, "kt": float(kt[i]), "mu": 1.0, "N0": float(limits[i])}
+            for i, ends in enumerate(between)
+        ],
+        "excitation": {"dof": "m0", "amplitude": 1.0},
+        "observe": {"dof": "m0", "band": [0.02, 0.6]},
+    }  # fmt: skip
 
 
 def carried_platform() -> solver.Scene:

@@ -125,7 +125,10 @@ def _cycles(found: Mapping[str, Any], dof: str) -> None:
     if found.get("load_for") is not None:
         asked = found["load_for"]
         pairs.append((f"holds a = {asked['disturbance']:.6g} √kg m", asked["words"]))
-    print_pairs(f"Aerodynamic damping ratio {found['aero_damping']:g}", pairs)
+    if not found["completed"]:
+        pairs.append(("not complete", "the curve ends before its largest amplitude: more may be beyond"))
+    on = ", on this mode alone" if found["mode_alone"] else ""
+    print_pairs(f"Aerodynamic damping ratio {found['aero_damping']:g}{on}", pairs)
 
 
 def _error(value: float | None, told: Callable[[float], str] = "{:.2g}".format) -> str:
