@@ -169,12 +169,14 @@ def _damped(
 
 def carried_anew(equations: Equations, found: Corrected) -> Corrected:
     """Return the same point with q that of the mode nearest to singular there."""
-    if found.at is None:
-        return found
+    omega, zeta = found.state.y[-2:]
+    return carried_as(equations, found, equations.structure.nearest(float(omega), float(zeta)))
+
+
+def carried_as(equations: Equations, found: Corrected, mode: int) -> Corrected:
+    """Return the same point with q that of a mode given."""
     state = found.state
-    omega, zeta = float(state.y[-2]), float(state.y[-1])
-    mode = equations.structure.nearest(omega, zeta)
-    if mode == state.mode:
+    if found.at is None or mode == state.mode:
         return found
     y = state.y.copy()
     q = complex(np.vdot(equations.structure.carried[:, mode], found.at.x[equations.structure.first]))

@@ -27,7 +27,7 @@ _EASY, _HARD = 5, 9  # Newton steps
 _JUMPS = (0.02, 0.06, 0.15, 0.3, 0.6, 1.0)  # of ln a, over what no short step passes
 LEAST_SHARE = 0.9  # of a² that harmonic 1 has
 _RESOLVED = 0.05  # step over which a curve may bend as it will: a kink is no farther from a point
-_BENT = 0.1  # relative change of ζ off the tangent, over a longer step: chords are off by a quarter of it
+BENT = 0.1  # relative change of ζ off the tangent, over a longer step: chords are off by a quarter of it
 _FAINT = 1e-4  # damping ratio below which changes of it are not looked at
 _PURE = 0.99  # share of harmonic 1 in a shape that leaps begin with
 _FARTHEST = 2.0  # ln a below the first amplitude, where a curve that turned back is left
@@ -67,7 +67,7 @@ def walk(
     point, low = first, first.state.log_amplitude
     farthest = purest = first
     yield Walked(point=point, rejected=0)
-    tangent, size = _tangent(equations, point, None), FIRST_STEP
+    tangent, size = tangent_of(equations, point), FIRST_STEP
     for _ in range(most_points):
         if point.state.log_amplitude >= high:
             ended(End.REACHED)
@@ -86,7 +86,7 @@ def walk(
             turned = point.state.log_amplitude <= low - _FARTHEST
             ended(End.TURNED_BACK if turned else End.STOPPED)
             return
-        tangent, point = _tangent(equations, found, before), found
+        tangent, point = tangent_of(equations, found, before), found
         if point.state.log_amplitude > farthest.state.log_amplitude:
             farthest = point
         if share_of_first(equations, point) > _PURE:
@@ -117,9 +117,9 @@ def _advance(
         if last:
             found = correct(equations, replace(guess, log_amplitude=high))
         else:
-            found = correct(equations, guess, _border(here.state, tangent, equations.size))
+            found = correct(equations, guess, border_of(here.state, tangent, equations.size))
         followed = found.converged and equations.follows(here.state.y, found.state.y)
-        if followed and _is_near(here, found, size, equations.size):
+        if followed and is_near(here, found, size, equations.size):
             if size > _RESOLVED and _bends(guess, found.state):
                 size = max(0.4 * size, _RESOLVED)
                 continue
@@ -152,7 +152,7 @@ def _leap(
                 continue
             if not equations.follows(here.state.y, found.state.y):
                 continue
-            if _is_near(here, found, rise, equations.size):
+            if is_near(here, found, rise, equations.size):
                 return carried_anew(equations, found)
     return None
 
@@ -163,12 +163,12 @@ def _bends(guess: State, found: State) -> bool:
     Between points the curve is taken as straight, by `solver.performance_curve` and by the eye.
     """
     zeta, omega = float(found.y[-1]), float(found.y[-2])
-    off = abs(zeta - float(guess.y[-1])) > _BENT * max(abs(zeta), _FAINT)
-    return off or abs(omega - float(guess.y[-2])) > 0.2 * _BENT * omega
+    off = abs(zeta - float(guess.y[-1])) > BENT * max(abs(zeta), _FAINT)
+    return off or abs(omega - float(guess.y[-2])) > 0.2 * BENT * omega
 
 
 def _ahead(state: State, tangent: Real, size: float, equations: Equations) -> State:
-    """Return where a tangent (see `_tangent`) leads."""
+    """Return where a tangent (see `tangent_of`) leads."""
     rise, n = size * tangent[-1], equations.size + 2
     y = state.y.copy()
     y[:n] = (y[:n] + size * math.exp(state.log_amplitude) * tangent[:n]) * math.exp(rise)
@@ -176,7 +176,7 @@ def _ahead(state: State, tangent: Real, size: float, equations: Equations) -> St
     return replace(state, y=y, log_amplitude=state.log_amplitude + rise)
 
 
-def _border(state: State, tangent: Real, size: int) -> Real:
+def border_of(state: State, tangent: Real, size: int) -> Real:
     """Return the row over the unknowns and ln a whose product with a change is the arc along a tangent.
 
     The shape counts: where a short stick begins or ends it may turn round while the others hardly change.
@@ -190,7 +190,7 @@ def _border(state: State, tangent: Real, size: int) -> Real:
     return row
 
 
-def _by_shape(state: State, change: Real, size: int) -> Real:
+def by_shape(state: State, change: Real, size: int) -> Real:
     """Return a change of the unknowns and ln a with motions and q over the amplitude."""
     found = change.copy()
     n = size + 2
@@ -198,13 +198,8 @@ def _by_shape(state: State, change: Real, size: int) -> Real:
     return found
 
 
-def tangent_of(equations: Equations, point: Corrected) -> Real | None:
-    """Return the tangent at a point toward larger amplitudes, as `_tangent`."""
-    return _tangent(equations, point, None)
-
-
-def _tangent(equations: Equations, found: Corrected, before: Real | None) -> Real | None:
-    """Return the unit tangent, onward from `before`; None if it is not unique.
+def tangent_of(equations: Equations, found: Corrected, before: Real | None = None) -> Real | None:
+    """Return the unit tangent, onward from `before` or toward larger amplitudes; None if it is not unique.
 
     It is that of the shape (motions and q over the amplitude), ω, ζ and ln a, in the order of the unknowns.
     """
@@ -216,22 +211,22 @@ def _tangent(equations: Equations, found: Corrected, before: Real | None) -> Rea
     J[m] = 0.0
     J[m, m] = 1.0
     if before is not None:
-        J[m] = _border(found.state, before, equations.size)
+        J[m] = border_of(found.state, before, equations.size)
     rhs = np.zeros(m + 1)
     rhs[m] = 1.0
     columns = np.append(scales(y, equations.size), 1.0)
     t = step(J, rhs, columns, least_squares=found.at.unheld)
     if t is None:
         return None
-    shape = _by_shape(found.state, t, equations.size)
-    squared = float(_border(found.state, shape, equations.size) @ t)
+    shape = by_shape(found.state, t, equations.size)
+    squared = float(border_of(found.state, shape, equations.size) @ t)
     return shape / math.sqrt(squared) if squared > 0.0 else None
 
 
-def _is_near(here: Corrected, found: Corrected, size: float, motions: int) -> bool:
+def is_near(here: Corrected, found: Corrected, size: float, motions: int) -> bool:
     """Return whether a point is on the same branch: no farther than some steps."""
     change = np.append(found.state.y - here.state.y, found.state.log_amplitude - here.state.log_amplitude)
-    far = float(_border(here.state, _by_shape(here.state, change, motions), motions) @ change)
+    far = float(border_of(here.state, by_shape(here.state, change, motions), motions) @ change)
     return math.sqrt(max(far, 0.0)) <= 3.0 * size + 1e-9
 
 

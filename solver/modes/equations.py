@@ -63,11 +63,16 @@ class Evaluated:
 
 
 class Equations:
-    """The extended periodic motion of a balance, whose λ is the frequency."""
+    """The extended periodic motion of a balance, whose λ is the frequency.
 
-    def __init__(self, balance: Balance) -> None:
-        self.balance = balance
-        self.structure: Structure = structure_of(balance)
+    Parameters
+    ----------
+    alone : (N,) a mode that −2ζω acts on alone; all masses if left out.
+    """
+
+    def __init__(self, balance: Balance, alone: Complex | None = None) -> None:
+        self.balance, self.alone = balance, alone
+        self.structure: Structure = structure_of(balance, alone)
         self.amplitudes = Amplitudes(balance)
         system = balance.system
         self._system = by_reference(system)
@@ -89,7 +94,7 @@ class Equations:
 
     def over(self, balance: Balance) -> Equations:
         """Return the same question to another balance of the scene."""
-        return Equations(balance)
+        return Equations(balance, self.alone)
 
     def follows(self, _before: Real, _y: Real) -> bool:
         """Return whether unknowns may follow others on one curve, beside being near to them."""

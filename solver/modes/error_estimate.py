@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from solver.balance.balance import build
 from solver.balance.simplifications import Effects
 from solver.contacts.kernels.system import DENSE
 from solver.jit.fourier import Real
-from solver.modes.corrector import Corrected, scales, step
+from solver.modes.corrector import Corrected, State, scales, step
 from solver.modes.equations import BESIDES, Equations
 from solver.scene.harmonics import MOST_HARMONICS, spread
 
@@ -25,16 +26,23 @@ class Wider:
             whole_matrices=balance.system.form == DENSE, even_harmonics=int(balance.system.ks[0]) == 0
         )
         self._given = equations
-        self._wide = equations.over(build(balance.scene, harmonics=harmonics, effects=effects))
+        self.equations = equations.over(build(balance.scene, harmonics=harmonics, effects=effects))
+        self.has_more = harmonics > balance.n_harmonics
+
+    def spread(self, state: State) -> State:
+        """Return the same motion, the harmonics it lacks at 0."""
+        given = self._given
+        w = state.y[: given.size].reshape(given.r, given.n)
+        wide = spread(w, given.structure.ks, self.equations.structure.ks).reshape(-1)
+        return replace(state, y=np.concatenate([wide, state.y[-BESIDES:]]))
 
     def estimate(self, found: Corrected) -> tuple[float, float]:
         """Return the changes of frequency [Hz] and of the last unknown by a Newton step; NaN if none.
 
         The step begins at the point with the harmonics it lacks at 0.
         """
-        given, wide, state = self._given, self._wide, found.state
-        w = state.y[: given.size].reshape(given.r, given.n)
-        y = np.concatenate([spread(w, given.structure.ks, wide.structure.ks).reshape(-1), state.y[-BESIDES:]])
+        wide, state = self.equations, found.state
+        y = self.spread(state).y
         at = wide.evaluate(y, state.log_amplitude, state.phase, state.mode)
         if at is None:
             return math.nan, math.nan

@@ -5,34 +5,37 @@ periodic motion is exactly that: where ζ(a) = −ζ_aero the motion is a period
 with its frequency and all harmonics, no approximation. It attracts where ζ(a) + ζ_aero grows with the
 amplitude. A scene with aerodynamic terms of its own has its cycles where ζ(a) = 0. Floquet multipliers of the
 whole structure say whether other modes grow.
+
+Cycles are found between bracketing points, of which each maximum and minimum of ζ is one: a root lies on its
+side of the most that friction can hold, however near.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any, ClassVar
 
 import numpy as np
-from scipy.optimize import brentq
 
 from solver.errors import SettingError
-from solver.jit.fourier import Complex
-from solver.modes.corrector import Corrected, State, correct
-from solver.modes.curve import tangent_of
+from solver.jit.fourier import Complex, Real
+from solver.modes.along import Way, points_of, with_turns, zeta_of
+from solver.modes.corrector import Corrected
+from solver.modes.curve import walk
 from solver.modes.equations import Equations
-from solver.modes.nonlinear_mode import ModeProblem, pose
+from solver.modes.finer import PERIOD, SAFETY, Cycle, Ladder, cycle_at, multipliers_of
+from solver.modes.nonlinear_mode import MOST_POINTS, ModeProblem, pose
 from solver.modes.peaks.performance import grows_together
-from solver.modes.records import Record, Recorder
+from solver.modes.records import Record
 from solver.modes.results import NonlinearMode
-from solver.response.stability.floquet import growth_of, scene_monodromy
+from solver.modes.start import begin
+from solver.response.stability.floquet import GROWS, growth_of
 from solver.results.told import Piece
 from solver.scene.scene import Scene
 
-PERIOD = 2.0 * math.pi
-_NEUTRAL = 1e-3  # distance from 1 of the multiplier of a shift in time, which is rounding of the period
 _MOST_COORDINATES = 200  # of a whole structure whose multipliers are computed unasked
-_CLOSE = 1e-10  # of ln a, at the amplitude of most damping
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
@@ -53,11 +56,21 @@ class LimitCycle(Piece):
         Floquet multipliers of the whole structure, without that of a shift in time; None if `unknown`.
     unknown : str
         Why they are not known, empty if they are.
+    amplitude_error, frequency_error, max_abs_error : float
+        Estimates of what more harmonics would change, by the cycle with twice and four times as many;
+        NaN where that was not found, so that nothing is known.
     record : Record
         Motions of contacts and DOFs, and forces, as `solver.NonlinearMode` has them.
     """
 
-    UNITS: ClassVar = {"amplitude": "√kg m", "frequency_hz": "Hz", "max_abs": "m"}
+    UNITS: ClassVar = {
+        "amplitude": "√kg m",
+        "frequency_hz": "Hz",
+        "max_abs": "m",
+        "amplitude_error": "√kg m",
+        "frequency_error": "Hz",
+        "max_abs_error": "m",
+    }
 
     amplitude: float
     frequency_hz: float
@@ -65,6 +78,9 @@ class LimitCycle(Piece):
     damping_slope: float
     multipliers: Complex | None
     unknown: str
+    amplitude_error: float
+    frequency_error: float
+    max_abs_error: float
     record: Record
 
     @property
@@ -73,11 +89,22 @@ class LimitCycle(Piece):
         return self.damping_slope > 0.0
 
     @property
-    def stable(self) -> bool:
-        """Whether no small perturbation grows: by the multipliers, or the slope where they are not known."""
+    def stable(self) -> bool | None:
+        """Whether no small perturbation grows, by the multipliers; None where they are not known."""
         if self.multipliers is None:
-            return self.attracts
-        return bool(np.all(np.abs(self.multipliers) <= 1.0 + 1e-9))
+            return None
+        return bool(np.all(np.abs(self.multipliers) <= 1.0 + GROWS))
+
+    def to_json(self) -> dict[str, Any]:
+        """Return it as one JSON object."""
+        return {
+            "amplitude": self.amplitude, "frequency": self.frequency_hz, "max_abs": self.max_abs,
+            "amplitude_error": _number(self.amplitude_error),
+            "frequency_error": _number(self.frequency_error),
+            "max_abs_error": _number(self.max_abs_error), "damping_slope": _number(self.damping_slope),
+            "attracts": self.attracts, "stable": self.stable, "growth": growth_from(self),
+            "by_slope": self.multipliers is None,
+        }  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
@@ -94,8 +121,18 @@ class LimitCycles(Piece):
         The largest ζ(a): an excitation of −ζ_aero up to that is held.
     most_at : float
         Its amplitude [√kg m].
+    most_error : float
+        Estimate of what more harmonics would change of `most_damping`; NaN where it is not known.
+    most_at_end : bool
+        That is an end of the curve: beyond it more may be held.
+    unsolved : tuple of (float, float)
+        Ranges of the amplitude [√kg m] within which ζ(a) + ζ_aero changes its sign and no cycle was found.
     scales : bool
         Whether amplitudes of cycles grow in proportion to the loads.
+    mode_alone : bool
+        Whether the gas acts on the one mode alone.
+    completed : bool
+        Whether the curve that they were looked for on reaches its largest amplitude: else there may be more.
     """
 
     UNITS: ClassVar = {"most_at": "√kg m"}
@@ -104,7 +141,12 @@ class LimitCycles(Piece):
     cycles: tuple[LimitCycle, ...]
     most_damping: float
     most_at: float
+    most_error: float
+    most_at_end: bool
+    unsolved: tuple[tuple[float, float], ...]
     scales: bool
+    mode_alone: bool
+    completed: bool
 
     def load_for(self, disturbance: float) -> float:
         """Return the least factor on every load with which a disturbance dies down to the stable cycle.
@@ -151,22 +193,20 @@ class LimitCycles(Piece):
         asked = {} if disturbance is None else {"load_for": self.held_by(disturbance)}
         return asked | {
             "aero_damping": self.aero_damping,
-            "most_damping": self.most_damping if math.isfinite(self.most_damping) else None,
-            "most_at": self.most_at if math.isfinite(self.most_at) else None,
-            "cycles": [
-                {
-                    "amplitude": cycle.amplitude, "frequency": cycle.frequency_hz,
-                    "max_abs": cycle.max_abs, "damping_slope": cycle.damping_slope,
-                    "stable": cycle.stable, "growth": growth_from(cycle),
-                    "by_slope": cycle.multipliers is None,
-                }
-                for cycle in self.cycles
-            ],
-        }  # fmt: skip
+            "mode_alone": self.mode_alone,
+            "completed": self.completed,
+            "most_damping": _number(self.most_damping),
+            "most_at": _number(self.most_at),
+            "most_error": _number(self.most_error),
+            "most_at_end": self.most_at_end,
+            "unsolved": [list(each) for each in self.unsolved],
+            "cycles": [cycle.to_json() for cycle in self.cycles],
+        }
 
 
 def limit_cycles(
-    found: NonlinearMode, aero_damping: float = 0.0, *, stability: bool | None = None
+    found: NonlinearMode, aero_damping: float = 0.0, *, stability: bool | None = None,
+    mode_alone: bool = False,
 ) -> LimitCycles:  # fmt: skip
     """Return the limit cycles of a mode that gas feeds, each solved with all harmonics.
 
@@ -177,6 +217,8 @@ def limit_cycles(
         what the scene itself says of the gas.
     stability : Floquet multipliers too; of a disk they are of all its sectors. Left out, they are computed of
         structures of at most 200 coordinates: of more they take minutes.
+    mode_alone : the gas acts on the linear mode φ alone, contacts as at rest and φᴴ M φ = 1, as the matrix
+        2 ζ_aero ω (M φ)(M φ)ᴴ; ζ(a) is followed anew with that.
 
     Raises
     ------
@@ -191,18 +233,58 @@ def limit_cycles(
         names = [c.name for c in found.scene.contacts if c.load is not None and c.load.amplitude != 0.0]
         raise SettingError("N1", names, "must be 0: a limit cycle has no phase that a load could follow")
     missing = stability_left_out(found.scene, stability)
-    surplus = found.damping_ratio + aero_damping
-    cycles = []
-    for i in range(len(found.points) - 1):
-        if surplus[i] == 0.0 or surplus[i] * surplus[i + 1] < 0.0:
-            solved = _at_damping(problem.equations, found, i, -aero_damping)
-            if solved is not None:
-                cycles.append(_cycle(problem, solved, found.scene, aero_damping, missing))
-    most, at = _most_damping(problem.equations, found)
+    curve, ended = points_of(problem.equations, found), found.completed
+    if mode_alone:
+        problem = _alone(problem, found)
+        curve, ended = _followed(problem, found)
+        if found.scene.structure.has_sectors:
+            missing = missing or "left out: of a disk whose gas feeds one mode alone they are not computed"
+    equations, ladder = problem.equations, Ladder(problem.equations)
+    points = with_turns(equations, curve, -aero_damping)
+    cycles: list[LimitCycle] = []
+    unsolved: list[tuple[float, float]] = []
+    for one, other in pairwise(points):
+        surplus = zeta_of(one) + aero_damping, zeta_of(other) + aero_damping
+        if surplus[0] != 0.0 and not surplus[0] * surplus[1] < 0.0:
+            continue
+        at = Way(equations, one, other).root(lambda point: zeta_of(point) + aero_damping)
+        if at is None:
+            unsolved.append((math.exp(one.state.log_amplitude), math.exp(other.state.log_amplitude)))
+        else:
+            cycles.append(_cycle(ladder, cycle_at(equations, at), equations, aero_damping, missing))
+    most = int(np.argmax([zeta_of(each) for each in points])) if points else -1
     return LimitCycles(
-        aero_damping=float(aero_damping), cycles=tuple(cycles), most_damping=most, most_at=at,
-        scales=bool(found.points) and grows_together(found),
+        aero_damping=float(aero_damping), cycles=tuple(cycles), unsolved=tuple(unsolved),
+        most_damping=zeta_of(points[most]) if points else math.nan,
+        most_at=math.exp(points[most].state.log_amplitude) if points else math.nan,
+        most_error=ladder.most_damping_error(points, most) if points else math.nan,
+        most_at_end=most in (0, len(points) - 1), completed=ended, mode_alone=mode_alone,
+        scales=bool(points) and grows_together(found),
     )  # fmt: skip
+
+
+def _alone(problem: ModeProblem, found: NonlinearMode) -> ModeProblem:
+    """Return the problem with −2ζω on the linear mode alone."""
+    whole = problem
+    if problem.equations.structure.is_diagonal:
+        whole = pose(found.scene, found.mode, None, found.n_harmonics, whole=True)
+    shape = whole.all_modes[found.mode - 1].shape
+    return replace(whole, equations=Equations(whole.equations.balance, shape))
+
+
+def _followed(problem: ModeProblem, found: NonlinearMode) -> tuple[list[Corrected], bool]:
+    """Return the points of a curve over the amplitudes of another, and whether it reaches the largest."""
+    if not found.points:
+        return [], False
+    low, high = found.points[0].log_amplitude, found.points[-1].log_amplitude
+    first = begin(problem.equations, problem.mode, problem.rest, low, turns=True)
+    if not first.converged:
+        return [], False
+    walked = walk(
+        problem.equations, first, high, turns=True, most_points=MOST_POINTS, ended=lambda _end: None
+    )
+    points = [each.point for each in walked]
+    return points, points[-1].state.log_amplitude >= high
 
 
 def stability_left_out(scene: Scene, stability: bool | None) -> str:
@@ -216,103 +298,37 @@ def stability_left_out(scene: Scene, stability: bool | None) -> str:
     return ""
 
 
-def between(found: NonlinearMode, i: int, share: float) -> State:
-    """Return a guess between points i and i + 1."""
-    one, other = found.points[i], found.points[i + 1]
-    # q is of one mode alone.
-    y = one.y + share * (other.y - one.y) if one.mode == other.mode else one.y.copy()
-    log_amplitude = one.log_amplitude + share * (other.log_amplitude - one.log_amplitude)
-    return State(y=y, log_amplitude=log_amplitude, mode=one.mode, phase=one.phase)
-
-
-def _at_damping(equations: Equations, found: NonlinearMode, i: int, zeta: float) -> Corrected | None:
-    """Return the point between i and i + 1 whose damping ratio is given; None if it was not found."""
-    one, other = float(found.damping_ratio[i]), float(found.damping_ratio[i + 1])
-    border = np.zeros(found.points[i].y.size + 1)
-    border[-2] = 1.0
-    for share in ((zeta - one) / (other - one), 0.0, 1.0, 0.5):
-        guess = between(found, i, share)
-        y = guess.y.copy()
-        y[-1] = zeta
-        solved = correct(equations, replace(guess, y=y), border, most=40)
-        near = abs(solved.state.log_amplitude - guess.log_amplitude) < 1.0
-        if solved.converged and near:
-            return solved
-    return None
-
-
-def _slope(equations: Equations, point: Corrected) -> float:
-    """Return dζ / d ln a at a point."""
-    tangent = tangent_of(equations, point)
-    return math.nan if tangent is None else float(tangent[-2] / tangent[-1])
-
-
 def _cycle(
-    problem: ModeProblem, point: Corrected, scene: Scene, aero_damping: float, missing: str
-) -> LimitCycle:
-    record = Recorder(problem.equations, turns=True).of(point)
-    omega = float(point.state.y[-2])
+    ladder: Ladder, cycle: Cycle, equations: Equations, aero_damping: float, missing: str
+) -> LimitCycle:  # fmt: skip
+    """Return a cycle with its errors and multipliers."""
+    finer = list(ladder.cycles(cycle))
     multipliers, unknown = None, missing
     if not missing:
-        multipliers, unknown = _multipliers(scene, omega, record, 2.0 * aero_damping * omega)
+        scene = equations.balance.scene
+        multipliers, unknown = multipliers_of(scene, [cycle, *finer], 2.0 * aero_damping, equations.alone)
+    here = _numbers(cycle)
+    changes = [np.abs(_numbers(each) - here) for each in finer] or [np.full(3, math.nan)]
+    errors = SAFETY * np.max(changes, axis=0)
+    amplitude, frequency, size = here.tolist()
     return LimitCycle(
-        amplitude=math.exp(point.state.log_amplitude), frequency_hz=omega / PERIOD, max_abs=record.max_abs,
-        damping_slope=_slope(problem.equations, point), multipliers=multipliers, unknown=unknown,
-        record=record,
+        amplitude=amplitude, frequency_hz=frequency, max_abs=size, damping_slope=cycle.slope,
+        multipliers=multipliers, unknown=unknown, amplitude_error=float(errors[0]),
+        frequency_error=float(errors[1]), max_abs_error=float(errors[2]), record=cycle.record,
     )  # fmt: skip
 
 
-def _multipliers(
-    scene: Scene, omega: float, record: Record, mass_damping: float
-) -> tuple[Complex | None, str]:
-    """Return the Floquet multipliers of a cycle without that of a shift in time, or why there are none."""
-    ends = np.cumsum([len(contact.end_keys) for contact in scene.contacts])[:-1]
-    motions = tuple(np.split(record.motions, ends))
-    try:
-        found = scene_monodromy(scene, omega / PERIOD, motions, mass_damping=mass_damping)
-    except SettingError as error:  # a law or a term without a motion in time
-        return None, str(error)
-    values = np.linalg.eigvals(found.reduced).astype(np.complex128)
-    shift = int(np.argmin(np.abs(values - 1.0)))
-    if abs(values[shift] - 1.0) > _NEUTRAL:
-        return None, "no multiplier is that of a shift in time: ask for more harmonics"
-    rest = np.delete(values, shift)
-    return rest[np.argsort(-np.abs(rest), kind="stable")], ""
+def _numbers(cycle: Cycle) -> Real:
+    """Return amplitude [√kg m], frequency [Hz] and max|x| [m] of a cycle."""
+    state = cycle.point.state
+    return np.array([math.exp(state.log_amplitude), state.y[-2] / PERIOD, cycle.record.max_abs])
 
 
 def growth_from(cycle: LimitCycle) -> str:
     """Return in words how a perturbation of a cycle grows."""
-    if cycle.multipliers is None:
-        return cycle.unknown
-    return growth_of(cycle.multipliers).value
+    return cycle.unknown if cycle.multipliers is None else growth_of(cycle.multipliers).value
 
 
-def _most_damping(equations: Equations, found: NonlinearMode) -> tuple[float, float]:
-    """Return the largest damping ratio of a curve and its amplitude, solved for between points."""
-    if not found.points:
-        return math.nan, math.nan
-    i = int(np.argmax(found.damping_ratio))
-    best = (float(found.damping_ratio[i]), float(found.amplitude[i]))
-    if not 0 < i < len(found.points) - 1:
-        return best
-    logs = [found.points[j].log_amplitude for j in (i - 1, i, i + 1)]
-    if not logs[0] < logs[1] < logs[2]:
-        return best
-
-    def at(log_amplitude: float) -> Corrected:
-        j = i - 1 if log_amplitude < logs[1] else i
-        share = (log_amplitude - found.points[j].log_amplitude) / (logs[j - i + 2] - logs[j - i + 1])
-        return correct(equations, between(found, j, share), most=40)
-
-    def slope(log_amplitude: float) -> float:
-        point = at(log_amplitude)
-        return _slope(equations, point) if point.converged else math.nan
-
-    ends = slope(logs[0]), slope(logs[2])
-    if not (ends[0] > 0.0 > ends[1]):
-        return best
-    top = float(brentq(slope, logs[0], logs[2], xtol=_CLOSE))
-    point = at(top)
-    if point.converged and float(point.state.y[-1]) >= best[0]:
-        return float(point.state.y[-1]), math.exp(top)
-    return best
+def _number(value: float) -> float | None:
+    """Return a float that JSON can carry."""
+    return value if math.isfinite(value) else None

@@ -21,7 +21,7 @@ from solver.modes.curve import End, walk
 from solver.modes.equations import Equations
 from solver.modes.records import collect
 from solver.modes.results import NonlinearMode, NonlinearModeStatus
-from solver.modes.start import LinearMode, begin, equilibrium, linear_modes, slopes_at_rest
+from solver.modes.start import LinearMode, begin, damped_mode, equilibrium, linear_modes, slopes_at_rest
 from solver.results.default_bar import shows_progress
 from solver.scene.cyclic.annulus import written_out
 
@@ -177,8 +177,8 @@ def _begin(equations: Equations, mode: int) -> tuple[LinearMode, Real, list[Line
         raise SettingError(
             "scene", equations.balance.scene.name, "must have an equilibrium under its constant forces"
         )
-    found = linear_modes(equations.balance, slopes)
-    return found[mode - 1], rest, found
+    found = linear_modes(equations.balance, slopes, guess)
+    return damped_mode(found, mode - 1), rest, found
 
 
 def check_mode(scene: Scene, mode: int) -> None:

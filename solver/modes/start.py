@@ -20,6 +20,10 @@ _LEAST = 1e-10  # relative motion of a contact below which a mode does not move 
 _RUNGS = 6  # decades below the first amplitude from which the mode is walked up, if it must
 _DECADE = math.log(10.0)
 _MOST_AT_FIRST = 40
+_MAJORITY = 0.5  # share of a² in the mode asked for, of which only one mode can have more
+_SAME = 1e-4  # of ω and in ζ, within which a motion of another shape is of a mode just as fast
+_HEAVY = 0.3  # first-order share of another mode by damping, beyond which the modes are complex
+_PARTS = np.geomspace(1e-3, 1.0, 31)  # of the damping, by which such a mode is followed from the undamped one
 
 
 class LinearMode:
@@ -29,11 +33,11 @@ class LinearMode:
     ----------
     omega : natural frequency [rad/s]; zeta : damping ratio ψᴴ C ψ / 2ω.
     shape : (n,) mass-normalised, in the coordinates of the matrices.
-    ports : (nc,) motions of the contacts.
+    ports : (nc,) motions of the contacts; drag : (n,) what dashpots answer per unit of its speed.
     """
 
-    def __init__(self, omega: float, zeta: float, shape: Complex, ports: Complex) -> None:
-        self.omega, self.zeta, self.shape, self.ports = omega, zeta, shape, ports
+    def __init__(self, omega: float, zeta: float, shape: Complex, ports: Complex, drag: Complex) -> None:
+        self.omega, self.zeta, self.shape, self.ports, self.drag = omega, zeta, shape, ports, drag
 
     @property
     def moves_contacts(self) -> bool:
@@ -42,8 +46,13 @@ class LinearMode:
         return bool(np.any(np.abs(self.ports) > _LEAST * largest))
 
 
-def linear_modes(balance: Balance, slopes: Complex) -> list[LinearMode]:
+def linear_modes(balance: Balance, slopes: Complex, omega: float = 1.0) -> list[LinearMode]:
     """Return the modes of harmonic 1 with stiffness `slopes` (nc, nc) at the ports, slowest first.
+
+    Parameters
+    ----------
+    slopes : what is not Hermitian in them is drag, iω times dashpots.
+    omega : frequency [rad/s] at which they were taken.
 
     Raises
     ------
@@ -58,17 +67,42 @@ def linear_modes(balance: Balance, slopes: Complex) -> list[LinearMode]:
         (M,) = model.inertia(diameters, one)
     L = model.ports_at(diameters)[0]
     free = np.ix_(model.free, model.free)
-    tied = hermitian((K + L.conj().T @ slopes @ L)[free])
-    found = undamped_modes(tied, hermitian(M[free]))
+    held = L.conj().T @ slopes @ L
+    dashpots = C + (held - hermitian(held)) / (1j * omega)
+    found = undamped_modes(hermitian((K + held)[free]), hermitian(M[free]))
     modes = []
     for square, column in zip(found.omega2, found.phi.T, strict=True):
         omega = math.sqrt(max(float(square), 0.0))
         shape = np.zeros(M.shape[0], np.complex128)
         shape[model.free] = column
-        lost = float(np.vdot(shape, C @ shape).real)
+        lost = float(np.vdot(shape, dashpots @ shape).real)
         zeta = lost / (2.0 * omega) if omega > 0.0 else 0.0
-        modes.append(LinearMode(omega, zeta, shape, L @ shape))
+        modes.append(LinearMode(omega, zeta, shape, L @ shape, dashpots @ shape))
     return modes
+
+
+def damped_mode(modes: list[LinearMode], i: int) -> LinearMode:
+    """Return the solution of [K + iωC − (ω² + 2iζω²) M] ψ = 0 that mode i becomes as C rises from 0.
+
+    A dashpot may be so stiff that it holds what the undamped mode moves most.
+    """
+    basis = np.stack([mode.shape for mode in modes], 1)
+    squares = np.array([mode.omega**2 for mode in modes])
+    drag = basis.conj().T @ np.stack([mode.drag for mode in modes], 1)
+    apart = np.abs(squares - squares[i])
+    apart[i] = np.inf
+    if np.all(modes[i].omega * np.abs(drag[:, i]) <= _HEAVY * apart):
+        return modes[i]
+    omega, zeta, share = modes[i].omega, modes[i].zeta, np.eye(len(modes), dtype=np.complex128)[i]
+    for part in _PARTS:
+        values, vectors = np.linalg.eig(np.diag(squares) + 1j * omega * part * drag)
+        alike = np.abs(vectors.conj().T @ share)
+        alike[values.real <= 0.0] = -1.0
+        best = int(np.argmax(alike))
+        share, square = vectors[:, best], float(values[best].real)
+        omega, zeta = math.sqrt(max(square, 0.0)), float(values[best].imag) / (2.0 * square)
+    ports = np.stack([mode.ports for mode in modes], 1)
+    return LinearMode(omega, zeta, basis @ share, ports @ share, modes[i].drag)
 
 
 def equilibrium(equations: Equations, omega: float) -> Real | None:
@@ -104,7 +138,10 @@ def _constant(equations: Equations, omega: float) -> Complex:
 
 
 def slopes_at_rest(equations: Equations, w: Real, omega: float) -> Complex | None:
-    """Return the slopes of the port forces of harmonic 1 by its motions, (nc, nc), without the shift."""
+    """Return the slopes of the port forces of harmonic 1 by its motions, (nc, nc), without the shift.
+
+    Forces that follow the speed are their imaginary part.
+    """
     if not equations.contacts(w, omega):
         return None
     balance, ks = equations.balance, equations.structure.ks
@@ -115,6 +152,7 @@ def slopes_at_rest(equations: Equations, w: Real, omega: float) -> Complex | Non
     block = equations.point.dF_dU[blocks]
     # A force that is no function of the phase answers a cosine and a sine alike; the mean of both else.
     G[rows, columns] = 0.5 * (block[:, here, here] + block[:, here + 1, here + 1])
+    G[rows, columns] += 0.5j * (block[:, here, here + 1] - block[:, here + 1, here])
     return G
 
 
@@ -169,22 +207,38 @@ def first_state(
 
 
 def begin(equations: Equations, mode: LinearMode, rest: Real, low: float, *, turns: bool) -> Corrected:
-    """Solve at the first amplitude, ln a = `low`; where that fails, from a smaller one upward."""
+    """Solve at the first amplitude, ln a = `low`; where that fails, from a smaller one upward.
+
+    What another mode has most of is no beginning of the one asked for: it counts as failed.
+    """
 
     def guess(at: float) -> State:
         return first_state(equations, mode, rest, at, turns=turns)
 
-    found = correct(equations, guess(low), most=_MOST_AT_FIRST)
-    spent = found.iterations
-    for rung in range(1, _RUNGS + 1):
+    spent = 0
+    for rung in range(_RUNGS + 1):
+        found = correct(equations, guess(low - rung * _DECADE), most=_MOST_AT_FIRST)
+        found = replace(found, converged=found.converged and _is_of(equations, mode, found))
+        spent += found.iterations
         if found.converged:
             break
-        found = correct(equations, guess(low - rung * _DECADE), most=_MOST_AT_FIRST)
-        spent += found.iterations
     while found.converged and found.state.log_amplitude < low:
         found = _raised(equations, found, rest, low)
         spent += found.iterations
     return replace(found, iterations=spent)
+
+
+def _is_of(equations: Equations, mode: LinearMode, found: Corrected) -> bool:
+    """Return whether a point moves mostly in a linear mode, or in one as fast and as damped."""
+    if found.at is None:
+        return False
+    s, shape = equations.structure, coordinates_of(equations, mode)
+    M, x = s.mass[s.first], found.at.x[s.first]
+    own, moved = (M * shape, M * x) if s.is_diagonal else (M @ shape, M @ x)
+    size = abs(complex(np.vdot(shape, own))) * abs(complex(np.vdot(x, moved)))
+    omega, zeta = found.state.y[-2:]
+    alike = abs(omega - mode.omega) <= _SAME * mode.omega and abs(zeta - mode.zeta) <= _SAME
+    return bool(alike or abs(complex(np.vdot(own, x))) ** 2 >= _MAJORITY * size)
 
 
 def _raised(equations: Equations, found: Corrected, rest: Real, low: float) -> Corrected:

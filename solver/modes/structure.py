@@ -33,6 +33,7 @@ class Structure:
     turns : (nk,) k, but 1 of the mean, whose C and M are its own.
     K, C, M : stiffness, damping and inertia of each harmonic, as the balance has them.
     mass : the mass of each harmonic, 0 of the mean; in modes 1.
+    fed : what −2ζω is multiplied by: the mass, or (M φ)(M φ)ᴴ where one mode φ alone is damped.
     contact : (nk, r, N) motions of the leading ports; back : (nk, N, r) what their forces push.
     constant : (N,) constant force on the mean; level : (3,) its factor by 1, ω, ω².
     force : (N,) the excitation of harmonic 1.
@@ -50,6 +51,7 @@ class Structure:
     C: Complex
     M: Complex
     mass: Complex
+    fed: Complex
     contact: Complex
     back: Complex
     constant: Complex
@@ -78,7 +80,7 @@ class Structure:
         flat = (self.ks.size, -1)
         fill_stiffness(
             self.turns, self.K.reshape(flat), self.C.reshape(flat), self.M.reshape(flat),
-            self.mass.reshape(flat), omega, zeta, Z.reshape(flat), by_omega.reshape(flat),
+            self.fed.reshape(flat), omega, zeta, Z.reshape(flat), by_omega.reshape(flat),
             by_zeta.reshape(flat),
         )  # fmt: skip
         b = self.carried[:, mode]
@@ -98,11 +100,11 @@ class Structure:
         if self.squares.size == 1:
             return 0
         i = self.first
-        K, C, M, mass = self.K[i], self.C[i], self.M[i], self.mass[i]
+        K, C, M, fed = self.K[i], self.C[i], self.M[i], self.fed[i]
         if self.is_diagonal:
-            Z = K + 1j * omega * C - omega**2 * M - 2j * zeta * omega**2 * mass
+            Z = K + 1j * omega * C - omega**2 * M - 2j * zeta * omega**2 * fed
             return int(np.argmin(np.abs(Z)))
-        Z = K + 1j * omega * C - omega**2 * M - 2j * zeta * omega**2 * mass
+        Z = K + 1j * omega * C - omega**2 * M - 2j * zeta * omega**2 * fed
         own = np.einsum("am,ab,bm->m", self.modes.conj(), Z, self.modes)
         return int(np.argmin(np.abs(own)))
 
@@ -139,8 +141,12 @@ class Dynamics:
         return np.asarray(self.of.contact @ (self.inverse @ self.of.back))
 
 
-def structure_of(balance: Balance) -> Structure:
+def structure_of(balance: Balance, alone: Complex | None = None) -> Structure:
     """Return the linear part of a balance in modes or as matrices (`Effects.whole_matrices`).
+
+    Parameters
+    ----------
+    alone : (N,) the mass-normalised mode that −2ζω acts on alone, of a balance with whole matrices.
 
     Poles do not carry the term in ζ: a balance of that form has to be built with whole matrices.
     """
@@ -180,7 +186,21 @@ def structure_of(balance: Balance) -> Structure:
         mass=np.array(mass, np.complex128), contact=np.ascontiguousarray(contact),
         back=np.ascontiguousarray(np.swapaxes(back, 1, 2)), constant=constant, level=row,
         force=forces[first], observe=observe, shapes=shapes, modes=modes, carried=carried, squares=squares,
+        fed=mass if alone is None else _on_one_mode(balance, mass, first, alone),
     )  # fmt: skip
+
+
+def _on_one_mode(balance: Balance, mass: Complex, first: int, alone: Complex) -> Complex:
+    """Return (M φ)(M φ)ᴴ of every harmonic, (nk, N, N): in a disk of those that are waves of φ's diameter."""
+    model, ks = linear_model(balance.scene), balance.system.ks
+    diameters = np.asarray(model.diameters(ks)) % model.sectors
+    pushed = mass[first] @ alone
+    matrix, fed = np.outer(pushed, pushed.conj()), np.zeros_like(mass)
+    forward = diameters == diameters[first]
+    backward = ~forward & (diameters == -diameters[first] % model.sectors)
+    fed[forward & (ks > 0)] = matrix
+    fed[backward & (ks > 0)] = matrix.conj()
+    return fed
 
 
 def _carried(K: Complex, M: Complex, free: Flags) -> tuple[Complex, Complex, Real]:

@@ -45,6 +45,9 @@ Aero = Annotated[
     float | None,
     amount("--aero", "ZETA", "Aerodynamic damping ratio, below 0 if it feeds: lists the limit cycles."),
 ]
+ModeAlone = Annotated[
+    bool, typer.Option("--mode-alone", help="With --aero: the gas feeds this mode alone, not every one.")
+]
 
 
 def modes(
@@ -55,6 +58,7 @@ def modes(
     nodal_diameter: Diameter = None,
     performance: Performance = False,
     aero: Aero = None,
+    mode_alone: ModeAlone = False,
     disturbance: Disturbance = None,
     phase_resonance: Resonance = False,
     values: options.Values = None,
@@ -77,6 +81,8 @@ def modes(
         raise InputError(
             "`--disturbance` needs `--aero`: without gas that feeds, every disturbance dies down"
         )
+    if mode_alone and aero is None:
+        raise InputError("`--mode-alone` needs `--aero`: it says what the gas feeds")
     if phase_resonance:
         if performance or aero is not None:
             raise InputError("`--phase-resonance` is a curve of its own: leave `--performance`, `--aero` out")
@@ -91,7 +97,7 @@ def modes(
     drawn = found if curve is None else curve
     answer = found.to_json() | ({} if curve is None else {"performance": curve.to_json()})
     if aero is not None:
-        cycles = solver.limit_cycles(found, aero)
+        cycles = solver.limit_cycles(found, aero, mode_alone=mode_alone)
         answer["limit_cycles"] = cycles.to_json(disturbance)
     outputs.write(drawn, drawn.plot if found.amplitude.size else None)
     show(answer, tables.report, as_json=as_json)

@@ -51,6 +51,8 @@ class ModesRequest(HarmonicRequest):
         Peaks over excitation and load too.
     aero_damping : float or None
         Damping ratio of the gas, for the limit cycles.
+    mode_alone : bool
+        Whether the gas feeds this mode alone.
     motions : bool
         Loops and shapes too.
     exact_peaks : int
@@ -76,6 +78,9 @@ class ModesRequest(HarmonicRequest):
     )
     aero_damping: Annotated[Number, Field(ge=-10.0, le=10.0)] | None = Field(
         default=None, description="Aerodynamic damping ratio, below 0 if it feeds: the limit cycles too."
+    )
+    mode_alone: Annotated[bool, Field(strict=True)] = Field(
+        default=False, description="With `aero_damping`: the gas feeds this mode alone, not every one."
     )
     motions: Annotated[bool, Field(strict=True)] = Field(
         default=False, description=f"Loops and shapes of up to {MOST_POINTS} points too."
@@ -145,6 +150,7 @@ def resolve(request: ModesRequest, source: SceneSource) -> Resolved:
         harmonics=request.harmonics,
         performance=request.performance,
         aero_damping=request.aero_damping,
+        mode_alone=request.mode_alone,
         motions=request.motions,
         exact_peaks=request.exact_peaks,
         disturbance=request.disturbance,
@@ -180,6 +186,9 @@ def _of_questions(request: ModesRequest) -> list[Issue]:
     if request.disturbance is not None and request.aero_damping is None:
         words = "`disturbance` needs `aero_damping`: without gas that feeds, every disturbance dies down"
         issues.append(refusal("/disturbance", words))
+    if request.mode_alone and request.aero_damping is None:
+        words = "`mode_alone` needs `aero_damping`: it says what the gas feeds"
+        issues.append(refusal("/mode_alone", words))
     if request.phase_resonance and (request.performance or request.aero_damping is not None):
         words = "`phase_resonance` is a curve of its own: leave `performance` and `aero_damping` out"
         issues.append(refusal("/phase_resonance", words))
@@ -211,7 +220,7 @@ def run(spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop) ->
             exact = exact_peaks(found.scene, factors, spec["harmonics"], rest, should_stop)
             answer["performance"]["exact"] = exact
     if spec["aero_damping"] is not None:
-        cycles = solver.limit_cycles(found, spec["aero_damping"])
+        cycles = solver.limit_cycles(found, spec["aero_damping"], mode_alone=spec.get("mode_alone", False))
         answer["limit_cycles"] = cycles.to_json(spec["disturbance"])
     if spec["motions"]:
         answer["motions"] = motions_of(found)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from service.rendering.tables.text import print_pairs, print_table
@@ -66,8 +66,11 @@ def report(found: Mapping[str, Any]) -> None:
     count = len(found["amplitude"])
     if count:
         rows = [_row(found, i) for i in _thinned(count)]
-        heads = ["a [√kg m]", f"max |{found['dof']}|", "frequency [Hz]", "damping ratio", "contacts"]
-        print_table(title, heads, rows, right="0123")
+        heads = [
+            "a [√kg m]", f"max |{found['dof']}|", "frequency [Hz]", "damping ratio", "± by harmonics",
+            "contacts",
+        ]  # fmt: skip
+        print_table(title, heads, rows, right="01234")
     pairs = [("points", f"{count}, {found['newton_iterations']} Newton iterations")]
     pairs.append(("time", units.duration(found["seconds"])))
     print_pairs("" if count else title, pairs)
@@ -102,20 +105,35 @@ def _cycles(found: Mapping[str, Any], dof: str) -> None:
     """Limit cycles, and the most the damper holds."""
     pairs = []
     if found["most_damping"] is not None:
-        at = f"at a = {found['most_at']:.4g} √kg m"
-        pairs.append(("most that is held", f"ζ = {found['most_damping']:.5g} {at}"))
+        most = f"ζ = {found['most_damping']:.5g} ± {_error(found['most_error'])}"
+        end = ", the end of the curve: more may be held beyond" if found["most_at_end"] else ""
+        pairs.append(("most that is held", f"{most} at a = {found['most_at']:.4g} √kg m{end}"))
     for cycle in found["cycles"]:
-        name = "stable cycle" if cycle["stable"] else "unstable cycle"
-        # Without multipliers nothing is known of other modes.
-        name += " (by the slope)" if cycle["by_slope"] else ""
-        size = f"a = {cycle['amplitude']:.6g} √kg m, max |{dof}| {units.length(cycle['max_abs'])}"
-        pairs.append((name, f"{size}, {cycle['frequency']:.6g} Hz"))
+        name = {True: "stable cycle", False: "unstable cycle", None: "cycle"}[cycle["stable"]]
+        size = (
+            f"max |{dof}| {units.length(cycle['max_abs'])} ± {_error(cycle['max_abs_error'], units.length)}"
+        )
+        at = f"{cycle['frequency']:.6g} ± {_error(cycle['frequency_error'])} Hz"
+        pairs.append((name, f"a = {cycle['amplitude']:.6g} √kg m, {size}, {at}"))
+        if cycle["stable"] is None:
+            mode = "attracts" if cycle["attracts"] else "repels"
+            pairs.append(("", f"the mode alone {mode}; stability not known: {cycle['growth']}"))
+    for low, high in found["unsolved"]:
+        pairs.append(("not solved", f"a = {low:.6g} to {high:.6g} √kg m: a cycle may be there"))
     if not found["cycles"]:
         pairs.append(("limit cycles", "none between these amplitudes"))
     if found.get("load_for") is not None:
         asked = found["load_for"]
         pairs.append((f"holds a = {asked['disturbance']:.6g} √kg m", asked["words"]))
-    print_pairs(f"Aerodynamic damping ratio {found['aero_damping']:g}", pairs)
+    if not found["completed"]:
+        pairs.append(("not complete", "the curve ends before its largest amplitude: more may be beyond"))
+    on = ", on this mode alone" if found["mode_alone"] else ""
+    print_pairs(f"Aerodynamic damping ratio {found['aero_damping']:g}{on}", pairs)
+
+
+def _error(value: float | None, told: Callable[[float], str] = "{:.2g}".format) -> str:
+    """What more harmonics would change."""
+    return "not known" if value is None else told(value)
 
 
 def _states(found: Mapping[str, Any], i: int) -> str:
@@ -133,6 +151,7 @@ def _row(found: Mapping[str, Any], i: int) -> list[str]:
         units.length(found["max_abs"][i]),
         f"{found['frequency'][i]:.6g}",
         f"{found['damping_ratio'][i]:.5g}",
+        _error(found["damping_error"][i]),
         _states(found, i),
     ]
 

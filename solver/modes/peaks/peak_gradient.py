@@ -24,9 +24,9 @@ from solver.jit.fourier import Complex, Real
 from solver.modes.corrector import Corrected, State, correct, scales, step
 from solver.modes.equations import Evaluated
 from solver.modes.gradient import ModeSensitivities
-from solver.modes.limit_cycles import between
 from solver.modes.nonlinear_mode import pose
 from solver.modes.peaks.performance import PerformanceCurve, crossing
+from solver.modes.results import NonlinearMode
 from solver.results.told import Piece
 
 _SAME = 1e-10  # ln of the force within which it is the one asked for
@@ -111,7 +111,7 @@ class _Solver:
 
     def solved(self, i: int, share: float, log_force: float) -> Corrected | None:
         """Return the point between i and i + 1 of a given force; None if it was not found."""
-        state = between(self._found, i, share)
+        state = _between(self._found, i, share)
         tried: list[tuple[float, float]] = []
         ends = sorted(self._found.points[j].log_amplitude for j in (i, i + 1))
         room = ends[1] - ends[0]
@@ -222,3 +222,12 @@ def _raised(state: State, to: float, size: int) -> State:
     y = state.y.copy()
     y[: size + 2] *= math.exp(to - state.log_amplitude)
     return replace(state, y=y, log_amplitude=to)
+
+
+def _between(found: NonlinearMode, i: int, share: float) -> State:
+    """Return a guess between points i and i + 1."""
+    one, other = found.points[i], found.points[i + 1]
+    # q is of one mode alone.
+    y = one.y + share * (other.y - one.y) if one.mode == other.mode else one.y.copy()
+    log_amplitude = one.log_amplitude + share * (other.log_amplitude - one.log_amplitude)
+    return State(y=y, log_amplitude=log_amplitude, mode=one.mode, phase=one.phase)

@@ -157,7 +157,8 @@ def growth_of(multipliers: Complex) -> Growth:
 
 
 def scene_monodromy(
-    scene: Scene, frequency_hz: float, motions: Motions, *, mass_damping: float = 0.0
+    scene: Scene, frequency_hz: float, motions: Motions, *, mass_damping: float = 0.0,
+    alone: Complex | None = None,
 ) -> Monodromy:  # fmt: skip
     """Return the monodromy matrix of a scene in a periodic motion, of all sectors if it is cyclic.
 
@@ -167,6 +168,7 @@ def scene_monodromy(
     frequency_hz : excitation frequency [Hz].
     motions : (ports, 2H + 1) full coefficients of the relative motions of every contact [m].
     mass_damping : what the damping has besides, in units of the mass [1/s]; below 0 it feeds the motion.
+    alone : (n,) mass-normalised mode that it acts on alone, of a structure without sectors.
     """
     whole = annulus(scene) if scene.structure.has_sectors else scene
     model = linear_model(whole)
@@ -183,7 +185,10 @@ def scene_monodromy(
             "domain, and stability is one in time"
         )
         raise SettingError("scene", scene.name, wanted)
-    structure = Structure(M=M, C=C.real + mass_damping * M.real, K=K.real)
+    fed = M.real
+    if alone is not None:
+        fed = np.outer(M @ alone, (M @ alone).conj()).real
+    structure = Structure(M=M, C=C.real + mass_damping * fed, K=K.real)
     return monodromy(structure, elements, PERIOD * frequency_hz)
 
 

@@ -42,9 +42,11 @@ function curveOf(result, key, over, pins, factor = 1) {
   };
 }
 
+export const stabilityOf = ({ stable }) => (stable === null ? "stability not known" : stable ? "stable" : "unstable");
+
 const cyclesOf = (result, over, y) => (result.limit_cycles?.cycles ?? []).map((cycle) => ({
   x: amplitudeOf(result, over).of(cycle), y: y(cycle), shape: cycle.stable ? "circle" : "diamond", colour: cycle.stable ? 3 : 2,
-  text: cycle.stable ? "stable" : "unstable",
+  text: stabilityOf(cycle),
 }));
 
 export const frequencyChart = (result, over, pins) => ({

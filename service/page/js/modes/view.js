@@ -9,7 +9,7 @@ import { chart } from "../charts/chart.js";
 import { run } from "../network/jobs.js";
 import { asked, current, value } from "../scene/scenes.js";
 import { putAll } from "../views/live.js";
-import { amplitudeOf, columnsOf, dampingChart, frequencyChart, loopChart, nearestMotion, performanceChart, shapeChart, statesAt } from "./charts.js";
+import { amplitudeOf, columnsOf, dampingChart, frequencyChart, loopChart, nearestMotion, performanceChart, shapeChart, stabilityOf, statesAt } from "./charts.js";
 import { buildForm, complain, fillForm, readForm } from "./form.js";
 
 const PRIORITY = 4;
@@ -168,9 +168,12 @@ function describe() {
   ]));
 }
 
-function flutterFacts({ cycles, most_damping: most, most_at: at }, result) {
-  const rows = cycles.map((cycle) => [`${cycle.stable ? "stable" : "unstable"} cycle`,
-    `${length(cycle.max_abs)} at ${number(cycle.frequency, 6)} Hz, a ${number(amplitudeOf(result, "modal").of(cycle), 4)} √kg m${cycle.by_slope ? ", by the slope of ζ" : ""}`]);
+const known = (error, told) => (error == null ? "not known" : told(error));
+
+function flutterFacts({ cycles, unsolved = [], most_damping: most, most_at: at, most_error: error }, result) {
+  const rows = cycles.map((cycle) => [cycle.stable === null ? "cycle" : `${stabilityOf(cycle)} cycle`,
+    `${length(cycle.max_abs)} ± ${known(cycle.max_abs_error, length)} at ${number(cycle.frequency, 6)} Hz, a ${number(amplitudeOf(result, "modal").of(cycle), 4)} √kg m${cycle.stable === null ? `, the mode alone ${cycle.attracts ? "attracts" : "repels"}, stability not known` : ""}`]);
+  rows.push(...unsolved.map(([low, high]) => ["not solved", `a ${number(low, 4)} to ${number(high, 4)} √kg m: a cycle may be there`]));
   if (!rows.length) rows.push(["limit cycles", "none between these amplitudes"]);
-  return [...(most === null ? [] : [["most that is held", `ζ_aero −${number(100 * most, 4)} % at a ${number(at, 4)} √kg m`]]), ...rows];
+  return [...(most === null ? [] : [["most that is held", `ζ_aero −${number(100 * most, 4)} % ± ${known(error, (value) => `${number(100 * value, 2)} %`)} at a ${number(at, 4)} √kg m`]]), ...rows];
 }
