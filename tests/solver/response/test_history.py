@@ -170,34 +170,35 @@ def test_two_limits_are_two_contacts() -> None:
         assert one.mean_range == pytest.approx(two.mean_range, rel=1e-9, abs=1e-12)
 
 
-def check_circle(seed: int, count: int, periods: int) -> str:
+def check_circle(seed: int) -> str:
+    """Compare one scene, its limits not sampled, with a march that goes on until the motion repeats."""
     scene, frequency_hz = history_scene(seed, "circle")
     solution = solve(scene, frequency_hz=frequency_hz, harmonics=21)
     if not solution.converged:
         return "not solved"
-    x, settled = crude_march(scene, frequency_hz, count=count, periods=periods)
-    if not settled:
+    raw = scene.to_dict()
+    for contact in raw["contacts"]:
+        contact.pop("samples", None)
+    rest = march(Scene.from_dict(raw), frequency_hz=frequency_hz, tolerance=1e-8)
+    if not rest.converged:
         return "not marched"
-    y, _ = crude_march(scene, frequency_hz, count=count // 2, periods=periods)
-    rest, coarse = (float(np.abs(each).max()) for each in (x, y))
     flagged = "mean_undetermined" in solution.flags
-    allowed = solution.error_estimate + 1e-3 * solution.max_abs + 3.0 * abs(rest - coarse)
-    near = abs(rest - solution.max_abs) <= allowed
-    assert flagged or near, f"{scene.name}: {solution.max_abs} against {rest}"
+    allowed = solution.error_estimate + 1e-3 * solution.max_abs
+    near = abs(rest.max_abs - solution.max_abs) <= allowed
+    assert flagged or near, f"{scene.name}: {solution.max_abs} against {rest.max_abs}"
     return "agrees" if not flagged else "flagged, agrees from rest" if near else "flagged"
 
 
-@pytest.mark.long
 def test_under_a_circular_limit_too() -> None:
-    """Light damping among them: the crude march goes on until the motion repeats, not only the forces."""
-    said = [check_circle(seed, 400, 4000) for seed in (103, 123, 195)]
-    assert said == ["agrees"] * 3
+    """What is lightly damped takes thousands of periods to come to its answer."""
+    said = [check_circle(seed) for seed in (7, 21, 103, 123, 195)]
+    assert said == ["agrees"] * 5
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("first", range(0, 200, 20))
 def test_under_a_circular_limit_in_many_scenes(first: int) -> None:
-    said = [check_circle(seed, 800, 6000) for seed in range(first, first + 20)]
+    said = [check_circle(seed) for seed in range(first, first + 20)]
     assert said.count("agrees") >= 3
     assert said.count("not marched") <= 5
 
