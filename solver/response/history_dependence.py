@@ -8,7 +8,8 @@ only falls, by Δvᵀ C Δv and by what slips differently (the elastic sliders a
 convex sets: J. J. Moreau, J. Differ. Equ. 26 (1977) 347, doi:10.1016/0022-0396(77)90085-7). Two periodic
 responses therefore keep their distance: they have the same velocities, and the forces of each contact differ
 by a constant Δf. A contact that slips anywhere in the period, or opens, leaves no room for one: Δf = 0. A
-contact that sticks all the time leaves every constant that keeps |f + Δf| ≤ μN, so
+contact that sticks all the time leaves every constant that keeps |f + Δf| ≤ μN (where each direction has its
+own limit, each is a contact by itself: one may slip and the other keep a force), so
 
 - all means that any history can leave are an interval, `mean_range`, and half peak to peak is the same;
 - a start from rest without contact forces leads to Δf = 0 if the contact has not slipped on the way. Its
@@ -30,7 +31,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
@@ -80,11 +80,18 @@ class History:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Contact:
-    """A contact that sticks all the time, its answer, and where it stands among the ports."""
+    """What sticks all the time under one limit, its contact's answer, and where that begins in the ports."""
 
     given: Slider
     found: ContactResponse
-    ports: slice
+    begin: int
+
+    @property
+    def ports(self) -> list[int]:
+        """The motions it follows among the ports of all contacts, that of the load last."""
+        normal = self.given.normal_port
+        own = (*self.given.ports, *(() if normal is None else (normal,)))
+        return [self.begin + port for port in own]
 
     def forces(self, tau: Real) -> Real:
         """Return the friction force [N], (directions, n)."""
@@ -98,11 +105,10 @@ class _Contact:
 
     def lost(self, moved: Real) -> float:
         """Return the most that motions of all ports up to `moved` [m] take of the room to the limit [N]."""
-        away = moved[self.ports]
-        given, normal = self.given, self.given.normal_port
-        lost = given.size(given.pull(away[list(given.ports)]))
-        if normal is not None:
-            lost = lost + given.mu * given.normal_stiffness * away[normal]
+        away, given = moved[self.ports], self.given
+        lost = given.size(given.pull(away[: len(given.ports)]))
+        if given.normal_port is not None:
+            lost = lost + given.mu * given.normal_stiffness * away[-1]
         return float(lost)
 
 
@@ -113,8 +119,7 @@ def history_of(solution: Solution) -> History:
     if not sticking:
         only = (solution.mean, solution.mean) if given else (math.nan, math.nan)
         return History(mean_open=False, half_range_open=False, mean_range=only)
-    closed = len(sticking) == len(scene.contacts)
-    bounded = given or closed
+    bounded = given or _every_one(solution, sticking)
     mean_open = not (bounded and _sticks_from_rest(solution, sticking))
     return History(
         mean_open=mean_open, half_range_open=mean_open and not given,
@@ -140,22 +145,35 @@ def has_another_solution(workspace: Workspace, u: Real, p: float, *, from_nothin
 
 
 def _sticking(solution: Solution) -> tuple[_Contact, ...]:
-    """Return the contacts that stick all the time and can hold a force."""
-    ends = np.append(0, np.cumsum(port_counts(solution.scene)))
-    found = []
-    for contact, response, (begin, end) in zip(
-        solution.scene.contacts, solution.contacts, pairwise(ends.tolist()), strict=True
-    ):
-        if contact.friction is not None and _sticks(contact.friction, response):
-            found.append(_Contact(given=contact.friction, found=response, ports=slice(begin, end)))
-    return tuple(found)
+    """Return what sticks all the time and can hold a force."""
+    begins = np.append(0, np.cumsum(port_counts(solution.scene))).tolist()
+    return tuple(
+        _Contact(given=slider, found=response, begin=begin)
+        for contact, response, begin in zip(solution.scene.contacts, solution.contacts, begins, strict=False)
+        for slider in held_sliders(contact.friction, response)
+    )
+
+
+def held_sliders(friction: Slider | None, response: ContactResponse) -> tuple[Slider, ...]:
+    """Return those of the sliders of a contact, one for each limit, that are held all the time."""
+    sliders = () if friction is None else friction.limited
+    return tuple(slider for slider in sliders if _sticks(slider, response))
+
+
+def _every_one(solution: Solution, sticking: tuple[_Contact, ...]) -> bool:
+    """Whether all of every contact sticks; one without friction never does."""
+    count = sum(1 if c.friction is None else len(c.friction.limited) for c in solution.scene.contacts)
+    return len(sticking) == count
 
 
 def _sticks(slider: Slider, response: ContactResponse) -> bool:
-    """Return whether a contact sticks all the time; a sampled one may graze its limit without any slip."""
+    """Return whether what has one limit sticks all the time.
+
+    Of a contact that slips one direction may stick, and one that is sampled may graze its limit without slip.
+    """
     if response.state is ContactState.STUCK:
         return True
-    if not slider.sampled or response.state is not ContactState.SLIPPING:
+    if not (slider.sampled or slider.limits_apart) or response.state is not ContactState.SLIPPING:
         return False
     motions, forces, ports = np.array(response.motions), np.array(response.forces), list(slider.ports)
     slips = np.abs(forces[ports, 1:] - slider.pull(motions[ports, 1:]))
@@ -184,11 +202,11 @@ def _sticks_from_rest(solution: Solution, sticking: tuple[_Contact, ...]) -> boo
 
     least = [float(np.min(each)) for each in room]
     start = _start(solution, model, stiffness)
-    distance = start.distance(start.x, start.v) + _in_sliders(solution, model, stiffness)
+    distance = start.distance(start.x, start.v) + _in_sliders(solution, model, sticking)
     lost = [_most_lost(each.given, distance, *by) for each, by in zip(sticking, reach, strict=True)]
     if all(left > most for left, most in zip(least, lost, strict=True)):
         return True
-    if len(sticking) < len(solution.contacts):
+    if not _every_one(solution, sticking):
         return False
 
     def holds(moved: Real) -> bool:
@@ -238,8 +256,8 @@ class _Fits:
         away = np.moveaxis(moved[:, :, contact.ports], 2, 0)
         given = contact.given
         if given.normal_port is not None:
-            limit = limit + given.mu * given.normal_stiffness * away[given.normal_port]
-        change = given.pull(away[list(given.ports)])
+            limit = limit + given.mu * given.normal_stiffness * away[-1]
+        change = given.pull(away[: len(given.ports)])
         between = _BETWEEN * np.abs(change).max(axis=(0, 1), initial=0.0)
         return not bool(np.any(given.size(forces + change) + between >= limit))
 
@@ -251,7 +269,9 @@ def _of_diameters(model: LinearModel) -> Iterator[tuple[Complex, Complex, Comple
         yield K[0], C[0], model.ports_at(n)[0]
 
 
-def _compliances(model: LinearModel, stiffness: Real, ports: list[slice]) -> list[tuple[float, float]] | None:
+def _compliances(
+    model: LinearModel, stiffness: Real, ports: list[list[int]]
+) -> list[tuple[float, float]] | None:
     """Return L K_s⁻¹ Lᵀ of slip and approach of each contact [m/N].
 
     None where nothing holds a part, a nodal diameter is not known, or where damping or a stiffness that is
@@ -275,7 +295,7 @@ def _compliances(model: LinearModel, stiffness: Real, ports: list[slice]) -> lis
             return None
     reach = []
     for port in ports:
-        block = total[port, port]
+        block = total[np.ix_(port, port)]
         if block.shape[0] == 1:
             reach.append((float(block[0, 0].real), 0.0))
             continue
@@ -294,25 +314,21 @@ def _start(solution: Solution, model: LinearModel, stiffness: Real) -> Start:
     return Start(model=model, stiffness=stiffness, x=(turns @ amplitudes).real, v=v, omega=omega)
 
 
-def _in_sliders(solution: Solution, model: LinearModel, stiffness: Real) -> float:
+def _in_sliders(solution: Solution, model: LinearModel, sticking: tuple[_Contact, ...]) -> float:
     """Return Σ f² / (2 kt) over what slips, at the beginning [J]; a part of a force is below its limit."""
-    ends = np.append(0, np.cumsum(port_counts(solution.scene)))
-    angles = np.arange(model.sectors, dtype=np.float64) * model.interblade_phase
+    angles = np.arange(model.sectors, dtype=np.float64) * model.interblade_phase % (2.0 * math.pi)
     total = 0.0
-    for contact, response, port in zip(solution.scene.contacts, solution.contacts, ends, strict=False):
-        given = contact.friction
-        if stiffness[port] > 0.0 or given is None:
-            continue
-        load = fourier.basis(angles, (response.load.size - 1) // 2) @ response.load
-        limits = (given.mu * np.maximum(load, 0.0)) ** 2
-        if len(given.ports) > 1:
-            limits = limits * (len(given.ports) if given.limits_apart else 1)
-        else:
-            motions = np.array(response.motions)
-            limits = np.minimum(
-                limits, contact.force_at(motions, response.load, angles % (2.0 * math.pi)) ** 2
-            )
-        total += float(np.sum(limits)) / (2.0 * min(given.stiffnesses))
+    for contact, response in zip(solution.scene.contacts, solution.contacts, strict=True):
+        held = [each.given for each in sticking if each.found is response]
+        for slider in () if contact.friction is None else contact.friction.limited:
+            if slider in held:
+                continue
+            load = fourier.basis(angles, (response.load.size - 1) // 2) @ response.load
+            squares = (slider.mu * np.maximum(load, 0.0)) ** 2
+            if len(slider.ports) == 1:
+                along = contact.friction_at(np.array(response.motions), response.load, angles)
+                squares = np.minimum(squares, along[slider.ports[0]] ** 2)
+            total += float(np.sum(squares)) / (2.0 * min(slider.stiffnesses))
     return total
 
 
@@ -329,7 +345,7 @@ def _mean_range(solution: Solution, sticking: tuple[_Contact, ...]) -> tuple[flo
     tau = _instants(solution)
     for contact in sticking:
         limit, forces = contact.limit(tau), contact.forces(tau)
-        for port, force in zip(range(contact.ports.start, contact.ports.stop), forces, strict=True):
+        for port, force in zip(contact.ports, forces, strict=False):
             room = max(float(np.min(limit + force)), 0.0), max(float(np.min(limit - force)), 0.0)
             for gain in gains[:, port].tolist():
                 # f may fall by room[0] and rise by room[1], and the mean moves by −gain Δf.

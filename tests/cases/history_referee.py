@@ -23,7 +23,7 @@ def _steps(inverse, M, C, K, L, kt, group, box, mu, N0, N1, phase, pull, omega, 
     record = np.empty((count, n))
     now, before = T.copy(), T.copy()
     for period in range(periods):
-        at_begin = T.copy()
+        at_begin, x_begin = T.copy(), x.copy()
         for j in range(count):
             to = (j + 1) % count
             u = L @ x
@@ -51,13 +51,17 @@ def _steps(inverse, M, C, K, L, kt, group, box, mu, N0, N1, phase, pull, omega, 
             a = 4.0 / h**2 * (beyond - x) - 4.0 / h * v - a
             x[:], v[:], T[:] = beyond, speed, now
             record[to] = x
-        if np.abs(T - at_begin).max() <= tolerance * np.abs(T).max() and period > 5:
-            break
-    return record
+        # A force at its limit repeats long before the motion does.
+        repeats = np.abs(T - at_begin).max() <= tolerance * np.abs(T).max()
+        if repeats and np.abs(x - x_begin).max() <= tolerance * np.abs(record).max() and period > 5:
+            return record, True
+    return record, False
 
 
-def crude_march(scene: Scene, frequency_hz: float, *, count: int = 3000, periods: int = 400) -> np.ndarray:
-    """Observed displacement [m] over the last period from rest, contacts without force."""
+def crude_march(
+    scene: Scene, frequency_hz: float, *, count: int = 3000, periods: int = 400
+) -> tuple[np.ndarray, bool]:
+    """Observed displacement [m] over the last period from rest, contacts without force; and if it repeats."""
     model = linear_model(scene)
     M, C, K, L = model.M, model.C0, model.K0, model.contact_here
     omega = 2.0 * math.pi * frequency_hz
@@ -75,8 +79,8 @@ def crude_march(scene: Scene, frequency_hz: float, *, count: int = 3000, periods
         pull += force.amplitude * turn[:, None] * force.vector
     nothing, n_ports = np.zeros(M.shape[0]), kt.size
     inverse = np.linalg.inv(4.0 / h**2 * M + 2.0 / h * C + K)
-    record = _steps(
+    record, repeats = _steps(
         inverse, M.copy(), C.copy(), K.copy(), L.copy(), kt, group, box, mu, N0, N1, phase, pull, omega,
         nothing.copy(), nothing.copy(), np.zeros(n_ports), periods, 1e-9,
     )  # fmt: skip
-    return np.asarray(record @ model.observe)
+    return np.asarray(record @ model.observe), bool(repeats)

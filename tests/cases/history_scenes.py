@@ -11,7 +11,7 @@ from scipy.linalg import eigvalsh
 from solver import Scene
 from solver.linear.assembly import linear_model
 
-KINDS = ("given", "moving", "circle")
+KINDS = ("given", "moving", "circle", "box", "box-moving")
 
 
 def history_scene(seed: int, kind: str) -> tuple[Scene, float]:
@@ -77,4 +77,11 @@ def _contact(rng: np.random.Generator, name: str, dofs: list[str], force: float,
         contact |= {"law": "coulomb-2d", "between_second": pair(), "limit": limit}
         if limit == "circle":
             contact["samples"] = 512
+    if kind.startswith("box"):
+        contact |= {"law": "coulomb-2d", "between_second": pair(), "limit": "box"}
+    if kind == "box-moving" and (name == "c0" or rng.random() < 0.5):
+        contact |= {
+            "law": "coulomb-3d", "normal_between": pair(), "kn": float(10.0 ** rng.uniform(0.5, 2.5)),
+            "prestressed": bool(rng.random() < 0.5), "kt_second": float(10.0 ** rng.uniform(0.5, 3.0)),
+        }  # fmt: skip
     return contact

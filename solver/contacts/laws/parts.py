@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import NamedTuple
 
@@ -149,6 +149,16 @@ class Slider:
         """The stiffness of every direction [N/m]."""
         second = self.kt if self.kt_second is None else self.kt_second
         return (self.kt, second)[: len(self.ports)]
+
+    @property
+    def limited(self) -> tuple[Slider, ...]:
+        """A slider for each limit, which sticks or slips whatever the others do."""
+        if not self.limits_apart:
+            return (self,)
+        return tuple(
+            replace(self, kt=kt, kt_second=None, ports=(port,))
+            for kt, port in zip(self.stiffnesses, self.ports, strict=True)
+        )
 
     def pull(self, away: Real) -> Real:
         """Return the forces (directions, ...) [N] of its spring for motions `away` of its directions [m]."""

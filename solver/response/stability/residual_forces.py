@@ -26,6 +26,7 @@ from solver.jit import fourier
 from solver.jit.fourier import Real
 from solver.linear.contact_table import port_counts
 from solver.response.contact_response import ContactState, contact_responses
+from solver.response.history_dependence import held_sliders
 from solver.response.solution import Solution
 from solver.results.told import Piece
 from solver.scene.bodies.body import Load
@@ -51,7 +52,7 @@ class AmplitudeRange(Piece):
     mean : (float, float)
         Of the mean [m].
     contacts : tuple of str
-        Which contacts stick all the time.
+        Which contacts stick all the time, in one direction at least.
     exact : bool
         The range is known; else it is what a search along gradients reached.
     """
@@ -88,7 +89,7 @@ def amplitude_range(solution: Solution, effects: Effects | None = None) -> Ampli
     stuck = [
         i
         for i, (contact, response) in enumerate(zip(scene.contacts, solution.contacts, strict=True))
-        if contact.friction is not None and response.state is ContactState.STUCK
+        if held_sliders(contact.friction, response)
     ]
     if not stuck:
         return None
@@ -104,7 +105,9 @@ def amplitude_range(solution: Solution, effects: Effects | None = None) -> Ampli
         return AmplitudeRange(
             max_abs=most, half_peak_to_peak=half, mean=(low, high), contacts=names, exact=True
         )
-    if scene.structure.has_sectors:
+    # What slips in one direction cannot be made to stick for the sake of the other.
+    in_part = any(solution.contacts[i].state is not ContactState.STUCK for i in stuck)
+    if scene.structure.has_sectors or in_part:
         unknown = (math.nan, math.nan)
         return AmplitudeRange(
             max_abs=unknown, half_peak_to_peak=unknown, mean=unknown, contacts=names, exact=False

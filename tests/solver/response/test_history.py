@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,10 +14,13 @@ from scene_cases import bladed_disk, oscillator, two_dof
 
 from solver import Effects, Scene, SettingError, Solution, load_scene, march, solve, sweep
 from solver.marching.result import MarchResult
-from solver.scene.scene import FrictionContact
+from solver.response.contact_response import ContactState
+from solver.response.stability.residual_forces import amplitude_range
+from solver.scene.scene import FrictionContact, Observe
 
 DATA = Path(__file__).parent.parent.parent / "data"
 MARCHED = {"tolerance": 1e-9, "max_periods": 1500}
+MORE = 81  # harmonics
 BRIEFLY = {"tolerance": 1e-8, "max_periods": 150}
 
 
@@ -46,63 +50,157 @@ def check(seed: int, kind: str, further: int, settings: dict[str, float]) -> str
     rest = march(scene, frequency_hz=frequency_hz, **settings)  # type: ignore[arg-type]
     if not rest.converged:
         return "not marched"
-    flagged = "mean_undetermined" in solution.flags
+    flagged, resolved = "mean_undetermined" in solution.flags, True
+    if not flagged and not agrees(solution, rest):
+        # Another motion stays another one with more harmonics; what these cure is an estimate that was short.
+        solution, resolved = solve(scene, frequency_hz=frequency_hz, harmonics=MORE), False
+        flagged = "mean_undetermined" in solution.flags
     assert flagged or agrees(solution, rest), f"{scene.name}: {solution.max_abs} against {rest.max_abs}"
     allowed = 5.0 * solution.error_estimate + 1e-4 * solution.max_abs
     for tractions in starts(scene, np.random.default_rng(seed), further):
         other = march(scene, frequency_hz=frequency_hz, tractions=tractions, **settings)  # type: ignore[arg-type]
         if not other.converged:
             continue
-        if "history_dependent" not in solution.flags and kind == "given":
+        if "history_dependent" not in solution.flags and all(c.load_is_given for c in scene.contacts):
             assert abs(other.half_peak_to_peak - solution.half_peak_to_peak) <= allowed, scene.name
         low, high = solution.mean_range
         if math.isfinite(low):
             assert low - allowed <= other.mean <= high + allowed, f"{scene.name}: {other.mean}"
     if flagged:
         return "flagged" if not agrees(solution, rest) else "flagged, agrees from rest"
-    return "agrees"
+    return "agrees" if resolved else "agrees with more harmonics"
 
 
-@pytest.mark.parametrize("kind", ["given", "moving"])
+@pytest.mark.parametrize("kind", ["given", "moving", "box", "box-moving"])
 def test_without_a_flag_rest_leads_to_the_answer(kind: str) -> None:
     said = [check(seed, kind, 2, BRIEFLY) for seed in range(8)]
     assert len(said) - said.count("not marched") >= 2
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("kind", ["given", "moving"])
+@pytest.mark.parametrize("kind", ["given", "moving", "box", "box-moving"])
 @pytest.mark.parametrize("first", range(0, 200, 20))
 def test_without_a_flag_rest_leads_to_the_answer_in_many_scenes(kind: str, first: int) -> None:
     said = [check(seed, kind, 4, MARCHED) for seed in range(first, first + 20)]
     assert said.count("agrees") >= 3
+    assert said.count("agrees with more harmonics") <= 1
 
 
-def check_circle(seed: int, count: int, periods: int) -> str:
+def test_an_estimate_that_is_short_is_no_other_motion() -> None:
+    """With 21 harmonics the error is 1.1 times the estimate; from rest and from it one motion follows."""
+    assert check(174, "moving", 0, MARCHED) == "agrees with more harmonics"
+
+
+def plane_scene(load: dict[str, Any], directions: dict[str, list[float]], **contact: Any) -> Scene:
+    """Oscillators of 1 kg, [k, c, force, phase] each, and a contact along x and y with a limit for each."""
+    ends = {"between": "x", "between_second": "y"} | ({"normal_between": "z"} if "kn" in contact else {})
+    law = "coulomb-3d" if "kn" in contact else "coulomb-2d"
+    return Scene.from_dict(
+        {
+            "name": "plane",
+            "structure": {
+                "kind": "lumped",
+                "masses": dict.fromkeys(directions, 1.0),
+                "springs": [
+                    {"between": [dof, "ground"], "k": k, "c": c} for dof, (k, c, _, _) in directions.items()
+                ],
+            },
+            "contacts": [
+                {"name": "c", "law": law, "limit": "box", "mu": 0.5, **load, **contact}
+                | {key: [dof, "ground"] for key, dof in ends.items()}
+            ],
+            "excitation": [
+                {"dof": dof, "amplitude": force, "phase": phase}
+                for dof, (_, _, force, phase) in directions.items()
+            ],
+            "observe": {"dof": "y", "band": [0.5, 5.0]},
+        }
+    )
+
+
+BOX = {"x": [95.9420458, 0.42562, 66.652313, 0.0], "y": [12.0438248, 0.2104916, 53.7568487, 2.4016075]}
+
+
+def test_one_direction_slips_and_the_other_keeps_what_it_slipped_on_its_way() -> None:
+    """With a limit for each direction they are two contacts: y has a range of means, x has none."""
+    scene = plane_scene({"N0": 100.0, "kt": 123.2448494}, BOX)
+    solution = solve(scene, frequency_hz=2.843074977332252, harmonics=25)
+    rest = march(scene, frequency_hz=2.843074977332252)
+    assert solution.flags == ("mean_undetermined",)
+    assert rest.max_abs > 1.5 * solution.max_abs
+    assert rest.half_peak_to_peak == pytest.approx(solution.half_peak_to_peak, rel=1e-6)
+    # What the slider of y carries leaves this for a constant; x has none of it.
+    room = (50.0 - 123.2448494 * solution.half_peak_to_peak) / 12.0438248
+    assert solution.mean_range == pytest.approx((-room, room), rel=1e-3)
+    assert solution.mean_range[0] < rest.mean < solution.mean_range[1]
+    found = amplitude_range(solution)
+    assert found is not None
+    assert found.exact
+    assert found.max_abs[0] <= rest.max_abs <= found.max_abs[1]
+    seen = solve(scene.model_copy(update={"observe": Observe(dof="x", band=(0.5, 5.0))}), frequency_hz=2.843)
+    assert seen.mean_range == pytest.approx((0.0, 0.0), abs=1e-12)
+
+
+def test_one_direction_that_slips_under_a_moving_load_leaves_the_other_open() -> None:
+    """Of 120 random scenes nine had another half peak to peak from rest, and did not say so."""
+    directions = {
+        "x": [101.741, 0.552604, 67.831882, 0.664438], "y": [44.603, 0.528111, 104.322701, 1.270637],
+        "z": [223.707, 0.125813, 99.640687, 4.364217],
+    }  # fmt: skip
+    scene = plane_scene({"N0": 147.137634}, directions, kt=216.934905, kn=93.490037, prestressed=True)
+    solution = solve(scene, frequency_hz=1.02188)
+    assert solution.contacts[0].state is ContactState.SLIPPING
+    assert {"mean_undetermined", "history_dependent"} <= set(solution.flags)
+    found = amplitude_range(solution)
+    assert found is not None
+    assert found.contacts == ("c",)
+    assert math.isnan(found.max_abs[0])
+
+
+def test_two_limits_are_two_contacts() -> None:
+    """A box is the scene with a contact for each direction, in all that depends on history."""
+    for N0, hertz in ((100.0, 2.843), (70.0, 2.5), (400.0, 1.2), (40.0, 0.3)):
+        both = plane_scene({"N0": N0, "kt": 123.0}, BOX)
+        raw = both.to_dict()
+        raw["contacts"] = [
+            {"name": dof, "between": [dof, "ground"], "kt": 123.0, "mu": 0.5, "N0": N0} for dof in ("x", "y")
+        ]
+        one, two = (solve(each, frequency_hz=hertz) for each in (both, Scene.from_dict(raw)))
+        assert one.flags == two.flags
+        assert one.mean_range == pytest.approx(two.mean_range, rel=1e-9, abs=1e-12)
+
+
+def check_circle(seed: int) -> str:
+    """Compare one scene, its limits not sampled, with a march that goes on until the motion repeats."""
     scene, frequency_hz = history_scene(seed, "circle")
     solution = solve(scene, frequency_hz=frequency_hz, harmonics=21)
     if not solution.converged:
         return "not solved"
-    x = crude_march(scene, frequency_hz, count=count, periods=periods)
-    y = crude_march(scene, frequency_hz, count=count // 2, periods=periods)
-    rest, coarse = (float(np.abs(each).max()) for each in (x, y))
+    raw = scene.to_dict()
+    for contact in raw["contacts"]:
+        contact.pop("samples", None)
+    rest = march(Scene.from_dict(raw), frequency_hz=frequency_hz, tolerance=1e-8)
+    if not rest.converged:
+        return "not marched"
     flagged = "mean_undetermined" in solution.flags
-    allowed = solution.error_estimate + 1e-3 * solution.max_abs + 3.0 * abs(rest - coarse)
-    near = abs(rest - solution.max_abs) <= allowed
-    assert flagged or near, f"{scene.name}: {solution.max_abs} against {rest}"
+    allowed = solution.error_estimate + 1e-3 * solution.max_abs
+    near = abs(rest.max_abs - solution.max_abs) <= allowed
+    assert flagged or near, f"{scene.name}: {solution.max_abs} against {rest.max_abs}"
     return "agrees" if not flagged else "flagged, agrees from rest" if near else "flagged"
 
 
-@pytest.mark.long
 def test_under_a_circular_limit_too() -> None:
-    said = [check_circle(seed, 400, 100) for seed in (0,)]
-    assert said.count("not solved") == 0
+    """What is lightly damped takes thousands of periods to come to its answer."""
+    said = [check_circle(seed) for seed in (7, 21, 103, 123, 195)]
+    assert said == ["agrees"] * 5
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("first", range(0, 200, 20))
 def test_under_a_circular_limit_in_many_scenes(first: int) -> None:
-    said = [check_circle(seed, 3000, 400) for seed in range(first, first + 20)]
+    said = [check_circle(seed) for seed in range(first, first + 20)]
     assert said.count("agrees") >= 3
+    assert said.count("not marched") <= 5
 
 
 def test_a_stuck_contact_that_slipped_on_its_way() -> None:
@@ -121,7 +219,7 @@ def test_a_circular_limit_that_is_only_grazed() -> None:
     """In the end it sticks, along a circle that touches the limit: what is kept depends on the history."""
     scene = load_scene(DATA / "mean_of_history_circle.toml")
     solution = solve(scene, frequency_hz=1.2729937015505208)
-    x = crude_march(scene, 1.2729937015505208, count=1500, periods=150)
+    x, _ = crude_march(scene, 1.2729937015505208, count=1500, periods=150)
     assert "mean_undetermined" in solution.flags
     assert np.abs(x).max() == pytest.approx(0.3763, rel=2e-2)
     assert 0.5 * (x.max() - x.min()) == pytest.approx(solution.half_peak_to_peak, rel=2e-3)
