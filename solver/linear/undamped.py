@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.linear.assembly import linear_model
+from solver.linear.contact_table import port_stiffnesses
 from solver.matrices.normal_modes import hermitian, undamped_modes
 from solver.scene.scene import Scene
 
@@ -21,6 +22,8 @@ _NEAR = 0.02  # relative to a natural frequency
 def undamped_resonance(scene: Scene, frequency_hz: float, harmonics: NDArray[np.int64]) -> bool:
     """Return whether nothing damps the structure, and a harmonic is near one of its natural frequencies.
 
+    Those with all contacts open count, and those with all of them stuck.
+
     Parameters
     ----------
     harmonics : those kept.
@@ -29,12 +32,14 @@ def undamped_resonance(scene: Scene, frequency_hz: float, harmonics: NDArray[np.
     ks = harmonics[harmonics > 0]
     if model.prescribed:
         return False
-    matrices = model.at(model.diameters(ks), np.ones(ks.size, np.bool_))
-    for k, K, C, M in zip(ks.tolist(), *matrices, strict=True):
+    diameters, kt = model.diameters(ks), port_stiffnesses(scene, model)
+    matrices = model.at(diameters, np.ones(ks.size, np.bool_))
+    for k, K, C, M, L in zip(ks.tolist(), *matrices, model.ports_at(diameters), strict=True):
         if np.any(hermitian(C)) or np.any(K - hermitian(K)):
             return False
-        omega2 = undamped_modes(hermitian(K), hermitian(M)).omega2
-        natural = np.sqrt(np.maximum(omega2, 0.0)) / (2.0 * math.pi)
-        if np.any(np.abs(k * frequency_hz - natural) <= _NEAR * natural):
-            return True
+        for stiffness in (K, K + L.conj().T @ (kt[:, None] * L)):
+            omega2 = undamped_modes(hermitian(stiffness), hermitian(M)).omega2
+            natural = np.sqrt(np.maximum(omega2, 0.0)) / (2.0 * math.pi)
+            if np.any(np.abs(k * frequency_hz - natural) <= _NEAR * natural):
+                return True
     return False
