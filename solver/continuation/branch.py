@@ -309,10 +309,7 @@ class Branch(Drawn):
     def to_json(self) -> dict[str, object]:
         """Return the branch as one JSON object."""
         peak, band = self.peak, self.band
-        judged = [
-            {"value": one.value, "at": one.at, **verdict.to_json()}
-            for one, verdict in zip(self.peaks, self.peak_stability, strict=True)
-        ]
+        judged = [each.stable.value for each in self.peak_stability]
         return {
             "scene": self.balance.scene.name,
             "parameter": self.values.tolist(),
@@ -322,8 +319,11 @@ class Branch(Drawn):
             "amplitude": self.amplitude.tolist(),
             "half_peak_to_peak": self.half_peak_to_peak.tolist(),
             "mean": self.mean.tolist(),
-            "peak": None if peak is None else judged[0],
-            "peaks": [each for each, one in zip(judged, self.peaks, strict=True) if one.interior],
+            "peak": None if peak is None else {"value": peak.value, "at": peak.at},
+            "peaks": [{"value": peak.value, "at": peak.at} for peak in self.peaks if peak.interior],
+            "stable": judged[0] if judged else None,
+            "stable_ground": self.peak_stability[0].ground if judged else None,
+            "peaks_stable": [word for word, one in zip(judged, self.peaks, strict=True) if one.interior],
             "band_hz": None if band is None else band.width,
             "band_limit": None if band is None else band.limit,
             "band_intervals_hz": None if band is None else [list(interval) for interval in band.intervals],

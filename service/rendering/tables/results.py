@@ -113,10 +113,8 @@ def branch(found: Json) -> None:
     pairs = _peaks(found, path)
     if found["error_estimate"] is not None:
         pairs.append(("estimated error", f"{units.length(found['error_estimate'])} of the highest"))
-    if (found["peak"] or {}).get("stable"):
-        pairs.append(
-            ("stable", f"at the highest peak {found['peak']['stable']}: {found['peak']['stable_ground']}")
-        )
+    if found.get("stable"):
+        pairs.append(("stable", f"at the highest peak {found['stable']}: {found['stable_ground']}"))
     if found.get("mean_undetermined"):
         pairs.append(("note", "at the highest peak " + FLAGS["mean_undetermined"]))
     if found["band_hz"] is not None:

@@ -60,7 +60,7 @@ def test_peaks_of_a_sweep_and_a_search_agree():
     branch = sweep(duffing(), "frequency", 0.2, 0.35, harmonics=7)
     told = branch.to_json()
     assert len(branch.peak_stability) == len(branch.peaks)
-    assert told["peak"]["stable"] == branch.peak_stability[0].stable.value
+    assert told["stable"] == branch.peak_stability[0].stable.value
     assert "stable at the peak" in str(branch.summary())
     found = solve_all(duffing(), frequency_hz=0.2664, harmonics=7, starts=4)
     for each in found.solutions:

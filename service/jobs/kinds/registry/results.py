@@ -25,10 +25,6 @@ class PeakAt(BaseModel):
 
     value: float
     at: float
-    stable: str | None = Field(
-        default=None, description="Whether small perturbations die out there: yes, no, not known."
-    )
-    stable_ground: str | None = Field(default=None, description="Why.")
 
 
 class KnownResult(KindResult):
