@@ -31,6 +31,7 @@ from solver.continuation.branch import Branch
 from solver.results.base import Drawn, MadeOfResponses
 from solver.results.known import Known
 from solver.results.told import Piece
+from solver.results.verdict import Stable, Verdict, worst
 from solver.results.views import Views
 
 SAME_HEIGHT = 1e-5  # relative distance within which rows count as equally high
@@ -202,6 +203,17 @@ class DesignResult(MadeOfResponses, Drawn):
         return parts[held.case].error_estimate if held.case in parts else math.nan
 
     @property
+    def stability(self) -> Verdict:
+        """Whether the responses at the highest peaks of the optimum are stable, in every case."""
+        responses = () if self.evaluation is None else self.evaluation.responses
+        return worst([response.branch.peak_stability[0] for response in responses if response.branch.peaks])
+
+    @property
+    def stable(self) -> Stable:
+        """Whether small perturbations die out there: yes, no, or not known."""
+        return self.stability.stable
+
+    @property
     def warnings(self) -> tuple[str, ...]:
         """What makes the numbers doubtful, in words."""
         return doubts_of(
@@ -311,6 +323,7 @@ class DesignResult(MadeOfResponses, Drawn):
             "rows": [] if evaluation is None else [row_json(row) for row in evaluation.rows],
             "held_by": None if self.held_by is None else row_json(self.held_by),
             "error_estimate": number(self.error_estimate),
+            **self.stability.to_json(),
             "errors": [
                 {"case": case, "peak": number(known.value), **known.to_json()}
                 for case, known in (() if evaluation is None else known_parts(evaluation))

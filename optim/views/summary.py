@@ -30,6 +30,8 @@ def of_design(result: DesignResult) -> Summary:
         pairs.append(("chosen by", result.chosen_by))
     if result.peak is not None:
         pairs.append(("peak", f"{units.length(result.peak.value)} at {result.peak.at:.6g} Hz"))
+    if result.peak is not None:
+        pairs.append(("stable", result.stability.line))
     pairs += [("warning", words) for words in result.warnings]
     if result.band_hz is not None and result.limit is not None:
         pairs.append(("band", f"{result.band_hz:.4g} Hz above {units.length(result.limit)}"))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from typing import TYPE_CHECKING, ClassVar
 
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from solver.continuation.marks import Bifurcations
+    from solver.results.verdict import Verdict
 
 
 class BranchStatus(Enum):
@@ -199,6 +200,7 @@ class Branch(Drawn):
     seconds: float
     peak_certificate: PeakCertificate
     flags: tuple[str, ...] = ()
+    _judged: list[tuple[Verdict, ...]] = field(default_factory=list, init=False, compare=False)
 
     @property
     def parameter(self) -> str:
@@ -263,6 +265,13 @@ class Branch(Drawn):
         return found
 
     @property
+    def peak_stability(self) -> tuple[Verdict, ...]:
+        """Whether the response at each of `peaks` is stable; found when asked for, where it costs little."""
+        if not self._judged:
+            self._judged.append(on_demand("solver.response.stability.verdict:of_peaks")(self))
+        return self._judged[0]
+
+    @property
     def folds(self) -> int:
         """How often the branch turned back in its parameter; two points at one value are no turn."""
         ahead = np.sign(np.diff(self.values))
@@ -300,6 +309,7 @@ class Branch(Drawn):
     def to_json(self) -> dict[str, object]:
         """Return the branch as one JSON object."""
         peak, band = self.peak, self.band
+        judged = [each.stable.value for each in self.peak_stability]
         return {
             "scene": self.balance.scene.name,
             "parameter": self.values.tolist(),
@@ -311,6 +321,9 @@ class Branch(Drawn):
             "mean": self.mean.tolist(),
             "peak": None if peak is None else {"value": peak.value, "at": peak.at},
             "peaks": [{"value": peak.value, "at": peak.at} for peak in self.peaks if peak.interior],
+            "stable": judged[0] if judged else None,
+            "stable_ground": self.peak_stability[0].ground if judged else None,
+            "peaks_stable": [word for word, one in zip(judged, self.peaks, strict=True) if one.interior],
             "band_hz": None if band is None else band.width,
             "band_limit": None if band is None else band.limit,
             "band_intervals_hz": None if band is None else [list(interval) for interval in band.intervals],

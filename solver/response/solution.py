@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from typing import TYPE_CHECKING, ClassVar
 
@@ -15,6 +15,7 @@ from solver.scene.scene import Scene
 
 if TYPE_CHECKING:
     from solver.response.stability.uniqueness import Uniqueness
+    from solver.results.verdict import Stable, Verdict
 
 MEAN_UNDETERMINED = "mean_undetermined"
 HISTORY_DEPENDENT = "history_dependent"
@@ -96,6 +97,7 @@ class Solution(Drawn):
     newton_iterations: int
     seconds: float
     mean_range: tuple[float, float] = (math.nan, math.nan)
+    _judged: list[Verdict] = field(default_factory=list, init=False, compare=False)  # once, when asked for
 
     @property
     def converged(self) -> bool:
@@ -120,6 +122,18 @@ class Solution(Drawn):
         )
         return found
 
+    @property
+    def stability(self) -> Verdict:
+        """Whether it is stable, and how that is known; found when asked for, and not where it costs much."""
+        if not self._judged:
+            self._judged.append(on_demand("solver.response.stability.verdict:of_solution")(self))
+        return self._judged[0]
+
+    @property
+    def stable(self) -> Stable:
+        """Whether small perturbations die out: yes, no, or not known."""
+        return self.stability.stable
+
     VIEWS: ClassVar = Views("solver.views", "of_solution", "solution_dataset", "of_solution")
 
     def to_json(self, *, with_stability: bool = False) -> dict[str, object]:
@@ -143,6 +157,7 @@ class Solution(Drawn):
             "harmonics": self.harmonics.tolist() if self.converged else None,
             "flags": list(self.flags),
             "contacts": {contact.name: contact.state.value for contact in self.contacts},
+            **self.stability.to_json(),
             "unique": only.unique,
             "unique_ground": only.ground,
             "residual": _number(self.residual),

@@ -21,6 +21,7 @@ from solver.contacts.kernels.system import (
 from solver.jit.fourier import Real
 from solver.linear.kernels.receptance import receptance
 from solver.linear.leading_ports import FEWEST_PORTS
+from solver.response.stability.verdict import forecast
 from solver.results.base import Shown
 from solver.results.views import Views
 from solver.scene.bodies.kinematics import static_forces
@@ -81,6 +82,9 @@ class Plan(Shown):
         Sizes behind it.
     seconds_a_point : float
         Estimated cost of a point of a branch [s].
+    seconds_of_stability : float
+        Estimated cost of the Floquet multipliers of a response [s]; answers have them by themselves below a
+        second.
     dense_bytes : int
         Estimated memory of the dense matrices of a response [bytes].
     performance_curve : str
@@ -96,6 +100,7 @@ class Plan(Shown):
     seconds_a_point: float
     dense_bytes: int
     performance_curve: str = ""
+    seconds_of_stability: float = 0.0
 
     VIEWS: ClassVar = Views("solver.views", "of_plan", "plan_dataset")
 
@@ -111,6 +116,7 @@ class Plan(Shown):
             "contacts": self.contacts,
             "n_harmonics": self.harmonics,
             "estimated_seconds_a_point": self.seconds_a_point,
+            "estimated_seconds_of_stability": self.seconds_of_stability,
             "estimated_dense_bytes": self.dense_bytes,
             "performance_curve": self.performance_curve,
         }
@@ -184,6 +190,7 @@ def plan(scene: Scene, *, harmonics: int = 11, effects: Effects | None = None) -
         seconds_a_point=_ITERATIONS_A_POINT * iteration,
         dense_bytes=dense_bytes(scene, harmonics, every_sector=asked.every_sector).total,
         performance_curve=performance_curve_words(balance.scene),
+        seconds_of_stability=forecast(balance.scene),
     )
 
 

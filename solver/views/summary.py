@@ -46,6 +46,7 @@ def of_branch(branch: Branch) -> Summary:
         pairs.append(("peak", f"{height} at {parameter(path, branch.peak.at)}"))
         if math.isfinite(branch.error_estimate):
             pairs.append(("estimated error", units.length(branch.error_estimate)))
+        pairs.append(("stable at the peak", branch.peak_stability[0].line))
     if branch.band is not None:
         width = parameter(path, branch.band.width)
         pairs.append(("band", f"{width} above {units.length(branch.band.limit)}"))
@@ -74,6 +75,7 @@ def of_solution(solution: Solution) -> Summary:
             ("max|x|", units.length(solution.max_abs)),
             ("estimated error", units.length(solution.error_estimate)),
             *((contact.name, contact.state.value) for contact in solution.contacts),
+            ("stable", solution.stability.line),
         ]
         pairs += [("note", words) for words in flag_words(solution.flags)]
         if "mean_undetermined" in solution.flags and math.isfinite(solution.mean_range[0]):
@@ -228,6 +230,7 @@ def of_plan(found: Plan) -> Summary:
     pairs = [(("" if e.used else "left out: ") + e.name, e.reason) for e in found.effects]
     pairs.append(("unknowns", str(found.unknowns)))
     pairs.append(("a point takes about", units.duration(found.seconds_a_point)))
+    pairs.append(("stability takes about", units.duration(found.seconds_of_stability)))
     pairs.append(("dense matrices take about", f"{found.dense_bytes / 1e6:.3g} MB"))
     return Summary(title=f"{found.scene}, {found.harmonics} harmonics", pairs=tuple(pairs))
 

@@ -46,6 +46,7 @@ class PlanAnswer(Answer):
     contacts: int
     n_harmonics: int
     estimated_seconds_a_point: float
+    estimated_seconds_of_stability: float
     performance_curve: str
     estimated_dense_bytes: int
 

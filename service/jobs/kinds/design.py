@@ -69,6 +69,8 @@ class OptimumResult(KnownResult, ReachedResult):
     objective: float | None
     rows: list[Table]
     held_by: Table | None
+    stable: str
+    stable_ground: str
     errors: list[Table]
     warnings: list[Any]
     plateau: Table

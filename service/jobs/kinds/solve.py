@@ -65,6 +65,10 @@ class SolveResult(KindResult):
     harmonics: list[float] | None = Field(description="Amplitudes of the harmonics from 0 on [m].")
     flags: list[str]
     contacts: dict[str, str] = Field(description="What each contact does during the period.")
+    stable: str = Field(
+        default="not known", description="Whether small perturbations die out: yes, no, not known."
+    )
+    stable_ground: str = Field(default="", description="Why, and a stable response beside one that is not.")
     unique: str = Field(
         default="not known", description="Whether it is the only response: proven or not known."
     )

@@ -105,6 +105,11 @@ class SweepResult(EndedResult):
     mean: Curve
     peak: PeakAt | None
     peaks: list[PeakAt]
+    stable: str | None = Field(
+        default=None, description="Whether the highest peak is stable: yes, no, not known."
+    )
+    stable_ground: str | None = Field(default=None, description="Why.")
+    peaks_stable: list[str] = Field(default=[], description="The same word for each of `peaks`.")
     band_hz: float | None
     band_limit: Amplitude
     band_intervals_hz: list[list[float]] | None

@@ -183,6 +183,8 @@ def _errors(found: Json) -> Pairs:
     pairs = [] if error is None else [("estimated error", units.length(error))]
     # The flags and open peaks are among the warnings.
     pairs = [pair for pair in known_pairs(found, besides=("peaks_open",)) if pair[0] != "note"] or pairs
+    if "stable" in found:
+        pairs.append(("stable", f"{found['stable']}: {found['stable_ground']}"))
     return pairs + [("warning", words) for words in found.get("warnings", ())]
 
 

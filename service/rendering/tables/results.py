@@ -54,6 +54,7 @@ def plan(found: Json) -> None:
             ("dense matrices", f"{found['estimated_dense_bytes'] / 1e6:.3g} MB"),
             ("performance curve", found["performance_curve"]),
             ("estimated cost", f"{units.duration(found['estimated_seconds_a_point'])} a point of a branch"),
+            ("stability", f"about {units.duration(found['estimated_seconds_of_stability'])} a response"),
         ],
     )
 
@@ -70,6 +71,8 @@ def solution(found: Json) -> None:
         pairs.append(("estimated error", f"{units.length(found['error_estimate'])} of {of}"))
     pairs.append(("harmonics 1 to 5", ", ".join(units.length(a) for a in found["harmonics"][1:6])))
     pairs += [(f"contact {name}", state) for name, state in found["contacts"].items()]
+    if "stable" in found:
+        pairs.append(("stable", f"{found['stable']}: {found['stable_ground']}"))
     if "unique" in found:
         pairs.append(("one response alone", f"{found['unique']}: {found['unique_ground']}"))
     pairs += [("note", words) for words in flag_words(found["flags"])]
@@ -110,6 +113,8 @@ def branch(found: Json) -> None:
     pairs = _peaks(found, path)
     if found["error_estimate"] is not None:
         pairs.append(("estimated error", f"{units.length(found['error_estimate'])} of the highest"))
+    if found.get("stable"):
+        pairs.append(("stable", f"at the highest peak {found['stable']}: {found['stable_ground']}"))
     if found.get("mean_undetermined"):
         pairs.append(("note", "at the highest peak " + FLAGS["mean_undetermined"]))
     if found["band_hz"] is not None:

@@ -25,8 +25,10 @@ from solver.response.stability.floquet import Stability, stability
 from solver.response.stability.residual_forces import AmplitudeRange, amplitude_range
 from solver.response.stability.search import Search
 from solver.response.stability.uniqueness import Uniqueness, uniqueness
+from solver.response.stability.verdict import verdict_of
 from solver.results.default_bar import shows_progress
 from solver.results.told import Piece
+from solver.results.verdict import Stable, Verdict
 from solver.scene.scene import Scene
 
 INCOMPLETE = "The list may be incomplete: no search finds every solution for certain."
@@ -201,10 +203,14 @@ def _described(search: Search, frequency_hz: float) -> list[FoundSolution]:
         solution = describe(search.workspace, each.point, frequency_hz, time.perf_counter())
         if not solution.converged:
             continue
+        stable: Stability | None = None
         try:
-            stable = stability(solution)
-        except SettingError:
-            stable = None
+            known = stability(solution)
+        except SettingError as error:
+            verdict = Verdict(stable=Stable.NOT_KNOWN, ground=str(error))
+        else:
+            stable, verdict = known, verdict_of(known)
+        solution._judged.append(verdict)
         found.append(
             FoundSolution(
                 solution=solution, stability=stable, sign=search.sign(each.point.u),

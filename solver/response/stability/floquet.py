@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from typing import ClassVar
@@ -106,13 +106,16 @@ def stability(solution: Solution) -> Stability:
     return motions_stability(solution.scene, solution.frequency_hz, motions)
 
 
-def branch_stability(branch: Branch, points: Iterable[int] | None = None) -> tuple[Stability, ...]:
+def branch_stability(
+    branch: Branch, points: Iterable[int] | None = None, *, at: Sequence[tuple[float, Real]] = ()
+) -> tuple[Stability, ...]:
     """Return the stability of points of a branch.
 
     Parameters
     ----------
     branch : from `sweep`.
-    points : indices into its points; all of them if left out.
+    points : indices into its points; all of them if left out, none if `at` is given.
+    at : other responses of its balance, as value of the parameter and solution (n_unknowns,): its peaks.
 
     Raises
     ------
@@ -120,11 +123,15 @@ def branch_stability(branch: Branch, points: Iterable[int] | None = None) -> tup
         An index beyond the branch.
     """
     balance, found = branch.balance, []
-    for i in range(len(branch.values)) if points is None else points:
+    every_point = range(0 if at else len(branch.values))
+    chosen = list(at)
+    for i in every_point if points is None else points:
         if not -len(branch.values) <= i < len(branch.values):
             raise SettingError("points", i, f"must be indices of a branch of {len(branch.values)} points")
-        value = float(branch.values[i])
-        every = fourier.to_full(branch.coefficients[i], balance.system.ks, balance.highest_harmonic)
+        chosen.append((float(branch.values[i]), branch.solutions[i, :-1]))
+    for value, solution in chosen:
+        coefficients = solution.reshape(-1, balance.n_coefficients)
+        every = fourier.to_full(coefficients, balance.system.ks, balance.highest_harmonic)
         motions = tuple(np.split(every, balance.system.first_port[1:-1]))
         if branch.parameter == "frequency":
             found.append(motions_stability(balance.scene.at_frequency(value), value, motions))

@@ -51,7 +51,7 @@ LARGEST = 120  # coordinates above which the proofs for loads that move are not 
 _SAME = 1e-12  # of the largest entry, or power: less is rounding
 _CELLS = 4096
 _MOST_MULTIPLES = 10_000
-_MONOTONE = (
+MONOTONE = (
     "loads are given, stiffnesses constant, and everything takes out power: any two responses come together, "
     "but for residual forces where contacts stick"
 )
@@ -95,9 +95,9 @@ def uniqueness(scene: Scene, frequency_hz: float) -> Uniqueness:
     """
     scene = scene.at_frequency(frequency_hz)
     model = linear_model(scene)
+    if monotone(scene, model):
+        return Uniqueness(unique=PROVEN, ground=MONOTONE)
     if all(contact.keeps_together for contact in scene.contacts):
-        if _takes_out_power(model):
-            return Uniqueness(unique=PROVEN, ground=_MONOTONE)
         return Uniqueness(unique=NOT_KNOWN, ground=_POWER)
     others = ", ".join(contact.name for contact in scene.contacts if not contact.keeps_together)
     unknown = Uniqueness(unique=NOT_KNOWN, ground=_MAY_BE.format(others))
@@ -124,6 +124,11 @@ def uniqueness(scene: Scene, frequency_hz: float) -> Uniqueness:
     if radius < MARGIN:
         return Uniqueness(unique=PROVEN, ground=_CONTRACTS.format(radius))
     return unknown
+
+
+def monotone(scene: Scene, model: LinearModel) -> bool:
+    """Whether two motions of a scene never move apart; `model` is that of the scene."""
+    return all(contact.keeps_together for contact in scene.contacts) and _takes_out_power(model)
 
 
 def _one_sided(contact: AnyContact) -> bool:

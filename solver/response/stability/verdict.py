@@ -1,0 +1,126 @@
+"""Whether a response is stable, as every answer says it: yes, no, or not known and why.
+
+It is known without Floquet multipliers where loads are given, stiffnesses constant and everything takes out
+power, and computed by them where that costs little; `forecast` says what it costs.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from typing import TYPE_CHECKING
+
+from solver.continuation.branch import Branch
+from solver.errors import SettingError
+from solver.linear.assembly import linear_model
+from solver.linear.contact_table import port_counts
+from solver.response.stability.floquet import GROWS, Stability, branch_stability, stability
+from solver.response.stability.uniqueness import MONOTONE, monotone
+from solver.results import units
+from solver.results.verdict import Stable, Verdict
+from solver.scene.scene import Scene
+
+if TYPE_CHECKING:
+    from solver.response.solution import Solution
+
+CHEAP = 1.0  # s, forecast, up to which an answer has its multipliers by itself
+NEUTRAL = 1e-7  # of the largest modulus beside 1: nothing is said to grow or to die out so slowly
+_SEARCH = 10.0  # s for the search for a stable response beside one that is not
+_STARTS = 8
+# Seconds of one interval between two changes, measured on one core: a fixed part, and of size³.
+_AN_INTERVAL, _A_PRODUCT = 3e-4, 6e-9
+# Intervals a period of one contact: the changes of its state, and where its direction turns in slip.
+_CHANGES, _TURNS = 6, 300
+_NO_SOLUTION = "there is no solution"
+_LONG = "Floquet multipliers would take about {}: stability() computes them"
+_DIES_OUT = "the largest Floquet multiplier is {:.4g}: perturbations die out"
+_BESIDE_ONE = "the largest Floquet multiplier is 1 to within {:.0e}: nothing is said to grow or to die out"
+_GROWS = "{} (largest Floquet multiplier {:.4g}): the motion does not stay as it is"
+_ANOTHER = "; a stable response has half peak to peak {} there"
+_NONE_FOUND = "; no stable response was found there"
+
+
+def forecast(scene: Scene) -> float:
+    """Return about how long the Floquet multipliers of a response of a scene take [s]."""
+    model, sectors = linear_model(scene), scene.structure.sector_count if scene.structure.has_sectors else 1
+    contacts, ports = len(scene.contacts) * sectors, int(port_counts(scene).sum()) * sectors
+    turning = sum(_turns(contact) for contact in scene.contacts) * sectors
+    size = 2 * model.n_coordinates * sectors + ports
+    return (1 + _CHANGES * contacts + _TURNS * turning) * (_AN_INTERVAL + _A_PRODUCT * size**3)
+
+
+def _turns(contact: object) -> bool:
+    """Whether the direction of a contact's force turns while it slips, or its stiffness changes."""
+    return not getattr(contact, "limits_apart", True) or getattr(contact, "LAW", "") == "polynomial"
+
+
+def verdict_of(found: Stability) -> Verdict:
+    """Return what the multipliers of a response say."""
+    radius = found.radius
+    if abs(radius - 1.0) <= NEUTRAL and len(found.multipliers):
+        return Verdict(stable=Stable.NOT_KNOWN, ground=_BESIDE_ONE.format(NEUTRAL))
+    if radius > 1.0 + GROWS:
+        return Verdict(stable=Stable.NO, ground=_GROWS.format(found.growth.value, radius))
+    return Verdict(stable=Stable.YES, ground=_DIES_OUT.format(radius))
+
+
+def of_solution(solution: Solution) -> Verdict:
+    """Return whether a solution is stable; of one that is not, name a stable one if it is found."""
+    if not solution.converged:
+        return Verdict(stable=Stable.NOT_KNOWN, ground=_NO_SOLUTION)
+    known = _without_multipliers(solution.scene)
+    if known is not None:
+        return known
+    try:
+        found = verdict_of(stability(solution))
+    except SettingError as error:
+        return Verdict(stable=Stable.NOT_KNOWN, ground=str(error))
+    if found.stable is not Stable.NO:
+        return found
+    return Verdict(stable=found.stable, ground=found.ground + _stable_beside(solution))
+
+
+def of_peaks(branch: Branch) -> tuple[Verdict, ...]:
+    """Return whether the response at each peak of a branch is stable, in the order of `Branch.peaks`.
+
+    As many as together cost little are judged, the highest first.
+    """
+    found: list[Verdict] = []
+    until = time.perf_counter() + CHEAP
+    for peak in branch.peaks:
+        scene = branch.balance.scene
+        scene = scene.at_frequency(peak.at) if branch.parameter == "frequency" else scene
+        known = _without_multipliers(scene)
+        if known is None and found and time.perf_counter() > until:
+            known = Verdict(stable=Stable.NOT_KNOWN, ground="the peaks above took the time there is for it")
+        if known is None:
+            try:
+                known = verdict_of(branch_stability(branch, at=[(peak.at, peak.solution)])[0])
+            except SettingError as error:
+                known = Verdict(stable=Stable.NOT_KNOWN, ground=str(error))
+        found.append(known)
+    return tuple(found)
+
+
+def _without_multipliers(scene: Scene) -> Verdict | None:
+    """Return what is known of a scene's responses without multipliers; None where they cost little."""
+    if monotone(scene, linear_model(scene)):
+        return Verdict(stable=Stable.YES, ground=MONOTONE)
+    seconds = forecast(scene)
+    if seconds > CHEAP:
+        return Verdict(stable=Stable.NOT_KNOWN, ground=_LONG.format(units.duration(seconds)))
+    return None
+
+
+def _stable_beside(solution: Solution) -> str:
+    """Return the words for the largest stable response of the same frequency."""
+    from solver.response.stability.all_solutions import solve_all
+
+    until = time.perf_counter() + _SEARCH
+    every = solve_all(
+        solution.scene, frequency_hz=solution.frequency_hz, harmonics=solution.n_harmonics, starts=_STARTS,
+        on_progress=lambda _share, _count: None, should_stop=lambda: time.perf_counter() > until,
+    )  # fmt: skip
+    stable = [each.solution for each in every.solutions if each.solution.stability.stable is Stable.YES]
+    largest = max((each.half_peak_to_peak for each in stable), default=math.nan)
+    return _ANOTHER.format(units.length(largest)) if stable else _NONE_FOUND
