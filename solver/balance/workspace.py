@@ -37,6 +37,7 @@ FEWEST_HARMONICS = (
 )
 
 
+HELD_FORCE = 1e-6  # of the forces: what a residual may leave of them where contacts hold the structure
 BALANCED = 1e-6  # of the forces on a part that contacts alone hold: a mean force that drives it is larger
 ROUNDING = 1e-15
 _LEAST_RISE = 1e-3  # share of the excitation below which it is raised no further
@@ -162,12 +163,13 @@ class Workspace:
         u, spent = np.zeros(self.balance.n_unknowns), 0
         if guess is not None:
             good, spent, norm = self._newton(guess, u, p)
-            if good:
+            if good and self.forces_balance(u, p):
                 return PointSolution(converged=True, u=u, iterations=spent, residual=norm)
         good, norm = False, np.inf
         for way in self._ways():
             good, more, norm = way(u, p)
             spent += more
+            good = good and self.forces_balance(u, p)
             if good:
                 break
         return PointSolution(converged=bool(good), u=u, iterations=int(spent), residual=float(norm))
@@ -184,6 +186,8 @@ class Workspace:
         at_rest = partial(self._by_level, at_rest=True)
         if self.balance.system.constant_mean:
             return stuck, soft, at_rest, self._from_fewer, rungs, self._by_level
+        if np.any(self.balance.system.shift):  # contacts hold it: the way it is loaded leads there
+            return stuck, self._by_level, self._from_fewer, soft, rungs
         return stuck, self._from_fewer, soft, rungs, self._by_level
 
     def _from_fewer(self, u: Real, p: float) -> tuple[bool, int, float]:
@@ -201,6 +205,24 @@ class Workspace:
         if good and len(self.balance.system.loose) and not self._balanced(u, p):
             good = False
         return PointSolution(converged=bool(good), u=u, iterations=int(spent), residual=float(norm))
+
+    def forces_balance(self, u: Real, p: float) -> bool:
+        """Return whether the vibrating forces balance where contacts hold the structure, relative to them.
+
+        The residual r is one of displacements and relative to motions: of a light part far away it is small
+        whatever the forces are, of which it leaves kt r unbalanced.
+        """
+        system, ports = self.balance.system, self.balance.n_ports
+        if not np.any(system.shift):
+            return True
+        _, point = self.forces(u, p)
+        vibrating = slice(1 if system.ks[0] == 0 else 0, None)
+        left = system.shift[:, None] * point.residual.reshape(ports, -1)[:, vibrating]
+        free = np.abs(receptance_by_value(self.linear).u_linear[0]).max(axis=0)
+        size = max(float(np.abs(point.F).max()), float((system.shift * free).max()))
+        # Of a part far away the forces are the rounding of its place.
+        lost = ROUNDING * float((system.shift[:, None] * np.abs(u.reshape(ports, -1))[:, vibrating]).max())
+        return float(np.abs(left).max()) + lost <= HELD_FORCE * size
 
     def _balanced(self, u: Real, p: float) -> bool:
         """Return whether the mean forces on what contacts alone hold balance, relative to these forces.
