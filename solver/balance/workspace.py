@@ -186,8 +186,8 @@ class Workspace:
         at_rest = partial(self._by_level, at_rest=True)
         if self.balance.system.constant_mean:
             return stuck, soft, at_rest, self._from_fewer, rungs, self._by_level
-        if np.any(self.balance.system.shift):  # contacts hold it: the way it is loaded leads there
-            return stuck, self._by_level, self._from_fewer, soft, rungs
+        if np.any(self.balance.system.shift):  # contacts hold it: the less they stick the farther it may seem
+            return stuck, rungs, self._from_fewer, soft, self._by_level
         return stuck, self._from_fewer, soft, rungs, self._by_level
 
     def _from_fewer(self, u: Real, p: float) -> tuple[bool, int, float]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass
 
@@ -47,7 +48,7 @@ class Bar:
     def scene(self, ground: float = 0.0) -> Scene:
         """The scene; `ground` is a spring at the far end [N/m]."""
         names = [f"u{i}" for i in range(self.n + 1)]
-        springs = [{"between": [*pair], "k": self.piece} for pair in zip(names, names[1:], strict=False)]
+        springs = [{"between": [*pair], "k": self.piece} for pair in itertools.pairwise(names)]
         springs += [{"between": [names[-1], "ground"], "k": ground}] if ground else []
         return Scene.from_dict(
             {
@@ -89,7 +90,9 @@ class Bar:
             load[0] = level
             for _ in range(50):  # monotonic loading: the friction is min(kt u, limit)
                 slips = kt * u > limits
-                new = np.linalg.solve(K + np.diag(np.where(slips, 0.0, kt)), load - np.where(slips, limits, 0))
+                new = np.linalg.solve(
+                    K + np.diag(np.where(slips, 0.0, kt)), load - np.where(slips, limits, 0)
+                )
                 if np.array_equal(kt * new > limits, slips):
                     break
                 u = new
