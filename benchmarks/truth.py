@@ -49,7 +49,8 @@ def _kinds() -> dict[str, Callable[[int], Drawn]]:
 def truth() -> None:
     """Count the answers of random scenes that violate the power balance by more than their estimate."""
     kinds = _kinds()
-    rows, wrong, every = [], [], SCENES // len(kinds)
+    rows: list[tuple[str, ...]] = []
+    wrong, every = [], SCENES // len(kinds)
     for kind, draw in kinds.items():
         endings: collections.Counter[str] = collections.Counter()
         worst, violations, begun = 0.0, 0, time.process_time()

@@ -207,22 +207,19 @@ class Workspace:
         return PointSolution(converged=bool(good), u=u, iterations=int(spent), residual=float(norm))
 
     def forces_balance(self, u: Real, p: float) -> bool:
-        """Return whether the vibrating forces balance where contacts hold the structure, relative to them.
+        """Return whether the vibrating forces balance, kt r of them left, where contacts hold the structure.
 
-        The residual r is one of displacements and relative to motions: of a light part far away it is small
-        whatever the forces are, of which it leaves kt r unbalanced.
+        The residual r is relative to motions: of a light part far away it is small whatever the forces are.
         """
         system, ports = self.balance.system, self.balance.n_ports
         if not np.any(system.shift):
             return True
         _, point = self.forces(u, p)
-        vibrating = slice(1 if system.ks[0] == 0 else 0, None)
-        left = system.shift[:, None] * point.residual.reshape(ports, -1)[:, vibrating]
+        left = np.abs(point.residual) + ROUNDING * np.abs(u)  # of a part far away, rounding of its place
+        largest = left.reshape(ports, -1)[:, int(system.ks[0] == 0) :].max(axis=1)
         free = np.abs(receptance_by_value(self.linear).u_linear[0]).max(axis=0)
-        size = max(float(np.abs(point.F).max()), float((system.shift * free).max()))
-        # Of a part far away the forces are the rounding of its place.
-        lost = ROUNDING * float((system.shift[:, None] * np.abs(u.reshape(ports, -1))[:, vibrating]).max())
-        return float(np.abs(left).max()) + lost <= HELD_FORCE * size
+        size = max(np.abs(point.F).max(), (system.shift * free).max())
+        return bool((system.shift * largest).max() <= HELD_FORCE * size)
 
     def _balanced(self, u: Real, p: float) -> bool:
         """Return whether the mean forces on what contacts alone hold balance, relative to these forces.
