@@ -32,11 +32,8 @@ from solver.jit.fourier import Integer, Real
 from solver.linear.kernels.receptance import receptance
 from solver.scene.harmonics import spread
 
-FEWEST_HARMONICS = (
-    2  # the mean and the first: with these Newton's method from full stick nearly always ends well
-)
-
-
+# The mean and the first: with these Newton's method from full stick nearly always ends well.
+FEWEST_HARMONICS = 2
 HELD_FORCE = 1e-6  # of the forces: what a residual may leave of them where contacts hold the structure
 BALANCED = 1e-6  # of the forces on a part that contacts alone hold: a mean force that drives it is larger
 ROUNDING = 1e-15
@@ -214,7 +211,7 @@ class Workspace:
         system, ports = self.balance.system, self.balance.n_ports
         if not np.any(system.shift):
             return True
-        _, point = self.forces(u, p)
+        point = self.forces(u, p)[1]
         left = np.abs(point.residual) + ROUNDING * np.abs(u)  # of a part far away, rounding of its place
         largest = left.reshape(ports, -1)[:, int(system.ks[0] == 0) :].max(axis=1)
         free = np.abs(receptance_by_value(self.linear).u_linear[0]).max(axis=0)
@@ -231,8 +228,7 @@ class Workspace:
     def drive(self, u: Real, p: float) -> Drive:
         """Return the mean force left on what contacts alone hold, where (u, p) solves the rest."""
         system, n = self.balance.system, self.balance.n_coefficients
-        _, point = self.forces(u, p)
-        forces = self._mean_forces(point)
+        forces = self._mean_forces(point := self.forces(u, p)[1])
         carried = np.abs(system.loose) @ np.abs(point.F).max(axis=1)
         free = receptance_by_value(self.linear).u_linear[0, 0].real
         applied = np.abs(system.loose @ (system.shift * free))
