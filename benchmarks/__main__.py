@@ -42,6 +42,7 @@ def _cases() -> dict[str, Callable[[], None]]:
         space_kernel,
         start,
         sweep_costs,
+        truth,
     )  # fmt: skip
 
     return {
@@ -71,6 +72,7 @@ def _cases() -> dict[str, Callable[[], None]]:
         "reduction": reduction.reduction,
         "sector": sector.sector,
         "robustness": robustness.robustness,
+        "truth": truth.truth,
         "load": service_load.load,
         "latency": service_load.latency,
         "lists": service_load.lists,

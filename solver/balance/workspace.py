@@ -32,11 +32,9 @@ from solver.jit.fourier import Integer, Real
 from solver.linear.kernels.receptance import receptance
 from solver.scene.harmonics import spread
 
-FEWEST_HARMONICS = (
-    2  # the mean and the first: with these Newton's method from full stick nearly always ends well
-)
-
-
+# The mean and the first: with these Newton's method from full stick nearly always ends well.
+FEWEST_HARMONICS = 2
+HELD_FORCE = 1e-6  # of the forces: what a residual may leave of them where contacts hold the structure
 BALANCED = 1e-6  # of the forces on a part that contacts alone hold: a mean force that drives it is larger
 ROUNDING = 1e-15
 _LEAST_RISE = 1e-3  # share of the excitation below which it is raised no further
@@ -162,12 +160,13 @@ class Workspace:
         u, spent = np.zeros(self.balance.n_unknowns), 0
         if guess is not None:
             good, spent, norm = self._newton(guess, u, p)
-            if good:
+            if good and self.forces_balance(u, p):
                 return PointSolution(converged=True, u=u, iterations=spent, residual=norm)
         good, norm = False, np.inf
         for way in self._ways():
             good, more, norm = way(u, p)
             spent += more
+            good = good and self.forces_balance(u, p)
             if good:
                 break
         return PointSolution(converged=bool(good), u=u, iterations=int(spent), residual=float(norm))
@@ -184,6 +183,8 @@ class Workspace:
         at_rest = partial(self._by_level, at_rest=True)
         if self.balance.system.constant_mean:
             return stuck, soft, at_rest, self._from_fewer, rungs, self._by_level
+        if np.any(self.balance.system.shift):  # contacts hold it: the less they stick the farther it may seem
+            return stuck, rungs, self._from_fewer, soft, self._by_level
         return stuck, self._from_fewer, soft, rungs, self._by_level
 
     def _from_fewer(self, u: Real, p: float) -> tuple[bool, int, float]:
@@ -202,6 +203,21 @@ class Workspace:
             good = False
         return PointSolution(converged=bool(good), u=u, iterations=int(spent), residual=float(norm))
 
+    def forces_balance(self, u: Real, p: float) -> bool:
+        """Return whether the vibrating forces balance, kt r of them left, where contacts hold the structure.
+
+        The residual r is relative to motions: of a light part far away it is small whatever the forces are.
+        """
+        system, ports = self.balance.system, self.balance.n_ports
+        if not np.any(system.shift):
+            return True
+        point = self.forces(u, p)[1]
+        left = np.abs(point.residual) + ROUNDING * np.abs(u)  # of a part far away, rounding of its place
+        largest = left.reshape(ports, -1)[:, int(system.ks[0] == 0) :].max(axis=1)
+        free = np.abs(receptance_by_value(self.linear).u_linear[0]).max(axis=0)
+        size = max(np.abs(point.F).max(), (system.shift * free).max())
+        return bool((system.shift * largest).max() <= HELD_FORCE * size)
+
     def _balanced(self, u: Real, p: float) -> bool:
         """Return whether the mean forces on what contacts alone hold balance, relative to these forces.
 
@@ -212,8 +228,7 @@ class Workspace:
     def drive(self, u: Real, p: float) -> Drive:
         """Return the mean force left on what contacts alone hold, where (u, p) solves the rest."""
         system, n = self.balance.system, self.balance.n_coefficients
-        _, point = self.forces(u, p)
-        forces = self._mean_forces(point)
+        forces = self._mean_forces(point := self.forces(u, p)[1])
         carried = np.abs(system.loose) @ np.abs(point.F).max(axis=1)
         free = receptance_by_value(self.linear).u_linear[0, 0].real
         applied = np.abs(system.loose @ (system.shift * free))

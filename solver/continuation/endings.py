@@ -29,12 +29,12 @@ def too_stiff(workspace: Workspace, stretches: list[Stretch]) -> bool:
     rows = [
         stretch.solutions[place, -1] for stretch in stretches if len(stretch.solutions) for place in (0, -1)
     ]
-    if not rows:
-        return False
-    both = [
-        np.abs(np.diagonal(workspace.receptance(float(at)).A[0], axis1=1, axis2=2))
-        for at in (rows[0], rows[-1])
-    ]
+    return bool(rows) and too_stiff_between(workspace, float(rows[0]), float(rows[-1]))
+
+
+def too_stiff_between(workspace: Workspace, first: float, last: float) -> bool:
+    """Return the same of two values of λ (inside unit)."""
+    both = [np.abs(np.diagonal(workspace.receptance(at).A[0], axis1=1, axis2=2)) for at in (first, last)]
     A = np.minimum(*both)
     system = workspace.balance.system
     kt = system.contacts[system.owner, KT]

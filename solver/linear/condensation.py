@@ -94,13 +94,10 @@ def reduce_model(
     shift, loose = np.zeros(kt.size), np.zeros((0, kt.size))
     if 0 in ks:
         loose = _loose(model, held.K[which[0]], L[which[0]], kt)
-        if len(loose) or not (model.prescribed or held_alone(held)):
-            shift, held = kt.copy(), held_by(held, L, kt)
-    found = None if dense_asked else decompose(held)
-    if found is None and not dense_asked and not held_alone(held):
-        # A free part has a double pole at 0, of which there are no two eigenvectors: held, it has not.
+    if len(loose) or not (model.prescribed or held_alone(held)):
+        # Also without a mean: of a light part A is 1/(m ω²) else, 1e9 times what its contacts let it move.
         shift, held = kt.copy(), held_by(held, L, kt)
-        found = decompose(held)
+    found = None if dense_asked else decompose(held)
     if found is None and not apart:
         which, diameters, moving = _structures(model, ks, apart=True)
         L = model.ports_at(diameters)
@@ -171,6 +168,12 @@ def loose_ports(scene: Scene) -> tuple[Real, Real]:
     kt = port_stiffnesses(scene, model)
     static = matrices_of(model, np.zeros(1, np.int64), np.zeros(1, np.bool_))
     return _loose(model, static.K[0], model.contact_here + model.contact_next, kt), kt
+
+
+def contacts_hold(model: LinearModel) -> bool:
+    """Return whether the structure alone does not hold every part against the first harmonic's motion."""
+    matrices = matrices_of(model, model.diameters(np.ones(1, np.int64)), np.ones(1, np.bool_))
+    return not (model.prescribed or held_alone(matrices))
 
 
 def _loose(model: LinearModel, K: NDArray[Any], L: NDArray[Any], kt: Real) -> Real:

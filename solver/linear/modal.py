@@ -28,7 +28,7 @@ from solver.matrices.normal_modes import (
 CLASSICAL = 1e-11  # largest off-diagonal modal damping, relative to the diagonal, that counts as none
 ROUNDING = 4.0  # the same in units of what the modes lack in orthogonality
 SPAN_ERROR = 1e-11  # largest relative error of the pole form against the direct inverse
-SINGULAR = 1e-13  # smallest squared pivot of the scaled K that counts as held in place
+SINGULAR = 1e-9  # smallest squared pivot of the scaled K that counts as held in place, not by a hair
 LEAST_POLE = 1e-25  # smallest |1/s| relative to the largest: below is rounding
 
 

@@ -40,6 +40,16 @@ class SolutionStatus(Enum):
         "At this frequency there is a resonance and no damping, so that nothing bounds the "
         "response: give the structure some (damping_ratio = 0.001, say)."
     )
+    TOO_STIFF = (
+        "A contact is so much stiffer than the structure that what it deforms is lost in the rounding of its "
+        "motion: lower kt. Above a million times the structure's stiffness the response no longer depends on "
+        "it."
+    )
+    POWER_LOST = (
+        "The balance is satisfied as far as rounding shows, but the power put in is not what is dissipated: "
+        "no such motion exists. Press parts that contacts alone hold harder, hold them by a spring, or lower "
+        "kt."
+    )
     LAW_FAILED = (
         "The law of a contact gives no finite force that repeats from period to period for a motion tried: "
         "look at its functions and parameters, or give it more samples."

@@ -20,6 +20,7 @@ from solver.contacts.kernels.stick_slip_events import FAILED, STUCK
 from solver.contacts.kernels.system import UNHELD, evaluation_by_value
 from solver.continuation.branches.adaptive_harmonics import solve_to
 from solver.continuation.branches.symmetry_breaking import assumed_flags, seen
+from solver.continuation.endings import too_stiff_between
 from solver.continuation.extrema.error_estimate import UNKNOWN, truncation_error
 from solver.continuation.from_nothing import solve_from_nothing
 from solver.jit import fourier
@@ -28,6 +29,7 @@ from solver.linear.condensation import loose_ports
 from solver.linear.undamped import undamped_resonance
 from solver.response.contact_response import OPENS, ContactResponse, ContactState, contact_responses
 from solver.response.history_dependence import has_another_solution, history_of
+from solver.response.power_balance import power_lost
 from solver.response.solution import HISTORY_DEPENDENT, MEAN_UNDETERMINED, Solution, SolutionStatus
 from solver.scene.scene import Scene
 
@@ -35,6 +37,9 @@ if TYPE_CHECKING:
     from solver.continuation.branch import Branch
 
     pass
+
+NEARBY = 0.9  # of a frequency: there, an undamped resonance is no reason for a large receptance
+LOST = 1e-2  # of the apparent power: at a resonance that nearly nothing damps rounding is amplified by 1e10
 
 
 def solve(
@@ -77,9 +82,16 @@ def solve(
         failed = _failure(workspace.balance, frequency_hz, found, time.perf_counter() - begun)
         if not found.ratchets and _law_fails(workspace, found.u, omega):
             failed = replace(failed, status=SolutionStatus.LAW_FAILED)
+        elif failed.status is SolutionStatus.NOT_CONVERGED and too_stiff_between(
+            workspace, omega, NEARBY * omega
+        ):
+            failed = replace(failed, status=SolutionStatus.TOO_STIFF)
         return failed
     found, flags = seen(workspace, found, omega)
     solution = describe(workspace, found, frequency_hz, begun)
+    if solution.converged and power_lost(solution) > LOST:
+        failed = _failure(workspace.balance, frequency_hz, found, time.perf_counter() - begun)
+        return replace(failed, status=SolutionStatus.POWER_LOST)
     solution = replace(solution, flags=(*solution.flags, *assumed_flags(workspace.balance), *flags))
     return solution if good_enough else replace(solution, status=SolutionStatus.ACCURACY_NOT_REACHED)
 

@@ -14,7 +14,7 @@ from solver.errors import SettingError
 from solver.jit import fourier
 from solver.jit.fourier import Complex, Real
 from solver.linear.assembly import linear_model, row_of
-from solver.linear.condensation import force_amplitudes
+from solver.linear.condensation import contacts_hold, force_amplitudes
 from solver.linear.contact_table import port_stiffnesses
 from solver.linear.model import LinearModel
 from solver.response.solution import Solution
@@ -81,9 +81,10 @@ def response(solution: Solution, k: int) -> Complex:
 def coordinates(solution: Solution, k: int) -> Complex:
     """Return the complex amplitudes of all coordinates of the matrices, (n,), behind a converged solution.
 
-    They are the DOFs, or those of the matrices or modes a structure is given by. The mean is found with
-    contact stiffnesses on both sides, (K + Lᵀ kt L) x̂_0 = f̂_0 − Lᵀ (F̂_0 − kt û_0), because a part may
-    be held in place by its contacts alone.
+    They are the DOFs, or those of the matrices or modes a structure is given by. The mean, and every
+    harmonic of a structure that contacts alone hold, is found with contact stiffnesses on both sides,
+    (Z_k + Lᵀ kt L) x̂_k = f̂_k − Lᵀ (F̂_k − kt û_k): without, all would be the difference of forces that
+    nearly balance over an inertia that may be next to nothing.
     """
     _check_converged(solution)
     model = linear_model(solution.scene)
@@ -92,9 +93,10 @@ def coordinates(solution: Solution, k: int) -> Complex:
     force = force_amplitudes(model, np.array([k], dtype=np.int64))[0]
     forces = [fourier.to_complex(force)[k] for c in solution.contacts for force in c.forces]
     friction = np.array(forces, dtype=np.complex128)
-    if k == 0 and solution.contacts:
+    if solution.contacts and (k == 0 or contacts_hold(model)):
         kt = port_stiffnesses(solution.scene, model)
-        friction = friction - kt * np.array([motion[0] for c in solution.contacts for motion in c.motions])
+        motions = [fourier.to_complex(motion)[k] for c in solution.contacts for motion in c.motions]
+        friction = friction - kt * np.array(motions)
         K = K + L.conj().T @ (kt[:, None] * L)
     speed = 2.0 * math.pi * solution.frequency_hz * k
     dynamic = K - speed**2 * M + 1j * speed * C
@@ -113,8 +115,10 @@ def all_coordinates(solution: Solution) -> Complex:
     friction = np.array(forces, dtype=np.complex128).reshape(-1, ks.size).T
     if solution.contacts:
         kt = port_stiffnesses(solution.scene, model)
-        friction[0] -= kt * np.array([motion[0] for c in solution.contacts for motion in c.motions])
-        K[0] += L[0].conj().T @ (kt[:, None] * L[0])
+        motions = np.array([fourier.to_complex(each) for c in solution.contacts for each in c.motions]).T
+        held = slice(None) if contacts_hold(model) else slice(1)
+        friction[held] -= kt * motions[held]
+        K[held] += np.swapaxes(L[held].conj(), 1, 2) @ (kt[:, None] * L[held])
     speed = (2.0 * math.pi * solution.frequency_hz * ks)[:, None, None]
     pushes = force_amplitudes(model, ks) - np.einsum("kpn,kp->kn", L.conj(), friction)
     return np.asarray(np.linalg.solve(K - speed**2 * M + 1j * speed * C, pushes[:, :, None])[:, :, 0])
