@@ -11,8 +11,8 @@ from solver.balance.balance import Balance, check_level
 from solver.balance.parameter import Kind, Parameter, resolve
 from solver.balance.simplifications import even_harmonics_reason
 from solver.balance.speed_line import check_given_loads
-from solver.contacts.kernels.columns import COLUMNS
-from solver.contacts.kernels.system import LOAD_COEFFICIENTS, MODES
+from solver.contacts.kernels.columns import highest_order
+from solver.contacts.kernels.system import MODES
 from solver.contacts.load_derivatives import load_slopes
 from solver.errors import SettingError
 from solver.jit.fourier import Complex, Real
@@ -40,6 +40,10 @@ def resolved(balance: Balance, paths: Sequence[str]) -> tuple[Parameter, ...]:
             raise SettingError("paths", path, "must be a value of the scene; the frequency is not")
         if parameter.kind is Kind.LEVEL:
             check_level(scene)
+        order = highest_order(parameter.column)
+        if order > int(balance.system.load_ks[-1]):
+            wanted = f"needs a load with that harmonic: give it {{order = {order}, amplitude = 0.0}} first"
+            raise SettingError("paths", path, wanted)
         reason = even_harmonics_reason(scene, (path,)) if balance.system.ks[0] != 0 else None
         if reason is not None:
             raise SettingError("paths", path, f"needs a balance with even harmonics: {reason}")
@@ -52,12 +56,12 @@ def contact_slopes(balance: Balance, parameters: Sequence[Parameter]) -> tuple[R
 
     Returns
     -------
-    (n_paths, n_contacts, COLUMNS) of the rows of the contact table, and (n_paths, n_contacts, 3) of the
+    (n_paths, n_contacts, ·) of the rows of the contact table, and (n_paths, n_contacts, 1 + 2 K) of the
     coefficients of the loads, see `solver.contacts.load_derivatives`.
     """
     rows = balance.system.contacts
-    slopes = np.zeros((len(parameters), rows.shape[0], COLUMNS))
-    loads = np.zeros((len(parameters), rows.shape[0], LOAD_COEFFICIENTS))
+    slopes = np.zeros((len(parameters), *rows.shape))
+    loads = np.zeros((len(parameters), rows.shape[0], 2 * balance.system.load_ks.size - 1))
     for slope, load, parameter in zip(slopes, loads, parameters, strict=True):
         acts = parameter.active > 0.0
         if acts.any():

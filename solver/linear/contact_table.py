@@ -64,12 +64,20 @@ def port_counts(scene: Scene) -> Integer:
     return np.array([len(contact.end_keys) for contact in scene.contacts], dtype=np.int64)
 
 
-def contact_table(scene: Scene, highest: int) -> Real:
-    """Return the rows of all contacts, (n_contacts, COLUMNS), for harmonics up to `highest`.
+def highest_load(scene: Scene, column: int = 0) -> int:
+    """Return the highest harmonic of the normal loads, 1 or more, with the one that a column is of."""
+    given = [len(contact.load.higher) + 1 for contact in scene.contacts if contact.load is not None]
+    return max([columns.highest_order(column), *given])
 
-    A load that is not tied has a ratio NaN.
+
+def contact_table(scene: Scene, highest: int, load_order: int | None = None) -> Real:
+    """Return the rows of all contacts, (n_contacts, ·), for harmonics up to `highest`.
+
+    They have columns for loads up to harmonic `load_order`, else as many as the scene calls for. A load that
+    is not tied has a ratio NaN.
     """
-    table = np.zeros((len(scene.contacts), columns.COLUMNS))
+    width = columns.wave_column((load_order or highest_load(scene)) + 1)
+    table = np.zeros((len(scene.contacts), width))
     table[:, columns.RATIO] = math.nan
     for row, contact in zip(table, scene.contacts, strict=True):
         contact.fill(row, highest)
