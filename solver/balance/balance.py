@@ -10,7 +10,7 @@ import numpy as np
 from solver.balance.parameter import Kind, Parameter, resolve
 from solver.balance.simplifications import Effects, even_harmonics_reason
 from solver.balance.speed_line import speed_line
-from solver.contacts.kernels.columns import N0, highest_order
+from solver.contacts.kernels.columns import N0
 from solver.contacts.kernels.system import System
 from solver.errors import SettingError
 from solver.jit.fourier import Integer
@@ -160,8 +160,7 @@ def for_parameter(balance: Balance, path: str, frequency_hz: float) -> Balance:
     SettingError
         Even harmonics were left out, but λ calls for them: build the first balance with them.
     """
-    new_order = highest_order(resolve(balance.scene, path).column) > int(balance.system.load_ks[-1])
-    if balance.scene.speed_order is not None or new_order:
+    if balance.scene.speed_order is not None:
         scene = balance.scene.at_frequency(frequency_hz)
         effects = replace(balance.effects, even_harmonics=int(balance.system.ks[0]) == 0)
         return build(scene, path, harmonics=balance.n_harmonics, frequency_hz=frequency_hz, effects=effects)
@@ -239,10 +238,10 @@ def _system(
         model, ks, port_stiffnesses(scene, model), derivative, whole_matrices=effects.whole_matrices,
         each_port=effects.every_port,
     )  # fmt: skip
-    load_order = highest_load(scene, parameter.column)
+    load_order = highest_load(scene)
     highest = max(int(ks[-1]), load_order)
     cos_table, sin_table = grid_tables(grid_size(highest), highest)
-    line, table = speed_line(scene), contact_table(scene, int(ks[-1]), load_order)
+    line, table = speed_line(scene), contact_table(scene, int(ks[-1]))
     table[line.follows, N0] = line.least
     return System(
         ks=ks, load_ks=np.arange(load_order + 1, dtype=np.int64), which=reduced.which, cos_table=cos_table,

@@ -15,7 +15,13 @@ from solver.jit.fourier import Real
 from solver.scene.bodies.paths import SPEED, is_body_path, least_value, unit_of
 from solver.scene.bodies.shape_parts import contact_shares, least_shape_value, shape_of, shape_unit
 from solver.scene.bodies.shapes import POINTS
-from solver.scene.parameter_paths import changed_quantities, follows_speed, has_parameter, is_gas_path, structure_unit
+from solver.scene.parameter_paths import (
+    changed_quantities,
+    follows_speed,
+    has_parameter,
+    is_gas_path,
+    structure_unit,
+)
 from solver.scene.scene import Scene
 
 

@@ -11,7 +11,6 @@ from solver.balance.balance import Balance, check_level
 from solver.balance.parameter import Kind, Parameter, resolve
 from solver.balance.simplifications import even_harmonics_reason
 from solver.balance.speed_line import check_given_loads
-from solver.contacts.kernels.columns import highest_order
 from solver.contacts.kernels.system import MODES
 from solver.contacts.load_derivatives import load_slopes
 from solver.errors import SettingError
@@ -40,10 +39,6 @@ def resolved(balance: Balance, paths: Sequence[str]) -> tuple[Parameter, ...]:
             raise SettingError("paths", path, "must be a value of the scene; the frequency is not")
         if parameter.kind is Kind.LEVEL:
             check_level(scene)
-        order = highest_order(parameter.column)
-        if order > int(balance.system.load_ks[-1]):
-            wanted = f"needs a load with that harmonic: give it {{order = {order}, amplitude = 0.0}} first"
-            raise SettingError("paths", path, wanted)
         reason = even_harmonics_reason(scene, (path,)) if balance.system.ks[0] != 0 else None
         if reason is not None:
             raise SettingError("paths", path, f"needs a balance with even harmonics: {reason}")

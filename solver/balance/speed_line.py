@@ -15,7 +15,6 @@ from solver.scene.parameter_paths import AMPLITUDE, follows_speed, has_parameter
 from solver.scene.scene import Scene
 
 
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SpeedLine:
     """Polynomials of ω in place of numbers.

@@ -64,19 +64,18 @@ def port_counts(scene: Scene) -> Integer:
     return np.array([len(contact.end_keys) for contact in scene.contacts], dtype=np.int64)
 
 
-def highest_load(scene: Scene, column: int = 0) -> int:
-    """Return the highest harmonic of the normal loads, 1 or more, with the one that a column is of."""
+def highest_load(scene: Scene) -> int:
+    """Return the highest harmonic of the normal loads, 1 or more."""
     given = [len(contact.load.higher) + 1 for contact in scene.contacts if contact.load is not None]
-    return max([columns.highest_order(column), *given])
+    return max([1, *given])
 
 
-def contact_table(scene: Scene, highest: int, load_order: int | None = None) -> Real:
+def contact_table(scene: Scene, highest: int) -> Real:
     """Return the rows of all contacts, (n_contacts, ·), for harmonics up to `highest`.
 
-    They have columns for loads up to harmonic `load_order`, else as many as the scene calls for. A load that
-    is not tied has a ratio NaN.
+    A load that is not tied has a ratio NaN.
     """
-    width = columns.wave_column((load_order or highest_load(scene)) + 1)
+    width = columns.wave_column(highest_load(scene) + 1)
     table = np.zeros((len(scene.contacts), width))
     table[:, columns.RATIO] = math.nan
     for row, contact in zip(table, scene.contacts, strict=True):

@@ -42,7 +42,7 @@ def kept_harmonics(
     kept = {*range(highest + 1), *forced}
     for k in load_orders(scene, paths):
         # Friction is the load times the direction of slip: sums and differences with a slow wave.
-        kept |= set(range(k - 1, k + 2)) if k > highest else set()
+        kept |= set(range(k - 1, k + 2)) if k > max(highest, 1) else set()
     for h in {force.harmonic for force in scene.forces}:
         if h < FAST:
             continue

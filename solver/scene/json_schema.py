@@ -81,7 +81,10 @@ def scene_schema() -> dict[str, Any]:
 def _load_list(definition: dict[str, Any]) -> None:
     """The list of a load as a file gives it: its mean first, which stands there or as N0."""
     load = definition["properties"]["load"]
-    number, table = {"type": "number", "description": "Mean normal load [N]."}, {"$ref": "#/$defs/LoadHarmonic"}
+    number, table = (
+        {"type": "number", "description": "Mean normal load [N]."},
+        {"$ref": "#/$defs/LoadHarmonic"},
+    )
     load.pop("anyOf")
     load.pop("default", None)
     load |= {"type": "array", "prefixItems": [{"anyOf": [number, table]}], "items": table}

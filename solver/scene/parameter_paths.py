@@ -111,14 +111,13 @@ _PROPORTIONAL_UNITS = dict(zip(PROPORTIONAL, ("s", "1/s"), strict=True))
 
 def has_parameter(contact: AnyContact, owner: str, key: str) -> bool:
     """Whether the path ``owner.key`` acts on a contact: its name or group, and a parameter of its law."""
-    return owner in (contact.name, contact.group) and contact.quantity(key) is not None
+    return owner in (contact.name, contact.group) and key in contact.parameters
 
 
 def changed_quantities(scene: HasParts, path: str) -> tuple[Quantity, ...]:
     """What a path changes in each contact it acts on; nothing of a path that is no contact's."""
     owner, _, key = path.rpartition(".")
-    found = (c.quantity(key) for c in scene.contacts if owner in (c.name, c.group))
-    return tuple(quantity for quantity in found if quantity is not None)
+    return tuple(c.parameters[key] for c in scene.contacts if has_parameter(c, owner, key))
 
 
 def follows_speed(scene: HasParts, path: str) -> str | None:
@@ -161,9 +160,8 @@ def check_path(scene: HasParts, path: str) -> None:
     """
     if path == SPEED and scene.speed_order is not None:
         return
-    if path == FREQUENCY or changed_quantities(scene, path) or path in parameter_paths(scene):
-        return
-    raise _unknown(scene, path, FREQUENCY)
+    if path != FREQUENCY and path not in parameter_paths(scene):
+        raise _unknown(scene, path, FREQUENCY)
 
 
 def value(scene: HasParts, path: str) -> float:
@@ -231,8 +229,8 @@ def _with_value(scene: _SceneT, path: str, new: float) -> _SceneT:
     if not any(has_parameter(contact, owner, key) for contact in own):
         raise _unknown(scene, path)
     contacts = tuple(
-        _changed(contact, contact.changed_by(key, new), path, new, quantity.wanted)
-        if owner in (contact.name, contact.group) and (quantity := contact.quantity(key)) is not None
+        _changed(contact, contact.changed_by(key, new), path, new, contact.parameters[key].wanted)
+        if has_parameter(contact, owner, key)
         else contact
         for contact in scene.contacts
     )

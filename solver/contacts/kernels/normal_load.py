@@ -1,4 +1,4 @@
-"""The given normal load of the contacts, N0 + Σ N_k cos(kτ + φ_k): its coefficients, their derivatives by λ."""
+"""The given normal load of the contacts, N0 + Σ N_k cos(kτ + φ_k): coefficients, derivatives by λ."""
 
 from __future__ import annotations
 

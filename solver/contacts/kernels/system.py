@@ -48,7 +48,7 @@ class System(NamedTuple):
     """
 
     ks: Integer  # (nk,) harmonics kept, ascending
-    load_ks: Integer  # (K + 1,) harmonics of the normal loads: 0 and all up to the highest of the scene, 1 or more
+    load_ks: Integer  # (K + 1,) harmonics of the normal loads, 0 … K; K ≥ 1 is the highest in the scene
     which: Integer  # (nk,) structure of each harmonic
     cos_table: Real
     sin_table: Real
@@ -292,7 +292,8 @@ def _new_evaluation(system: System, spanned: bool) -> Evaluation:
         np.zeros(nt), np.zeros(nt), np.zeros((nc, n)), np.zeros((blocks, n, n)), np.zeros((nc, n)),
         np.zeros(n), np.zeros(n), np.zeros((n, coefficient_count(system.load_ks))), np.zeros(ne, np.int64),
         np.zeros(ne, np.int64), np.zeros(ne),
-        np.zeros((segment_capacity(max(system.ks[-1], system.load_ks[-1])), SEGMENT_COLUMNS)), np.zeros((whole, whole)),
+        np.zeros((segment_capacity(max(system.ks[-1], system.load_ks[-1])), SEGMENT_COLUMNS)),
+        np.zeros((whole, whole)),
         np.zeros((size + 1, size + 1)), np.zeros(nt + 1, np.int32), np.zeros(nc, np.int64),
         np.zeros(nc, np.int64), np.zeros(COUNTS, np.int64), np.zeros((blocks, n, n)),
         np.zeros((nk, ports, ports), np.complex128), np.zeros((nk, ports, ports), np.complex128),

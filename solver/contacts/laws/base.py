@@ -128,10 +128,6 @@ class AnyContact(Element, InSpace):
         """Its numbers that are parameter paths, with those it has because of its values."""
         return self.PARAMETERS
 
-    def quantity(self, key: str) -> Quantity | None:
-        """Return what a parameter is, also of one it may be given; None of what it has not."""
-        return self.PARAMETERS.get(key)
-
     def value_of(self, key: str) -> float:
         """Value of a parameter.
 

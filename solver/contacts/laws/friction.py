@@ -12,7 +12,7 @@ from pydantic import ConfigDict, Field, field_validator, model_validator
 from solver.contacts.fields import Angle, Friction, Positive, Real, Signed
 from solver.contacts.kernels import columns
 from solver.contacts.laws.base import AnyContact
-from solver.contacts.laws.harmonics import LoadHarmonic, higher_quantity, as_harmonics, named_apart, order_of
+from solver.contacts.laws.harmonics import LoadHarmonic, as_harmonics, higher_quantity, named_apart, order_of
 from solver.contacts.laws.parts import Held, NormalLoad, Quantity, Slider, Span
 from solver.errors import SettingError
 
@@ -66,8 +66,8 @@ class FrictionContact(AnyContact):
         "N1": "Amplitude of the normal load [N]; in place of N1_ratio.",
         "N1_ratio": "Amplitude of the normal load as a multiple of N0; in place of N1.",
         "N1_phase": "Phase of the normal load [rad]: N0 + N1 cos(ωt + N1_phase).",
-        "load": "The normal load as a Fourier list: its mean [N], which may stand as N0 instead, then a table "
-        "of `order`, `amplitude` [N] and `phase` [rad] for each harmonic amplitude cos(order ωt + phase).",
+        "load": "The normal load as a Fourier list: its mean [N], which may stand as N0 instead, then for "
+        "each harmonic a table of `order`, `amplitude` [N] and `phase` [rad]: amplitude cos(order ωt + phase).",
     }
     HELD: ClassVar[tuple[Held, ...]] = (Held(columns.KT),)
     RUBBING: ClassVar[tuple[int, ...]] = (0,)
@@ -144,10 +144,6 @@ class FrictionContact(AnyContact):
                 found[key] = higher_quantity(key)
         return found
 
-    def quantity(self, key: str) -> Quantity | None:
-        """Return what a parameter is; of the load any harmonic may be given."""
-        return self.PARAMETERS.get(key) or (None if order_of(key) is None else higher_quantity(key))
-
     def value_of(self, key: str) -> float:
         """Value of a parameter; of the load's amplitude whichever way it was given."""
         if key == "N1":
@@ -172,7 +168,11 @@ class FrictionContact(AnyContact):
         order = order_of(key)
         if order is None:
             return {key: new}
-        changed = {"order": order, "amplitude": self.value_of(f"N{order}"), "phase": self.value_of(f"N{order}_phase")}
+        changed = {
+            "order": order,
+            "amplitude": self.value_of(f"N{order}"),
+            "phase": self.value_of(f"N{order}_phase"),
+        }
         changed["phase" if key.endswith("_phase") else "amplitude"] = new
         return {"higher_load": (*(each for each in self.higher_load or () if each.order != order), changed)}
 

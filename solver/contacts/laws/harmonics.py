@@ -1,4 +1,4 @@
-"""The normal load as a Fourier list, `load = [N0, {order, amplitude, phase}, …]`: its harmonics and their paths.
+"""The normal load as a Fourier list, `load = [N0, {order, amplitude, phase}, …]`: harmonics and their paths.
 
 N0, N1 and N1_phase are fields of their own; the list keeps the harmonics from the second on.
 """
@@ -43,7 +43,9 @@ class LoadHarmonic(Part):
     def in_sector(self, turn: float, *, standing: bool) -> LoadHarmonic:
         """Return it in a sector that the wave's first harmonic reaches an angle later [rad]."""
         angle = self.order * turn
-        changed = {"amplitude": self.amplitude * math.cos(angle)} if standing else {"phase": self.phase + angle}
+        changed = (
+            {"amplitude": self.amplitude * math.cos(angle)} if standing else {"phase": self.phase + angle}
+        )
         return self.model_copy(update=changed)
 
     def times(self, factor: float) -> LoadHarmonic:
@@ -112,7 +114,9 @@ def as_harmonics(given: Any) -> Any:
     orders: set[object] = set()
     for i, each in enumerate(given):
         if _is_number(each) and i > 0:
-            raise ValueError(f"`load` must have its mean first and then tables, got {each!r} in place {i + 1}")
+            raise ValueError(
+                f"`load` must have its mean first and then tables, got {each!r} in place {i + 1}"
+            )
         order = each.get("order") if isinstance(each, Mapping) else getattr(each, "order", None)
         if order is not None and order in orders:
             raise ValueError(f"`load` must have one entry of each order, got order {order!r} twice")

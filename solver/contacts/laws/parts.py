@@ -108,10 +108,14 @@ class NormalLoad:
     higher: tuple[tuple[float, float], ...] = ()
 
     @property
+    def waves(self) -> tuple[tuple[float, float], ...]:
+        """Amplitude and phase of the harmonics 1, 2, … [N, rad]."""
+        return ((self.amplitude, self.phase), *self.higher)
+
+    @property
     def orders(self) -> tuple[int, ...]:
         """The harmonics in which it varies, ascending."""
-        waves = (self.amplitude, *(amplitude for amplitude, _ in self.higher))
-        return tuple(order for order, amplitude in enumerate(waves, start=1) if amplitude != 0.0)
+        return tuple(order for order, (size, _) in enumerate(self.waves, start=1) if size != 0.0)
 
     @property
     def in_proportion(self) -> bool:
@@ -121,8 +125,7 @@ class NormalLoad:
     @property
     def coefficients(self) -> Real:
         """Its Fourier coefficients (1 + 2 K,) [N], K its highest harmonic, 1 or more."""
-        waves = ((self.amplitude, self.phase), *self.higher)
-        pairs = [(size * math.cos(phase), -size * math.sin(phase)) for size, phase in waves]
+        pairs = [(size * math.cos(phase), -size * math.sin(phase)) for size, phase in self.waves]
         return np.array([self.mean, *(number for pair in pairs for number in pair)])
 
     @property
@@ -134,20 +137,17 @@ class NormalLoad:
 
     @property
     def least_at(self) -> float:
-        """The angle of its least value [rad]: of all roots of its derivative, with z = e^{iτ} a polynomial."""
+        """The angle of its least value [rad], among the roots of its derivative, a polynomial in e^{iτ}."""
         if self.orders in ((), (1,)):
             return (math.pi if self.amplitude > 0.0 else 0.0) - self.phase
-        complex_slopes = [
-            0.5j * order * amplitude * cmath.exp(1j * phase)
-            for order, (amplitude, phase) in enumerate(((self.amplitude, self.phase), *self.higher), start=1)
-        ]
-        polynomial = [*reversed(complex_slopes), 0.0, *(slope.conjugate() for slope in complex_slopes)]
-        return min(np.angle(np.roots(polynomial)).tolist(), key=self.at)
+        up = [0.5j * k * size * cmath.exp(1j * phase) for k, (size, phase) in enumerate(self.waves, start=1)]
+        roots = np.roots([*reversed(up), 0.0, *(each.conjugate() for each in up)])
+        return float(min(np.angle(roots).tolist(), key=self.at))
 
     def at(self, tau: float) -> float:
         """Its value at an angle [N]."""
-        waves = enumerate(((self.amplitude, self.phase), *self.higher), start=1)
-        return self.mean + sum(size * math.cos(order * tau + phase) for order, (size, phase) in waves)
+        waves = enumerate(self.waves, start=1)
+        return self.mean + sum(size * math.cos(k * tau + phase) for k, (size, phase) in waves)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

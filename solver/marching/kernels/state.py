@@ -33,8 +33,8 @@ class System(NamedTuple):
     W is the inverse of the mass matrix times omega^-2. L is that of the motions along which contacts pull,
     `kt` is also the stiffness of a gap spring. Of the laws elastic-normal and circle: the normal motions,
     their stiffness, and the part of the normal force that is in equilibrium at rest; `presses` is 0 where
-    another row has that force already. `waves` and `wave_phases` (n_contacts, K) are of the harmonics 1 … K of
-    the given loads. `powers` (n_contacts, degree) are the coefficients of polynomial
+    another row has that force already. `waves` and `wave_phases` (n_contacts, K) are of the given loads'
+    harmonics 1 … K. `powers` (n_contacts, degree) are the coefficients of polynomial
     springs. Of laws given by functions: their numbers, whether they go from sample to sample, how many states
     they have, their parameters (n_contacts, MOST_OWN), their damping at rest [N s/m], and the frequency
     [rad/s].

@@ -136,9 +136,9 @@ def annulus(scene: Scene) -> Scene:
     DOF ``tip`` of sector j is ``tip@j``, contact ``shroud`` becomes ``shroud@j`` in the group ``shroud``
     (or in the group it had), a named spring ``k`` becomes ``k@j`` in the group ``k``, times
     the sector's factor of the mistuning. In a travelling wave sector j has
-    harmonic * engine_order * j * 2 pi / sectors added to the phase of its forces and
-    order * engine_order * j * 2 pi / sectors to that of each harmonic of its loads; in a standing wave the amplitudes are multiplied
-    by the cosines of these angles instead. What joins a sector to itself (one sector only)
+    harmonic * engine_order * j * 2 pi / sectors added to the phase of its forces, and to that of a load's
+    harmonic of this order; in a standing wave the amplitudes are multiplied by the cosines of these angles
+    instead. What joins a sector to itself (one sector only)
     never moves and is left out. Observed is sector 0, or the one that the scene names.
 
     Raises
