@@ -67,7 +67,7 @@ class FrictionContact(AnyContact):
         "N1_ratio": "Amplitude of the normal load as a multiple of N0; in place of N1.",
         "N1_phase": "Phase of the normal load [rad]: N0 + N1 cos(ωt + N1_phase).",
         "load": "The normal load as a Fourier list: its mean [N], which may stand as N0 instead, then for "
-        "each harmonic a table of `order`, `amplitude` [N] and `phase` [rad]: amplitude cos(order ωt + phase).",
+        "each harmonic amplitude cos(order ωt + phase) a table of `order`, `amplitude` [N], `phase` [rad].",
     }
     HELD: ClassVar[tuple[Held, ...]] = (Held(columns.KT),)
     RUBBING: ClassVar[tuple[int, ...]] = (0,)
