@@ -152,7 +152,7 @@ def sets_every_load(scene: Scene, variable: Variable) -> bool:
         if getattr(contact, "N0", None) is None:
             return False
         load = contact.load
-        if load is None or (load.amplitude != 0.0 and getattr(contact, "N1_ratio", None) is None):
+        if load is None or not load.in_proportion:
             return False
         wanted.add(f"{contact.name}.N0")
     return bool(wanted) and set(variable.paths) == wanted

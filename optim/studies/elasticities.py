@@ -22,6 +22,7 @@ from optim.problem.variables import Real
 from solver.balance.parameter import resolve
 from solver.balance.parameter_derivatives import resolved
 from solver.balance.simplifications import Effects, even_harmonics_reason
+from solver.contacts.laws.harmonics import is_phase
 from solver.continuation.branch import Branch, Peak
 from solver.continuation.branches.sweep import sweep
 from solver.continuation.extrema.extrema import HALF_POWER
@@ -32,8 +33,6 @@ from solver.results.views import Views
 from solver.scene.cyclic.annulus import check_in_annulus
 from solver.scene.parameter_paths import PHASE
 from solver.scene.scene import Scene
-
-_ANGLES = (".N1_phase", PHASE)
 
 
 class SensitivityStatus(Enum):
@@ -243,7 +242,7 @@ def _rows(
         rows.append(
             ParameterSensitivity(
                 path=path, unit=resolve(scene, path).unit, value=value,
-                relative=value != 0.0 and not path.endswith(_ANGLES),
+                relative=value != 0.0 and path != PHASE and not is_phase(path.rpartition(".")[2]),
                 peaks=tuple(float(slopes[i]) for slopes in by_peak), band=float(band[i]),
             )
         )  # fmt: skip

@@ -17,7 +17,7 @@ from solver.jit.fourier import Integer
 from solver.jit.trig_polynomial import grid_size, grid_tables
 from solver.linear.assembly import linear_model, structure_derivative
 from solver.linear.condensation import reduce_model
-from solver.linear.contact_table import contact_set, contact_table, port_stiffnesses
+from solver.linear.contact_table import contact_set, contact_table, highest_load, port_stiffnesses
 from solver.scene.bodies.kinematics import static_forces
 from solver.scene.cyclic.annulus import check_in_annulus, written_out
 from solver.scene.harmonics import MOST_HARMONICS, forced_harmonics, kept_harmonics
@@ -196,7 +196,7 @@ def with_harmonics(balance: Balance, ks: Integer) -> Balance:
     """Return the same balance with the harmonics `ks`, some of its own."""
     system = balance.system
     at = np.searchsorted(system.ks, ks)
-    highest = max(int(ks[-1]), 1)
+    highest = max(int(ks[-1]), int(system.load_ks[-1]))
     cos_table, sin_table = grid_tables(grid_size(highest), highest)
     rows = {name: getattr(system, name) for name in ("modal_forces", "forces")}
     rows = {name: np.ascontiguousarray(row[at]) if row.shape[0] else row for name, row in rows.items()}
@@ -238,12 +238,13 @@ def _system(
         model, ks, port_stiffnesses(scene, model), derivative, whole_matrices=effects.whole_matrices,
         each_port=effects.every_port,
     )  # fmt: skip
-    highest = max(int(ks[-1]), 1)
+    load_order = highest_load(scene)
+    highest = max(int(ks[-1]), load_order)
     cos_table, sin_table = grid_tables(grid_size(highest), highest)
     line, table = speed_line(scene), contact_table(scene, int(ks[-1]))
     table[line.follows, N0] = line.least
     return System(
-        ks=ks, load_ks=np.arange(2, dtype=np.int64), which=reduced.which, cos_table=cos_table,
+        ks=ks, load_ks=np.arange(load_order + 1, dtype=np.int64), which=reduced.which, cos_table=cos_table,
         sin_table=sin_table, **contact_set(scene)._asdict(), contacts=table,
         samples=0, condense=0 if effects.every_contact else 1,
         least_size=reduced.least_size,

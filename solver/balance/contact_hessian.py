@@ -13,11 +13,10 @@ import numpy as np
 
 from solver.balance.kernels.residual import contact_values
 from solver.balance.parameter import Parameter
-from solver.contacts.kernels.columns import COLUMNS
 from solver.contacts.kernels.laws import law_force
 from solver.contacts.kernels.second_laws import law_second
 from solver.contacts.kernels.stick_slip_events import FAILED, SEGMENT_COLUMNS, segment_capacity
-from solver.contacts.kernels.system import LOAD_COEFFICIENTS, System
+from solver.contacts.kernels.system import System
 from solver.contacts.laws.base import without_second
 from solver.contacts.load_derivatives import contradicting
 from solver.errors import SettingError
@@ -31,12 +30,12 @@ class ContactForces:
 
     system: System
     seconds: Integer  # (ne,) numbers of the kernels of second derivatives
-    table: Real  # (ne, COLUMNS)
-    load: Real  # (ne, 3)
+    table: Real  # (ne, ·)
+    load: Real  # (ne, 1 + 2 K)
     U: Real  # (nc, n)
     F: Real  # (nc, n)
     dF_dU: Real  # (blocks, n, n)
-    dF_dN: Real  # (nc, n, 3) by the given load
+    dF_dN: Real  # (nc, n, 1 + 2 K) by the given load
 
     def ports(self, e: int) -> slice:
         """Return the ports of an element."""
@@ -57,13 +56,13 @@ class ContactForces:
         found = np.einsum("cij,pcj->pci", self.dF_dN, loads[:, self.system.owner])
         for e in range(self.system.laws.size):
             for i in np.flatnonzero(np.any(slopes[:, e] != 0.0, axis=1)):
-                found[i, self.ports(e)] += self._law(e, slopes[i, e], np.zeros(LOAD_COEFFICIENTS))[2]
+                found[i, self.ports(e)] += self._law(e, slopes[i, e], np.zeros(self.load.shape[1]))[2]
         return np.asarray(found)
 
     def second(self, e: int, w: Real, dU: Real, drow: Real, dload: Real) -> tuple[Real, Real, Real]:
         """Differentiate the gradient of w·F of an element by motions, row and load along a direction."""
         system, U = self.system, self.U[self.ports(e)]
-        by_U, by_row, by_load = np.empty(U.shape), np.empty(COLUMNS), np.empty(LOAD_COEFFICIENTS)
+        by_U, by_row, by_load = np.empty(U.shape), np.empty(self.table.shape[1]), np.empty(self.load.shape[1])
         state = law_second(
             self.seconds[e], U, system.ks, self.load[e], system.load_ks, self.table[e], system.cos_table,
             system.sin_table, w, dU, drow, dload, by_U, by_row, by_load,
@@ -77,7 +76,7 @@ class ContactForces:
         system, U = self.system, self.U[self.ports(e)]
         m, n = U.shape
         F, dF_dU, dF_dp = np.empty((m, n)), np.empty((m * m, n, n)), np.empty((m, n))
-        segments = np.zeros((segment_capacity(max(int(system.ks[-1]), 1)), SEGMENT_COLUMNS))
+        segments = np.zeros((segment_capacity(int(max(system.ks[-1], system.load_ks[-1]))), SEGMENT_COLUMNS))
         state, _ = law_force(
             system.laws[e], U, system.ks, self.load[e], system.load_ks, self.table[e], slope, dload,
             system.cos_table, system.sin_table, segments, F, dF_dU, dF_dp,
@@ -90,9 +89,9 @@ class ContactForces:
         """Evaluate all contacts."""
         for e in range(self.system.laws.size):
             ports, blocks = self.ports(e), slice(*map(int, self.system.first_block[e : e + 2]))
-            for j in range(LOAD_COEFFICIENTS):
+            for j in range(self.load.shape[1]):
                 self.F[ports], self.dF_dU[blocks], self.dF_dN[ports, :, j] = self._law(
-                    e, np.zeros(COLUMNS), np.eye(LOAD_COEFFICIENTS)[j]
+                    e, np.zeros(self.table.shape[1]), np.eye(self.load.shape[1])[j]
                 )
 
 
@@ -109,7 +108,7 @@ def contact_forces(system: System, seconds: Integer, u: Real) -> ContactForces:
     table, load, _, _ = contact_values(system, 0.0, 0.0)
     found = ContactForces(
         system=system, seconds=seconds, table=table, load=load, U=u.reshape(nc, n), F=np.empty((nc, n)),
-        dF_dU=np.empty((int(system.first_block[-1]), n, n)), dF_dN=np.empty((nc, n, LOAD_COEFFICIENTS)),
+        dF_dU=np.empty((int(system.first_block[-1]), n, n)), dF_dN=np.empty((nc, n, load.shape[1])),
     )  # fmt: skip
     found.fill()
     return found

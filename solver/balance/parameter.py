@@ -15,7 +15,13 @@ from solver.jit.fourier import Real
 from solver.scene.bodies.paths import SPEED, is_body_path, least_value, unit_of
 from solver.scene.bodies.shape_parts import contact_shares, least_shape_value, shape_of, shape_unit
 from solver.scene.bodies.shapes import POINTS
-from solver.scene.parameter_paths import follows_speed, has_parameter, is_gas_path, structure_unit
+from solver.scene.parameter_paths import (
+    changed_quantities,
+    follows_speed,
+    has_parameter,
+    is_gas_path,
+    structure_unit,
+)
 from solver.scene.scene import Scene
 
 
@@ -142,7 +148,7 @@ def resolve(scene: Scene, path: str) -> Parameter:
             unit=structure_unit(scene.structure, key), least=0.0,
         )  # fmt: skip
     acts = [has_parameter(contact, owner, key) for contact in scene.contacts]
-    members = [contact.PARAMETERS[key] for contact, mine in zip(scene.contacts, acts, strict=True) if mine]
+    members = changed_quantities(scene, path)
     if len({member.column for member in members}) > 1:
         raise SettingError("path", path, "must be of contacts whose laws mean the same by it")
     return Parameter(

@@ -11,8 +11,7 @@ from solver.balance.balance import Balance, check_level
 from solver.balance.parameter import Kind, Parameter, resolve
 from solver.balance.simplifications import even_harmonics_reason
 from solver.balance.speed_line import check_given_loads
-from solver.contacts.kernels.columns import COLUMNS
-from solver.contacts.kernels.system import LOAD_COEFFICIENTS, MODES
+from solver.contacts.kernels.system import MODES
 from solver.contacts.load_derivatives import load_slopes
 from solver.errors import SettingError
 from solver.jit.fourier import Complex, Real
@@ -52,12 +51,12 @@ def contact_slopes(balance: Balance, parameters: Sequence[Parameter]) -> tuple[R
 
     Returns
     -------
-    (n_paths, n_contacts, COLUMNS) of the rows of the contact table, and (n_paths, n_contacts, 3) of the
+    (n_paths, n_contacts, ·) of the rows of the contact table, and (n_paths, n_contacts, 1 + 2 K) of the
     coefficients of the loads, see `solver.contacts.load_derivatives`.
     """
     rows = balance.system.contacts
-    slopes = np.zeros((len(parameters), rows.shape[0], COLUMNS))
-    loads = np.zeros((len(parameters), rows.shape[0], LOAD_COEFFICIENTS))
+    slopes = np.zeros((len(parameters), *rows.shape))
+    loads = np.zeros((len(parameters), rows.shape[0], 2 * balance.system.load_ks.size - 1))
     for slope, load, parameter in zip(slopes, loads, parameters, strict=True):
         acts = parameter.active > 0.0
         if acts.any():

@@ -7,13 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from solver.contacts.laws.harmonics import is_of_variation
 from solver.errors import SettingError
 from solver.jit.fourier import Integer, Real
 from solver.scene.bodies.body import REVOLUTIONS
 from solver.scene.parameter_paths import AMPLITUDE, follows_speed, has_parameter
 from solver.scene.scene import Scene
-
-LOADS = ("N1", "N1_ratio", "N1_phase")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,7 +66,7 @@ def check_given_loads(scene: Scene, paths: Iterable[str]) -> None:
         return
     for path in paths:
         owner, _, key = path.rpartition(".")
-        if key in LOADS and follows_speed(scene, f"{owner}.N0") is not None:
+        if is_of_variation(key) and follows_speed(scene, f"{owner}.N0") is not None:
             raise SettingError("paths", path, f"must not be of a load that follows the speed ({owner}.N0)")
 
 

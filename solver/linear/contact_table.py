@@ -64,12 +64,19 @@ def port_counts(scene: Scene) -> Integer:
     return np.array([len(contact.end_keys) for contact in scene.contacts], dtype=np.int64)
 
 
+def highest_load(scene: Scene) -> int:
+    """Return the highest harmonic of the normal loads, 1 or more."""
+    given = [len(contact.load.higher) + 1 for contact in scene.contacts if contact.load is not None]
+    return max([1, *given])
+
+
 def contact_table(scene: Scene, highest: int) -> Real:
-    """Return the rows of all contacts, (n_contacts, COLUMNS), for harmonics up to `highest`.
+    """Return the rows of all contacts, (n_contacts, ·), for harmonics up to `highest`.
 
     A load that is not tied has a ratio NaN.
     """
-    table = np.zeros((len(scene.contacts), columns.COLUMNS))
+    width = columns.wave_column(highest_load(scene) + 1)
+    table = np.zeros((len(scene.contacts), width))
     table[:, columns.RATIO] = math.nan
     for row, contact in zip(table, scene.contacts, strict=True):
         contact.fill(row, highest)

@@ -42,16 +42,20 @@ def columns(
     powers = np.zeros((len(found), max(degree, 1)))
     for i, row in enumerate(found):
         powers[i, : len(row.powers)] = row.powers
+    waves = np.zeros((2, len(found), 1 + max((len(row.higher) for row in found), default=0)))
+    for i, row in enumerate(found):
+        waves[:, i, : 1 + len(row.higher)] = np.array([(row.N1, row.N1_phase), *row.higher]).T
     own = np.zeros((len(found), max((len(row.numbers) for row in found), default=0)))
     for i, row in enumerate(found):
         own[i, : len(row.numbers)] = row.numbers
-    scalars = ("kt", "mu", "N0", "N1", "N1_phase", "kn", "rest", "presses", "gap", "damping")
+    scalars = ("kt", "mu", "N0", "kn", "rest", "presses", "gap", "damping")
     whole = ("history", "in_steps", "states")
     counts = {name: np.array([getattr(row, name) for row in found], dtype=np.int64) for name in whole}
     numbers = {name: np.array([getattr(row, name) for row in found], dtype=np.float64) for name in scalars}
     laws = np.array([row.follows.value for row in found], dtype=np.int64)
     motions = {**_compressed("L", L), **_compressed("normal", selection(normal, index, n))}
-    return {**numbers, **counts, **motions, "law": laws, "powers": powers, "numbers": own}
+    swings = {"waves": waves[0], "wave_phases": waves[1]}
+    return {**numbers, **counts, **motions, **swings, "law": laws, "powers": powers, "numbers": own}
 
 
 def selection(forms: Sequence[Form], index: dict[str, int], n: int) -> csr_array:

@@ -171,12 +171,14 @@ def _steps(system: kernel.System, forces: tuple[Excitation, ...], wanted: int | 
     """Steps of the finer run: the fastest motion turns less than 0.375 rad in one of them."""
     full = system.W_value.size > system.W_start.size - 1 or bool(np.any(np.abs(system.L_value) != 1.0))
     turns = 2.0 * math.pi * _fastest(system, BALANCING if full else 1)
-    least = max(LEAST_STEPS, 2 * math.ceil(turns / 1.5), 16 * max(force.harmonic for force in forces))
+    load = int(np.max(np.nonzero(system.waves)[1], initial=0)) + 1
+    harmonic = max(load, *(force.harmonic for force in forces))
+    least = max(LEAST_STEPS, 2 * math.ceil(turns / 1.5), 16 * harmonic)
     finer = 2 if _order(system) == kernel.ORDER else FINER
     chosen = max(2 * LEAST_STEPS, finer * least) if wanted is None else wanted
     if isinstance(chosen, Integral) and chosen % 2 == 0 and least <= chosen <= MOST_STEPS:
         return int(chosen)
-    needs = f"structure and forces need at least {least} steps per period at this frequency"
+    needs = f"structure, forces and loads need at least {least} steps per period at this frequency"
     raise SettingError("steps_per_period", chosen, f"must be an even number up to {MOST_STEPS}; {needs}")
 
 

@@ -53,7 +53,7 @@ def state_at(equations: Equations, start: MarchStart, names: tuple[str, ...], om
     if equations.observed not in index.values():
         for vector in (x, v):
             vector[equations.observed] = sum(factor * vector[at] for at, factor in equations.seen)
-    load = system.N0 + system.N1 * np.cos(system.N1_phase)
+    load = system.N0 + (system.waves * np.cos(system.wave_phases)).sum(axis=1)
     moving = np.isin(system.law, (kernel.ELASTIC_NORMAL, kernel.CIRCLE))
     for c in np.flatnonzero(np.isin(system.law, _FRICTION)):
         load[c] += system.kn[c] * kernel.normal_slip(system, x, int(c))

@@ -230,7 +230,7 @@ def limit_cycles(
         raise SettingError("aero_damping", aero_damping, "must be a damping ratio, below 0 if it feeds")
     problem = pose(found.scene, found.mode, None, found.n_harmonics, whole=found.whole_matrices)
     if not problem.turns:
-        names = [c.name for c in found.scene.contacts if c.load is not None and c.load.amplitude != 0.0]
+        names = [c.name for c in found.scene.contacts if c.load is not None and c.load.orders]
         raise SettingError("N1", names, "must be 0: a limit cycle has no phase that a load could follow")
     missing = stability_left_out(found.scene, stability)
     curve, ended = points_of(problem.equations, found), found.completed

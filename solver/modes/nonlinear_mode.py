@@ -152,7 +152,7 @@ def pose(
         equations = kind(_balance(scene, harmonics, whole=True))
         found = _begin(equations, mode)
     loads = [contact.load for contact in equations.balance.scene.contacts]
-    turns = not any(load is not None and load.amplitude != 0.0 for load in loads)
+    turns = not any(load is not None and load.orders for load in loads)
     return ModeProblem(
         equations=equations, mode=found[0], rest=found[1], turns=turns, all_modes=found[2]
     )  # fmt: skip

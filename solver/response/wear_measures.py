@@ -4,8 +4,8 @@ Each measure comes with its slopes along any changes of the solution and of λ, 
 
 - friction work W = ∮ f du = π Σ_k F_k · (dU/dτ)_k, bilinear in force and motion. The motion has the harmonics
   kept only, so this is the work of the whole force of the law, not of its first harmonics.
-- least normal load: N0 − |N1| of a given load; of N0 + N1 cos(τ + φ) + kn v its minimum over the period,
-  whose place is stationary (envelope theorem).
+- least normal load: N0 − |N1| of a given load of one harmonic; of any other, and of one that gains kn v, its
+  minimum over the period, whose place is stationary (envelope theorem).
 - slip travel: with w_ξ = ξ kt u − μ N the slider moves by dw_ξ/kt while the contact slips towards ξ, so every
   slip adds the difference of w_ξ at its ends. It begins where w_ξ = −ξ c, with the offset c of the stick
   before, fixed at that stick's onset, and ends where dw_ξ/dτ = 0: these instants drop out of the
@@ -53,8 +53,8 @@ class Change(NamedTuple):
 
     dU: Real  # (n_ports, n) motions
     dF: Real  # (n_ports, n) forces, the share of λ at fixed motions
-    row: Real  # (n_contacts, COLUMNS) contact table
-    load: Real  # (n_contacts, 3) coefficients of the given normal load
+    row: Real  # (n_contacts, ·) contact table
+    load: Real  # (n_contacts, 1 + 2 K) coefficients of the given normal load
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,9 +69,9 @@ class Cycle:
         Coefficients of motions [m] and forces [N].
     dF_dU : (blocks, n, n) array
         As in `solver.contacts.kernels.system.Evaluation`.
-    table : (n_contacts, COLUMNS) array
+    table : (n_contacts, ·) array
         Parameters of the contacts at this λ.
-    load : (n_contacts, 3) array
+    load : (n_contacts, 1 + 2 K) array
         Coefficients of the given normal loads [N].
     """
 
@@ -91,8 +91,8 @@ class Cycle:
 
     @property
     def top(self) -> int:
-        """Highest harmonic of the full coefficients below; a given load has the first."""
-        return max(self.balance.highest_harmonic, 1)
+        """Highest harmonic of the full coefficients below, those of the given loads among them."""
+        return max(self.balance.highest_harmonic, int(self.balance.system.load_ks[-1]))
 
     def ports(self, e: int) -> range:
         """Return the relative motions of contact `e`."""
@@ -106,7 +106,7 @@ class Cycle:
     def normal_load(self, e: int) -> Real:
         """Return the coefficients (2 top + 1,) of the normal load of contact `e`, not cut at 0 [N]."""
         N = np.zeros(2 * self.top + 1)
-        N[:3] = self.load[e]
+        N[: self.load.shape[1]] = self.load[e]
         normal = self.balance.system.normal_port[e]
         if normal >= 0:
             N += self.table[e, self._stiffness(normal)] * self.full(self.U[normal])
@@ -115,7 +115,7 @@ class Cycle:
     def load_change(self, e: int, change: Change) -> Real:
         """Return the change of `normal_load`."""
         dN = np.zeros(2 * self.top + 1)
-        dN[:3] = change.load[e]
+        dN[: self.load.shape[1]] = change.load[e]
         normal = self.balance.system.normal_port[e]
         if normal >= 0:
             dN += change.row[e, self._stiffness(normal)] * self.full(self.U[normal])

@@ -89,6 +89,8 @@ EXAMPLES: dict[str, list[Any]] = {
     "mu": [0.3],
     "N0": [200.0],
     "N1_ratio": [0.3],
+    "load": [[120.0, {"order": 1, "amplitude": 30.0, "phase": 0.2}, {"order": 3, "amplitude": 5.0}]],
+    "order": [3],
     "band": [[500.0, 900.0]],
     "normal": [[0.0, 1.0, 0.0]],
     "inertia": [[2e-8, 2e-8, 3e-8]],

@@ -24,7 +24,8 @@ def kept_harmonics(
 ) -> Integer:
     """Return the harmonics kept, ascending; more of them for a larger `highest`, never others.
 
-    All up to `highest`; those of every force and of the normal loads, whatever `highest` is; and of a force
+    All up to `highest`; those of every force and of the normal loads, whatever `highest` is, of a load with
+    their neighbours; and of a force
     whose harmonic h is 4 or more also its multiples up to 5 h (H h for a smaller `highest` H), and where
     something else drives the structure too h ± 1, h ± 2: friction makes of a fast wave the same multiples as
     of a slow one, and the two together make the sums and differences.
@@ -39,7 +40,10 @@ def kept_harmonics(
     """
     forced = forced_harmonics(scene, paths)
     kept = {*range(highest + 1), *forced}
-    for h in forced:
+    for k in load_orders(scene, paths):
+        # Friction is the load times the direction of slip: sums and differences with a slow wave.
+        kept |= set(range(k - 1, k + 2)) if k > max(highest, 1) else set()
+    for h in {force.harmonic for force in scene.forces}:
         if h < FAST:
             continue
         kept |= {m * h for m in range(1, min(highest, multiples) + 1) if m * h <= MOST_HARMONICS}
@@ -53,19 +57,24 @@ def kept_harmonics(
 def forced_harmonics(scene: Scene, paths: Iterable[str] = ()) -> tuple[int, ...]:
     """Return the harmonics of the forces and of the normal loads that vary, ascending."""
     found = {force.harmonic for force in scene.forces}
-    loads = [contact.load for contact in scene.contacts]
-    varies = any(load is not None and load.amplitude != 0.0 for load in loads)
-    if varies or any(changed.varies_load for path in paths for changed in changed_quantities(scene, path)):
-        found |= {0, 1}
+    orders = load_orders(scene, paths)
+    found |= {0, *orders} if orders else set()
     if any(changes_loads(scene, path) for path in paths):
         found.add(0)
     return tuple(sorted(found))
 
 
+def load_orders(scene: Scene, paths: Iterable[str] = ()) -> set[int]:
+    """Return the harmonics of the normal loads that vary, or would along the paths."""
+    found = {order for contact in scene.contacts if contact.load is not None for order in contact.load.orders}
+    changed = (quantity for path in paths for quantity in changed_quantities(scene, path))
+    return found | {quantity.load_order for quantity in changed if quantity.varies_load}
+
+
 def is_fast(scene: Scene, ks: Integer) -> Flags:
     """Return which of the harmonics `ks` are multiples of a fast force's."""
     found = np.zeros(ks.size, np.bool_)
-    for h in forced_harmonics(scene):
+    for h in {force.harmonic for force in scene.forces}:
         if h >= FAST:
             found |= (ks > 0) & (ks % h == 0)
     return found

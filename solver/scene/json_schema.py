@@ -14,6 +14,7 @@ from pydantic import BaseModel
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
 
+from solver.contacts.laws import harmonics as load_harmonics
 from solver.contacts.laws.base import AnyContact
 from solver.contacts.laws.registry import laws
 from solver.matrices.file_units import UNITS
@@ -33,7 +34,7 @@ DIALECT = "https://json-schema.org/draft/2020-12/schema"
 _ENTRY = re.compile(r"^(\w+(?:, \w+)*) : .*\n((?:    .*\n?)+)", re.MULTILINE)
 _HOMES = (
     scene_parts, scene_bodies, scene_shapes, scene_patch, scene_terms, scene_speed, scene_recovery,
-    matrices_part,
+    matrices_part, load_harmonics,
 )  # fmt: skip
 
 
@@ -65,6 +66,7 @@ def scene_schema() -> dict[str, Any]:
     for definition in definitions.values():
         if {"N1", "N1_ratio"} <= set(definition["properties"]):
             definition["not"] = {"required": ["N1", "N1_ratio"]}
+            _load_list(definition)
     for word, law in laws().items():
         if ends := further_ends(word):
             ways = (list(ends), ["normal"], ["motions"])
@@ -74,6 +76,21 @@ def scene_schema() -> dict[str, Any]:
     many = {"type": "array", "minItems": 1, "items": forces.pop("items")}
     found["properties"]["excitation"] = {**forces, "anyOf": [{"$ref": "#/$defs/Excitation"}, many]}
     return {"$schema": DIALECT, "title": "stickslip scene", **plain(found)}
+
+
+def _load_list(definition: dict[str, Any]) -> None:
+    """The list of a load as a file gives it: its mean first, which stands there or as N0."""
+    load = definition["properties"]["load"]
+    number, table = (
+        {"type": "number", "description": "Mean normal load [N]."},
+        {"$ref": "#/$defs/LoadHarmonic"},
+    )
+    load.pop("anyOf")
+    load.pop("default", None)
+    load |= {"type": "array", "prefixItems": [{"anyOf": [number, table]}], "items": table}
+    definition["required"].remove("N0")
+    first = {"properties": {"load": {"prefixItems": [{"type": "number"}], "minItems": 1}}}
+    definition["allOf"] = [{"anyOf": [{"required": ["N0"]}, {"required": ["load"], **first}]}]
 
 
 def plain(schema: Any) -> Any:

@@ -74,9 +74,9 @@ def parameter_paths(scene: HasParts) -> tuple[str, ...]:
     """Every path that has a value in the scene."""
     own = own_parts(scene)["contacts"] if scene.dampers else scene.contacts
     contacts = dict.fromkeys(
-        f"{contact.group}.{key}" for contact in own if contact.group for key in contact.PARAMETERS
+        f"{contact.group}.{key}" for contact in own if contact.group for key in contact.parameters
     )
-    contacts |= dict.fromkeys(f"{c.name}.{key}" for c in own for key in c.PARAMETERS)
+    contacts |= dict.fromkeys(f"{c.name}.{key}" for c in own for key in c.parameters)
     structural = (f"structure.{name}" for name in structure_names(scene.structure))
     gas = (f"{each.name}.{FACTOR}" for each in scene.aerodynamics if each.name is not None)
     others = dict.fromkeys((*shape_paths(scene), *body_paths(scene), *gas))
@@ -111,13 +111,13 @@ _PROPORTIONAL_UNITS = dict(zip(PROPORTIONAL, ("s", "1/s"), strict=True))
 
 def has_parameter(contact: AnyContact, owner: str, key: str) -> bool:
     """Whether the path ``owner.key`` acts on a contact: its name or group, and a parameter of its law."""
-    return owner in (contact.name, contact.group) and key in contact.PARAMETERS
+    return owner in (contact.name, contact.group) and key in contact.parameters
 
 
 def changed_quantities(scene: HasParts, path: str) -> tuple[Quantity, ...]:
     """What a path changes in each contact it acts on; nothing of a path that is no contact's."""
     owner, _, key = path.rpartition(".")
-    return tuple(c.PARAMETERS[key] for c in scene.contacts if has_parameter(c, owner, key))
+    return tuple(c.parameters[key] for c in scene.contacts if has_parameter(c, owner, key))
 
 
 def follows_speed(scene: HasParts, path: str) -> str | None:
@@ -229,7 +229,7 @@ def _with_value(scene: _SceneT, path: str, new: float) -> _SceneT:
     if not any(has_parameter(contact, owner, key) for contact in own):
         raise _unknown(scene, path)
     contacts = tuple(
-        _changed(contact, contact.changed_by(key, new), path, new, contact.PARAMETERS[key].wanted)
+        _changed(contact, contact.changed_by(key, new), path, new, contact.parameters[key].wanted)
         if has_parameter(contact, owner, key)
         else contact
         for contact in scene.contacts
@@ -291,7 +291,7 @@ def _with_phase(forces: tuple[Excitation, ...], new: float) -> tuple[Excitation,
 def _changed(part: _PartT, update: Mapping[str, object], path: str, new: float, wanted: str) -> _PartT:
     """The part with other fields; SettingError says what is `wanted` if it may not have them."""
     try:
-        return type(part).model_validate({**part.__dict__, **update})
+        return type(part).model_validate({**part.__dict__, **update}, by_name=True)
     except ValidationError as error:
         raise SettingError(path, new, wanted) from error
 

@@ -14,6 +14,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from solver.contacts.fields import GROUND, parse_end
+from solver.contacts.laws.harmonics import LoadHarmonic
 from solver.contacts.laws.registry import DEFAULT, laws
 from solver.errors import Issue
 from solver.errors import pointer as json_pointer
@@ -82,10 +83,12 @@ def _contact_keys() -> dict[tuple[str, ...], tuple[str, tuple[str, ...]]]:
     """Name and known keys of the contacts of each law."""
     found: dict[tuple[str, ...], tuple[str, tuple[str, ...]]] = {}
     for law, each in laws().items():
-        answer = f"a contact with the law `{law}`", tuple(each.model_fields)
+        keys = tuple(field.alias or key for key, field in each.model_fields.items())
+        answer = f"a contact with the law `{law}`", keys
         if law == DEFAULT:
             answer = found["contacts",] = "a contact", answer[1]
         found["contacts", LAW_TAG + law] = answer
+        found["contacts", LAW_TAG + law, "load"] = "a harmonic of a load", tuple(LoadHarmonic.model_fields)
     return found
 
 
@@ -126,6 +129,9 @@ def _field_issue(found: ErrorDetails, raw: dict[str, Any]) -> Issue:
     steps, last = _walk(found["loc"], raw)
     kind, context = found["type"], found.get("ctx", {})
     key = _key(steps)
+    if kind in _BOUNDS and isinstance(last, dict) and found["loc"][-1] in _table(found["loc"])[1]:
+        # Another key gave the number, as the list of a load gives N0.
+        key, last = str(found["loc"][-1]), found["input"]
     if kind == "missing" and isinstance(found["loc"][-1], int):
         message = f"`{key}` has too few entries, got {quoted(last)}"
     elif kind == "missing":

@@ -56,7 +56,6 @@ from solver.sensitivity.kernels.adjoint import (
     BY_OMEGA,
     BY_PHASE,
     EXTREME_COLUMNS,
-    PER_ELEMENT,
     amplitude_slopes,
 )
 
@@ -136,6 +135,7 @@ class Sensitivities:
         self.balance, self.paths = balance, tuple(paths)
         self._parameters = resolved(balance, paths)
         self._slopes, self._loads = contact_slopes(balance, self._parameters)
+        self._each = BY_LOAD + self._loads.shape[2]
         self._rows = self._rows_of_paths()
         self._matrices = matrices_of_paths(balance, self._parameters)
         self._dampings = modal_dampings(balance, self._parameters)
@@ -149,7 +149,7 @@ class Sensitivities:
         self._x, self._tops = np.zeros(n), np.zeros((2, EXTREME_COLUMNS))
         self._turns = np.zeros((2, balance.system.ks.size), np.complex128)
         self._weights, self._pulls = np.zeros((2, nc, n)), np.zeros((2, nc * n))
-        self._by = np.zeros((2, ne * PER_ELEMENT + BESIDES))
+        self._by = np.zeros((2, ne * self._each + BESIDES))
         self._seconds: Integer | None = None
 
     def gradient(self, solution: Real, at_hz: float) -> Gradient:
@@ -291,7 +291,7 @@ class Sensitivities:
         """Return the derivatives of one extreme by ω and by the paths."""
         by = self._by[top]
         slopes = self._rows @ by
-        by_omega = float(by[self.balance.system.laws.size * PER_ELEMENT + BY_OMEGA])
+        by_omega = float(by[self.balance.system.laws.size * self._each + BY_OMEGA])
         for e in self._others:
             self._add_other_law(int(e), u, omega, self._weights[top], slopes)
         if self._matrices is not None or self._dampings:
@@ -301,17 +301,17 @@ class Sensitivities:
     def _rows_of_paths(self) -> Real:
         """Return what each path takes of the derivatives the kernel gives, (n_paths, ·)."""
         system, ne = self.balance.system, self.balance.system.laws.size
-        rows = np.zeros((len(self._parameters), ne * PER_ELEMENT + BESIDES))
-        parts = rows[:, : ne * PER_ELEMENT].reshape(len(rows), ne, PER_ELEMENT)
+        rows = np.zeros((len(self._parameters), ne * self._each + BESIDES))
+        parts = rows[:, : ne * self._each].reshape(len(rows), ne, self._each)
         plain = system.jenkins == 1
         parts[:, plain, BY_KT] = self._slopes[:, plain, KT]
         parts[:, plain, BY_MU] = self._slopes[:, plain, MU]
         parts[:, plain, BY_LOAD:] = self._loads[:, plain]
         for row, parameter in zip(rows, self._parameters, strict=True):
             if parameter.kind is Kind.LEVEL:
-                row[ne * PER_ELEMENT + BY_LEVEL] = 1.0 / _level(self.balance)
+                row[ne * self._each + BY_LEVEL] = 1.0 / _level(self.balance)
             elif parameter.kind is Kind.FORCE_PHASE:
-                row[ne * PER_ELEMENT + BY_PHASE] = 1.0
+                row[ne * self._each + BY_PHASE] = 1.0
         return rows
 
     def _add_other_law(self, e: int, u: Real, omega: float, weights: Real, slopes: Real) -> None:

@@ -129,11 +129,7 @@ def performance_curve_words(scene: Scene) -> str:
     if any(force.harmonic != 1 for force in scene.excitation):
         return "no: a harmonic of the excitation other than the first drives no single mode"
     loads = [contact.load for contact in scene.contacts]
-    tied = all(
-        load is not None
-        and (load.amplitude == 0.0 or getattr(contact, "N1_ratio", None) is not None)
-        for contact, load in zip(scene.contacts, loads, strict=True)
-    )  # fmt: skip
+    tied = all(load is not None and load.in_proportion for load in loads)
     grows = bool(loads) and tied and not static_forces(scene)
     names = ",".join(f"{contact.name}.N0" for contact in scene.contacts)
     how = f"one curve for all values of `{names}` if laws scale" if grows else "one for each design"

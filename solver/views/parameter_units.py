@@ -8,6 +8,7 @@ from solver.results.units import number
 def parameter_unit(path: str) -> str:
     """The unit of the values of a parameter path; empty where there is none, or it depends on the scene."""
     # Loaded here: help and tables of results need no laws.
+    from solver.contacts.laws.harmonics import higher_quantity, order_of
     from solver.contacts.laws.registry import laws
     from solver.scene.parameter_paths import AMPLITUDE, FREQUENCY, PHASE
 
@@ -15,6 +16,8 @@ def parameter_unit(path: str) -> str:
     owner, _, key = path.rpartition(".")
     if path in units or owner == "structure":
         return units.get(path, "")
+    if order_of(key) is not None:
+        return higher_quantity(key).unit
     # A path does not say which law its contact has: laws that share a word must agree.
     found = {law.PARAMETERS[key].unit for law in laws().values() if key in law.PARAMETERS}
     return found.pop() if len(found) == 1 else ""

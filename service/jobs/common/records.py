@@ -188,6 +188,6 @@ def contact_values(scene: Scene, parameter: str) -> tuple[ContactValues, ...]:
 
 
 def _values(contact: AnyContact, swept: str) -> ContactValues:
-    kept = contact.PARAMETERS.keys() - contact.followers(swept)
+    kept = contact.parameters.keys() - contact.followers(swept)
     values = {key: contact.value_of(key) if key in kept else None for key in _STORED}
     return ContactValues(name=contact.name, **values)

@@ -134,8 +134,9 @@ def scene_section(scene: Scene) -> str:
     for contact in scene.contacts:
         values = [
             f"{key} = {parameter(f'{contact.name}.{key}', value)}"
-            for key in contact.PARAMETERS
-            if (value := getattr(contact, key)) is not None
+            for key in contact.parameters
+            if (value := getattr(contact, key) if key in contact.PARAMETERS else contact.value_of(key))
+            is not None
         ]
         contacts.append([contact.name, " – ".join(contact.between), ", ".join(values)])
     low, high = scene.observe.band

@@ -10,11 +10,11 @@ from solver.balance.kernels.coordinates import is_reduced
 from solver.balance.kernels.coordinates import reaches as span_reaches
 from solver.balance.kernels.coordinates import responses as span_responses
 from solver.balance.kernels.gauge import find_gauge, let_hold
-from solver.contacts.kernels.columns import COLUMN_KIND, COLUMNS, KT, N0, N1, OMEGA, RATIO
+from solver.contacts.kernels.columns import COLUMN_KIND, KT, N0, N1, OMEGA, RATIO
 from solver.contacts.kernels.laws import call_law
 from solver.contacts.kernels.normal_load import fill_load, tie
 from solver.contacts.kernels.stick_slip_events import BEGAN, FAILED, SEPARATED, STUCK, UNLOADED
-from solver.contacts.kernels.system import FREQUENCY, LEVEL, LOAD_COEFFICIENTS, Evaluation, Receptance, System
+from solver.contacts.kernels.system import FREQUENCY, LEVEL, Evaluation, Receptance, System
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Complex, Real, coefficient_count, cosine_position
 from solver.jit.lapack import copy_block, fill
@@ -27,12 +27,12 @@ _CANCELLED, _LOST = 1e-3, 1e-5  # shares of |A| |F| and |A| |dF/dU| |u| a residu
 
 @apart
 def contact_values(system: System, p: float, added: float) -> tuple[Real, Real, Real, Real]:
-    """Return the elements at λ = p: table, load coefficients (ne, 3), and the derivatives of both by λ.
+    """Return the elements at λ = p: table, load coefficients, and the derivatives of both by λ.
 
     `added` [N] is put on every mean load (the start-up ladder presses the contacts into full stick).
     """
     nc = system.laws.size
-    table, slope = np.empty((nc, COLUMNS)), np.zeros((nc, COLUMNS))
+    table, slope = np.empty(system.contacts.shape), np.zeros(system.contacts.shape)
     copy_block(table, system.contacts)
     for c in range(nc):
         row, d = table[c], slope[c]
@@ -49,7 +49,8 @@ def contact_values(system: System, p: float, added: float) -> tuple[Real, Real, 
             d[N0] = system.load_rise[0, c] + 2.0 * p * system.load_rise[1, c]
         if tied:
             tie(row, d)
-    load, dload = np.empty((nc, LOAD_COEFFICIENTS)), np.empty((nc, LOAD_COEFFICIENTS))
+    size = coefficient_count(system.load_ks)
+    load, dload = np.empty((nc, size)), np.empty((nc, size))
     for c in range(nc):
         fill_load(table[c], slope[c], added, load[c], dload[c])
     return table, load, slope, dload

@@ -12,6 +12,8 @@ OWN, MOST_OWN = 6, 9
 OMEGA, NODES = OWN + MOST_OWN, OWN + MOST_OWN + 1
 HISTORY_LAW, HISTORY_STATES, HISTORY_FORM, HISTORY_WAY = NODES + 1, NODES + 2, NODES + 3, NODES + 4
 COLUMNS = HISTORY_WAY + 1
+# Behind them amplitude and phase of the load's harmonics from the second on, as many as the scene's loads
+# have: the column `wave_column(order)` and the one after it.
 # What λ is: COLUMN_KIND + j where it is the value in column j (less is in `solver.contacts.kernels.system`).
 COLUMN_KIND = 4
 # Elastic normal: stiffness [N/m], and 1.0 where the normal motion counts from the prestressed state.
@@ -24,6 +26,12 @@ K_GAP, GAP = OWN, OWN + 1
 A_1, MOST_DEGREE = OWN, MOST_OWN
 # Where the force is found by samples in time: samples a period.
 SAMPLES = OWN
+
+
+def wave_column(order: int) -> int:
+    """Return the column of the amplitude of a harmonic of the load, of order 2 or more."""
+    return COLUMNS + 2 * (order - 2)
+
 
 # States beside those of `solver.contacts.kernels.stick_slip_events`.
 CLOSED, TOUCHING, DEFORMING = 5, 6, 7

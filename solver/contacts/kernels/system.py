@@ -35,7 +35,6 @@ from solver.jit.reference import Reference
 FREQUENCY, LEVEL, FORCE_PHASE, STRUCTURE = 0, 1, 2, 3
 # How Z⁻¹ is kept.
 MODES, POLES, DENSE = 0, 1, 2
-LOAD_COEFFICIENTS = 3
 # Numbers in `Evaluation.counts`.
 FREE, HELD, SIZE, AT_BRANCH_POINT, UNHELD, PINNED = 0, 1, 2, 3, 4, 5
 COUNTS = 6
@@ -49,7 +48,7 @@ class System(NamedTuple):
     """
 
     ks: Integer  # (nk,) harmonics kept, ascending
-    load_ks: Integer  # harmonics of the normal load
+    load_ks: Integer  # (K + 1,) harmonics of the normal loads, 0 … K; K ≥ 1 is the highest in the scene
     which: Integer  # (nk,) structure of each harmonic
     cos_table: Real
     sin_table: Real
@@ -62,7 +61,7 @@ class System(NamedTuple):
     owner: Integer  # (nc,) element of each port
     rubs: Integer  # (nc,) 1: friction, which a larger normal load would hold, else 0
     held: Integer  # (nc, 3) of the stiffness at rest: its column, and the column and sign of what must be > 0
-    contacts: Real  # (ne, COLUMNS) the numbers of each law, see `solver.contacts.kernels.columns`
+    contacts: Real  # (ne, ·) the numbers of each law, see `solver.contacts.kernels.columns`
     active: Real  # (ne,) share of λ in the number it changes, 0.0 where it does not act
     load_rise: Real  # (2, ne) N0 gains these times ω and ω² where λ is the frequency [N s, N s²]
     level: (
@@ -291,9 +290,10 @@ def _new_evaluation(system: System, spanned: bool) -> Evaluation:
     kept = r if spanned else nc
     return _evaluation_of(
         np.zeros(nt), np.zeros(nt), np.zeros((nc, n)), np.zeros((blocks, n, n)), np.zeros((nc, n)),
-        np.zeros(n), np.zeros(n), np.zeros((n, LOAD_COEFFICIENTS)), np.zeros(ne, np.int64),
+        np.zeros(n), np.zeros(n), np.zeros((n, coefficient_count(system.load_ks))), np.zeros(ne, np.int64),
         np.zeros(ne, np.int64), np.zeros(ne),
-        np.zeros((segment_capacity(max(system.ks[-1], 1)), SEGMENT_COLUMNS)), np.zeros((whole, whole)),
+        np.zeros((segment_capacity(max(system.ks[-1], system.load_ks[-1])), SEGMENT_COLUMNS)),
+        np.zeros((whole, whole)),
         np.zeros((size + 1, size + 1)), np.zeros(nt + 1, np.int32), np.zeros(nc, np.int64),
         np.zeros(nc, np.int64), np.zeros(COUNTS, np.int64), np.zeros((blocks, n, n)),
         np.zeros((nk, ports, ports), np.complex128), np.zeros((nk, ports, ports), np.complex128),

@@ -123,6 +123,11 @@ class AnyContact(Element, InSpace):
         """The ends of each relative motion the force depends on, DOFs; of a contact without a `normal`."""
         return tuple(getattr(self, key) for key in self.end_keys)
 
+    @property
+    def parameters(self) -> Mapping[str, Quantity]:
+        """Its numbers that are parameter paths, with those it has because of its values."""
+        return self.PARAMETERS
+
     def value_of(self, key: str) -> float:
         """Value of a parameter.
 
@@ -139,7 +144,7 @@ class AnyContact(Element, InSpace):
 
     def followers(self, key: str) -> frozenset[str]:
         """The parameters that change while one of its own does, itself among them."""
-        return frozenset({key} & self.PARAMETERS.keys())
+        return frozenset({key} & self.parameters.keys())
 
     def in_sector(self, turn: float, share: float | None) -> dict[str, object]:
         """The fields that differ in another sector of an annulus.

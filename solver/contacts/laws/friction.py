@@ -1,4 +1,4 @@
-"""What the laws of elastic Coulomb friction share: kt, μ, and a normal load N0 + N1 cos(ωt + N1_phase)."""
+"""What the laws of elastic Coulomb friction share: kt, μ, and a normal load of any harmonics."""
 
 from __future__ import annotations
 
@@ -7,11 +7,12 @@ from collections.abc import Mapping
 from typing import Any, ClassVar, Self, cast
 
 import numpy as np
-from pydantic import model_validator
+from pydantic import ConfigDict, Field, field_validator, model_validator
 
 from solver.contacts.fields import Angle, Friction, Positive, Real, Signed
 from solver.contacts.kernels import columns
 from solver.contacts.laws.base import AnyContact
+from solver.contacts.laws.harmonics import LoadHarmonic, as_harmonics, higher_quantity, named_apart, order_of
 from solver.contacts.laws.parts import Held, NormalLoad, Quantity, Slider, Span
 from solver.errors import SettingError
 
@@ -20,7 +21,18 @@ _VARIATION = "changes the variation of a normal load"
 
 
 class FrictionContact(AnyContact):
-    """Elastic Coulomb friction with a normal load N(t) = N0 + N1 cos(omega t + N1_phase)."""
+    """Elastic Coulomb friction with a normal load N(t) = N0 + N1 cos(omega t + N1_phase) + higher harmonics.
+
+    A scene may give the load as a list, `load = [N0, {order, amplitude, phase}, ...]`: N0, N1 and N1_phase
+    are then read from its first entries, so that both ways of writing give equal contacts.
+
+    Attributes
+    ----------
+    higher_load : tuple of LoadHarmonic or None
+        The harmonics of the load from the second on, ascending.
+    """
+
+    model_config = ConfigDict(serialize_by_alias=True)
 
     PARAMETERS: ClassVar[Mapping[str, Quantity]] = {
         "N0": Quantity(
@@ -54,6 +66,8 @@ class FrictionContact(AnyContact):
         "N1": "Amplitude of the normal load [N]; in place of N1_ratio.",
         "N1_ratio": "Amplitude of the normal load as a multiple of N0; in place of N1.",
         "N1_phase": "Phase of the normal load [rad]: N0 + N1 cos(ωt + N1_phase).",
+        "load": "The normal load as a Fourier list: its mean [N], which may stand as N0 instead, then for "
+        "each harmonic amplitude cos(order ωt + phase) a table of `order`, `amplitude` [N], `phase` [rad].",
     }
     HELD: ClassVar[tuple[Held, ...]] = (Held(columns.KT),)
     RUBBING: ClassVar[tuple[int, ...]] = (0,)
@@ -64,6 +78,23 @@ class FrictionContact(AnyContact):
     N1: Signed | None = None
     N1_ratio: Signed | None = None
     N1_phase: Angle = 0.0
+    higher_load: tuple[LoadHarmonic, ...] | None = Field(default=None, alias="load")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _names_of_the_first(cls, data: Any) -> Any:
+        return named_apart(data)
+
+    @field_validator("higher_load", mode="before")
+    @classmethod
+    def _a_list_of_harmonics(cls, given: Any) -> Any:
+        return as_harmonics(given)
+
+    @field_validator("higher_load")
+    @classmethod
+    def _those_without_names(cls, given: tuple[LoadHarmonic, ...] | None) -> tuple[LoadHarmonic, ...] | None:
+        kept = [each for each in given or () if each.order > 1]
+        return tuple(sorted(kept, key=lambda each: each.order)) or None
 
     @model_validator(mode="after")
     def _one_of_n1(self) -> FrictionContact:
@@ -98,12 +129,28 @@ class FrictionContact(AnyContact):
     @property
     def load(self) -> NormalLoad:
         """The given normal load."""
-        return NormalLoad(mean=self.N0, amplitude=self.N1_value, phase=self.N1_phase, ratio=self.N1_ratio)
+        given = {each.order: (each.amplitude, each.phase) for each in self.higher_load or ()}
+        return NormalLoad(
+            mean=self.N0, amplitude=self.N1_value, phase=self.N1_phase, ratio=self.N1_ratio,
+            higher=tuple(given.get(order, (0.0, 0.0)) for order in range(2, max(given, default=1) + 1)),
+        )  # fmt: skip
+
+    @property
+    def parameters(self) -> Mapping[str, Quantity]:
+        """Its numbers that are parameter paths: amplitude and phase of every harmonic of the load too."""
+        found = dict(self.PARAMETERS)
+        for each in self.higher_load or ():
+            for key in (f"N{each.order}", f"N{each.order}_phase"):
+                found[key] = higher_quantity(key)
+        return found
 
     def value_of(self, key: str) -> float:
         """Value of a parameter; of the load's amplitude whichever way it was given."""
         if key == "N1":
             return self.N1_value
+        if (order := order_of(key)) is not None:
+            given = next((each for each in self.higher_load or () if each.order == order), None)
+            return 0.0 if given is None else given.phase if key.endswith("_phase") else given.amplitude
         if key != "N1_ratio":
             return cast(float, getattr(self, key))
         if self.N1_ratio is not None:
@@ -118,7 +165,16 @@ class FrictionContact(AnyContact):
         """The fields that change where a parameter is set: N1 unties the amplitude, N1_ratio ties it."""
         if key in ("N1", "N1_ratio"):
             return {"N1": None, "N1_ratio": None, key: new}
-        return {key: new}
+        order = order_of(key)
+        if order is None:
+            return {key: new}
+        changed = {
+            "order": order,
+            "amplitude": self.value_of(f"N{order}"),
+            "phase": self.value_of(f"N{order}_phase"),
+        }
+        changed["phase" if key.endswith("_phase") else "amplitude"] = new
+        return {"higher_load": (*(each for each in self.higher_load or () if each.order != order), changed)}
 
     def followers(self, key: str) -> frozenset[str]:
         """The parameters that change while one of its own does: the amplitude with what it is tied to."""
@@ -128,13 +184,16 @@ class FrictionContact(AnyContact):
     def in_sector(self, turn: float, share: float | None) -> dict[str, object]:
         """The load in another sector: later in a wave that travels, smaller in a standing one."""
         if share is None:
-            return {"N1_phase": self.N1_phase + turn}
-        return {key: share * value for key in ("N1", "N1_ratio") if (value := getattr(self, key))}
+            changed: dict[str, object] = {"N1_phase": self.N1_phase + turn}
+        else:
+            changed = {key: share * value for key in ("N1", "N1_ratio") if (value := getattr(self, key))}
+        higher = tuple(each.in_sector(turn, standing=share is not None) for each in self.higher_load or ())
+        return {**changed, "higher_load": higher or None}
 
     def fill(self, row: Real, highest: int) -> None:
         """Put its numbers into its row of the contact table; a load that is not tied has a ratio NaN."""
         del highest
-        for key, quantity in self.PARAMETERS.items():
+        for key, quantity in self.parameters.items():
             if key != "N1_ratio":
                 row[quantity.column] = self.value_of(key)
         row[columns.RATIO] = math.nan if self.N1_ratio is None else self.N1_ratio
@@ -143,7 +202,12 @@ class FrictionContact(AnyContact):
         """The contact with the numbers of a row of the contact table."""
         moved = super().with_numbers(row)
         tied = not math.isnan(row[columns.RATIO])
-        return moved.model_copy(update={"N1": None} if tied else {"N1_ratio": None})
+        higher = tuple(
+            LoadHarmonic(order=order, amplitude=row[column], phase=row[column + 1])
+            for order, column in enumerate(range(columns.COLUMNS, row.size, 2), start=2)
+            if row[column] != 0.0 or order in {each.order for each in self.higher_load or ()}
+        )
+        return moved.model_copy(update={"N1" if tied else "N1_ratio": None, "higher_load": higher or None})
 
     def normal_load(self, motions: Real) -> Real:
         """Return the coefficients of the normal load not cut at 0 [N], with what the normal motion adds."""
@@ -162,7 +226,9 @@ class FrictionContact(AnyContact):
             return f"the normal load of {self.name} moves with the parts"
         if self.N1_value != 0.0:
             return f"the normal load of {self.name} varies by {abs(self.N1_value):g} N"
-        return None
+        # A load of even harmonics is the same half a period later.
+        odd = [order for order in self.load.orders if order % 2]
+        return f"the normal load of {self.name} varies with harmonic {odd[0]}" if odd else None
 
     @property
     def keeps_together(self) -> bool:
@@ -226,18 +292,27 @@ class FrictionContact(AnyContact):
         """Return the numbers of a row of the time march that friction has."""
         load = self.load
         return {
-            "kt": self.kt, "mu": self.mu, "N0": load.mean, "N1": load.amplitude, "N1_phase": load.phase
+            "kt": self.kt, "mu": self.mu, "N0": load.mean, "N1": load.amplitude, "N1_phase": load.phase,
+            "higher": load.higher,
         }  # fmt: skip
 
     def linear_limit(self, load: float, *, gone: bool) -> dict[str, Any]:
         """Return what makes it linear: no load if it is `gone`, else stuck under a large load [N]."""
-        changed: dict[str, Any] = {"N1_ratio": None, "N1": 0.0, "N0": 0.0 if gone else load}
+        changed: dict[str, Any] = {"N1_ratio": None, "N1": 0.0, "N0": 0.0 if gone else load, "load": None}
         if self.mu < _LEAST_FRICTION:
             changed["mu"] = _LEAST_FRICTION
         return changed
 
     def least_load_slope(self, key: str) -> float:
-        """Return the derivative of N0 − |N1| of a given load by a parameter of its own."""
-        sign = math.copysign(1.0, self.N1_value)
-        by_key = {"N0": 1.0 - sign * (self.N1_ratio or 0.0), "N1": -sign, "N1_ratio": -sign * self.N0}
-        return by_key.get(key, 0.0)
+        """Return the derivative of the least value of a given load by a parameter of its own."""
+        tau = self.load.least_at
+        along = math.cos(tau + self.N1_phase)
+        by_key = {
+            "N0": 1.0 + along * (self.N1_ratio or 0.0), "N1": along, "N1_ratio": along * self.N0,
+            "N1_phase": -self.N1_value * math.sin(tau + self.N1_phase),
+        }  # fmt: skip
+        order = order_of(key)
+        if order is None:
+            return by_key.get(key, 0.0)
+        angle = order * tau + self.value_of(f"N{order}_phase")
+        return -self.value_of(f"N{order}") * math.sin(angle) if key.endswith("_phase") else math.cos(angle)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cmath
 import math
 from dataclasses import dataclass, field, replace
 from enum import Enum
@@ -54,6 +55,8 @@ class Quantity:
         Whether with it a motion and its negative half a period later are answered differently.
     varies_load : bool
         Whether it makes the normal load vary.
+    load_order : int
+        The harmonic of the load that it makes vary.
     symbol : str
         How people write it; as its key if empty.
     otherwise : tuple of str or None
@@ -71,6 +74,7 @@ class Quantity:
     unlike_half_waves: str = ""
     breaks_symmetry: bool = False
     varies_load: bool = False
+    load_order: int = 1
     symbol: str = ""
     otherwise: tuple[str, ...] | None = None
     by_hand: bool = True
@@ -87,30 +91,63 @@ class Quantity:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NormalLoad:
-    """A given normal load N(τ) = mean + amplitude cos(τ + phase) [N, rad].
+    """A given normal load N(τ) = mean + amplitude cos(τ + phase) + Σ A_k cos(kτ + φ_k), k ≥ 2 [N, rad].
 
     Attributes
     ----------
     ratio : float or None
         Of the amplitude to the mean where it is tied to it.
+    higher : tuple of (float, float)
+        Amplitude and phase of the harmonics 2, 3, …
     """
 
     mean: float
     amplitude: float
     phase: float
     ratio: float | None = None
+    higher: tuple[tuple[float, float], ...] = ()
+
+    @property
+    def waves(self) -> tuple[tuple[float, float], ...]:
+        """Amplitude and phase of the harmonics 1, 2, … [N, rad]."""
+        return ((self.amplitude, self.phase), *self.higher)
+
+    @property
+    def orders(self) -> tuple[int, ...]:
+        """The harmonics in which it varies, ascending."""
+        return tuple(order for order, (size, _) in enumerate(self.waves, start=1) if size != 0.0)
+
+    @property
+    def in_proportion(self) -> bool:
+        """Whether it varies in proportion to its mean, or not at all."""
+        return not self.orders or (self.orders == (1,) and self.ratio is not None)
 
     @property
     def coefficients(self) -> Real:
-        """Its Fourier coefficients (3,) [N]."""
-        return np.array(
-            [self.mean, self.amplitude * math.cos(self.phase), -self.amplitude * math.sin(self.phase)]
-        )
+        """Its Fourier coefficients (1 + 2 K,) [N], K its highest harmonic, 1 or more."""
+        pairs = [(size * math.cos(phase), -size * math.sin(phase)) for size, phase in self.waves]
+        return np.array([self.mean, *(number for pair in pairs for number in pair)])
 
     @property
     def least(self) -> float:
         """Its least value in a period [N]; below 0 it would pull."""
-        return self.mean - abs(self.amplitude)
+        if self.orders in ((), (1,)):
+            return self.mean - abs(self.amplitude)
+        return self.at(self.least_at)
+
+    @property
+    def least_at(self) -> float:
+        """The angle of its least value [rad], among the roots of its derivative, a polynomial in e^{iτ}."""
+        if self.orders in ((), (1,)):
+            return (math.pi if self.amplitude > 0.0 else 0.0) - self.phase
+        up = [0.5j * k * size * cmath.exp(1j * phase) for k, (size, phase) in enumerate(self.waves, start=1)]
+        roots = np.roots([*reversed(up), 0.0, *(each.conjugate() for each in up)])
+        return float(min(np.angle(roots).tolist(), key=self.at))
+
+    def at(self, tau: float) -> float:
+        """Its value at an angle [N]."""
+        waves = enumerate(self.waves, start=1)
+        return self.mean + sum(size * math.cos(k * tau + phase) for k, (size, phase) in waves)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -209,6 +246,8 @@ class Row:
         Which of the contact's relative motions it pulls along.
     kt, mu, N0, N1, N1_phase : float
         Stiffness [N/m], friction coefficient, normal load [N, rad].
+    higher : tuple of (float, float)
+        Amplitude and phase of the load's harmonics from the second on [N, rad].
     normal_port, kn, rest : of a row that rubs
         Which of them is the normal motion, its stiffness [N/m], and the part of the normal force that is in
         equilibrium at rest [N].
@@ -231,6 +270,7 @@ class Row:
     N0: float = 0.0
     N1: float = 0.0
     N1_phase: float = 0.0
+    higher: tuple[tuple[float, float], ...] = ()
     normal_port: int | None = None
     kn: float = 0.0
     rest: float = 0.0

@@ -28,8 +28,10 @@ from solver.marching.kernels.state import (
     Series,
     State,
     System,
+    load_rise,
     normal_slip,
     slip,
+    swing,
 )
 
 SLIP = 1  # the mode of a contact in space that slips
@@ -48,7 +50,7 @@ def load_size(system: System, series: Series, c: int) -> float:
     Not from the whole series: near the pole its last terms are large where the step is cut.
     """
     moved = abs(normal_slip(system, series.x[0], c)) + abs(normal_slip(system, series.x[1], c))
-    return abs(system.N0[c]) + abs(system.N1[c]) + system.kn[c] * moved
+    return abs(system.N0[c]) + swing(system, c) + system.kn[c] * moved
 
 
 @compiled
@@ -200,7 +202,7 @@ def _leaves_stick(system: System, series: Series, c: int, margin: float) -> floa
 def close_circle(system: System, state: State, tau: float, c: int) -> None:
     """Put a contact in space whose contact begins into its state: it sticks or slips by its rates."""
     state.force[c], state.force[c + 1] = 0.0, 0.0
-    push = -system.mu[c] * system.N1[c] * math.sin(tau + system.N1_phase[c])
+    push = system.mu[c] * load_rise(system, tau, c)
     push += system.mu[c] * system.kn[c] * normal_slip(system, state.v, c)
     x, y, rate = onset(system, state.v, c, push)
     if rate > 0.0 and system.mu[c] > 0.0:

@@ -33,7 +33,8 @@ class System(NamedTuple):
     W is the inverse of the mass matrix times omega^-2. L is that of the motions along which contacts pull,
     `kt` is also the stiffness of a gap spring. Of the laws elastic-normal and circle: the normal motions,
     their stiffness, and the part of the normal force that is in equilibrium at rest; `presses` is 0 where
-    another row has that force already. `powers` (n_contacts, degree) are the coefficients of polynomial
+    another row has that force already. `waves` and `wave_phases` (n_contacts, K) are of the given loads'
+    harmonics 1 … K. `powers` (n_contacts, degree) are the coefficients of polynomial
     springs. Of laws given by functions: their numbers, whether they go from sample to sample, how many states
     they have, their parameters (n_contacts, MOST_OWN), their damping at rest [N s/m], and the frequency
     [rad/s].
@@ -58,8 +59,8 @@ class System(NamedTuple):
     kt: Real
     mu: Real
     N0: Real
-    N1: Real
-    N1_phase: Real
+    waves: Real
+    wave_phases: Real
     law: Whole
     normal_start: Whole
     normal_column: Whole
@@ -196,6 +197,25 @@ def wave(k: int, angle: float) -> float:
     turn = k % 4
     value = math.cos(angle) if turn % 2 == 0 else math.sin(angle)
     return value if turn in (0, 3) else -value
+
+
+@compiled
+def load_rise(system: System, tau: float, c: int) -> float:
+    """Return the derivative of the given load of contact c by tau."""
+    rise = 0.0
+    for j in range(system.waves.shape[1]):
+        order = j + 1
+        rise -= order * system.waves[c, j] * math.sin(order * tau + system.wave_phases[c, j])
+    return rise
+
+
+@compiled
+def swing(system: System, c: int) -> float:
+    """Return a bound of how far the given load of contact c goes from its mean."""
+    size = 0.0
+    for j in range(system.waves.shape[1]):
+        size += abs(system.waves[c, j])
+    return size
 
 
 @compiled

@@ -53,6 +53,7 @@ from solver.marching.kernels.state import (
     System,
     finite,
     largest_change,
+    load_rise,
     motion_size,
     new_record,
     new_series,
@@ -63,6 +64,7 @@ from solver.marching.kernels.state import (
     product,
     pull_back,
     slip,
+    swing,
     wave,
 )
 
@@ -70,11 +72,13 @@ from solver.marching.kernels.state import (
 @compiled
 def _load_series(system: System, tau: float, h: float, series: Series) -> None:
     for c in range(system.kt.size):
-        factor = system.N1[c]
         for k in range(ORDER + 1):
-            series.load[k, c] = factor * wave(k, tau + system.N1_phase[c])
-            factor *= h / (k + 1)
-        series.load[0, c] += system.N0[c]
+            series.load[k, c] = system.N0[c] if k == 0 else 0.0
+        for j in range(system.waves.shape[1]):
+            order, factor = j + 1, system.waves[c, j]
+            for k in range(ORDER + 1):
+                series.load[k, c] += factor * wave(k, order * tau + system.wave_phases[c, j])
+                factor *= order * h / (k + 1)
 
 
 @apart
@@ -205,7 +209,7 @@ def _next_change(
         return circle_change(system, state, series, c, q)
     if law == GAP:
         return _gap_change(system, series, c, mode, q)
-    margin = abs(system.N0[c]) + abs(system.N1[c])
+    margin = abs(system.N0[c]) + swing(system, c)
     if law == ELASTIC_NORMAL:
         margin += system.kn[c] * motion_size(system, series, c, True)
     margin *= 1e-13
@@ -272,7 +276,7 @@ def _change(system: System, state: State, tau: float, c: int, target: int) -> No
         if system.mu[c] == 0.0:
             return
         pull = system.kt[c] * slip(system, state.v, c)
-        push = -system.mu[c] * system.N1[c] * math.sin(tau + system.N1_phase[c])
+        push = system.mu[c] * load_rise(system, tau, c)
         if system.law[c] == ELASTIC_NORMAL:
             push += system.mu[c] * system.kn[c] * normal_slip(system, state.v, c)
         if abs(pull) > push:
@@ -307,7 +311,7 @@ def _step(
         when, target, which = NONE, STICK, -1
         far = 1.0
         for c in range(system.kt.size):
-            if system.law[c] != COULOMB or system.mu[c] * (system.N0[c] + abs(system.N1[c])) > 0.0:
+            if system.law[c] != COULOMB or system.mu[c] * (system.N0[c] + swing(system, c)) > 0.0:
                 s, mode = _next_change(system, state, series, rest, c, q)
                 if s < when:
                     when, target, which = s, mode, c

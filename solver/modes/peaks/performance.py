@@ -150,6 +150,8 @@ def with_loads(scene: Scene, factor: float) -> Scene:
     for contact in scene.contacts:
         given = {key: getattr(contact, key, None) for key in ("N0", "N1")}
         scaled = {key: factor * value for key, value in given.items() if value is not None}
+        higher = getattr(contact, "higher_load", None) or ()
+        scaled["higher_load"] = tuple(each.times(factor) for each in higher) or None
         changed.append(contact.model_copy(update=scaled))
     return scene.model_copy(update={"contacts": tuple(changed)})
 

@@ -10,10 +10,12 @@ import math
 from dataclasses import dataclass
 from typing import TypeVar
 
+from solver.contacts.laws.harmonics import is_phase
 from solver.errors import SettingError
 from solver.results.told import Piece
 from solver.scene.bodies.kinematics import forms_of, written_form
 from solver.scene.cyclic.matrices_annulus import matrices_annulus
+from solver.scene.parameter_paths import changed_quantities
 from solver.scene.scene import (
     AnyContact,
     Body,
@@ -118,8 +120,8 @@ def check_in_annulus(scene: Scene, path: str) -> None:
     the scene, there it stands for all sectors.
     """
     owner, _, key = path.rpartition(".")
-    differs = ("N1", "N1_ratio") if _standing(scene) else ("N1_phase",)
-    if owner != "structure" and key in differs:
+    amplitude = any(quantity.varies_load for quantity in changed_quantities(scene, path))
+    if amplitude if _standing(scene) else owner != "structure" and is_phase(key):
         reason = sectors_needed(scene).reason
         raise SettingError(
             "path",
@@ -134,9 +136,9 @@ def annulus(scene: Scene) -> Scene:
     DOF ``tip`` of sector j is ``tip@j``, contact ``shroud`` becomes ``shroud@j`` in the group ``shroud``
     (or in the group it had), a named spring ``k`` becomes ``k@j`` in the group ``k``, times
     the sector's factor of the mistuning. In a travelling wave sector j has
-    harmonic * engine_order * j * 2 pi / sectors added to the phase of its forces and
-    engine_order * j * 2 pi / sectors to that of its loads; in a standing wave the amplitudes are multiplied
-    by the cosines of these angles instead. What joins a sector to itself (one sector only)
+    harmonic * engine_order * j * 2 pi / sectors added to the phase of its forces, and to that of a load's
+    harmonic of this order; in a standing wave the amplitudes are multiplied by the cosines of these angles
+    instead. What joins a sector to itself (one sector only)
     never moves and is left out. Observed is sector 0, or the one that the scene names.
 
     Raises

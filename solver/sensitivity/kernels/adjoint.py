@@ -23,17 +23,23 @@ from solver.balance.kernels.residual import contact_values, evaluate
 from solver.contacts.kernels.columns import KT, MU
 from solver.contacts.kernels.coulomb.force import contact_force
 from solver.contacts.kernels.stick_slip_events import FAILED
-from solver.contacts.kernels.system import LOAD_COEFFICIENTS, Evaluation, Receptance, System
+from solver.contacts.kernels.system import Evaluation, Receptance, System
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Complex, Integer, Real, coefficient_count, cosine_position
 from solver.jit.separate import apart
 from solver.linear.kernels.receptance import receptance
 
 # Entries of `by`: for each element the slopes by kt, mu and its load, then those of the linear part.
-BY_KT, BY_MU, BY_LOAD, PER_ELEMENT = 0, 1, 2, 5
+BY_KT, BY_MU, BY_LOAD = 0, 1, 2
 BY_OMEGA, BY_LEVEL, BY_PHASE, BESIDES = 0, 1, 2, 3
 # Columns of the extremes.
 AMPLITUDE, SIGN, TAU, EXTREME_COLUMNS = 0, 1, 2, 3
+
+
+@compiled
+def per_element(system: System) -> int:
+    """Return how many entries of `by` an element has."""
+    return BY_LOAD + coefficient_count(system.load_ks)
 
 
 @apart
@@ -49,7 +55,7 @@ def amplitude_slopes(
     x : (n,) the observed motion; tops : (2, EXTREME_COLUMNS) the extremes that are max|x|; filled, as below.
     turns : (2, nk) ξ e^{ikτ} of both, with which max|x| = Re Σ turn x̂.
     weights : (2, nc, n) w; pulls : (2, nt) λ.
-    by : (2, ne·PER_ELEMENT + BESIDES) derivatives; those by level and phase are of a unit factor on all
+    by : (2, ne·`per_element` + BESIDES) derivatives; those by level and phase are of a unit factor on all
         forces, and of the angle by which all that are not static turn.
 
     Returns
@@ -211,7 +217,7 @@ def _by_linear_part(
             level += driven.real
         if k > 0:
             phase -= driven.imag
-    first = system.laws.size * PER_ELEMENT
+    first = system.laws.size * per_element(system)
     by[first + BY_OMEGA], by[first + BY_LEVEL], by[first + BY_PHASE] = by_omega, level, phase
 
 
@@ -220,7 +226,7 @@ def _by_forces(system: System, point: Evaluation, weights: Real, by: Real) -> No
     """Add w·∂F/∂ω to the slope by ω: of normal loads that follow the frequency, and of forces of velocity."""
     for c in range(system.owner.size):
         for i in range(coefficient_count(system.ks)):
-            by[system.laws.size * PER_ELEMENT + BY_OMEGA] += weights[c, i] * point.dF_dp[c, i]
+            by[system.laws.size * per_element(system) + BY_OMEGA] += weights[c, i] * point.dF_dp[c, i]
 
 
 @apart
@@ -229,7 +235,7 @@ def _by_contacts(
     by: Real,
 ) -> None:  # fmt: skip
     """Fill w·∂F/∂kt, w·∂F/∂mu and w·∂F/∂N of the Jenkins elements asked for."""
-    n = coefficient_count(system.ks)
+    n, each = coefficient_count(system.ks), per_element(system)
     table, load, _, _ = contact_values(system, omega, 0.0)
     for e in range(system.laws.size):
         if wanted[e] == 0 or system.jenkins[e] == 0:
@@ -241,12 +247,12 @@ def _by_contacts(
             point.dF_dmu, point.dF_dN, point.F[c],
         )  # fmt: skip
         for top in range(count):
-            row = by[top, e * PER_ELEMENT : (e + 1) * PER_ELEMENT]
-            for column in range(PER_ELEMENT):
+            row = by[top, e * each : (e + 1) * each]
+            for column in range(each):
                 row[column] = np.nan if state == FAILED else 0.0
             for i in range(n):
                 weight = weights[top, c, i]
                 row[BY_KT] += weight * point.dF_dkt[i]
                 row[BY_MU] += weight * point.dF_dmu[i]
-                for j in range(LOAD_COEFFICIENTS):
+                for j in range(each - BY_LOAD):
                     row[BY_LOAD + j] += weight * point.dF_dN[i, j]

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from solver.contacts.kernels.columns import COLUMNS, KT, MU
+from solver.contacts.kernels.columns import KT, MU
 from solver.contacts.kernels.coulomb.force import contact_force
 from solver.contacts.kernels.coulomb.hessian import second_along
 from solver.contacts.kernels.laws import call_law
 from solver.contacts.kernels.second_laws import call_second
 from solver.contacts.kernels.stick_slip_events import BEGAN, FAILED, SEPARATED, STUCK, UNLOADED
-from solver.contacts.kernels.system import LOAD_COEFFICIENTS, System
+from solver.contacts.kernels.system import System
 from solver.continuation.extrema.kernels.peak_state import Summit
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Real, coefficient_count
@@ -54,7 +54,7 @@ def _jenkins_at(system: System, e: int, u: Real, at: Summit) -> bool:
         at.point.slopes[e] = row[KT]
     for i in range(n):
         total = at.slope[e, KT] * at.dF_dkt[e, i] + at.slope[e, MU] * at.dF_dmu[e, i]
-        for j in range(LOAD_COEFFICIENTS):
+        for j in range(at.dload.shape[1]):
             total += at.dF_dN[e, i, j] * at.dload[e, j]
         at.dF_dp[c, i] = total
     return True
@@ -114,7 +114,7 @@ def second_forces_at(system: System, u: Real, at: Summit) -> float:
 def _second_of_jenkins(system: System, e: int, u: Real, at: Summit) -> float:
     """Fill h of an elastic Coulomb contact with zᵀ∂²F/∂U² du/dω; return the same by p."""
     n, c, block, row = coefficient_count(system.ks), system.first_port[e], system.first_block[e], at.table[e]
-    along, none, out_N = np.empty(n), np.zeros(LOAD_COEFFICIENTS), np.empty(LOAD_COEFFICIENTS)
+    along, none, out_N = np.empty(n), np.zeros(at.dload.shape[1]), np.empty(at.dload.shape[1])
     for i in range(n):
         along[i] = -at.rhs[1, c * n + i]
     by_kt, by_mu = second_along(
@@ -138,16 +138,16 @@ def _second_of(system: System, e: int, u: Real, at: Summit) -> float:
     for a in range(end - c):
         for i in range(n):
             along[a, i] = -at.rhs[1, (c + a) * n + i]
-    out_row, out_load = np.empty(COLUMNS), np.empty(LOAD_COEFFICIENTS)
+    out_row, out_load = np.empty(at.slope.shape[1]), np.empty(at.dload.shape[1])
     state = call_second(
         at.seconds[e], u[c * n : end * n].reshape(shape), system.ks, at.load[e], system.load_ks, at.table[e],
-        system.cos_table, system.sin_table, at.z[VALUE][c:end], along, np.zeros(COLUMNS),
-        np.zeros(LOAD_COEFFICIENTS), at.h[c * n : end * n].reshape(shape), out_row, out_load,
+        system.cos_table, system.sin_table, at.z[VALUE][c:end], along, np.zeros(at.slope.shape[1]),
+        np.zeros(at.dload.shape[1]), at.h[c * n : end * n].reshape(shape), out_row, out_load,
     )  # fmt: skip
     if state == FAILED:
         return np.nan
     total = dot(out_load, at.dload[e])
-    for column in range(COLUMNS):
+    for column in range(at.slope.shape[1]):
         if at.slope[e, column] != 0.0:
             total += out_row[column] * at.slope[e, column]
     return total

@@ -9,10 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numba.experimental import structref
 
-from solver.contacts.kernels.columns import COLUMNS
 from solver.contacts.kernels.stick_slip_events import SEGMENT_COLUMNS, segment_capacity
 from solver.contacts.kernels.system import (
-    LOAD_COEFFICIENTS,
     Evaluation,
     Receptance,
     System,
@@ -41,15 +39,15 @@ class Summit(NamedTuple):
     dF_dU: Real  # (blocks, n, n) slopes of the forces themselves; those of `point`
     dF_dp: Real  # (nc, n)
     seconds: Integer  # (ne,) numbers of the kernels of second derivatives; Jenkins elements need none
-    dF_dN: Real  # (ne, n, 3) of the Jenkins elements, likewise the five below
+    dF_dN: Real  # (ne, n, 1 + 2 K) of the Jenkins elements, likewise the five below
     dF_dkt: Real  # (ne, n)
     dF_dmu: Real  # (ne, n)
     states: Integer  # (ne,)
     counts: Integer  # (ne,) segments of each
     segments: Real  # (ne, capacity, columns)
-    table: Real  # (ne, COLUMNS) contacts at p, their loads, and both differentiated by p
+    table: Real  # (ne, ·) contacts at p, their loads, and both differentiated by p
     load: Real  # (ne, 3)
-    slope: Real  # (ne, COLUMNS)
+    slope: Real  # (ne, ·)
     dload: Real  # (ne, 3)
     rhs: Real  # (3, nt) the solutions of J x = r, dr/dω, dr/dp
     adjoint: Real  # (nt,) λ
@@ -79,15 +77,15 @@ _new: Callable[..., Summit] = _SummitReference
 def new_summit(system: System) -> Summit:
     """Return empty arrays for `system`; the numbers of the second derivatives are not in place yet."""
     ne, nc, n = system.laws.size, system.shift.size, coefficient_count(system.ks)
-    nt, m = nc * n, LOAD_COEFFICIENTS
+    nt, m, columns = nc * n, coefficient_count(system.load_ks), system.contacts.shape[1]
     capacity = segment_capacity(max(system.ks[-1], system.load_ks[-1]))
     jets, point = new_jets(system), new_whole_evaluation(system)
     linear = receptance_over(jets.A, jets.u_linear, jets.B, jets.x_linear)
     return _new(
         jets, linear, point, np.zeros((nc, n)), point.dF_dU, np.zeros((nc, n)), np.full(ne, -1, np.int64),
         np.zeros((ne, n, m)), np.zeros((ne, n)), np.zeros((ne, n)), np.zeros(ne, np.int64),
-        np.zeros(ne, np.int64), np.zeros((ne, capacity, SEGMENT_COLUMNS)), np.zeros((ne, COLUMNS)),
-        np.zeros((ne, m)), np.zeros((ne, COLUMNS)), np.zeros((ne, m)), np.zeros((3, nt)), np.zeros(nt),
+        np.zeros(ne, np.int64), np.zeros((ne, capacity, SEGMENT_COLUMNS)), np.zeros((ne, columns)),
+        np.zeros((ne, m)), np.zeros((ne, columns)), np.zeros((ne, m)), np.zeros((3, nt)), np.zeros(nt),
         np.zeros(nt), np.zeros(n), np.zeros(n), np.zeros((nc, n)), np.zeros((5, nc, n)), np.zeros(NUMBERS),
     )  # fmt: skip
 
