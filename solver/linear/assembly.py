@@ -208,9 +208,9 @@ def _derivative_by(scene: Scene, name: str) -> LinearModelDerivative:
         gas = terms_by_gas(scene, name.rpartition(".")[0], _coordinates_of(scene))
         return replace(_of_nothing(gas.K.shape[1]), extra=gas)
     if is_loss(structure, name):
-        own = _coordinates_of(scene)
-        nothing = _of_nothing(own.shapes.shape[1])
-        return replace(nothing, by_loss_factor=True, extra=terms_by_loss(own))
+        here = _coordinates_of(scene)
+        nothing = _of_nothing(here.shapes.shape[1])
+        return replace(nothing, by_loss_factor=True, extra=terms_by_loss(here))
     if isinstance(structure, MatricesStructure):
         return _proportional(structure, scene.bodies, name)
     parts: tuple[Mass | Spring | Damper, ...] = (*structure.masses, *structure.springs, *structure.dampers)

@@ -95,11 +95,11 @@ def power_lost(solution: Solution) -> float:
     Far from a resonance force and motion are in quadrature and next to nothing is dissipated: the largest of
     the powers would compare rounding with rounding.
     """
-    power, ks = power_balance(solution), np.arange(solution.highest_harmonic + 1)
+    power, ks = power_balance(solution), range(solution.highest_harmonic + 1)
     omega = 2.0 * math.pi * solution.frequency_hz
     motion = max(float(np.abs(coordinates(solution, k)).max(initial=0.0)) for k in ks)
-    forces = force_amplitudes(linear_model(solution.scene), ks.astype(np.int64))
-    apparent = 0.5 * omega * float(ks @ np.abs(forces).sum(axis=1)) * motion
+    forces = force_amplitudes(linear_model(solution.scene), np.array(ks, dtype=np.int64))
+    apparent = 0.5 * omega * float(np.array(ks) @ np.abs(forces).sum(axis=1)) * motion
     apparent += sum(abs(each) for each in power.contacts_w.values()) + abs(power.viscous_w)
     lost = abs(power.input_w - power.viscous_w - power.friction_w)
     return lost / apparent if apparent > 0.0 else 0.0
