@@ -13,7 +13,7 @@ from solver.jit import fourier
 from solver.linear.assembly import linear_model
 from solver.linear.condensation import force_amplitudes
 from solver.response.solution import Solution
-from solver.response.time_history import coordinates, matrices
+from solver.response.time_history import coordinates, mass, matrices
 from solver.results.told import Piece
 
 
@@ -27,7 +27,8 @@ class PowerBalance(Piece):
     Attributes
     ----------
     input_w : float
-        Put in by the excitation [W].
+        Put in by the excitation [W]; of a base that moves what it puts into the coordinates that move freely,
+        in which dashpots to the base then take out.
     viscous_w : float
         Taken out by the dampers of the structure, structural damping and gas included [W].
     friction_w : float
@@ -67,16 +68,22 @@ def power_balance(solution: Solution) -> PowerBalance:
         The solution did not converge.
     """
     model = linear_model(solution.scene)
+    free = model.free
     put_in = taken = 0.0
-    for k in range(solution.highest_harmonic + 1):
+    for k in range(1, solution.highest_harmonic + 1):
         speed = 2.0 * math.pi * solution.frequency_hz * k
-        velocity = 1j * speed * coordinates(solution, k)
+        motion = coordinates(solution, k)
+        velocity, moved = 1j * speed * motion[free], motion[~free]
         force = force_amplitudes(model, np.array([k], dtype=np.int64))[0]
-        K, C, _ = matrices(model, k)
-        put_in += 0.5 * float(np.vdot(force, velocity).real)
-        taken += 0.5 * float(np.vdot(velocity, C @ velocity).real)
-        if k and model.extra is not None:  # what a stiffness that is not symmetric or not real takes out
-            taken += 0.5 / speed * float(np.vdot(velocity, K @ velocity).imag)
+        K, C, L = matrices(model, k)
+        dynamic = K - speed**2 * mass(model, k) + 1j * speed * C
+        put_in += 0.5 * float(np.vdot(velocity, force[free] - dynamic[np.ix_(free, ~free)] @ moved).real)
+        rubbing = [fourier.to_complex(each)[k] for contact in solution.contacts for each in contact.forces]
+        if moved.size and rubbing:
+            put_in += 0.5 * float(np.vdot(1j * speed * L[:, ~free] @ moved, rubbing).real)
+        taken += 0.5 * float(np.vdot(velocity, C[np.ix_(free, free)] @ velocity).real)
+        if model.extra is not None:  # what a stiffness that is not symmetric or not real takes out
+            taken += 0.5 / speed * float(np.vdot(velocity, K[np.ix_(free, free)] @ velocity).imag)
     omega = 2.0 * math.pi * solution.frequency_hz
     friction = {}
     for contact in solution.contacts:
@@ -95,9 +102,9 @@ def power_lost(solution: Solution) -> float:
     Far from a resonance force and motion are in quadrature and next to nothing is dissipated: the largest of
     the powers would compare rounding with rounding.
     """
-    power, ks = power_balance(solution), range(solution.highest_harmonic + 1)
+    power, ks = power_balance(solution), range(1, solution.highest_harmonic + 1)
     omega = 2.0 * math.pi * solution.frequency_hz
-    motion = max(float(np.abs(coordinates(solution, k)).max(initial=0.0)) for k in ks)
+    motion = max((float(np.abs(coordinates(solution, k)).max(initial=0.0)) for k in ks), default=0.0)
     forces = force_amplitudes(linear_model(solution.scene), np.array(ks, dtype=np.int64))
     apparent = 0.5 * omega * float(np.array(ks) @ np.abs(forces).sum(axis=1)) * motion
     apparent += sum(abs(each) for each in power.contacts_w.values()) + abs(power.viscous_w)

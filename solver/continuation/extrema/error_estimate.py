@@ -70,8 +70,9 @@ class ErrorEstimator:
     weighted by the receptance of the structure with the mean stiffness of its contacts, so that a resonance
     out there is not overlooked. Where these move the contacts more than the harmonics looked at, as they do
     up to the resonance of a light damper on its stiff contacts, the change counts as many times; up to twice
-    where contacts are stiffer than the structure at the highest harmonic looked at: friction jumps there for
-    all they can tell, the error falls like 1/H, and what is found up to 2 H is one half of it.
+    where they would without these stiffnesses, which contacts that slip do not have, and where contacts are
+    stiffer than the structure at the highest harmonic looked at: friction jumps there for all they can tell,
+    the error falls like 1/H, and what is found up to 2 H is one half of it.
     """
 
     def __init__(self, workspace: Workspace) -> None:
@@ -221,25 +222,25 @@ class ErrorEstimator:
         except np.linalg.LinAlgError:
             return math.nan, 1.0
         B = np.abs(np.einsum("kd,kdc->kc", linear.B[0], held))
-        A = np.abs(linear.A[0] @ held)
+        A = np.abs(np.stack([linear.A[0] @ held, linear.A[0]]))
         sizes = np.zeros((F.shape[0], ks.size))
         moving = ks > 0
         pairs = F[:, int(ks[0] == 0) :].reshape(F.shape[0], int(moving.sum()), 2)
         sizes[:, moving] = np.hypot(pairs[..., 0], pairs[..., 1])
-        weighted, tail, far = sizes * ks**2, 0.0, np.zeros(F.shape[0])
+        weighted, tail, far = sizes * ks**2, 0.0, np.zeros((2, F.shape[0]))
         for fast in (False, True):  # waves of their own, each with its own rate
             own, later = self._is_fast == fast, self._later_is_fast == fast
             late = weighted[:, own][:, np.count_nonzero(own) // 2 :]
             falling = np.max(late, axis=1, initial=0.0)
             share = 1.0 / self._beyond_ks[later] ** 2
             tail += float(np.sum(B[self._is_beyond][later] @ falling * share))
-            far += share @ (A[self._is_beyond][later] @ falling)
+            far += np.einsum("k,akcd,d->ac", share, A[:, self._is_beyond][:, later], falling)
         added = np.isin(self._all_ks, ks[~np.isin(ks, kept)])
-        near = np.einsum("kcd,dk->c", A[added], sizes[:, ~np.isin(ks, kept)])
-        furthest, nearest = float(far.max(initial=0.0)), float(near.max(initial=0.0))
+        near = np.einsum("akcd,dk->ac", A[:, added], sizes[:, ~np.isin(ks, kept)])
+        further, bare = far.max(axis=1, initial=0.0) / np.maximum(near.max(axis=1, initial=0.0), 1e-300)
         last = np.abs(np.diagonal(linear.A[0, ~self._is_beyond][-1])) * self._stiffest
         jumps = 1.0 + float(np.max(last / (1.0 + last), initial=0.0))
-        return tail, max(jumps, furthest / nearest) if nearest > 0.0 else 1.0
+        return tail, max(jumps, float(further), min(float(bare), 2.0)) if near.any() else 1.0
 
     def _mean_stiffness(self) -> Real:
         """Return what contacts add to the structure at high harmonics where last evaluated, (nc,) [N/m]."""

@@ -17,7 +17,7 @@ from solver.jit.fourier import Integer, Real
 
 # Up to these departures from what the points beside an interval foretell a change in it hides no maximum:
 # relative to the amplitude, and as a part of the slopes.
-FORETOLD, STEEPER = 1e-3, 8.0
+FORETOLD, STEEPER = 1e-3, 12.0
 FORETOLD_BESIDE = 1e-2  # the first of them, of an interval beside a change
 MOST_CHANGES = 16  # in one interval of the branch
 MOST_HALVINGS = 4  # of what a change leaves on either side of it

@@ -200,6 +200,19 @@ def wave(k: int, angle: float) -> float:
 
 
 @compiled
+def load_series(system: System, tau: float, h: float, series: Series) -> None:
+    """Fill in the Taylor coefficients of the given normal loads from τ on, over a step h."""
+    for c in range(system.kt.size):
+        series.load[:, c] = 0.0
+        series.load[0, c] = system.N0[c]
+        for j in range(system.waves.shape[1]):
+            factor, angle = system.waves[c, j], (j + 1) * tau + system.wave_phases[c, j]
+            for k in range(ORDER + 1):
+                series.load[k, c] += factor * wave(k, angle)
+                factor *= (j + 1) * h / (k + 1)
+
+
+@compiled
 def load_rise(system: System, tau: float, c: int) -> float:
     """Return the derivative of the given load of contact c by tau."""
     rise = 0.0

@@ -54,6 +54,7 @@ from solver.marching.kernels.state import (
     finite,
     largest_change,
     load_rise,
+    load_series,
     motion_size,
     new_record,
     new_series,
@@ -67,18 +68,6 @@ from solver.marching.kernels.state import (
     swing,
     wave,
 )
-
-
-@compiled
-def _load_series(system: System, tau: float, h: float, series: Series) -> None:
-    for c in range(system.kt.size):
-        for k in range(ORDER + 1):
-            series.load[k, c] = system.N0[c] if k == 0 else 0.0
-        for j in range(system.waves.shape[1]):
-            order, factor = j + 1, system.waves[c, j]
-            for k in range(ORDER + 1):
-                series.load[k, c] += factor * wave(k, order * tau + system.wave_phases[c, j])
-                factor *= order * h / (k + 1)
 
 
 @apart
@@ -136,7 +125,7 @@ def _expand(system: System, state: State, tau: float, h: float, series: Series) 
     for i in range(n):
         series.x[0, i] = state.x[i]
         series.v[0, i] = state.v[i]
-    _load_series(system, tau, h, series)
+    load_series(system, tau, h, series)
     _contact_series(system, state, series, 0)
     scale = 1.0  # h^k / k!
     for k in range(ORDER):

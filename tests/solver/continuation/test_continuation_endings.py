@@ -15,22 +15,22 @@ from solver.balance.kernels.output import MAX_ABS
 from solver.jit.fourier import to_complex
 
 
-def test_stalled():
+def test_undamped():
     """Without damping the motion grows without bound towards the resonance; the steps end before it."""
     scene = oscillator({"kt": 0.3, "mu": 0.3, "N0": 0.5}, k=1.0)
     branch = sweep(scene, start=0.05, stop=0.3, harmonics=3)
-    assert branch.status is BranchStatus.STALLED
+    assert branch.status is BranchStatus.UNDAMPED
     assert not branch.completed
     assert branch.residuals.max() <= 1e-9
     assert branch.values[-1] == pytest.approx(1.0 / (2.0 * math.pi), rel=1e-6)
-    assert "too small" in branch.to_json()["status"]
+    assert "no damping" in branch.to_json()["status"]
 
 
 def test_no_start():
     """At the resonance itself there is no bounded motion to start from."""
     scene = oscillator({"kt": 0.3, "mu": 0.3, "N0": 0.5}, k=1.0)
     branch = sweep(scene, start=1.0 / (2.0 * math.pi), stop=0.3, harmonics=3)
-    assert branch.status is BranchStatus.NO_START
+    assert branch.status is BranchStatus.UNDAMPED
     assert len(branch.values) == 0
     assert branch.peak is None
     assert branch.band is None
