@@ -1,8 +1,8 @@
 """Griffin's blade with a flexible damper (J. Eng. Power 102 (1980) 329): the load that makes the peak least.
 
-One harmonic of a slider of stiffness k_d and limit F on an undamped mass under P cos ωt: at resonance the force
-works π P A a period and the slider takes 4F (A − F/k_d), so A = 4F² / (k_d (4F − πP)). That is least, π P/k_d,
-at F = μN₀ = πP/2, where A is twice what the slider yields before it slips, and m ω² = k + k_d/2.
+One harmonic of a slider of stiffness k_d and limit F on an undamped mass under P cos ωt: at resonance the
+force works π P A a period and the slider takes 4F (A − F/k_d), so A = 4F² / (k_d (4F − πP)). That is least,
+πP/k_d, at F = μN₀ = πP/2: A is twice the motion from which it slips, and m ω² = k + k_d/2.
 """
 
 from __future__ import annotations
