@@ -42,3 +42,25 @@ def test_loops_shapes_and_exact_peaks(shipped: httpx.Client) -> None:
 def test_exact_peaks_need_the_curve(shipped: httpx.Client) -> None:
     problem = is_problem(shipped.post("/v1/jobs", json={**MODE, "exact_peaks": 2}), 422)
     assert [one["pointer"] for one in problem["errors"]] == ["/exact_peaks"]
+
+
+def test_gas_on_one_mode_has_the_cycles_of_the_library(shipped: httpx.Client) -> None:
+    scene = solver.load_scene("two-dof").with_values({"damper.N1": 0.0})
+    mode = solver.nonlinear_mode(scene, 1, amplitudes=(0.1, 100.0), harmonics=3)
+    aero = -0.5 * float(mode.damping_ratio.max())
+    cycles = {}
+    for alone in (False, True):
+        body = {**MODE, "set": {"damper.N1": 0.0}, "aero_damping": aero, "mode_alone": alone}
+        answer = shipped.post("/v1/jobs", json=body, headers={"Prefer": "wait=60"}).json()
+        found = answer["result"]["limit_cycles"]
+        assert found["mode_alone"] is alone
+        cycles[alone] = [each["amplitude"] for each in found["cycles"]]
+        expected = solver.limit_cycles(mode, aero, mode_alone=alone)
+        assert cycles[alone] == pytest.approx([each.amplitude for each in expected.cycles], rel=1e-9)
+    assert cycles[True]
+    assert cycles[True] != pytest.approx(cycles[False], rel=1e-6)
+
+
+def test_gas_on_one_mode_needs_the_gas(shipped: httpx.Client) -> None:
+    problem = is_problem(shipped.post("/v1/jobs", json={**MODE, "mode_alone": True}), 422)
+    assert [one["pointer"] for one in problem["errors"]] == ["/mode_alone"]
