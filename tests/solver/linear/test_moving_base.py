@@ -108,6 +108,42 @@ def test_gradients_are_differences(way: Any) -> None:
         assert slope == pytest.approx((high - low) / (2e-5 * value), rel=3e-6), path
 
 
+@pytest.mark.parametrize("motion", list(ORDERS))
+def test_driven_dofs_move_in_several_harmonics(motion: str) -> None:
+    """Each harmonic of one pattern, with its own phase, against the matrices, and with friction the march."""
+    entries = [
+        {"driven": {"floor": -0.8}, "motion": motion, "amplitude": 0.7, "phase": 0.2},
+        {"driven": {"floor": -0.8}, "motion": motion, "amplitude": 0.5, "harmonic": 3, "phase": -1.1},
+    ]
+    omega, turn = 2.0 * math.pi * 0.5, np.exp(2j * np.pi * np.arange(4096) / 4096)
+    wanted = np.zeros(4096)
+    for k, motion_of in ((1, 0.7 * np.exp(0.2j)), (3, 0.5 * np.exp(-1.1j))):
+        s = 1j * k * omega
+        push = np.array([(40.0 + 0.6 * s) * -0.8 * motion_of / s ** ORDERS[motion], 0.0])
+        wanted += (np.linalg.solve(K + s * C + s**2 * M, push)[1] * turn**k).real
+    linear = Scene.from_dict(driven() | {"excitation": entries})
+    found = solver.solve(linear, frequency_hz=0.5, harmonics=3)
+    history = np.asarray(solver.time_history(found, "y")[1])
+    assert history == pytest.approx(
+        wanted[:: 4096 // history.size], rel=1e-10, abs=1e-10 * np.abs(wanted).max()
+    )
+    assert found.max_abs == pytest.approx(np.abs(wanted).max(), rel=1e-6)  # the most of 4096 instants
+    rubbing = Scene.from_dict(driven(contacts=[RUB]) | {"excitation": entries})
+    precise, marched = (
+        solver.solve(rubbing, frequency_hz=0.5, harmonics=61),
+        solver.march(rubbing, frequency_hz=0.5),
+    )
+    assert precise.half_peak_to_peak == pytest.approx(marched.half_peak_to_peak, rel=1e-5)
+
+
+def test_harmonics_of_different_patterns_are_refused() -> None:
+    entries = [
+        {"driven": {"floor": share}, "amplitude": 1.0, "harmonic": k} for k, share in ((1, 1.0), (3, 0.5))
+    ]
+    with pytest.raises(SceneError, match="`driven` must be the same motion in every excitation"):
+        Scene.from_dict(driven() | {"excitation": entries})
+
+
 def test_a_pattern_is_the_sum_of_its_forces(tmp_path: Path) -> None:
     pattern = {"forces": {"x": [0.5, 0.3], "y": -2.0}, "amplitude": 3.0, "phase": 0.1}
     apart = [
