@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from solver.linear.assembly import linear_model
 from solver.linear.contact_table import port_stiffnesses
-from solver.matrices.normal_modes import hermitian, undamped_modes
 from solver.scene.scene import Scene
 
 _NEAR = 0.02  # relative to a natural frequency
@@ -28,6 +27,9 @@ def undamped_resonance(scene: Scene, frequency_hz: float, harmonics: NDArray[np.
     ----------
     harmonics : those kept.
     """
+    # Loaded here: it brings SciPy's packages along, which an answer does without.
+    from solver.matrices.normal_modes import hermitian, undamped_modes
+
     model = linear_model(scene)
     ks = harmonics[harmonics > 0]
     if model.prescribed:

@@ -26,6 +26,7 @@ from solver.continuation.from_nothing import solve_from_nothing
 from solver.jit import fourier
 from solver.jit.fourier import Real
 from solver.linear.condensation import loose_ports
+from solver.linear.undamped import undamped_resonance
 from solver.response.contact_response import OPENS, ContactResponse, ContactState, contact_responses
 from solver.response.history_dependence import has_another_solution, history_of
 from solver.response.power_balance import power_lost
@@ -203,9 +204,6 @@ def _flags(
 def _failure(balance: Balance, frequency_hz: float, found: PointSolution, seconds: float) -> Solution:
     nothing = np.full(2 * balance.highest_harmonic + 1, np.nan)
     status = SolutionStatus.RATCHETS if found.ratchets else SolutionStatus.NOT_CONVERGED
-    # Loaded here: it brings SciPy's packages along, which an answer does without.
-    from solver.linear.undamped import undamped_resonance
-
     if not found.ratchets and undamped_resonance(balance.scene, frequency_hz, balance.system.ks):
         status = SolutionStatus.UNDAMPED
     return Solution(

@@ -1,7 +1,8 @@
 """Whether a response is stable, as every answer says it: yes, no, or not known and why.
 
 It is known without Floquet multipliers where loads are given, stiffnesses constant and everything takes out
-power, and computed by them where that costs little; `forecast` says what it costs.
+power, and computed by them where that costs little; `forecast` says what it costs. What computes them is loaded where it
+is needed: it brings SciPy's packages along, which an answer does without.
 """
 
 from __future__ import annotations
@@ -14,7 +15,6 @@ from solver.continuation.branch import Branch
 from solver.errors import SettingError
 from solver.linear.assembly import linear_model
 from solver.linear.contact_table import port_counts
-from solver.response.stability.floquet import GROWS, Stability, branch_stability, stability
 from solver.response.stability.uniqueness import MONOTONE, monotone
 from solver.results import units
 from solver.results.verdict import Stable, Verdict
@@ -22,6 +22,7 @@ from solver.scene.scene import Scene
 
 if TYPE_CHECKING:
     from solver.response.solution import Solution
+    from solver.response.stability.floquet import Stability
 
 CHEAP = 1.0  # s, forecast, up to which an answer has its multipliers by itself
 NEUTRAL = 1e-7  # of the largest modulus beside 1: nothing is said to grow or to die out so slowly
@@ -56,6 +57,8 @@ def _turns(contact: object) -> bool:
 
 def verdict_of(found: Stability) -> Verdict:
     """Return what the multipliers of a response say."""
+    from solver.response.stability.floquet import GROWS
+
     radius = found.radius
     if abs(radius - 1.0) <= NEUTRAL and len(found.multipliers):
         return Verdict(stable=Stable.NOT_KNOWN, ground=_BESIDE_ONE.format(NEUTRAL))
@@ -71,6 +74,8 @@ def of_solution(solution: Solution) -> Verdict:
     known = _without_multipliers(solution.scene)
     if known is not None:
         return known
+    from solver.response.stability.floquet import stability
+
     try:
         found = verdict_of(stability(solution))
     except SettingError as error:
@@ -94,6 +99,8 @@ def of_peaks(branch: Branch) -> tuple[Verdict, ...]:
         if known is None and found and time.perf_counter() > until:
             known = Verdict(stable=Stable.NOT_KNOWN, ground="the peaks above took the time there is for it")
         if known is None:
+            from solver.response.stability.floquet import branch_stability
+
             try:
                 known = verdict_of(branch_stability(branch, at=[(peak.at, peak.solution)])[0])
             except SettingError as error:
