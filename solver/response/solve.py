@@ -20,7 +20,6 @@ from solver.contacts.kernels.stick_slip_events import FAILED, STUCK
 from solver.contacts.kernels.system import UNHELD, evaluation_by_value
 from solver.continuation.branches.adaptive_harmonics import solve_to
 from solver.continuation.branches.symmetry_breaking import assumed_flags, seen
-from solver.continuation.endings import too_stiff_between
 from solver.continuation.extrema.error_estimate import UNKNOWN, truncation_error
 from solver.continuation.from_nothing import solve_from_nothing
 from solver.jit import fourier
@@ -79,6 +78,9 @@ def solve(
             lambda h: build(scene, harmonics=h, effects=effects), omega, accuracy
         )
     if not found.converged:
+        # Loaded here: it brings the kernels of a walk along, which an answer does without.
+        from solver.continuation.endings import too_stiff_between
+
         failed = _failure(workspace.balance, frequency_hz, found, time.perf_counter() - begun)
         if not found.ratchets and _law_fails(workspace, found.u, omega):
             failed = replace(failed, status=SolutionStatus.LAW_FAILED)

@@ -1,8 +1,8 @@
 """Whether a response is stable, as every answer says it: yes, no, or not known and why.
 
 It is known without Floquet multipliers where loads are given, stiffnesses constant and everything takes out
-power, and computed by them where that costs little; `forecast` says what it costs. What computes them is loaded where it
-is needed: it brings SciPy's packages along, which an answer does without.
+power, and computed by them where that costs little; `forecast` says what it costs. What computes them is
+loaded where it is needed: it brings SciPy's packages along, which an answer does without.
 """
 
 from __future__ import annotations
