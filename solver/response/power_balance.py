@@ -10,6 +10,7 @@ from typing import ClassVar
 import numpy as np
 
 from solver.jit import fourier
+from solver.jit.fourier import Complex
 from solver.linear.assembly import linear_model
 from solver.linear.condensation import force_amplitudes
 from solver.response.solution import Solution
@@ -67,12 +68,21 @@ def power_balance(solution: Solution) -> PowerBalance:
     SettingError
         The solution did not converge.
     """
+    return _powers(solution, _motions(solution))
+
+
+def _motions(solution: Solution) -> list[Complex]:
+    """Return the complex amplitudes of all coordinates for each harmonic from the first on."""
+    return [coordinates(solution, k) for k in range(1, solution.highest_harmonic + 1)]
+
+
+def _powers(solution: Solution, motions: list[Complex]) -> PowerBalance:
+    """Return the mean powers of a periodic response with these motions."""
     model = linear_model(solution.scene)
     free = model.free
     put_in = taken = 0.0
-    for k in range(1, solution.highest_harmonic + 1):
+    for k, motion in enumerate(motions, 1):
         speed = 2.0 * math.pi * solution.frequency_hz * k
-        motion = coordinates(solution, k)
         velocity, moved = 1j * speed * motion[free], motion[~free]
         force = force_amplitudes(model, np.array([k], dtype=np.int64))[0]
         K, C, L = matrices(model, k)
@@ -102,9 +112,10 @@ def power_lost(solution: Solution) -> float:
     Far from a resonance force and motion are in quadrature and next to nothing is dissipated: the largest of
     the powers would compare rounding with rounding.
     """
-    power, ks = power_balance(solution), range(1, solution.highest_harmonic + 1)
+    motions, ks = _motions(solution), range(1, solution.highest_harmonic + 1)
+    power = _powers(solution, motions)
     omega = 2.0 * math.pi * solution.frequency_hz
-    motion = max((float(np.abs(coordinates(solution, k)).max(initial=0.0)) for k in ks), default=0.0)
+    motion = max((float(np.abs(each).max(initial=0.0)) for each in motions), default=0.0)
     forces = force_amplitudes(linear_model(solution.scene), np.array(ks, dtype=np.int64))
     apparent = 0.5 * omega * float(np.array(ks) @ np.abs(forces).sum(axis=1)) * motion
     apparent += sum(abs(each) for each in power.contacts_w.values()) + abs(power.viscous_w)
