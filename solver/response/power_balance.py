@@ -14,7 +14,7 @@ from solver.jit.fourier import Complex
 from solver.linear.assembly import linear_model
 from solver.linear.condensation import force_amplitudes
 from solver.response.solution import Solution
-from solver.response.time_history import coordinates, mass, matrices
+from solver.response.time_history import all_coordinates, mass, matrices
 from solver.results.told import Piece
 
 
@@ -68,15 +68,10 @@ def power_balance(solution: Solution) -> PowerBalance:
     SettingError
         The solution did not converge.
     """
-    return _powers(solution, _motions(solution))
+    return _powers(solution, all_coordinates(solution, first=1))
 
 
-def _motions(solution: Solution) -> list[Complex]:
-    """Return the complex amplitudes of all coordinates for each harmonic from the first on."""
-    return [coordinates(solution, k) for k in range(1, solution.highest_harmonic + 1)]
-
-
-def _powers(solution: Solution, motions: list[Complex]) -> PowerBalance:
+def _powers(solution: Solution, motions: Complex) -> PowerBalance:
     """Return the mean powers of a periodic response with these motions."""
     model = linear_model(solution.scene)
     free = model.free
@@ -112,10 +107,10 @@ def power_lost(solution: Solution) -> float:
     Far from a resonance force and motion are in quadrature and next to nothing is dissipated: the largest of
     the powers would compare rounding with rounding.
     """
-    motions, ks = _motions(solution), range(1, solution.highest_harmonic + 1)
+    motions, ks = all_coordinates(solution, first=1), range(1, solution.highest_harmonic + 1)
     power = _powers(solution, motions)
     omega = 2.0 * math.pi * solution.frequency_hz
-    motion = max((float(np.abs(each).max(initial=0.0)) for each in motions), default=0.0)
+    motion = float(np.abs(motions).max(initial=0.0))
     forces = force_amplitudes(linear_model(solution.scene), np.array(ks, dtype=np.int64))
     apparent = 0.5 * omega * float(np.array(ks) @ np.abs(forces).sum(axis=1)) * motion
     apparent += sum(abs(each) for each in power.contacts_w.values()) + abs(power.viscous_w)

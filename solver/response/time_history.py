@@ -103,20 +103,22 @@ def coordinates(solution: Solution, k: int) -> Complex:
     return np.asarray(np.linalg.solve(dynamic, force - L.conj().T @ friction), dtype=np.complex128)
 
 
-def all_coordinates(solution: Solution) -> Complex:
-    """Return the complex amplitudes of all coordinates for every harmonic at once, (H + 1, n)."""
+def all_coordinates(solution: Solution, *, first: int = 0) -> Complex:
+    """Return the complex amplitudes of all coordinates of every harmonic from `first` on, a row each."""
     _check_converged(solution)
     model = linear_model(solution.scene)
-    ks = np.arange(solution.highest_harmonic + 1)
+    ks = np.arange(first, solution.highest_harmonic + 1)
     diameters = model.diameters(ks)
     K, C, M = model.at(diameters, ks > 0)
     K, L = K.astype(np.complex128), model.ports_at(diameters)
-    forces = [fourier.to_complex(force) for c in solution.contacts for force in c.forces]
-    friction = np.array(forces, dtype=np.complex128).reshape(-1, ks.size).T
+    forces = [fourier.to_complex(force)[first:] for c in solution.contacts for force in c.forces]
+    friction = np.array(forces, dtype=np.complex128).reshape(len(forces), ks.size).T
     if solution.contacts:
         kt = port_stiffnesses(solution.scene, model)
-        motions = np.array([fourier.to_complex(each) for c in solution.contacts for each in c.motions]).T
-        held = slice(None) if contacts_hold(model) else slice(1)
+        motions = np.array(
+            [fourier.to_complex(each)[first:] for c in solution.contacts for each in c.motions]
+        ).T
+        held = np.flatnonzero((ks == 0) | contacts_hold(model))
         friction[held] -= kt * motions[held]
         K[held] += np.swapaxes(L[held].conj(), 1, 2) @ (kt[:, None] * L[held])
     speed = (2.0 * math.pi * solution.frequency_hz * ks)[:, None, None]
