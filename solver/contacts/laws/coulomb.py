@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, ClassVar, Literal
 
-from solver.contacts.fields import NonNegative, Real
+from solver.contacts.fields import NonNegative, Real, Stiffness
 from solver.contacts.laws.friction import FrictionContact
 from solver.contacts.laws.parts import Motion, Row
 
@@ -43,7 +43,7 @@ class Contact(SlidesOnALine):
     Attributes
     ----------
     kt : float
-        Tangential contact stiffness [N/m].
+        Tangential contact stiffness [N/m]; infinite of a rigid contact, see `solver.response.exact`.
     mu : float
         Friction coefficient.
     N0 : float
@@ -64,6 +64,7 @@ class Contact(SlidesOnALine):
     JENKINS: ClassVar[bool] = True
 
     law: Literal["coulomb"] | None = None
+    kt: Stiffness
     N0: NonNegative
 
     @property
