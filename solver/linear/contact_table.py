@@ -88,7 +88,9 @@ def contact_table(scene: Scene, highest: int) -> Real:
     """
     rigid = next((contact for contact in scene.contacts if contact.is_rigid), None)
     if rigid is not None:
-        raise SettingError(f"{rigid.name}.{'kt' if math.isinf(rigid.stiffnesses[0]) else 'kn'}", math.inf, _SINGLE)
+        raise SettingError(
+            f"{rigid.name}.{'kt' if math.isinf(rigid.stiffnesses[0]) else 'kn'}", math.inf, _SINGLE
+        )
     width = columns.wave_column(highest_load(scene) + 1)
     table = np.zeros((len(scene.contacts), width))
     table[:, columns.RATIO] = math.nan

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 from solver.contacts.fields import NonNegative, Real, Stiffness
 from solver.contacts.laws.friction import FrictionContact
 from solver.contacts.laws.parts import Motion, Row
+from solver.errors import SettingError
 
 if TYPE_CHECKING:
     from solver.contacts.pieces.piece import Part
@@ -32,6 +33,9 @@ class SlidesOnALine(FrictionContact):
         from solver.contacts.pieces.line import friction_pieces
         from solver.contacts.pieces.piece import Part
 
+        if self.is_rigid:
+            wanted = "must be finite here: what is known of the stability of a rigid contact is in the answer"
+            raise SettingError(f"{self.name}.kt", self.kt, wanted)
         kn = None if self.normal_port is None else self.stiffnesses[self.normal_port]
         pieces = friction_pieces(motions[0], load, self.kt, self.mu, kn=kn)
         return (Part(tuple(range(len(motions))), pieces),)

@@ -12,19 +12,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from solver.errors import SettingError
 from solver.jit.fourier import Real
 from solver.response.contact_response import OPENS, ContactResponse, ContactState
-from solver.response.exact.flow import Lifted, NoMotion, exponential, first_root, steps_of, taylor
-from solver.response.exact.orbit import PERIOD, Ended, Orbit, find
+from solver.response.exact.flow import LiftsError, NoMotionError, exponential, first_root, steps_of, taylor
+from solver.response.exact.orbit import PERIOD, Ended, Orbit, find, grazed
 from solver.response.exact.piecewise import STICK, Mode, Piecewise, State
 from solver.response.solution import HISTORY_DEPENDENT, MEAN_UNDETERMINED, Solution, SolutionStatus
-from solver.results.verdict import Stable, Verdict
+from solver.response.stability.floquet import Stability, growth_of
+from solver.response.stability.verdict import verdict_of
 from solver.scene.scene import Scene
 
 _GAUSS = 12
 _TURN = 2.0  # rad by which the highest harmonic asked for turns over a panel at most
 _MOVES = 1e-7  # of the largest change of a motion: less is none
-_NEUTRAL = 1e-7  # beside a modulus of 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,20 +110,42 @@ def solve_exactly(scene: Scene, frequency_hz: float, harmonics: int) -> Solution
     """
     begun = time.perf_counter()
     scene = scene.at_frequency(frequency_hz)
+    found = _orbit_of(scene, frequency_hz)
+    highest = max(harmonics, found[0].top)
+    if isinstance(found[1], SolutionStatus):
+        return _nothing(scene, frequency_hz, harmonics, highest, found[1], time.perf_counter() - begun)
+    solution = _described(*found, frequency_hz, harmonics, highest, begun)
+    solution._judged.append(verdict_of(_stability(found[1], frequency_hz, begun)))  # a by-product here
+    return solution
+
+
+def stability_exactly(scene: Scene, frequency_hz: float) -> Stability:
+    """Return the Floquet multipliers of the response of a scene with rigid contacts.
+
+    Raises
+    ------
+    SettingError
+        A part of the scene that cannot stand beside rigid contacts, or there is no response.
+    """
+    begun = time.perf_counter()
+    _, orbit = _orbit_of(scene, frequency_hz)
+    if isinstance(orbit, SolutionStatus):
+        raise SettingError("solution", orbit.value, "must have converged")
+    return _stability(orbit, frequency_hz, begun)
+
+
+def _orbit_of(scene: Scene, frequency_hz: float) -> tuple[Piecewise, Orbit | SolutionStatus]:
+    """Return the response of a scene as an orbit, or why there is none."""
     system = Piecewise(scene, 2.0 * math.pi * frequency_hz)
     try:
         found = find(system, *system.at_rest())
-        status = SolutionStatus.RATCHETS if found is Ended.RATCHETS else SolutionStatus.NOT_CONVERGED
-    except Lifted:
-        found, status = Ended.NOT_FOUND, SolutionStatus.RIGID_OPENS
-    except NoMotion:
-        found, status = Ended.NOT_FOUND, SolutionStatus.NOT_CONVERGED
-    highest = max(harmonics, system.top)
+    except LiftsError:
+        return system, SolutionStatus.RIGID_OPENS
+    except NoMotionError:
+        return system, SolutionStatus.NOT_CONVERGED
     if isinstance(found, Ended):
-        return _nothing(scene, frequency_hz, harmonics, highest, status, time.perf_counter() - begun)
-    solution = _described(system, found, frequency_hz, harmonics, highest, begun)
-    solution._judged.append(_verdict(found))  # a by-product here
-    return solution
+        return system, SolutionStatus.RATCHETS if found is Ended.RATCHETS else SolutionStatus.NOT_CONVERGED
+    return system, found
 
 
 def _described(
@@ -165,7 +188,7 @@ def _friction(system: Piecewise, panels: Panels, i: int, highest: int) -> Contac
     whole = panels.values(np.array([mode.limits[slider] for mode in modes]))
     total = panels.values(np.array([mode.forces[slider] for mode in modes]))
     factor = member.factor
-    # Parallel rigid contacts share a force in proportion to their limits; along a motion `factor` times as large.
+    # Parallel rigid contacts share a force in proportion to their limits.
     with np.errstate(divide="ignore", invalid="ignore"):
         force = np.sign(factor) * np.where(whole > 0.0, total / whole, 0.0) * limit
         used = np.where(whole > 0.0, np.abs(total) / whole, 0.0)
@@ -179,7 +202,10 @@ def _friction(system: Piecewise, panels: Panels, i: int, highest: int) -> Contac
         own["second_motion"] = panels.w[:, : system.n] @ member.normal
         own["second_force"] = np.maximum(load, 0.0) - member.rest
     coefficients = {key: panels.coefficients(values, highest) for key, values in own.items()}
-    utilisation = {ContactState.STUCK: min(float(used.max(initial=0.0)), 1.0), ContactState.SEPARATED: math.nan}
+    utilisation = {
+        ContactState.STUCK: min(float(used.max(initial=0.0)), 1.0),
+        ContactState.SEPARATED: math.nan,
+    }
     return ContactResponse(
         name=system.scene.contacts[member.contact].name, state=state,
         load=panels.coefficients(load, highest), utilisation=utilisation.get(state, 1.0), **coefficients,
@@ -204,14 +230,14 @@ def _gap(system: Piecewise, panels: Panels, at: int, highest: int) -> ContactRes
     force = k * np.maximum(motion - gap, 0.0)
     return ContactResponse(
         name=system.scene.contacts[number].name, state=state, slip=panels.coefficients(motion, highest),
-        force=panels.coefficients(force, highest), load=np.zeros(3), 
+        force=panels.coefficients(force, highest), load=np.zeros(3),
         utilisation=math.nan if state is ContactState.SEPARATED else 1.0,
     )  # fmt: skip
 
 
 def _flags(system: Piecewise, orbit: Orbit, contacts: tuple[ContactResponse, ...]) -> tuple[str, ...]:
     """Return the flags; the mean is open where a direction that nothing decides moves what is observed."""
-    mean_open = range_open = False
+    mean_open, range_open = grazed(system, orbit), False
     for direction in orbit.open_directions.T:
         seen = []
         for piece in orbit.pieces:
@@ -237,16 +263,15 @@ def _through(mode: Mode, length: float) -> Real:
     return np.asarray(np.linalg.matrix_power(steps.powers[1], int(whole)) @ exponential(mode.A * rest))
 
 
-def _verdict(orbit: Orbit) -> Verdict:
-    """Return what the multipliers say, those of open directions apart."""
-    beside_one = np.argsort(np.abs(orbit.multipliers - 1.0))
-    others = orbit.multipliers[beside_one[orbit.open_directions.shape[1] :]]
-    radius = float(np.abs(others).max(initial=0.0))
-    if radius > 1.0 + _NEUTRAL:
-        return Verdict(stable=Stable.NO, ground=f"the largest Floquet multiplier is {radius:.4g}: the motion does not stay as it is")
-    if radius > 1.0 - _NEUTRAL:
-        return Verdict(stable=Stable.NOT_KNOWN, ground=f"the largest Floquet multiplier is 1 to within {_NEUTRAL:.0e}: nothing is said to grow or to die out")
-    return Verdict(stable=Stable.YES, ground=f"the largest Floquet multiplier is {radius:.4g}: perturbations die out")
+def _stability(orbit: Orbit, frequency_hz: float, begun: float) -> Stability:
+    """Return the multipliers of an orbit, those of open directions apart."""
+    neutral = orbit.open_directions.shape[1]
+    others = orbit.multipliers[np.argsort(np.abs(orbit.multipliers - 1.0))[neutral:]]
+    multipliers = others[np.argsort(-np.abs(others), kind="stable")].astype(np.complex128)
+    return Stability(
+        multipliers=multipliers, neutral=neutral, growth=growth_of(multipliers), frequency_hz=frequency_hz,
+        seconds=time.perf_counter() - begun,
+    )  # fmt: skip
 
 
 def _nothing(

@@ -44,7 +44,7 @@ _PIVOTS, _FEW = 30, 8
 _TIE = 1e-12  # of the size a number is a sum of: a force that far beyond its limit is on it
 
 
-class Lifted(Exception):
+class LiftsError(Exception):
     """A rigid normal contact is about to open."""
 
     def __init__(self, member: int) -> None:
@@ -52,7 +52,7 @@ class Lifted(Exception):
         self.member = member
 
 
-class NoMotion(Exception):
+class NoMotionError(Exception):
     """No motion goes on: events without end, or no state of the contacts that is consistent."""
 
 
@@ -93,7 +93,7 @@ class Flow:
 
         Raises
         ------
-        Lifted, NoMotion
+        LiftsError, NoMotionError
         """
         self.pieces = []
         end, at_once = self.tau + length, 0
@@ -111,7 +111,7 @@ class Flow:
             if at_once > _AT_ONCE or not np.all(np.isfinite(self.w)):
                 break
             self._change(mode, ended)
-        raise NoMotion
+        raise NoMotionError
 
     # A piece
 
@@ -153,7 +153,7 @@ class Flow:
     def _root(
         self, mode: Mode, w: Real, h: float, end: float, order: list[int] | None
     ) -> tuple[int, float] | None:
-        """Return the first condition that ends within a step, and where, as a share of it; None if none does."""
+        """Return the first condition that ends within a step, and where, as a share of it; None: none."""
         values = mode.conditions @ taylor(mode, w, h).T
         earliest: tuple[int, float] | None = None
         for c, coefficients in enumerate(values):
@@ -173,7 +173,7 @@ class Flow:
         row, before = mode.conditions[ended], mode.A @ self.w
         state, resets = self.state.copy(), np.eye(system.nw)
         if what == LIFTS:
-            raise Lifted(which)
+            raise LiftsError(which)
         if what == TO_SLIP:
             state.sliders[which] = direction
         elif what == TO_REST:
@@ -221,7 +221,7 @@ class Flow:
         return state
 
     def _decided(self, state: State, which: list[int]) -> State:
-        """Decide what rigid sliders at rest do: each sticks within its limit, or slips the way it is sped up."""
+        """Decide what rigid sliders at rest do: stick within the limit, or slip the way they are sped up."""
         system = self.system
         resting = which + [i for i, xi in enumerate(state.sliders) if xi == STICK and system.rigid[i]]
         resting = list(dict.fromkeys(resting))
@@ -236,10 +236,10 @@ class Flow:
                 state.sliders[resting] = tried
                 if self._inconsistent(state, resting) is None:
                     return state
-        raise NoMotion
+        raise NoMotionError
 
     def _inconsistent(self, state: State, resting: list[int]) -> tuple[int, int] | None:
-        """Return the slider at rest whose state is furthest from consistent, with a better one; None if all are."""
+        """Return the slider at rest whose state is least consistent, with a better one; None if all are."""
         mode, worst, found = self.system.mode(state), _TIE, None
         for i in resting:
             force, limit = float(mode.forces[i] @ self.w), float(mode.limits[i] @ self.w)
@@ -331,7 +331,10 @@ def first_root(coefficients: Real, end: float) -> float | None:
     values = np.polynomial.polynomial.polyval(t, coefficients)
     below = np.flatnonzero(values[1:] <= 0.0)
     until = int(below[0]) + 1 if below.size else len(t) - 1
-    dips = np.flatnonzero((values[1:until] < values[: until - 1]) & (values[1:until] < values[2 : until + 1])) + 1
+    dips = (
+        np.flatnonzero((values[1:until] < values[: until - 1]) & (values[1:until] < values[2 : until + 1]))
+        + 1
+    )
     slopes = coefficients[1:] * np.arange(1, len(coefficients))
     for at in dips.tolist():
         lowest = _bisected(slopes, float(t[at - 1]), float(t[at + 1]), rising=True)

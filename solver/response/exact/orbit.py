@@ -1,4 +1,4 @@
-"""The periodic motion of a piecewise linear system: Newton's method on the map over a period, begun by a march.
+"""The periodic motion of a piecewise linear system: Newton's method on the map of a period, after a march.
 
 The march from rest goes from event to event; in between Newton's steps w += (1 − Φ)⁻¹ (P(w) − w) with the
 derivative Φ of the map P are tried from the middle of the longest piece of the last period, and kept where
@@ -14,8 +14,8 @@ from enum import Enum
 import numpy as np
 
 from solver.jit.fourier import Complex, Flags, Real
-from solver.response.exact.flow import Flow, NoMotion, Piece
-from solver.response.exact.piecewise import STICK, Piecewise, State
+from solver.response.exact.flow import Flow, NoMotionError, Piece
+from solver.response.exact.piecewise import FREE, STICK, Piecewise, State
 
 PERIOD = 2.0 * np.pi
 CLOSED = 1e-11  # distance after a period, of the largest number of the state, from which on it is polished
@@ -23,6 +23,8 @@ _NEWTON, _POLISH = 12, 4
 MOST_PERIODS = 4000
 _OPEN = 1e-9  # singular values of 1 − Φ below: nothing decides that direction
 _REPEATS = 1e-9
+MOST_GRAZED = 100  # periods after which a march has decided whether what slips by next to nothing sticks
+_GRAZES = 1e-6  # of its motion: what slips by less stands at the edge of where it may stick
 
 
 class Ended(Enum):
@@ -60,7 +62,7 @@ def find(system: Piecewise, w: Real, state: State, *, most_periods: int = MOST_P
 
     Raises
     ------
-    Lifted, NoMotion
+    LiftsError, NoMotionError
     """
     flow, periods, some = Flow(system, w, state, 0.0), 0, 2
     while periods < most_periods:
@@ -72,12 +74,30 @@ def find(system: Piecewise, w: Real, state: State, *, most_periods: int = MOST_P
             drifts.append(flow.w - before)
         periods += some
         found = _newton(system, flow, periods)
-        if found is not None:
+        if found is not None and (periods > MOST_GRAZED or not grazed(system, found)):
             return found
         if _ratchets(system, flow, drifts):
             return Ended.RATCHETS
         some = min(2 * some, 256)
     return Ended.NOT_FOUND
+
+
+def grazed(system: Piecewise, orbit: Orbit) -> bool:
+    """Whether a slider slips by next to nothing: it might as well stick, with another mean."""
+    ends = [*(piece.w for piece in orbit.pieces[1:]), orbit.pieces[0].w]
+    for i, d in enumerate(system.d):
+        row, travel = system.motion(d), 0.0
+        for piece, end in zip(orbit.pieces, ends, strict=True):
+            xi = piece.state.sliders[i]
+            if abs(xi) == 1:
+                slid = row if system.rigid[i] else row - xi * piece.mode.limits[i] / system.kt[i]
+                travel += abs(float(slid @ (end - piece.w)))
+            elif xi == FREE:
+                travel = np.inf
+        places = [float(row @ each) for each in ends]
+        if 0.0 < travel <= _GRAZES * (max(places) - min(places)):
+            return True
+    return False
 
 
 def _ratchets(system: Piecewise, flow: Flow, drifts: list[Real]) -> bool:
@@ -111,14 +131,16 @@ def _newton(system: Piecewise, march: Flow, periods: int) -> Orbit | None:
             if now <= CLOSED * size:
                 polished += 1
                 if best is None or now < best[0]:
-                    relative = now / size if size > 0.0 else 0.0
                     error = 4.0 * float(np.abs(change).max(initial=0.0)) + 1e-15 * size
-                    best = now, Orbit(pieces=flow.pieces, residual=relative, error=error, periods=periods,
-                                      multipliers=multipliers, open_directions=open_directions, steps=step + 1)  # fmt: skip
+                    best = now, Orbit(
+                        pieces=flow.pieces, residual=now / size if size > 0.0 else 0.0, error=error,
+                        multipliers=multipliers, open_directions=open_directions, periods=periods,
+                        steps=step + 1,
+                    )  # fmt: skip
                 if polished > _POLISH or now == 0.0:
                     break
             w = system.mode(state).to_rates @ (begun + change)
-    except NoMotion:
+    except NoMotionError:
         pass
     return None if best is None else best[1]
 

@@ -3,9 +3,10 @@
 The state in the angle τ = ωt is w = (x, dx/dτ, s, 1, cos τ, sin τ, …, cos Kτ, sin Kτ): coordinates, their
 rates, the positions of elastic sliders, and the harmonics of forces and loads, so that in every mode w' = A w
 and each force, load and condition is a row times w. A slider that sticks is rigid (d·x' = 0, its force the
-multiplier of that constraint) or elastic (kt (d·x − s)); in slip its force is ± its limit Λ = Σ μ_i max(N_i, 0).
-Rigid sliders along the same motion are one slider with the sum of their limits: how they share its force is
-not determined. A rigid normal contact keeps v = 0; its load is the multiplier, and must stay positive.
+multiplier of that constraint) or elastic (kt (d·x − s)); in slip its force is ± its limit
+Λ = Σ μ_i max(N_i, 0). Rigid sliders along the same motion are one slider with the sum of their limits: how
+they share its force is not determined. A rigid normal contact keeps v = 0; its load is the multiplier, and
+must stay positive.
 """
 
 from __future__ import annotations
@@ -197,9 +198,7 @@ class Piecewise:
             for slider in range(len(rows))
         ]
 
-    def _member(
-        self, number: int, contact: AnyContact, own: Real, slider: int, factor: float
-    ) -> Member:
+    def _member(self, number: int, contact: AnyContact, own: Real, slider: int, factor: float) -> Member:
         load, normal, kn, rest = contact.load, None, 0.0, 0.0
         coefficients = np.zeros(2 * self.top + 1)
         assert load is not None
@@ -226,7 +225,9 @@ class Piecewise:
         if rows and np.linalg.matrix_rank(np.array([row for _, row in rows]), 1e-9) < len(rows):
             names = ", ".join(dict.fromkeys(self.scene.contacts[at].name for at, _ in rows))
             wanted = "must be of motions that do not follow from each other, where contacts are rigid: "
-            raise SettingError("contacts", names, wanted + "the forces in such a loop are not determined; " + _ELASTIC)
+            raise SettingError(
+                "contacts", names, wanted + "the forces in such a loop are not determined; " + _ELASTIC
+            )
 
     # Modes
 
@@ -239,18 +240,48 @@ class Piecewise:
         return found
 
     def _made(self, state: State) -> Mode:
-        n, nw = self.n, self.nw
-        push, forces, limits = self.base.copy(), np.zeros((len(self.kt), nw)), np.zeros((len(self.kt), nw))
+        loads = np.array([each.given for each in self.members]).reshape(-1, self.nw)
+        limits = np.zeros((len(self.kt), self.nw))
+        for i in np.flatnonzero(state.closed):
+            limits[self.members[i].slider] += self._weight(i) * loads[i]
+        push, forces = self._pushed(state), np.zeros_like(limits)
+        for i, xi in enumerate(state.sliders):
+            if xi == STICK and not self.rigid[i]:
+                forces[i] = self.kt[i] * self.motion(self.d[i])
+                forces[i, self.elastic_at[i]] = -self.kt[i]
+            elif abs(xi) == 1:
+                forces[i] = xi * limits[i]
+            push -= np.outer(self.d[i], forces[i])
+        held = [i for i, xi in enumerate(state.sliders) if xi == STICK and self.rigid[i]]
         pressing = [i for i, each in enumerate(self.members) if each.rigid_normal]
-        share = {i: np.array(self.members[i].normal) for i in pressing}  # how a multiplier pulls, and friction
-        loads = np.array([each.given for each in self.members]).reshape(-1, nw)
+        normals = [self.members[i].normal for i in pressing]
+        slip = {i: int(state.sliders[self.members[i].slider]) for i in pressing}
+        slip = {i: xi if abs(xi) == 1 else 0 for i, xi in slip.items()}
+        shares = [  # how a unit of each multiplier pulls: what is pressed also rubs
+            normal + slip[i] * self._weight(i) * self.d[self.members[i].slider]
+            for i, normal in zip(pressing, normals, strict=True)
+        ]
+        B = np.array([*self.d[held], *normals]).reshape(-1, self.n)
+        pulls = np.array([*self.d[held], *shares]).reshape(-1, self.n).T
+        multipliers = np.linalg.solve(B @ self.inverse @ pulls, B @ self.inverse @ push)
+        push -= pulls @ multipliers
+        forces[held] = multipliers[: len(held)]
+        for i, row in zip(pressing, multipliers[len(held) :], strict=True):
+            loads[i] += row
+            limits[self.members[i].slider] += self._weight(i) * row
+            forces[self.members[i].slider] += slip[i] * self._weight(i) * row
+        A = self._rates(push)
+        conditions, ends = self._conditions(state, A, forces, limits, loads)
+        return Mode(A, forces, limits, loads, conditions, ends, self._to_rates(B))
+
+    def _weight(self, i: int) -> float:
+        """Return how much of a member's load counts in the limit of its slider."""
+        return abs(self.members[i].factor) * self.members[i].mu
+
+    def _pushed(self, state: State) -> Real:
+        """Return the forces on the coordinates without friction and multipliers, (n, nw)."""
+        push = self.base.copy()
         for i, member in enumerate(self.members):
-            xi = state.sliders[member.slider]
-            if state.closed[i]:
-                weight = abs(member.factor) * member.mu
-                limits[member.slider] += weight * member.given
-                if member.rigid_normal and abs(xi) == 1:
-                    share[i] = share[i] + xi * weight * self.d[member.slider]
             if member.normal is not None and not member.rigid_normal:
                 pressed = member.given * state.closed[i]
                 pressed[self.nd] -= member.rest
@@ -260,29 +291,7 @@ class Piecewise:
                 spring = k * self.motion(row)
                 spring[self.nd] -= k * gap
                 push -= np.outer(row, spring)
-        for i, xi in enumerate(state.sliders):
-            if xi == STICK and not self.rigid[i]:
-                forces[i] = self.kt[i] * self.motion(self.d[i])
-                forces[i, self.elastic_at[i]] = -self.kt[i]
-            elif abs(xi) == 1:
-                forces[i] = xi * limits[i]
-            push -= np.outer(self.d[i], forces[i])
-        held = [i for i, xi in enumerate(state.sliders) if xi == STICK and self.rigid[i]]
-        B = np.array([*self.d[held], *(self.members[i].normal for i in pressing)]).reshape(-1, n)
-        pulls = np.array([*self.d[held], *(share[i] for i in pressing)]).reshape(-1, n).T
-        multipliers = np.linalg.solve(B @ self.inverse @ pulls, B @ self.inverse @ push)
-        push -= pulls @ multipliers
-        forces[held] = multipliers[: len(held)]
-        for i, row in zip(pressing, multipliers[len(held) :], strict=True):
-            member = self.members[i]
-            loads[i] += row
-            weight = abs(member.factor) * member.mu
-            limits[member.slider] += weight * row
-            if abs(state.sliders[member.slider]) == 1:
-                forces[member.slider] += state.sliders[member.slider] * weight * row
-        A = self._rates(push)
-        conditions, ends = self._conditions(state, A, forces, limits, loads)
-        return Mode(A, forces, limits, loads, conditions, ends, self._to_rates(B))
+        return push
 
     def _rates(self, push: Real) -> Real:
         """Return A for the forces on the coordinates."""
@@ -343,7 +352,10 @@ def _slider_of(row: Real, kt: float, rows: list[Real], stiffnesses: list[float])
     if math.isinf(kt):
         for at, other in enumerate(rows):
             factor = float(row @ other) / float(other @ other)
-            if math.isinf(stiffnesses[at]) and np.abs(row - factor * other).max() <= _PARALLEL * np.abs(row).max():
+            if (
+                math.isinf(stiffnesses[at])
+                and np.abs(row - factor * other).max() <= _PARALLEL * np.abs(row).max()
+            ):
                 return at, factor
     rows.append(row)
     stiffnesses.append(kt)
@@ -353,9 +365,15 @@ def _slider_of(row: Real, kt: float, rows: list[Real], stiffnesses: list[float])
 def _check_structure(scene: Scene, model: LinearModel) -> None:
     real = model.extra is None or model.extra.is_real
     if model.sectors > 1 or scene.structure.has_sectors:
-        raise SettingError("structure", scene.structure.kind, "must be without sectors where contacts are rigid; " + _ELASTIC)
+        raise SettingError(
+            "structure", scene.structure.kind, "must be without sectors where contacts are rigid; " + _ELASTIC
+        )
     if not real:
-        raise SettingError("loss_factor", scene.structure.loss_factor, "cannot be followed in time beside rigid contacts")
+        raise SettingError(
+            "loss_factor", scene.structure.loss_factor, "cannot be followed in time beside rigid contacts"
+        )
     if model.prescribed or model.line is not None:
         what = "excitation" if model.prescribed else "speed_order"
-        raise SettingError(what, scene.name, "must be forces at a fixed speed where contacts are rigid; " + _ELASTIC)
+        raise SettingError(
+            what, scene.name, "must be forces at a fixed speed where contacts are rigid; " + _ELASTIC
+        )
