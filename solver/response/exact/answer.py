@@ -24,7 +24,7 @@ from solver.response.stability.verdict import verdict_of
 from solver.scene.scene import Scene
 
 _GAUSS = 12
-_TURN = 2.0  # rad by which the highest harmonic asked for turns over a panel at most
+_TURN = 5.0  # rad by which the highest harmonic asked for turns over a panel at most
 _MOVES = 1e-7  # of the largest change of a motion: less is none
 
 

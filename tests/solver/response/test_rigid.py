@@ -227,8 +227,8 @@ def test_a_rigid_normal_contact_is_a_constraint(kt: float) -> None:
     marched = stickslip.march(pressed(math.inf, kt=kt), frequency_hz=0.12)
     assert found.converged
     assert marched.converged
-    assert found.max_abs == pytest.approx(marched.max_abs, rel=3e-5)
-    elastic = stickslip.march(pressed(3e3, kt=kt), frequency_hz=0.12)
+    assert found.max_abs == pytest.approx(marched.max_abs, rel=3e-5 + 3.0 * marched.error_estimate)
+    elastic = stickslip.solve(pressed(1e3, kt=kt), frequency_hz=0.12, harmonics=31)
     assert found.max_abs == pytest.approx(elastic.max_abs, rel=3e-3)
     assert np.abs(found.contacts[0].second_motion).max() < 1e-12
 
