@@ -92,7 +92,8 @@ def run(
     it = stepped(equations, steps)
     m, n = it.law.size, x.size
     kept = np.eye(n)[equations.observed]
-    force, doing, changes = np.zeros(m), np.zeros(m, np.int64), []
+    force, doing = np.zeros(m), np.zeros(m, np.int64)
+    changes: list[float] = []
     elastic = it.law == stepping.ELASTIC
     nothing, status = np.empty((2, 0)), MarchStatus.MAX_PERIODS
     while len(changes) < max_periods:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -195,6 +196,28 @@ def test_a_large_kt_comes_near_like_its_root() -> None:
         off.append(abs(found.max_abs - exact))
     assert 7.0 < off[0] / off[1] < 14.0
     assert off[1] / exact < 0.01
+
+
+# Elastic scenes
+
+CERTIFIED = json.loads((Path(__file__).parents[2] / "data" / "certified_orbits.json").read_text())
+
+
+@pytest.mark.parametrize("case", CERTIFIED, ids=[case["id"] for case in CERTIFIED])
+def test_elastic_orbits_with_proofs(case: dict[str, Any]) -> None:
+    """Periodic orbits enclosed by interval arithmetic to 18 digits, with no code of this package."""
+    scene = stickslip.Scene.from_dict(case["scene"])
+    found = stickslip.solve(scene, frequency_hz=case["frequency_hz"], exact=True)
+    assert found.status is SolutionStatus.CONVERGED
+    value = getattr(found, case["measure"])
+    assert value == pytest.approx(case["value"], rel=1e-11)
+    assert abs(value - case["value"]) <= found.error_estimate
+
+
+def test_exact_refuses_what_has_no_events() -> None:
+    scene = stickslip.load_scene("bladed-disk")
+    with pytest.raises(stickslip.SettingError, match="sectors"):
+        stickslip.solve(scene, frequency_hz=700.0, exact=True)
 
 
 # kn = inf
