@@ -25,7 +25,7 @@ MOST_PERIODS = 4000
 _OPEN = 1e-9  # singular values of 1 − Φ below: nothing decides that direction
 _REPEATS = 1e-9
 MOST_GRAZED = 100  # periods after which a march has decided whether what slips by next to nothing sticks
-_GRAZES = 1e-6  # of its motion: what slips by less stands at the edge of where it may stick
+_GRAZES = 1e-6  # of its largest motion: what slips by less stands at the edge of where it may stick
 
 
 class Ended(Enum):
@@ -96,7 +96,7 @@ def grazed(system: Piecewise, orbit: Orbit) -> bool:
             elif xi == FREE:
                 travel = np.inf
         places = [float(row @ each) for each in ends]
-        if 0.0 < travel <= _GRAZES * (max(places) - min(places)):
+        if 0.0 < travel <= _GRAZES * max(map(abs, places)):
             return True
     return False
 
