@@ -27,7 +27,7 @@ from solver.contacts.kernels.system import Evaluation, Receptance, System
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Complex, Integer, Real, coefficient_count, cosine_position
 from solver.jit.separate import apart
-from solver.linear.kernels.receptance import receptance
+from solver.linear.kernels.receptance import forget, receptance
 
 # Entries of `by`: for each element the slopes by kt, mu and its load, then those of the linear part.
 BY_KT, BY_MU, BY_LOAD = 0, 1, 2
@@ -123,6 +123,7 @@ def slopes_along(
 @apart
 def _transpose(system: System, linear: Receptance, point: Evaluation) -> None:
     """Transpose A and ∂F/∂U in place."""
+    forget(linear)
     for i in range(system.ks.size):
         A = linear.A[0, i]
         for c in range(A.shape[0]):
