@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solver.balance.balance import Balance, build, check_frequency
+from solver.balance.balance import Balance, build, check_frequency, check_harmonics
 from solver.balance.kernels.gauge import FREE
 from solver.balance.kernels.newton import stuck_start
 from solver.balance.kernels.output import HALF_RANGE, MAX_ABS, MEAN
@@ -68,6 +68,10 @@ def solve(
     begun = time.perf_counter()
     check_frequency("frequency_hz", frequency_hz)
     scene = scene.at_frequency(frequency_hz)
+    if any(contact.is_rigid for contact in scene.contacts):
+        from solver.response.exact.answer import solve_exactly  # loaded by such scenes alone
+
+        return solve_exactly(scene, frequency_hz, check_harmonics(harmonics))
     omega = 2.0 * math.pi * frequency_hz
     good_enough = True
     if accuracy is None:
