@@ -81,6 +81,7 @@ class System(NamedTuple):
     level_reference: float  # N, the excitation amplitude at level 1
     constant_mean: int  # 1: constant forces are loads, which the level of the excitation leaves alone
     phase_reference: float  # rad
+    centred: int  # 1: the observed motion counts from the middle of its range, 0: from where it is at rest
     parameter_reference: float  # the value of a structural parameter at which K, M, C stand
     least_size: float  # m, motions of the contacts far below it are rounding of what cancels in ū
     form: int

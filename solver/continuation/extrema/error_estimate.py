@@ -137,6 +137,8 @@ class ErrorEstimator:
         if not across and steps[1] > _FIRST_ORDER * steps[0] and largest[0] > _FIRST_ORDER * self._size(x):
             largest = self._solved(x, start, p, largest)
         max_abs, half_range = more * SAFETY * largest + tail + self._rounding()
+        if kept.system.centred:
+            max_abs = half_range
         return ErrorEstimate(max_abs=float(max_abs), half_peak_to_peak=float(half_range))
 
     def _solved(self, x: Real, U: Real, p: float, largest: Real) -> Real:

@@ -49,6 +49,8 @@ def amplitude_slopes(
 ) -> int:  # fmt: skip
     """Differentiate max|x| of the observed DOF at the solution (u, ω); λ of `system` is the frequency.
 
+    Counted from the middle of its range it is (max x − min x)/2, whose turn is half of both.
+
     Parameters
     ----------
     wanted : (ne,) 1 for the elastic Coulomb contacts whose slopes are asked for.
@@ -71,10 +73,14 @@ def amplitude_slopes(
         for column in range(EXTREME_COLUMNS):
             tops[0, column], tops[1, column] = tops[1, column], tops[0, column]
     count = 2 if both else 1
-    for top in range(count):
+    for top in range(2):
         for i in range(system.ks.size):
             angle = system.ks[i] * tops[top, TAU]
             turns[top, i] = tops[top, SIGN] * complex(math.cos(angle), math.sin(angle))
+    if system.centred == 1:
+        count, tops[0, AMPLITUDE] = 1, 0.5 * (high - low)
+        for i in range(system.ks.size):
+            turns[0, i] = 0.5 * (turns[0, i] + turns[1, i])
     good = slopes_along(system, linear, u, omega, point, wanted, count, turns, weights, pulls, by)
     return count if good else 0
 
