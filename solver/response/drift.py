@@ -9,6 +9,7 @@ motion that a constant force would leave, with which the part was told to ratche
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -32,9 +33,10 @@ if TYPE_CHECKING:
     from solver.response.solution import Solution
 
 SAMPLES = 1024  # of a period
-LARGEST = 800  # unknowns beyond which it costs more than a march
-_STARTS = (0.03, 0.3, 1.0, 3.0)  # first drifts in a period, relative to the vibration
-_MOST, _HALVINGS = 40, 8
+MOST_UNKNOWNS = 800  # beyond which it costs more than a march
+_SHARES = (1.0, 0.3, 3.0)  # of the first drift, to begin with one after the other
+_LEAST, _LARGEST, _TRIALS = 1e-4, 1e2, 16  # drifts in a period that are looked at, relative to the vibration
+_MOST, _HALVINGS = 25, 6
 _SOLVED, _STEP = 1e-7, 1e-6  # relative residual aimed at; step of a difference
 _DRAG = 1e-9  # share of what cancels in the drag of dashpots, below which it is rounding
 
@@ -70,17 +72,16 @@ def drift_per_period(workspace: Workspace, p: float) -> float:
     """
     found = workspace.solve(p)
     balance = workspace.balance
-    if not found.ratchets or balance.n_unknowns > LARGEST:
+    if not found.ratchets or balance.n_unknowns > MOST_UNKNOWNS:
         return math.nan
     drifting = _Drifting.of(workspace, p, found)
     if drifting is None:
         return math.nan
     if found.above_friction and not drifting.dragged:
         return math.inf
-    size = max(float(np.abs(drifting.start.reshape(balance.n_ports, -1)[:, 1:]).max(initial=0.0)), 1e-300)
-    for share in _STARTS:
-        drift = drifting.first(share, size, above=found.above_friction)
-        solved = drifting.solved(drift)
+    first = drifting.first(above=found.above_friction)
+    for share in _SHARES:
+        solved = drifting.solved(share * first)
         if solved is not None:
             return float(np.abs(drifting.shapes @ solved).max(initial=0.0))
     return math.nan
@@ -152,22 +153,33 @@ class _Drifting:
             free=_coefficients(linear.u_linear[0].T, system.ks).reshape(-1),
         )  # fmt: skip
 
-    def first(self, share: float, size: float, *, above: bool) -> Real:
+    def first(self, *, above: bool) -> Real:
         """Return a drift (g,) to begin with, the way the force drives.
 
-        It is a share of a size [m], or (`above` friction) of what dashpots alone would hold.
+        It is what leaves the least of the force while the vibration stays that held by a constant force; or
+        (`above` friction) what dashpots alone would hold.
         """
-        residual, _, _ = self._residual(self.start, np.zeros(len(self.ways)))
-        force = -self._along(residual)
+        force = self._left(np.zeros(len(self.ways)))
         if above:
-            return np.asarray(share * np.linalg.solve(self.damped, force))
-        return np.asarray(share * size * force / max(float(np.abs(force @ self.ways).max()), 1e-300))
+            return np.asarray(np.linalg.solve(self.damped, force))
+        ports = self.start.reshape(self.workspace.balance.n_ports, -1)
+        size = float(np.abs(ports[:, 1:]).max(initial=0.0))
+        unit = size * force / max(float(np.abs(force @ self.ways).max()), 1e-300)
+        low, high = _LEAST, _LARGEST
+        for _ in range(_TRIALS):
+            middle = math.sqrt(low * high)
+            low, high = (middle, high) if self._left(middle * unit) @ force > 0.0 else (low, middle)
+        return np.asarray(math.sqrt(low * high) * unit)
+
+    def _left(self, drift: Real) -> Real:
+        """Return the mean force (g,) that drives the held motion on beside a drift [N]."""
+        return -self._along(self._residual(self.start, drift, slopes=False)[0])
 
     def solved(self, drift: Real) -> Real | None:
         """Return the drift in a period by each way (g,), by Newton's method from there; None: not found."""
-        u, norm = self.start.copy(), math.inf
-        residual, u_slope, drift_slope = self._residual(u, drift)
+        u = self.start.copy()
         for _ in range(_MOST):
+            residual, u_slope, drift_slope = self._residual(u, drift)
             norm = self._norm(residual)
             if norm <= _SOLVED:
                 return drift
@@ -177,12 +189,10 @@ class _Drifting:
             share = 1.0
             for _ in range(_HALVINGS):
                 there = u - share * step[: u.size], drift - share * step[u.size :]
-                ahead = self._residual(*there)
-                if self._norm(ahead[0]) < (1.0 - 0.1 * share) * norm:
+                if self._norm(self._residual(*there, slopes=False)[0]) < (1.0 - 0.1 * share) * norm:
                     break
                 share *= 0.5
             u, drift = there
-            residual, u_slope, drift_slope = ahead
         return None
 
     def _step(self, residual: Real, u_slope: Real, drift_slope: Real) -> Real | None:
@@ -214,7 +224,7 @@ class _Drifting:
         shift, ports = self.workspace.balance.system.shift, self.workspace.balance.n_ports
         return float((shift[:, None] * np.abs(self.free.reshape(ports, -1))).max())
 
-    def _residual(self, u: Real, drift: Real) -> tuple[Real, Real, Real]:
+    def _residual(self, u: Real, drift: Real, *, slopes: bool = True) -> tuple[Real, Real, Real]:
         """Return the residual (m,) at a motion and drift with its slopes (m, m) by u and (m, g) by drift."""
         balance = self.workspace.balance
         system, n = balance.system, balance.n_coefficients
@@ -230,7 +240,7 @@ class _Drifting:
             first, end = int(system.first_port[e]), int(system.first_port[e + 1])
             rows, ways = slice(first * n, end * n), self.ways[:, first:end]
             forces[rows], by_u[rows, rows], by_port = _followed(
-                u[rows].reshape(end - first, n), drift @ ways, system.ks, *slider
+                u[rows].reshape(end - first, n), drift @ ways, system.ks, slopes, *slider
             )
             by_drift[rows] = by_port @ ways.T
         stiffness = np.repeat(system.shift, n)
@@ -263,13 +273,21 @@ def _dashpots(balance: Balance, ways: Real, omega: float) -> tuple[Real, Real, R
 
 
 def _followed(
-    motions: Real, drift: Real, ks: fourier.Integer, slider: Slider, mu: float, load: Real, rest: float
+    motions: Real,
+    drift: Real,
+    ks: fourier.Integer,
+    differences: bool,
+    slider: Slider,
+    mu: float,
+    load: Real,
+    rest: float,
 ) -> tuple[Real, Real, Real]:
     """Return the forces of a contact that drifts, and their slopes by its motions and by the drift.
 
     Parameters
     ----------
     motions : (ports, n) coefficients [m]; drift : (ports,) in a period [m].
+    differences : whether slopes are found, else they are 0.
 
     Returns
     -------
@@ -278,14 +296,14 @@ def _followed(
     """
     ports, n = motions.shape
     size = max(float(np.abs(motions[:, int(ks[0] == 0) :]).max()), float(np.abs(drift).max()), 1e-300)
-    many = 1 + ports * n + ports
+    many = 1 + ports * n + ports if differences else 1
     every, ways = np.repeat(motions[None], many, axis=0), np.repeat(drift[None], many, axis=0)
-    every.reshape(many, -1)[1 + np.arange(ports * n), np.arange(ports * n)] += _STEP * size
-    ways[1 + ports * n + np.arange(ports), np.arange(ports)] += _STEP * size
-    tau = 2.0 * math.pi / SAMPLES * np.arange(SAMPLES)
-    basis = fourier.from_full(fourier.basis(tau, int(ks[-1])), ks)  # (samples, n)
+    if differences:
+        every.reshape(many, -1)[1 + np.arange(ports * n), np.arange(ports * n)] += _STEP * size
+        ways[1 + ports * n + np.arange(ports), np.arange(ports)] += _STEP * size
+    basis = _instants(ks.tobytes())
     x = every @ basis.T
-    normal = fourier.basis(tau, (load.size - 1) // 2) @ load
+    normal = _instants(np.arange((load.size - 1) // 2 + 1).tobytes()) @ load
     pressed = np.repeat(normal[None], many, axis=0)
     if slider.normal_port is not None:
         pressed = pressed + slider.normal_stiffness * x[:, slider.normal_port]
@@ -301,8 +319,18 @@ def _followed(
     weights = basis.T * (2.0 / SAMPLES)
     weights[: int(ks[0] == 0)] *= 0.5
     found = (force @ weights.T).reshape(many, -1)
+    if not differences:
+        return found[0], np.zeros((ports * n, ports * n)), np.zeros((ports * n, ports))
     slopes = ((found[1:] - found[0]) / (_STEP * size)).T
     return found[0], slopes[:, : ports * n], slopes[:, ports * n :]
+
+
+@functools.lru_cache(maxsize=8)
+def _instants(ks: bytes) -> Real:
+    """Return what the coefficients of these harmonics are multiplied by at each sample, (samples, n)."""
+    orders = np.frombuffer(ks, np.int64)
+    tau = 2.0 * math.pi / SAMPLES * np.arange(SAMPLES)
+    return fourier.from_full(fourier.basis(tau, int(orders[-1])), orders)
 
 
 def _coefficients(amplitudes: Complex, ks: fourier.Integer) -> Real:
