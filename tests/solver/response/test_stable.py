@@ -13,7 +13,7 @@ from test_all_solutions import duffing
 
 import optim
 from solver import Scene, march, plan, solve, solve_all, sweep
-from solver.response.stability.verdict import forecast
+from solver.response.stability.cost import forecast
 from solver.results.verdict import Stable
 from solver.studies.instant import start_of
 
