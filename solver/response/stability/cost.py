@@ -21,7 +21,8 @@ _INVERSES = 60.0  # operations by n³ of a step where modes are joined
 _MULTIPLIERS, _FIXED, _ELEMENT = 1.2e-9, 1e-3, 1e-3  # of eigenvalues by size³; looked up once; of a contact
 # Intervals a period of one contact: changes of its state; those and parts of slips in space.
 _CHANGES, _TURNS = 6, 12
-_CLOSED = 0.6  # share of the period that contacts whose load moves are taken to be closed
+_CLOSED = 0.5  # share of the period that contacts whose load moves are taken to be closed
+_DECOUPLED = 1e-8  # relative size of the commutator of stiffness and damping
 _POWERS = 40  # iterations for the largest eigenvalue
 
 
@@ -80,8 +81,9 @@ def _structure(scene: Scene, model: LinearModel, omega: float) -> tuple[float, b
         L = (model.contact_here + model.contact_next * model.turns(np.array([diameter]))[0])[:, free]
         added = stiff[:, None] * (L @ np.linalg.solve(M, L.conj().T))
         fastest = max(fastest, _largest(by_K) + (float(np.linalg.norm(added, 2)) if stiff.size else 0.0))
-        apart = np.abs(by_K @ by_C - by_C @ by_K).max() <= 1e-9 * np.abs(by_K).max() * np.abs(by_C).max()
-        decoupled = decoupled and bool(apart)
+        joint = float(np.linalg.norm(by_K @ by_C - by_C @ by_K))
+        apart = joint <= _DECOUPLED * float(np.linalg.norm(by_K) * np.linalg.norm(by_C))
+        decoupled = decoupled and apart
     return math.sqrt(fastest) / omega, decoupled
 
 
