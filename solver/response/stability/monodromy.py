@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from scipy.linalg import block_diag, expm
 
 from solver.contacts.pieces.piece import SHORTEST, Piece
-from solver.errors import SolverError
+from solver.errors import StoppedError
 from solver.jit.fourier import Real
 from solver.response.stability.collocation import GAUSS, ContactStep, StructureStep, blocks_of, stepped
 from solver.response.stability.cost import FASTEST_IN_A_STEP, of_a_step, of_an_exponential
@@ -39,10 +39,6 @@ INVARIANT = 1e-9  # smallest singular value, relative to the largest, of what re
 ALIKE = 1e-9  # relative difference of matrices of sectors that are alike
 SMOOTH = 2e-3  # of the largest force, the last Legendre coefficients of a step that is not halved
 LEAST_STEP = 1e-6  # rad: where a force goes to 0 its direction turns ever faster
-
-
-class StoppedError(SolverError):
-    """The caller ended a computation of multipliers."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -12,14 +12,14 @@ from mistuned_cases import disk
 from moving_scenes import moving_scene
 from scipy.integrate import solve_ivp
 
-from solver import Scene, annulus, plan, solve, stability
+from solver import Scene, StoppedError, annulus, plan, solve, stability
 from solver.contacts.pieces.piece import Entry, Piece, Rates, steady
 from solver.jit.fourier import Real
 from solver.response.stability import monodromy as module
 from solver.response.stability.collocation import blocks_of
 from solver.response.stability.cost import forecast
 from solver.response.stability.floquet import scene_monodromy
-from solver.response.stability.monodromy import PERIOD, Element, StoppedError, Structure, monodromy
+from solver.response.stability.monodromy import PERIOD, Element, Structure, monodromy
 
 
 def maps(scene: Scene, frequency_hz: float, harmonics: int) -> tuple[Real, Real]:
