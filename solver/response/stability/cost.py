@@ -74,7 +74,7 @@ def _structure(scene: Scene, model: LinearModel, omega: float) -> tuple[float, b
     """Return what is fastest in units of ω, and whether damping leaves modes apart."""
     free, fastest, decoupled = model.free, 0.0, True
     every = np.arange(model.sectors) if model.every_diameter else np.array([model.engine_order])
-    stiff = np.array([k for contact in scene.contacts for k in contact.stiffnesses])
+    stiff = np.array([k if math.isfinite(k) else 0.0 for c in scene.contacts for k in c.stiffnesses])
     for diameter in every[every <= model.sectors // 2] if model.every_diameter else every:
         K, C, M = (each[0][free][:, free] for each in model.at(np.array([diameter]), np.ones(1, np.bool_)))
         by_K, by_C = np.linalg.solve(M, K), np.linalg.solve(M, C)
