@@ -21,7 +21,7 @@ from solver.contacts.kernels.system import (
 from solver.jit.fourier import Real
 from solver.linear.kernels.receptance import receptance
 from solver.linear.leading_ports import FEWEST_PORTS
-from solver.response.stability.verdict import forecast
+from solver.response.stability.cost import forecast
 from solver.results.base import Shown
 from solver.results.views import Views
 from solver.scene.bodies.kinematics import static_forces
