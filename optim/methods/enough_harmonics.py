@@ -24,6 +24,7 @@ def well_known(problem: Problem, evaluation: Evaluation) -> bool:
 
 def honest(result: DesignResult) -> DesignResult:
     """Return a result that claims an optimum only if its highest peak is known."""
+    result = result.with_errors()
     claims = result.status in CLAIMS and result.evaluation is not None
     if claims and not well_known(result.problem, result.evaluation):  # type: ignore[arg-type]
         return replace(result, status=DesignStatus.NOT_KNOWN)

@@ -60,7 +60,7 @@ class Search:
         self.check()
         if len(self.history) >= self._most:
             raise StoppedError(DesignStatus.TOO_MANY)
-        evaluation = evaluate(self.problem, values, should_stop=self.should_stop)
+        evaluation = evaluate(self.problem, values, errors=False, should_stop=self.should_stop)
         self.keep(evaluation)
         return evaluation
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import ClassVar
 
@@ -298,6 +298,14 @@ class DesignResult(MadeOfResponses, Drawn):
         others = [evaluation for evaluation in self.history if evaluation is not self.evaluation]
         last = [] if self.evaluation is None else [self.evaluation]
         return [(e.values, response.branch) for e in [*others, *last] for response in e.responses]
+
+    def with_errors(self) -> DesignResult:
+        """Return it with the errors of the peaks of the optimum estimated; a search leaves that out."""
+        if self.evaluation is None:
+            return self
+        found = self.evaluation.with_errors()
+        history = tuple(found if one is self.evaluation else one for one in self.history)
+        return replace(self, evaluation=found, history=history)
 
     VIEWS: ClassVar = Views("optim.views", "of_design", "design_dataset", "of_design")
 
