@@ -80,6 +80,11 @@ class Evaluation:
         return total if self.rows else math.inf
 
     @property
+    def harmonics(self) -> int:
+        """Of the balances behind it; 0 without a response."""
+        return max((one.branch.balance.n_harmonics for one in self.responses), default=0)
+
+    @property
     def branch(self) -> Branch:
         """The response of the first case."""
         return self.responses[0].branch

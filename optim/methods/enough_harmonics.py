@@ -13,13 +13,19 @@ from solver.results.watch import ShouldStop
 
 CLAIMS = (DesignStatus.OPTIMAL, DesignStatus.AT_BOUND, DesignStatus.APPROXIMATE)
 MOST_HARMONICS = 60  # beyond that a design is not looked at with more
+WORSE = 2.0  # times the doubt that twice the harmonics leave, from which still more do not mend it
 _RUNGS = 4  # times the harmonics asked for, at most: more of them cost more than a search was asked to
 _FEW = 12  # harmonics that a search may have though it was asked for fewer
 
 
 def well_known(problem: Problem, evaluation: Evaluation) -> bool:
     """Return whether the highest peak of a design is known within 5 %."""
-    return doubt_of(evaluation, {case.name: case.weight for case in problem.cases}) <= WELL_KNOWN
+    return doubt_in(problem, evaluation) <= WELL_KNOWN
+
+
+def doubt_in(problem: Problem, evaluation: Evaluation) -> float:
+    """Return the share by which the highest peak of a design may be higher."""
+    return doubt_of(evaluation, {case.name: case.weight for case in problem.cases})
 
 
 def honest(result: DesignResult) -> DesignResult:
@@ -31,28 +37,33 @@ def honest(result: DesignResult) -> DesignResult:
     return result
 
 
-def with_enough(result: DesignResult, should_stop: ShouldStop) -> tuple[Problem | None, int]:
-    """Return the problem to solve instead of one whose end is doubtful, and the responses that told so.
+def with_enough(
+    result: DesignResult, should_stop: ShouldStop
+) -> tuple[Problem | None, list[Evaluation]]:
+    """Return the problem to solve instead of one whose end is doubtful, and the evaluations that told so.
 
     A response or two at the optimum tell how many harmonics it needs, so that at most one search follows.
 
     Returns
     -------
-    (problem, responses); None where the harmonics are enough, or more of them do not help.
+    (problem, evaluations); None where the harmonics are enough, or more of them do not help.
     """
-    problem, evaluation, responses = result.problem, result.evaluation, 0
+    problem, evaluation, tried = result.problem, result.evaluation, list[Evaluation]()
     if (
         result.status not in (*CLAIMS, DesignStatus.INFEASIBLE)
         or evaluation is None
         or well_known(problem, evaluation)
     ):
-        return None, 0
-    harmonics, most = 2 * problem.harmonics, max(_RUNGS * problem.harmonics, _FEW)
+        return None, tried
+    doubt, harmonics = doubt_in(problem, evaluation), 2 * problem.harmonics
+    most = max(_RUNGS * problem.harmonics, _FEW)
     while harmonics <= min(most, MOST_HARMONICS) and not (should_stop is not None and should_stop()):
         more = replace(problem, harmonics=harmonics)
         found = evaluate(more, result.optimum, gradients=False, should_stop=should_stop)
-        responses += len(found.responses)
+        tried.append(found)
         if found.good and well_known(more, found):
-            return replace(more, start=dict(result.optimum)), responses
+            return replace(more, start=dict(result.optimum)), tried
+        if found.good and doubt_in(more, found) > WORSE * doubt:
+            break
         harmonics *= 2
-    return None, responses
+    return None, tried

@@ -48,9 +48,10 @@ class Search:
         self._above = above  # the search with all harmonics, for which this one only ranks designs
         self._scout: Search | None = None
         self._least = (math.inf, math.inf)
+        self._known: dict[tuple[float, ...], Evaluation] = {}
 
     def __call__(self, values: Mapping[str, float]) -> Evaluation:
-        """Evaluate one design with gradients.
+        """Evaluate one design with gradients, each once.
 
         Raises
         ------
@@ -58,9 +59,13 @@ class Search:
             The caller asked to stop, or the evaluations are used up.
         """
         self.check()
+        place = tuple(values[variable.name] for variable in self.variables)
+        if place in self._known:
+            return self._known[place]
         if len(self.history) >= self._most:
             raise StoppedError(DesignStatus.TOO_MANY)
         evaluation = evaluate(self.problem, values, errors=False, should_stop=self.should_stop)
+        self._known[place] = evaluation
         self.keep(evaluation)
         return evaluation
 

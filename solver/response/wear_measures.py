@@ -156,7 +156,7 @@ def friction_work(cycle: Cycle, e: int, changes: Sequence[Change]) -> tuple[floa
 
 
 def force_change(system: System, e: int, a: int, dF_dU: Real, dU: Real) -> Real:
-    """Return what motions that change by dU (n_ports, n) change of the force (n,) at port `a` of contact `e`."""
+    """Return the change of the force (n,) at port `a` of contact `e` for motions that change by `dU`."""
     first, ports = system.first_block[e], range(int(system.first_port[e]), int(system.first_port[e + 1]))
     changes = [dF_dU[first + a * len(ports) + b] @ dU[port] for b, port in enumerate(ports)]
     total: Real = np.sum(changes, axis=0) if len(ports) > 1 else changes[0]
