@@ -34,7 +34,6 @@ MOST_STEPS = 40
 FIRST_PENALTY = 1.0  # times the objective: far above the multipliers, it makes limits that bend too steep
 STRONGER = 10.0  # factor of a penalty that leaves limits broken
 ENOUGH = 1e-4  # share of the predicted decrease from which a step is taken
-FORESEEN = 0.1  # share of the predicted decrease within which a longer step is trusted far
 REMEMBERED = 8  # designs whose rows are kept as cuts
 CUTS_REACH = 10.0  # times the radius, as far as cuts reach
 SAME_DESIGN = 1e-5  # scaled distance within which the rows of another design tell of the optimum
@@ -88,7 +87,7 @@ def minimax_search(
             seen.append(model if ratio > ENOUGH else fresh)
         size = float(np.linalg.norm(step.step, norm))
         if ratio > 0.75 and size > 0.9 * radius:
-            radius = min((4.0 if abs(ratio - 1.0) <= FORESEEN else 2.0) * radius, LARGEST_RADIUS)
+            radius = min(2.0 * radius, LARGEST_RADIUS)
         elif ratio < 0.25:
             radius = 0.5 * size if ratio > 0.0 else 0.25 * size
         if ratio > ENOUGH and fresh.smooth:

@@ -29,11 +29,12 @@ def coarse(problem: Problem) -> list[dict[str, float]]:
     return [start, *designs] if start is not None and start not in designs else designs
 
 
-def places(n: int) -> Real:
+def places(n: int, known: int = 0) -> Real:
     """Return the places of a look, (k, n), of the unit box: bounds included.
 
     The middle; the corners, of many variables only those next to the lowest and the highest; the middles of
-    the faces, with two variables those of the edges; a Sobol sequence between them.
+    the faces, with two variables those of the edges; a Sobol sequence between them, shorter by so many
+    places as are `known` between the bounds already.
     """
     if n == 1:
         return np.linspace(0.0, 1.0, LOOKS_ONE)[:, None]
@@ -43,7 +44,7 @@ def places(n: int) -> Real:
         faces[2 * i, i], faces[2 * i + 1, i] = 0.0, 1.0
     between = quasi_random(n, 2 ** math.ceil(math.log2(LOOKS_EACH * n)))
     # The first place of the sequence is a corner, the second the middle.
-    return np.vstack([middle, corners(n), faces, between[2:]])
+    return np.vstack([middle, corners(n), faces, between[2 + known :]])
 
 
 def quasi_random(n: int, count: int, seed: int | None = None) -> Real:

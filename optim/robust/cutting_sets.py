@@ -17,7 +17,7 @@ from optim.results.design import DesignResult
 from optim.robust.result import Cut, RobustStatus
 from optim.robust.scenarios import Outcome, number_of
 from optim.robust.search import RobustSearch
-from optim.robust.worst_case import Aspect, Finding, UnknownScenarioError, pessimise
+from optim.robust.worst_case import MOST_BESIDES, Aspect, Finding, UnknownScenarioError, pessimise
 
 CLOSED = (
     1e-6  # relative excess of the worst scenario found over the master problem's, up to which it is solved
@@ -27,7 +27,6 @@ AT_ONCE = 2  # scenarios that join the master problem for one aspect
 CLOUD = 0.05  # distance of ξ within which two scenarios are one place
 FAR_APART = 1e-2  # scaled distance from which two starts are two
 FEW = 8  # samples that the starts of a sampled search are judged by
-CHECKED = 4  # of the drawn scenarios, the worst, that a worst case is checked against
 
 
 @dataclass(slots=True, kw_only=True)
@@ -158,11 +157,11 @@ def _checked(
 ) -> Finding:  # fmt: skip
     """Return the worst scenarios again, looking at the whole set and climbing from the worst drawn ones."""
     inside = [scenario for scenario in drawn if search.uncertain.inside_of(scenario)]
-    asked = [search.outcome(values, scenario, gradients=False) for scenario in inside]
+    asked = [search.outcome(values, scenario) for scenario in inside]
     ranked = sorted((o for o in asked if o.good), key=lambda found: -aspect.worst(found.rows))
     return pessimise(
         lambda scenario: search.outcome(values, scenario), search.uncertain, aspect, progress.scenarios,
-        besides=[found.scenario for found in ranked[:CHECKED]], thorough=True,
+        besides=[found.scenario for found in ranked[:MOST_BESIDES]], thorough=True,
     )  # fmt: skip
 
 
