@@ -37,9 +37,7 @@ def honest(result: DesignResult) -> DesignResult:
     return result
 
 
-def with_enough(
-    result: DesignResult, should_stop: ShouldStop
-) -> tuple[Problem | None, list[Evaluation]]:
+def with_enough(result: DesignResult, should_stop: ShouldStop) -> tuple[Problem | None, list[Evaluation]]:
     """Return the problem to solve instead of one whose end is doubtful, and the evaluations that told so.
 
     A response or two at the optimum tell how many harmonics it needs, so that at most one search follows.

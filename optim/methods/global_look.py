@@ -182,9 +182,7 @@ class WholeRange:
             enough=1.0 + KEPT,
         ).evaluation  # fmt: skip
 
-    def _local(
-        self, begin: Evaluation, model_of: ModelOf, evaluate: Evaluate | None = None
-    ) -> Evaluation:
+    def _local(self, begin: Evaluation, model_of: ModelOf, evaluate: Evaluate | None = None) -> Evaluation:
         return self._local_search(
             evaluate or self.search, self.search.variables, begin, model_of
         ).evaluation  # fmt: skip

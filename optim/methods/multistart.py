@@ -13,8 +13,8 @@ from optim.problem.variables import Real, unscaled
 COARSE_ONE = 9  # designs of the coarse stage of a robust search with one variable
 COARSE_EACH = 6  # and for each variable with more
 LOOKS_ONE = 17  # designs of a look with one variable
-LOOKS_EACH = 12  # and for each variable with more, besides corners and middles
-MOST_CORNERS = 32
+LOOKS_EACH = 6  # and for each variable with more, besides corners and middles
+MOST_CORNERS = 16
 
 
 def coarse(problem: Problem) -> list[dict[str, float]]:
