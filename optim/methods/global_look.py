@@ -153,10 +153,10 @@ class WholeRange:
         """Search locally from a design, for the limits alone where it ends without keeping them."""
         self._starts.append(scaled(self.search.variables, begin.values))
         here, ends = begin, []
-        if self.search.model(begin).violation > KEPT and not any(local.feasible for local in self.found):
-            here = self._eased(begin)
-            ends.append(self._ended(here))
         try:
+            if self.search.model(begin).violation > KEPT and not any(local.feasible for local in self.found):
+                here = self._eased(begin)
+                ends.append(self._ended(here))
             if not ends or ends[0].feasible:
                 ends.append(self._ended(self._local(here, self.search.model, _Watched(self))))
         except JoinedError:
@@ -178,7 +178,7 @@ class WholeRange:
         from optim.methods.minimax import thorough_search
 
         return thorough_search(
-            self.search, self.search.variables, begin, lambda e: of_limits(self.search.model(e)),
+            _Watched(self), self.search.variables, begin, lambda e: of_limits(self.search.model(e)),
             enough=1.0 + KEPT,
         ).evaluation  # fmt: skip
 
@@ -190,19 +190,23 @@ class WholeRange:
     def joins(self, here: Evaluation) -> bool:
         """Return whether what is minimised falls all the way from a design to an end that is known.
 
+        Of a design that does not keep its limits it is the largest excess.
+
         On the straight way to the nearest end that is better, values and slopes fall at every design looked
         at: the design is in the basin of that end, as far as these tell (hill-valley test: Ursem, Proc. CEC
         1999, p. 1633, doi:10.1109/CEC.1999.785470).
         """
         mine = self._ended(here)
         better = [(local, there) for local, there in self._ends if _beats(local.standing, mine.standing)]
-        if not better or not mine.feasible:
+        if not better:
             return False
+        broken = not mine.feasible
         z = scaled(self.search.variables, here.values)
         ways = [scaled(self.search.variables, local.evaluation.values) - z for local, _ in better]
         nearest = min(range(len(ways)), key=lambda i: float(np.abs(ways[i]).max()))
-        way, end = ways[nearest], taylor_of(self._scout.model(better[nearest][1])).value
-        if not _falls(taylor_of(self.search.model(here)), way):
+        way = ways[nearest]
+        end = taylor_of(self._scout.model(better[nearest][1]), feasibility=broken).value
+        if not _falls(taylor_of(self.search.model(here), feasibility=broken), way):
             return False
         last = math.inf
         for share in ON_THE_WAY:
@@ -210,7 +214,7 @@ class WholeRange:
             if not there.good:
                 return False
             self._seen.append(there)
-            one = taylor_of(self._scout.model(there))
+            one = taylor_of(self._scout.model(there), feasibility=broken)
             if not end < one.value < last or not _falls(one, way):
                 return False
             last = one.value
