@@ -13,13 +13,11 @@ import numpy as np
 from optim.criteria.evaluation import natural_scales
 from optim.criteria.linearised import conditions, model_of
 from optim.criteria.rows import Evaluation
-from optim.methods.afterwards import looked_after, settled_status
+from optim.methods.afterwards import honest, looked_after, settled_status, with_enough
 from optim.methods.eased import Eased
-from optim.methods.enough_harmonics import honest, with_enough
-from optim.methods.evaluator import Search, StoppedError
+from optim.methods.evaluator import Search, StoppedError, Tally
 from optim.methods.global_look import WholeRange
 from optim.methods.kkt import FLAT_SLOPE, Local, LocalSearch
-from optim.methods.tally import Tally
 from optim.problem.keys import ROBUST, DesignKeys
 from optim.problem.keywords import keywords
 from optim.problem.problem import Method, Problem, pose

@@ -29,9 +29,8 @@ from optim.methods.kkt import (
     standing,
     without_limits,
 )
-from optim.methods.multistart import places
 from optim.methods.polish import polished
-from optim.methods.surrogate import Taylor, candidates, promising, taylor_of
+from optim.methods.surrogate import Taylor, candidates, places, promising, taylor_of
 from optim.problem.variables import Real, scaled, unscaled
 
 FEWEST = 3  # harmonics of a look with several variables, at least

@@ -93,6 +93,16 @@ class DesignStatus(Enum):
     STOPPED = "The search was stopped by the caller."
 
 
+class Certainty(Enum):
+    """How far it is certain that no other design is better; the value is what a user reads."""
+
+    CLOSED = "closed: the peaks followed over the whole range are nowhere lower"
+    SAMPLED = "sampled: between the designs looked at a better one may lie that shows in no slope around"
+
+
+_PROVEN = (DesignStatus.OPTIMAL, DesignStatus.AT_BOUND)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class DesignPeak(Piece):
     """A peak of the response of a design: max|x| of the observed DOF [m] and its frequency [Hz]."""
@@ -212,6 +222,12 @@ class DesignResult(MadeOfResponses, Drawn):
     def stable(self) -> Stable:
         """Whether small perturbations die out there: yes, no, or not known."""
         return self.stability.stable
+
+    @property
+    def certainty(self) -> Certainty:
+        """Whether the range is closed by peaks that were followed over all of it, or only sampled."""
+        followed = self.method is Method.TRACKED and bool(self.basins) and self.basins[0].proven
+        return Certainty.CLOSED if followed and self.status in _PROVEN else Certainty.SAMPLED
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -339,6 +355,7 @@ class DesignResult(MadeOfResponses, Drawn):
             "warnings": list(self.warnings),
             "plateau": {name: list(ends) for name, ends in self.plateau.items()},
             "chosen_by": self.chosen_by,
+            "certainty": self.certainty.value,
             "checked": [checked_json(one) for one in self.checked],
             "curve": None if self.curve is None else self.curve.to_json(),
             "looked_at": [looked_json(one) for one in self.looked_at if one.good],

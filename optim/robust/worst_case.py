@@ -20,8 +20,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from optim.criteria.criterion import Criterion, Row
-from optim.methods.multistart import places
-from optim.methods.surrogate import Taylor, candidates, promising
+from optim.methods.surrogate import Taylor, candidates, places, promising
 from optim.problem.uncertainty_set import Disk, Scenario, Shape, UncertainSet
 from optim.problem.variables import Real
 from optim.robust.scenarios import Outcome

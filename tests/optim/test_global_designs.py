@@ -26,8 +26,7 @@ from sampling import others_long
 import optim
 import solver
 from optim.criteria.peak import PEAK
-from optim.methods.multistart import corners, places
-from optim.methods.surrogate import Taylor, promising
+from optim.methods.surrogate import Taylor, corners, places, promising
 from optim.results.design import DesignResult, DesignStatus
 from optim.robust.result import RobustResult, RobustStatus
 from optim.robust.scenarios import outcome
