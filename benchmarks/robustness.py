@@ -23,10 +23,13 @@ def lost_power(solution: solver.Solution) -> float:
     Far from a resonance force and motion are in quadrature and next to nothing is dissipated, so that the
     largest of the powers would compare rounding with rounding.
     """
-    power, forces = solver.power_balance(solution), solution.scene.excitation
-    reach = sum(force.amplitude * force.harmonic for force in forces) * np.abs(solver.motion(solution)).max()
-    apparent = 2.0 * math.pi * solution.frequency_hz * float(reach)
-    return abs(power.input_w - power.viscous_w - power.friction_w) / apparent
+    power, forces = solver.power_balance(solution), solution.scene.forces
+    moved = float(np.abs(solver.motion(solution)[:, 1:]).max(initial=0.0))
+    reach = sum(abs(force.amplitude) * force.harmonic for force in forces) * moved
+    apparent = 2.0 * math.pi * solution.frequency_hz * reach
+    apparent += sum(abs(each) for each in power.contacts_w.values()) + abs(power.viscous_w)
+    lost = abs(power.input_w - power.viscous_w - power.friction_w)
+    return lost / apparent if apparent > 0.0 else 0.0
 
 
 def robustness() -> None:

@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING, Unpack
 
 import numpy as np
 
-from optim.criteria.evaluation import natural_scales
+from optim.criteria.evaluation import evaluate, natural_scales
 from optim.criteria.linearised import conditions, model_of
 from optim.criteria.rows import Evaluation
-from optim.methods.afterwards import honest, looked_after, settled_status, with_enough
+from optim.methods.afterwards import looked_after, settled_status
 from optim.methods.eased import Eased
+from optim.methods.enough_harmonics import honest, with_enough
 from optim.methods.evaluator import Search, StoppedError, Tally
 from optim.methods.global_look import WholeRange
 from optim.methods.kkt import FLAT_SLOPE, Local, LocalSearch
@@ -25,6 +26,7 @@ from optim.problem.typed import Limit, with_limits
 from optim.results.basins import SAME_PLACE, Basin
 from optim.results.best_so_far import OnBest
 from optim.results.design import DesignResult, DesignStatus
+from solver.continuation.branch import BranchStatus
 from solver.results.default_bar import shows_progress
 from solver.results.watch import OnProgress, ShouldStop
 from solver.scene.scene import Scene
@@ -87,9 +89,20 @@ def solve_problem(
     found = _solved(problem, tally.searching, should_stop, on_best)
     found, more = _with_enough_harmonics(found, tally, should_stop, on_best)
     found = looked_after(found, should_stop, tally.further, more)
+    if found.status is DesignStatus.NO_RESPONSE and _undamped(found, should_stop):
+        found = replace(found, status=DesignStatus.UNDAMPED)
     if found.evaluation is not None:
         tally.tell(1.0)
     return found
+
+
+def _undamped(found: DesignResult, should_stop: ShouldStop) -> bool:
+    """Return whether responses end at a resonance without damping: of designs tried, or amid the range."""
+    problem = found.problem
+    middle = {variable.name: variable.outside(0.5) for variable in problem.variables}
+    tried = found.history or (evaluate(problem, middle, gradients=False, should_stop=should_stop),)
+    ends = {response.branch.status for one in tried for response in one.responses}
+    return BranchStatus.UNDAMPED in ends
 
 
 def _with_enough_harmonics(
@@ -106,7 +119,8 @@ def _with_enough_harmonics(
     found = replace(found, evaluations=found.evaluations + responses, work=found.work + responses)
     if problem is None:
         return found, tried
-    again = _solved(problem, tally.again(found.evaluations), should_stop, on_best, found)
+    same = found if problem.cases is found.problem.cases else None  # by another measure nothing is known
+    again = _solved(problem, tally.again(found.evaluations), should_stop, on_best, same)
     if again.status is DesignStatus.STOPPED:
         return replace(found, status=DesignStatus.STOPPED), tried
     if again.evaluation is None or not again.evaluation.good:

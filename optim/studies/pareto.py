@@ -23,7 +23,7 @@ from optim.criteria.linearised import ACTIVE, Model, bounds_held
 from optim.criteria.peak import PEAK
 from optim.criteria.rows import Evaluation
 from optim.errors import DesignError
-from optim.methods.afterwards import honest
+from optim.methods.enough_harmonics import honest
 from optim.methods.evaluator import Search, StoppedError
 from optim.methods.kkt import Local
 from optim.problem.keys import FEWEST_POINTS, POINTS, FrontKeys

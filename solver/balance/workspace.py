@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -12,9 +12,11 @@ from solver.balance.balance import Balance, fewer_harmonics
 from solver.balance.closed_loop_poles import ClosedLoop
 from solver.balance.kernels.jacobian import fill_jacobian, whole_jacobian
 from solver.balance.kernels.locate import slope_by_parameter
+from solver.balance.kernels.mechanics import ALLOWED, unaccounted
 from solver.balance.kernels.newton import from_stuck, ladder, newton, stuck_start
 from solver.balance.kernels.output import MEASURES
-from solver.balance.kernels.residual import evaluate
+from solver.balance.kernels.residual import contact_values, evaluate
+from solver.balance.mean_loads import friction_can_hold
 from solver.balance.softening import solve_softened
 from solver.contacts.kernels.system import (
     UNHELD,
@@ -34,10 +36,12 @@ from solver.scene.harmonics import spread
 
 # The mean and the first: with these Newton's method from full stick nearly always ends well.
 FEWEST_HARMONICS = 2
-HELD_FORCE = 1e-6  # of the forces: what a residual may leave of them where contacts hold the structure
-BALANCED = 1e-6  # of the forces on a part that contacts alone hold: a mean force that drives it is larger
-ROUNDING = 1e-15
+ALONG = 1e-6  # share of a motion below which it has no part along a direction
 _LEAST_RISE = 1e-3  # share of the excitation below which it is raised no further
+
+
+Way = Callable[[Real, float], tuple[bool, int, float]]
+"""From nothing or a guess to (whether u solves at λ, iterations, relative residual), u in place."""
 
 
 def _in_place(
@@ -63,7 +67,12 @@ class PointSolution:
     residual : float
         Relative residual at `u`.
     ratchets : bool
-        There is no periodic motion: a part that contacts alone hold drifts a little further every period.
+        There is no periodic motion: a part that contacts alone hold drifts a little further every period. `u`
+        is the motion it has where a constant force holds it.
+    above_friction : bool
+        It does because the mean load on it is more than friction can hold.
+    loses_power : bool
+        Residuals were small, but powers or mean forces did not balance.
     """
 
     converged: bool
@@ -71,23 +80,8 @@ class PointSolution:
     iterations: int
     residual: float
     ratchets: bool = False
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Drive:
-    """The mean force on what contacts alone hold.
-
-    Attributes
-    ----------
-    relative : float
-        Relative to the forces of the contacts along the same motion.
-    unheld : bool
-        Whether nothing holds a part there against it: each of its contacts slips both ways, is open, or
-        carries all it can.
-    """
-
-    relative: float
-    unheld: bool
+    above_friction: bool = False
+    loses_power: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -147,31 +141,50 @@ class Workspace:
         little by little, beginning with the first alone, and the contacts are made soft and then stiffer
         (under constant forces in the other order, and the excitation is raised from the static equilibrium);
         if that fails too, the load is walked down rung by rung from full stick, and at last the excitation
-        is raised from nothing. Where contacts alone hold a part, and none does, it is looked whether a force
-        drives the part away.
+        is raised from nothing. Where contacts alone hold a part, it is looked first whether friction can hold
+        its mean load, and where no contact holds it, whether a force drives it away. What is found obeys
+        mechanics, see `solver.balance.kernels.mechanics`.
         """
-        found = self._plain(p, guess)
-        if not len(self.balance.system.loose) or (found.converged and self._balanced(found.u, p)):
+        ways = self._ways()
+        if not len(self.balance.system.loose):
+            return self._plain(p, ways, guess)
+        if not self.friction_can_hold(p):
+            nothing = np.zeros(self.balance.n_unknowns)
+            return PointSolution(
+                converged=False, u=nothing, iterations=0, residual=np.inf, ratchets=True, above_friction=True
+            )
+        # Under given loads what holds a part shows at once; a load that moves may hold it elsewhere.
+        first = 1 if all(contact.keeps_together for contact in self.balance.scene.contacts) else len(ways)
+        found = self._plain(p, ways[:first], guess)
+        if not found.converged:
+            held = self._held_in_place(p, found.iterations)
+            found = held if held.converged or held.ratchets or first == len(ways) else found
+        if found.converged or found.ratchets or first == len(ways):
             return found
-        return self._held_in_place(p, found.iterations)
+        last = self._plain(p, ways[first:])
+        return replace(last, iterations=found.iterations + last.iterations)
 
-    def _plain(self, p: float, guess: Real | None = None) -> PointSolution:
-        """Solve the balance as it stands, as `solve`."""
-        u, spent = np.zeros(self.balance.n_unknowns), 0
+    def friction_can_hold(self, p: float) -> bool:
+        """Return whether friction can hold the mean loads on parts that contacts alone hold."""
+        receptance(self.system, p, self.linear)
+        stuck = receptance_by_value(self.linear).u_linear[0, 0].real
+        table, loads, _, _ = contact_values(self.system, p, 0.0)
+        return friction_can_hold(self.balance, stuck, table, loads)
+
+    def _plain(self, p: float, ways: Sequence[Way], guess: Real | None = None) -> PointSolution:
+        """Solve the balance as it stands, from `guess` and then by these ways."""
+        u, spent, lost = np.zeros(self.balance.n_unknowns), 0, False
         if guess is not None:
-            good, spent, norm = self._newton(guess, u, p)
-            if good and self.forces_balance(u, p):
-                return PointSolution(converged=True, u=u, iterations=spent, residual=norm)
-        good, norm = False, np.inf
-        for way in self._ways():
+            ways = (partial(self._newton, guess), *ways)
+        for way in ways:
             good, more, norm = way(u, p)
             spent += more
-            good = good and self.forces_balance(u, p)
-            if good:
-                break
-        return PointSolution(converged=bool(good), u=u, iterations=int(spent), residual=float(norm))
+            if good and self.obeys(u):
+                return PointSolution(converged=True, u=u, iterations=spent, residual=float(norm))
+            lost |= bool(good)
+        return PointSolution(converged=False, u=u, iterations=spent, residual=float(norm), loses_power=lost)
 
-    def _ways(self) -> tuple[Callable[[Real, float], tuple[bool, int, float]], ...]:
+    def _ways(self) -> tuple[Way, ...]:
         """Return the ways to a solution from nothing in their order, each as `newton` with u in place.
 
         Under constant forces the contacts are soft at first: their load is not known before the equilibrium.
@@ -197,55 +210,39 @@ class Workspace:
 
     def solve_from(self, p: float, guess: Real) -> PointSolution:
         """Solve at λ = `p` (inside unit) by Newton's method from `guess` alone."""
-        u = np.zeros(self.balance.n_unknowns)
-        good, spent, norm = self._newton(guess, u, p)
-        if good and len(self.balance.system.loose) and not self._balanced(u, p):
-            good = False
-        return PointSolution(converged=bool(good), u=u, iterations=int(spent), residual=float(norm))
+        return self._plain(p, (partial(self._newton, guess),))
 
-    def forces_balance(self, u: Real, p: float) -> bool:
-        """Return whether the vibrating forces balance, kt r of them left, where contacts hold the structure.
+    def obeys(self, u: Real) -> bool:
+        """Return whether u obeys mechanics where it was last evaluated: powers and mean forces balance.
 
-        The residual r is relative to motions: of a light part far away it is small whatever the forces are.
+        The residual is relative to motions: of a light part far away it is small whatever the forces are.
         """
-        system, ports = self.balance.system, self.balance.n_ports
-        if not np.any(system.shift):
-            return True
-        point = self.forces(u, p)[1]
-        left = np.abs(point.residual) + ROUNDING * np.abs(u)  # of a part far away, rounding of its place
-        largest = left.reshape(ports, -1)[:, int(system.ks[0] == 0) :].max(axis=1)
-        free = np.abs(receptance_by_value(self.linear).u_linear[0]).max(axis=0)
-        size = max(np.abs(point.F).max(), (system.shift * free).max())
-        return bool((system.shift * largest).max() <= HELD_FORCE * size)
+        return bool(unaccounted(self.system, self.linear, u, self.point) <= ALLOWED)
 
-    def _balanced(self, u: Real, p: float) -> bool:
-        """Return whether the mean forces on what contacts alone hold balance, relative to these forces.
+    def _unheld(self, u: Real) -> bool:
+        """Return whether nothing holds a part against the mean force on it, where u was last evaluated.
 
-        The residual is one of displacements, which are large where a part is far away.
+        Each of its contacts slips both ways, is open, or carries all it can.
         """
-        return self.drive(u, p).relative <= BALANCED
-
-    def drive(self, u: Real, p: float) -> Drive:
-        """Return the mean force left on what contacts alone hold, where (u, p) solves the rest."""
-        system, n = self.balance.system, self.balance.n_coefficients
-        forces = self._mean_forces(point := self.forces(u, p)[1])
-        carried = np.abs(system.loose) @ np.abs(point.F).max(axis=1)
-        free = receptance_by_value(self.linear).u_linear[0, 0].real
-        applied = np.abs(system.loose @ (system.shift * free))
-        size = max(float(carried.max()), float(applied.max()), float(np.abs(forces).max()))
-        # Of a part far away the forces are the rounding of its place.
-        lost = ROUNDING * (np.abs(system.loose) @ (system.shift * np.abs(u[::n]))).max()
-        relative = float(np.abs(forces).max() + lost) / size if size > 0.0 else 0.0
+        system, point = self.balance.system, evaluation_by_value(self.point)
+        way = self._mean_forces(point) @ system.loose
         # A contact that sticks with all the mean force it can carry, and was pulled beyond, holds the part
         # the other way.
         full = point.elastic > 0.0
-        beyond = point.elastic * u[::n] - point.F[:, 0]
-        away = bool(np.all((forces @ system.loose)[full] * beyond[full] <= 0.0))
-        # A contact that opens and closes with the parts, or is pressed by them, may hold the part elsewhere.
+        beyond = point.elastic * u[:: self.balance.n_coefficients] - point.F[:, 0]
+        if not np.all(way[full] * beyond[full] <= 0.0):
+            return False
+        # A contact that opens, or is pressed, along the way may hold the part elsewhere.
         contacts = self.balance.scene.contacts
-        moves = np.array([each.OPENS or each.normal_port is not None for each in contacts])[system.owner]
-        away &= not np.any(system.loose[:, moves])
-        return Drive(relative=relative, unheld=away and bool(full.any() or point.counts[UNHELD]))
+        moves = np.zeros(way.size, bool)
+        for first, contact in zip(system.first_port.tolist(), contacts, strict=False):
+            if contact.normal_port is not None:
+                moves[first + contact.normal_port] = True
+            elif contact.OPENS:
+                moves[first : first + len(contact.end_keys)] = True
+        if np.any(np.abs(way[moves]) > ALONG * np.abs(way).max()):
+            return False
+        return bool(full.any() or point.counts[UNHELD])
 
     def _mean_forces(self, point: Evaluation) -> Real:
         """Return the mean forces along the motions of loose parts that were left where last evaluated.
@@ -262,25 +259,39 @@ class Workspace:
         Under given loads the friction forces of two motions never work on their difference, so the motion of
         a part that needs such a force is no periodic one without it.
         """
-        held = self.balance.system._replace(hold=1)
-        other = Workspace.of(replace(self.balance, system=held))
-        found = other._plain(p)
+        other, found = self._holding(), self.held(p)
         u, spent, good = found.u, spent + found.iterations, found.converged
+        failed = PointSolution(
+            converged=False, u=u, iterations=spent, residual=np.inf, loses_power=found.loses_power
+        )
         for side in range(2):
             if not good:
                 break
-            drive = self.drive(u, p)
-            if drive.relative <= BALANCED:
-                norm, _ = self.forces(u, p)
+            norm, _ = self.forces(u, p)
+            if self.obeys(u):
                 return PointSolution(converged=True, u=u, iterations=spent, residual=norm)
-            if drive.unheld:
-                return PointSolution(converged=False, u=u, iterations=spent, residual=np.inf, ratchets=True)
+            if self._unheld(u):
+                return replace(failed, iterations=spent, ratchets=True)
             start = self._other_side(u, p) if side == 0 else None
             if start is None:
                 break
             good, more, _ = other._newton(start, u, p)
             spent += more
-        return PointSolution(converged=False, u=u, iterations=spent, residual=np.inf)
+        return replace(failed, iterations=spent)
+
+    def _holding(self) -> Workspace:
+        """Return the same where a constant force holds what no contact does."""
+        return Workspace.of(replace(self.balance, system=self.balance.system._replace(hold=1)))
+
+    def held(self, p: float) -> PointSolution:
+        """Solve at λ = `p` (inside unit) where a constant force holds what no contact does."""
+        other = self._holding()
+        return other._plain(p, other._ways())
+
+    def unheld_ways(self, u: Real, p: float) -> Real:
+        """Return the motions of the ports (g, nc) that no contact holds at (u, λ = p)."""
+        _, point = self._holding().forces(u, p)
+        return point.gauge[: int(point.counts[UNHELD])].copy()
 
     def _other_side(self, u: Real, p: float) -> Real | None:
         """Return u with loose parts driven on, to where contacts that stick hold them the other way, or None.

@@ -57,6 +57,11 @@ class BranchStatus(Enum):
         "Beyond the last point there is a resonance and no damping, so that nothing bounds the "
         "response: give the structure some (damping_ratio = 0.001, say)."
     )
+    POWER_LOST = (
+        "Beyond the last point the balance is satisfied as far as rounding shows, but the power put in is "
+        "not what is dissipated: no such motion exists. Press parts that contacts alone hold harder, hold "
+        "them by a spring, or lower kt."
+    )
 
 
 ENDINGS = {
@@ -178,7 +183,8 @@ class Branch(Drawn):
         Why no higher peak hides between two points, or why that is not known.
     flags : tuple of str
         ``symmetric_unstable`` if a half-wave symmetric point of it is not the motion that is seen,
-        ``travelling_wave_assumed`` where one sector stands for all though the laws allow other motions.
+        ``travelling_wave_assumed`` where one sector stands for all though the laws allow other motions,
+        ``mean_load_above_friction`` where it ends because contacts cannot hold a part's mean load.
     """
 
     balance: Balance
@@ -201,6 +207,7 @@ class Branch(Drawn):
     peak_certificate: PeakCertificate
     flags: tuple[str, ...] = ()
     _judged: list[tuple[Verdict, ...]] = field(default_factory=list, init=False, compare=False)
+    _drifts: list[float] = field(default_factory=list, init=False, compare=False)
 
     @property
     def parameter(self) -> str:
@@ -272,6 +279,23 @@ class Branch(Drawn):
         return self._judged[0]
 
     @property
+    def ratchets(self) -> bool:
+        """Whether a part that contacts alone hold drifts a little further every period."""
+        return self.status is BranchStatus.RATCHETS
+
+    @property
+    def drift_per_period(self) -> float:
+        """How far a part drifts in a period [m] just beyond where the branch ended as RATCHETS; else NaN.
+
+        As that of a solution it is found when asked for.
+        """
+        if not self.ratchets:
+            return math.nan
+        if not self._drifts:
+            self._drifts.append(on_demand("solver.response.drift:of_branch")(self))
+        return self._drifts[0]
+
+    @property
     def folds(self) -> int:
         """How often the branch turned back in its parameter; two points at one value are no turn."""
         ahead = np.sign(np.diff(self.values))
@@ -329,9 +353,10 @@ class Branch(Drawn):
             "band_intervals_hz": None if band is None else [list(interval) for interval in band.intervals],
             "band_known": None if band is None else band.known and self.peak_certificate.known,
             "peak_certificate": self.peak_certificate.to_json(),
+            **({"drift_per_period": _number(self.drift_per_period)} if self.ratchets else {}),
             "points": len(self.values),
             "n_harmonics": self.balance.n_harmonics,
-            "error_estimate": float(self.error_estimate) if math.isfinite(self.error_estimate) else None,
+            "error_estimate": _number(self.error_estimate),
             "newton_iterations": self.newton_iterations,
             "rejected_steps": self.rejected_steps,
             "folds": self.folds,
@@ -343,3 +368,8 @@ class Branch(Drawn):
             "completed": self.completed,
             "status": self.status.value,
         }
+
+
+def _number(value: float) -> float | None:
+    """Return a float that JSON can carry."""
+    return float(value) if math.isfinite(value) else None

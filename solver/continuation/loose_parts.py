@@ -1,7 +1,8 @@
-"""The part of a branch on which the mean forces on what contacts alone hold balance.
+"""The part of a branch that obeys mechanics.
 
 The residual of a branch is one of displacements, and relative: of a part far away it is small whatever the
-forces are, which then are rounding. Every point is held against the forces themselves.
+forces are, which then are rounding. Every point is held against powers and forces themselves
+(`solver.balance.kernels.mechanics`), and one that fails is none of the branch.
 """
 
 from __future__ import annotations
@@ -10,26 +11,33 @@ from dataclasses import replace
 
 import numpy as np
 
-from solver.balance.workspace import BALANCED, Workspace
+from solver.balance.kernels.mechanics import ALLOWED
+from solver.balance.kernels.output import LOST
+from solver.balance.workspace import PointSolution, Workspace
 from solver.continuation.branch import BranchStatus
 from solver.continuation.segment import Stretch
 
 
 def balanced_part(workspace: Workspace, stretch: Stretch) -> Stretch:
-    """Return a stretch up to the first point at which a mean force drives a loose part; itself if none does.
+    """Return a stretch up to the first point that does not obey mechanics; itself if all do.
 
-    What is cut ends as RATCHETS where no force balance is found there because the part drifts away, else as
-    STALLED.
+    What is cut ends as `ending` says of a solution from nothing there.
     """
-    system = workspace.balance.system
-    if not len(system.loose) or system.ks[0] != 0:
+    wrong = ~(stretch.measures[:, LOST] <= ALLOWED)
+    if len(workspace.balance.system.loose):  # far away, the place itself is what is lost in rounding
+        other = Workspace.of(workspace.balance)  # the continuation goes on from the last point of `workspace`
+        for i, row in enumerate(stretch.solutions):
+            other.forces(u := row[:-1].copy(), float(row[-1]))
+            wrong[i] |= not other.obeys(u)
+    if not wrong.any():
         return stretch
-    workspace = Workspace.of(workspace.balance)  # that of the continuation goes on from its last point
-    for i, row in enumerate(stretch.solutions):
-        at = float(row[-1])
-        if workspace.drive(row[:-1].copy(), at).relative <= BALANCED:
-            continue
-        drifts = workspace.solve(at).ratchets
-        status = BranchStatus.RATCHETS if drifts else BranchStatus.STALLED
-        return replace(stretch.first(i), status=status, walk=np.zeros(0))
-    return stretch
+    first = int(np.argmax(wrong))
+    found = Workspace.of(workspace.balance).solve(float(stretch.solutions[first, -1]))
+    return replace(stretch.first(first), status=ending(found, BranchStatus.STALLED), walk=np.zeros(0))
+
+
+def ending(found: PointSolution, else_: BranchStatus) -> BranchStatus:
+    """Return why a branch ends where this was tried from nothing."""
+    if found.ratchets:
+        return BranchStatus.RATCHETS
+    return BranchStatus.POWER_LOST if found.loses_power else else_

@@ -76,6 +76,8 @@ class Stretch(Piece):
     def from_arrays(cls, arrays: Mapping[str, Real | Integer]) -> Stretch:
         """Return the stretch of such arrays (KeyError, ValueError or IndexError if they are not that)."""
         real = {name: np.ascontiguousarray(arrays[name], np.float64) for name in (*_ROWS, "walk")}
+        if real["measures"].shape[1] != MEASURES:
+            raise ValueError(f"measures of a branch have {MEASURES} columns")
         ending, iterations, rejected, over = (int(number) for number in arrays["counts"])
         return cls(
             solutions=real["solutions"], tangents=real["tangents"],

@@ -10,7 +10,6 @@ from typing import ClassVar
 import numpy as np
 
 from solver.jit import fourier
-from solver.jit.fourier import Complex
 from solver.linear.assembly import linear_model
 from solver.linear.condensation import force_amplitudes
 from solver.response.solution import Solution
@@ -68,15 +67,10 @@ def power_balance(solution: Solution) -> PowerBalance:
     SettingError
         The solution did not converge.
     """
-    return _powers(solution, all_coordinates(solution, first=1))
-
-
-def _powers(solution: Solution, motions: Complex) -> PowerBalance:
-    """Return the mean powers of a periodic response with these motions."""
     model = linear_model(solution.scene)
     free = model.free
     put_in = taken = 0.0
-    for k, motion in enumerate(motions, 1):
+    for k, motion in enumerate(all_coordinates(solution, first=1), 1):
         speed = 2.0 * math.pi * solution.frequency_hz * k
         velocity, moved = 1j * speed * motion[free], motion[~free]
         force = force_amplitudes(model, np.array([k], dtype=np.int64))[0]
@@ -99,20 +93,3 @@ def _powers(solution: Solution, motions: Complex) -> PowerBalance:
     return PowerBalance(
         input_w=put_in, viscous_w=taken, friction_w=sum(friction.values()), contacts_w=friction
     )
-
-
-def power_lost(solution: Solution) -> float:
-    """Return the power that is unaccounted for, relative to what forces and motions could carry at most.
-
-    Far from a resonance force and motion are in quadrature and next to nothing is dissipated: the largest of
-    the powers would compare rounding with rounding.
-    """
-    motions, ks = all_coordinates(solution, first=1), range(1, solution.highest_harmonic + 1)
-    power = _powers(solution, motions)
-    omega = 2.0 * math.pi * solution.frequency_hz
-    motion = float(np.abs(motions).max(initial=0.0))
-    forces = force_amplitudes(linear_model(solution.scene), np.array(ks, dtype=np.int64))
-    apparent = 0.5 * omega * float(np.array(ks) @ np.abs(forces).sum(axis=1)) * motion
-    apparent += sum(abs(each) for each in power.contacts_w.values()) + abs(power.viscous_w)
-    lost = abs(power.input_w - power.viscous_w - power.friction_w)
-    return lost / apparent if apparent > 0.0 else 0.0

@@ -50,6 +50,10 @@ class SolutionStatus(Enum):
         "no such motion exists. Press parts that contacts alone hold harder, hold them by a spring, or lower "
         "kt."
     )
+    RIGID_OPENS = (
+        "A contact with kn = inf opens under its load: what happens where it closes again is an impact, "
+        "which takes a law of its own. Press it harder, or give it a finite kn."
+    )
     LAW_FAILED = (
         "The law of a contact gives no finite force that repeats from period to period for a motion tried: "
         "look at its functions and parameters, or give it more samples."
@@ -80,7 +84,8 @@ class Solution(Drawn):
     flags : tuple of str
         ``mean_undetermined``, ``history_dependent``, ``all_stuck``, ``separation``, ``not_unique``,
         ``symmetric_unstable``, ``travelling_wave_assumed`` where they apply; for the last three see
-        `solver.continuation.branches.symmetry_breaking`.
+        `solver.continuation.branches.symmetry_breaking`. ``mean_load_above_friction`` of what ratchets
+        because its contacts cannot hold its mean load (`solver.balance.mean_loads`).
     residual : float
         Relative residual of the balance.
     error_estimate : float
@@ -108,6 +113,7 @@ class Solution(Drawn):
     seconds: float
     mean_range: tuple[float, float] = (math.nan, math.nan)
     _judged: list[Verdict] = field(default_factory=list, init=False, compare=False)  # once, when asked for
+    _drifts: list[float] = field(default_factory=list, init=False, compare=False)
 
     @property
     def converged(self) -> bool:
@@ -144,6 +150,24 @@ class Solution(Drawn):
         """Whether small perturbations die out: yes, no, or not known."""
         return self.stability.stable
 
+    @property
+    def ratchets(self) -> bool:
+        """Whether a part that contacts alone hold drifts a little further every period."""
+        return self.status is SolutionStatus.RATCHETS
+
+    @property
+    def drift_per_period(self) -> float:
+        """How far what RATCHETS drifts in a period [m]; found when asked for (`solver.response.drift`).
+
+        It is the largest of all DOFs; infinite where a mean load above friction speeds it up without end,
+        NaN where there is none or it is not known.
+        """
+        if not self.ratchets:
+            return math.nan
+        if not self._drifts:
+            self._drifts.append(on_demand("solver.response.drift:of_solution")(self))
+        return self._drifts[0]
+
     VIEWS: ClassVar = Views("solver.views", "of_solution", "solution_dataset", "of_solution")
 
     def to_json(self, *, with_stability: bool = False) -> dict[str, object]:
@@ -175,6 +199,7 @@ class Solution(Drawn):
             "n_harmonics": self.n_harmonics,
             "newton_iterations": self.newton_iterations,
             "seconds": self.seconds,
+            **({"drift_per_period": _number(self.drift_per_period)} if self.ratchets else {}),
             **({"mean_range": [*map(_number, self.mean_range)]} if MEAN_UNDETERMINED in self.flags else {}),
         }
 

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solver.balance.balance import Balance, build, check_frequency
+from solver.balance.balance import Balance, build, check_frequency, check_harmonics
 from solver.balance.kernels.gauge import FREE
 from solver.balance.kernels.newton import stuck_start
-from solver.balance.kernels.output import HALF_RANGE, MAX_ABS, MEAN
+from solver.balance.kernels.output import HALF_RANGE, MEAN, extremes
 from solver.balance.parameter import Kind
 from solver.balance.simplifications import Effects
 from solver.balance.workspace import PointSolution, Workspace
@@ -28,8 +28,8 @@ from solver.linear.condensation import loose_ports
 from solver.linear.undamped import undamped_resonance
 from solver.response.contact_response import OPENS, ContactResponse, ContactState, contact_responses
 from solver.response.history_dependence import has_another_solution, history_of
-from solver.response.power_balance import power_lost
 from solver.response.solution import HISTORY_DEPENDENT, MEAN_UNDETERMINED, Solution, SolutionStatus
+from solver.results.notes import ABOVE_FRICTION
 from solver.scene.scene import Scene
 
 if TYPE_CHECKING:
@@ -38,7 +38,6 @@ if TYPE_CHECKING:
     pass
 
 NEARBY = 0.9  # of a frequency: there, an undamped resonance is no reason for a large receptance
-LOST = 1e-2  # of the apparent power: at a resonance that nearly nothing damps rounding is amplified by 1e10
 
 
 def solve(
@@ -68,6 +67,10 @@ def solve(
     begun = time.perf_counter()
     check_frequency("frequency_hz", frequency_hz)
     scene = scene.at_frequency(frequency_hz)
+    if any(contact.is_rigid for contact in scene.contacts):
+        from solver.response.exact.answer import solve_exactly  # loaded by such scenes alone
+
+        return solve_exactly(scene, frequency_hz, check_harmonics(harmonics))
     omega = 2.0 * math.pi * frequency_hz
     good_enough = True
     if accuracy is None:
@@ -88,12 +91,11 @@ def solve(
             workspace, omega, NEARBY * omega
         ):
             failed = replace(failed, status=SolutionStatus.TOO_STIFF)
+        elif failed.status is SolutionStatus.NOT_CONVERGED and found.loses_power:
+            failed = replace(failed, status=SolutionStatus.POWER_LOST)
         return failed
     found, flags = seen(workspace, found, omega)
     solution = describe(workspace, found, frequency_hz, begun)
-    if solution.converged and power_lost(solution) > LOST:
-        failed = _failure(workspace.balance, frequency_hz, found, time.perf_counter() - begun)
-        return replace(failed, status=SolutionStatus.POWER_LOST)
     solution = replace(solution, flags=(*solution.flags, *assumed_flags(workspace.balance), *flags))
     return solution if good_enough else replace(solution, status=SolutionStatus.ACCURACY_NOT_REACHED)
 
@@ -109,13 +111,14 @@ def describe(
     if measures is None:
         return _failure(balance, frequency_hz, found, time.perf_counter() - begun)
     contacts = contact_responses(workspace, found.u, omega)
+    high, _, low, _ = extremes(balance.system, measures.observed)
     observed = fourier.to_full(measures.observed, balance.system.ks, balance.highest_harmonic)
     solution = Solution(
         scene=balance.scene.at_frequency(frequency_hz),
         frequency_hz=frequency_hz,
         n_harmonics=balance.n_harmonics,
         status=SolutionStatus.CONVERGED,
-        max_abs=float(measures.values[MAX_ABS]),
+        max_abs=max(high, -low),
         half_peak_to_peak=float(measures.values[HALF_RANGE]),
         mean=float(measures.values[MEAN]),
         harmonics=np.abs(fourier.to_complex(observed)),
@@ -146,16 +149,26 @@ def peak_flags(branch: Branch) -> tuple[str, ...]:
 
 def peak_response(branch: Branch) -> Solution:
     """Return the response at the highest peak of a branch that has one, without its error estimate."""
-    balance, (peak, *_) = branch.balance, branch.peaks
-    scene, frequency_hz = balance.scene, peak.at
+    peak = branch.peaks[0]
+    return _described(branch, peak.at, peak.solution)
+
+
+def described_at(branch: Branch, i: int) -> Solution:
+    """Return the response at point number `i` of a branch, without its error estimate."""
+    return _described(branch, float(branch.values[i]), branch.solutions[i, :-1].copy())
+
+
+def _described(branch: Branch, at: float, u: Real) -> Solution:
+    """Return the response `u` at a value of a branch's parameter, without its error estimate."""
+    balance, scene, frequency_hz = branch.balance, branch.balance.scene, at
     if balance.parameter.kind is not Kind.FREQUENCY:
         scene, frequency_hz = (
-            scene.with_values({branch.parameter: peak.at}),
+            scene.with_values({branch.parameter: at}),
             balance.system.omega / (2.0 * math.pi),
         )
         effects = replace(balance.effects, even_harmonics=int(balance.system.ks[0]) == 0)
         balance = build(scene, harmonics=balance.n_harmonics, effects=effects)
-    found = PointSolution(converged=True, u=peak.solution, iterations=0, residual=0.0)
+    found = PointSolution(converged=True, u=u, iterations=0, residual=0.0)
     return describe(Workspace.of(balance), found, frequency_hz, time.perf_counter(), estimated=False)
 
 
@@ -212,6 +225,7 @@ def _failure(balance: Balance, frequency_hz: float, found: PointSolution, second
         scene=balance.scene, frequency_hz=frequency_hz, n_harmonics=balance.n_harmonics,
         status=status,
         max_abs=math.nan, half_peak_to_peak=math.nan, mean=math.nan,
-        harmonics=np.full(balance.highest_harmonic + 1, np.nan), observed=nothing, contacts=(), flags=(),
+        harmonics=np.full(balance.highest_harmonic + 1, np.nan), observed=nothing, contacts=(),
+        flags=(ABOVE_FRICTION,) if found.above_friction else (),
         residual=found.residual, error_estimate=math.nan, newton_iterations=found.iterations, seconds=seconds,
     )  # fmt: skip

@@ -9,7 +9,7 @@ import numpy as np
 
 from solver.continuation.branch import BranchStatus
 from solver.results import units
-from solver.results.notes import BAND_OPEN, between_points, flag_words
+from solver.results.notes import BAND_OPEN, between_points, drift_words, flag_words
 from solver.results.told import Summary
 from solver.views.parameter_units import parameter
 
@@ -50,6 +50,8 @@ def of_branch(branch: Branch) -> Summary:
     if branch.band is not None:
         width = parameter(path, branch.band.width)
         pairs.append(("band", f"{width} above {units.length(branch.band.limit)}"))
+    if branch.ratchets:
+        pairs.append(("drifts", drift_words(branch.drift_per_period, branch.flags)))
     pairs += _branch_notes(branch)
     pairs += [("points", str(len(branch.values))), ("time", units.duration(branch.seconds))]
     title = f"{branch.balance.scene.name} over {path}, {branch.balance.n_harmonics} harmonics"
@@ -77,10 +79,12 @@ def of_solution(solution: Solution) -> Summary:
             *((contact.name, contact.state.value) for contact in solution.contacts),
             ("stable", solution.stability.line),
         ]
-        pairs += [("note", words) for words in flag_words(solution.flags)]
         if "mean_undetermined" in solution.flags and math.isfinite(solution.mean_range[0]):
             low, high = (units.length(bound) for bound in solution.mean_range)
             pairs.append(("mean, any history", f"{low} to {high}"))
+    if solution.ratchets:
+        pairs.append(("drifts", drift_words(solution.drift_per_period, solution.flags)))
+    pairs += [("note", words) for words in flag_words(solution.flags)]
     pairs += [("residual", f"{solution.residual:.1e}"), ("time", units.duration(solution.seconds))]
     title = f"{solution.scene.name} at {solution.frequency_hz:.6g} Hz, {solution.n_harmonics} harmonics"
     return made(title, pairs, solution.status.value)

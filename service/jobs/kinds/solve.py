@@ -81,6 +81,9 @@ class SolveResult(KindResult):
     mean_range: list[float | None] | None = Field(
         default=None, description="Means that any history can leave [m], if the mean depends on it."
     )
+    drift_per_period: float | None = Field(
+        default=None, description="How far a part that ratchets drifts in a period [m], if that is known."
+    )
     solutions: list[dict[str, Any]] | None = Field(
         default=None, description="Of a search for all: each solution with its stability, largest first."
     )

@@ -137,6 +137,9 @@ class SweepResult(EndedResult):
     largest_residual: float | None
     seconds: float
     flags: list[str]
+    drift_per_period: float | None = Field(
+        default=None, description="How far a part that ratchets drifts in a period [m], if that is known."
+    )
 
 
 def resolve(request: SweepRequest, source: SceneSource) -> Resolved:

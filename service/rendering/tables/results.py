@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from service.rendering.tables.text import print_pairs, print_table, say
 from solver.results import units
-from solver.results.notes import BAND_OPEN, FLAGS, between_points, flag_words
+from solver.results.notes import BAND_OPEN, FLAGS, between_points, drift_words, flag_words
 from solver.results.views import on_demand
 from solver.views.parameter_units import parameter
 
@@ -63,7 +63,11 @@ def solution(found: Json) -> None:
     """One response."""
     title = f"{found['scene']} at {found['frequency_hz']:g} Hz, {found['n_harmonics']} harmonics"
     if not found["converged"]:
-        print_pairs(title, [("converged", "no")])
+        drifts = (
+            [("drifts", drift_words(found["drift_per_period"], found["flags"]))] if _drifts(found) else []
+        )
+        notes = [("note", words) for words in flag_words(found["flags"])]
+        print_pairs(title, [("converged", "no"), *drifts, *notes])
         return
     pairs = _amplitudes(found)
     if found["error_estimate"] is not None:
@@ -81,6 +85,11 @@ def solution(found: Json) -> None:
         pairs.append(("mean, any history", f"{units.length(low)} to {units.length(high)}"))
     pairs += [("residual", f"{found['residual']:.1e}"), ("time", units.duration(found["seconds"]))]
     print_pairs(title, pairs)
+
+
+def _drifts(found: Json) -> bool:
+    """Whether a part ratchets, so that it was looked how far it drifts in a period."""
+    return "drift_per_period" in found
 
 
 def all_solutions(found: Json) -> None:
@@ -121,6 +130,8 @@ def branch(found: Json) -> None:
         pairs.append(("band", _band(found)))
     effort = f"{found['newton_iterations']} Newton iterations, {found['rejected_steps']} steps rejected"
     pairs += sure_of(found)
+    if _drifts(found):
+        pairs.append(("drifts", drift_words(found["drift_per_period"], found["flags"])))
     pairs += [("note", words) for words in flag_words(found.get("flags", ()))]
     pairs += _marks(found, path)
     pairs.append(("points", f"{found['points']} ({effort}, {found['folds']} folds)"))

@@ -7,8 +7,19 @@ import math
 import numpy as np
 
 from solver.balance.kernels.jacobian import factorise, step_back
+from solver.balance.kernels.mechanics import ALLOWED
 from solver.balance.kernels.newton import arc_newton
-from solver.balance.kernels.output import HIGH, HIGH_SLOPE, LOW, LOW_SLOPE, MAX_ABS, RESIDUAL, SLOPE, measure
+from solver.balance.kernels.output import (
+    HIGH,
+    HIGH_SLOPE,
+    LOST,
+    LOW,
+    LOW_SLOPE,
+    MAX_ABS,
+    RESIDUAL,
+    SLOPE,
+    measure,
+)
 from solver.contacts.kernels.system import Evaluation, Receptance, System
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Real
@@ -24,7 +35,10 @@ _BY_CUBIC, _BY_SECANT = 2, 7  # trials up to which a cubic tells where to look, 
 def slope_by_parameter(
     system: System, linear: Receptance, u: Real, point: Evaluation, x: Real, out: Real
 ) -> bool:
-    """Measure a solution with its slopes by λ, du/dλ = −(dr/du)⁻¹ dr/dλ; False where dr/du is singular."""
+    """Measure a solution with its slopes by λ, du/dλ = −(dr/du)⁻¹ dr/dλ.
+
+    False where dr/du is singular, or mechanics is not obeyed.
+    """
     n = u.size
     slope = np.empty(n)
     if factorise(system, linear, point, slope, 0.0, 0.0) == 0.0:
@@ -33,7 +47,7 @@ def slope_by_parameter(
         slope[i] = -point.dr_dp[i]
     step_back(system, point, slope)
     measure(system, linear, u, point, slope, 1.0, x, out)
-    return True
+    return bool(out[LOST] <= ALLOWED)
 
 
 @compiled
@@ -105,7 +119,7 @@ def _on_plane(
     found[n] = p
     measure(system, linear, u, point, tangent[:n], tangent[n], x, out)
     out[RESIDUAL] = norm
-    return True, iterations
+    return out[LOST] <= ALLOWED, iterations
 
 
 @compiled

@@ -159,7 +159,7 @@ def stuck_start(system: System, linear: Receptance, p: float, u: Real) -> float:
         held = _held_stiffness(table[system.owner[c]], system.held[c], system.constant_mean)
         stiffness[c] = held - system.shift[c]
     for i in range(system.ks.size):
-        good = _on_springs(system, linear, i, stiffness, motions)
+        good = on_springs(system, linear, i, stiffness, linear.u_linear[0, i], motions)
         here = cosine_position(system.ks, i)
         for c in range(nc):
             u[c * n + here] = motions[c].real if good else 0.0
@@ -179,10 +179,12 @@ def stuck_start(system: System, linear: Receptance, p: float, u: Real) -> float:
 
 
 @apart
-def _on_springs(system: System, linear: Receptance, i: int, stiffness: Real, motions: Complex) -> bool:
-    """Fill motions (nc,) of harmonic number i with springs for contacts; False if there is no such motion."""
+def on_springs(
+    system: System, linear: Receptance, i: int, stiffness: Real, free: Complex, motions: Complex
+) -> bool:
+    """Solve (I + A k) motions = free at harmonic number i, (nc,) each; False if there is no such motion."""
     if is_reduced(system, linear):
-        return springs_response(system, linear.A[0, i], stiffness, linear.u_linear[0, i], motions)
+        return springs_response(system, linear.A[0, i], stiffness, free, motions)
     nc = stiffness.size
     matrix, inverse = np.empty((nc, nc), np.complex128), np.empty((nc, nc), np.complex128)
     for c in range(nc):
@@ -194,7 +196,7 @@ def _on_springs(system: System, linear: Receptance, i: int, stiffness: Real, mot
     for c in range(nc):
         motion = complex(0.0)
         for d in range(nc):
-            motion += inverse[c, d] * linear.u_linear[0, i, d]
+            motion += inverse[c, d] * free[d]
         motions[c] = motion
     return True
 

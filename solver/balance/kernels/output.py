@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from solver.balance.kernels.mechanics import unaccounted
 from solver.contacts.kernels.stick_slip_events import largest
 from solver.contacts.kernels.system import Evaluation, Receptance, System
 from solver.jit.decorators import compiled
@@ -17,7 +18,8 @@ from solver.jit.trig_polynomial import on_grid, unpack
 # max|x|, the larger of the two, has a kink where they cross.
 MAX_ABS, HALF_RANGE, MEAN, SLOPE, RANGE_SLOPE, RESIDUAL, HIGH, LOW, HIGH_SLOPE, LOW_SLOPE = range(10)
 PIECE = 10  # a number for the smooth pieces of their laws that all contacts are on, see `piece`
-MEASURES = 11
+LOST = 11  # share of powers and mean forces that the point loses, see `solver.balance.kernels.mechanics`
+MEASURES = 12
 SAME_HEIGHT = 1e-12  # relative distance within which max x and −min x are the same but for rounding
 
 
@@ -127,16 +129,21 @@ def measure(
     dx = np.empty(x.size)
     observed_slope(system, linear, u, point, du, dp, dx)
     measure_motion(system, point, x, dx, out)
+    out[LOST] = unaccounted(system, linear, u, point)
 
 
 @apart
 def measure_motion(system: System, point: Evaluation, x: Real, dx: Real, out: Real) -> None:
     """Fill `out` with the measures of the observed coefficients `x` and their slopes where x changes by dx.
 
-    The place of an extremum is stationary, so a slope is the change of the motion at that place.
+    The place of an extremum is stationary, so a slope is the change of the motion at that place. Counted from
+    the middle of its range the motion is as far up as down.
     """
     high, at_high, low, at_low = extremes(system, x)
     rise, sink = _along(system, dx, at_high), _along(system, dx, at_low)
+    if system.centred == 1:
+        high, rise = 0.5 * (high - low), 0.5 * (rise - sink)
+        low, sink = -high, -rise
     out[HALF_RANGE], out[RANGE_SLOPE] = 0.5 * (high - low), 0.5 * (rise - sink)
     out[HIGH], out[LOW], out[HIGH_SLOPE], out[LOW_SLOPE] = high, -low, rise, -sink
     out[MEAN] = x[0] if system.ks[0] == 0 else 0.0

@@ -23,6 +23,7 @@ from solver.balance.workspace import Workspace
 from solver.contacts.kernels.system import DENSE, MODES
 from solver.continuation.branch import BranchStatus
 from solver.continuation.extrema.nodes import Node, NodeSolver
+from solver.continuation.loose_parts import ending
 from solver.continuation.segment import Stretch
 from solver.jit.fourier import Real
 from solver.linear.assembly import linear_model
@@ -94,8 +95,7 @@ def walk_by_points(
             rejected += 1
             step *= 0.5
             if step < SMALLEST * span and node is None:
-                drifts = workspace.solve(there).ratchets
-                status = BranchStatus.RATCHETS if drifts else BranchStatus.STALLED
+                status = ending(workspace.solve(there), BranchStatus.STALLED)
             continue
         if far > _TORN * size:
             status = BranchStatus.STALLED

@@ -22,7 +22,7 @@ from solver.continuation.branch import ENDINGS, Branch, BranchStatus, Peak
 from solver.continuation.branches.adaptive_harmonics import sweep_to
 from solver.continuation.branches.point_by_point import is_unique, rows_before_a_turn, walk_by_points
 from solver.continuation.branches.symmetry_breaking import branch_flags
-from solver.continuation.endings import MANY, ratchets_ahead, stands_still, taken_up, too_stiff
+from solver.continuation.endings import AHEAD, MANY, ratchets_ahead, stands_still, taken_up, too_stiff
 from solver.continuation.extrema.branch_error import branch_error
 from solver.continuation.extrema.extrema import Survey, band_limit
 from solver.continuation.extrema.nodes import Points
@@ -30,13 +30,14 @@ from solver.continuation.from_nothing import solve_from_nothing
 from solver.continuation.kernels import state as walk_states
 from solver.continuation.kernels.pseudo_arclength import begin_walk, walk_on
 from solver.continuation.kernels.state import Control, walk_by_value
-from solver.continuation.loose_parts import balanced_part
+from solver.continuation.loose_parts import balanced_part, ending
 from solver.continuation.segment import Stretch, go_on_from, joined, rows_of, state_of
 from solver.continuation.settings import ContinuationSettings
 from solver.errors import SettingError
 from solver.jit.fourier import Integer, Real, to_full
 from solver.linear.undamped import undamped_resonance
 from solver.results.default_bar import shows_progress
+from solver.results.notes import ABOVE_FRICTION
 from solver.scene.bodies.paths import SPEED
 from solver.scene.parameter_paths import FREQUENCY
 from solver.scene.scene import Scene
@@ -46,7 +47,9 @@ _SHORT_STRETCH = 4  # the first of them where a point may take long
 _LARGE = 400  # unknowns from which it may
 _STRETCH_SECONDS = 0.5
 _MOST_FOLLOWED = 500  # points of a look at a resonance beside the branch
-_LOST = (BranchStatus.STALLED, BranchStatus.TURNED_BACK, BranchStatus.TOO_MANY_POINTS)
+_LOST = (
+    BranchStatus.STALLED, BranchStatus.TURNED_BACK, BranchStatus.TOO_MANY_POINTS, BranchStatus.POWER_LOST,
+)  # fmt: skip
 
 
 @shows_progress("sweep")
@@ -180,14 +183,11 @@ def _covering(
         before = resume
         yield resume
     else:
-        for found in walk(workspace, start, stop, settings, guess, resume):
-            stretch = found if found is resume else balanced_part(workspace, found)
+        for stretch in walk(workspace, start, stop, settings, guess, resume):
             turned = rows_before_a_turn(stretch, first, last) if unique else None
             lost = unique and stretch.status in (BranchStatus.STALLED, BranchStatus.TURNED_BACK)
             if turned is None and not lost:
                 yield stretch
-                if stretch is not found:
-                    return
                 earlier = stretch
                 continue
             before = stretch.first(len(stretch.solutions) if turned is None else turned)
@@ -254,7 +254,7 @@ def walk(
         found = solve_from_nothing(workspace, control.start, guess)
         spent = found.iterations
         if not found.converged:
-            yield _no_start(balance, spent, begun, ratchets=found.ratchets)
+            yield _no_start(balance, spent, begun, ending(found, BranchStatus.NO_START))
             return
         code, state = begin_walk(system, linear, point, control, found.u)
     else:
@@ -276,21 +276,23 @@ def walk(
             status, code = None, walk_states.RUNNING
         elif status is BranchStatus.STALLED and ratchets_ahead(workspace, state, control):
             status = BranchStatus.RATCHETS
-        yield _stretch(rows, count, status, state, spent, begun)
+        stretch = balanced_part(workspace, _stretch(rows, count, status, state, spent, begun))
+        yield stretch
+        if stretch.status is not None:
+            return
         state = state if again is None else again
         elapsed = time.perf_counter() - before
         size = min(_STRETCH, max(1, int(size * min(2.0, _STRETCH_SECONDS / max(elapsed, 1e-9)))))
     if code == walk_states.NO_START:
-        yield _no_start(balance, spent, begun)
+        yield _no_start(balance, spent, begun, BranchStatus.NO_START)
 
 
-def _no_start(balance: Balance, iterations: int, begun: float, *, ratchets: bool = False) -> Stretch:
+def _no_start(balance: Balance, iterations: int, begun: float, status: BranchStatus) -> Stretch:
     """Return the stretch of a branch that could not begin."""
     rows = rows_of(balance, 0)
     return Stretch(
         solutions=rows[0], tangents=rows[1], states=rows[2], observed=rows[3], measures=rows[4],
-        status=BranchStatus.RATCHETS if ratchets else BranchStatus.NO_START, newton_iterations=iterations,
-        rejected_steps=0, stepped_over=0,
+        status=status, newton_iterations=iterations, rejected_steps=0, stepped_over=0,
         seconds=time.perf_counter() - begun, walk=np.zeros(0),
     )  # fmt: skip
 
@@ -335,7 +337,9 @@ def _finish(
         newton_iterations=whole.newton_iterations + survey.spent,
         rejected_steps=whole.rejected_steps, stepped_over=whole.stepped_over,
         seconds=time.perf_counter() - begun,
-        flags=branch_flags(workspace, points.solutions),
+        flags=(
+            *branch_flags(workspace, points.solutions), *_drive_flags(workspace, whole, status, start, stop)
+        ),
         peak_certificate=survey.certificate(completed=status is BranchStatus.COMPLETED),
     )  # fmt: skip
 
@@ -351,6 +355,18 @@ def with_error(branch: Branch, workspace: Workspace | None = None) -> Branch:
     follow = None if branch.status is BranchStatus.STOPPED else highest_between
     error = branch_error(workspace or Workspace.of(branch.balance), points, branch.peaks, follow)
     return replace(branch, error_estimate=error)
+
+
+def _drive_flags(
+    workspace: Workspace, whole: Stretch, status: BranchStatus, start: float, stop: float
+) -> tuple[str, ...]:
+    """Return the flag of a branch that ends because friction cannot hold a mean load a little further on."""
+    if status is not BranchStatus.RATCHETS:
+        return ()
+    first, last = (float(workspace.balance.parameter.inside(end)) for end in (start, stop))
+    end = float(whole.solutions[-1, -1]) if len(whole.solutions) else first
+    beyond = [end + share * (last - first) for share in ((0.0, *AHEAD) if len(whole.solutions) else (0.0,))]
+    return () if all(map(workspace.friction_can_hold, beyond)) else (ABOVE_FRICTION,)
 
 
 def _survey(workspace: Workspace, whole: Stretch) -> Survey:

@@ -13,8 +13,19 @@ import math
 import numpy as np
 
 from solver.balance.kernels.jacobian import factorise, step_back
+from solver.balance.kernels.mechanics import ALLOWED
 from solver.balance.kernels.newton import newton
-from solver.balance.kernels.output import HIGH, HIGH_SLOPE, LOW, LOW_SLOPE, PIECE, RESIDUAL, measure, piece
+from solver.balance.kernels.output import (
+    HIGH,
+    HIGH_SLOPE,
+    LOST,
+    LOW,
+    LOW_SLOPE,
+    PIECE,
+    RESIDUAL,
+    measure,
+    piece,
+)
 from solver.balance.kernels.residual import contact_values, evaluate
 from solver.contacts.kernels.columns import KT, MU
 from solver.contacts.kernels.state_durations import find_segments
@@ -113,7 +124,8 @@ def _solve_at(
     step_back(system, point, way[:n])
     measure(system, linear, u, point, way[:n], 1.0, x, out)
     out[RESIDUAL] = norm
-    return math.isfinite(out[HIGH] + out[LOW] + out[HIGH_SLOPE] + out[LOW_SLOPE]), iterations
+    finite = math.isfinite(out[HIGH] + out[LOW] + out[HIGH_SLOPE] + out[LOW_SLOPE])
+    return finite and out[LOST] <= ALLOWED, iterations
 
 
 @apart

@@ -1,0 +1,100 @@
+"""Whether friction can hold the mean loads on parts that contacts alone hold: a limit analysis.
+
+In a periodic motion the mean forces on such a part balance. The mean of a friction force is no larger than
+the mean of its limit, μ times the mean normal load, whatever the motion; where the parts press the contact
+the mean normal force is an unknown of the same balance. These sets are convex: forces that balance are found
+by a linear program, or there are none and the part is driven away by whatever exceeds them (the theorems of
+limit analysis: D. C. Drucker, W. Prager, H. J. Greenberg, Quart. Appl. Math. 9 (1952) 381). The reverse does
+not hold: a part that vibrates may creep under less.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from solver.balance.balance import Balance
+from solver.contacts.kernels.columns import MU, N0, PRESTRESSED
+from solver.contacts.laws.base import AnyContact
+from solver.jit import fourier
+from solver.jit.fourier import Real
+
+SIDES = 64  # of the polygon round a circular limit, 0.1 % larger
+_INSTANTS = 720  # of a period, for the mean of a load that opens the contact
+_LEFT = 1e-7  # of the forces: a mean force that is left as rounding
+
+
+def friction_can_hold(balance: Balance, stuck: Real, table: Real, loads: Real) -> bool:
+    """Return whether mean forces that contacts can carry balance the mean loads on loose parts.
+
+    Parameters
+    ----------
+    stuck : (nc,) mean motions of the ports on the contacts' stiffnesses `shift` [m].
+    table, loads : of `solver.balance.kernels.residual.contact_values`.
+    """
+    system = balance.system
+    elastic, applied = system.shift * stuck, system.loose @ (system.shift * stuck)
+    if not np.any(np.abs(applied) > _LEFT * (np.abs(system.loose) @ np.abs(elastic))):
+        return True
+    rows, bounds = _limits(balance, table, loads)
+    size = float(np.abs(elastic).max())
+    if np.all(rows @ elastic <= bounds + _LEFT * size):
+        return True
+    # Loaded here: few scenes have a part under a mean load that elastic contacts would not hold.
+    from scipy.optimize import linprog
+
+    parts, count = system.loose.shape
+    scale = np.abs(system.loose).sum(axis=1)
+    forces, off = system.loose / scale[:, None], -np.ones((parts, 1))
+    given = applied / scale / size
+    found = linprog(
+        np.append(np.zeros(count), 1.0),
+        A_ub=np.block([[forces, off], [-forces, off], [rows, np.zeros((len(rows), 1))]]),
+        b_ub=np.concatenate([given, -given, bounds / size]),
+        bounds=[*[(None, None)] * count, (0.0, None)],
+    )
+    return found.status != 0 or bool(found.x[-1] <= _LEFT)
+
+
+def _limits(balance: Balance, table: Real, loads: Real) -> tuple[Real, Real]:
+    """Return rows and bounds of what the mean forces of the ports F (nc,) obey, rows · F <= bounds [N]."""
+    system = balance.system
+    rows, bounds = [np.zeros((0, system.owner.size))], [np.zeros(0)]
+    for e, contact in enumerate(balance.scene.contacts):
+        if contact.friction is None:
+            continue  # what else it is, its force has no limit
+        first, normal = int(system.first_port[e]), contact.normal_port
+        sides = _sides(contact)
+        row = np.zeros((len(sides), system.owner.size))
+        row[:, [first + port for port in contact.friction.ports]] = sides
+        mu = float(table[e, MU])
+        if normal is None:
+            bound = mu * _mean_of_open(loads[e])
+        else:  # μ N with N the normal force and what of it is in equilibrium at rest, N >= 0
+            row[:, first + normal] = -mu
+            rest = max(float(table[e, N0]), 0.0) if table[e, PRESTRESSED] > 0.0 else 0.0
+            bound = mu * rest
+            pressed = np.zeros((1, system.owner.size))
+            pressed[0, first + normal] = -1.0
+            rows.append(pressed)
+            bounds.append(np.array([rest]))
+        rows.append(row)
+        bounds.append(np.full(len(sides), bound))
+    return np.concatenate(rows), np.concatenate(bounds)
+
+
+def _sides(contact: AnyContact) -> Real:
+    """Return the directions (sides, directions it slides in) in which its friction is limited."""
+    assert contact.friction is not None
+    count = len(contact.friction.ports)
+    if count == 1 or contact.friction.limits_apart:
+        return np.concatenate([np.eye(count), -np.eye(count)])
+    angles = 2.0 * math.pi / SIDES * np.arange(SIDES)
+    return np.stack([np.cos(angles), np.sin(angles)], axis=1)
+
+
+def _mean_of_open(load: Real) -> float:
+    """Return the mean of max(N, 0) of a load with these coefficients [N]."""
+    tau = 2.0 * math.pi / _INSTANTS * (np.arange(_INSTANTS) + 0.5)
+    return float(np.maximum(fourier.basis(tau, (load.size - 1) // 2) @ load, 0.0).mean())
