@@ -21,8 +21,8 @@ from optim.criteria.linearised import Model
 from optim.problem.variables import Real
 
 LOOKS_ONE = 17  # designs of a look with one variable
-LOOKS_EACH = 6  # and for each variable with more, besides corners and middles
-MOST_CORNERS = 16
+LOOKS_EACH = 12  # and for each variable with more, besides corners and middles
+MOST_CORNERS = 32
 NEAREST = 2  # designs a variable, and two more, whose models predict a place
 DOUBT = 1.0  # spreads by which a prediction may be too high
 MOST_GROWTH = 3.0  # exponent at most
