@@ -277,6 +277,62 @@ def _forecasts() -> Callable[[], Answer]:
     return call
 
 
+def _designed(scene: Any, wanted: dict[str, Any], *, robust: bool = False) -> Callable[[], Answer]:
+    """Return the call that designs a scene and tells how many responses that took."""
+    import optim
+
+    def call() -> Answer:
+        found = (optim.robust_design if robust else optim.design)(scene, **wanted)
+        responses = found.responses if robust else found.evaluations
+        print(f"{scene.name}: {responses} responses, {found.status.name}", file=sys.stderr, flush=True)
+        expect(f"{scene.name} has an optimum", math.isfinite(found.objective if robust else found.peak.value))
+        return Answer(value=found.objective if robust else found.evaluation.objective)
+
+    return call
+
+
+def _wedge(low: float, high: float) -> Callable[[], Answer]:
+    import solver
+
+    wanted = {"variables": {"wedge.mass": (low, high)}, "harmonics": 3}
+    return _designed(solver.load_scene("platform-wedge"), wanted)
+
+
+@row("design-wedge", "design of `wedge.mass`, 4 contact points, H = 3, 0.005 to 0.05 kg", 8.0, runs=1)
+def _wedge_design() -> Callable[[], Answer]:
+    return _wedge(0.005, 0.05)
+
+
+@row("design-wedge-light", "the same, 0.001 to 0.03 kg", 8.0, runs=1)
+def _light_wedge_design() -> Callable[[], Answer]:
+    return _wedge(0.001, 0.03)
+
+
+@row("design-five", "design of `bladed-disk`: five variables, three criteria", 3.0, runs=2)
+def _five_variables() -> Callable[[], Answer]:
+    import solver
+    from benchmarks.designing import FIVE
+
+    variables, limits = FIVE["bladed-disk"]
+    return _designed(solver.load_scene("bladed-disk"), {"variables": variables, **limits})
+
+
+@row("design-robust", "robust design of `bladed-disk`: kt and mu in intervals", 4.0, runs=2)
+def _robust_design() -> Callable[[], Answer]:
+    import solver
+    from benchmarks.designing import UNCERTAIN
+
+    return _designed(solver.load_scene("bladed-disk"), UNCERTAIN, robust=True)
+
+
+@row("design-cases", "design of two masses: two variables, three cases, a limit on the band", 5.0, runs=2)
+def _design_of_cases() -> Callable[[], Answer]:
+    from benchmarks.designing import CASES
+    from benchmarks.problems import case_a
+
+    return _designed(case_a(), CASES)
+
+
 def classes() -> None:
     """Every class of work beside its goal: `python -m benchmarks.classes --help` has rows and ratios."""
     _print_table(list(ROWS), [])
