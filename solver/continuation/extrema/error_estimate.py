@@ -230,13 +230,15 @@ class ErrorEstimator:
         weighted, tail, far = sizes * ks**2, 0.0, np.zeros((2, F.shape[0]))
         for fast in (False, True):  # waves of their own, each with its own rate
             own, later = self._is_fast == fast, self._later_is_fast == fast
+            if not later.any():
+                continue
             late = weighted[:, own][:, np.count_nonzero(own) // 2 :]
             falling = np.max(late, axis=1, initial=0.0)
             share = 1.0 / self._beyond_ks[later] ** 2
             tail += float(np.sum(B[self._is_beyond][later] @ falling * share))
             far += np.einsum("k,akcd,d->ac", share, A[:, self._is_beyond][:, later], falling)
-        added = np.isin(self._all_ks, ks[~np.isin(ks, kept)])
-        near = np.einsum("akcd,dk->ac", A[:, added], sizes[:, ~np.isin(ks, kept)])
+        new = ~np.isin(ks, kept)
+        near = np.einsum("akcd,dk->ac", A[:, np.isin(self._all_ks, ks[new])], sizes[:, new])
         further, bare = far.max(axis=1, initial=0.0) / np.maximum(near.max(axis=1, initial=0.0), 1e-300)
         last = np.abs(np.diagonal(linear.A[0, ~self._is_beyond][-1])) * self._stiffest
         jumps = 1.0 + float(np.max(last / (1.0 + last), initial=0.0))
