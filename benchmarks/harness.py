@@ -6,11 +6,16 @@ The time on the wall stands beside it where both are known.
 
 from __future__ import annotations
 
+import json
 import os
+import select
 import statistics
+import subprocess
+import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TypeVar
 
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
@@ -31,6 +36,49 @@ class Timing:
     median: float
     cpu: float
     runs: int
+
+
+class Checkout:
+    """A checkout of the project that does work of these benchmarks in a process of its own.
+
+    Its process imports this folder's `benchmarks`, all else from there, and runs `serve` of a module, which
+    answers a line with a line of JSON.
+    """
+
+    def __init__(self, folder: Path, module: str) -> None:
+        ours = str(Path(__file__).resolve().parents[1])
+        start = (
+            f"import sys; sys.path[:1] = [{ours!r}]; import benchmarks; sys.path[0] = {str(folder)!r}; "
+            f"from {module} import serve; serve()"
+        )
+        self._process = subprocess.Popen(
+            [sys.executable, "-c", start],
+            cwd=folder,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+
+    def ask(self, line: str, patience: float | None = None) -> dict[str, float] | None:
+        """Return the answer to a line; None, and none ever after, if it takes longer than `patience` [s]."""
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        if self._process.poll() is not None:
+            return None
+        self._process.stdin.write(line + "\n")
+        self._process.stdin.flush()
+        if not select.select([self._process.stdout], [], [], patience)[0]:
+            self._process.kill()
+            self._process.wait()
+            return None
+        answer = self._process.stdout.readline()
+        return dict(json.loads(answer)) if answer else None
+
+    def close(self) -> None:
+        """End the process."""
+        assert self._process.stdin is not None
+        self._process.stdin.close()
+        self._process.wait()
 
 
 def timed(call: Callable[[], _T], *, runs: int = 9, warm_up: int = 1) -> tuple[_T, Timing]:

@@ -9,9 +9,7 @@ from __future__ import annotations
 import argparse
 import importlib
 import json
-import os
 import statistics
-import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -20,7 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from benchmarks.harness import expect, table
+from benchmarks.harness import Checkout, expect, table
 from benchmarks.problems import chain
 
 REPEATS = 21
@@ -179,33 +177,7 @@ def stages(cases: tuple[Case, ...] = CASES) -> None:
     table("Stages of a response [ms of the process]", ("scene", "whole", *STAGES, "rest"), rows)
 
 
-class _Other:
-    """A checkout that times responses in a process of its own."""
-
-    def __init__(self, folder: Path) -> None:
-        environment = {**os.environ, "PYTHONPATH": str(folder)}
-        self._process = subprocess.Popen(
-            [sys.executable, str(Path(__file__).resolve()), "--serve"],
-            env=environment, cwd=folder, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
-        )  # fmt: skip
-
-    def ask(self, case: str) -> dict[str, float]:
-        """Return the milliseconds of one response and its highest peak [m]."""
-        assert self._process.stdin is not None
-        assert self._process.stdout is not None
-        self._process.stdin.write(case + "\n")
-        self._process.stdin.flush()
-        found: dict[str, float] = json.loads(self._process.stdout.readline())
-        return found
-
-    def close(self) -> None:
-        """End the process."""
-        assert self._process.stdin is not None
-        self._process.stdin.close()
-        self._process.wait()
-
-
-def _serve() -> None:
+def serve() -> None:
     """Answer with the cost of one response for each name of a case."""
     cases = {case.name: _call(case) for case in CASES}
     for line in sys.stdin:
@@ -218,7 +190,7 @@ def _serve() -> None:
 
 def against(folders: list[Path], cases: tuple[Case, ...] = CASES) -> None:
     """What a response costs in checkouts, each beside the first."""
-    sides = [_Other(folder) for folder in folders]
+    sides = [Checkout(folder, "benchmarks.sweep_costs") for folder in folders]
     rows = []
     for case in cases:
         first = [side.ask(case.name) for side in sides]
@@ -244,12 +216,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.sweep_costs", description=__doc__)
     parser.add_argument("--against", nargs="+", type=Path, metavar="FOLDER", help="the first is the measure")
     parser.add_argument("--case", nargs="+", metavar="NAME", help=", ".join(case.name for case in CASES))
-    parser.add_argument("--serve", action="store_true", help=argparse.SUPPRESS)
     asked = parser.parse_args()
     cases = tuple(case for case in CASES if asked.case is None or case.name in asked.case)
-    if asked.serve:
-        _serve()
-    elif asked.against:
+    if asked.against:
         against([*(folder.resolve() for folder in asked.against), Path(__file__).resolve().parents[1]], cases)
     else:
         stages(cases)

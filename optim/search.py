@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Unpack
 
 import numpy as np
 
-from optim.criteria.evaluation import natural_scales
+from optim.criteria.evaluation import evaluate, natural_scales
 from optim.criteria.linearised import conditions, model_of
 from optim.methods.afterwards import looked_after, settled_status
 from optim.methods.eased import Eased
@@ -26,6 +26,7 @@ from optim.problem.typed import Limit, with_limits
 from optim.results.basins import SAME_PLACE, Basin
 from optim.results.best_so_far import OnBest
 from optim.results.design import DesignResult, DesignStatus
+from solver.continuation.branch import BranchStatus
 from solver.results.default_bar import shows_progress
 from solver.results.watch import OnProgress, ShouldStop
 from solver.scene.scene import Scene
@@ -88,9 +89,20 @@ def solve_problem(
     found = _solved(problem, tally.searching, should_stop, on_best)
     found = _with_enough_harmonics(found, tally, should_stop, on_best)
     found = looked_after(found, should_stop, tally.further)
+    if found.status is DesignStatus.NO_RESPONSE and _undamped(found, should_stop):
+        found = replace(found, status=DesignStatus.UNDAMPED)
     if found.evaluation is not None:
         tally.tell(1.0)
     return found
+
+
+def _undamped(found: DesignResult, should_stop: ShouldStop) -> bool:
+    """Return whether responses end at a resonance without damping: of designs tried, or amid the range."""
+    problem = found.problem
+    middle = {variable.name: variable.outside(0.5) for variable in problem.variables}
+    tried = found.history or (evaluate(problem, middle, gradients=False, should_stop=should_stop),)
+    ends = {response.branch.status for one in tried for response in one.responses}
+    return BranchStatus.UNDAMPED in ends
 
 
 def _with_enough_harmonics(

@@ -63,15 +63,12 @@ def identify(
     scaling : unknown to ``linear``, ``logarithmic`` or ``auto``: logarithmic from a ratio of the bounds of 5.
     priors : unknown to (mean, standard deviation), what was known before.
     noise : standard deviation relative to the amplitude (of a loop, to its largest force), for data that do
-    not
-        say their own; found from what the fit leaves over if left out.
+        not say their own; found from what the fit leaves over if left out.
     robust : let outliers weigh less (Huber's loss).
     candidates : parameter path to values, conditions of measurements that could be made next; levels and
-    loads
-        around those measured if left out.
+        loads around those measured if left out.
     harmonics : highest harmonic kept.
-    starts : places within the bounds that are tried.
-    seed : of those places.
+    starts, seed : how many places within the bounds are tried, and the seed of them.
     on_progress : called with (share done, evaluations).
     should_stop : asked now and then; True ends it with the status STOPPED.
 
@@ -91,22 +88,14 @@ def identify(
     _check_settings(noise, starts, seed, harmonics)
     measured = read_data(scene, data, known.paths)
     conditions = read_candidates(scene, measured, known, candidates)
-    runs = Runs(scene, measured, known, harmonics)
-    told = Noise(level=noise, robust=robust)
+    runs, told = Runs(scene, measured, known, harmonics), Noise(level=noise, robust=robust)
     found = search(runs, told, starts=starts, seed=seed, on_progress=on_progress, should_stop=should_stop)
     if found.best is None:
-        stopped = should_stop is not None and should_stop()
-        status = IdentifyStatus.STOPPED if stopped else IdentifyStatus.NO_START
-        return _nothing(scene, status, found, runs, harmonics, time.perf_counter() - begun)
-    _check_plausible(runs, found.best)
-    level_known = found.best.level == 1.0
-    info = information(runs, found.best, robust=robust, level_known=level_known)
-    size = _misfit(info.reduced_chi2) if level_known else _scatter(found.best.level)
-    misfit = f"{size} {doubts(runs, found.best, robust=robust)}".strip()
-    level = found.best.level if not level_known else math.nan if noise is None else noise
-    result = _described(runs, found, found.best, info, misfit, level)
-    ranked = rank(runs, found.best, info, conditions)
-    return replace(result, candidates=ranked, seconds=time.perf_counter() - begun)
+        result = _nothing(runs, found, stopped=should_stop is not None and should_stop())
+    else:
+        _check_plausible(runs, found.best)
+        result = _judged(runs, found, found.best, told, conditions)
+    return replace(result, seconds=time.perf_counter() - begun)
 
 
 def _check_settings(noise: float | None, starts: int, seed: int, harmonics: int) -> None:
@@ -133,14 +122,24 @@ def _check_plausible(runs: Runs, best: LocalFit) -> None:
         if not 1.0 / _IMPLAUSIBLE < ratio < _IMPLAUSIBLE:
             wanted = (
                 f"must be {run.unit_words} such as the scene has under {run.words}, at most {computed:.3g} "
-                "with the "
-                f"best "
-                "values within the bounds: give the unit in the head of the column, `amplitude [mm]`, and "
-                "look at "
-                "the excitation"
+                "with the best values within the bounds: give the unit in the head of the column, "
+                "`amplitude [mm]`, and look at the excitation"
             )
             size = seen / run.scale
             raise DataError(run.source, float(f"{size:.4g}"), wanted)
+
+
+def _judged(
+    runs: Runs, found: Searched, best: LocalFit, told: Noise, conditions: Sequence[Mapping[str, float]]
+) -> Identification:
+    """Return what the fit tells, whether the model describes the data, and what to measure next."""
+    level_known = best.level == 1.0
+    info = information(runs, best, robust=told.robust, level_known=level_known)
+    size = _misfit(info.reduced_chi2) if level_known else _scatter(best.level)
+    misfit = f"{size} {doubts(runs, best, robust=told.robust)}".strip()
+    level = best.level if not level_known else math.nan if told.level is None else told.level
+    result = _described(runs, found, best, info, misfit, level)
+    return replace(result, candidates=rank(runs, best, info, conditions))
 
 
 def _described(
@@ -247,14 +246,12 @@ def _not_reached(runs: Runs, best: LocalFit) -> tuple[NotReached, ...]:
     return tuple(found)
 
 
-def _nothing(
-    scene: Scene, status: IdentifyStatus, found: Searched, runs: Runs, harmonics: int, seconds: float
-) -> Identification:
+def _nothing(runs: Runs, found: Searched, *, stopped: bool) -> Identification:
     """Return that there is no fit, and why."""
-    empty = np.zeros((0, 0))
+    empty, status = np.zeros((0, 0)), IdentifyStatus.STOPPED if stopped else IdentifyStatus.NO_START
     return Identification(
-        scene=scene.name, status=status, estimates=(), covariance=empty, correlation=empty, noise=math.nan,
-        reduced_chi2=math.nan, misfit="", untold=(), correlated=(), candidates=(), runs=(), not_reached=(),
-        uncertain={}, values={}, other_optima=(), starts=found.starts, agreeing=0,
-        evaluations=runs.evaluations, harmonics=harmonics, seconds=seconds,
+        scene=runs.scene.name, status=status, estimates=(), covariance=empty, correlation=empty,
+        noise=math.nan, reduced_chi2=math.nan, misfit="", untold=(), correlated=(), candidates=(), runs=(),
+        not_reached=(), uncertain={}, values={}, other_optima=(), starts=found.starts, agreeing=0,
+        evaluations=runs.evaluations, harmonics=runs.harmonics, seconds=0.0,
     )  # fmt: skip

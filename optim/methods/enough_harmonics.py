@@ -1,4 +1,9 @@
-"""With how many harmonics the peak of a design is known well enough to call the design the best."""
+"""By which measure, and with how many harmonics, the peak of a design is known well enough to call it best.
+
+The measure is max|x|, or half peak to peak in all cases as soon as the mean of the peak of one is free:
+max|x| then depends on the history, and a minimum of it is none. What is minimised is what the result is
+judged by.
+"""
 
 from __future__ import annotations
 
@@ -6,10 +11,13 @@ from dataclasses import replace
 
 from optim.criteria.evaluation import evaluate
 from optim.criteria.rows import Evaluation
-from optim.problem.problem import Problem
+from optim.problem.problem import Method, Problem
 from optim.results.design import DesignResult, DesignStatus
 from optim.results.doubts import WELL_KNOWN, doubt_of
+from optim.results.json import known_parts
+from solver.results.known import HALF_PEAK_TO_PEAK
 from solver.results.watch import ShouldStop
+from solver.scene.scene import Scene
 
 CLAIMS = (DesignStatus.OPTIMAL, DesignStatus.AT_BOUND, DesignStatus.APPROXIMATE)
 MOST_HARMONICS = 60  # beyond that a design is not looked at with more
@@ -23,11 +31,13 @@ def well_known(problem: Problem, evaluation: Evaluation) -> bool:
 
 
 def honest(result: DesignResult) -> DesignResult:
-    """Return a result that claims an optimum only if its highest peak is known."""
-    claims = result.status in CLAIMS and result.evaluation is not None
-    if claims and not well_known(result.problem, result.evaluation):  # type: ignore[arg-type]
-        return replace(result, status=DesignStatus.NOT_KNOWN)
-    return result
+    """Return a result that claims an optimum only if its highest peak is known, by what was minimised."""
+    problem, evaluation = result.problem, result.evaluation
+    if result.status not in CLAIMS or evaluation is None:
+        return result
+    if well_known(problem, evaluation) and _by_its_measure(problem, evaluation) is problem:
+        return result
+    return replace(result, status=DesignStatus.NOT_KNOWN)
 
 
 def with_enough(result: DesignResult, should_stop: ShouldStop) -> tuple[Problem | None, int]:
@@ -37,15 +47,15 @@ def with_enough(result: DesignResult, should_stop: ShouldStop) -> tuple[Problem 
 
     Returns
     -------
-    (problem, responses); None where the harmonics are enough, or more of them do not help.
+    (problem, responses); None where measure and harmonics are right, or more harmonics do not help.
     """
-    problem, evaluation, responses = result.problem, result.evaluation, 0
-    if (
-        result.status not in (*CLAIMS, DesignStatus.INFEASIBLE)
-        or evaluation is None
-        or well_known(problem, evaluation)
-    ):
+    evaluation, responses = result.evaluation, 0
+    if result.status not in (*CLAIMS, DesignStatus.INFEASIBLE) or evaluation is None:
         return None, 0
+    problem = _by_its_measure(result.problem, evaluation)
+    measured = replace(problem, start=dict(result.optimum)) if problem is not result.problem else None
+    if well_known(problem, evaluation):
+        return measured, 0
     harmonics, most = 2 * problem.harmonics, max(_RUNGS * problem.harmonics, _FEW)
     while harmonics <= min(most, MOST_HARMONICS) and not (should_stop is not None and should_stop()):
         more = replace(problem, harmonics=harmonics)
@@ -54,4 +64,19 @@ def with_enough(result: DesignResult, should_stop: ShouldStop) -> tuple[Problem 
         if found.good and well_known(more, found):
             return replace(more, start=dict(result.optimum)), responses
         harmonics *= 2
-    return None, responses
+    return measured, responses
+
+
+def _by_its_measure(problem: Problem, evaluation: Evaluation) -> Problem:
+    """Return the problem with half peak to peak in all cases where the mean of the peak of one is free."""
+    free = any(known.measure == HALF_PEAK_TO_PEAK for _, known in known_parts(evaluation))
+    if not free or all(case.scene.observe.centred for case in problem.cases):
+        return problem
+    cases = tuple(replace(case, scene=_half_peak_to_peak(case.scene)) for case in problem.cases)
+    method = Method.AUTO if problem.method is Method.TRACKED else problem.method
+    return replace(problem, cases=cases, method=method)
+
+
+def _half_peak_to_peak(scene: Scene) -> Scene:
+    observe = scene.observe.model_copy(update={"measure": HALF_PEAK_TO_PEAK})
+    return scene.model_copy(update={"observe": observe})

@@ -72,6 +72,8 @@ class Problem(Goals):
             return (
                 "tracked takes no engine-order line (`speed_order`), along which loads follow the frequency"
             )
+        if self.cases[0].scene.observe.centred:
+            return "tracked follows max|x|, and half peak to peak is observed"
         if moves_contacts(self.scene, self.paths[0]):
             return f"tracked follows no geometry: `{self.paths[0]}` moves the contacts"
         others = without_second(self.scene.contacts)
@@ -86,6 +88,8 @@ class Problem(Goals):
             return "performance-curve is for the highest peak of one case alone, without limits"
         if self.scene.speed_order is not None:
             return "performance-curve takes no engine-order line (`speed_order`)"
+        if self.cases[0].scene.observe.centred:
+            return "performance-curve is for max|x|, and half peak to peak is observed"
         if any(force.harmonic != 1 for force in self.cases[0].scene.excitation):
             return "performance-curve takes an excitation of harmonic 1 alone"
         return None

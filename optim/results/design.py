@@ -65,8 +65,11 @@ class DesignStatus(Enum):
     )
     NO_RESPONSE = (
         "The frequency response could not be computed over the whole band for any design tried: "
-        "use more harmonics or a narrower band, and some damping where there is none (nothing bounds a "
-        "resonance then)."
+        "use more harmonics or a narrower band."
+    )
+    UNDAMPED = (
+        "There is a resonance in the band and no damping, so that nothing bounds the response of any design "
+        "tried: give the structure some (damping_ratio = 0.001, say), or a band without the resonance."
     )
     NOT_TRACKED = (
         "The peaks could not be followed over the whole range; the best design seen is given: use the method "

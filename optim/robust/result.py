@@ -48,7 +48,8 @@ class RobustStatus(Enum):
     )
     NO_RESPONSE = (
         "The frequency response could not be computed over the whole band for any design tried: use more "
-        "harmonics or a narrower band."
+        "harmonics or a narrower band, and some damping where there is none, which leaves a resonance "
+        "without bound."
     )
     UNKNOWN_SCENARIO = (
         "The response could not be computed in a scenario that counts, so the worst case is not known: use "

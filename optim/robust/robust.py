@@ -150,8 +150,9 @@ def _run(
             search.problem, on_progress=count, should_stop=should_stop, on_best=search.nominal
         )
     )
-    # What is minimised over the uncertainty is judged with as many harmonics as the nominal optimum needs.
-    search.problem = replace(search.problem, harmonics=state.nominal.problem.harmonics)
+    # What is minimised over the uncertainty has the measure and the harmonics that the nominal optimum needs.
+    posed = state.nominal.problem
+    search.problem = replace(search.problem, harmonics=posed.harmonics, cases=posed.cases)
     try:
         status = _search(search, drawn, state)
     except StoppedError as stop:

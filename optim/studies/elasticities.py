@@ -23,7 +23,7 @@ from solver.balance.parameter import resolve
 from solver.balance.parameter_derivatives import resolved
 from solver.balance.simplifications import Effects, even_harmonics_reason
 from solver.contacts.laws.harmonics import is_phase
-from solver.continuation.branch import Branch, Peak
+from solver.continuation.branch import Branch, BranchStatus, Peak
 from solver.continuation.branches.sweep import sweep
 from solver.continuation.extrema.extrema import HALF_POWER
 from solver.errors import SettingError
@@ -46,6 +46,10 @@ class SensitivityStatus(Enum):
     NO_RESPONSE = (
         "The frequency response could not be computed over the whole band: use more harmonics or a narrower "
         "band."
+    )
+    UNDAMPED = (
+        "There is a resonance in the band and no damping, so that nothing bounds the response: give the "
+        "structure some (damping_ratio = 0.001, say), or a band without the resonance."
     )
 
 
@@ -111,7 +115,7 @@ class SensitivityResult(MadeOfResponses, Drawn):
     @property
     def reached(self) -> bool:
         """Whether there are sensitivities."""
-        return self.status is not SensitivityStatus.NO_RESPONSE
+        return self.status not in (SensitivityStatus.NO_RESPONSE, SensitivityStatus.UNDAMPED)
 
     @property
     def band_hz(self) -> float:
@@ -191,8 +195,10 @@ def sensitivities(
     effects = Effects(even_harmonics=even_harmonics_reason(here, known) is not None)
     branch = sweep(here, harmonics=harmonics, limit=limit, effects=effects)
     if not branch.completed or branch.peak is None:
+        undamped = branch.status is BranchStatus.UNDAMPED
+        status = SensitivityStatus.UNDAMPED if undamped else SensitivityStatus.NO_RESPONSE
         return SensitivityResult(
-            scene=here, status=SensitivityStatus.NO_RESPONSE, branch=branch, peaks=(), rows=(),
+            scene=here, status=status, branch=branch, peaks=(), rows=(),
             band_by_limit=math.nan, left_out=(), seconds=time.perf_counter() - begun,
         )  # fmt: skip
     paths, left_out = _differentiable(here, branch, known)

@@ -122,6 +122,13 @@ def check_laws(scene: Scene) -> None:
         raise SettingError("scene", scene.name, f"{wanted}; only its gradient is exact here")
 
 
+def check_measure(scene: Scene) -> None:
+    """Raise SettingError where what is observed has no second derivatives, being at two places at once."""
+    if scene.observe.centred:
+        wanted = "has a gradient alone and is followed by sweeps, not by its peak: use `max_abs`"
+        raise SettingError("observe.measure", scene.observe.measure, wanted)
+
+
 def check_loads(system: System, parameters: Sequence[Parameter], slopes: Real) -> None:
     """Raise SettingError where paths of one load contradict each other."""
     clash = contradicting(system.contacts, slopes)

@@ -10,7 +10,7 @@ import numpy as np
 
 from solver.balance.balance import Balance, build, with_harmonics
 from solver.contacts.kernels.columns import NODES
-from solver.contacts.kernels.system import System
+from solver.contacts.kernels.system import DENSE, System
 from solver.jit.fourier import Complex, Integer, Real
 from solver.jit.trig_polynomial import grid_size, grid_tables
 from solver.linear.contact_table import contact_table
@@ -84,12 +84,17 @@ def _extended(balance: Balance, ks: Integer) -> System | None:
         return None
     sectors = scene.structure.sector_count
     known, wanted = ((each * scene.engine_order) % sectors for each in (system.ks, ks))
-    structures = {int(d): int(s) for d, s in zip(known, system.which, strict=True)}
-    if any(int(d) not in structures for d in wanted):
-        return None
+    # Of the matrices themselves the mean has others than what moves.
+    moving = (system.ks > 0) | (system.form != DENSE)
+    structures = {int(d): int(s) for d, s in zip(known[moving], system.which[moving], strict=True)}
     at = np.searchsorted(ks, system.ks).astype(np.int64)
+    further = np.isin(ks, system.ks, invert=True)
+    if any(int(d) not in structures for d in wanted[further]):
+        return None
+    which = np.zeros(ks.size, np.int64)
+    which[at], which[further] = system.which, [structures[int(d)] for d in wanted[further]]
     return system._replace(
-        ks=ks, which=np.array([structures[int(d)] for d in wanted], dtype=np.int64),
+        ks=ks, which=which,
         modal_forces=_padded_rows(system.modal_forces, at, ks.size),
         forces=_padded_rows(system.forces, at, ks.size),
         # Of none at all numpy would make reals, for which every kernel would be compiled once more.

@@ -2,11 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    PlainSerializer,
+    WithJsonSchema,
+)
+from pydantic_core import PydanticKnownError
 
 Real: TypeAlias = NDArray[np.float64]
 LARGEST = 1e15
@@ -22,6 +32,33 @@ EndName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+(\.r?[xyz])?(@([0-9]+|ne
 Between = tuple[EndName, EndName]
 NonNegative = Annotated[float, Field(strict=True, ge=0.0, le=LARGEST, allow_inf_nan=False)]
 Positive = Annotated[float, Field(strict=True, gt=0.0, le=LARGEST, allow_inf_nan=False)]
+INFINITE = "inf"  # what stands for infinity where JSON has no number for it
+
+
+def _read_infinite(value: object) -> object:
+    return math.inf if value == INFINITE else value
+
+
+def _largest_unless_infinite(value: float) -> float:
+    if LARGEST < value < math.inf:
+        raise PydanticKnownError("less_than_equal", {"le": LARGEST})
+    return value
+
+
+def _write_infinite(value: float) -> float | str:
+    return INFINITE if math.isinf(value) else value
+
+
+Stiffness = Annotated[
+    float,
+    Field(strict=True, gt=0.0, allow_inf_nan=True),
+    BeforeValidator(_read_infinite),
+    AfterValidator(_largest_unless_infinite),
+    PlainSerializer(_write_infinite, when_used="json"),
+    WithJsonSchema(
+        {"anyOf": [{"type": "number", "exclusiveMinimum": 0.0, "maximum": LARGEST}, {"const": INFINITE}]}
+    ),
+]  # of a contact that may be rigid
 Signed = Annotated[float, Field(strict=True, ge=-LARGEST, le=LARGEST, allow_inf_nan=False)]
 Vector = tuple[Signed, Signed, Signed]
 Friction = Annotated[float, Field(strict=True, ge=0.0, le=100.0, allow_inf_nan=False)]

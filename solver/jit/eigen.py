@@ -54,7 +54,8 @@ def pencil(A: Matrix, B: Matrix) -> tuple[NDArray[np.float64], Matrix]:
 def two_sided(A: Matrix) -> tuple[Complex, Complex, Complex]:
     """Return the eigenvalues of A with left and right eigenvectors: wᴴ A = λ wᴴ, A v = λ v.
 
-    The left ones of a small matrix are the rows of V⁻¹, unless that costs them digits.
+    The left ones are the rows of V⁻¹, unless that costs them digits: where eigenvalues meet, as those of
+    equal parts do, each of these belongs to its right one, and LAPACK's need not.
 
     Parameters
     ----------
@@ -65,7 +66,7 @@ def two_sided(A: Matrix) -> tuple[Complex, Complex, Complex]:
     (n,) eigenvalues, (n, n) left and (n, n) right eigenvectors as columns.
     """
     n = A.shape[0]
-    if n <= SMALL and np.all(np.isfinite(A)):
+    if np.all(np.isfinite(A)):
         values, right = np.linalg.eig(A)
         try:
             rows = np.linalg.inv(right)

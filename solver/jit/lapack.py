@@ -1,9 +1,9 @@
-"""Dense linear algebra inside compiled loops: vectors, solves with the sign of the determinant, inverses.
+"""Dense linear algebra inside compiled loops: vectors, solves with the sign of the determinant, products.
 
 Written as plain loops: an array expression costs Numba a tenth of a second of compilation each time.
 
 Small systems use a loop of our own (a call to LAPACK costs more than the factorisation), larger ones LAPACK's
-``dgetrf`` through the entry Numba itself links, which stays cacheable on disk.
+``getrf`` and ``getri`` through the entries Numba itself links, which stay cacheable on disk.
 """
 
 from __future__ import annotations
@@ -20,13 +20,18 @@ from solver.jit.fourier import Complex, Index, Real
 from solver.jit.separate import apart
 
 OWN_UP_TO = 36  # measured crossing of our loop and LAPACK
+INVERTED_UP_TO = 24  # the same of a complex inverse
+MULTIPLIED_UP_TO = 4000  # the same of a product: complex multiplications
 
 _int, _index, _doubles = numba.types.intc, numba.types.intp, numba.types.CPointer(numba.types.float64)
 _pivots = numba.types.CPointer(numba.types.int32)
 _getrf: Callable[..., int] = numba.core.types.ExternalFunction(
     "numba_xxgetrf", _int(numba.types.char, _index, _index, _doubles, _index, _pivots)
 )
-_DOUBLE = np.int8(ord("d"))
+_getri: Callable[..., int] = numba.core.types.ExternalFunction(
+    "numba_ez_xxgetri", _int(numba.types.char, _index, _doubles, _index, _pivots)
+)
+_DOUBLE, _COMPLEX = np.int8(ord("d")), np.int8(ord("z"))
 lapack.load()
 
 
@@ -86,12 +91,50 @@ def largest_entry(vector: Real) -> float:
 
 
 @apart
+def multiply(left: Complex, right: Complex, out: Complex) -> None:
+    """Fill `out` with left @ right, all of them row after row without gaps."""
+    if left.shape[0] * left.shape[1] * right.shape[1] > MULTIPLIED_UP_TO:
+        np.dot(left, right, out)
+        return
+    for a in range(left.shape[0]):
+        for b in range(right.shape[1]):
+            out[a, b] = 0.0
+        for c in range(left.shape[1]):
+            factor = left[a, c]
+            for b in range(right.shape[1]):
+                out[a, b] += factor * right[c, b]
+
+
+@apart
+def _invert_large(matrix: Complex, inverse: Complex) -> bool:
+    """Invert by LAPACK, as `invert`."""
+    n = matrix.shape[0]
+    work, pivots = np.empty((n, 2 * n)), np.empty(n, np.int32)
+    for i in range(n):
+        for j in range(n):
+            work[i, 2 * j], work[i, 2 * j + 1] = matrix[i, j].real, matrix[i, j].imag
+            if not math.isfinite(matrix[i, j].real + matrix[i, j].imag):
+                return False
+    # What LAPACK takes for the matrix is its transpose, whose inverse is that of the inverse.
+    if _getrf(_COMPLEX, n, n, work.ctypes, n, pivots.ctypes) != 0:
+        return False
+    if _getri(_COMPLEX, n, work.ctypes, n, pivots.ctypes) != 0:
+        return False
+    for i in range(n):
+        for j in range(n):
+            inverse[i, j] = complex(work[i, 2 * j], work[i, 2 * j + 1])
+    return True
+
+
+@apart
 def invert(matrix: Complex, inverse: Complex) -> bool:
-    """Invert a complex matrix by Gauss–Jordan elimination with partial pivoting; `matrix` is destroyed.
+    """Invert a complex matrix, with partial pivoting; a small one by Gauss–Jordan, which destroys `matrix`.
 
     Returns False, with `inverse` meaningless, if the matrix is singular or not finite.
     """
     n = matrix.shape[0]
+    if n > INVERTED_UP_TO:
+        return _invert_large(matrix, inverse)
     for i in range(n):
         for j in range(n):
             inverse[i, j] = 1.0 if i == j else 0.0

@@ -32,7 +32,7 @@ from solver.linear.lumped_matrices import (
     topology_of,
 )
 from solver.linear.model import ForceTerm, LinearModel, LinearModelDerivative
-from solver.linear.moving_base import base_of, derivative_with_base, with_base
+from solver.linear.moving_base import base_motions, derivative_with_base, with_base
 from solver.linear.sector_matrices import ProportionalDamping, sector_matrices
 from solver.scene.bodies.body import MOMENTS, Body
 from solver.scene.bodies.kinematics import Form, force_derivatives
@@ -64,8 +64,8 @@ def linear_model(scene: Scene) -> LinearModel:
     changing contacts or excitation costs microseconds.
     """
     scene = written_out(scene)
-    model, base = _without_base(scene), base_of(scene)
-    return model if base is None else with_base(model, scene, base)
+    model, base = _without_base(scene), base_motions(scene)
+    return with_base(model, scene, base) if base else model
 
 
 def structure_derivative(scene: Scene, name: str) -> LinearModelDerivative:
@@ -79,8 +79,8 @@ def structure_derivative(scene: Scene, name: str) -> LinearModelDerivative:
     SettingError
         The structure has no parameter of that name.
     """
-    found, base = _derivative_by(scene, name), base_of(scene)
-    return found if base is None else derivative_with_base(found, _without_base(scene), base)
+    found, base = _derivative_by(scene, name), base_motions(scene)
+    return derivative_with_base(found, _without_base(scene), base) if base else found
 
 
 def _without_base(scene: Scene) -> LinearModel:

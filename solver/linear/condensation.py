@@ -85,7 +85,8 @@ def reduce_model(
     numpy.linalg.LinAlgError
         The mass matrix is not positive definite.
     """
-    dense_asked = whole_matrices or derivative is not None or model.prescribed or model.line is not None
+    no_modes = model.prescribed > 0 or model.line is not None
+    dense_asked = whole_matrices or derivative is not None or no_modes
     apart = dense_asked or (model.extra is not None and not model.extra.is_real)
     which, diameters, moving = _structures(model, ks, apart=apart)
     forces = force_amplitudes(model, ks)

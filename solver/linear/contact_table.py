@@ -11,9 +11,15 @@ import numpy as np
 from solver.contacts.kernels import columns
 from solver.contacts.kernels.laws import law_number
 from solver.contacts.kernels.second_laws import second_number
+from solver.errors import SettingError
 from solver.jit.fourier import Integer, Real
 from solver.linear.model import LinearModel
 from solver.scene.scene import Scene
+
+_SINGLE = (
+    "must be finite here: contacts with kt = inf or kn = inf are solved frequency by frequency, by solve and "
+    "march; elsewhere give kt = 1e4 times the stiffness beside it"
+)
 
 
 class ContactSet(NamedTuple):
@@ -74,7 +80,17 @@ def contact_table(scene: Scene, highest: int) -> Real:
     """Return the rows of all contacts, (n_contacts, ·), for harmonics up to `highest`.
 
     A load that is not tied has a ratio NaN.
+
+    Raises
+    ------
+    SettingError
+        A contact is rigid: its events are solved for one frequency at a time.
     """
+    rigid = next((contact for contact in scene.contacts if contact.is_rigid), None)
+    if rigid is not None:
+        raise SettingError(
+            f"{rigid.name}.{'kt' if math.isinf(rigid.stiffnesses[0]) else 'kn'}", math.inf, _SINGLE
+        )
     width = columns.wave_column(highest_load(scene) + 1)
     table = np.zeros((len(scene.contacts), width))
     table[:, columns.RATIO] = math.nan
@@ -84,8 +100,8 @@ def contact_table(scene: Scene, highest: int) -> Real:
 
 
 def port_stiffnesses(scene: Scene, model: LinearModel) -> Real:
-    """Return a stiffness > 0 of every port [N/m]: its own, or one of the size of the structure's."""
+    """Return a finite stiffness > 0 of every port [N/m]: its own, or one of the size of the structure's."""
     own = np.array([k for contact in scene.contacts for k in contact.stiffnesses], dtype=np.float64)
     K = model.K0 if model.sector is None else model.sector.at(model.engine_order)[0]
     largest = float(np.abs(K).max(initial=0.0))
-    return np.where(own > 0.0, own, largest if largest > 0.0 else 1.0)
+    return np.where((own > 0.0) & np.isfinite(own), own, largest if largest > 0.0 else 1.0)

@@ -76,8 +76,8 @@ class LinearModel:
         empty, (0, 0).
     extra : ExtraTerms or None
         Terms that are not symmetric, not real or not of springs and dashpots; see `at`.
-    prescribed : bool
-        The last coordinate is the motion of a base; see `solver.linear.moving_base`.
+    prescribed : int
+        So many coordinates, the last, are motions of a base; see `solver.linear.moving_base`.
     line : ExtraTerms or None
         What K gains per squared speed and C per speed where the speed follows the frequency, Ω = ω / order.
     line_order : float
@@ -99,7 +99,7 @@ class LinearModel:
     sectors: int
     sector: SectorMatrices | None = None
     extra: ExtraTerms | None = None
-    prescribed: bool = False
+    prescribed: int = 0
     line: ExtraTerms | None = None
     line_order: float = 1.0
 
@@ -119,7 +119,7 @@ class LinearModel:
         if not self.prescribed:
             return np.ones(self.n_coordinates, np.bool_)
         moves: Flags = np.any(self.M, axis=1)
-        moves[-1] = False
+        moves[-self.prescribed :] = False
         return moves
 
     @property

@@ -1,15 +1,19 @@
-"""A base that moves as prescribed: its motion as one more coordinate of a linear model.
+"""A base that moves as prescribed: its motions as more coordinates of a linear model.
 
-The coordinate y stands last and has the row y = amplitude, ikω y = amplitude or −(kω)² y = amplitude, so that
-amplitudes, derivatives and observed motion follow as for any other. Where the ground moves, x = z + R y
-with the rigid-body motion R of the structure; counted from the ground, M z'' + C z' + K z = f − M R y''.
-Driven DOFs have the rows x_s = r_s y, of a stiffness beside which that of the structure vanishes.
+Each coordinate y moves one pattern of real shares r, and what has phases is the sum of two in quadrature,
+r cos(φ) and r sin(φ). They stand last and have the rows y = amplitude, ikω y = amplitude or
+−(kω)² y = amplitude, so that amplitudes, derivatives and observed motion follow as for any other. Where the
+ground moves, x = z + Σ R y with the rigid-body motions R of the structure; counted from the ground,
+M z'' + C z' + K z = f − Σ M R y''. Driven DOFs have the rows x_s = Σ r_s y, of a stiffness beside which that
+of the structure vanishes.
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +22,7 @@ from solver.errors import SettingError
 from solver.linear.extra_terms import ExtraTerms
 from solver.linear.model import ForceTerm, LinearModel, LinearModelDerivative
 from solver.scene.scene import Scene
-from solver.scene.terms.excitation import Base
+from solver.scene.terms.excitation import Motion
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -26,69 +30,103 @@ _WHOLE, _MOVING = np.zeros(1, np.int64), np.ones(1, np.bool_)  # a structure wit
 _RIGID = 1e20  # stiffness of what drives a DOF, relative to the largest of the structure
 
 
-def base_of(scene: Scene) -> Base | None:
-    """Return the base that moves; None where only forces act."""
-    return next((force.base for force in scene.excitation if force.base is not None), None)
+class BaseMotion(NamedTuple):
+    """What one coordinate of a base moves.
+
+    Attributes
+    ----------
+    ground : whether the ground moves, or the DOFs of the shares do.
+    shares : DOF and its part of the motion.
+    motion : what the amplitudes are of.
+    counts : whether it is part of the motion of the base, from which a relative one is counted; what phases
+        of shares add in quadrature is not.
+    """
+
+    ground: bool
+    shares: tuple[tuple[str, float], ...]
+    motion: Motion
+    counts: bool
 
 
-def with_base(model: LinearModel, scene: Scene, base: Base) -> LinearModel:
-    """Return the model with the motion of the base as its last coordinate.
+Amplitudes = tuple[float, float, int]  # amplitude, phase [rad] and harmonic
+BaseMotions = Mapping[BaseMotion, list[Amplitudes]]
+
+
+def base_motions(scene: Scene) -> BaseMotions:
+    """Return the coordinates of the base that moves, with the amplitudes of each; none of forces alone.
+
+    r cos(ωt + φ) = r cos(φ) cos(ωt) + r sin(φ) cos(ωt + π/2).
+    """
+    found: dict[BaseMotion, list[Amplitudes]] = {}
+    for e in scene.excitation:
+        if e.base is None:
+            continue
+        for part, turn in ((math.cos, 0.0), (math.sin, 0.5 * math.pi)):
+            shares = tuple((dof, share * part(phase)) for dof, share, phase in e.base.shares)
+            if turn == 0.0 or any(share for _, share in shares):
+                own = BaseMotion(e.base.ground, shares, e.base.motion, turn == 0.0)
+                found.setdefault(own, []).append((e.amplitude, e.phase + turn, e.harmonic))
+    return found
+
+
+def with_base(model: LinearModel, scene: Scene, base: BaseMotions) -> LinearModel:
+    """Return the model with the motions of the base as its last coordinates.
 
     Raises
     ------
     SettingError
         Driven DOFs that are sums of the coordinates: of a structure given by its modes.
     """
-    n = model.M.shape[0]
-    shares = _shares(model, base)
+    n, m = model.M.shape[0], len(base)
+    shares, driven = _shares(model, base), _driven(model, base)
     M, K, C = (
-        _padded(model.M),
-        np.zeros((n + 1, n + 1), np.complex128),
-        np.zeros((n + 1, n + 1), np.complex128),
+        np.pad(model.M, (0, m)),
+        np.zeros((n + m, n + m), np.complex128),
+        np.zeros((n + m, n + m), np.complex128),
     )
     if model.extra is not None:
         (K[:n, :n],), (C[:n, :n],) = model.extra.at(model.turns(_WHOLE), _MOVING, model.K0[None])
-    K0, C0 = _padded(model.K0), _padded(model.C0)
-    still = np.zeros((n + 1, n + 1))
-    if base.ground:
-        M[:n, n] = model.M @ shares
-    else:
-        rows = np.flatnonzero(shares)
-        stiffness = _RIGID * float(np.abs(model.K0).max())
-        for matrix, own in ((K, K0), (C, C0)):
-            matrix[rows] = -own[rows]
-        M[rows] = 0.0
-        K[rows, rows] += stiffness
-        K[rows, n] -= stiffness * shares[rows]
-    if base.motion == "displacement":
-        K[n, n] = 1.0
-    else:
-        still[n, n] = 1.0
-        (C if base.motion == "velocity" else M)[n, n] = 1.0
+    K0, C0 = np.pad(model.K0, (0, m)), np.pad(model.C0, (0, m))
+    still = np.zeros((n + m, n + m))
+    stiffness = _RIGID * float(np.abs(model.K0).max())
+    for matrix, own in ((K, K0), (C, C0)):
+        matrix[driven] = -own[driven]
+    M[driven] = 0.0
+    K[driven, driven] += stiffness
+    for at, (one, part) in enumerate(zip(base, shares.T, strict=True), start=n):
+        if one.ground:
+            M[:n, at] = model.M @ part
+        else:
+            K[driven, at] -= stiffness * part[driven]
+        row = {"displacement": K, "velocity": C, "acceleration": M}[one.motion]
+        row[at, at] = 1.0
+        if one.motion != "displacement":
+            still[at, at] = 1.0
     for array in (M, K0, C0, K, C, still):
         array.setflags(write=False)
     return replace(
-        model, M=M, K0=K0, Kp=_zeros(n + 1), C0=C0, Cp=_zeros(n + 1), prescribed=True,
-        shapes=_seen(model.shapes, scene, base, model), observe=_seen_one(model, scene, base),
-        contact_here=_widened(model.contact_here), contact_next=_widened(model.contact_next),
+        model, M=M, K0=K0, Kp=_zeros(n + m), C0=C0, Cp=_zeros(n + m), prescribed=m,
+        shapes=_seen(model.shapes, scene, base, shares), observe=_seen(model.observe, scene, base, shares),
+        contact_here=_wide(model.contact_here, m), contact_next=_wide(model.contact_next, m),
         extra=ExtraTerms(offsets=(0,), K=K[None], C=C[None], still=still),
-        forces=(*(_wider(term) for term in model.forces), *_motions(scene, n)),
+        forces=(*_wider(model.forces, m), *_motions(base, n)),
     )  # fmt: skip
 
 
-def derivative_with_base(d: LinearModelDerivative, model: LinearModel, base: Base) -> LinearModelDerivative:
+def derivative_with_base(
+    d: LinearModelDerivative, model: LinearModel, base: BaseMotions
+) -> LinearModelDerivative:
     """Return a derivative of `model` (without its base) as one of the model with it."""
-    shares = _shares(model, base)
-    driven = np.zeros(shares.size, np.bool_) if base.ground else shares != 0.0
+    m, driven = len(base), _driven(model, base)
 
     def wide(matrix: NDArray[Any]) -> NDArray[Any]:
-        found = np.pad(matrix, (0, 1))
-        found[:-1][driven] = 0.0
+        found = np.pad(matrix, (0, m))
+        found[driven] = 0.0
         return found
 
     dM = wide(d.dM)
-    if base.ground:
-        dM[:-1, -1] = d.dM @ shares
+    if not driven.size:  # the ground moves
+        dM[:-m, -m:] = d.dM @ _shares(model, base)
     # Rows of driven DOFs are of no symmetric part: the whole derivative stands with the extra terms.
     (dK,), (dC,), _ = d.at(model, _WHOLE, _MOVING)
     own = ExtraTerms(offsets=(0,), K=wide(dK)[None], C=wide(dC)[None])
@@ -96,67 +134,70 @@ def derivative_with_base(d: LinearModelDerivative, model: LinearModel, base: Bas
     if second is not None:
         K, C = (np.array([wide(each) for each in part]) for part in (second.K, second.C))
         second = replace(second, K=K, C=C)
-    nothing = _zeros(shares.size + 1)
+    nothing = _zeros(len(dM))
     return replace(
         d, dM=dM, dK0=nothing, dKp=nothing, dC0=nothing, dCp=nothing, by_loss_factor=False,
         extra=own, second_extra=second,
-        contact_here=None if d.contact_here is None else _widened(d.contact_here),
-        contact_next=None if d.contact_next is None else _widened(d.contact_next),
-        forces=tuple(map(_wider, d.forces)), second_forces=tuple(map(_wider, d.second_forces)),
+        contact_here=None if d.contact_here is None else _wide(d.contact_here, m),
+        contact_next=None if d.contact_next is None else _wide(d.contact_next, m),
+        forces=_wider(d.forces, m), second_forces=_wider(d.second_forces, m),
     )  # fmt: skip
 
 
-def _shares(model: LinearModel, base: Base) -> Real:
-    """The coordinates' part of the motion: DOFs must be coordinates."""
-    found = np.zeros(model.M.shape[0])
-    for dof, share in base.shares:
-        row = model.shapes[model.dofs.index(dof)]
-        if np.count_nonzero(row) != 1 or row.max() != 1.0:
-            wanted = "must be coordinates of the matrices: give the structure by M and K, not by modes"
-            raise SettingError("excitation", dof, wanted)
-        found += share * row
+def _shares(model: LinearModel, base: BaseMotions) -> Real:
+    """The coordinates' part of each motion, (n, m): DOFs must be coordinates."""
+    found = np.zeros((model.M.shape[0], len(base)))
+    for i, motion in enumerate(base):
+        for dof, share in motion.shares:
+            found[_coordinate(model, dof), i] += share
     return found
 
 
-def _motions(scene: Scene, n: int) -> tuple[ForceTerm, ...]:
-    """The amplitudes of the base as right-hand sides of its own row."""
-    vector = np.append(np.zeros(n), 1.0)
-    vector.setflags(write=False)
-    return tuple(
-        ForceTerm(vector=vector, amplitude=e.amplitude, phase=e.phase, harmonic=e.harmonic)
-        for e in scene.excitation
-        if e.base is not None
-    )
+def _driven(model: LinearModel, base: BaseMotions) -> NDArray[np.int64]:
+    """The coordinates that are driven; none where the ground moves."""
+    at = {_coordinate(model, dof) for one in base if not one.ground for dof, _ in one.shares}
+    return np.array(sorted(at), np.int64)
 
 
-def _seen(shapes: Real, scene: Scene, base: Base, model: LinearModel) -> Real:
-    """The DOFs, absolute or relative to the base, in all coordinates."""
-    moved = shapes @ _shares(model, base) if base.ground else np.zeros(len(shapes))
+def _coordinate(model: LinearModel, dof: str) -> int:
+    row = model.shapes[model.dofs.index(dof)]
+    if np.count_nonzero(row) != 1 or row.max() != 1.0:
+        wanted = "must be coordinates of the matrices: give the structure by M and K, not by modes"
+        raise SettingError("excitation", dof, wanted)
+    return int(np.argmax(row))
+
+
+def _motions(base: BaseMotions, n: int) -> Iterable[ForceTerm]:
+    """The amplitudes of the base as right-hand sides of its own rows."""
+    for vector, amplitudes in zip(np.eye(len(base), n + len(base), n), base.values(), strict=True):
+        vector.setflags(write=False)
+        for amplitude, phase, harmonic in amplitudes:
+            yield ForceTerm(vector=vector, amplitude=amplitude, phase=phase, harmonic=harmonic)
+
+
+def _seen(rows: Real, scene: Scene, base: BaseMotions, shares: Real) -> Real:
+    """What is seen, (…, n), absolute or relative to the base, in all coordinates."""
+    ground = np.array([one.ground for one in base])
     if scene.observe.relative:
-        moved = np.zeros(len(shapes)) if base.ground else -shapes.sum(axis=1)
-    return _frozen(np.column_stack([shapes, moved]))
+        counted = np.array([one.counts and not one.ground for one in base], np.float64)
+        moved = -rows.sum(axis=-1, keepdims=True) * counted
+    else:
+        moved = rows @ shares * ground
+    return _frozen(np.concatenate([rows, moved], axis=-1))
 
 
-def _seen_one(model: LinearModel, scene: Scene, base: Base) -> Real:
-    return _frozen(_seen(model.observe[None], scene, base, model)[0])
+def _wider(terms: tuple[ForceTerm, ...], m: int) -> tuple[ForceTerm, ...]:
+    return tuple(replace(term, vector=_frozen(np.pad(term.vector, (0, m)))) for term in terms)
 
 
-def _wider(term: ForceTerm) -> ForceTerm:
-    return replace(term, vector=_frozen(np.append(term.vector, 0.0)))
-
-
-def _widened(rows: Real) -> Real:
-    return _frozen(np.column_stack([rows, np.zeros(len(rows))]))
-
-
-def _padded(matrix: Real) -> Real:
-    return np.pad(matrix, (0, 1))
+def _wide(rows: Real, m: int) -> Real:
+    return _frozen(np.pad(rows, ((0, 0), (0, m))))
 
 
 def _zeros(n: int) -> Real:
     return _frozen(np.zeros((n, n)))
 
 
-def _frozen(array: Real) -> Real:
+def _frozen(array: NDArray[Any]) -> NDArray[Any]:
     array.setflags(write=False)
     return array

@@ -10,7 +10,7 @@ from scipy.sparse import block_diag, csr_array, diags_array
 
 from solver.errors import SettingError
 from solver.linear.first_order import equations, modal_damping_root
-from solver.marching.base import base_force, with_base, with_sum
+from solver.marching.base import with_base, with_sum
 from solver.marching.contacts import columns, selection
 from solver.marching.kernels import state as kernel
 from solver.scene.bodies.body import REVOLUTIONS, Body
@@ -84,7 +84,7 @@ def _of_matrices(
     own = [dof for body in scene.bodies for dof in body.dofs]
     ends = [term.dof for forms in scene.forms for form in forms for term in form]
     pushed = [dof for force in scene.forces for dof, *_ in force.parts]
-    moved = [dof for force in scene.forces if force.base is not None for dof, _ in force.base.shares]
+    moved = [dof for force in scene.forces if force.base is not None for dof, *_ in force.base.shares]
     used = [*ends, *pushed, *moved, *(dof for dof, _ in scene.seen(scene.observe.dof) or ())]
     used += [dof for coupling in scene.couplings for dof in (coupling.on, coupling.of)]
     spin = (scene.speed or 0.0) * REVOLUTIONS
@@ -131,16 +131,15 @@ def equations_of_motion(scene: Scene, omega: float) -> Equations:
         for force in scene.forces
         for dof, factor, phase in force.parts
     ]
-    bases = [force for force in scene.excitation if force.base is not None]
+    moves = any(force.base for force in scene.excitation)
     if scene.observed_unit != "m":
         wanted = "is not followed by the march, whose tolerance is one of displacements: observe DOFs"
         raise SettingError("observe", scene.observe.dof, wanted)
-    if scene.observe.dof not in index and not bases:
+    if scene.observe.dof not in index and not moves:
         A, B, W, observed = with_sum(seen, A, B, W)
-    if bases:
-        A, B, W, observed = with_base(scene, bases[0], A, B, W, index, omega)
-        n = A.shape[0]
-        pushes += [(n - 2, *base_force(force, omega), force.harmonic) for force in bases]
+    if moves:
+        A, B, W, observed, driving = with_base(scene, A, B, W, index, omega)
+        pushes += driving
     A, B, W = A / omega**2, B / omega, W / omega**2
     dof, amplitude, phase, harmonic = zip(*pushes, strict=True) if pushes else ((), (), (), ())
     placed = [(row, own) for one, own in zip(scene.contacts, scene.forms, strict=True) for row in one.rows()]

@@ -18,10 +18,12 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array, diags_array
 
 from solver.errors import SettingError
+from solver.marching import moreau
 from solver.marching.contacts import rows
-from solver.marching.equations import equations_of_motion
+from solver.marching.equations import Equations, equations_of_motion
 from solver.marching.kernels import state as kernel
 from solver.marching.kernels import taylor as stepping
+from solver.marching.moreau import is_rigid
 from solver.marching.result import MarchResult, MarchStatus, describe
 from solver.marching.start import MarchStart, state_at
 from solver.results.default_bar import shows_progress
@@ -129,7 +131,11 @@ def march(
     whole = annulus(scene) if scene.structure.has_sectors else scene
     omega = 2.0 * math.pi * frequency_hz
     equations = equations_of_motion(whole, omega)
-    steps = _steps(equations.system, scene.forces, steps_per_period)
+    rigid = is_rigid(whole.contacts)
+    system = equations.system
+    if rigid:
+        system = system._replace(kt=_finite(system.kt), kn=_finite(system.kn))
+    steps = _steps(system, scene.forces, steps_per_period, least=moreau.STEPS if rigid else 0)
     plan = _Plan(
         system=equations.system, dof=equations.observed, tolerance=tolerance, max_periods=max_periods,
         on_progress=on_progress, should_stop=should_stop,
@@ -138,7 +144,10 @@ def march(
     if start is not None and tractions is not None:
         raise SettingError("tractions", dict(tractions), "must be those of `start` where that is given")
     begins = state_at(equations, start or MarchStart(tractions=tractions or {}), names, omega)
-    found = _twice(plan, begins, steps, names, frequency_hz)
+    if rigid:
+        found = _twice_rigid(plan, equations, begins, steps, names, frequency_hz)
+    else:
+        found = _twice(plan, begins, steps, names, frequency_hz)
     return replace(found, seconds=time.perf_counter() - begin)
 
 
@@ -158,6 +167,37 @@ def _twice(
     )  # fmt: skip
 
 
+def _twice_rigid(
+    plan: _Plan, equations: Equations, start: kernel.State, steps: int, names: tuple[str, ...],
+    frequency_hz: float,
+) -> MarchResult:  # fmt: skip
+    """The same by Moreau's steps."""
+    x, v, runs, done = start.x.copy(), start.v.copy(), [], 0
+    for each in (steps // 2, steps):
+
+        def told(change: float, done: int = done) -> None:
+            if plan.on_progress is not None:
+                plan.on_progress(_fraction(change, moreau.REPEATS), done)
+
+        x, v, record, status, changes = moreau.run(
+            equations, x, v, each, plan.tolerance, plan.max_periods, plan.should_stop, told
+        )
+        runs.append((record, changes))
+        done += changes.size
+        if status is not MarchStatus.CONVERGED:
+            break
+    return describe(
+        record=runs[-1][0], coarse=runs[0][0], order=moreau.ORDER,
+        transient=_left_to_decay(runs[0][1], runs[-1][1]), periods=done, contacts=names,
+        frequency_hz=frequency_hz, steps_per_period=each, status=status, drift=0.0,
+    )  # fmt: skip
+
+
+def _finite(stiffnesses: FloatArray) -> FloatArray:
+    """The stiffnesses with 0 for those that are infinite: they set no rate."""
+    return np.where(np.isfinite(stiffnesses), stiffnesses, 0.0)
+
+
 def _check(frequency_hz: float, tolerance: float, max_periods: int) -> None:
     if not (isinstance(frequency_hz, Real) and 0.0 < frequency_hz <= 1e9):
         raise SettingError("frequency_hz", frequency_hz, "must be a number > 0 and <= 1e9 [Hz]")
@@ -167,13 +207,15 @@ def _check(frequency_hz: float, tolerance: float, max_periods: int) -> None:
         raise SettingError("max_periods", max_periods, "must be a whole number from 1 to 1e8")
 
 
-def _steps(system: kernel.System, forces: tuple[Excitation, ...], wanted: int | None) -> int:
+def _steps(
+    system: kernel.System, forces: tuple[Excitation, ...], wanted: int | None, *, least: int = 0
+) -> int:
     """Steps of the finer run: the fastest motion turns less than 0.375 rad in one of them."""
     full = system.W_value.size > system.W_start.size - 1 or bool(np.any(np.abs(system.L_value) != 1.0))
     turns = 2.0 * math.pi * _fastest(system, BALANCING if full else 1)
     load = int(np.max(np.nonzero(system.waves)[1], initial=0)) + 1
     harmonic = max(load, *(force.harmonic for force in forces))
-    least = max(LEAST_STEPS, 2 * math.ceil(turns / 1.5), 16 * harmonic)
+    least = max(least, LEAST_STEPS, 2 * math.ceil(turns / 1.5), 16 * harmonic)
     finer = 2 if _order(system) == kernel.ORDER else FINER
     chosen = max(2 * LEAST_STEPS, finer * least) if wanted is None else wanted
     if isinstance(chosen, Integral) and chosen % 2 == 0 and least <= chosen <= MOST_STEPS:

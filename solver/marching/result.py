@@ -43,6 +43,10 @@ class MarchStatus(Enum):
         "There is no periodic motion: everything repeats from period to period, but a part that contacts "
         "alone hold drifts by the same distance each period."
     )
+    RIGID_OPENS = (
+        "A contact with kn = inf opens under its load: where it closes again is an impact, which takes a law "
+        "of its own. Press it harder, or give it a finite kn."
+    )
     NOT_FINITE = "The motion grows without bound: use more steps per period."
 
 

@@ -56,7 +56,8 @@ def state_at(equations: Equations, start: MarchStart, names: tuple[str, ...], om
     load = system.N0 + (system.waves * np.cos(system.wave_phases)).sum(axis=1)
     moving = np.isin(system.law, (kernel.ELASTIC_NORMAL, kernel.CIRCLE))
     for c in np.flatnonzero(np.isin(system.law, _FRICTION)):
-        load[c] += system.kn[c] * kernel.normal_slip(system, x, int(c))
+        if np.isfinite(system.kn[c]):
+            load[c] += system.kn[c] * kernel.normal_slip(system, x, int(c))
     for c in np.flatnonzero(system.law == kernel.CIRCLE_SECOND):
         load[c] = load[c - 1]
     closed = np.where(moving, load, system.mu * load) > 0.0

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from enum import Enum
 from itertools import pairwise
 
+import numpy as np
+
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.columns import CLOSED, DEFORMING, TOUCHING
 from solver.contacts.kernels.stick_slip_events import LIFTING, SEPARATED, SLIPPING, STUCK
@@ -94,6 +96,16 @@ class ContactResponse(Piece):
         """Coefficients of the forces along them [N]."""
         every = (self.force, self.second_force, self.third_force)
         return tuple(force for force in every if force is not None)
+
+    def force_over(self, given: AnyContact, tau: Real) -> Real:
+        """Return the force of the contact `given` along its first motion [N] at angles, evenly spaced from 0.
+
+        It is what the law gives for the motion, with its corners; the motion of a rigid contact does not tell
+        its force, which is then the sum of the harmonics kept.
+        """
+        if given.is_rigid:
+            return np.asarray(fourier.basis(tau, (self.force.size - 1) // 2) @ self.force)
+        return given.force_at(np.array(self.motions), self.load, tau)
 
 
 def contact_responses(workspace: Workspace, u: Real, p: float) -> tuple[ContactResponse, ...]:

@@ -20,6 +20,7 @@ def known_of(branch: Branch) -> Known:
     """Return how well the highest peak of a branch is known, `Branch.known`.
 
     Where the mean of the peak is free, it is judged by half peak to peak: max|x| depends on the history.
+    So it is where the scene observes half peak to peak.
     """
     peak = branch.peak
     if peak is None:
@@ -30,6 +31,11 @@ def known_of(branch: Branch) -> Known:
         flags=tuple(dict.fromkeys((*branch.flags, *(flag for flag in there.flags if flag in _OPEN)))),
         peaks_open=tuple(unsettled([branch.peak_certificate])),
     )  # fmt: skip
+    if branch.balance.scene.observe.centred:
+        return replace(
+            known, measure=HALF_PEAK_TO_PEAK, peak_max_abs=there.max_abs, error_estimate=math.nan,
+            peak_half_peak_to_peak=peak.value, half_peak_to_peak_error=branch.error_estimate,
+        )  # fmt: skip
     if MEAN_UNDETERMINED not in there.flags:
         return known
     at = float(branch.balance.parameter.inside(peak.at))
@@ -45,7 +51,7 @@ def known_of_solution(solution: Solution) -> Known:
     flags = tuple(flag for flag in solution.flags if flag not in ("all_stuck", "separation"))
     if not solution.converged:
         return Known(flags=flags)
-    if MEAN_UNDETERMINED in flags:
+    if MEAN_UNDETERMINED in flags or solution.scene.observe.centred:
         return Known(
             measure=HALF_PEAK_TO_PEAK, peak_max_abs=solution.max_abs,
             peak_half_peak_to_peak=solution.half_peak_to_peak,

@@ -50,6 +50,10 @@ class SolutionStatus(Enum):
         "no such motion exists. Press parts that contacts alone hold harder, hold them by a spring, or lower "
         "kt."
     )
+    RIGID_OPENS = (
+        "A contact with kn = inf opens under its load: what happens where it closes again is an impact, "
+        "which takes a law of its own. Press it harder, or give it a finite kn."
+    )
     LAW_FAILED = (
         "The law of a contact gives no finite force that repeats from period to period for a motion tried: "
         "look at its functions and parameters, or give it more samples."

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solver.balance.balance import Balance, build, check_frequency
+from solver.balance.balance import Balance, build, check_frequency, check_harmonics
 from solver.balance.kernels.gauge import FREE
 from solver.balance.kernels.newton import stuck_start
-from solver.balance.kernels.output import HALF_RANGE, MAX_ABS, MEAN
+from solver.balance.kernels.output import HALF_RANGE, MEAN, extremes
 from solver.balance.parameter import Kind
 from solver.balance.simplifications import Effects
 from solver.balance.workspace import PointSolution, Workspace
@@ -67,6 +67,10 @@ def solve(
     begun = time.perf_counter()
     check_frequency("frequency_hz", frequency_hz)
     scene = scene.at_frequency(frequency_hz)
+    if any(contact.is_rigid for contact in scene.contacts):
+        from solver.response.exact.answer import solve_exactly  # loaded by such scenes alone
+
+        return solve_exactly(scene, frequency_hz, check_harmonics(harmonics))
     omega = 2.0 * math.pi * frequency_hz
     good_enough = True
     if accuracy is None:
@@ -107,13 +111,14 @@ def describe(
     if measures is None:
         return _failure(balance, frequency_hz, found, time.perf_counter() - begun)
     contacts = contact_responses(workspace, found.u, omega)
+    high, _, low, _ = extremes(balance.system, measures.observed)
     observed = fourier.to_full(measures.observed, balance.system.ks, balance.highest_harmonic)
     solution = Solution(
         scene=balance.scene.at_frequency(frequency_hz),
         frequency_hz=frequency_hz,
         n_harmonics=balance.n_harmonics,
         status=SolutionStatus.CONVERGED,
-        max_abs=float(measures.values[MAX_ABS]),
+        max_abs=max(high, -low),
         half_peak_to_peak=float(measures.values[HALF_RANGE]),
         mean=float(measures.values[MEAN]),
         harmonics=np.abs(fourier.to_complex(observed)),

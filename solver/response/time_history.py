@@ -55,7 +55,7 @@ def hysteresis_loop(solution: Solution, contact: str, *, samples: int = 512) -> 
     """Return motion [m] and force [N] of a contact over one period, (samples,) each.
 
     Of a contact with two relative motions they are the first. The force is the one the law gives for the
-    motion of the solution, with its corners, not the sum of the harmonics kept.
+    motion of the solution, with its corners, not the sum of the harmonics kept; but of a rigid contact.
 
     Raises
     ------
@@ -70,7 +70,7 @@ def hysteresis_loop(solution: Solution, contact: str, *, samples: int = 512) -> 
     at = names.index(contact)
     given, found = solution.scene.contacts[at], solution.contacts[at]
     basis, omega = fourier.basis(tau, solution.highest_harmonic), 2.0 * math.pi * solution.frequency_hz
-    return basis @ found.slip, given.at_frequency(omega).force_at(np.array(found.motions), found.load, tau)
+    return basis @ found.slip, found.force_over(given.at_frequency(omega), tau)
 
 
 def response(solution: Solution, k: int) -> Complex:

@@ -312,7 +312,8 @@ def _number(path: str, new: object) -> float:
         number = float(new)  # type: ignore[arg-type]
     except (TypeError, ValueError, OverflowError) as error:
         raise SettingError(str(path), new, "must be a number") from error
-    if isinstance(new, str | bool) or not math.isfinite(number):
+    rigid = path.endswith((".kt", ".kn")) and number == math.inf
+    if isinstance(new, str | bool) or not (rigid or math.isfinite(number)):
         raise SettingError(str(path), new, "must be a finite number")
     return number
 

@@ -208,11 +208,20 @@ class Observe(Part):
     ----------
     relative : bool
         Where a base moves: the motion relative to it, not the absolute one.
+    measure : "max_abs" or "half_peak_to_peak"
+        What amplitudes, peaks and limits are of: max|x|, or (max x − min x)/2, which does not depend on the
+        mean.
     """
 
     dof: DofName
     relative: bool = False
+    measure: Literal["max_abs", "half_peak_to_peak"] = "max_abs"
     band: tuple[Positive, Positive]
+
+    @property
+    def centred(self) -> bool:
+        """Whether the motion counts from the middle of its range."""
+        return self.measure == "half_peak_to_peak"
 
     @field_validator("band")
     @classmethod

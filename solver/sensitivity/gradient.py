@@ -16,7 +16,13 @@ from typing import ClassVar
 import numpy as np
 
 from solver.balance.balance import Balance
-from solver.balance.contact_hessian import ContactForces, check_laws, check_loads, contact_forces
+from solver.balance.contact_hessian import (
+    ContactForces,
+    check_laws,
+    check_loads,
+    check_measure,
+    contact_forces,
+)
 from solver.balance.dynamic_stiffness import WholeMotion, times, whole_motion
 from solver.balance.kernels.jacobian import factorise, step_back
 from solver.balance.kernels.residual import contact_values
@@ -228,6 +234,7 @@ class Sensitivities:
     def check_second(self) -> None:
         """Raise SettingError where laws or paths have no exact second derivatives here."""
         check_laws(self.balance.scene)
+        check_measure(self.balance.scene)
         check_no_line(self.balance.scene)
         check_smooth_structure(self.balance.scene, self._parameters)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cache
 
@@ -101,6 +101,27 @@ def random_case(rng: np.random.Generator, most_harmonics: int = 21) -> Case:
     # Not always far beyond the limit: the motion is sized by the slip at which it is reached.
     U *= mu * abs(N[0]) / kt * 10.0 ** rng.uniform(-1.0, 2.5) / np.abs(U[1:]).max()
     return Case(U=U, N=N, kt=kt, mu=mu)
+
+
+def closing_cases(rng: np.random.Generator) -> Iterator[Case]:
+    """Yield contacts that stick or slip at once as they close, and slip briefly within a grid interval.
+
+    With friction μ the function that reaches 0 where the limit does begins with slope 0, curved upward, and
+    turns down again soon.
+    """
+    H, fall = int(rng.choice([3, 7, 11, 21, 41])), rng.uniform(0.0, 2.5)
+    U = np.concatenate([[0.0], rng.normal(size=2 * H) * np.repeat(np.arange(1.0, H + 1) ** -fall, 2)])
+    ratio = rng.uniform(1.05, 10.0)
+    rate_n, soon = np.sqrt(ratio**2 - 1.0), 10.0 ** rng.uniform(-3.0, -0.5) * 2.0 * np.pi / grid_size(H)
+    rate = fourier.derivative(U)
+    tau = np.linspace(0.0, 2.0 * np.pi, 4001)
+    along, bend = values(rate, tau), values(fourier.derivative(rate), tau)
+    curve = np.sign(along) * bend - np.abs(along) / rate_n  # of kt |u| − μ N where N = 0, at the critical μ
+    for i in np.flatnonzero((curve[:-1] > 0.0) & (curve[1:] < 0.0) & (along[:-1] * along[1:] > 0.0)):
+        closes = tau[i] + (tau[1] - tau[0]) * curve[i] / (curve[i] - curve[i + 1]) - soon
+        phase = closes + np.arccos(-1.0 / ratio)
+        N = np.array([1.0, ratio * np.cos(phase), ratio * np.sin(phase)])
+        yield Case(U=U, N=N, kt=1.0, mu=abs(values(rate, np.array([closes]))[0]) / rate_n)
 
 
 def values(coefficients: np.ndarray, tau: np.ndarray) -> np.ndarray:

@@ -117,91 +117,137 @@ def import_scene(
     target = output_path("--out", out, (".toml",))
     if target is None or target.exists():
         raise InputError(f"`--out`: {out!r} exists already; give another name or remove it")
-    if not reduce_once and not (modes is None and up_to is None and reduced is None):
+    _check_reduction(reduce_once, keep_modes, (modes, up_to, reduced), mistune, sectors)
+    deck = deck_file(nodes)
+    of = disk(sectors, low, high, deck, axis, pair_by, tolerance, engine_order, patches=bool(patches))
+    read = _read(sources(files, mapping, units, mistune), deck, of, dofs, patches, tolerance, contacts)
+    with ExitStack() as undo:
+        structure, table, written = read.found.table(target), read.table, None
+        if reduce_once:
+            path = reduced_file(reduced, target) if of is None else sector_file(reduced, target)
+            undo.callback(path.unlink, missing_ok=True)
+            written = _reduced(read, modes, up_to, path)
+            structure, table = written.table(target), dict(written.rows)
+        else:
+            structure |= _referring(read, keep_modes, target)
+        driven = excitation(forces, excite, next(iter(table)))
+        raw = _Parts(
+            read=read, target=target, structure=structure, dofs=table, excitation=driven, observe=observe
+        )
+        scene, frequencies, said = _made(raw, written, start, stop)
+        undo.pop_all()
+    _report(scene, target, frequencies, written, read.given, said, as_json)
+
+
+def _check_reduction(
+    reduce_once: bool, keep_modes: int | None, of_reduced: Sequence[object], mistune: Sequence[str] | None,
+    sectors: int | None,
+) -> None:  # fmt: skip
+    """Refuse options that go with --reduce without it, or not with it."""
+    if not reduce_once and any(each is not None for each in of_reduced):
         raise InputError("`--modes`, `--up-to` and `--reduced` go with --reduce")
     if reduce_once and keep_modes is not None:
         raise InputError("`--keep-modes` reduces on every load, --reduce once: keep one of them")
-    deck = deck_file(nodes)
-    of = disk(sectors, low, high, deck, axis, pair_by, tolerance, engine_order, patches=bool(patches))
     if mistune and not (reduce_once and sectors is not None):
         raise InputError(
             "`--mistune` goes with --sectors and --reduce; a scene that refers to its files names parts in "
             "[structure.parts]"
         )
-    found = sources(files, mapping, units, mistune)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Read:
+    """What the files hold and what is asked of them, checked.
+
+    Attributes
+    ----------
+    found, given : the files, and their matrices unless they are modes.
+    deck, of : positions of the nodes, and the disk they are a sector of.
+    table : DOF to its row.
+    parts : the tables of contacts, bodies and nodes.
+    """
+
+    found: Sources
+    given: MatrixSet | None
+    deck: Path | None
+    of: Disk | None
+    table: dict[str, int | str]
+    parts: dict[str, list[dict[str, Any]]]
+
+
+def _read(
+    found: Sources, deck: Path | None, of: Disk | None, dofs: Sequence[str] | None,
+    patches: Sequence[str] | None, tolerance: float | None, contacts: Sequence[str] | None,
+) -> _Read:  # fmt: skip
     given = read_sources(found, deck)
-    faces = Patches(
-        patches,
-        None if given is None else given.deck,
-        units,
-        None if of is None else (of.sectors, of.axis),
-        tolerance,
-    )
+    positions, turn = None if given is None else given.deck, None if of is None else (of.sectors, of.axis)
+    faces = Patches(patches, positions, found.units, turn, tolerance)
     table = dof_table(dofs, found, given, patches=bool(patches))
     made = faces.made(given, table)
-    table |= made.dofs
-    parts = made.tables | {"contacts": contact_tables(contacts)}
-    with ExitStack() as undo:
-        structure, written = found.table(target), None
-        if reduce_once:
-            path = reduced_file(reduced, target) if of is None else sector_file(reduced, target)
-            undo.callback(path.unlink, missing_ok=True)
-            written = _reduced(given, table, modes, up_to, path, of, found)
-            structure = written.table(target)
-            table = dict(written.rows)
-        else:
-            kept = {} if keep_modes is None else {"keep_modes": keep_modes}
-            gone = None if of is None else _gone(given, of)
-            _checked(given, reduced=keep_modes is not None, gone=gone)
-            structure |= kept if of is None else {"sectors": of.sectors, "cyclic": of.joined(target) | kept}
-            if of is None and given is not None and given.remarks and deck is not None:
-                structure["nodes"] = relative(deck, target)
-        undamped = not _damped(found)
-        if undamped:
-            structure["damping_ratio"] = _RATIO
-        driven = excitation(forces, excite, next(iter(table)))
-        raw = _Parts(
-            target=target, structure={**structure, "dofs": table}, excitation=driven, observe=observe,
-            engine_order=None if of is None else of.engine_order, parts=parts,
-        )  # fmt: skip
-        omega2 = _omega2(_load(raw.table([1.0, 2.0], bare=True), target.parent))
-        frequencies = [math.sqrt(max(float(value), 0.0)) / (2.0 * math.pi) for value in omega2]
-        scene = _write(target, raw.table(band(start, stop, frequencies)), found, written)
-        undo.pop_all()
-    said = [*_notes(given, omega2), *found_by_position(of)]
+    return _Read(
+        found=found, given=given, deck=deck, of=of, table=table | made.dofs,
+        parts=made.tables | {"contacts": contact_tables(contacts)},
+    )  # fmt: skip
+
+
+def _referring(read: _Read, keep_modes: int | None, target: Path) -> dict[str, object]:
+    """Return what [structure] says beside the names of its files, which are a structure."""
+    kept: dict[str, object] = {} if keep_modes is None else {"keep_modes": keep_modes}
+    of, given = read.of, read.given
+    gone = None if of is None else _gone(given, of)
+    _checked(given, reduced=keep_modes is not None, gone=gone)
+    if of is not None:
+        return {"sectors": of.sectors, "cyclic": of.joined(target) | kept}
+    if given is not None and given.remarks and read.deck is not None:
+        kept["nodes"] = relative(read.deck, target)
+    return kept
+
+
+def _made(
+    raw: _Parts, written: Written | WrittenSector | None, start: float | None, stop: float | None
+) -> tuple[Scene, list[float], list[str]]:
+    """Write the scene; return it, its natural frequencies [Hz] and what is to be said of it."""
+    found, undamped = raw.read.found, not _damped(raw.read.found)
+    if undamped:
+        raw.structure["damping_ratio"] = _RATIO
+    omega2 = _omega2(_load(raw.table([1.0, 2.0], bare=True), raw.target.parent))
+    frequencies = [math.sqrt(max(float(value), 0.0)) / (2.0 * math.pi) for value in omega2]
+    scene = _write(raw.target, raw.table(band(start, stop, frequencies)), found, written)
+    said = [*_notes(raw.read.given, omega2), *found_by_position(raw.read.of)]
     if undamped:
         said.append(f"the files hold no damping: the scene has damping_ratio = {_RATIO:g}; put yours there")
-    _report(scene, target, frequencies, written, given, said, as_json)
+    return scene, frequencies, said
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Parts:
     """The tables of the scene, but for the band."""
 
+    read: _Read
     target: Path
     structure: dict[str, object]
+    dofs: dict[str, int | str]
     excitation: dict[str, Any]
     observe: str | None
-    engine_order: int | None = None
-    parts: dict[str, list[dict[str, Any]]]
 
     def table(self, between: list[float], *, bare: bool = False) -> dict[str, Any]:
         """All tables; bare without contacts, which do not move natural frequencies."""
-        order = {} if self.engine_order is None else {"engine_order": self.engine_order}
+        of = self.read.of
+        order = {} if of is None or of.engine_order is None else {"engine_order": of.engine_order}
         forced = self.excitation.get("dof") or next(iter(self.excitation["forces"]))
         return {
             "name": re.sub(r"[^A-Za-z0-9_-]", "-", self.target.stem)[:100],
-            "structure": self.structure,
-            **({} if bare else {key: rows for key, rows in self.parts.items() if rows}),
+            "structure": {**self.structure, "dofs": self.dofs},
+            **({} if bare else {key: rows for key, rows in self.read.parts.items() if rows}),
             "excitation": self.excitation | order,
             "observe": {"dof": self.observe or forced, "band": between},
         }
 
 
 def _reduced(
-    given: MatrixSet | None, table: dict[str, int | str], modes: int | None, up_to: float | None, path: Path,
-    of: Disk | None, found: Sources,
+    read: _Read, modes: int | None, up_to: float | None, path: Path
 ) -> Written | WrittenSector:  # fmt: skip
+    given, of = read.given, read.of
     if given is None:
         raise InputError("`--reduce` is for matrices; modes are reduced already")
     if of is not None and up_to is not None:
@@ -209,9 +255,9 @@ def _reduced(
     if of is not None:
         from solver.matrices.file_units import METRES
 
-        mistune, metres = tuple(found.parts), METRES[found.units]
-        return reduce_disk(given, rows_of(table, given), modes, of, path, mistune, metres)
-    return reduce(given, rows_of(table, given), modes, up_to, path)
+        mistune, metres = tuple(read.found.parts), METRES[read.found.units]
+        return reduce_disk(given, rows_of(read.table, given), modes, of, path, mistune, metres)
+    return reduce(given, rows_of(read.table, given), modes, up_to, path)
 
 
 def _gone(given: MatrixSet | None, of: Disk) -> Any:

@@ -71,8 +71,8 @@ def _contact(given: AnyContact, found: ContactResponse, tau: FloatArray) -> dict
     slip = fourier.basis(tau, (found.slip.size - 1) // 2) @ found.slip
     load = fourier.basis(tau, (found.load.size - 1) // 2) @ found.load
     motions = np.array(found.motions)
-    force = given.force_at(motions, found.load, tau[:-1])
-    motion = given.motion_at(motions, found.load, force, tau[:-1])
+    force = found.force_over(given, tau[:-1])
+    motion = None if given.is_rigid else given.motion_at(motions, found.load, force, tau[:-1])
     shares = None
     if motion is not None:
         shares = {each.name.lower(): motion.count(each) / len(motion) for each in Motion}

@@ -130,23 +130,23 @@ def _pushed_through(system: System, point: Evaluation, x: Real, y: Real) -> None
 
 @apart
 def _fill_springs(system: System, point: Evaluation) -> None:
-    """Fill Ĝ = Pᵀ G P, (r, n·r·n): first G P, row by row, then one product of matrices."""
+    """Fill Ĝ = Pᵀ G P, (n, r, r·n): of each coefficient of the forces G P, then one product of matrices."""
     n, r = coefficient_count(system.ks), system.span.shape[1]
     pushed = point.pushed
-    for e in range(system.laws.size):
-        first, m = system.first_port[e], system.first_port[e + 1] - system.first_port[e]
-        for a in range(m):
-            row = pushed[first + a]
-            fill(row, 0.0)
-            for b in range(m):
-                G = point.G[system.first_block[e] + a * m + b]
-                for i in range(n):
+    for i in range(n):
+        for e in range(system.laws.size):
+            first, m = system.first_port[e], system.first_port[e + 1] - system.first_port[e]
+            for a in range(m):
+                row = pushed[first + a]
+                fill(row, 0.0)
+                for b in range(m):
+                    G = point.G[system.first_block[e] + a * m + b, i]
                     for q in range(r):
-                        share, at = system.span[first + b, q], (i * r + q) * n
+                        share = system.span[first + b, q]
                         if share != 0.0:
                             for j in range(n):
-                                row[at + j] += share * G[i, j]
-    np.dot(system.span.T, pushed, point.springs)
+                                row[q * n + j] += share * G[j]
+        np.dot(system.span.T, pushed, point.springs[i])
     along = np.empty(r)
     for k in range(point.counts[PINNED]):
         fill(along, 0.0)
@@ -155,20 +155,20 @@ def _fill_springs(system: System, point: Evaluation) -> None:
                 along[a] += system.span[c, a] * point.pinned[k, c]
         for a in range(r):
             for b in range(r):
-                point.springs[a, b * n] += along[a] * along[b]
+                point.springs[0, a, b * n] += along[a] * along[b]
 
 
 @apart
 def _assemble(system: System, point: Evaluation) -> None:
     """Fill the leading block of the factors with T = I + Â Ĝ, harmonic by harmonic."""
     n, r = coefficient_count(system.ks), system.span.shape[1]
-    springs, lu = point.springs.reshape((r * n, r * n)), point.lu
+    springs, lu = point.springs, point.lu
     for i in range(system.ks.size):
         here, m = cosine_position(system.ks, i), 2 if system.ks[i] > 0 else 1
         left, right, product = np.empty((m * r, m * r)), point.rows[: m * r], point.rows[2 * r : (2 + m) * r]
         for a in range(r):
             for q in range(m):
-                copy_to(right[q * r + a], springs[a * n + here + q])
+                copy_to(right[q * r + a], springs[here + q, a])
             for b in range(r):
                 entry = point.reduced[i, a, b]
                 left[a, b] = entry.real

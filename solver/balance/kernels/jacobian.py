@@ -1,8 +1,9 @@
 """The Jacobian of the balance: assembled whole where it is looked at, condensed where a step is solved for.
 
-A contact that sticks all the time from the unloaded state is a spring, F = kt u, and one that never touches
-has F = 0: their ports (`held`) do not couple the harmonics, so they are eliminated exactly, harmonic by
-harmonic. With g = slope − shift of those ports, G = ∂F/∂U − shift of the others (`free`), and
+A contact that sticks all the time from the unloaded state is a spring, F = kt u (in space one for each of
+its directions), and one that never touches has F = 0: their ports (`held`) do not couple the harmonics, so
+they are eliminated exactly, harmonic by harmonic. With g = slope − shift of those ports, G = ∂F/∂U − shift of
+the others (`free`), and
 
   D = I + A_hh g,  W = D⁻¹ A_hf,  V = A_fh g D⁻¹,  A' = A_ff − V A_hf,
 
@@ -45,6 +46,7 @@ from solver.jit.lapack import (
     fill,
     fill_block,
     invert,
+    multiply,
 )
 from solver.jit.lapack import factorise as factorise_block
 from solver.jit.separate import apart
@@ -102,7 +104,7 @@ def _part(system: System, point: Evaluation) -> None:
     free, held = 0, 0
     whole = system.condense == 0 or point.counts[UNHELD] > 0
     for c in range(system.owner.size):
-        if whole or math.isnan(point.slopes[system.owner[c]]):
+        if whole or math.isnan(point.slopes[c]) or point.elastic[c] > 0.0:
             point.free[free] = c
             free += 1
         else:
@@ -111,48 +113,61 @@ def _part(system: System, point: Evaluation) -> None:
     point.counts[FREE], point.counts[HELD] = free, held
 
 
+@compiled
+def _take(A: Complex, rows: Integer, columns: Integer, out: Complex) -> None:
+    """Fill `out` with some rows and columns of a matrix; it has as many."""
+    for a in range(out.shape[0]):
+        for b in range(out.shape[1]):
+            out[a, b] = A[rows[a], columns[b]]
+
+
+@compiled
+def _put(block: Complex, out: Complex) -> None:
+    """Copy a matrix into the upper left block of another."""
+    for a in range(block.shape[0]):
+        for b in range(block.shape[1]):
+            out[a, b] = block[a, b]
+
+
 @apart
 def _eliminate(system: System, linear: Receptance, point: Evaluation) -> bool:
     """Fill D⁻¹, W, V and A' of all harmonics; False if one's D is singular."""
     free, held = point.counts[FREE], point.counts[HELD]
-    A, reduced, kept, gone = linear.A[0], point.reduced, point.free, point.held
-    for i in range(system.ks.size):
-        for a in range(free):
-            for b in range(free):
-                reduced[i, a, b] = A[i, kept[a], kept[b]]
+    kept, gone = point.free, point.held
     if held == 0:
+        for i in range(system.ks.size):
+            for a in range(free):
+                for b in range(free):
+                    point.reduced[i, a, b] = linear.A[0, i, kept[a], kept[b]]
         return True
     D, inverse = np.empty((held, held), np.complex128), np.empty((held, held), np.complex128)
-    g, stored, W, V = np.empty(held), point.inverse, point.W, point.V
-    for h in range(held):
-        c = gone[h]
-        g[h] = point.slopes[system.owner[c]] - system.shift[c]
+    W, down = np.empty((held, free), np.complex128), np.empty((held, free), np.complex128)
+    V, up = np.empty((free, held), np.complex128), np.empty((free, held), np.complex128)
+    taken = np.empty((free, free), np.complex128)
     for i in range(system.ks.size):
+        A = linear.A[0, i]
+        _take(A, gone, gone, D)
+        _take(A, gone, kept, down)
+        _take(A, kept, gone, up)
         for h in range(held):
-            c = gone[h]
+            g = point.slopes[gone[h]] - system.shift[gone[h]]
             for other in range(held):
-                D[h, other] = A[i, c, gone[other]] * g[other]
-            D[h, h] += 1.0
-        if held == 1:
-            if not abs(D[0, 0].real) + abs(D[0, 0].imag) > 0.0:
-                return False
-            inverse[0, 0] = 1.0 / D[0, 0]
-        elif not invert(D, inverse):
-            return False
-        for h in range(held):
-            for other in range(held):
-                stored[i, h, other] = inverse[h, other]
+                D[other, h] *= g
             for a in range(free):
-                across, back = complex(0.0), complex(0.0)
-                for other in range(held):
-                    across += inverse[h, other] * A[i, gone[other], kept[a]]
-                    back += A[i, kept[a], gone[other]] * g[other] * inverse[other, h]
-                W[i, h, a], V[i, a, h] = across, back
+                up[a, h] *= g
+        for h in range(held):
+            D[h, h] += 1.0
+        if not invert(D, inverse):
+            return False
+        multiply(inverse, down, W)
+        multiply(up, inverse, V)
+        multiply(V, down, taken)
         for a in range(free):
-            for h in range(held):
-                factor, c = V[i, a, h], gone[h]
-                for b in range(free):
-                    reduced[i, a, b] -= factor * A[i, c, kept[b]]
+            for b in range(free):
+                point.reduced[i, a, b] = A[kept[a], kept[b]] - taken[a, b]
+        _put(inverse, point.inverse[i])
+        _put(W, point.W[i])
+        _put(V, point.V[i])
     return True
 
 

@@ -136,10 +136,14 @@ def measure(
 def measure_motion(system: System, point: Evaluation, x: Real, dx: Real, out: Real) -> None:
     """Fill `out` with the measures of the observed coefficients `x` and their slopes where x changes by dx.
 
-    The place of an extremum is stationary, so a slope is the change of the motion at that place.
+    The place of an extremum is stationary, so a slope is the change of the motion at that place. Counted from
+    the middle of its range the motion is as far up as down.
     """
     high, at_high, low, at_low = extremes(system, x)
     rise, sink = _along(system, dx, at_high), _along(system, dx, at_low)
+    if system.centred == 1:
+        high, rise = 0.5 * (high - low), 0.5 * (rise - sink)
+        low, sink = -high, -rise
     out[HALF_RANGE], out[RANGE_SLOPE] = 0.5 * (high - low), 0.5 * (rise - sink)
     out[HIGH], out[LOW], out[HIGH_SLOPE], out[LOW_SLOPE] = high, -low, rise, -sink
     out[MEAN] = x[0] if system.ks[0] == 0 else 0.0

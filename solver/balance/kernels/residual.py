@@ -10,6 +10,7 @@ from solver.balance.kernels.coordinates import is_reduced
 from solver.balance.kernels.coordinates import reaches as span_reaches
 from solver.balance.kernels.coordinates import responses as span_responses
 from solver.balance.kernels.gauge import find_gauge, let_hold
+from solver.balance.kernels.slopes import springs_of
 from solver.contacts.kernels.columns import COLUMN_KIND, KT, N0, N1, OMEGA, RATIO
 from solver.contacts.kernels.laws import call_law
 from solver.contacts.kernels.normal_load import fill_load, tie
@@ -129,12 +130,14 @@ def _element(
         system.laws[e], U, system.ks, load, system.load_ks, table, slope, dload, system.cos_table,
         system.sin_table, out.segments, out.F[c:end], out.dF_dU[block:last], out.dF_dp[c:end],
     )  # fmt: skip
-    out.states[e], out.pieces[e], out.slopes[e] = state, piece, np.nan
+    out.states[e], out.pieces[e], out.slopes[c:end] = state, piece, np.nan
     if system.jenkins[e] == 1:
         if state == SEPARATED:
-            out.slopes[e] = 0.0
+            out.slopes[c] = 0.0
         elif state == STUCK and out.segments[0, BEGAN] == UNLOADED:
-            out.slopes[e] = table[KT]
+            out.slopes[c] = table[KT]
+    elif last > block and state != FAILED:
+        springs_of(out.dF_dU[block:last], out.slopes[c:end])
     return bool(state != FAILED)
 
 

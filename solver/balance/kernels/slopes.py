@@ -2,11 +2,33 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from solver.contacts.kernels.system import PINNED, UNHELD, Evaluation, System
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Real, coefficient_count
 from solver.jit.lapack import copy_block, fill
 from solver.jit.separate import apart
+
+
+@compiled
+def springs_of(blocks: Real, slopes: Real) -> None:
+    """Fill slopes (m,) with the stiffness of each port where m² blocks of ∂F/∂U are springs', else NaN.
+
+    That is where it sticks all the time or is open: no port feels another's motion, no harmonic another.
+    """
+    m, n = slopes.size, blocks.shape[1]
+    for a in range(m):
+        slopes[a] = blocks[a * m + a, 0, 0]
+    for a in range(m):
+        for b in range(m):
+            block = blocks[a * m + b]
+            for i in range(n):
+                for j in range(n):
+                    if block[i, j] != (slopes[a] if a == b and i == j else 0.0):
+                        for c in range(m):
+                            slopes[c] = np.nan
+                        return
 
 
 @compiled

@@ -123,6 +123,37 @@ def _crosses(
     return bracketed_root(c, s, degree, 0, shift, begin, end, guess, RISING)
 
 
+@compiled
+def _begin_stick(
+    c: Real, s: Real, degree: int, shift: float, start: float, until: float, tol: float
+) -> tuple[float, float, float, float]:
+    """Begin to follow a stuck contact towards one limit.
+
+    Where the function dips first, a rise and fall that follow before `until` would not show at the ends of
+    this interval: it is followed from where it rises. A parabola is back at its level after −2 w'/w''; what
+    falls again afterwards is lower there, and still rises.
+
+    Returns
+    -------
+    (where the stick ends at once, or infinity; value, slope and place from which it is followed).
+    """
+    q, dq, curve, _ = at_point(c, s, degree, start)
+    flat, at_limit = tol * degree * degree, q + shift > -tol
+    if at_limit and (dq > flat or (dq > -flat and curve > 0.0)):
+        return start, q + shift, dq, start
+    back = -2.0 * dq / curve if dq <= 0.0 < curve else np.inf
+    if start + back < until:
+        rise = 0.0
+        for share in (1.0, 0.75):
+            tau = start + share * back
+            there, rise, _, _ = at_point(c, s, degree, tau)
+            if rise > 0.0 and there + shift < -tol:
+                return np.inf, there + shift, rise, tau
+        if at_limit and rise > 0.0:  # a dip as deep as rounding
+            return start + back, q + shift, dq, start
+    return np.inf, q + shift, dq, start
+
+
 @apart
 def leave_stick(
     c: Real,
@@ -143,18 +174,12 @@ def leave_stick(
     from_here = np.empty((3, 2))
     g_lo, slope_lo, begin = from_here[0], from_here[1], from_here[2]
     for x in range(2):
-        q, dq, curve, _ = at_point(c[x], s[x], degree, start)
-        g_lo[x] = q + (1 - 2 * x) * offset
-        slope_lo[x], begin[x] = dq, start
-        if g_lo[x] > -tol and dq > tol * degree * degree:
-            return start, x
-        if dq <= 0.0 < curve and g_lo[x] < -tol:
-            # It dips first: a rise and fall that follow within the interval would not show at its ends.
-            turn = start - 2.0 * dq / curve
-            if turn < min(j * delta, end):
-                q, dq, _, _ = at_point(c[x], s[x], degree, turn)
-                if dq > 0.0 and q + (1 - 2 * x) * offset < -tol:
-                    g_lo[x], slope_lo[x], begin[x] = q + (1 - 2 * x) * offset, dq, turn
+        shift = offset if x == 0 else -offset
+        ends, g_lo[x], slope_lo[x], begin[x] = _begin_stick(
+            c[x], s[x], degree, shift, start, min(j * delta, end), tol
+        )
+        if ends < np.inf:
+            return ends, x
     at = j % n
     while lo < end:
         hi = j * delta
@@ -206,8 +231,14 @@ def leave_slip(
     at = j % n
     lo = start
     _, rate, curve, _ = at_point(c, s, degree, start)
-    if rate < -tol * degree * degree or (rate < tol * degree * degree and curve < 0.0):
+    flat = tol * degree * degree
+    if rate < -flat or (rate < flat and curve < 0.0):
         return start
+    if rate < flat and 4.0 * flat < (min(j * delta, end) - start) * curve:
+        # It starts at its lowest point, which is no end of the slip: the search begins where w' has risen.
+        start += 4.0 * flat / curve
+        lo = start
+        _, rate, curve, _ = at_point(c, s, degree, lo)
     while lo < end:
         hi = j * delta
         last = hi >= end
@@ -216,7 +247,7 @@ def leave_slip(
             rate_hi = at_point(c, s, degree, end)[1]
         else:
             rate_hi = slope[at]
-        if rate_hi < -tol * degree * degree:
+        if rate_hi < -flat:
             fall = rate - rate_hi
             guess = lo + (hi - lo) * (rate / fall if fall > 0.0 else 0.5)
             if not last and lo > start:

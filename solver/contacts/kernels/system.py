@@ -38,6 +38,8 @@ MODES, POLES, DENSE = 0, 1, 2
 # Numbers in `Evaluation.counts`.
 FREE, HELD, SIZE, AT_BRANCH_POINT, UNHELD, PINNED = 0, 1, 2, 3, 4, 5
 COUNTS = 6
+# Numbers that say where and of what a receptance's A was filled.
+PLACE = 5
 
 
 class System(NamedTuple):
@@ -79,6 +81,7 @@ class System(NamedTuple):
     level_reference: float  # N, the excitation amplitude at level 1
     constant_mean: int  # 1: constant forces are loads, which the level of the excitation leaves alone
     phase_reference: float  # rad
+    centred: int  # 1: the observed motion counts from the middle of its range, 0: from where it is at rest
     parameter_reference: float  # the value of a structural parameter at which K, M, C stand
     least_size: float  # m, motions of the contacts far below it are rounding of what cancels in ū
     form: int
@@ -102,7 +105,11 @@ class System(NamedTuple):
 
 
 class Receptance(NamedTuple):
-    """Condensed linear part at one λ, and its derivative by λ (first index 0: value, 1: derivative)."""
+    """Condensed linear part at one λ, and its derivative by λ (first index 0: value, 1: derivative).
+
+    By reference it has one array more, `filled` (PLACE,): where A was filled, see
+    `solver.linear.kernels.receptance`; NaN where it is to be filled anew.
+    """
 
     A: Complex  # (2, nk, nc, nc), or Â (2, nk, r, r) of the leading ports alone where r < nc
     u_linear: Complex  # (2, nk, nc)
@@ -127,7 +134,7 @@ class Evaluation(NamedTuple):
     dF_dN: Real  # (n, 3)
     states: Integer  # (ne,)
     pieces: Integer  # (ne,) which smooth piece of its law a contact is on, see `events.piece_of`
-    slopes: Real  # (ne,) F = slope · u where the law is linear there (stuck or separated), else NaN
+    slopes: Real  # (nc,) ∂F/∂U of a port where that is a spring's (stuck or separated), else NaN
     segments: Real  # scratch
     jacobian: Real  # (nt, nt) dr/du
     lu: Real  # (nt + 1, nt + 1) factors of the condensed, perhaps bordered, Jacobian in their leading block
@@ -148,8 +155,9 @@ class Evaluation(NamedTuple):
     unheld: Real  # (nr, nr) forces along them, over the rigid-body motions
     elastic: Real  # (nc,) stiffness of contacts that carry all the mean force they can [N/m], else 0
     pinned: Real  # (nr, nc) kt l along these motions at the factors' point
-    pushed: Real  # (nc, n·r·n) G P, scratch as the two below; see `solver.balance.kernels.coordinates`
-    springs: Real  # (r, n·r·n) Pᵀ G P
+    pushed: Real  # (nc, r·n) G P of one coefficient, scratch as the two below; see
+    # `solver.balance.kernels.coordinates`
+    springs: Real  # (n, r, r·n) Pᵀ G P, coefficient by coefficient of the force
     rows: Real  # (4·r, r·n)
 
 
@@ -195,7 +203,7 @@ class _EvaluationReference(structref.StructRefProxy):
 
 
 structref.define_proxy(_SystemReference, _SystemType, list(System._fields))
-structref.define_proxy(_ReceptanceReference, _ReceptanceType, list(Receptance._fields))
+structref.define_proxy(_ReceptanceReference, _ReceptanceType, [*Receptance._fields, "filled"])
 structref.define_proxy(_EvaluationReference, _EvaluationType, list(Evaluation._fields))
 
 _new_system: Callable[..., System] = _SystemReference
@@ -229,7 +237,7 @@ def evaluation_arrays(point: Evaluation) -> Evaluation:
 @compiled
 def receptance_over(A: Complex, u_linear: Complex, B: Complex, x_linear: Complex) -> Receptance:
     """Return a receptance that reads arrays of others, whose first index begins with value, derivative."""
-    return _receptance_of(A, u_linear, B, x_linear)
+    return _receptance_of(A, u_linear, B, x_linear, np.full(PLACE, np.nan))
 
 
 def receptance_by_value(linear: Receptance) -> Receptance:
@@ -265,6 +273,7 @@ def new_receptance(system: System) -> Receptance:
         np.zeros((2, nk, nc), np.complex128),
         np.zeros((2, nk, nc), np.complex128),
         np.zeros((2, nk), np.complex128),
+        np.full(PLACE, np.nan),
     )
 
 
@@ -282,7 +291,10 @@ def new_whole_evaluation(system: System) -> Evaluation:
 
 @compiled
 def _new_evaluation(system: System, spanned: bool) -> Evaluation:
-    """Return empty arrays, for factors in the leading ports alone if `spanned`."""
+    """Return empty arrays, for factors in the leading ports alone if `spanned`.
+
+    The large ones are not set to zero: of many contacts that stick most of their memory is never touched.
+    """
     ne, nc, n, nk = system.laws.size, system.owner.size, coefficient_count(system.ks), system.ks.size
     blocks, nt, rigid = system.first_block[ne], nc * n, system.loose.shape[0]
     r = system.leading.size if spanned else 0
@@ -291,13 +303,13 @@ def _new_evaluation(system: System, spanned: bool) -> Evaluation:
     return _evaluation_of(
         np.zeros(nt), np.zeros(nt), np.zeros((nc, n)), np.zeros((blocks, n, n)), np.zeros((nc, n)),
         np.zeros(n), np.zeros(n), np.zeros((n, coefficient_count(system.load_ks))), np.zeros(ne, np.int64),
-        np.zeros(ne, np.int64), np.zeros(ne),
+        np.zeros(ne, np.int64), np.zeros(nc),
         np.zeros((segment_capacity(max(system.ks[-1], system.load_ks[-1])), SEGMENT_COLUMNS)),
-        np.zeros((whole, whole)),
-        np.zeros((size + 1, size + 1)), np.zeros(nt + 1, np.int32), np.zeros(nc, np.int64),
+        np.empty((whole, whole)),
+        np.empty((size + 1, size + 1)), np.zeros(nt + 1, np.int32), np.zeros(nc, np.int64),
         np.zeros(nc, np.int64), np.zeros(COUNTS, np.int64), np.zeros((blocks, n, n)),
-        np.zeros((nk, ports, ports), np.complex128), np.zeros((nk, ports, ports), np.complex128),
-        np.zeros((nk, ports, ports), np.complex128), np.zeros((nk, kept, kept), np.complex128), np.zeros(nt),
+        np.empty((nk, ports, ports), np.complex128), np.empty((nk, ports, ports), np.complex128),
+        np.empty((nk, ports, ports), np.complex128), np.empty((nk, kept, kept), np.complex128), np.zeros(nt),
         np.zeros(nt), np.zeros((4, nt + 1)), np.zeros((rigid, nc)), np.zeros((rigid, rigid)), np.zeros(nc),
-        np.zeros((rigid, nc)), np.zeros((nc, n * r * n)), np.zeros((r, n * r * n)), np.zeros((4 * r, r * n)),
+        np.zeros((rigid, nc)), np.empty((nc, r * n)), np.empty((n, r, r * n)), np.empty((4 * r, r * n)),
     )  # fmt: skip

@@ -202,6 +202,11 @@ class AnyContact(Element, InSpace):
         return None
 
     @property
+    def is_rigid(self) -> bool:
+        """Whether a stiffness of it is infinite: it is then solved by events, not by the balance."""
+        return False
+
+    @property
     def slides_on_a_line(self) -> bool:
         """Whether its slider has the events of `solver.contacts.segments`, so that its travel is known."""
         return False

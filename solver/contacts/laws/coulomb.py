@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, ClassVar, Literal
 
-from solver.contacts.fields import NonNegative, Real
+from solver.contacts.fields import NonNegative, Real, Stiffness
 from solver.contacts.laws.friction import FrictionContact
 from solver.contacts.laws.parts import Motion, Row
+from solver.errors import SettingError
 
 if TYPE_CHECKING:
     from solver.contacts.pieces.piece import Part
@@ -32,6 +33,9 @@ class SlidesOnALine(FrictionContact):
         from solver.contacts.pieces.line import friction_pieces
         from solver.contacts.pieces.piece import Part
 
+        if self.is_rigid:
+            wanted = "must be finite here: what is known of the stability of a rigid contact is in the answer"
+            raise SettingError(f"{self.name}.kt", self.kt, wanted)
         kn = None if self.normal_port is None else self.stiffnesses[self.normal_port]
         pieces = friction_pieces(motions[0], load, self.kt, self.mu, kn=kn)
         return (Part(tuple(range(len(motions))), pieces),)
@@ -43,7 +47,7 @@ class Contact(SlidesOnALine):
     Attributes
     ----------
     kt : float
-        Tangential contact stiffness [N/m].
+        Tangential contact stiffness [N/m]; infinite of a rigid contact, see `solver.response.exact`.
     mu : float
         Friction coefficient.
     N0 : float
@@ -64,6 +68,7 @@ class Contact(SlidesOnALine):
     JENKINS: ClassVar[bool] = True
 
     law: Literal["coulomb"] | None = None
+    kt: Stiffness
     N0: NonNegative
 
     @property

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, ClassVar, Literal
 
-from solver.contacts.fields import Between, Positive, Real
+from solver.contacts.fields import Between, Real, Stiffness
 from solver.contacts.kernels import columns
 from solver.contacts.laws.coulomb import SlidesOnALine
 from solver.contacts.laws.friction import FrictionContact
@@ -47,7 +47,7 @@ class ElasticNormalContact(SlidesOnALine):
             wanted="must be a number >= 0 (from -1e15 with the law elastic-normal) and <= 1e15 [N]",
         ),
         "kn": Quantity(
-            column=columns.KN, unit="N/m", least=0.0, wanted="must be a number > 0 and <= 1e15 [N/m]"
+            column=columns.KN, unit="N/m", least=0.0, wanted="must be a number > 0 and <= 1e15 [N/m], or inf"
         ),
     }  # fmt: skip
     WORDS: ClassVar[Mapping[str, str]] = {
@@ -62,7 +62,8 @@ class ElasticNormalContact(SlidesOnALine):
 
     law: Literal["elastic-normal"]
     normal_between: Between | None = None
-    kn: Positive
+    kt: Stiffness
+    kn: Stiffness
     prestressed: bool = False
 
     @property

@@ -127,6 +127,11 @@ class FrictionContact(AnyContact):
         )  # fmt: skip
 
     @property
+    def is_rigid(self) -> bool:
+        """Whether a stiffness of it is infinite."""
+        return math.inf in self.stiffnesses
+
+    @property
     def load(self) -> NormalLoad:
         """The given normal load."""
         given = {each.order: (each.amplitude, each.phase) for each in self.higher_load or ()}

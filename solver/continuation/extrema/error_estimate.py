@@ -18,7 +18,6 @@ from solver.contacts.kernels.system import (
     by_reference,
     evaluation_by_value,
     new_receptance,
-    of_all_ports,
     receptance_by_value,
 )
 from solver.continuation.branch import Branch
@@ -29,8 +28,9 @@ from solver.scene.harmonics import MULTIPLES, is_fast
 
 # Harmonics looked at beyond those kept, for a solution with H of them: H + max(H, 8).
 _LEAST_BEYOND = 8
-# How much farther the receptance is looked at.
+# How much farther the receptance is looked at, and entries of it that are held at once.
 _TAIL = 4
+_AT_ONCE = 2**21
 _LOST_BITS = 16.0  # of the sums behind a motion, in units of their rounding
 # Fitted to 600 random scenes, see docs/accuracy.md: 98 % of the true errors are below the estimate.
 SAFETY = 1.7
@@ -137,6 +137,8 @@ class ErrorEstimator:
         if not across and steps[1] > _FIRST_ORDER * steps[0] and largest[0] > _FIRST_ORDER * self._size(x):
             largest = self._solved(x, start, p, largest)
         max_abs, half_range = more * SAFETY * largest + tail + self._rounding()
+        if kept.system.centred:
+            max_abs = half_range
         return ErrorEstimate(max_abs=float(max_abs), half_peak_to_peak=float(half_range))
 
     def _solved(self, x: Real, U: Real, p: float, largest: Real) -> Real:
@@ -215,34 +217,69 @@ class ErrorEstimator:
         least 1.
         """
         ks, kept = self._larger.balance.system.ks, self._workspace.balance.system.ks
-        receptance(self._beyond, p, self._beyond_linear)
-        linear = of_all_ports(self._larger.balance.system, receptance_by_value(self._beyond_linear))
-        try:  # δF = F + κ δu and δu = −A δF
-            held = np.linalg.inv(np.eye(F.shape[0]) + self._mean_stiffness()[:, None] * linear.A[0])
-        except np.linalg.LinAlgError:
-            return math.nan, 1.0
-        B = np.abs(np.einsum("kd,kdc->kc", linear.B[0], held))
-        A = np.abs(np.stack([linear.A[0] @ held, linear.A[0]]))
         sizes = np.zeros((F.shape[0], ks.size))
         moving = ks > 0
         pairs = F[:, int(ks[0] == 0) :].reshape(F.shape[0], int(moving.sum()), 2)
         sizes[:, moving] = np.hypot(pairs[..., 0], pairs[..., 1])
-        weighted, tail, far = sizes * ks**2, 0.0, np.zeros((2, F.shape[0]))
-        for fast in (False, True):  # waves of their own, each with its own rate
-            own, later = self._is_fast == fast, self._later_is_fast == fast
-            if not later.any():
-                continue
+        added = ~np.isin(ks, kept)
+        # Of each port at harmonics beyond: of waves of their own, each with its own rate.
+        weighted, later = sizes * ks**2, np.zeros((self._beyond_ks.size, F.shape[0]))
+        for fast in (False, True):
+            own = self._is_fast == fast
             late = weighted[:, own][:, np.count_nonzero(own) // 2 :]
-            falling = np.max(late, axis=1, initial=0.0)
-            share = 1.0 / self._beyond_ks[later] ** 2
-            tail += float(np.sum(B[self._is_beyond][later] @ falling * share))
-            far += np.einsum("k,akcd,d->ac", share, A[:, self._is_beyond][:, later], falling)
-        new = ~np.isin(ks, kept)
-        near = np.einsum("akcd,dk->ac", A[:, np.isin(self._all_ks, ks[new])], sizes[:, new])
+            which = self._later_is_fast == fast
+            later[which] = np.max(late, axis=1, initial=0.0) / self._beyond_ks[which, None] ** 2
+        if not sizes[:, added].any() and not later.any():
+            return 0.0, 1.0
+        forces = np.zeros((self._all_ks.size, F.shape[0]))
+        forces[self._is_beyond], forces[np.isin(self._all_ks, ks[added])] = later, sizes[:, added].T
+        try:
+            seen, moved, last = self._beyond_motions(forces, p)
+        except np.linalg.LinAlgError:
+            return math.nan, 1.0
+        far, near = (moved[:, part].sum(axis=1) for part in (self._is_beyond, ~self._is_beyond))
         further, bare = far.max(axis=1, initial=0.0) / np.maximum(near.max(axis=1, initial=0.0), 1e-300)
-        last = np.abs(np.diagonal(linear.A[0, ~self._is_beyond][-1])) * self._stiffest
         jumps = 1.0 + float(np.max(last / (1.0 + last), initial=0.0))
+        tail = float(seen[self._is_beyond].sum())
         return tail, max(jumps, float(further), min(float(bare), 2.0)) if near.any() else 1.0
+
+    def _beyond_motions(self, forces: Real, p: float) -> tuple[Real, Real, Real]:
+        """Return what forces of any phase do at harmonics beyond: forces δF = F + κ δu, motions δu = −A δF.
+
+        Parameters
+        ----------
+        forces : (nk, nc) amplitudes; only ports with any, of harmonics with any, are looked at.
+
+        Returns
+        -------
+        (nk,) bounds of the motion of the observed DOF; (2, nk, nc) of the contacts, with κ and without;
+        (nc,) the receptance of the highest harmonic looked at times the stiffest slope of each contact.
+
+        Raises
+        ------
+        numpy.linalg.LinAlgError
+            Structure and contacts are singular there.
+        """
+        system, stiffness = self._larger.balance.system, self._mean_stiffness()
+        receptance(self._beyond, p, self._beyond_linear)
+        linear = receptance_by_value(self._beyond_linear)
+        span = system.span if linear.A.shape[2] < forces.shape[1] else None
+        springs = np.diag(stiffness) if span is None else span.T @ (stiffness[:, None] * span)
+        pushed = np.flatnonzero(forces.any(axis=0))
+        seen, moved = np.zeros(forces.shape[0]), np.zeros((2, *forces.shape))
+        wanted = np.flatnonzero(forces.any(axis=1))
+        count = math.ceil(wanted.size * forces.shape[1] * pushed.size / _AT_ONCE)
+        for part in np.array_split(wanted, max(1, count)):
+            A, B, sizes = linear.A[0, part], linear.B[0, part, None], forces[part][:, pushed, None]
+            bare = A[:, :, pushed] if span is None else A @ span[pushed].T
+            held = np.linalg.solve(np.eye(A.shape[1]) + A @ springs, bare)
+            if span is not None:
+                bare, held = span @ bare, span @ held
+            seen[part] = (np.abs(B[..., pushed] - (B * stiffness) @ held) @ sizes)[:, 0, 0]
+            moved[0, part], moved[1, part] = (np.abs(held) @ sizes)[..., 0], (np.abs(bare) @ sizes)[..., 0]
+        A = linear.A[0, ~self._is_beyond][-1]
+        own = np.diagonal(A) if span is None else np.einsum("ca,ca->c", span, span @ A.T)
+        return seen, moved, np.abs(own) * self._stiffest
 
     def _mean_stiffness(self) -> Real:
         """Return what contacts add to the structure at high harmonics where last evaluated, (nc,) [N/m]."""

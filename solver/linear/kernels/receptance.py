@@ -19,10 +19,12 @@ from solver.contacts.kernels.system import (
 )
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Complex, Real
-from solver.jit.lapack import invert
+from solver.jit.lapack import invert, multiply
 from solver.jit.separate import apart
+from solver.linear.kernels.modal_products import basis_of_modes, fill_product
 
 BLOCK = 512  # modes summed at a time: their weights stay in the near cache
+PAIRS_UP_TO = 12  # leading ports, with more products of matrices are faster (measured)
 
 
 @compiled
@@ -48,17 +50,23 @@ def excitation(system: System, p: float, k: int) -> tuple[complex, complex]:
 
 @apart
 def receptance(system: System, p: float, out: Receptance) -> None:
-    """Fill `out` with the condensed linear part at λ = p and its derivative by λ."""
+    """Fill `out` with the condensed linear part at λ = p and its derivative by λ.
+
+    A that was filled for the same structure at the same λ is left as it is.
+    """
     if system.form == DENSE:
         _dense_receptance(system, p, out)
+    elif _is_filled(system, p, out):
+        _modal_receptance(system, p, 0, out)
     else:
         _modal_receptance(system, p, system.leading.size, out)
+        _note(system, p, out)
     scale_driven(system, p, out)
 
 
 @apart
 def observer_receptance(system: System, p: float, out: Receptance) -> None:
-    """Fill in what the observed DOF needs: B and x̄ with their derivatives; A is not what it should be.
+    """Fill in what the observed DOF needs: B and x̄ with their derivatives; A stays what it was.
 
     Of many observed DOFs on one motion each needs its own, but A, by far the most work, need not be known.
     """
@@ -67,6 +75,42 @@ def observer_receptance(system: System, p: float, out: Receptance) -> None:
     else:
         _modal_receptance(system, p, 0, out)
     scale_driven(system, p, out)
+
+
+@compiled
+def _place(system: System, p: float, i: int) -> float:
+    """Return number i of those that tell what A belongs to: λ, what λ is, the frequency, and the modes."""
+    if i == 0:
+        return p
+    if i == 1:
+        return float(system.kind)
+    if i == 2:
+        return system.omega
+    address = system.contact_modes.ctypes.data
+    return float(address % 2**32) if i == 3 else float(address // 2**32)
+
+
+@compiled
+def _is_filled(system: System, p: float, out: Any) -> bool:
+    """Return whether A is that of this structure at λ = p."""
+    same = True
+    for i in range(out.filled.size):
+        same = same and out.filled[i] == _place(system, p, i)
+    return bool(same)
+
+
+@compiled
+def _note(system: System, p: float, out: Any) -> None:
+    """Keep in mind where A was filled."""
+    for i in range(out.filled.size):
+        out.filled[i] = _place(system, p, i)
+
+
+@compiled
+def forget(out: Any) -> None:
+    """Have A filled anew next time: it is changed."""
+    for i in range(out.filled.size):
+        out.filled[i] = np.nan
 
 
 @compiled
@@ -83,22 +127,13 @@ def scale_driven(system: System, p: float, out: Receptance) -> None:
 
 @compiled
 def clear(out: Any) -> None:
-    """Set all derivatives of a receptance, or of `Jets`, to zero."""
+    """Set all derivatives of a receptance, or of `Jets`, to zero, but for A."""
     for order in range(out.x_linear.shape[0]):
         for i in range(out.x_linear.shape[1]):
-            _clear_harmonic(out, order, i)
-
-
-@compiled
-def _clear_harmonic(out: Any, order: int, i: int) -> None:
-    """Set one derivative of harmonic number i to zero."""
-    out.x_linear[order, i] = 0.0
-    for c in range(out.B.shape[2]):
-        out.u_linear[order, i, c] = 0.0
-        out.B[order, i, c] = 0.0
-    for c in range(out.A.shape[2]):
-        for d in range(out.A.shape[2]):
-            out.A[order, i, c, d] = 0.0
+            out.x_linear[order, i] = 0.0
+            for c in range(out.B.shape[2]):
+                out.u_linear[order, i, c] = 0.0
+                out.B[order, i, c] = 0.0
 
 
 @apart
@@ -107,12 +142,17 @@ def _modal_receptance(system: System, p: float, r: int, out: Receptance) -> None
 
     Block by block: the products of modes at pairs of contacts once for all harmonics of a structure, then one
     real sum over the block for each of them, which the compiler vectorises. Of the leading ports the first r
-    are summed.
+    are summed; where these are many A is a product of matrices.
     """
     omega = p if system.kind == FREQUENCY else system.omega
     by_omega = 1.0 if system.kind == FREQUENCY else 0.0
     nc, most = out.B.shape[2], min(BLOCK, system.eigenvalues.shape[1])
     clear(out)
+    if r > PAIRS_UP_TO:
+        _fill_by_products(system, omega, by_omega, out)
+        r = 0
+    elif r > 0:
+        out.A[:] = 0.0
     weights, driven = np.empty((2 * (r * r + nc), most)), np.empty((2 * (nc + 1), most))
     terms = np.empty((4, most))
     for s in range(system.eigenvalues.shape[0]):
@@ -125,6 +165,21 @@ def _modal_receptance(system: System, p: float, r: int, out: Receptance) -> None
                     _add_pairs(system, r, size, i, turns, weights, terms, out)
                     if fill_driven(system, s, first, size, i, driven):
                         add_driven_modes(size, i, driven, terms, out)
+
+
+@apart
+def _fill_by_products(system: System, omega: float, by_omega: float, out: Receptance) -> None:
+    """Fill A with products of the modes at the leading ports."""
+    nm, orders = system.eigenvalues.shape[1], 2 if by_omega != 0.0 else 1
+    terms = np.empty((4, nm))
+    for s in range(system.eigenvalues.shape[0]):
+        basis, duals, kinds = basis_of_modes(system, s, system.leading)
+        for i in range(system.ks.size):
+            if system.which[i] == s:
+                fill_terms(system, s, 0, nm, float(system.ks[i]), omega, by_omega, terms)
+                fill_product(basis, duals, kinds, terms, orders, i, out.A)
+                if orders == 1:
+                    out.A[1, i] = 0.0
 
 
 @compiled
@@ -278,6 +333,7 @@ def _dense_receptance(system: System, p: float, out: Receptance) -> None:
     Z, dZ = np.empty((n, n), np.complex128), np.empty((n, n), np.complex128)
     green = np.empty((2, n, n), np.complex128)
     half = np.empty((n, n), np.complex128)
+    force, rise = np.empty(n, np.complex128), np.empty(n, np.complex128)
     for i in range(system.ks.size):
         k, s = max(system.ks[i], 1), system.which[i]
         speed = k * omega
@@ -298,28 +354,16 @@ def _dense_receptance(system: System, p: float, out: Receptance) -> None:
                     dZ[a, b] = complex(0.0, float(k)) * C - 2.0 * k * speed * M
         if not invert(Z, green[0]):
             green[0, 0, 0] = np.nan
-        _product(dZ, green[0], half)
-        _product(green[0], half, green[1])
-        force, rise = np.empty(n, np.complex128), np.empty(n, np.complex128)
+        multiply(dZ, green[0], half)
+        multiply(green[0], half, green[1])
+        for a in range(n):
+            for b in range(n):
+                green[1, a, b] = -green[1, a, b]
         fill_forces(system, i, moved, force, rise)
         for order in range(2):
-            _project(system, s, force, 1.0 - 2.0 * order, green[order], i, order, out)
+            project(system, s, force, green[order], i, order, out)
         if system.kind == STRUCTURE:
             add_driven(system, s, rise, green[0], out.u_linear[1, i], out.x_linear[1, i : i + 1])
-
-
-@compiled
-def _product(left: Complex, right: Complex, out: Complex) -> None:
-    """Fill `out` with left @ right."""
-    n = left.shape[0]
-    for a in range(n):
-        for b in range(n):
-            out[a, b] = 0.0
-        for c in range(n):
-            factor = left[a, c]
-            if factor != 0.0:
-                for b in range(n):
-                    out[a, b] += factor * right[c, b]
 
 
 @compiled
@@ -346,22 +390,28 @@ def add_driven(system: System, s: int, force: Complex, green: Complex, u: Comple
 
 
 @compiled
-def _project(
-    system: System, s: int, force: Complex, sign: float, green: Complex, i: int, order: int, out: Receptance
-) -> None:
-    """Project Z⁻¹ (or its derivative) of harmonic number i on contacts, excitation and observed DOF."""
-    nc, n = out.B.shape[2], green.shape[0]
-    _clear_harmonic(out, order, i)
+def project(system: System, s: int, force: Complex, green: Complex, i: int, order: int, out: Any) -> None:
+    """Fill in Z⁻¹ (or a derivative) of harmonic number i, seen from contacts, excitation and observed DOF.
+
+    A is that of the leading ports, or, where `out` has room for them, of all.
+    """
+    nc, n, r = out.B.shape[2], green.shape[0], out.A.shape[2]
+    back, moved = np.empty((n, nc), np.complex128), np.empty((n, nc), np.complex128)
     for a in range(n):
-        for b in range(n):
-            value = sign * green[a, b]
-            driven = value * force[b]
-            out.x_linear[order, i] += system.observe[a] * driven
-            for c in range(nc):
-                out.u_linear[order, i, c] += system.L[s, c, a] * driven
-                back = value * system.L[s, c, b].conjugate()
-                out.B[order, i, c] += system.observe[a] * back
-            for c in range(system.leading.size):
-                back = value * system.L[s, system.leading[c], b].conjugate()
-                for d in range(system.leading.size):
-                    out.A[order, i, d, c] += system.L[s, system.leading[d], a] * back
+        for c in range(nc):
+            back[a, c] = system.L[s, c, a].conjugate()
+    multiply(green, back, moved)
+    out.x_linear[order, i] = 0.0
+    for c in range(nc):
+        out.u_linear[order, i, c], out.B[order, i, c] = 0.0, 0.0
+        for a in range(n):
+            out.B[order, i, c] += system.observe[a] * moved[a, c]
+    add_driven(system, s, force, green, out.u_linear[order, i], out.x_linear[order, i : i + 1])
+    if r == nc:
+        multiply(system.L[s], moved, out.A[order, i])
+        return
+    rows, columns = np.empty((r, n), np.complex128), np.empty((n, r), np.complex128)
+    for c in range(r):
+        for a in range(n):
+            rows[c, a], columns[a, c] = system.L[s, system.leading[c], a], moved[a, system.leading[c]]
+    multiply(rows, columns, out.A[order, i])

@@ -14,11 +14,19 @@ from numba.experimental import structref
 
 from solver.contacts.kernels.system import DENSE, MODES, STRUCTURE, System
 from solver.jit.decorators import compiled
-from solver.jit.fourier import Complex
-from solver.jit.lapack import invert
+from solver.jit.fourier import Complex, Real
+from solver.jit.lapack import invert, multiply
 from solver.jit.reference import Reference
 from solver.jit.separate import apart
-from solver.linear.kernels.receptance import add_driven, clear, excitation, fill_forces
+from solver.linear.kernels.modal_products import basis_of_modes, fill_product
+from solver.linear.kernels.receptance import (
+    PAIRS_UP_TO,
+    add_driven,
+    clear,
+    excitation,
+    fill_forces,
+    project,
+)
 
 # First index of every array.
 VALUE, BY_OMEGA, BY_OMEGA_TWICE, BY_P, BY_BOTH = 0, 1, 2, 3, 4
@@ -62,6 +70,7 @@ def new_jets(system: System) -> Jets:
 def fill_jets(system: System, omega: float, p: float, out: Jets) -> None:
     """Fill `out` at the frequency `omega` [rad/s] and the parameter λ = p (which is not the frequency)."""
     clear(out)
+    out.A[:] = 0.0
     if system.form == DENSE:
         _dense(system, omega, p, out)
     else:
@@ -85,36 +94,51 @@ def fill_jets(system: System, omega: float, p: float, out: Jets) -> None:
 @compiled
 def _modal(system: System, omega: float, out: Jets) -> None:
     """Sum the modes: Z⁻¹ = Σ x_m y_mᴴ/d_m; (1/d)' = −d'/d², (1/d)'' = 2d'²/d³ − d''/d²."""
-    nc = out.u_linear.shape[2]
-    parts = np.empty(BY_P, np.complex128)
-    for i in range(system.ks.size):
-        k, s = system.ks[i], system.which[i]
-        speed = k * omega
-        for m in range(system.eigenvalues.shape[1]):
-            if system.form == MODES:
-                damping = system.dampings[s, m]
-                d = complex(system.eigenvalues[s, m].real - speed * speed, speed * damping)
-                slope, bend = complex(-2.0 * k * speed, k * damping), complex(-2.0 * k * k)
-            else:
-                d = complex(0.0, speed) - system.eigenvalues[s, m]
-                slope, bend = complex(0.0, float(k)), complex(0.0)
-            if d.real == 0.0 and d.imag == 0.0:
-                d = complex(np.nan, np.nan)
-            inverse = 1.0 / d
-            parts[VALUE] = inverse
-            parts[BY_OMEGA] = -slope * inverse * inverse
-            parts[BY_OMEGA_TWICE] = (2.0 * slope * slope * inverse - bend) * inverse * inverse
-            force, seen = system.modal_forces[i, m], system.observe_modes[s, m]
+    nc, nm = out.u_linear.shape[2], system.eigenvalues.shape[1]
+    terms, ports = np.empty((2 * BY_P, nm)), np.arange(nc if nc > PAIRS_UP_TO else 0)
+    for s in range(system.eigenvalues.shape[0]):
+        basis, duals, kinds = basis_of_modes(system, s, ports)
+        for i in range(system.ks.size):
+            if system.which[i] != s:
+                continue
+            _fill_terms(system, s, system.ks[i], omega, terms)
             for order in range(BY_P):
-                part = parts[order]
-                out.x_linear[order, i] += seen * part * force
-                for c in range(nc):
-                    phi = system.contact_modes[s, c, m]
-                    dual = system.contact_duals[s, c, m]
-                    out.u_linear[order, i, c] += phi * part * force
-                    out.B[order, i, c] += seen * part * dual
-                    for other in range(nc):
-                        out.A[order, i, c, other] += phi * part * system.contact_duals[s, other, m]
+                for m in range(nm):
+                    part = complex(terms[2 * order, m], terms[2 * order + 1, m])
+                    driven = part * system.modal_forces[i, m]
+                    seen = part * system.observe_modes[s, m]
+                    out.x_linear[order, i] += system.observe_modes[s, m] * driven
+                    for c in range(nc):
+                        out.u_linear[order, i, c] += system.contact_modes[s, c, m] * driven
+                        out.B[order, i, c] += seen * system.contact_duals[s, c, m]
+                        if nc <= PAIRS_UP_TO:
+                            phi = system.contact_modes[s, c, m] * part
+                            for other in range(nc):
+                                out.A[order, i, c, other] += phi * system.contact_duals[s, other, m]
+            if nc > PAIRS_UP_TO:
+                fill_product(basis, duals, kinds, terms, BY_P, i, out.A)
+
+
+@compiled
+def _fill_terms(system: System, s: int, k: int, omega: float, terms: Real) -> None:
+    """Fill in 1/d_m and its first two derivatives by ω, real and imaginary parts; NaN where d_m is zero."""
+    speed = k * omega
+    for m in range(system.eigenvalues.shape[1]):
+        if system.form == MODES:
+            damping = system.dampings[s, m]
+            d = complex(system.eigenvalues[s, m].real - speed * speed, speed * damping)
+            slope, bend = complex(-2.0 * k * speed, k * damping), complex(-2.0 * k * k)
+        else:
+            d = complex(0.0, speed) - system.eigenvalues[s, m]
+            slope, bend = complex(0.0, float(k)), complex(0.0)
+        if d.real == 0.0 and d.imag == 0.0:
+            d = complex(np.nan, np.nan)
+        inverse = 1.0 / d
+        first = -slope * inverse * inverse
+        second = (2.0 * slope * slope * inverse - bend) * inverse * inverse
+        terms[0, m], terms[1, m] = inverse.real, inverse.imag
+        terms[2, m], terms[3, m] = first.real, first.imag
+        terms[4, m], terms[5, m] = second.real, second.imag
 
 
 @compiled
@@ -170,7 +194,7 @@ def _dense(system: System, omega: float, p: float, out: Jets) -> None:
         fill_forces(system, i, moved, force, rise)
         for order in range(ORDERS):
             if structural or order < BY_P:
-                _project(system, s, force, G[order], i, order, out)
+                project(system, s, force, G[order], i, order, out)
         if structural:
             for order, by in ((BY_P, VALUE), (BY_BOTH, BY_OMEGA)):
                 add_driven(system, s, rise, G[by], out.u_linear[order, i], out.x_linear[order, i : i + 1])
@@ -179,21 +203,8 @@ def _dense(system: System, omega: float, p: float, out: Jets) -> None:
 @apart
 def _sandwich(left: Complex, middle: Complex, right: Complex, half: Complex, out: Complex) -> None:
     """Fill `out` with left @ middle @ right."""
-    _product(left, middle, half)
-    _product(half, right, out)
-
-
-@compiled
-def _product(left: Complex, right: Complex, out: Complex) -> None:
-    """Fill `out` with left @ right."""
-    n = left.shape[0]
-    for a in range(n):
-        for b in range(n):
-            out[a, b] = 0.0
-        for c in range(n):
-            factor = left[a, c]
-            for b in range(n):
-                out[a, b] += factor * right[c, b]
+    multiply(left, middle, half)
+    multiply(half, right, out)
 
 
 @compiled
@@ -210,20 +221,3 @@ def _more(target: Complex, factor: float, source: Complex) -> None:
     for a in range(target.shape[0]):
         for b in range(target.shape[1]):
             target[a, b] += factor * source[a, b]
-
-
-@apart
-def _project(system: System, s: int, force: Complex, green: Complex, i: int, order: int, out: Jets) -> None:
-    """Add Z⁻¹ (or a derivative) of harmonic number i, seen from contacts, excitation and observed DOF."""
-    nc, n = out.u_linear.shape[2], green.shape[0]
-    for a in range(n):
-        for b in range(n):
-            value = green[a, b]
-            driven = value * force[b]
-            out.x_linear[order, i] += system.observe[a] * driven
-            for c in range(nc):
-                out.u_linear[order, i, c] += system.L[s, c, a] * driven
-                back = value * system.L[s, c, b].conjugate()
-                out.B[order, i, c] += system.observe[a] * back
-                for d in range(nc):
-                    out.A[order, i, d, c] += system.L[s, d, a] * back

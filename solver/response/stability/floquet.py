@@ -102,6 +102,10 @@ def stability(solution: Solution) -> Stability:
     """
     if not solution.converged:
         raise SettingError("solution", solution.status.value, "must have converged")
+    if any(contact.is_rigid for contact in solution.scene.contacts):
+        from solver.response.exact.answer import stability_exactly  # loaded by such scenes alone
+
+        return stability_exactly(solution.scene, solution.frequency_hz)
     motions = tuple(np.array(contact.motions) for contact in solution.contacts)
     return motions_stability(solution.scene, solution.frequency_hz, motions)
 

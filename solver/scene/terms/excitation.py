@@ -59,12 +59,12 @@ class Base(NamedTuple):
     ----------
     ground : whether the ground moves, and `shares` is what each DOF moves along with it; else the DOFs are
         driven and it is what each moves.
-    shares : DOF and its part of the motion.
+    shares : DOF, its part of the motion and the phase of that [rad].
     motion : what the amplitude is of.
     """
 
     ground: bool
-    shares: tuple[tuple[str, float], ...]
+    shares: tuple[tuple[str, float, float], ...]
     motion: Motion
 
 
@@ -81,10 +81,11 @@ class Excitation(Part):
         Forces on many DOFs, such as a pressure: DOF to its factor of the amplitude, or to [factor, phase in
         rad]; in a scene file also the name of a file (CSV) with rows dof, factor and maybe phase.
     ground : table or None
-        The ground moves: DOF to its share of that motion when the structure moves along as a rigid body. DOFs
-        are then counted from the moving ground, as contacts to it are.
+        The ground moves: DOF to its share of that motion when the structure moves along as a rigid body, or
+        to [share, phase in rad]. DOFs are then counted from the moving ground, as contacts to it are.
     driven : table or None
-        These DOFs move as prescribed, each by its share.
+        These DOFs move as prescribed, each by its share or [share, phase in rad]; one that another excitation
+        drives moves with both.
     motion : "acceleration", "velocity", "displacement" or None
         What the amplitude of a base is of [m/s², m/s, m]; acceleration if left out.
     amplitude : float
@@ -104,8 +105,8 @@ class Excitation(Part):
 
     dof: DofName | None = None
     forces: Pattern | None = None
-    ground: Shares | None = None
-    driven: Shares | None = None
+    ground: Pattern | None = None
+    driven: Pattern | None = None
     motion: Motion | None = None
     amplitude: Signed
     phase: Angle = 0.0
@@ -147,7 +148,7 @@ class Excitation(Part):
     def place(self) -> str:
         """What it acts on, in words."""
         if self.base is not None:
-            return "the ground" if self.base.ground else listed(dof for dof, _ in self.base.shares)
+            return "the ground" if self.base.ground else listed(dof for dof, *_ in self.base.shares)
         return listed(dof for dof, *_ in self.parts)
 
 

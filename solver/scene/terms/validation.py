@@ -55,8 +55,8 @@ def _issues(raw: dict[str, Any], structure: dict[str, Any]) -> Iterator[Issue]:
 
 
 def _base_issues(raw: dict[str, Any], cyclic: bool) -> Iterator[Issue]:
-    """Bases that differ, of a disk, or a relative motion without any."""
-    first: tuple[object, ...] | None = None
+    """Bases of two kinds, of a disk, or a relative motion without any."""
+    first: str | None = None
     for steps, row in rows_of(raw, "excitation"):
         given = [key for key in ("ground", "driven") if row.get(key) is not None]
         if not given:
@@ -66,11 +66,10 @@ def _base_issues(raw: dict[str, Any], cyclic: bool) -> Iterator[Issue]:
             yield Issue(
                 pointer=pointer, message=f"`{given[0]}` moves a base, which a cyclic structure has not"
             )
-        here = (given[0], row[given[0]], row.get("motion") or "acceleration")
-        if first is not None and here != first:
-            message = f"`{given[0]}` must be the same motion in every excitation that moves a base"
+        first = first or given[0]
+        if given[0] != first:
+            message = f"`{given[0]}` beside `{first}`: the ground moves or DOFs are driven, not both"
             yield Issue(pointer=pointer, message=message)
-        first = first or here
     for steps, row in rows_of(raw, "observe"):
         if row.get("relative") and first is None:
             message = "`relative` = true needs a base that moves (`ground` or `driven` of the excitation)"

@@ -27,7 +27,7 @@ from solver.contacts.kernels.system import Evaluation, Receptance, System
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Complex, Integer, Real, coefficient_count, cosine_position
 from solver.jit.separate import apart
-from solver.linear.kernels.receptance import receptance
+from solver.linear.kernels.receptance import forget, receptance
 
 # Entries of `by`: for each element the slopes by kt, mu and its load, then those of the linear part.
 BY_KT, BY_MU, BY_LOAD = 0, 1, 2
@@ -48,6 +48,8 @@ def amplitude_slopes(
     tops: Real, turns: Complex, weights: Real, pulls: Real, by: Real,
 ) -> int:  # fmt: skip
     """Differentiate max|x| of the observed DOF at the solution (u, ω); λ of `system` is the frequency.
+
+    Counted from the middle of its range it is (max x − min x)/2, whose turn is half of both.
 
     Parameters
     ----------
@@ -71,10 +73,14 @@ def amplitude_slopes(
         for column in range(EXTREME_COLUMNS):
             tops[0, column], tops[1, column] = tops[1, column], tops[0, column]
     count = 2 if both else 1
-    for top in range(count):
+    for top in range(2):
         for i in range(system.ks.size):
             angle = system.ks[i] * tops[top, TAU]
             turns[top, i] = tops[top, SIGN] * complex(math.cos(angle), math.sin(angle))
+    if system.centred == 1:
+        count, tops[0, AMPLITUDE] = 1, 0.5 * (high - low)
+        for i in range(system.ks.size):
+            turns[0, i] = 0.5 * (turns[0, i] + turns[1, i])
     good = slopes_along(system, linear, u, omega, point, wanted, count, turns, weights, pulls, by)
     return count if good else 0
 
@@ -123,6 +129,7 @@ def slopes_along(
 @apart
 def _transpose(system: System, linear: Receptance, point: Evaluation) -> None:
     """Transpose A and ∂F/∂U in place."""
+    forget(linear)
     for i in range(system.ks.size):
         A = linear.A[0, i]
         for c in range(A.shape[0]):

@@ -64,7 +64,8 @@ def solve_row(
         known[i] = SOLVED
         observed_motion(system, linear, u, point, x)
         high, _, low, _ = extremes(system, x)
-        values[i, MAX_ABS], values[i, HALF_RANGE] = max(high, -low), 0.5 * (high - low)
+        values[i, HALF_RANGE] = 0.5 * (high - low)
+        values[i, MAX_ABS] = values[i, HALF_RANGE] if system.centred == 1 else max(high, -low)
     return omegas.size, spent
 
 

@@ -14,6 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from solver.balance.contact_hessian import check_measure
 from solver.balance.simplifications import Effects
 from solver.balance.speed_line import check_no_line
 from solver.contacts.kernels.system import System, by_reference
@@ -106,6 +107,7 @@ class Tracker(Looking):
         check_no_line(scene)
         super().__init__(scene, parameter, start, stop, harmonics, effects, pace, allowance)
         check_laws(self.balance.scene)
+        check_measure(self.balance.scene)
         self._first_step = pace.first_step
         self.exact_between: set[tuple[float, float, float]] = set()  # z, z and height of rows: cubics hold
         self._system: System = by_reference(self.balance.system)

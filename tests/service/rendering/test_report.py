@@ -268,3 +268,45 @@ def test_a_report_without_linear_limits() -> None:
     page = design_report(given)
     assert "between the linear limits" not in page
     assert "as given and at the optimum" in page
+
+
+UNDAMPED = """name = "undamped"
+[structure]
+kind = "lumped"
+masses = { a = 1.0, b = 0.5 }
+springs = [{ between = ["a", "ground"], k = 40.0 }, { between = ["a", "b"], k = 20.0 }]
+[[contacts]]
+name = "rub"
+between = ["a", "b"]
+kt = 30.0
+mu = 0.3
+N0 = 1.5
+[excitation]
+dof = "a"
+amplitude = 1.0
+[observe]
+dof = "b"
+band = [0.5, 2.2]
+"""
+
+
+@pytest.mark.parametrize(("load", "bounded"), [((0.2, 6.0), True), ((5e5, 1e6), False)])
+def test_a_design_without_damping_is_reported_with_the_right_word(
+    load: tuple[float, float], bounded: bool, server: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Friction bounds a resonance, or sticks and does not: by the command, and by the service."""
+    (tmp_path / "undamped.toml").write_text(UNDAMPED)
+    low, high = (f"{each:g}" for each in load)
+    words = ["undamped.toml", "--variable", "rub.N0", low, high, "--harmonics", "3"]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(tmp_path)
+        main(["design", *words, "--report", "own.html"])
+        said = capsys.readouterr()
+        job = submitted(server, capsys, "design", *words)
+        main(["watch", job, "--url", server])
+        assert main(["report", job, "--url", server, "--out", "served.html"]) == 0
+    for page in ("own.html", "served.html"):
+        text = (tmp_path / page).read_text("utf-8")
+        assert ">Scene<" in text
+        assert ("nothing bounds the response of any design" in text) != bounded
+    assert ("no damping" in said.err) != bounded

@@ -8,7 +8,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from contact_cases import Case, crude_force, derivative_errors, evaluate, load_zeros, random_case, values
+from contact_cases import (
+    Case,
+    closing_cases,
+    crude_force,
+    derivative_errors,
+    evaluate,
+    load_zeros,
+    random_case,
+    values,
+)
 from force_cases import NAMES, REFERENCE, TRANSITIONS, critical, reference_case
 
 from solver.contacts.kernels import stick_slip_events as events
@@ -111,6 +120,17 @@ def test_the_force_is_continuous_across_a_transition(name: str):
     before, after = (evaluate(transition.family(x + step)) for step in (-gap, gap))
     assert before.pattern != after.pattern
     assert np.abs(after.F - before.F).max() < 1e-6
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_the_force_is_continuous_where_a_contact_closes(seed: int):
+    """It sticks or slips at once, and slips briefly within a grid interval: 2e-3 of the force were missed."""
+    for case in closing_cases(np.random.default_rng(seed)):
+        crude = crude_force(case, 2**16)
+        assert np.abs(evaluate(case).F - crude).max() <= 2e-5 * np.abs(crude).max()
+        for off in (1e-5, 1e-7, 1e-9, 1e-11, 1e-13):
+            more, less = (evaluate(replace(case, mu=case.mu * (1.0 + sign * off))).F for sign in (1.0, -1.0))
+            assert np.abs(more - less).max() <= (3.0 * math.sqrt(off) + 1e-9) * np.abs(more).max()
 
 
 @pytest.mark.parametrize("name", ["after separation: stick becomes slip", "reference"])

@@ -24,6 +24,7 @@ from solver.contacts.kernels.circle.adjoint import (
     moments_between,
     panel_back,
 )
+from solver.contacts.kernels.circle.force import pack
 from solver.contacts.kernels.circle.panels import (
     CURVES,
     DDLIMIT,
@@ -231,18 +232,6 @@ def _linear_parts(
 
 
 @compiled
-def _pack(wave: Array, ks: Integer, q: Array) -> None:
-    """Fill q with the coefficients for `ks` of a curve kept as cosines and sines."""
-    here = 0
-    for i in range(ks.size):
-        q[here] = wave[0, ks[i]]
-        here += 1
-        if ks[i] > 0:
-            q[here] = wave[1, ks[i]]
-            here += 1
-
-
-@compiled
 def _add_block(block: Array, weights: Array, component: int, column: int, factor: Number, G: Array) -> None:
     """Add factor · (weights of a component) · block to the columns of G from `column`."""
     n, size = block.shape
@@ -296,7 +285,7 @@ def circle_gradient(
     table, adjoint = np.empty((STAGES, 3 * size + 1), dtype), np.empty((STAGES, rows + 2), dtype)
     packed = np.empty((3, size), dtype)
     for x in range(3):
-        _pack(waves[x], all_ks, packed[x])
+        pack(waves[x], all_ks, packed[x])
     fill_block(G, 0.0)
     fill_block(F, 0.0)
     if found[HOW] == CLOSES:

@@ -17,6 +17,7 @@ import math
 
 import numpy as np
 
+from solver.contacts.kernels.circle.force import circle_force
 from solver.contacts.kernels.circle.gradient import circle_gradient
 from solver.contacts.kernels.circle.panels import LIMIT, Array, Number, X, Y
 from solver.contacts.kernels.circle.path import BEGAN as PIECE_BEGAN
@@ -173,7 +174,7 @@ def coulomb_circle(
 ) -> tuple[int, int]:  # fmt: skip
     """Fill the force of two or three ports, its Jacobian and its derivative by λ; circular limit.
 
-    Without blocks in `dF_dU` the force alone is found, for four fifths of the time; `dF_dp` is left 0 then.
+    Without blocks in `dF_dU` the force alone is found, for TIME of the time; `dF_dp` is left 0 then.
     """
     row, slope = with_second(row, slope)
     m = U.shape[0]
@@ -236,9 +237,7 @@ def _friction(
     load_of(U, ks, dload, load_ks, slope[KN], all_ks, dN)
     curves_of(U, ks, N, all_ks, kt, mu, waves)
     if dF_dU.shape[0] == 0:
-        # One sum of no weight: what is left is the force.
-        G, weights = np.empty((3, 3 * size + 1)), np.zeros((1, 2, n))
-        circle_gradient(waves, kt / second, ks, all_ks, of_motion, found, pieces, panels, weights, F[:2], G)
+        circle_force(waves, kt / second, ks, all_ks, found, pieces, panels, F[:2])
         return
     G, weights = np.empty((2 * n + 2, 3 * size + 1)), np.empty((0, 2, n))
     circle_gradient(waves, kt / second, ks, all_ks, of_motion, found, pieces, panels, weights, F[:2], G)

@@ -56,6 +56,11 @@ TABLE_FULL, UNSOLVED = -1, -2
 SMALL_TAIL = 1e-6  # integrals over a panel are right to nearly the square of its last Legendre terms
 LEAST_PANEL, SHORT_PANEL = 1e-13, 1e-9  # rad
 NOWHERE = 2.0  # no place in a panel, which is 0..1
+NEAR = 1e-6  # of a panel, within which the end of a slip is looked for
+# Lengths in which directions decay: of the first panel, the same where the force begins along the motion (its
+# derivatives alone have a transient), and after how many nothing is left to be resolved.
+FIRST_PANEL, ALIGNED_PANEL, DECAYED = 3.0, 6.0, 24.0
+ALIGNED = 1e-10  # rad
 IDLE = 4  # pieces without length in a row, after which a slip is not asked whether it sticks at once
 BLIND = 1e-7  # rad, for so long
 
@@ -119,14 +124,20 @@ def _where_it_falls(
         if min(fc, fd) >= -tol:
             return NOWHERE
         hi = c if fc < fd else d
-    for _ in range(50):
-        middle = 0.5 * (lo + hi)
-        if _dense_rate(waves, kappa, begin, h, theta0, theta, middle, at) < 0.0:
-            hi = middle
+    rate_lo = _dense_rate(waves, kappa, begin, h, theta0, theta, lo, at)
+    rate_hi = _dense_rate(waves, kappa, begin, h, theta0, theta, hi, at)
+    place, side = hi, 0
+    for turn in range(50):
+        # Illinois, with a bisection now and then; `_end_of_slip` closes in from there.
+        share = rate_lo / (rate_lo - rate_hi) if rate_lo > 0.0 > rate_hi and turn % 4 != 3 else 0.5
+        last, place = place, lo + share * (hi - lo)
+        rate = _dense_rate(waves, kappa, begin, h, theta0, theta, place, at)
+        if rate < 0.0:
+            hi, rate_hi, rate_lo, side = place, rate, rate_lo * (0.5 if side < 0 else 1.0), -1
         else:
-            lo = middle
-        if hi - lo < 1e-6:
-            break
+            lo, rate_lo, rate_hi, side = place, rate, rate_hi * (0.5 if side > 0 else 1.0), 1
+        if hi - lo < NEAR or abs(place - last) < NEAR:
+            return place
     return hi
 
 
@@ -227,7 +238,7 @@ def slip_on(
     tau, factor, tol, small = begin, 1.0, numbers[TOL_RATE], numbers[TAIL_SIZE]
     curves_at(waves, begin, at)
     first, limit0, limits = slip_rate(at, kappa, theta0), at[LIMIT], np.empty(STAGES)
-    h = _first_panel(at, kappa, theta0, numbers)
+    h, decay = _first_panel(at, kappa, theta0, numbers)
     while tau < end:
         rest = end - tau
         share = rest if h > 0.95 * rest else (0.5 * rest if h > 0.5 * rest else h)
@@ -238,7 +249,9 @@ def slip_on(
             h = 0.2 * share
             continue
         error = _error_of(limit0, nodes, theta0, theta, numbers[SCALE], limits)
-        change = 3.0 if error == 0.0 else min(3.0, max(0.15, 0.9 * (small / error) ** (1.0 / STAGES)))
+        change = 3.0 if to - begin < DECAYED * decay else 64.0
+        if error > 0.0:
+            change = min(change, max(0.15, 0.9 * (small / error) ** (1.0 / STAGES)))
         if error > 3.0 * small and share > LEAST_PANEL:
             h = change * share
             continue
@@ -269,13 +282,15 @@ def slip_on(
 
 
 @compiled
-def _first_panel(at: Real, kappa: float, theta0: float, numbers: Real) -> float:
-    """Return the length of a slip's first panel: three times that in which the direction decays."""
-    _, stiff, g, _ = turning(at, kappa, theta0)
-    h, scale = numbers[LONGEST], at[LIMIT] * g
-    if at[LIMIT] > 1e-12 * numbers[SCALE] and abs(stiff) * h > 3.0 * scale:
-        h = 3.0 * scale / abs(stiff)
-    return float(h)
+def _first_panel(at: Real, kappa: float, theta0: float, numbers: Real) -> tuple[float, float]:
+    """Return the length of a slip's first panel, and that in which its direction decays (none: 0)."""
+    F, stiff, g, _ = turning(at, kappa, theta0)
+    longest, scale = numbers[LONGEST], at[LIMIT] * g
+    if not (at[LIMIT] > 1e-12 * numbers[SCALE] and abs(stiff) * longest > FIRST_PANEL * scale):
+        return longest, 0.0
+    decay = scale / abs(stiff)
+    aligned = stiff < 0.0 and abs(F) <= -ALIGNED * stiff
+    return min((ALIGNED_PANEL if aligned else FIRST_PANEL) * decay, longest), decay
 
 
 @compiled

@@ -71,6 +71,8 @@ TURN = 2.0 * math.pi
 FORGOTTEN = (
     24.0  # exponent of what is left of a difference, at which the exact march begins before its period
 )
+MOST_FORGETTING = 0.75  # of a period, beyond which an exact march before it costs more than it saves,
+LITTLE = 3.0  # but for what slips so little that it may end in sticking
 REPEATS = 3e-9  # change of the force over a period, relative to the largest limit, that counts as none
 MOST_ROUNDS = 60
 MOST_TRANSIENT = 40  # periods after which a slider that still slips is taken to do so for ever
@@ -126,25 +128,30 @@ def _march_intervals(
 
 
 @compiled
-def _rough_step(force: Real, dx: float, dy: float, limit: float) -> float:
-    """Move a force by one straight step (dx, dy) under a limit; return what the step forgets, 0 if it sticks.
+def _rough_step(force: Real, dx: float, dy: float, before: float, limit: float) -> float:
+    """Move a force by one straight step (dx, dy) while the limit goes straight too.
 
-    In slip tan φ/2, φ the angle from the step, decays by exp(−|step|/limit): forgetting is the exponent.
+    In slip tan φ/2, φ the angle from the step, decays by exp(−∫|dstep|/limit).
+
+    Returns
+    -------
+    What the step forgets, that exponent, 0 if it sticks.
     """
     tx, ty = force[0], force[1]
-    size, trial = math.hypot(tx, ty), math.hypot(tx + dx, ty + dy)
+    trial = math.sqrt((tx + dx) ** 2 + (ty + dy) ** 2)
     if trial <= limit:
         force[0], force[1] = tx + dx, ty + dy
         return 0.0
-    stuck = min(max((limit - size) / (trial - size), 0.0), 1.0) if trial > size else 0.0
+    below = max(before - math.sqrt(tx * tx + ty * ty), 0.0)
+    stuck = below / (below + trial - limit)
     tx, ty = tx + stuck * dx, ty + stuck * dy
-    size, length = math.hypot(tx, ty), math.hypot(dx, dy)
+    size, length = math.sqrt(tx * tx + ty * ty), math.sqrt(dx * dx + dy * dy)
     if size == 0.0 or length == 0.0:
         share = limit / trial
         force[0], force[1] = share * (force[0] + dx), share * (force[1] + dy)
         return 0.0
     nx, ny, wx, wy = tx / size, ty / size, dx / length, dy / length
-    c, exponent = nx * wx + ny * wy, (1.0 - stuck) * length / limit
+    c, exponent = nx * wx + ny * wy, 2.0 * (1.0 - stuck) * length / (size + limit)
     q = math.exp(-exponent)
     below = 1.0 + c + q * q * (1.0 - c)
     along, kept = (1.0 + c - q * q * (1.0 - c) - 2.0 * q * c) / below, 2.0 * q / below
@@ -160,7 +167,8 @@ def _rough(grid: Real, kappa: float, force: Real, history: Real) -> tuple[int, i
     Returns
     -------
     (from, to) points of the grid: at `to` it slips most, and what happened before `from` is forgotten there;
-    −1 if it does not slip in the second period. `force` is that at `from`.
+    both the same where that takes most of a period, −1 if it does not slip in the second one. `force` is that
+    at `from`.
     """
     n = grid.shape[1]
     force[0], force[1] = grid[0, 0], grid[1, 0] / kappa
@@ -174,7 +182,7 @@ def _rough(grid: Real, kappa: float, force: Real, history: Real) -> tuple[int, i
             forgets = 0.0
             if period > 0 or j > 0:
                 dx, dy = grid[0, j] - grid[0, before], (grid[1, j] - grid[1, before]) / kappa
-                forgets = _rough_step(force, dx, dy, grid[2, j])
+                forgets = _rough_step(force, dx, dy, grid[2, before], grid[2, j])
             history[0, j], history[1, j], history[2, j] = forgets, force[0], force[1]
             if period > 0 and forgets > most:
                 best, most = j, forgets
@@ -184,6 +192,8 @@ def _rough(grid: Real, kappa: float, force: Real, history: Real) -> tuple[int, i
     while total < FORGOTTEN and back < n:
         total += history[0, (best - back + n) % n]
         back += 1
+    if back > MOST_FORGETTING * n and total >= LITTLE:
+        back = 0
     begin = best - back if best >= back else best - back + n
     force[0], force[1] = history[1, begin % n], history[2, begin % n]
     return begin, begin + back
@@ -281,10 +291,13 @@ def _closed(
         tau = TURN * begin / n
         curves_at(waves, tau, at)
         _start_at(at, kappa, force[0], force[1], state)
-        count, _ = march_path(waves, kappa, grid, tau, TURN * place / n, state, numbers, pieces, panels, 0, 0)
-        if count < 0:
-            return count
-        force[0], force[1] = state[S_TX], state[S_TY]
+        if place > begin:
+            count, _ = march_path(
+                waves, kappa, grid, tau, TURN * place / n, state, numbers, pieces, panels, 0, 0
+            )
+            if count < 0:
+                return count
+            force[0], force[1] = state[S_TX], state[S_TY]
         how = _repeat(waves, kappa, grid, TURN * place / n, force, numbers, pieces, panels, found)
         if how != STUCK:
             return how

@@ -20,7 +20,7 @@ from solver.jit.fourier import Complex, Integer, Real
 from solver.jit.law_functions import call_force, call_rate, call_step
 from solver.jit.separate import apart
 
-RAMP = 48  # steps from no motion to that of the first node, in an eighth of a period
+_RAMP = 48  # steps at least from no motion to that of the first node, in an eighth of a period
 _AT_REST, _NEAR_REST = 1e-9, 2e-5  # of the largest velocity: what is a reversal, and the same for differences
 _RAMP_SHARE = 0.125
 
@@ -109,11 +109,22 @@ def go_round(course: Course, state: Real, force: Real, tops: Real) -> bool:
 
 
 @compiled
+def _ramp_steps(course: Course) -> int:
+    """Return the steps to the first node: about as long as those of the period, and no more than it has."""
+    travel, steps = 0.0, _RAMP
+    for j in range(1, course.u.size):
+        travel += abs(course.u[j] - course.u[j - 1])
+    while 2 * steps <= course.nodes and 2.0 * steps * travel <= course.nodes * abs(course.u[0]):
+        steps *= 2
+    return steps
+
+
+@compiled
 def ramp_of(course: Course) -> Course:
     """Return the course from no motion to that of the first node."""
     u, v = course.u[0], course.v[0]
     time = _RAMP_SHARE * 2.0 * math.pi / course.omega
-    count = 1 if course.steps else RAMP
+    count = 1 if course.steps else _ramp_steps(course)
     points = halves_of(course.steps) * count + 1
     tau, weight = np.empty(count + 1), np.zeros(count + 1)
     basis = np.zeros((points, course.basis.shape[1]))

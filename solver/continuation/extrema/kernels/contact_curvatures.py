@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from solver.balance.kernels.slopes import springs_of
 from solver.contacts.kernels.columns import KT, MU
 from solver.contacts.kernels.coulomb.force import contact_force
 from solver.contacts.kernels.coulomb.hessian import second_along
@@ -45,13 +46,13 @@ def _jenkins_at(system: System, e: int, u: Real, at: Summit) -> bool:
         u[c * n : (c + 1) * n], system.ks, at.load[e], system.load_ks, row[KT], row[MU], system.cos_table,
         system.sin_table, at.segments[e], at.dF_dU[block], at.dF_dkt[e], at.dF_dmu[e], at.dF_dN[e], at.F[c],
     )  # fmt: skip
-    at.states[e], at.counts[e], at.point.slopes[e] = state, count, np.nan
+    at.states[e], at.counts[e], at.point.slopes[c] = state, count, np.nan
     if state == FAILED:
         return False
     if state == SEPARATED:
-        at.point.slopes[e] = 0.0
+        at.point.slopes[c] = 0.0
     elif state == STUCK and at.segments[e, 0, BEGAN] == UNLOADED:
-        at.point.slopes[e] = row[KT]
+        at.point.slopes[c] = row[KT]
     for i in range(n):
         total = at.slope[e, KT] * at.dF_dkt[e, i] + at.slope[e, MU] * at.dF_dmu[e, i]
         for j in range(at.dload.shape[1]):
@@ -71,7 +72,8 @@ def _other_law_at(system: System, e: int, u: Real, at: Summit) -> bool:
         system.cos_table, system.sin_table, at.point.segments, at.F[c:end], at.dF_dU[block:last],
         at.dF_dp[c:end],
     )  # fmt: skip
-    at.states[e], at.point.slopes[e] = state, np.nan
+    at.states[e] = state
+    springs_of(at.dF_dU[block:last], at.point.slopes[c:end])
     return bool(state != FAILED)
 
 

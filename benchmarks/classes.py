@@ -1,0 +1,341 @@
+"""Every class of work at its cost: what is to be reached, what is, and the ratio to other checkouts.
+
+`python -m benchmarks.classes` prints the table, `--row NAME …` some of its rows, `--against FOLDER` the ratio
+to the checkout there. Each checkout runs in a process of its own, the calls of a row in turn, so that what
+else the machine does meets both alike.
+
+A row is a function that prepares its work and returns the call to be timed; what the call gives back must
+be equal in all checkouts. Modules of the solver are imported inside: each checkout has its own.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import resource
+import statistics
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+from benchmarks.harness import Checkout, expect, table
+
+AGREE = 1e-9  # relative difference of a result of two checkouts
+PATIENCE = 900.0  # s on the wall that an answer is waited for
+WARM = 20.0  # s of a process: what takes longer is timed at its first call alone
+MIB = 1024.0  # ru_maxrss is in KiB
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Answer:
+    """What a call found.
+
+    Attributes
+    ----------
+    value : must be equal in all checkouts.
+    parts : into so many points the time is divided.
+    figure : stands in the table instead of the time.
+    """
+
+    value: float
+    parts: int = 1
+    figure: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Row:
+    """A row of the table: what is done, the figure that is wanted in its unit, and how often it is timed."""
+
+    name: str
+    work: str
+    goal: float
+    unit: str
+    runs: int
+    prepare: Callable[[], Callable[[], Answer]]
+
+
+ROWS: dict[str, Row] = {}
+
+
+def row(
+    name: str, work: str, goal: float, *, unit: str = "s", runs: int = 5
+) -> Callable[[Callable[[], Callable[[], Answer]]], Callable[[], Callable[[], Answer]]]:
+    """Enter a function into the table as the row `name`."""
+
+    def entered(prepare: Callable[[], Callable[[], Answer]]) -> Callable[[], Callable[[], Answer]]:
+        ROWS[name] = Row(name=name, work=work, goal=goal, unit=unit, runs=runs, prepare=prepare)
+        return prepare
+
+    return entered
+
+
+def lap_joint(nodes: int, *, amplitude: float = 30.0) -> Any:
+    """Two bars in space, pressed together at so many nodes that rub in two directions, a mass at the end.
+
+    With an amplitude of 30 N all nodes stick.
+    """
+    from solver import Scene
+
+    bars = [[f"{bar}{i}" for i in range(nodes)] for bar in "ab"]
+    springs: list[dict[str, Any]] = [
+        {"between": [f"{one}{axis}", f"{other}{axis}"], "k": 5e7, "c": 5.0}
+        for bar in bars
+        for one, other in pairwise(bar)
+        for axis in "xyz"
+    ]
+    first, last = bars[0][0], bars[1][-1]
+    springs += [{"between": [f"{first}{axis}", "ground"], "k": 1e7, "c": 5.0} for axis in "xyz"]
+    springs.append({"between": ["tipz", f"{last}z"], "k": 3e5, "c": 2.0})
+    springs.append({"between": [f"{last}z", f"{bars[0][-1]}z"], "k": 1e4, "c": 1.0})
+    return Scene.from_dict(
+        {
+            "name": f"lap-joint-{nodes}",
+            "structure": {
+                "kind": "lumped",
+                "masses": {f"{node}{axis}": 0.01 for bar in bars for node in bar for axis in "xyz"}
+                | {"tipz": 0.5},
+                "springs": springs,
+            },
+            "contacts": [
+                {
+                    "name": f"c{i}", "law": "coulomb-3d", "between": [f"{b}x", f"{a}x"],
+                    "between_second": [f"{b}y", f"{a}y"], "normal_between": [f"{b}z", f"{a}z"],
+                    "kt": 2e8 / nodes, "kn": 3e8 / nodes, "mu": 0.3, "N0": 2400.0 / nodes,
+                    "prestressed": True,
+                }
+                for i, (a, b) in enumerate(zip(*bars, strict=True))
+            ],
+            "excitation": {"forces": {"tipz": 1.0, f"{last}x": 2.0}, "amplitude": amplitude},
+            "observe": {"dof": "tipz", "band": [60.0, 140.0]},
+        }
+    )  # fmt: skip
+
+
+def _solved(scene: Any, frequency_hz: float, harmonics: int, *, slips: bool = True) -> Callable[[], Answer]:
+    """Return the call that solves at a frequency."""
+    import solver
+
+    def call() -> Answer:
+        found = solver.solve(scene, frequency_hz=frequency_hz, harmonics=harmonics)
+        expect(f"{scene.name}: {found.status.value}", found.converged)
+        moving = any(one.state.value != "stuck" for one in found.contacts)
+        expect(f"{scene.name}: some contact slips: {moving}", moving == slips)
+        return Answer(value=found.max_abs)
+
+    return call
+
+
+@row("lap-16", "lap joint in space, 16 nodes, H = 3, all stuck, a solve", 0.05, runs=9)
+def _lap_of_16() -> Callable[[], Answer]:
+    return _solved(lap_joint(16), 100.0, 3, slips=False)
+
+
+@row("lap-30", "the same, 30 nodes", 0.2, runs=9)
+def _lap_of_30() -> Callable[[], Answer]:
+    return _solved(lap_joint(30), 100.0, 3, slips=False)
+
+
+@row("lap-122", "the same, 122 nodes: 366 ports, 733 DOFs (no more than 4 GiB)", 3.0, runs=3)
+def _lap_of_122() -> Callable[[], Answer]:
+    return _solved(lap_joint(122), 100.0, 3, slips=False)
+
+
+@row("lap-122-slips", "the same, 40 times the force: some nodes slip", 60.0, runs=1)
+def _lap_that_slips() -> Callable[[], Answer]:
+    return _solved(lap_joint(122, amplitude=1200.0), 100.0, 3)
+
+
+@row("lap-122-mode", "a nonlinear mode of 25 points of the same, H = 3", 60.0, runs=1)
+def _mode_of_the_lap() -> Callable[[], Answer]:
+    import solver
+
+    scene = lap_joint(122)
+
+    def call() -> Answer:
+        found = solver.nonlinear_mode(
+            scene, 1, amplitudes=(1e-4, 3e-2), harmonics=3, errors=False, most_points=25
+        )
+        expect("a mode has points", len(found.points) > 1)
+        return Answer(value=found.points[-1].frequency_hz)
+
+    return call
+
+
+@row("contacts-324", "324 contacts in space on 40 modes, H = 11, a solve", 5.0, runs=3)
+def _many_contacts() -> Callable[[], Answer]:
+    from benchmarks.space import plate
+
+    return _solved(plate(324), 1.1, 11)
+
+
+@row("rigid-damper", "rigid damper, 2 × 25 points, 2 blades of 20 modes, H = 7, a branch", 1.5, runs=3)
+def _rigid_damper() -> Callable[[], Answer]:
+    from benchmarks.space import damper
+    from solver import ContinuationSettings
+    from solver.balance.balance import build
+    from solver.balance.workspace import Workspace
+    from solver.continuation.branches.sweep import walk
+
+    scene = damper()
+    balance, (low, high) = build(scene, harmonics=7), scene.observe.band
+
+    def call() -> Answer:
+        workspace = Workspace.of(balance)
+        start = workspace.solve(balance.parameter.inside(low))
+        expect("the start converges", start.converged)
+        stretches = list(walk(workspace, low, high, ContinuationSettings(), start.u))
+        expect(f"the branch ends {stretches[-1].status}", stretches[-1].status.name == "COMPLETED")
+        return Answer(value=float(abs(stretches[-1].solutions[-1][:-1]).max()))
+
+    return call
+
+
+def _mistuned_fe_disk() -> Any:
+    """Return the shipped disk of finite elements with loads that differ from blade to blade."""
+    import numpy as np
+
+    import solver
+    from solver.scene.cyclic.annulus import annulus
+
+    scene = annulus(solver.load_scene("fe-disk"))
+    factors = 1.0 + 0.1 * np.random.default_rng(1).normal(size=len(scene.contacts))
+    loads = {f"{one.name}.N0": 50.0 * float(by) for one, by in zip(scene.contacts, factors, strict=True)}
+    return scene.with_values(loads)
+
+
+@row(
+    "fe-disk-solve", "`fe-disk` mistuned (48 contacts, 24 sectors), H = 5, a point from nothing", 1.0, runs=3
+)
+def _disk_from_nothing() -> Callable[[], Answer]:
+    return _solved(_mistuned_fe_disk(), 172.0, 5)
+
+
+@row("fe-disk-branch", "the same, a point along a branch", 0.2, runs=1)
+def _disk_along_a_branch() -> Callable[[], Answer]:
+    import solver
+
+    scene = _mistuned_fe_disk()
+
+    def call() -> Answer:
+        branch = solver.sweep(scene, start=170.0, stop=174.0, harmonics=5)
+        expect(f"the branch is {branch.status.value}", branch.completed)
+        return Answer(value=branch.peak.value, parts=len(branch.values))
+
+    return call
+
+
+def _forecast_scenes() -> list[tuple[Any, int]]:
+    """Return scenes of all classes, each with its harmonics."""
+    import solver
+    from benchmarks.problems import chain, graded_chain
+    from benchmarks.space import damper, masses, plate
+
+    shipped = ("two-dof", "bladed-disk", "shroud-3d", "platform-wedge", "platform-cylinder", "fe-disk")
+    return [
+        *((solver.load_scene(name), 11) for name in shipped),
+        (chain(8, sliders=True), 11), (chain(32, sliders=True), 5), (graded_chain(100), 7),
+        (masses(4, "elastic-normal"), 11), (masses(16, "elastic-normal"), 7), (masses(4, "coulomb-3d"), 11),
+        (masses(16, "coulomb-3d"), 5), (damper(25), 7), (plate(100), 5), (plate(324), 5), (lap_joint(16), 3),
+        (lap_joint(30), 3), (lap_joint(60, amplitude=1200.0), 3), (_mistuned_fe_disk(), 5),
+    ]  # fmt: skip
+
+
+@row("forecast", "`plan`'s forecast of a point, most of 9 of 10 scenes", 2.0, unit="× off", runs=1)
+def _forecasts() -> Callable[[], Answer]:
+    import solver
+
+    def call() -> Answer:
+        off = []
+        for scene, harmonics in _forecast_scenes():
+            low, high = scene.observe.band
+            told = solver.plan(scene, harmonics=harmonics).seconds_a_point
+            spent = []
+            for share in (0.3, 0.5, 0.7, 0.5):
+                begun = time.process_time()
+                solver.solve(scene, frequency_hz=low + share * (high - low), harmonics=harmonics)
+                spent.append(time.process_time() - begun)
+            took = statistics.median(spent[1:])
+            off.append(max(told / took, took / told))
+            print(f"{scene.name}: {told:.2g} s foretold, {took:.2g} s", file=sys.stderr, flush=True)
+        return Answer(value=1.0, figure=sorted(off)[math.ceil(0.9 * len(off)) - 1])
+
+    return call
+
+
+def classes() -> None:
+    """Every class of work beside its goal: `python -m benchmarks.classes --help` has rows and ratios."""
+    _print_table(list(ROWS), [])
+
+
+def serve() -> None:
+    """Answer with cost, result and memory of one call for each name of a row."""
+    calls: dict[str, Callable[[], Answer]] = {}
+    for line in sys.stdin:
+        name = line.rstrip("\n")
+        if name not in calls:
+            calls[name] = ROWS[name].prepare()
+        begun = time.process_time()
+        found = calls[name]()
+        spent = (time.process_time() - begun) / found.parts
+        mib = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / MIB
+        figure = spent if found.figure is None else found.figure
+        print(json.dumps({"figure": figure, "value": found.value, "mib": mib}), flush=True)
+
+
+def _measure(which: Row, folders: list[Path]) -> tuple[str, ...]:
+    """Return a line of the table: a row in all checkouts, ours the first."""
+    sides = [Checkout(folder, "benchmarks.classes") for folder in folders]
+    found = [[side.ask(which.name, PATIENCE)] for side in sides]
+    for _ in range(which.runs):
+        for side, answers in zip(sides, found, strict=True):
+            if answers[0] is not None and answers[0]["figure"] <= WARM:
+                answers.append(side.ask(which.name, PATIENCE))
+    for side in sides:
+        side.close()
+    ours = found[0][-1]
+    expect(f"{which.name}: no answer after {PATIENCE:g} s", ours is not None)
+    assert ours is not None
+    figures = []
+    for answers in found:
+        warm = [each["figure"] for each in answers[1:] or answers if each is not None]
+        figures.append(statistics.median(warm) if warm else math.nan)
+        for each in answers:
+            off = 0.0 if each is None else abs(each["value"] / ours["value"] - 1.0)
+            expect(f"{which.name}: results are {off:.1e} apart", off <= AGREE)
+    ratios = [
+        f"{each:.3g}" + (f" ({each / figures[0]:.1f} ×)" if each == each else "") for each in figures[1:]
+    ]
+    met = "yes" if figures[0] <= which.goal else "no"
+    return (
+        which.name, which.work, f"{which.goal:g} {which.unit}", f"{figures[0]:.3g}", met,
+        f"{ours['mib']:.0f}", *ratios,
+    )  # fmt: skip
+
+
+def _print_table(names: list[str], others: list[Path]) -> None:
+    """Print the rows of some names."""
+    here = Path(__file__).resolve().parents[1]
+    folders = [here, *(folder.resolve() for folder in others)]
+    lines = [_measure(ROWS[name], folders) for name in names]
+    header = ("row", "work", "goal", "figure", "met", "MiB", *(folder.name for folder in folders[1:]))
+    table("Every class at its cost [of the process, one thread, warm, medians]", header, lines)
+
+
+def main() -> None:
+    """Print the table, or some of its rows, beside other checkouts."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.classes", description=__doc__)
+    parser.add_argument(
+        "--row", nargs="+", choices=ROWS, default=list(ROWS), metavar="NAME", help=", ".join(ROWS)
+    )
+    parser.add_argument("--against", nargs="+", type=Path, default=[], metavar="FOLDER")
+    asked = parser.parse_args()
+    _print_table(asked.row, asked.against)
+
+
+if __name__ == "__main__":
+    main()
