@@ -186,8 +186,9 @@ def _twice_rigid(
         done += changes.size
         if status is not MarchStatus.CONVERGED:
             break
+    order = moreau.ORDER if np.all(np.isfinite(equations.system.kn)) else 1
     return describe(
-        record=runs[-1][0], coarse=runs[0][0], order=moreau.ORDER,
+        record=runs[-1][0], coarse=runs[0][0], order=order,
         transient=_left_to_decay(runs[0][1], runs[-1][1]), periods=done, contacts=names,
         frequency_hz=frequency_hz, steps_per_period=each, status=status, drift=0.0,
     )  # fmt: skip

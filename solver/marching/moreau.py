@@ -16,7 +16,7 @@ from solver.marching.kernels import state as kernel
 from solver.marching.result import MarchStatus
 
 FloatArray = NDArray[np.float64]
-ORDER = 2
+ORDER = 2  # of the steps; where a load is a mean over the step, 1
 STEPS = 1024  # a period, of the finer run
 REPEATS = 1e-9  # relative change over a period: where a step is halved is a jump of this size
 _LAWS = {kernel.COULOMB: stepping.ELASTIC, kernel.ELASTIC_NORMAL: stepping.ELASTIC, kernel.GAP: stepping.GAP}
@@ -92,7 +92,8 @@ def run(
     it = stepped(equations, steps)
     m, n = it.law.size, x.size
     kept = np.eye(n)[equations.observed]
-    force, doing, changes = np.zeros(m), np.zeros(m, np.int64), []
+    force, doing = np.zeros(m), np.zeros(m, np.int64)
+    changes: list[float] = []
     elastic = it.law == stepping.ELASTIC
     nothing, status = np.empty((2, 0)), MarchStatus.MAX_PERIODS
     while len(changes) < max_periods:

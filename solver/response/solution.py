@@ -54,6 +54,10 @@ class SolutionStatus(Enum):
         "A contact with kn = inf opens under its load: what happens where it closes again is an impact, "
         "which takes a law of its own. Press it harder, or give it a finite kn."
     )
+    NO_ORBIT = (
+        "The events of the contacts were followed for thousands of periods without a motion that repeats: "
+        "change the frequency a little, give some damping, or look at a march, it may have another period."
+    )
     LAW_FAILED = (
         "The law of a contact gives no finite force that repeats from period to period for a motion tried: "
         "look at its functions and parameters, or give it more samples."

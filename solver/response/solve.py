@@ -47,6 +47,7 @@ def solve(
     harmonics: int = 11,
     accuracy: float | None = None,
     effects: Effects | None = None,
+    exact: bool = False,
 ) -> Solution:
     """Find the periodic response of a scene at one frequency.
 
@@ -58,28 +59,35 @@ def solve(
     accuracy : estimated error of the amplitude, relative to it, that the fewest harmonics are chosen for.
     effects : what is paid for though the scene does not call for it; see
     `solver.balance.simplifications.Effects`.
+    exact : follow the events of the contacts instead, to rounding (`solver.response.exact`), as scenes with
+    rigid contacts always are. Where no orbit is found the balance answers, with ACCURACY_NOT_REACHED.
 
     Raises
     ------
     SettingError
-        A bad frequency, number of harmonics or accuracy.
+        A bad frequency, number of harmonics or accuracy; a scene that has no place in an exact solution.
     """
     begun = time.perf_counter()
     check_frequency("frequency_hz", frequency_hz)
     scene = scene.at_frequency(frequency_hz)
-    if any(contact.is_rigid for contact in scene.contacts):
-        from solver.response.exact.answer import solve_exactly  # loaded by such scenes alone
-
-        return solve_exactly(scene, frequency_hz, check_harmonics(harmonics))
     omega = 2.0 * math.pi * frequency_hz
     good_enough = True
+    rigid = any(contact.is_rigid for contact in scene.contacts)
+    if exact or rigid:
+        from solver.response.exact.answer import solve_exactly  # loaded where it is asked for
+
+        orbit = solve_exactly(scene, frequency_hz, check_harmonics(harmonics))
+        if rigid or orbit.converged:
+            return orbit
+        good_enough = False
     if accuracy is None:
         workspace = Workspace.of(build(scene, harmonics=harmonics, effects=effects))
         found = solve_from_nothing(workspace, omega)
     else:
-        workspace, found, good_enough = solve_to(
+        workspace, found, reached = solve_to(
             lambda h: build(scene, harmonics=h, effects=effects), omega, accuracy
         )
+        good_enough = good_enough and reached
     if not found.converged:
         # Loaded here: it brings the kernels of a walk along, which an answer does without.
         from solver.continuation.endings import too_stiff_between

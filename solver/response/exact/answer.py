@@ -16,7 +16,7 @@ from solver.errors import SettingError
 from solver.jit.fourier import Real
 from solver.response.contact_response import OPENS, ContactResponse, ContactState
 from solver.response.exact.flow import LiftsError, NoMotionError, exponential, first_root, steps_of, taylor
-from solver.response.exact.orbit import PERIOD, Ended, Orbit, find, grazed
+from solver.response.exact.orbit import PERIOD, ROUNDING, Ended, Orbit, find, grazed
 from solver.response.exact.piecewise import STICK, Mode, Piecewise, State
 from solver.response.solution import HISTORY_DEPENDENT, MEAN_UNDETERMINED, Solution, SolutionStatus
 from solver.response.stability.floquet import Stability, growth_of
@@ -24,7 +24,7 @@ from solver.response.stability.verdict import verdict_of
 from solver.scene.scene import Scene
 
 _GAUSS = 12
-_TURN = 2.0  # rad by which the highest harmonic asked for turns over a panel at most
+_TURN = 5.0  # rad by which the highest harmonic asked for turns over a panel at most
 _MOVES = 1e-7  # of the largest change of a motion: less is none
 
 
@@ -110,12 +110,12 @@ def solve_exactly(scene: Scene, frequency_hz: float, harmonics: int) -> Solution
     """
     begun = time.perf_counter()
     scene = scene.at_frequency(frequency_hz)
-    found = _orbit_of(scene, frequency_hz)
-    highest = max(harmonics, found[0].top)
-    if isinstance(found[1], SolutionStatus):
-        return _nothing(scene, frequency_hz, harmonics, highest, found[1], time.perf_counter() - begun)
-    solution = _described(*found, frequency_hz, harmonics, highest, begun)
-    solution._judged.append(verdict_of(_stability(found[1], frequency_hz, begun)))  # a by-product here
+    system, orbit = _orbit_of(scene, frequency_hz)
+    highest = max(harmonics, system.top)
+    if isinstance(orbit, SolutionStatus):
+        return _nothing(scene, frequency_hz, harmonics, highest, orbit, time.perf_counter() - begun)
+    solution = _described(system, orbit, frequency_hz, harmonics, highest, begun)
+    solution._judged.append(verdict_of(_stability(orbit, frequency_hz, begun)))  # a by-product here
     return solution
 
 
@@ -142,9 +142,9 @@ def _orbit_of(scene: Scene, frequency_hz: float) -> tuple[Piecewise, Orbit | Sol
     except LiftsError:
         return system, SolutionStatus.RIGID_OPENS
     except NoMotionError:
-        return system, SolutionStatus.NOT_CONVERGED
+        return system, SolutionStatus.NO_ORBIT
     if isinstance(found, Ended):
-        return system, SolutionStatus.RATCHETS if found is Ended.RATCHETS else SolutionStatus.NOT_CONVERGED
+        return system, SolutionStatus.RATCHETS if found is Ended.RATCHETS else SolutionStatus.NO_ORBIT
     return system, found
 
 
@@ -164,7 +164,7 @@ def _described(
         status=SolutionStatus.CONVERGED, max_abs=largest, half_peak_to_peak=0.5 * (high - low),
         mean=float(observed[0]), harmonics=np.concatenate([[abs(observed[0])], amplitudes]),
         observed=observed, contacts=contacts, flags=_flags(system, orbit, contacts),
-        residual=orbit.residual, error_estimate=gain * orbit.error + 1e-14 * largest,
+        residual=orbit.residual, error_estimate=gain * orbit.error + ROUNDING * largest,
         newton_iterations=orbit.steps, seconds=time.perf_counter() - begun,
     )  # fmt: skip
 

@@ -19,12 +19,13 @@ from solver.response.exact.piecewise import FREE, STICK, Piecewise, State
 
 PERIOD = 2.0 * np.pi
 CLOSED = 1e-11  # distance after a period, of the largest number of the state, from which on it is polished
+ROUNDING = 5e-13  # of the largest number of the state: of 88 orbits with proofs the worst was 4e-13 off
 _NEWTON, _POLISH = 12, 4
 MOST_PERIODS = 4000
 _OPEN = 1e-9  # singular values of 1 − Φ below: nothing decides that direction
 _REPEATS = 1e-9
 MOST_GRAZED = 100  # periods after which a march has decided whether what slips by next to nothing sticks
-_GRAZES = 1e-6  # of its motion: what slips by less stands at the edge of where it may stick
+_GRAZES = 1e-6  # of its largest motion: what slips by less stands at the edge of where it may stick
 
 
 class Ended(Enum):
@@ -95,7 +96,7 @@ def grazed(system: Piecewise, orbit: Orbit) -> bool:
             elif xi == FREE:
                 travel = np.inf
         places = [float(row @ each) for each in ends]
-        if 0.0 < travel <= _GRAZES * (max(places) - min(places)):
+        if 0.0 < travel <= _GRAZES * max(map(abs, places)):
             return True
     return False
 
@@ -131,7 +132,7 @@ def _newton(system: Piecewise, march: Flow, periods: int) -> Orbit | None:
             if now <= CLOSED * size:
                 polished += 1
                 if best is None or now < best[0]:
-                    error = 4.0 * float(np.abs(change).max(initial=0.0)) + 1e-15 * size
+                    error = 10.0 * float(np.abs(change).max(initial=0.0)) + ROUNDING * size
                     best = now, Orbit(
                         pieces=flow.pieces, residual=now / size if size > 0.0 else 0.0, error=error,
                         multipliers=multipliers, open_directions=open_directions, periods=periods,
@@ -166,7 +167,7 @@ def _solved(system: Piecewise, flow: Flow, state: State, away: Real) -> tuple[Re
     change[:nd] = allowed @ (right[kept].T @ ((left[:, kept].T @ (allowed.T @ away)) / values[kept]))
     directions = np.zeros((system.nw, int((~kept).sum())))
     directions[:nd] = allowed @ right[~kept].T
-    return change, directions, np.linalg.eigvals(reduced)
+    return change, directions, np.asarray(np.linalg.eigvals(reduced), dtype=np.complex128)
 
 
 def _tangent(system: Piecewise, state: State) -> Real:

@@ -30,7 +30,8 @@ from solver.scene.scene import Scene
 STICK, FREE = 0, 2  # of a slider; one that slips has its direction, +1 or -1
 TO_SLIP, TO_REST, TO_OPEN, TO_CLOSE, AT_GAP, LIFTS = range(6)  # what ends a piece
 _PARALLEL = 1e-12
-_ELASTIC = "give one a large finite kt (1e4 times the stiffness beside it is about 0.3 % off)"
+_ELASTIC = "give one a large finite kt (the error falls with its square root)"
+_EVENTS = "where contacts are followed by their events (kt = inf, kn = inf, exact)"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -173,7 +174,9 @@ class Piecewise:
         """Sort the contacts into sliders with members, and springs on one side."""
         raw: list[tuple[int, Real, AnyContact]] = []
         self.gaps: list[tuple[int, Real, float, float]] = []
-        first, rows, stiffnesses = 0, [], []
+        first = 0
+        rows: list[Real] = []
+        stiffnesses: list[float] = []
         belongs: list[tuple[int, float]] = []
         for number, contact in enumerate(scene.contacts):
             row = ports[first]
@@ -183,7 +186,7 @@ class Piecewise:
                 raw.append((number, ports[first : first + len(contact.end_keys)], contact))
                 belongs.append(_slider_of(row, contact.kt, rows, stiffnesses))
             else:
-                wanted = "must be coulomb, elastic-normal or gap beside a rigid contact"
+                wanted = f"must be coulomb, elastic-normal or gap {_EVENTS}"
                 raise SettingError(f"{contact.name}.law", contact.LAW, wanted)
             first += len(contact.end_keys)
         self.d = np.array(rows).reshape(-1, self.n)
@@ -221,7 +224,7 @@ class Piecewise:
         """Refuse rigid contacts of which some follow from the others, other than along the same motion."""
         rows = [(self.members[own[0]].contact, self.d[i])
                 for i, own in enumerate(self.of_slider) if self.rigid[i]]  # fmt: skip
-        rows += [(each.contact, each.normal) for each in self.members if each.rigid_normal]  # type: ignore[misc]
+        rows += [(each.contact, each.normal) for each in self.members if each.rigid_normal]
         if rows and np.linalg.matrix_rank(np.array([row for _, row in rows]), 1e-9) < len(rows):
             names = ", ".join(dict.fromkeys(self.scene.contacts[at].name for at, _ in rows))
             wanted = "must be of motions that do not follow from each other, where contacts are rigid: "
@@ -242,17 +245,17 @@ class Piecewise:
     def _made(self, state: State) -> Mode:
         loads = np.array([each.given for each in self.members]).reshape(-1, self.nw)
         limits = np.zeros((len(self.kt), self.nw))
-        for i in np.flatnonzero(state.closed):
+        for i in np.flatnonzero(state.closed).tolist():
             limits[self.members[i].slider] += self._weight(i) * loads[i]
         push, forces = self._pushed(state), np.zeros_like(limits)
-        for i, xi in enumerate(state.sliders):
+        for i, xi in enumerate(state.sliders.tolist()):
             if xi == STICK and not self.rigid[i]:
                 forces[i] = self.kt[i] * self.motion(self.d[i])
                 forces[i, self.elastic_at[i]] = -self.kt[i]
             elif abs(xi) == 1:
                 forces[i] = xi * limits[i]
             push -= np.outer(self.d[i], forces[i])
-        held = [i for i, xi in enumerate(state.sliders) if xi == STICK and self.rigid[i]]
+        held = [i for i, xi in enumerate(state.sliders.tolist()) if xi == STICK and self.rigid[i]]
         pressing = [i for i, each in enumerate(self.members) if each.rigid_normal]
         normals = [self.members[i].normal for i in pressing]
         slip = {i: int(state.sliders[self.members[i].slider]) for i in pressing}
@@ -316,14 +319,14 @@ class Piecewise:
         """Return the rows that must stay positive, and (what ends there, of which, direction)."""
         rows: list[Real] = []
         ends: list[tuple[int, int, int]] = []
-        for i, xi in enumerate(state.sliders):
+        for i, xi in enumerate(state.sliders.tolist()):
             if xi == STICK:
                 rows += [limits[i] - forces[i], limits[i] + forces[i]]
                 ends += [(TO_SLIP, i, 1), (TO_SLIP, i, -1)]
             elif xi != FREE:
                 rate = self.motion(self.d[i], rate=True)
                 rows.append(xi * rate if self.rigid[i] else xi * self.kt[i] * rate - limits[i] @ A)
-                ends.append((TO_REST, i, int(xi)))
+                ends.append((TO_REST, i, xi))
         for i, member in enumerate(self.members):
             if np.any(loads[i, : self.nd]) or np.any(loads[i, self.nd + 1 :]):
                 rows.append(loads[i] if state.closed[i] else -loads[i])
@@ -363,17 +366,14 @@ def _slider_of(row: Real, kt: float, rows: list[Real], stiffnesses: list[float])
 
 
 def _check_structure(scene: Scene, model: LinearModel) -> None:
-    real = model.extra is None or model.extra.is_real
-    if model.sectors > 1 or scene.structure.has_sectors:
+    """Refuse what is no system of ordinary differential equations under forces."""
+    structure = scene.structure
+    if model.sectors > 1 or structure.has_sectors:
+        raise SettingError("structure", structure.kind, f"must be without sectors {_EVENTS}")
+    if model.extra is not None and not model.extra.is_real:
         raise SettingError(
-            "structure", scene.structure.kind, "must be without sectors where contacts are rigid; " + _ELASTIC
-        )
-    if not real:
-        raise SettingError(
-            "loss_factor", scene.structure.loss_factor, "cannot be followed in time beside rigid contacts"
+            "loss_factor", structure.loss_factor, f"must be 0 {_EVENTS}: it has no meaning in time"
         )
     if model.prescribed or model.line is not None:
         what = "excitation" if model.prescribed else "speed_order"
-        raise SettingError(
-            what, scene.name, "must be forces at a fixed speed where contacts are rigid; " + _ELASTIC
-        )
+        raise SettingError(what, scene.name, f"must be forces at a fixed speed {_EVENTS}")
