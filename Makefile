@@ -21,7 +21,7 @@ help:
 	@echo "make dev        add to it what tests, checks, benchmarks and the reference need"
 	@echo "make demo       run the main job end to end; pictures go to demo-output/"
 	@echo "make test       check the code and run every test but the long ones"
-	@echo "make test-long  run the long studies; .ci/nightly runs them and the benchmarks"
+	@echo "make test-long  run the long studies, hours of them; some: make test-long PYTEST=tests/solver/response"
 	@echo "make lint       check the code: ruff, mypy, import-linter"
 	@echo "make bench      measure the solver and print tables; some of them: make bench BENCH='case-a chains'"
 	@echo "make docs       build the documentation site, reference and gallery too; it goes to site/"

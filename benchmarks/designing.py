@@ -38,6 +38,20 @@ FIVE = {
     ),
 }  # fmt: skip
 
+UNCERTAIN = {
+    "uncertain": {"shroud.kt": [4.4e6, 6.6e6], "shroud.mu": [0.2, 0.4]},
+    "variables": {"shroud.N0": (20.0, 3000.0)},
+}
+CASES = {
+    "cases": [
+        {"name": "as built"},
+        {"name": "more force", "set": {"excitation.amplitude": 130.0}, "weight": 0.8},
+        {"name": "driven mass", "observe": "m1", "weight": 0.9},
+    ],
+    "variables": {"damper.N0": (20.0, 3000.0), "damper.kt": (10.0, 60.0)},
+    "limit": 4.0, "max_band_hz": 0.45, "harmonics": 5,
+}  # fmt: skip
+
 
 def one_variable() -> None:
     """The best normal load by every method, beside a grid and SciPy's search over the same sweeps."""
@@ -153,12 +167,9 @@ def robust() -> None:
     """The load of bladed-disk that is best for the worst kt and mu of two intervals."""
     scene = solver.load_scene("bladed-disk")
     result, spent = timed(
-        lambda: optim.robust_design(
-            scene, uncertain={"shroud.kt": [4.4e6, 6.6e6], "shroud.mu": [0.2, 0.4]},
-            variables={"shroud.N0": (20.0, 3000.0)},
-        ),
+        lambda: optim.robust_design(scene, **UNCERTAIN),  # type: ignore[arg-type]
         runs=1,
-    )  # fmt: skip
+    )
     expect(f"robust: {result.status.value}", result.reached)
     answer = result.to_json()
     rows = [

@@ -12,13 +12,13 @@ import numpy as np
 
 from optim.criteria.evaluation import evaluate, natural_scales
 from optim.criteria.linearised import conditions, model_of
+from optim.criteria.rows import Evaluation
 from optim.methods.afterwards import looked_after, settled_status
 from optim.methods.eased import Eased
 from optim.methods.enough_harmonics import honest, with_enough
-from optim.methods.evaluator import Search, StoppedError
+from optim.methods.evaluator import Search, StoppedError, Tally
 from optim.methods.global_look import WholeRange
 from optim.methods.kkt import FLAT_SLOPE, Local, LocalSearch
-from optim.methods.tally import Tally
 from optim.problem.keys import ROBUST, DesignKeys
 from optim.problem.keywords import keywords
 from optim.problem.problem import Method, Problem, pose
@@ -87,8 +87,8 @@ def solve_problem(
         return _by_curve(problem, on_progress, should_stop)
     tally = Tally(on_progress)
     found = _solved(problem, tally.searching, should_stop, on_best)
-    found = _with_enough_harmonics(found, tally, should_stop, on_best)
-    found = looked_after(found, should_stop, tally.further)
+    found, more = _with_enough_harmonics(found, tally, should_stop, on_best)
+    found = looked_after(found, should_stop, tally.further, more)
     if found.status is DesignStatus.NO_RESPONSE and _undamped(found, should_stop):
         found = replace(found, status=DesignStatus.UNDAMPED)
     if found.evaluation is not None:
@@ -107,30 +107,37 @@ def _undamped(found: DesignResult, should_stop: ShouldStop) -> bool:
 
 def _with_enough_harmonics(
     found: DesignResult, tally: Tally, should_stop: ShouldStop, on_best: OnBest
-) -> DesignResult:
-    """Search again with more harmonics where those asked for leave the peak of the optimum in doubt."""
-    problem, responses = with_enough(found, should_stop)
-    spent = {
-        "evaluations": found.evaluations + responses, "work": found.work + responses,
-    }  # fmt: skip
+) -> tuple[DesignResult, list[Evaluation]]:
+    """Search again with more harmonics where those asked for leave the peak of the optimum in doubt.
+
+    The second search begins from what the first has seen. With the result come the evaluations of the first
+    optimum with more harmonics.
+    """
+    found = found.with_errors()
+    problem, tried = with_enough(found, should_stop)
+    responses = sum(len(one.responses) for one in tried)
+    found = replace(found, evaluations=found.evaluations + responses, work=found.work + responses)
     if problem is None:
-        return replace(found, **spent)  # type: ignore[arg-type]
-    again = _solved(problem, tally.again(found.evaluations + responses), should_stop, on_best)
+        return found, tried
+    same = found if problem.cases is found.problem.cases else None  # by another measure nothing is known
+    again = _solved(problem, tally.again(found.evaluations), should_stop, on_best, same)
     if again.status is DesignStatus.STOPPED:
-        return replace(found, status=DesignStatus.STOPPED, **spent)  # type: ignore[arg-type]
+        return replace(found, status=DesignStatus.STOPPED), tried
     if again.evaluation is None or not again.evaluation.good:
-        return replace(found, **spent)  # type: ignore[arg-type]
+        return found, tried
     return replace(
-        again, evaluations=again.evaluations + found.evaluations + responses,
-        work=again.work + found.work + responses, seconds=again.seconds + found.seconds,
-    )  # fmt: skip
+        again, evaluations=again.evaluations + found.evaluations, work=again.work + found.work,
+        seconds=again.seconds + found.seconds,
+    ).with_errors(), tried  # fmt: skip
 
 
 def _solved(
-    problem: Problem, on_progress: OnProgress, should_stop: ShouldStop, on_best: OnBest
-) -> DesignResult:
-    """Search the best design of a problem by its method."""
+    problem: Problem, on_progress: OnProgress, should_stop: ShouldStop, on_best: OnBest,
+    before: DesignResult | None = None,
+) -> DesignResult:  # fmt: skip
+    """Search the best design of a problem by its method; `before`: of a search with fewer harmonics."""
     begun = time.perf_counter()
+    tracked = None
     trackable = problem.method in (Method.AUTO, Method.TRACKED) and problem.why_not_tracked is None
     if trackable:
         from optim.methods.peak_tracking import tracked_optimum
@@ -139,13 +146,15 @@ def _solved(
         if problem.method is Method.TRACKED or tracked.status is not DesignStatus.NOT_TRACKED:
             return _of_tracked(problem, tracked, time.perf_counter() - begun)
     search = Search(problem, on_progress, should_stop, on_best=on_best)
-    eased = Eased.of(search)
+    eased = Eased.of(search, tracked)
     if eased.proven is not None:
         return _of_tracked(problem, eased.proven, time.perf_counter() - begun)
     found: list[Local] = []
-    whole = WholeRange(search, local_search_of(problem.method), found)
+    seen = () if before is None else before.looked_at
+    whole = WholeRange(search, local_search_of(problem.method), found, seen)
+    others = () if before is None else [dict(basin.values) for basin in before.basins[1:]]
     try:
-        status = _search(whole, found, eased.starts)
+        status = _search(whole, found, [*eased.starts, *others])
     except StoppedError as stop:
         status = stop.status
         if status is DesignStatus.TOO_MANY and found:

@@ -19,7 +19,15 @@ if TYPE_CHECKING:
     from solver.continuation.marks import Bifurcations, Mark, MarkKind
     from solver.continuation.segment import Stretch, joined
     from solver.continuation.settings import ContinuationSettings, Predictor
-    from solver.errors import Issue, MissingExtraError, ResultFileError, SceneError, SettingError, SolverError
+    from solver.errors import (
+        Issue,
+        MissingExtraError,
+        ResultFileError,
+        SceneError,
+        SettingError,
+        SolverError,
+        StoppedError,
+    )
     from solver.marching.march import march
     from solver.marching.start import MarchStart
     from solver.modes.driven.controlled import HeldAmplitude, HeldStatus, held_amplitude
@@ -83,6 +91,7 @@ _HOME = {
     "Shown": "results.base", "Summary": "results.base", "progress_bar": "results.base", "load": "views.io",
     "save": "views.io", "MissingExtraError": "errors", "ResultFileError": "errors", "Issue": "errors",
     "SceneError": "errors", "SettingError": "errors", "SolverError": "errors",
+    "StoppedError": "errors",
     "Effects": "balance.simplifications", "Plan": "studies.plan", "plan": "studies.plan",
     "SceneBuilder": "scene.builder",
     "Scene": "scene.scene", "load_scene": "scene.scene", "shipped_scenes": "scene.scene",
@@ -209,6 +218,7 @@ __all__ = [
     "SolutionStatus",
     "SolverError",
     "Stability",
+    "StoppedError",
     "Stretch",
     "Summary",
     "Switched",

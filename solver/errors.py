@@ -46,6 +46,10 @@ class SceneError(SolverError):
         super().__init__("; ".join(issue.message for issue in self.issues))
 
 
+class StoppedError(SolverError):
+    """The caller ended a computation that has no answer before it is done."""
+
+
 class SettingError(SolverError):
     """A bad argument of a computation (a frequency, a number of harmonics, a parameter path).
 

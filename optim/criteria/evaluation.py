@@ -20,8 +20,9 @@ from solver.scene.scene import Scene
 
 
 def evaluate(
-    problem: Problem, values: Mapping[str, float], *, gradients: bool = True, should_stop: ShouldStop = None
-) -> Evaluation:
+    problem: Problem, values: Mapping[str, float], *, gradients: bool = True, errors: bool = True,
+    should_stop: ShouldStop = None,
+) -> Evaluation:  # fmt: skip
     """Compute everything a design is judged by.
 
     Parameters
@@ -29,6 +30,7 @@ def evaluate(
     problem : what is judged.
     values : the design, variable name to value.
     gradients : compute them (otherwise they are NaN).
+    errors : estimate those of the peaks; `Evaluation.with_errors` does it later if not.
     should_stop : asked while the responses are computed.
 
     Returns
@@ -39,7 +41,7 @@ def evaluate(
     rows: list[Row] = []
     for case in problem.cases:
         known = [response.branch for response in responses if response.case == case.beside]
-        found = _case(problem, case, values, known, gradients, should_stop)
+        found = _case(problem, case, values, known, gradients, errors, should_stop)
         responses += found[0]
         rows += found[1]
         if not all(response.branch.completed for response in found[0]):
@@ -49,7 +51,7 @@ def evaluate(
 
 def _case(
     problem: Problem, case: Case, values: Mapping[str, float], known: Sequence[Branch], gradients: bool,
-    should_stop: ShouldStop,
+    errors: bool, should_stop: ShouldStop,
 ) -> tuple[list[Response], list[Row]]:  # fmt: skip
     """Compute the responses and rows of one case; `known` are those of a case with another DOF alone."""
     here = case.scene.with_values(parameter_values(problem.variables, values))
@@ -63,7 +65,7 @@ def _case(
         else:
             branch = sweep(
                 here, start=over.low, stop=over.high, harmonics=problem.harmonics, limit=problem.limit,
-                effects=effects, should_stop=should_stop,
+                effects=effects, errors=errors, should_stop=should_stop,
             )  # fmt: skip
         responses.append(Response(case=case.name, branch=branch))
         rows += judge.rows(branch, over)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from optim.criteria.band import BAND
 from optim.criteria.criterion import Criterion, Row
@@ -80,9 +80,21 @@ class Evaluation:
         return total if self.rows else math.inf
 
     @property
+    def harmonics(self) -> int:
+        """Of the balances behind it; 0 without a response."""
+        return max((one.branch.balance.n_harmonics for one in self.responses), default=0)
+
+    @property
     def branch(self) -> Branch:
         """The response of the first case."""
         return self.responses[0].branch
+
+    def with_errors(self) -> Evaluation:
+        """Return it with the errors of its peaks estimated, where a search left that out."""
+        from solver.continuation.branches.sweep import with_error
+
+        done = tuple(replace(one, branch=with_error(one.branch)) for one in self.responses)
+        return replace(self, responses=done)
 
     def violation(self, scales: Mapping[Criterion, float]) -> float:
         """Return the largest relative excess over a bound; −inf without bounds."""

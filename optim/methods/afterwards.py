@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 
 from optim.criteria.evaluation import evaluate, natural_scales
@@ -13,6 +14,7 @@ from optim.methods.enough_harmonics import MOST_HARMONICS, honest
 from optim.methods.evaluator import Search, StoppedError
 from optim.methods.kkt import KEPT, KKT_TOLERANCE
 from optim.methods.plateau import Plateau, Tick, nothing, plateau_of
+from optim.problem.problem import Method
 from optim.results.basins import Basin, Checked
 from optim.results.design import DesignResult, DesignStatus
 from optim.results.doubts import DOUBTFUL, open_peaks
@@ -30,7 +32,9 @@ def settled_status(found: Conditions) -> DesignStatus:
     return DesignStatus.AT_BOUND if held else DesignStatus.OPTIMAL
 
 
-def looked_after(result: DesignResult, should_stop: ShouldStop, tick: Tick = nothing) -> DesignResult:
+def looked_after(
+    result: DesignResult, should_stop: ShouldStop, tick: Tick = nothing, more: Sequence[Evaluation] = ()
+) -> DesignResult:
     """Return a result with its plateau and its check by more harmonics; as far as the caller lets it.
 
     Parameters
@@ -38,13 +42,14 @@ def looked_after(result: DesignResult, should_stop: ShouldStop, tick: Tick = not
     result : of a search.
     should_stop : asked between responses.
     tick : called after every design looked at.
+    more : evaluations with more harmonics that are known already.
     """
     begun = time.perf_counter()
     found = result
     stopped = result.status in (DesignStatus.STOPPED, DesignStatus.NO_RESPONSE)
     if result.evaluation is not None and result.evaluation.good and not stopped:
         try:
-            found = _checked(_level(found, should_stop, tick), should_stop, tick)
+            found = _checked(_level(found, should_stop, tick).with_errors(), should_stop, tick, more)
         except StoppedError:
             found = replace(found, status=DesignStatus.STOPPED)
     return replace(honest(_proven(found)), seconds=result.seconds + time.perf_counter() - begun)
@@ -107,7 +112,8 @@ def _improved(result: DesignResult, begin: Evaluation, should_stop: ShouldStop, 
         status = settled_status(local.conditions) if local.settled else DesignStatus.KINK
     responses = sum(len(one.responses) for one in search.history)
     return replace(
-        result, status=status, evaluation=local.evaluation, conditions=local.conditions,
+        result, method=Method.MINIMAX, status=status, evaluation=local.evaluation,
+        conditions=local.conditions,
         basins=(basin, *result.basins), history=(*result.history, *search.history),
         evaluations=result.evaluations + responses, work=result.work + responses,
     )  # fmt: skip
@@ -137,7 +143,9 @@ def _on(plateau: Plateau, basin: Basin, chosen: Evaluation) -> bool:
     return True
 
 
-def _checked(result: DesignResult, should_stop: ShouldStop, tick: Tick) -> DesignResult:
+def _checked(
+    result: DesignResult, should_stop: ShouldStop, tick: Tick, more: Sequence[Evaluation]
+) -> DesignResult:
     """Return a result with its local optima computed again where the harmonics may be too few."""
     few = result.problem.harmonics
     if result.evaluation is None or 2 * few > MOST_HARMONICS or result.status is DesignStatus.FLAT:
@@ -150,9 +158,12 @@ def _checked(result: DesignResult, should_stop: ShouldStop, tick: Tick) -> Desig
     for values in designs:
         if should_stop is not None and should_stop():
             raise StoppedError(DesignStatus.STOPPED)
-        found = evaluate(problem, values, gradients=False, should_stop=should_stop)
-        responses += len(found.responses)
-        tick()
+        same = (one for one in more if one.values == values and one.harmonics == problem.harmonics)
+        found = next(same, None)
+        if found is None:
+            found = evaluate(problem, values, gradients=False, errors=False, should_stop=should_stop)
+            responses += len(found.responses)
+            tick()
         good = found.good and bool(found.peaks)
         checked.append(
             Checked(

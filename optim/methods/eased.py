@@ -36,8 +36,11 @@ class Eased:
     proven: Tracked | None = None
 
     @classmethod
-    def of(cls, search: Search) -> Eased:
-        """Return it; tracking goes on for `search` and is counted by it."""
+    def of(cls, search: Search, plain: Tracked | None = None) -> Eased:
+        """Return it; tracking goes on for `search` and is counted by it.
+
+        `plain`: what tracking the problem itself came to, where that was tried.
+        """
         problem = search.problem
         starts = [] if problem.start is None else [dict(problem.start)]
         if problem.method is not Method.AUTO or len(problem.cases) > MOST_CASES:
@@ -46,7 +49,9 @@ class Eased:
         from optim.methods.peak_tracking import tracked_optimum
 
         for eased in _cases(problem):
-            tracked = tracked_optimum(eased, on_progress=search.easing, should_stop=search.should_stop)
+            tracked = plain or tracked_optimum(
+                eased, on_progress=search.easing, should_stop=search.should_stop
+            )  # fmt: skip
             search.eased(tracked.sweeps)
             starts += [dict(basin.values) for basin in tracked.basins]
             if len(problem.cases) == 1 and tracked.status is DesignStatus.OPTIMAL and starts:

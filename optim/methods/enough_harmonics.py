@@ -21,17 +21,24 @@ from solver.scene.scene import Scene
 
 CLAIMS = (DesignStatus.OPTIMAL, DesignStatus.AT_BOUND, DesignStatus.APPROXIMATE)
 MOST_HARMONICS = 60  # beyond that a design is not looked at with more
+HOPELESS = 2.0  # times what is well known: doubts foretold above it are not looked at
 _RUNGS = 4  # times the harmonics asked for, at most: more of them cost more than a search was asked to
 _FEW = 12  # harmonics that a search may have though it was asked for fewer
 
 
 def well_known(problem: Problem, evaluation: Evaluation) -> bool:
     """Return whether the highest peak of a design is known within 5 %."""
-    return doubt_of(evaluation, {case.name: case.weight for case in problem.cases}) <= WELL_KNOWN
+    return doubt_in(problem, evaluation) <= WELL_KNOWN
+
+
+def doubt_in(problem: Problem, evaluation: Evaluation) -> float:
+    """Return the share by which the highest peak of a design may be higher."""
+    return doubt_of(evaluation, {case.name: case.weight for case in problem.cases})
 
 
 def honest(result: DesignResult) -> DesignResult:
     """Return a result that claims an optimum only if its highest peak is known, by what was minimised."""
+    result = result.with_errors()
     problem, evaluation = result.problem, result.evaluation
     if result.status not in CLAIMS or evaluation is None:
         return result
@@ -40,31 +47,38 @@ def honest(result: DesignResult) -> DesignResult:
     return replace(result, status=DesignStatus.NOT_KNOWN)
 
 
-def with_enough(result: DesignResult, should_stop: ShouldStop) -> tuple[Problem | None, int]:
-    """Return the problem to solve instead of one whose end is doubtful, and the responses that told so.
+def with_enough(result: DesignResult, should_stop: ShouldStop) -> tuple[Problem | None, list[Evaluation]]:
+    """Return the problem to solve instead of one whose end is doubtful, and the evaluations that told so.
 
     A response or two at the optimum tell how many harmonics it needs, so that at most one search follows.
 
     Returns
     -------
-    (problem, responses); None where measure and harmonics are right, or more harmonics do not help.
+    (problem, evaluations); None where measure and harmonics are right, or more harmonics do not help.
     """
-    evaluation, responses = result.evaluation, 0
+    evaluation, tried = result.evaluation, list[Evaluation]()
     if result.status not in (*CLAIMS, DesignStatus.INFEASIBLE) or evaluation is None:
-        return None, 0
+        return None, tried
     problem = _by_its_measure(result.problem, evaluation)
     measured = replace(problem, start=dict(result.optimum)) if problem is not result.problem else None
     if well_known(problem, evaluation):
-        return measured, 0
-    harmonics, most = 2 * problem.harmonics, max(_RUNGS * problem.harmonics, _FEW)
+        return measured, tried
+    doubt, harmonics = doubt_in(problem, evaluation), 2 * problem.harmonics
+    most = max(_RUNGS * problem.harmonics, _FEW)
     while harmonics <= min(most, MOST_HARMONICS) and not (should_stop is not None and should_stop()):
         more = replace(problem, harmonics=harmonics)
         found = evaluate(more, result.optimum, gradients=False, should_stop=should_stop)
-        responses += len(found.responses)
+        tried.append(found)
         if found.good and well_known(more, found):
-            return replace(more, start=dict(result.optimum)), responses
+            return replace(more, start=dict(result.optimum)), tried
+        if found.good:
+            # From one doubling to the next a doubt falls by the same factor, if it falls.
+            left = doubt_in(more, found)
+            if left * min(left / doubt, 1.0) > HOPELESS * WELL_KNOWN:
+                break
+            doubt = left
         harmonics *= 2
-    return measured, responses
+    return measured, tried
 
 
 def _by_its_measure(problem: Problem, evaluation: Evaluation) -> Problem:

@@ -10,7 +10,6 @@ from optim.criteria.evaluation import evaluate, natural_scales
 from optim.criteria.linearised import Model, model_of
 from optim.criteria.rows import Evaluation
 from optim.methods.kkt import KEPT
-from optim.methods.tally import share_of
 from optim.problem.problem import Problem
 from optim.problem.variables import Variable
 from optim.results.best_so_far import FEWER_HARMONICS, PEAKS_OPEN, VERIFIED, BestSoFar, OnBest
@@ -19,6 +18,8 @@ from optim.results.doubts import open_peaks
 from solver.results.watch import OnProgress, ShouldStop
 
 MOST_EVALUATIONS = 800
+SEARCHED = 0.75  # share of the progress that the search has
+USUAL = 12.0  # evaluations of a usual search; how many are left is not known beforehand
 
 
 class StoppedError(Exception):
@@ -48,9 +49,10 @@ class Search:
         self._above = above  # the search with all harmonics, for which this one only ranks designs
         self._scout: Search | None = None
         self._least = (math.inf, math.inf)
+        self._known: dict[tuple[float, ...], Evaluation] = {}
 
     def __call__(self, values: Mapping[str, float]) -> Evaluation:
-        """Evaluate one design with gradients.
+        """Evaluate one design with gradients, each once.
 
         Raises
         ------
@@ -58,9 +60,13 @@ class Search:
             The caller asked to stop, or the evaluations are used up.
         """
         self.check()
+        place = tuple(values[variable.name] for variable in self.variables)
+        if place in self._known:
+            return self._known[place]
         if len(self.history) >= self._most:
             raise StoppedError(DesignStatus.TOO_MANY)
-        evaluation = evaluate(self.problem, values, should_stop=self.should_stop)
+        evaluation = evaluate(self.problem, values, errors=False, should_stop=self.should_stop)
+        self._known[place] = evaluation
         self.keep(evaluation)
         return evaluation
 
@@ -143,3 +149,42 @@ class Search:
     def merit(self, evaluation: Evaluation) -> float:
         """Return what the search decreases."""
         return self.model(evaluation).merit
+
+
+def share_of(done: int) -> float:
+    """Return a share that approaches 1 from below."""
+    return done / (done + USUAL)
+
+
+class Tally:
+    """Counts what both look at; the count never falls back.
+
+    Parameters
+    ----------
+    on_progress : told of the share of the whole and of the count.
+    """
+
+    def __init__(self, on_progress: OnProgress) -> None:
+        self._on_progress = on_progress
+        self._count = self._afterwards = 0
+        self._searched = 0.0
+
+    def searching(self, share: float, count: int) -> None:
+        """Hear of the search: the `on_progress` to give to it."""
+        self._count = count
+        self._searched = max(self._searched, SEARCHED * share)
+        self.tell(self._searched)
+
+    def again(self, before: int) -> Callable[[float, int], None]:
+        """Return the `on_progress` of a search that follows after so many evaluations."""
+        return lambda share, count: self.searching(share, before + count)
+
+    def further(self) -> None:
+        """Hear of another evaluation after the search."""
+        self._afterwards += 1
+        self.tell(SEARCHED + (1.0 - SEARCHED) * share_of(self._afterwards))
+
+    def tell(self, share: float) -> None:
+        """Report."""
+        if self._on_progress is not None:
+            self._on_progress(share, self._count + self._afterwards)

@@ -11,7 +11,7 @@ numbers is kept.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from optim.criteria.rows import Evaluation
 from optim.methods.evaluator import Search
 from optim.methods.kkt import (
     KEPT,
+    Evaluate,
     Local,
     LocalSearch,
     ModelOf,
@@ -28,9 +29,8 @@ from optim.methods.kkt import (
     standing,
     without_limits,
 )
-from optim.methods.multistart import places
 from optim.methods.polish import polished
-from optim.methods.surrogate import candidates, promising, taylor_of
+from optim.methods.surrogate import Taylor, candidates, places, promising, taylor_of
 from optim.problem.variables import Real, scaled, unscaled
 
 FEWEST = 3  # harmonics of a look with several variables, at least
@@ -40,24 +40,31 @@ BATCH = 4  # designs a round and variable
 IDLE = 3  # rounds in a row that find nothing, after which a look is finished
 IDLE_MANY = 2  # the same with more than two variables
 MOST_ROUNDS = 16
+ON_THE_WAY = (1.0 / 3.0, 2.0 / 3.0)  # to a known end, where it is looked at whether a search leads there
+LOOK_AHEAD = 2  # better designs of a local search from one such look to the next
+SMALL = 1e-6  # share of the way along which a slope is taken
 MOST_BEGINS = 4  # designs that the first local searches begin from
 APART = {1: 1.0 / 256.0, 2: 0.02}  # scaled distance from which two designs of a look are two
 APART_MANY = 0.05
 
 
 class WholeRange:
-    """A search of the whole range of a problem."""
+    """A search of the whole range of a problem; `seen`: designs of an earlier look with fewer harmonics."""
 
-    def __init__(self, search: Search, local_search: LocalSearch, found: list[Local]) -> None:
+    def __init__(
+        self, search: Search, local_search: LocalSearch, found: list[Local], seen: Sequence[Evaluation] = ()
+    ) -> None:
         self.search, self.found = search, found
         self.finished = False
         self._local_search = local_search
         self._n = len(search.variables)
         few = max(FEWEST, (search.problem.harmonics + 1) // 2)
-        whole = self._n == 1 or few >= search.problem.harmonics
-        self._scout = search if whole else search.scout(few)
-        self._seen: list[Evaluation] = []
+        few = few if self._n > 1 else search.problem.harmonics
+        few = min((one.harmonics for one in seen), default=few)
+        self._scout = search if few >= search.problem.harmonics else search.scout(few)
+        self._seen = [one for one in seen if one.harmonics == few]
         self._starts: list[Real] = []
+        self._ends: list[tuple[Local, Evaluation]] = []  # with the numbers of the look
         self._apart = APART.get(self._n, APART_MANY)
         self._off = 0.0  # natural logarithm by which the look's harmonics are off
 
@@ -74,7 +81,7 @@ class WholeRange:
         True if nothing depends on the variables, None if no response could be computed.
         """
         try:
-            for z in places(self._n):
+            for z in () if self._seen else places(self._n):
                 self._look(z)
             begins = [e for values in given if (e := self.search(values)).good]
             if not self._seen and not begins:
@@ -145,17 +152,21 @@ class WholeRange:
         """Search locally from a design, for the limits alone where it ends without keeping them."""
         self._starts.append(scaled(self.search.variables, begin.values))
         here, ends = begin, []
-        if self.search.model(begin).violation > KEPT and not any(local.feasible for local in self.found):
-            here = self._eased(begin)
-            ends.append(self._ended(here))
-        if not ends or ends[0].feasible:
-            ends.append(self._ended(self._local(here, self.search.model)))
+        try:
+            if self.search.model(begin).violation > KEPT and not any(local.feasible for local in self.found):
+                here = self._eased(begin)
+                ends.append(self._ended(here))
+            if not ends or ends[0].feasible:
+                ends.append(self._ended(self._local(here, self.search.model, _Watched(self))))
+        except JoinedError:
+            return
         best = min(ends, key=lambda local: local.standing)
         self.found.append(best)
         there = best.evaluation
         if self._scout is not self.search:
             there = self._scout(best.evaluation.values)
         if there.good:
+            self._ends.append((best, there))
             if self._scout is not self.search:
                 exact, rough = best.evaluation.objective, there.objective
                 self._off = max(self._off, abs(math.log(max(exact, 1e-300) / max(rough, 1e-300))))
@@ -166,12 +177,47 @@ class WholeRange:
         from optim.methods.minimax import thorough_search
 
         return thorough_search(
-            self.search, self.search.variables, begin, lambda e: of_limits(self.search.model(e)),
+            _Watched(self), self.search.variables, begin, lambda e: of_limits(self.search.model(e)),
             enough=1.0 + KEPT,
         ).evaluation  # fmt: skip
 
-    def _local(self, begin: Evaluation, model_of: ModelOf) -> Evaluation:
-        return self._local_search(self.search, self.search.variables, begin, model_of).evaluation
+    def _local(self, begin: Evaluation, model_of: ModelOf, evaluate: Evaluate | None = None) -> Evaluation:
+        return self._local_search(
+            evaluate or self.search, self.search.variables, begin, model_of
+        ).evaluation  # fmt: skip
+
+    def joins(self, here: Evaluation) -> bool:
+        """Return whether what is minimised falls all the way from a design to an end that is known.
+
+        Of a design that does not keep its limits it is the largest excess.
+
+        On the straight way to the nearest end that is better, values and slopes fall at every design looked
+        at: the design is in the basin of that end, as far as these tell (hill-valley test: Ursem, Proc. CEC
+        1999, p. 1633, doi:10.1109/CEC.1999.785470).
+        """
+        mine = self._ended(here)
+        better = [(local, there) for local, there in self._ends if _beats(local.standing, mine.standing)]
+        if not better:
+            return False
+        broken = not mine.feasible
+        z = scaled(self.search.variables, here.values)
+        ways = [scaled(self.search.variables, local.evaluation.values) - z for local, _ in better]
+        nearest = min(range(len(ways)), key=lambda i: float(np.abs(ways[i]).max()))
+        way = ways[nearest]
+        end = taylor_of(self._scout.model(better[nearest][1]), feasibility=broken).value
+        if not _falls(taylor_of(self.search.model(here), feasibility=broken), way):
+            return False
+        last = math.inf
+        for share in ON_THE_WAY:
+            there = self._scout(unscaled(self.search.variables, z + share * way))
+            if not there.good:
+                return False
+            self._seen.append(there)
+            one = taylor_of(self._scout.model(there), feasibility=broken)
+            if not end < one.value < last or not _falls(one, way):
+                return False
+            last = one.value
+        return True
 
     def _ended(self, there: Evaluation) -> Local:
         return ended(there, self.search.model(there), self.search.variables)
@@ -251,6 +297,41 @@ class WholeRange:
             self.found.append(better)
             if not better.settled:
                 self._descend(better.evaluation)
+
+
+class JoinedError(Exception):
+    """A local search leads to an end that is known."""
+
+
+class _Watched:
+    """Evaluates for a local search, and ends it once it leads to an end that is known."""
+
+    def __init__(self, whole: WholeRange) -> None:
+        self._whole, self._best, self._better = whole, (math.inf, math.inf), 0
+
+    def __call__(self, values: Mapping[str, float]) -> Evaluation:
+        """Evaluate a design.
+
+        Raises
+        ------
+        JoinedError
+            It is on the way to an end that is known.
+        """
+        found = self._whole.search(values)
+        if not found.good:
+            return found
+        here = standing(self._whole.search.model(found))
+        if here < self._best:
+            self._best, self._better = here, self._better + 1
+            if self._better % LOOK_AHEAD == 0 and self._whole.joins(found):
+                raise JoinedError
+        return found
+
+
+def _falls(model: Taylor, way: Real) -> bool:
+    """Return whether what a model is of falls at its place along a way."""
+    ahead = model.place + SMALL * way
+    return bool(model.at(ahead[None, :])[0] < model.value)
 
 
 def _beats(one: tuple[float, float], other: tuple[float, float]) -> bool:

@@ -20,7 +20,7 @@ from scipy.optimize import minimize, minimize_scalar
 from optim.criteria.evaluation import evaluate
 from optim.criteria.rows import Evaluation
 from optim.methods.evaluator import StoppedError
-from optim.methods.multistart import quasi_random
+from optim.methods.surrogate import quasi_random
 from optim.problem.problem import Problem
 from optim.problem.variables import Real, Variable, by_variables, parameter_values, unscaled
 from optim.results.curve_check import CurveCheck

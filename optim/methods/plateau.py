@@ -117,7 +117,9 @@ class _Level:
     def _evaluated(self, values: Mapping[str, float], *, gradients: bool = False) -> Evaluation:
         if self._should_stop is not None and self._should_stop():
             raise StoppedError(DesignStatus.STOPPED)
-        found = evaluate(self._problem, values, gradients=gradients, should_stop=self._should_stop)
+        found = evaluate(
+            self._problem, values, gradients=gradients, errors=False, should_stop=self._should_stop
+        )  # fmt: skip
         self.responses += len(found.responses)
         self._tick()
         if found.good and found.objective < self._lower and self._good(found):

@@ -1,28 +1,65 @@
-"""What is known between the designs looked at: Taylor models of the nearest ones, and how far they differ.
+"""Where designs are looked at, and what is known between them: Taylor models of the nearest ones.
 
-Every design looked at has its rows with their slopes. Between designs each of the nearest ones predicts the
-number by its own rows, positive ones along exponentials (Shepard's inverse-distance weights of Taylor models:
-Franke, Nielson, Int. J. Numer. Methods Eng. 15 (1980) 1691, doi:10.1002/nme.1620151110); where these
-predictions differ, little is known. A place is worth a look where the mean less a few times the spread may
-beat the best design (lower confidence bound: Cox, John, in Multidisciplinary Design Optimization, SIAM 1997,
-p. 105).
+A look begins with corners, middles and a Sobol sequence. Every design looked at has its rows with their
+slopes. Between designs each of the nearest ones predicts the number by its own rows, positive ones along
+exponentials (Shepard's inverse-distance weights of Taylor models: Franke, Nielson, Int. J. Numer. Methods
+Eng. 15 (1980) 1691, doi:10.1002/nme.1620151110); where these predictions differ, little is known. A place is
+worth a look where the mean less a few times the spread may beat the best design (lower confidence bound:
+Cox, John, in Multidisciplinary Design Optimization, SIAM 1997, p. 105).
 """
 
 from __future__ import annotations
 
+import itertools
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from optim.criteria.linearised import Model
-from optim.methods.multistart import quasi_random
 from optim.problem.variables import Real
 
+LOOKS_ONE = 17  # designs of a look with one variable
+LOOKS_EACH = 12  # and for each variable with more, besides corners and middles
+MOST_CORNERS = 32
 NEAREST = 2  # designs a variable, and two more, whose models predict a place
 DOUBT = 1.0  # spreads by which a prediction may be too high
 MOST_GROWTH = 3.0  # exponent at most
 CANDIDATES = 256  # places a variable that are compared, one variable: all of them in steps
+
+
+def places(n: int, known: int = 0) -> Real:
+    """Return the places of a look, (k, n), of the unit box: bounds included.
+
+    The middle; the corners, of many variables only those next to the lowest and the highest; the middles of
+    the faces, with two variables those of the edges; a Sobol sequence between them, shorter by so many
+    places as are `known` between the bounds already.
+    """
+    if n == 1:
+        return np.linspace(0.0, 1.0, LOOKS_ONE)[:, None]
+    middle = np.full((1, n), 0.5)
+    faces = np.repeat(middle, 2 * n, axis=0)
+    for i in range(n):
+        faces[2 * i, i], faces[2 * i + 1, i] = 0.0, 1.0
+    between = quasi_random(n, 2 ** math.ceil(math.log2(LOOKS_EACH * n)))
+    # The first place of the sequence is a corner, the second the middle.
+    return np.vstack([middle, corners(n), faces, between[2 + known :]])
+
+
+def quasi_random(n: int, count: int, seed: int | None = None) -> Real:
+    """Return the first places of a Sobol sequence in the unit box, (count, n); scrambled if it has a seed."""
+    from scipy.stats import qmc  # takes half a second to load, and a design of one variable needs none
+
+    return np.asarray(qmc.Sobol(n, scramble=seed is not None, seed=seed).random(count))
+
+
+def corners(n: int) -> Real:
+    """Return the corners of the unit box, (k, n); of many variables those that differ from an end in one."""
+    if 2**n <= MOST_CORNERS:
+        return np.array(list(itertools.product((0.0, 1.0), repeat=n)))
+    low = np.vstack([np.zeros(n), np.eye(n)])
+    return np.vstack([low, 1.0 - low])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import ClassVar
 
@@ -94,6 +94,16 @@ class DesignStatus(Enum):
         "warnings say."
     )
     STOPPED = "The search was stopped by the caller."
+
+
+class Certainty(Enum):
+    """How far it is certain that no other design is better; the value is what a user reads."""
+
+    CLOSED = "closed: the peaks followed over the whole range are nowhere lower"
+    SAMPLED = "sampled: between the designs looked at a better one may lie that shows in no slope around"
+
+
+_PROVEN = (DesignStatus.OPTIMAL, DesignStatus.AT_BOUND)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
@@ -217,6 +227,12 @@ class DesignResult(MadeOfResponses, Drawn):
         return self.stability.stable
 
     @property
+    def certainty(self) -> Certainty:
+        """Whether the range is closed by peaks that were followed over all of it, or only sampled."""
+        followed = self.method is Method.TRACKED and bool(self.basins) and self.basins[0].proven
+        return Certainty.CLOSED if followed and self.status in _PROVEN else Certainty.SAMPLED
+
+    @property
     def warnings(self) -> tuple[str, ...]:
         """What makes the numbers doubtful, in words."""
         return doubts_of(
@@ -302,6 +318,14 @@ class DesignResult(MadeOfResponses, Drawn):
         last = [] if self.evaluation is None else [self.evaluation]
         return [(e.values, response.branch) for e in [*others, *last] for response in e.responses]
 
+    def with_errors(self) -> DesignResult:
+        """Return it with the errors of the peaks of the optimum estimated; a search leaves that out."""
+        if self.evaluation is None:
+            return self
+        found = self.evaluation.with_errors()
+        history = tuple(found if one is self.evaluation else one for one in self.history)
+        return replace(self, evaluation=found, history=history)
+
     VIEWS: ClassVar = Views("optim.views", "of_design", "design_dataset", "of_design")
 
     def known_parts(self) -> Iterable[Known]:
@@ -334,6 +358,7 @@ class DesignResult(MadeOfResponses, Drawn):
             "warnings": list(self.warnings),
             "plateau": {name: list(ends) for name, ends in self.plateau.items()},
             "chosen_by": self.chosen_by,
+            "certainty": self.certainty.value,
             "checked": [checked_json(one) for one in self.checked],
             "curve": None if self.curve is None else self.curve.to_json(),
             "looked_at": [looked_json(one) for one in self.looked_at if one.good],

@@ -49,9 +49,9 @@ def known_parts(evaluation: Evaluation) -> list[tuple[str, Known]]:
 def looked_json(one: Evaluation) -> dict[str, object]:
     """Return a design of the look over the whole range."""
     kept = all(row.bound is None or row.value <= row.bound for row in one.rows)
-    harmonics = one.responses[0].branch.balance.n_harmonics if one.responses else None
     return {
-        "values": dict(one.values), "objective": one.objective, "feasible": kept, "n_harmonics": harmonics
+        "values": dict(one.values), "objective": one.objective, "feasible": kept,
+        "n_harmonics": one.harmonics or None,
     }  # fmt: skip
 
 

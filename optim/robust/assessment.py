@@ -15,10 +15,8 @@ from optim.robust.result import Side, Spread
 from optim.robust.risk_measure import rank_of
 from optim.robust.scenarios import Outcome
 from optim.robust.search import RobustSearch
-from optim.robust.worst_case import Aspect, UnknownScenarioError, pessimise
+from optim.robust.worst_case import MOST_BESIDES, Aspect, UnknownScenarioError, pessimise
 from solver.results.known import worst_of
-
-CHECKED = 4  # of the samples, the worst, that the worst case is also climbed from
 
 
 def side_of(
@@ -37,7 +35,8 @@ def side_of(
     scenarios : that may be the worst.
     """
     nominal = search.outcome(values, Scenario(), gradients=False)
-    samples = [search.outcome(values, scenario, gradients=False) for scenario in drawn]
+    slopes = not search.uncertain.finite  # the search for the worst begins from them
+    samples = [search.outcome(values, scenario, gradients=slopes) for scenario in drawn]
     peaks = [found.highest(PEAK) if found.good else None for found in samples]
     worst, unknown = _worst(search, values, samples, scenarios)
     peak, band = nominal.highest(PEAK), nominal.highest(BAND)
@@ -58,7 +57,7 @@ def _worst(
     """Return the design in the scenario of the highest peak; or None and the scenario that is not known."""
     aspect = Aspect(quantity=PEAK, limited=False, plain=True)
     ranked = sorted((o for o in samples if o.good), key=lambda found: -aspect.worst(found.rows))
-    besides = [found.scenario for found in ranked[:CHECKED]]
+    besides = [found.scenario for found in ranked[:MOST_BESIDES]]
     try:
         finding = pessimise(
             lambda scenario: search.outcome(values, scenario),

@@ -9,15 +9,16 @@ from dataclasses import dataclass, field
 from optim.criteria.peak import PEAK
 from optim.criteria.rows import Evaluation
 from optim.methods.kkt import Local, is_flat
-from optim.methods.multistart import coarse
+from optim.methods.surrogate import quasi_random
+from optim.problem.problem import Problem
 from optim.problem.uncertainty_set import Scenario
-from optim.problem.variables import scaled
+from optim.problem.variables import scaled, unscaled
 from optim.results.basins import SAME_PLACE
 from optim.results.design import DesignResult
 from optim.robust.result import Cut, RobustStatus
 from optim.robust.scenarios import Outcome, number_of
 from optim.robust.search import RobustSearch
-from optim.robust.worst_case import Aspect, Finding, UnknownScenarioError, pessimise
+from optim.robust.worst_case import MOST_BESIDES, Aspect, Finding, UnknownScenarioError, pessimise
 
 CLOSED = (
     1e-6  # relative excess of the worst scenario found over the master problem's, up to which it is solved
@@ -26,8 +27,9 @@ MOST_CUTS = 40
 AT_ONCE = 2  # scenarios that join the master problem for one aspect
 CLOUD = 0.05  # distance of ξ within which two scenarios are one place
 FAR_APART = 1e-2  # scaled distance from which two starts are two
+COARSE_ONE = 9  # designs of the coarse stage with one variable
+COARSE_EACH = 6  # and for each variable with more
 FEW = 8  # samples that the starts of a sampled search are judged by
-CHECKED = 4  # of the drawn scenarios, the worst, that a worst case is checked against
 
 
 @dataclass(slots=True, kw_only=True)
@@ -158,11 +160,11 @@ def _checked(
 ) -> Finding:  # fmt: skip
     """Return the worst scenarios again, looking at the whole set and climbing from the worst drawn ones."""
     inside = [scenario for scenario in drawn if search.uncertain.inside_of(scenario)]
-    asked = [search.outcome(values, scenario, gradients=False) for scenario in inside]
+    asked = [search.outcome(values, scenario) for scenario in inside]
     ranked = sorted((o for o in asked if o.good), key=lambda found: -aspect.worst(found.rows))
     return pessimise(
         lambda scenario: search.outcome(values, scenario), search.uncertain, aspect, progress.scenarios,
-        besides=[found.scenario for found in ranked[:CHECKED]], thorough=True,
+        besides=[found.scenario for found in ranked[:MOST_BESIDES]], thorough=True,
     )  # fmt: skip
 
 
@@ -202,12 +204,12 @@ def sampled(
 
 def _first(search: RobustSearch, nominal: DesignResult) -> dict[str, float]:
     """Return the nominal optimum, or else the first design of the coarse stage."""
-    return dict(nominal.optimum) if nominal.optimum else coarse(search.problem)[0]
+    return dict(nominal.optimum) if nominal.optimum else _coarse(search.problem)[0]
 
 
 def _starts(search: RobustSearch, nominal: DesignResult, scenarios: Sequence[Scenario]) -> list[Evaluation]:
     """Return designs over the whole range, evaluated over some scenarios: a coarse stage of its own."""
-    given = [dict(basin.values) for basin in nominal.basins] + coarse(search.problem)
+    given = [dict(basin.values) for basin in nominal.basins] + _coarse(search.problem)
     if nominal.optimum:
         given.insert(0, dict(nominal.optimum))
     seen = [search.evaluation(values, scenarios) for values in given]
@@ -260,3 +262,15 @@ def _ended(best: Local) -> RobustStatus:
     if not best.feasible:
         return RobustStatus.INFEASIBLE
     return RobustStatus.OPTIMAL if best.settled else RobustStatus.KINK
+
+
+def _coarse(problem: Problem) -> list[dict[str, float]]:
+    """Return the designs a robust search starts from: even in scaled variables, the start first."""
+    n = len(problem.variables)
+    if n == 1:
+        points = [[i / (COARSE_ONE - 1.0)] for i in range(COARSE_ONE)]
+    else:
+        points = quasi_random(n, 2 ** math.ceil(math.log2(COARSE_EACH * n))).tolist()
+    designs = [unscaled(problem.variables, point) for point in points]
+    start = None if problem.start is None else dict(problem.start)
+    return [start, *designs] if start is not None and start not in designs else designs

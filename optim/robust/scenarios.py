@@ -138,7 +138,9 @@ class _Chain:
         problem, values = self._posed(case), self._values()
         if self._of_every_blade(problem):
             return _of_all_blades(problem, problem.cases[0], values, gradients, should_stop)
-        evaluation = evaluate(problem, values, gradients=gradients, should_stop=should_stop)
+        evaluation = evaluate(
+            problem, values, gradients=gradients, errors=False, should_stop=should_stop
+        )  # fmt: skip
         return list(evaluation.rows), len(evaluation.responses)
 
     def known(self, case: Case, should_stop: ShouldStop) -> list[Known]:
@@ -215,7 +217,7 @@ def _of_all_blades(
     for over in ranges:
         branch = sweep(
             here, start=over.low, stop=over.high, harmonics=problem.harmonics, limit=problem.limit,
-            effects=effects, should_stop=should_stop,
+            effects=effects, errors=False, should_stop=should_stop,
         )  # fmt: skip
         if not branch.completed:
             return [], len(ranges)

@@ -20,8 +20,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from optim.criteria.criterion import Criterion, Row
-from optim.methods.multistart import places
-from optim.methods.surrogate import Taylor, candidates, promising
+from optim.methods.surrogate import Taylor, candidates, places, promising
 from optim.problem.uncertainty_set import Disk, Scenario, Shape, UncertainSet
 from optim.problem.variables import Real
 from optim.robust.scenarios import Outcome
@@ -38,6 +37,7 @@ APART = 0.02  # distance of two scenarios, as a share of the width of the set
 WORSE = 1e-6  # relative, from which a scenario is worse
 NEAR_TOP = 0.85  # of the worst seen, from which a place is climbed from
 OUTWARD = 1e-9  # relative slope at a corner above which it is a local maximum
+MOST_BESIDES = 64  # drawn scenarios, the worst of them, that a look begins with
 SAME = 1e-9  # distance within which two places are one
 
 
@@ -128,7 +128,7 @@ def pessimise(
     uncertain : all scenarios.
     aspect : what is maximised.
     known : scenarios to start from.
-    besides : more scenarios to try.
+    besides : more scenarios to try, drawn at random.
     thorough : look at the whole set.
 
     Raises
@@ -146,7 +146,8 @@ def pessimise(
             ascent = _Ascent(ask, uncertain, aspect, disk)
             tried += ascent.run(mine)
             if thorough:
-                finished = ascent.look() and finished
+                inside = sum(max(map(abs, s.xi)) < 1.0 for s in besides if s in mine)
+                finished = ascent.look(inside) and finished
                 tried = [*tried, *ascent.outcomes]
     ranked = sorted(tried, key=lambda found: -aspect.worst(found.rows))
     return Finding(
@@ -190,10 +191,13 @@ class _Ascent:
         """Everything tried."""
         return [found for _, found in self._tried]
 
-    def look(self) -> bool:
-        """Look at the whole set, and climb from what stands out; return whether that came to its end."""
+    def look(self, known: int) -> bool:
+        """Look at the whole set, and climb from what stands out; return whether that came to its end.
+
+        So many places between the bounds are `known`: random ones, that were tried already.
+        """
         n = len(self._set.centre)
-        for z in places(n):
+        for z in places(n, known if n > 1 else 0):
             self._at(2.0 * z - 1.0)
         idle = 0
         for turn in range(MOST_ROUNDS):

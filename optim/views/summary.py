@@ -38,6 +38,7 @@ def of_design(result: DesignResult) -> Summary:
     pairs += [(row.quantity.name, f"{row.value:.4g} {row.quantity.unit}") for row in result.further]
     if result.active:
         pairs.append(("held by", "; ".join(result.active)))
+    pairs.append(("certain", result.certainty.value))
     pairs.append(("responses", str(result.evaluations)))
     pairs.append(("time", units.duration(result.seconds)))
     return made(f"{result.scene}, {result.method.value}", pairs, result.status.value)

@@ -15,25 +15,32 @@ import math
 import numpy as np
 
 from solver.balance.balance import Balance
+from solver.balance.kernels.residual import contact_values
 from solver.contacts.kernels.columns import MU, N0, PRESTRESSED
-from solver.contacts.laws.base import AnyContact
+from solver.contacts.kernels.system import Receptance, System, receptance_by_value
+from solver.contacts.laws.parts import Slider
 from solver.jit import fourier
 from solver.jit.fourier import Real
+from solver.linear.kernels.receptance import receptance
 
 SIDES = 64  # of the polygon round a circular limit, 0.1 % larger
 _INSTANTS = 720  # of a period, for the mean of a load that opens the contact
 _LEFT = 1e-7  # of the forces: a mean force that is left as rounding
 
 
-def friction_can_hold(balance: Balance, stuck: Real, table: Real, loads: Real) -> bool:
-    """Return whether mean forces that contacts can carry balance the mean loads on loose parts.
+def friction_can_hold(balance: Balance, reference: System, linear: Receptance, p: float) -> bool:
+    """Return whether mean forces that contacts can carry balance the mean loads on loose parts at λ = p.
 
     Parameters
     ----------
-    stuck : (nc,) mean motions of the ports on the contacts' stiffnesses `shift` [m].
-    table, loads : of `solver.balance.kernels.residual.contact_values`.
+    reference, linear : the balance's system by reference, and its receptance, which is filled.
     """
     system = balance.system
+    if not len(system.loose):
+        return True
+    receptance(reference, p, linear)
+    stuck = receptance_by_value(linear).u_linear[0, 0].real  # on the contacts' stiffnesses `shift`
+    table, loads, _, _ = contact_values(reference, p, 0.0)
     elastic, applied = system.shift * stuck, system.loose @ (system.shift * stuck)
     if not np.any(np.abs(applied) > _LEFT * (np.abs(system.loose) @ np.abs(elastic))):
         return True
@@ -62,12 +69,13 @@ def _limits(balance: Balance, table: Real, loads: Real) -> tuple[Real, Real]:
     system = balance.system
     rows, bounds = [np.zeros((0, system.owner.size))], [np.zeros(0)]
     for e, contact in enumerate(balance.scene.contacts):
-        if contact.friction is None:
+        slider = contact.friction
+        if slider is None:
             continue  # what else it is, its force has no limit
         first, normal = int(system.first_port[e]), contact.normal_port
-        sides = _sides(contact)
+        sides = _sides(slider)
         row = np.zeros((len(sides), system.owner.size))
-        row[:, [first + port for port in contact.friction.ports]] = sides
+        row[:, [first + port for port in slider.ports]] = sides
         mu = float(table[e, MU])
         if normal is None:
             bound = mu * _mean_of_open(loads[e])
@@ -84,11 +92,10 @@ def _limits(balance: Balance, table: Real, loads: Real) -> tuple[Real, Real]:
     return np.concatenate(rows), np.concatenate(bounds)
 
 
-def _sides(contact: AnyContact) -> Real:
-    """Return the directions (sides, directions it slides in) in which its friction is limited."""
-    assert contact.friction is not None
-    count = len(contact.friction.ports)
-    if count == 1 or contact.friction.limits_apart:
+def _sides(slider: Slider) -> Real:
+    """Return the directions (sides, directions it slides in) in which friction is limited."""
+    count = len(slider.ports)
+    if count == 1 or slider.limits_apart:
         return np.concatenate([np.eye(count), -np.eye(count)])
     angles = 2.0 * math.pi / SIDES * np.arange(SIDES)
     return np.stack([np.cos(angles), np.sin(angles)], axis=1)
@@ -96,5 +103,5 @@ def _sides(contact: AnyContact) -> Real:
 
 def _mean_of_open(load: Real) -> float:
     """Return the mean of max(N, 0) of a load with these coefficients [N]."""
-    tau = 2.0 * math.pi / _INSTANTS * (np.arange(_INSTANTS) + 0.5)
+    tau = np.asarray(2.0 * math.pi / _INSTANTS * (np.arange(_INSTANTS) + 0.5), np.float64)
     return float(np.maximum(fourier.basis(tau, (load.size - 1) // 2) @ load, 0.0).mean())

@@ -15,7 +15,7 @@ from solver.balance.kernels.locate import slope_by_parameter
 from solver.balance.kernels.mechanics import ALLOWED, unaccounted
 from solver.balance.kernels.newton import from_stuck, ladder, newton, stuck_start
 from solver.balance.kernels.output import MEASURES
-from solver.balance.kernels.residual import contact_values, evaluate
+from solver.balance.kernels.residual import evaluate
 from solver.balance.mean_loads import friction_can_hold
 from solver.balance.softening import solve_softened
 from solver.contacts.kernels.system import (
@@ -146,7 +146,7 @@ class Workspace:
         mechanics, see `solver.balance.kernels.mechanics`.
         """
         ways = self._ways()
-        if not len(self.balance.system.loose):
+        if not len(self.balance.system.loose) or self.balance.system.hold:
             return self._plain(p, ways, guess)
         if not self.friction_can_hold(p):
             nothing = np.zeros(self.balance.n_unknowns)
@@ -162,14 +162,12 @@ class Workspace:
         if found.converged or found.ratchets or first == len(ways):
             return found
         last = self._plain(p, ways[first:])
-        return replace(last, iterations=found.iterations + last.iterations)
+        lost = found.loses_power or last.loses_power
+        return replace(last, iterations=found.iterations + last.iterations, loses_power=lost)
 
     def friction_can_hold(self, p: float) -> bool:
         """Return whether friction can hold the mean loads on parts that contacts alone hold."""
-        receptance(self.system, p, self.linear)
-        stuck = receptance_by_value(self.linear).u_linear[0, 0].real
-        table, loads, _, _ = contact_values(self.system, p, 0.0)
-        return friction_can_hold(self.balance, stuck, table, loads)
+        return friction_can_hold(self.balance, self.system, self.linear, p)
 
     def _plain(self, p: float, ways: Sequence[Way], guess: Real | None = None) -> PointSolution:
         """Solve the balance as it stands, from `guess` and then by these ways."""
@@ -259,7 +257,8 @@ class Workspace:
         Under given loads the friction forces of two motions never work on their difference, so the motion of
         a part that needs such a force is no periodic one without it.
         """
-        other, found = self._holding(), self.held(p)
+        other = self.holding()
+        found = other.solve(p)
         u, spent, good = found.u, spent + found.iterations, found.converged
         failed = PointSolution(
             converged=False, u=u, iterations=spent, residual=np.inf, loses_power=found.loses_power
@@ -279,19 +278,9 @@ class Workspace:
             spent += more
         return replace(failed, iterations=spent)
 
-    def _holding(self) -> Workspace:
+    def holding(self) -> Workspace:
         """Return the same where a constant force holds what no contact does."""
         return Workspace.of(replace(self.balance, system=self.balance.system._replace(hold=1)))
-
-    def held(self, p: float) -> PointSolution:
-        """Solve at λ = `p` (inside unit) where a constant force holds what no contact does."""
-        other = self._holding()
-        return other._plain(p, other._ways())
-
-    def unheld_ways(self, u: Real, p: float) -> Real:
-        """Return the motions of the ports (g, nc) that no contact holds at (u, λ = p)."""
-        _, point = self._holding().forces(u, p)
-        return point.gauge[: int(point.counts[UNHELD])].copy()
 
     def _other_side(self, u: Real, p: float) -> Real | None:
         """Return u with loose parts driven on, to where contacts that stick hold them the other way, or None.

@@ -130,7 +130,7 @@ def held_alone(held: Held) -> bool:
 
 def held_by(held: Held, L: Complex, kt: Real) -> Held:
     """Return the matrices with the stiffness of the contacts in them."""
-    extra = (L.conj() * kt[:, None]).transpose(0, 2, 1) @ L
+    extra: NDArray[Any] = (L.conj() * kt[:, None]).transpose(0, 2, 1) @ L
     if not np.iscomplexobj(held.K) and not np.any(extra.imag):
         extra = extra.real
     return Held(held.K + extra, held.C, held.M, (held.key, L.tobytes(), kt.tobytes()))

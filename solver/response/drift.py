@@ -21,9 +21,10 @@ from solver.balance.kernels.residual import contact_values
 from solver.balance.parameter import Kind
 from solver.balance.workspace import ALONG, PointSolution, Workspace
 from solver.contacts.kernels.columns import PRESTRESSED
+from solver.contacts.kernels.system import UNHELD
 from solver.contacts.laws.parts import Slider
 from solver.jit import fourier
-from solver.jit.fourier import Complex, Real
+from solver.jit.fourier import Complex, Integer, Real
 from solver.linear.assembly import linear_model
 from solver.linear.contact_table import port_stiffnesses
 from solver.response.kernels.slide import slide
@@ -103,7 +104,7 @@ class _Drifting:
     dragged : whether dashpots hold every way.
     A : (m, m) motions for forces.
     free : (m,) motions without contacts.
-    sliders : the contacts along which it drifts: number, friction, μ, load.
+    sliders : the contacts along which it drifts: number, friction, load, and what of it is there at rest.
     """
 
     workspace: Workspace
@@ -116,31 +117,32 @@ class _Drifting:
     dragged: bool
     A: Real
     free: Real
-    sliders: tuple[tuple[int, Slider, float, Real, float], ...]
+    sliders: tuple[tuple[int, Slider, Real, float], ...]
 
     @classmethod
     def of(cls, workspace: Workspace, p: float, found: PointSolution) -> _Drifting | None:
         """Return the balance for what ratchets; None where it is not known how it drifts."""
-        held = workspace.held(p) if found.above_friction else found
+        holding = workspace.holding()
+        held = holding.solve(p) if found.above_friction else found
         balance, system = workspace.balance, workspace.balance.system
-        ways = workspace.unheld_ways(held.u, p)
+        _, point = holding.forces(held.u, p)
+        ways = point.gauge[: int(point.counts[UNHELD])].copy()
         if not len(ways) and len(system.loose) == 1:
             ways = system.loose
         moving = np.abs(ways) > ALONG * np.abs(ways).max(initial=0.0)
         table, loads, _, _ = contact_values(workspace.system, p, 0.0)
         sliders = []
         for e, contact in enumerate(balance.scene.contacts):
+            contact = contact.with_numbers(table[e])
             first, slider = int(system.first_port[e]), contact.friction
             ports = np.flatnonzero(moving[:, first : int(system.first_port[e + 1])].any(axis=0))
             if not ports.size:
                 continue
             if slider is None or not set(ports.tolist()) <= set(slider.ports):
                 return None
-            contact = contact.with_numbers(table[e])
-            assert contact.friction is not None
             pressed = contact.normal_port is not None and table[e, PRESTRESSED] > 0.0
             rest = max(float(loads[e, 0]), 0.0) if pressed else 0.0
-            sliders.append((e, contact.friction, float(contact.friction.mu), loads[e].copy(), rest))
+            sliders.append((e, slider, loads[e].copy(), rest))
         if not sliders:
             return None
         omega = p if balance.parameter.kind is Kind.FREQUENCY else system.omega
@@ -236,11 +238,11 @@ class _Drifting:
             rows = slice(first * n, (first + ports) * n)
             blocks = point.dF_dU[system.first_block[e] :][: ports * ports].reshape(ports, ports, n, n)
             by_u[rows, rows] = blocks.transpose(0, 2, 1, 3).reshape(ports * n, ports * n)
-        for e, *slider in self.sliders:
+        for e, slider, load, rest in self.sliders:
             first, end = int(system.first_port[e]), int(system.first_port[e + 1])
             rows, ways = slice(first * n, end * n), self.ways[:, first:end]
             forces[rows], by_u[rows, rows], by_port = _followed(
-                u[rows].reshape(end - first, n), drift @ ways, system.ks, slopes, *slider
+                u[rows].reshape(end - first, n), drift @ ways, system.ks, slider, load, rest, slopes=slopes
             )
             by_drift[rows] = by_port @ ways.T
         stiffness = np.repeat(system.shift, n)
@@ -259,10 +261,13 @@ def _dashpots(balance: Balance, ways: Real, omega: float) -> tuple[Real, Real, R
     from solver.response.time_history import matrices
 
     model = linear_model(balance.scene)
-    K, _, L = matrices(model, 0)
+    whole, _, ports = matrices(model, 0)
     C = model.plain(np.zeros(1, np.int64))[1][0]
     free = model.free
-    K, C, L = K[np.ix_(free, free)].real, C[np.ix_(free, free)].real, L[:, free].real
+    K, C, L = (
+        np.ascontiguousarray(each.real)
+        for each in (whole[np.ix_(free, free)], C[np.ix_(free, free)], ports[:, free])
+    )
     kt = port_stiffnesses(balance.scene, model)
     held = K + L.T @ (kt[:, None] * L)
     moved = np.linalg.solve(held, L.T @ (kt * ways).T)
@@ -273,21 +278,15 @@ def _dashpots(balance: Balance, ways: Real, omega: float) -> tuple[Real, Real, R
 
 
 def _followed(
-    motions: Real,
-    drift: Real,
-    ks: fourier.Integer,
-    differences: bool,
-    slider: Slider,
-    mu: float,
-    load: Real,
-    rest: float,
+    motions: Real, drift: Real, ks: Integer, slider: Slider, load: Real, rest: float, *, slopes: bool
 ) -> tuple[Real, Real, Real]:
     """Return the forces of a contact that drifts, and their slopes by its motions and by the drift.
 
     Parameters
     ----------
     motions : (ports, n) coefficients [m]; drift : (ports,) in a period [m].
-    differences : whether slopes are found, else they are 0.
+    load : coefficients of the normal load, of which `rest` is in equilibrium at rest [N].
+    slopes : whether these are found, else they are 0.
 
     Returns
     -------
@@ -296,9 +295,9 @@ def _followed(
     """
     ports, n = motions.shape
     size = max(float(np.abs(motions[:, int(ks[0] == 0) :]).max()), float(np.abs(drift).max()), 1e-300)
-    many = 1 + ports * n + ports if differences else 1
+    many = 1 + ports * n + ports if slopes else 1
     every, ways = np.repeat(motions[None], many, axis=0), np.repeat(drift[None], many, axis=0)
-    if differences:
+    if slopes:
         every.reshape(many, -1)[1 + np.arange(ports * n), np.arange(ports * n)] += _STEP * size
         ways[1 + ports * n + np.arange(ports), np.arange(ports)] += _STEP * size
     basis = _instants(ks.tobytes())
@@ -312,35 +311,35 @@ def _followed(
     stiff = np.array(slider.stiffnesses)[:, None]
     travel = np.diff(x[:, along], prepend=x[:, along, -1:], axis=2) + ways[:, along, None] / SAMPLES
     force, friction = np.zeros((many, ports, SAMPLES)), np.zeros((many, len(along), SAMPLES))
-    slide(np.ascontiguousarray(stiff * travel), mu * pressed, not slider.limits_apart, friction)
+    slide(np.ascontiguousarray(stiff * travel), slider.mu * pressed, not slider.limits_apart, friction)
     force[:, along] = friction
     if slider.normal_port is not None:
         force[:, slider.normal_port] = pressed - rest
     weights = basis.T * (2.0 / SAMPLES)
     weights[: int(ks[0] == 0)] *= 0.5
     found = (force @ weights.T).reshape(many, -1)
-    if not differences:
+    if not slopes:
         return found[0], np.zeros((ports * n, ports * n)), np.zeros((ports * n, ports))
-    slopes = ((found[1:] - found[0]) / (_STEP * size)).T
-    return found[0], slopes[:, : ports * n], slopes[:, ports * n :]
+    changes = ((found[1:] - found[0]) / (_STEP * size)).T
+    return found[0], changes[:, : ports * n], changes[:, ports * n :]
 
 
 @functools.lru_cache(maxsize=8)
 def _instants(ks: bytes) -> Real:
     """Return what the coefficients of these harmonics are multiplied by at each sample, (samples, n)."""
     orders = np.frombuffer(ks, np.int64)
-    tau = 2.0 * math.pi / SAMPLES * np.arange(SAMPLES)
+    tau = np.asarray(2.0 * math.pi / SAMPLES * np.arange(SAMPLES), np.float64)
     return fourier.from_full(fourier.basis(tau, int(orders[-1])), orders)
 
 
-def _coefficients(amplitudes: Complex, ks: fourier.Integer) -> Real:
+def _coefficients(amplitudes: Complex, ks: Integer) -> Real:
     """Return the coefficients (..., n) of complex amplitudes (..., nk) of the harmonics kept."""
     full = np.zeros((*amplitudes.shape[:-1], int(ks[-1]) + 1), np.complex128)
     full[..., ks] = amplitudes
     return fourier.from_full(fourier.to_real(full), ks)
 
 
-def _in_real(A: Complex, ks: fourier.Integer) -> Real:
+def _in_real(A: Complex, ks: Integer) -> Real:
     """Return A (nk, nc, nc) as a matrix (nc·n, nc·n) of coefficients."""
     nc, n = A.shape[1], int(fourier.coefficient_count(ks))
     real = np.zeros((nc, n, nc, n))

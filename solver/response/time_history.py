@@ -115,15 +115,17 @@ def all_coordinates(solution: Solution, *, first: int = 0) -> Complex:
     friction = np.array(forces, dtype=np.complex128).reshape(len(forces), ks.size).T
     if solution.contacts:
         kt = port_stiffnesses(solution.scene, model)
-        motions = np.array(
-            [fourier.to_complex(each)[first:] for c in solution.contacts for each in c.motions]
-        ).T
+        slips = [fourier.to_complex(each)[first:] for c in solution.contacts for each in c.motions]
         held = np.flatnonzero((ks == 0) | contacts_hold(model))
-        friction[held] -= kt * motions[held]
+        friction[held] -= kt * np.array(slips).T[held]
         K[held] += np.swapaxes(L[held].conj(), 1, 2) @ (kt[:, None] * L[held])
-    speed = (2.0 * math.pi * solution.frequency_hz * ks)[:, None, None]
     pushes = force_amplitudes(model, ks) - np.einsum("kpn,kp->kn", L.conj(), friction)
-    return np.asarray(np.linalg.solve(K - speed**2 * M + 1j * speed * C, pushes[:, :, None])[:, :, 0])
+    moved = np.flatnonzero(pushes.any(axis=1))  # of odd harmonics alone, every second is nothing
+    speed = (2.0 * math.pi * solution.frequency_hz * ks[moved])[:, None, None]
+    dynamic = K[moved] - speed**2 * M[moved] + 1j * speed * C[moved]
+    motions: Complex = np.zeros_like(pushes)
+    motions[moved] = np.linalg.solve(dynamic, pushes[moved, :, None])[:, :, 0]
+    return motions
 
 
 def matrices(model: LinearModel, k: int) -> tuple[Complex, Complex, Complex]:

@@ -39,7 +39,7 @@ from solver.contacts.kernels.stick_slip_events import (
     UNLOADED,
     largest,
 )
-from solver.contacts.kernels.system import Evaluation
+from solver.contacts.kernels.system import Evaluation, System
 from solver.contacts.segments import Segments, segments_of
 from solver.jit import fourier
 from solver.jit.fourier import Integer, Real
@@ -144,27 +144,45 @@ def friction_work(cycle: Cycle, e: int, changes: Sequence[Change]) -> tuple[floa
     work, slopes = 0.0, np.zeros(len(changes))
     system, ports = cycle.balance.system, cycle.ports(e)
     for a in cycle.balance.scene.contacts[e].RUBBING:
-        speed, force = _speed(cycle.U[ports[a]], system.ks), cycle.F[ports[a]]
-        done = float(force @ speed)
-        if abs(done) <= _ROUNDING * float(np.abs(force) @ np.abs(speed)):
-            continue  # a stuck contact: what is left of terms that cancel; 0 is the least, so the slope is 0
-        work += math.pi * done
-        for j, change in enumerate(changes):
-            dF = change.dF[ports[a]].copy()
-            for b, port in enumerate(ports):
-                dF += cycle.dF_dU[system.first_block[e] + a * len(ports) + b] @ change.dU[port]
-            dspeed = _speed(change.dU[ports[a]], system.ks)
-            slopes[j] += math.pi * float(dF @ speed + force @ dspeed)
+        U, F = cycle.U[ports[a]], cycle.F[ports[a]]
+        dU = np.array([change.dU[ports[a]] for change in changes]).reshape(-1, U.size)
+        dF = np.array([
+            change.dF[ports[a]] + force_change(system, e, a, cycle.dF_dU, change.dU) for change in changes
+        ]).reshape(-1, U.size)  # fmt: skip
+        done, rises = work_of(U, F, dU, dF, system.ks)
+        work += float(done)
+        slopes += rises
     return work, slopes
 
 
+def force_change(system: System, e: int, a: int, dF_dU: Real, dU: Real) -> Real:
+    """Return the change of the force (n,) at port `a` of contact `e` for motions that change by `dU`."""
+    first, ports = system.first_block[e], range(int(system.first_port[e]), int(system.first_port[e + 1]))
+    changes = [dF_dU[first + a * len(ports) + b] @ dU[port] for b, port in enumerate(ports)]
+    total: Real = np.sum(changes, axis=0) if len(ports) > 1 else changes[0]
+    return total
+
+
+def work_of(U: Real, F: Real, dU: Real, dF: Real, ks: Integer) -> tuple[Real, Real]:
+    """Return the work of forces F on motions U in a period [J], (...,), and its changes by dU and dF.
+
+    All are coefficients (..., n). A stuck contact does none: what is left of terms that cancel is not work,
+    and 0 is the least, so that the change is 0 too.
+    """
+    speed = _speed(U, ks)
+    done = np.sum(F * speed, axis=-1)
+    real = np.abs(done) > _ROUNDING * np.sum(np.abs(F * speed), axis=-1)
+    rises = np.sum(dF * speed + F * _speed(dU, ks), axis=-1)
+    return math.pi * np.where(real, done, 0.0), math.pi * np.where(real, rises, 0.0)
+
+
 def _speed(coefficients: Real, ks: Integer) -> Real:
-    """Return the coefficients (n,) of dq/dτ for those of the ascending harmonics `ks` alone."""
+    """Return the coefficients (..., n) of dq/dτ for those of the ascending harmonics `ks` alone."""
     first = int(ks[0] == 0)
     orders = ks[first:]
     result = np.zeros_like(coefficients)
-    result[first::2] = orders * coefficients[first + 1 :: 2]
-    result[first + 1 :: 2] = -orders * coefficients[first::2]
+    result[..., first::2] = orders * coefficients[..., first + 1 :: 2]
+    result[..., first + 1 :: 2] = -orders * coefficients[..., first::2]
     return result
 
 

@@ -32,7 +32,15 @@ from solver.errors import SettingError
 from solver.jit.fourier import Real
 from solver.linear.kernels.receptance import receptance
 from solver.response.wear import contact_index
-from solver.response.wear_measures import Change, Cycle, friction_work, least_load, slip_travel
+from solver.response.wear_measures import (
+    Change,
+    Cycle,
+    force_change,
+    friction_work,
+    least_load,
+    slip_travel,
+    work_of,
+)
 from solver.results.told import Piece
 
 # Maxima below this share of the highest cannot lead within one step of an optimiser.
@@ -136,8 +144,7 @@ class _Search:
         self._e = e
         self._measure = measure
         self._sign = -1.0 if measure is Measure.LEAST_LOAD else 1.0
-        rows = zip(branch.solutions, branch.tangents, strict=True)
-        nodes = [self._on_branch(solution, tangent) for solution, tangent in rows]
+        nodes = self._on_branch(branch.solutions, branch.tangents)
         top = max(node.value for node in nodes)
         self._size = max(abs(node.value) for node in nodes)
         self._nodes = [nodes[0]]
@@ -216,12 +223,42 @@ class _Search:
             side = now
         return best
 
-    def _on_branch(self, solution: Real, tangent: Real) -> _Node:
-        """Return a point of the branch."""
-        workspace, p = self._workspace, float(solution[-1])
-        receptance(workspace.system, p, workspace.linear)
-        evaluate(workspace.system, workspace.linear, solution[:-1], p, 0.0, workspace.point)
-        return self._node(solution, tangent)
+    def _on_branch(self, solutions: Real, tangents: Real) -> list[_Node]:
+        """Return the points of the branch: the work at all of them at once."""
+        workspace, point, system = self._workspace, self._point, self._workspace.balance.system
+        e, first = self._e, int(system.first_port[self._e])
+        rubbing = workspace.balance.scene.contacts[e].RUBBING
+        together = self._measure is Measure.FRICTION_WORK and rubbing
+        nodes: list[_Node] = []
+        forces = np.zeros((2, len(rubbing), len(solutions), point.F.shape[1]))
+        for i, (solution, tangent) in enumerate(zip(solutions, tangents, strict=True)):
+            p = float(solution[-1])
+            if i == 0 or not together:  # forces of contacts do not depend on the receptance
+                receptance(workspace.system, p, workspace.linear)
+            evaluate(workspace.system, workspace.linear, solution[:-1], p, 0.0, workspace.point)
+            if not together:
+                nodes.append(self._node(solution, tangent))
+                continue
+            dU = tangent[:-1].reshape(point.F.shape)
+            for j, a in enumerate(rubbing):
+                forces[0, j, i] = point.F[first + a]
+                forces[1, j, i] = tangent[-1] * point.dF_dp[first + a]
+                forces[1, j, i] += force_change(system, e, a, point.dF_dU, dU)
+        if not together:
+            return nodes
+        values, slopes = np.zeros(len(solutions)), np.zeros(len(solutions))
+        for j, a in enumerate(rubbing):
+            motions = [
+                rows[:, :-1].reshape(-1, *point.F.shape)[:, first + a] for rows in (solutions, tangents)
+            ]
+            done, rises = work_of(motions[0], forces[0, j], motions[1], forces[1, j], system.ks)
+            values, slopes = values + done, slopes + rises
+        known = np.isfinite(values)
+        values, slopes = np.where(known, values, -math.inf), np.where(known, slopes, 0.0)
+        return [
+            _Node(*each)
+            for each in zip(solutions, tangents, values.tolist(), slopes.tolist(), strict=True)
+        ]  # fmt: skip
 
     def _between(self, left: _Node, right: _Node, share: float) -> _Node | None:
         """Return the solution at a share of the chord, its slope by the share; None if there is none."""

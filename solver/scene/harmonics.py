@@ -66,7 +66,8 @@ def forced_harmonics(scene: Scene, paths: Iterable[str] = ()) -> tuple[int, ...]
 
 def load_orders(scene: Scene, paths: Iterable[str] = ()) -> set[int]:
     """Return the harmonics of the normal loads that vary, or would along the paths."""
-    found = {order for contact in scene.contacts if contact.load is not None for order in contact.load.orders}
+    loads = (contact.load for contact in scene.contacts)
+    found = {order for load in loads if load is not None for order in load.orders}
     changed = (quantity for path in paths for quantity in changed_quantities(scene, path))
     return found | {quantity.load_order for quantity in changed if quantity.varies_load}
 

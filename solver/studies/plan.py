@@ -7,21 +7,12 @@ from typing import ClassVar
 
 import numpy as np
 
-from solver.balance.balance import Balance, build, fewer_harmonics
+from solver.balance.balance import Balance, build
 from solver.balance.simplifications import Effects, even_harmonics_reason
-from solver.contacts.kernels.system import (
-    DENSE,
-    MODES,
-    POLES,
-    by_reference,
-    new_receptance,
-    of_all_ports,
-    receptance_by_value,
-)
+from solver.contacts.kernels.system import DENSE, MODES, POLES
 from solver.jit.fourier import Real
-from solver.linear.kernels.receptance import receptance
 from solver.linear.leading_ports import FEWEST_PORTS
-from solver.response.stability.verdict import forecast
+from solver.response.stability.cost import forecast
 from solver.results.base import Shown
 from solver.results.views import Views
 from solver.scene.bodies.kinematics import static_forces
@@ -31,16 +22,10 @@ from solver.scene.scene import (
     AnyContact,
     Scene,
 )
+from solver.studies.cost import point_seconds, stuck_forces
 from solver.studies.memory import dense_bytes
 
-# Fitted to responses of the shipped scenes at 11 harmonics on one core of a server: seconds of a Newton
-# iteration, of one contact with n coefficients (times n²), and of a solve with n unknowns (times n³).
-_SECONDS_AN_ITERATION = 5e-6
-_SECONDS_A_CONTACT = 2e-8
-_SECONDS_A_SOLVE = 1.5e-10
 _SECONDS_A_DIAMETER = 1e-8  # of the modes of a Hermitian structure of n coordinates, times n³
-_ITERATIONS_A_POINT = 4.0
-_FREQUENCIES = 101  # of the band at which the stuck response is looked at
 
 _FORMS = {
     MODES: "undamped modes: the damping is diagonal in them, so a frequency costs modes x contacts^2",
@@ -155,16 +140,9 @@ def plan(scene: Scene, *, harmonics: int = 11, effects: Effects | None = None) -
     """
     asked = effects or Effects()
     balance = build(scene, harmonics=harmonics, effects=asked)
-    n, contacts = balance.n_unknowns, balance.n_ports
-    carried = _stuck_force(balance)
+    stuck = stuck_forces(balance)
+    carried = stuck.max(axis=0)
     slips = tuple(_slip(balance, i, carried) for i in range(len(balance.scene.contacts)))
-    kept = sum(effect.used for effect in slips) if balance.n_leading == contacts else balance.n_leading
-    kept *= balance.n_coefficients
-    iteration = (
-        _SECONDS_AN_ITERATION
-        + _SECONDS_A_CONTACT * contacts * balance.n_coefficients**2
-        + _SECONDS_A_SOLVE * kept**3
-    )
     return Plan(
         scene=scene.name,
         effects=(
@@ -179,11 +157,11 @@ def plan(scene: Scene, *, harmonics: int = 11, effects: Effects | None = None) -
             Effect(name="linear part", used=True, reason=_linear_part(balance)),
             _stiffness_shift(balance.system.shift),
         ),
-        unknowns=n,
+        unknowns=balance.n_unknowns,
         linear_dofs=_linear_dofs(balance.scene),
         contacts=len(balance.scene.contacts),
         harmonics=harmonics,
-        seconds_a_point=_ITERATIONS_A_POINT * iteration,
+        seconds_a_point=point_seconds(balance, stuck),
         dense_bytes=dense_bytes(scene, harmonics, every_sector=asked.every_sector).total,
         performance_curve=performance_curve_words(balance.scene),
         seconds_of_stability=forecast(balance.scene),
@@ -290,26 +268,6 @@ def _slip(balance: Balance, i: int, stuck: Real) -> Effect:
             reason=f"{words}: while it sticks it is its spring of {friction.kt:g} N/m, checked at every step",
         )
     return Effect(name=name, used=True, reason=words)
-
-
-def _stuck_force(balance: Balance) -> Real:
-    """Return the largest force each port carries over the band if all stick [N], without the mean."""
-    # Stuck contacts are springs: nothing moves but at the harmonics of the forces.
-    forced = fewer_harmonics(balance, 0)
-    system, low_high = by_reference(forced.system), balance.scene.observe.band
-    out = new_receptance(system)
-    kt = np.array([k for contact in balance.scene.contacts for k in contact.stiffnesses])
-    largest = np.zeros(kt.size)
-    stiffness = kt - balance.system.shift
-    for frequency in np.linspace(*low_high, _FREQUENCIES):
-        receptance(system, 2.0 * np.pi * float(frequency), out)
-        linear = of_all_ports(forced.system, receptance_by_value(out))
-        total = np.zeros(kt.size)
-        for k, A, free in zip(forced.system.ks, linear.A[0], linear.u_linear[0], strict=True):
-            if k > 0 and np.any(free):
-                total += np.abs(np.linalg.solve(np.eye(kt.size) + A * stiffness, free))
-        largest = np.maximum(largest, kt * total)
-    return largest
 
 
 def _even_harmonics(balance: Balance) -> Effect:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -180,13 +180,7 @@ def posed(asked: dict[str, Any]) -> Problem:
 def brute_force(problem: Problem, n: int, *, places: int = 3, levels: int = 4, fine: int = 7) -> Brute:
     """A grid of n points a variable, refined round its best places."""
     known: dict[tuple[float, ...], tuple[float, float]] = {}
-
-    def at(z: tuple[float, ...]) -> tuple[float, float]:
-        if z not in known:
-            found = evaluate(problem, unscaled(problem.variables, z), gradients=False)
-            known[z] = rank(problem, found) if found.good else (math.inf, math.inf)
-        return known[z]
-
+    at = _ranking(problem, known)
     count = len(problem.variables)
     step = 1.0 / (n - 1)
     grid = itertools.product(*[np.linspace(0.0, 1.0, n).tolist()] * count)
@@ -198,12 +192,55 @@ def brute_force(problem: Problem, n: int, *, places: int = 3, levels: int = 4, f
                 at(z)
             best = min((z for z in known if _distance(z, best) <= reach), key=lambda z: known[z])
             reach *= 2.5 / (fine - 1)
+    return _best_of(known)
+
+
+def random_multistart(
+    problem: Problem, seed: int, n: int, *, places: int = 3, levels: int = 5, each: int = 10
+) -> Brute:  # fmt: skip
+    """So many designs at random, and round the best of them random steps that become shorter."""
+    rng = np.random.default_rng([seed, n])
+    known: dict[tuple[float, ...], tuple[float, float]] = {}
+    at = _ranking(problem, known)
+    count = len(problem.variables)
+    ranked = sorted(map(tuple, rng.random((n, count)).tolist()), key=at)
+    for best in _apart(ranked, 0.1, places):
+        reach = 0.2
+        for _ in range(levels):
+            for step in rng.uniform(-reach, reach, (each, count)):
+                best = min(best, tuple(np.clip(np.array(best) + step, 0.0, 1.0).tolist()), key=at)
+            reach *= 0.4
+    return _best_of(known)
+
+
+def _ranking(
+    problem: Problem, known: dict[tuple[float, ...], tuple[float, float]]
+) -> Callable[[tuple[float, ...]], tuple[float, float]]:
+    """What ranks scaled variables, each once."""
+
+    def at(z: tuple[float, ...]) -> tuple[float, float]:
+        if z not in known:
+            found = evaluate(problem, unscaled(problem.variables, z), gradients=False, errors=False)
+            known[z] = rank(problem, found) if found.good else (math.inf, math.inf)
+        return known[z]
+
+    return at
+
+
+def _best_of(known: dict[tuple[float, ...], tuple[float, float]]) -> Brute:
     best = min(known, key=lambda z: known[z])
     violation, objective = known[best]
     nothing = not math.isfinite(violation)
     return Brute(
         z=None if nothing else best, objective=objective, violation=violation, evaluations=len(known)
     )
+
+
+def limited_cases(seed: int) -> dict[str, Any]:
+    """The arguments of a design of one to three masses: two or three cases, limits, two to five variables."""
+    while len(random_design_scene(seed).structure.masses) > 3:  # type: ignore[union-attr]
+        seed += 1000
+    return random_design(seed, 2 + seed % 4, cases=2 + seed % 2, limits=True)
 
 
 def _distance(one: Sequence[float], other: Sequence[float]) -> float:

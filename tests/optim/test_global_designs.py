@@ -6,6 +6,8 @@ import itertools
 import math
 import time
 import tomllib
+from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -13,10 +15,13 @@ from typing import Any
 import numpy as np
 import pytest
 from random_designs import (
+    Brute,
     beaten_by,
     brute_force,
+    limited_cases,
     posed,
     random_design,
+    random_multistart,
     random_uncertain,
     rank,
     stands,
@@ -26,9 +31,9 @@ from sampling import others_long
 import optim
 import solver
 from optim.criteria.peak import PEAK
-from optim.methods.multistart import corners, places
-from optim.methods.surrogate import Taylor, promising
-from optim.results.design import DesignResult, DesignStatus
+from optim.methods.surrogate import Taylor, corners, places, promising
+from optim.problem.problem import Method, Problem
+from optim.results.design import Certainty, DesignResult, DesignStatus
 from optim.robust.result import RobustResult, RobustStatus
 from optim.robust.scenarios import outcome
 
@@ -38,12 +43,19 @@ LOADS = {"c0.N0": (6.8237, 682.37), "c1.N0": (10.815, 1081.5)}
 
 
 def check_design(asked: dict[str, Any], n: int, **finer: int) -> None:
-    """Brute force never beats a design by more than 1e-4 unless its status says that it is local."""
+    """A grid never beats a design by more than 1e-4 unless its status says that it is local."""
+    check_against(asked, lambda problem: brute_force(problem, n, **finer))
+
+
+def check_against(asked: dict[str, Any], judge: Callable[[Problem], Brute]) -> None:
+    """The same for any brute force."""
     found = optim.design(**asked)
     if found.status is DesignStatus.LOCAL:
         return
-    problem = posed(asked)
-    brute = brute_force(problem, n, **finer)
+    assert (found.certainty is Certainty.CLOSED) <= (found.method is Method.TRACKED)
+    # With as many harmonics as the design was found with.
+    problem = replace(posed(asked), harmonics=found.problem.harmonics)
+    brute = judge(problem)
     good = found.evaluation is not None and found.evaluation.good
     mine = rank(problem, found.evaluation) if good else (math.inf, math.inf)  # type: ignore[arg-type]
     by = beaten_by(mine, brute)
@@ -59,6 +71,12 @@ def test_one_variable(seed: int) -> None:
 @pytest.mark.parametrize("seed", [3])
 def test_two_variables(seed: int) -> None:
     check_design(random_design(seed, 2), 7, places=2, levels=2, fine=5)
+
+
+@pytest.mark.parametrize("seed", others_long(range(15), keep=(4,)))
+def test_two_to_five_variables_with_cases_and_limits(seed: int) -> None:
+    """One to three masses; designs at random and steps from the best of them find nothing better."""
+    check_against(limited_cases(seed), lambda problem: random_multistart(problem, seed, 60))
 
 
 @pytest.mark.long

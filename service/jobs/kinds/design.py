@@ -75,6 +75,7 @@ class OptimumResult(KnownResult, ReachedResult):
     warnings: list[Any]
     plateau: Table
     chosen_by: str | None
+    certainty: str = Field(description="Whether the range is closed by peaks followed over it, or sampled.")
     checked: list[Any]
     curve: Table | None
     looked_at: list[Any]

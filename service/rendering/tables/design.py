@@ -125,6 +125,8 @@ def _pairs(found: Json) -> Pairs:
     if looked:
         ends = len(found.get("basins", ()))
         pairs.append(("looked at", f"{looked} designs over the whole range; {ends} local optima"))
+    if "certainty" in found:
+        pairs.append(("certain", found["certainty"]))
     residual = found.get("optimality")
     if residual is not None:
         pairs.append(("KKT residual", f"{residual:.1e}"))

@@ -17,7 +17,6 @@ slider is at rest, δw = δu − F δt; where a contact closes into stick, w = u
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 
 import numpy as np
@@ -56,10 +55,10 @@ class _Motion:
         curves[3, : path.load.size] = path.mu * fourier.derivative(path.load)
         self._curves, self._highest = curves, highest
 
-    def at(self, tau: float) -> tuple[Real, float, float]:
-        """Return u' (2,) [m], L and L' [N]."""
-        here = self._curves @ fourier.basis(np.array([tau]), self._highest)[0]
-        return here[:2], float(here[2]), float(here[3])
+    def at(self, tau: Real) -> tuple[Real, Real, Real]:
+        """Return u' (t, 2) [m], L and L' (t,) [N]."""
+        here = fourier.basis(tau, self._highest) @ self._curves.T
+        return here[:, :2], here[:, 2], here[:, 3]
 
     def direction(self, piece: Real, tau: float) -> float:
         """Return θ in a slip."""
@@ -106,16 +105,18 @@ def _without_friction(path: SpacePath, kn: float | None) -> tuple[Piece, ...]:
 
 
 def _padded(block: Real, kn: float | None, column: Real | None = None) -> Real:
-    """Return rows of two motions with the column of the third, if there is one."""
+    """Return rows (…, 2) of two motions with the column (…,) of the third, if there is one."""
     if kn is None:
         return block
-    return np.column_stack([block, np.zeros(len(block)) if column is None else column])
+    third = np.zeros(block.shape[:-1]) if column is None else column
+    return np.concatenate([block, third[..., None]], axis=-1)
 
 
 def _tangent(block: Real, kn: float | None, column: Real) -> Real:
     if kn is None:
         return block
-    return np.vstack([_padded(block, kn, column), [0.0, 0.0, kn]])
+    rows = _padded(block, kn, column)
+    return np.concatenate([rows, np.broadcast_to([0.0, 0.0, kn], (*rows.shape[:-2], 1, 3))], axis=-2)
 
 
 def _stick(path: SpacePath, kn: float | None, begin: float, end: float, entry: Entry | None) -> Piece:
@@ -131,12 +132,12 @@ def _entry(motion: _Motion, kn: float | None, row: Real, before: Real | None) ->
     path, begin = motion.path, float(row[BEGIN])
     K, by_load = np.diag(path.kt), path.mu * (kn or 0.0)
     m = 2 if kn is None else 3
-    rate, _, limit_rate = motion.at(begin)
+    rate, limit_rate = motion.at(np.array([begin]))[::2]
     slips = row[MOTION] == SLIP
     if before is None:
         if slips:
             return Entry(np.zeros((1, m)), None)
-        return Entry(_padded(np.eye(2), kn, -rate * by_load / limit_rate if kn else None), None)
+        return Entry(_padded(np.eye(2), kn, -rate[0] * by_load / limit_rate[0] if kn else None), None)
     slipped = before[MOTION] == SLIP
     if slipped and slips:
         return Entry(np.zeros((1, m)), np.eye(1))
@@ -153,9 +154,9 @@ def _entry(motion: _Motion, kn: float | None, row: Real, before: Real | None) ->
     return Entry(_padded(np.eye(2), kn, -F @ n * by_load), -path.kt[0] * (F @ m_way)[:, None])
 
 
-def _ways(theta: float) -> tuple[Real, Real]:
-    c, s = math.cos(theta), math.sin(theta)
-    return np.array([c, s]), np.array([-s, c])
+def _ways(theta: float | Real) -> tuple[Real, Real]:
+    c, s = np.cos(theta), np.sin(theta)
+    return np.stack([c, s], axis=-1), np.stack([-s, c], axis=-1)
 
 
 def _slip(motion: _Motion, kn: float | None, row: Real, entry: Entry) -> Piece:
@@ -170,27 +171,31 @@ def _slip(motion: _Motion, kn: float | None, row: Real, entry: Entry) -> Piece:
     )  # fmt: skip
 
 
-def _slip_rates(motion: _Motion, kn: float | None, row: Real) -> Callable[[float], Rates]:
-    """Return the rates in a slip as a function of the angle."""
+def _slip_rates(motion: _Motion, kn: float | None, row: Real) -> Callable[[Real], Rates]:
+    """Return the rates in a slip as a function of angles."""
     (k1, k2), by_load = motion.path.kt, motion.path.mu * (kn or 0.0)
     more = 1.0 / k2 - 1.0 / k1
 
-    def rates(tau: float) -> Rates:
-        theta = motion.direction(row, tau)
-        n, m_way = _ways(theta)
+    def rates(tau: Real) -> Rates:
+        n, m_way = _ways(np.array([motion.direction(row, float(each)) for each in tau]))
         rate, limit, limit_rate = motion.at(tau)
-        limit = max(limit, _LEAST)
-        c, s = n
+        limit = np.maximum(limit, _LEAST)
+        c, s = n.T
         G = c * c / k2 + s * s / k1
-        turn = (float(m_way @ rate) - more * s * c * limit_rate) / (limit * G)
-        a = -float(n @ rate) - more * (c * c - s * s) * limit_rate + 2.0 * limit * more * s * c * turn
-        grip = k1 * m_way[:, None]
+        turn = (np.sum(m_way * rate, axis=1) - more * s * c * limit_rate) / (limit * G)
+        a = (
+            -np.sum(n * rate, axis=1)
+            - more * (c * c - s * s) * limit_rate
+            + 2.0 * limit * more * s * c * turn
+        )
+        by_rate = _padded(m_way / (k1 * G)[:, None], kn, -more * s * c * by_load / (k1 * G))
+        grip = k1 * m_way[:, :, None]
         return Rates(
-            tangent=_tangent(np.zeros((2, 2)), kn, by_load * n),
-            grip=grip if kn is None else np.vstack([grip, [0.0]]),
-            by_motion=_padded(np.zeros((1, 2)), kn, np.array([-turn * by_load / k1])),
-            by_rate=_padded(m_way[None, :] / (k1 * G), kn, np.array([-more * s * c * by_load / (k1 * G)])),
-            own=np.array([[limit_rate / limit + a / (limit * G)]]),
+            tangent=_tangent(np.zeros((len(tau), 2, 2)), kn, by_load * n),
+            grip=grip if kn is None else np.concatenate([grip, np.zeros_like(grip[:, :1])], axis=1),
+            by_motion=_padded(np.zeros((len(tau), 2)), kn, -turn * by_load / k1)[:, None],
+            by_rate=by_rate[:, None],
+            own=(limit_rate / limit + a / (limit * G))[:, None, None],
         )
 
     return rates

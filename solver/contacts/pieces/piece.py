@@ -24,9 +24,10 @@ TURN = 2.0 * math.pi
 
 
 class Rates(NamedTuple):
-    """How force and memory follow at one instant, with m motions and s numbers remembered.
+    """How force and memory follow, with m motions and s numbers remembered.
 
-    tangent (m, m) [N/m], grip (m, s) [N/m]; by_motion (s, m), by_rate (s, m), own (s, s) by τ.
+    tangent (m, m) [N/m], grip (m, s) [N/m]; by_motion (s, m), by_rate (s, m), own (s, s) by τ. At t instants
+    each of them is (t, …).
     """
 
     tangent: Real
@@ -55,7 +56,7 @@ class Piece:
     begin, end : float
         When it lasts [rad]; `begin` may be any angle, and the end at most a period later.
     rates : Rates or callable
-        How it follows; of an angle where that changes within the state.
+        How it follows; of angles (t,), as (t, …) arrays, where that changes within the state.
     entry : Entry or None
         None where nothing is remembered, or a slider is held all the time.
     carried : (s, m) array
@@ -66,7 +67,7 @@ class Piece:
 
     begin: float
     end: float
-    rates: Rates | Callable[[float], Rates]
+    rates: Rates | Callable[[Real], Rates]
     entry: Entry | None = None
     carried: Real
     edges: tuple[float, ...] = ()
@@ -91,9 +92,11 @@ class Piece:
         """Whether its sliders are held all the time: what they hold never changes."""
         return self.memory > 0 and self.entry is None
 
-    def at(self, tau: float) -> Rates:
-        """Return its rates at an angle."""
-        return self.rates if isinstance(self.rates, Rates) else self.rates(tau)
+    def at(self, tau: Real) -> Rates:
+        """Return its rates at angles (t,), (t, …) each."""
+        if not isinstance(self.rates, Rates):
+            return self.rates(tau)
+        return Rates(*(np.broadcast_to(each, (len(tau), *each.shape)) for each in self.rates))
 
     def holds_at(self, tau: float) -> bool:
         """Whether it lasts at `tau`."""

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from solver.contacts.fields import Real
 from solver.contacts.kernels.stick_slip_events import BEGIN, END
-from solver.contacts.pieces.piece import SHORTEST, TURN, Piece, Rates, spring, steady
+from solver.contacts.pieces.piece import SHORTEST, TURN, Piece, Rates, spring
 from solver.contacts.segments import segments_of
 from solver.jit import fourier
 
@@ -28,13 +26,12 @@ def polynomial_pieces(motion: Real, powers: tuple[float, ...]) -> tuple[Piece, .
     if not any(slopes[1:]):
         return (spring(0.0, TURN, np.array([[slopes[0]]])),)
     highest = (motion.size - 1) // 2
-    still = steady(np.zeros((1, 1)))
 
-    def rates(tau: float) -> Rates:
-        u, stiffness = float(fourier.basis(np.array([tau]), highest)[0] @ motion), 0.0
-        for slope in reversed(slopes):
-            stiffness = stiffness * u + slope
-        return still._replace(tangent=np.array([[stiffness]]))
+    def rates(tau: Real) -> Rates:
+        u = fourier.basis(tau, highest) @ motion
+        stiffness = np.asarray(np.polynomial.polynomial.polyval(u, slopes), dtype=np.float64)
+        none = np.zeros((len(tau), 0, 1))
+        return Rates(stiffness[:, None, None], none.swapaxes(1, 2), none, none, none[:, :, :0])
 
     edges = tuple(k * TURN / 8.0 for k in range(1, 8))
-    return (Piece(begin=0.0, end=2.0 * math.pi, rates=rates, carried=np.zeros((0, 1)), edges=edges),)
+    return (Piece(begin=0.0, end=TURN, rates=rates, carried=np.zeros((0, 1)), edges=edges),)

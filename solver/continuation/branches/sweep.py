@@ -6,8 +6,10 @@ stretches, so that the caller can watch and stop, and the result is put together
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -63,6 +65,7 @@ def sweep(
     limit: float | None = None,
     settings: ContinuationSettings | None = None,
     effects: Effects | None = None,
+    errors: bool = True,
     guess: Real | None = None,
     resume: Stretch | None = None,
     on_stretch: Callable[[Stretch], None] | None = None,
@@ -87,6 +90,7 @@ def sweep(
     settings : of the continuation.
     effects : what is paid for though the scene does not call for it; see
     `solver.balance.simplifications.Effects`.
+    errors : whether the error of the highest peak is estimated; `with_error` does it later if not.
     guess : (n_unknowns,) slip motions [m] to start from, instead of the start-up ladder.
     resume : the beginning of the same branch, to go on behind its last point.
     on_stretch : called with all consecutive points as they are found; joined (`solver.joined`) they are what
@@ -158,6 +162,8 @@ def sweep(
         status = BranchStatus.TOO_STIFF
     earlier = 0.0 if resume is None else resume.seconds
     branch = _finish(workspace, stretches, status, first, last, limit, begun - earlier)
+    if errors:
+        branch = with_error(branch, workspace)
     if on_progress is not None and branch.completed:
         on_progress(1.0, len(branch.values))
     return branch
@@ -321,14 +327,13 @@ def _finish(
     at = band_limit(limit, survey.peaks, balance.parameter.kind)
     band = None if at is None else survey.band(at)
     points = survey.points
-    follow = None if status is BranchStatus.STOPPED else highest_between
     return Branch(
         balance=balance, status=status, start=start, stop=stop,
         values=balance.parameter.all_outside(points.solutions[:, -1].copy()), solutions=points.solutions,
         tangents=points.tangents,
         observed=to_full(points.observed, balance.system.ks, balance.highest_harmonic),
         measures=points.measures, states=points.states, peaks=survey.peaks,
-        band=band, error_estimate=branch_error(workspace, points, survey.peaks, follow),
+        band=band, error_estimate=math.nan,
         newton_iterations=whole.newton_iterations + survey.spent,
         rejected_steps=whole.rejected_steps, stepped_over=whole.stepped_over,
         seconds=time.perf_counter() - begun,
@@ -337,6 +342,19 @@ def _finish(
         ),
         peak_certificate=survey.certificate(completed=status is BranchStatus.COMPLETED),
     )  # fmt: skip
+
+
+def with_error(branch: Branch, workspace: Workspace | None = None) -> Branch:
+    """Return a branch with the estimated error of its highest peak, if that was left out."""
+    if math.isfinite(branch.error_estimate) or not branch.peaks:
+        return branch
+    points = Points(
+        solutions=branch.solutions, tangents=branch.tangents, measures=branch.measures,
+        observed=branch.observed, states=branch.states,
+    )  # fmt: skip
+    follow = None if branch.status is BranchStatus.STOPPED else highest_between
+    error = branch_error(workspace or Workspace.of(branch.balance), points, branch.peaks, follow)
+    return replace(branch, error_estimate=error)
 
 
 def _drive_flags(

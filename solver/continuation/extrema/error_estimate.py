@@ -273,10 +273,11 @@ class ErrorEstimator:
             A, B, sizes = linear.A[0, part], linear.B[0, part, None], forces[part][:, pushed, None]
             bare = A[:, :, pushed] if span is None else A @ span[pushed].T
             held = np.linalg.solve(np.eye(A.shape[1]) + A @ springs, bare)
-            if span is not None:
-                bare, held = span @ bare, span @ held
-            seen[part] = (np.abs(B[..., pushed] - (B * stiffness) @ held) @ sizes)[:, 0, 0]
-            moved[0, part], moved[1, part] = (np.abs(held) @ sizes)[..., 0], (np.abs(bare) @ sizes)[..., 0]
+            weights = B * stiffness if span is None else (B * stiffness) @ span
+            seen[part] = (np.abs(B[..., pushed] - weights @ held) @ sizes)[:, 0, 0]
+            for way, motions in enumerate((held, bare)):
+                real, imag = (each if span is None else span @ each for each in (motions.real, motions.imag))
+                moved[way, part] = (np.sqrt(real * real + imag * imag) @ sizes)[..., 0]
         A = linear.A[0, ~self._is_beyond][-1]
         own = np.diagonal(A) if span is None else np.einsum("ca,ca->c", span, span @ A.T)
         return seen, moved, np.abs(own) * self._stiffest

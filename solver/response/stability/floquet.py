@@ -20,7 +20,9 @@ from solver.linear.contact_table import port_counts
 from solver.response.solution import Solution
 from solver.response.stability.monodromy import PERIOD, Element, Monodromy, Structure, monodromy
 from solver.results.base import Drawn
+from solver.results.default_bar import shows_progress
 from solver.results.views import Views
+from solver.results.watch import OnProgress, ShouldStop
 from solver.scene.cyclic.annulus import annulus
 from solver.scene.scene import Scene
 
@@ -89,16 +91,27 @@ class Stability(Drawn):
         }
 
 
-def stability(solution: Solution) -> Stability:
-    """Return the Floquet multipliers of a periodic response.
+@shows_progress("stability")
+def stability(
+    solution: Solution, *, on_progress: OnProgress = None, should_stop: ShouldStop = None
+) -> Stability:
+    """Return the Floquet multipliers of a periodic response; `plan` says how long that takes.
 
     Of a cyclic scene the whole annulus is perturbed: contacts in their states join all nodal diameters, so
     the sector that stands for the motion does not stand for its perturbations.
+
+    Parameters
+    ----------
+    solution : one that converged.
+    on_progress : called with (share done, steps so far).
+    should_stop : asked between steps.
 
     Raises
     ------
     SettingError
         The solution did not converge.
+    StoppedError
+        `should_stop` said so.
     """
     if not solution.converged:
         raise SettingError("solution", solution.status.value, "must have converged")
@@ -107,7 +120,9 @@ def stability(solution: Solution) -> Stability:
 
         return stability_exactly(solution.scene, solution.frequency_hz)
     motions = tuple(np.array(contact.motions) for contact in solution.contacts)
-    return motions_stability(solution.scene, solution.frequency_hz, motions)
+    return motions_stability(
+        solution.scene, solution.frequency_hz, motions, on_progress=on_progress, should_stop=should_stop
+    )
 
 
 def branch_stability(
@@ -145,10 +160,13 @@ def branch_stability(
     return tuple(found)
 
 
-def motions_stability(scene: Scene, frequency_hz: float, motions: Motions) -> Stability:
+def motions_stability(
+    scene: Scene, frequency_hz: float, motions: Motions, *, on_progress: OnProgress = None,
+    should_stop: ShouldStop = None,
+) -> Stability:  # fmt: skip
     """Return the stability of a response of a scene at a frequency with given motions of its contacts."""
     begun = time.perf_counter()
-    found = scene_monodromy(scene, frequency_hz, motions)
+    found = scene_monodromy(scene, frequency_hz, motions, on_progress=on_progress, should_stop=should_stop)
     values = np.linalg.eigvals(found.reduced).astype(np.complex128)
     multipliers = values[np.argsort(-np.abs(values), kind="stable")]
     return Stability(
@@ -169,7 +187,7 @@ def growth_of(multipliers: Complex) -> Growth:
 
 def scene_monodromy(
     scene: Scene, frequency_hz: float, motions: Motions, *, mass_damping: float = 0.0,
-    alone: Complex | None = None,
+    alone: Complex | None = None, on_progress: OnProgress = None, should_stop: ShouldStop = None,
 ) -> Monodromy:  # fmt: skip
     """Return the monodromy matrix of a scene in a periodic motion, of all sectors if it is cyclic.
 
@@ -180,16 +198,18 @@ def scene_monodromy(
     motions : (ports, 2H + 1) full coefficients of the relative motions of every contact [m].
     mass_damping : what the damping has besides, in units of the mass [1/s]; below 0 it feeds the motion.
     alone : (n,) mass-normalised mode that it acts on alone, of a structure without sectors.
+    on_progress, should_stop : as for `stability`.
     """
     whole = annulus(scene) if scene.structure.has_sectors else scene
     model = linear_model(whole)
+    free = model.free
     parts, ends = _parts(scene, motions), np.cumsum(port_counts(whole))[:-1]
     elements = tuple(
-        Element(ports=ports[list(part.ports)], pieces=part.pieces)
+        Element(ports=ports[list(part.ports)][:, free], pieces=part.pieces)
         for ports, contact in zip(np.split(model.contact_here, ends), whole.contacts, strict=True)
         for part in parts[contact.name]
     )
-    K, C, M = (each[0] for each in model.at(np.zeros(1, np.int64), np.ones(1, np.bool_)))
+    K, C, M = (each[0][free][:, free] for each in model.at(np.zeros(1, np.int64), np.ones(1, np.bool_)))
     if np.any(K.imag) or np.any(C.imag):
         wanted = (
             "must have no structural damping and no imaginary coefficients: they are terms of the frequency "
@@ -200,7 +220,11 @@ def scene_monodromy(
     if alone is not None:
         fed = np.outer(M @ alone, (M @ alone).conj()).real
     structure = Structure(M=M, C=C.real + mass_damping * fed, K=K.real)
-    return monodromy(structure, elements, PERIOD * frequency_hz)
+    sectors = scene.structure.sector_count if scene.structure.has_sectors else 1
+    return monodromy(
+        structure, elements, PERIOD * frequency_hz, sectors=sectors, order=scene.engine_order,
+        on_progress=on_progress, should_stop=should_stop,
+    )  # fmt: skip
 
 
 def _parts(scene: Scene, motions: Motions) -> dict[str, tuple[Part, ...]]:

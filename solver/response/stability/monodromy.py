@@ -6,11 +6,10 @@ sliders are held at), a contact in one state (`solver.contacts.pieces.piece.Piec
 
     δf = tangent δu + grip δw,      δw' = by_motion δu + by_rate δu' + own δw,
 
-and δw = from_motion δu + from_memory δw⁻ where the state begins. Where these matrices are constant, as with
-friction along one direction, the perturbation goes on by a matrix exponential. Where they change (a direction
-that turns in slip, a stiffness that changes with the motion) it goes on by exponentials of Magnus' series of
-order 6, in steps whose order-4 part agrees with it to `AGREES`: S. Blanes, F. Casas, J. A. Oteo, J. Ros,
-Phys. Rep. 470 (2009) 151, doi:10.1016/j.physrep.2008.11.001, section 5.4, at the three Gauss points.
+and δw = from_motion δu + from_memory δw⁻ where the state begins. The perturbation goes on by collocation
+(`solver.response.stability.collocation`), in steps as short as what is fastest wants, or where these matrices
+are constant, as with friction along one direction, by a matrix exponential if that costs less. Of a wave
+around a disk a share of the period is enough: the map over it and a turn, several times, are that of all.
 
 Nothing jumps in (x, x') because forces are continuous. The frame is that of R. I. Leine, H. Nijmeijer,
 Dynamics and Bifurcations of Non-Smooth Mechanical Systems, 2004, chapter 7, doi:10.1007/978-3-540-44398-8;
@@ -22,18 +21,24 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import expm
+from numpy.typing import NDArray
+from scipy.linalg import block_diag, expm
 
 from solver.contacts.pieces.piece import SHORTEST, Piece
+from solver.errors import StoppedError
 from solver.jit.fourier import Real
+from solver.response.stability.collocation import GAUSS, ContactStep, StructureStep, blocks_of, stepped
+from solver.response.stability.cost import FASTEST_IN_A_STEP, of_a_step, of_an_exponential
+from solver.results.watch import OnProgress, ShouldStop
 
 PERIOD = 2.0 * math.pi
 INVARIANT = 1e-9  # smallest singular value, relative to the largest, of what resists a rigid displacement
-AGREES = 1e-5  # relative, of the two orders of a step; what order 6 leaves is a hundredth of it
+ALIKE = 1e-9  # relative difference of matrices of sectors that are alike
+SMOOTH = 2e-3  # of the largest force, the last Legendre coefficients of a step that is not halved
 LEAST_STEP = 1e-6  # rad: where a force goes to 0 its direction turns ever faster
-_GAUSS = math.sqrt(15.0) / 10.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -99,7 +104,10 @@ class Monodromy:
     neutral: int
 
 
-def monodromy(structure: Structure, elements: tuple[Element, ...], omega: float) -> Monodromy:
+def monodromy(
+    structure: Structure, elements: tuple[Element, ...], omega: float, *, sectors: int = 1, order: int = 0,
+    on_progress: OnProgress = None, should_stop: ShouldStop = None,
+) -> Monodromy:  # fmt: skip
     """Return the monodromy matrix of a periodic motion from its contacts' states.
 
     Parameters
@@ -107,27 +115,73 @@ def monodromy(structure: Structure, elements: tuple[Element, ...], omega: float)
     structure : the linear part.
     elements : the contacts with their states over the period.
     omega : excitation frequency [rad/s].
+    sectors, order : sectors that do the same one after the other, and the engine order of that wave.
+    on_progress : called with (share done, steps so far).
+    should_stop : asked between steps.
+
+    Raises
+    ------
+    StoppedError
+        `should_stop` said so.
     """
-    n = structure.M.shape[0]
-    instants = _instants(elements)
-    flow = _Flow(structure, elements, omega, 0.5 * (instants[-2] + instants[-1]))
-    kept = [*range(2 * n), *flow.remembered()]
+    n, wave = structure.M.shape[0], _wave(structure, elements, sectors, order)
+    instants = _instants(elements, PERIOD / wave.parts)
+    flow = _Flow(structure, elements, omega, _instants(elements, PERIOD))
+    begun, kept = list(flow.active), [*range(2 * n), *flow.remembered()]
     sliders = tuple(flow.owner(i) for i in kept[2 * n :])
     state = np.zeros((flow.size, len(kept)))
     state[kept, np.arange(len(kept))] = 1.0
     for begin, end in pairwise(instants):
+        if should_stop is not None and should_stop():
+            raise StoppedError("the computation of multipliers was stopped")
         state = flow.over(begin, end, flow.entered(0.5 * (begin + end), state))
-    matrix = state[kept]
+        if on_progress is not None:
+            on_progress(end / instants[-1], flow.steps)
+    if flow.active != flow.further(begun, wave):  # rounding has put a change on the other side of the cut
+        return monodromy(structure, elements, omega, on_progress=on_progress, should_stop=should_stop)
+    flow.active = begun
+    part = flow.as_given(state)[flow.places(wave, -wave.ahead)][kept]
+    matrix = np.linalg.matrix_power(part, wave.parts)
+    around = np.zeros(flow.size, dtype=np.intp)
+    around[kept] = np.arange(len(kept))
+    matrix = matrix[around[flow.places(wave, wave.ahead * wave.parts)[kept]]]
     reduced, neutral = _without_neutral(structure, elements, flow, matrix)
     return Monodromy(matrix=matrix, sliders=sliders, reduced=reduced, neutral=neutral)
 
 
-def _instants(elements: tuple[Element, ...]) -> list[float]:
-    """Every instant at which a state changes, from one period boundary at a change to the next.
+class _Wave(NamedTuple):
+    """A wave around a disk: what is so many sectors ahead is here one of so many parts of a period later."""
 
-    The period is cut at τ = 0, so 0 and 2π are in it too.
+    sectors: int = 1
+    ahead: int = 0
+    parts: int = 1
+
+
+def _wave(structure: Structure, elements: tuple[Element, ...], sectors: int, order: int) -> _Wave:
+    """Return by how much of a period sectors follow each other, if they are alike.
+
+    With x_j(τ) that of sector j and s order = g modulo n, g the greatest divisor they share, what the sector
+    s further does now this one does g/n of a period later. So the map over a period is the power of that over
+    g/n of it, followed by the turn.
     """
-    changes = {0.0, PERIOD}
+    n, joint = len(structure.M), math.gcd(order, sectors)
+    if joint == sectors or n % sectors or len(elements) % sectors:
+        return _Wave()
+    width, count = n // sectors, len(elements) // sectors
+    for each in (structure.M, structure.C, structure.K):
+        if np.abs(np.roll(each, (width, width), (0, 1)) - each).max() > ALIKE * np.abs(each).max():
+            return _Wave()
+    for i, element in enumerate(elements):
+        other = elements[(i + count) % len(elements)].ports
+        if other.shape != element.ports.shape or not np.allclose(np.roll(element.ports, width, 1), other):
+            return _Wave()
+    ahead = next(s for s in range(sectors) if s * order % sectors == joint)
+    return _Wave(sectors, ahead, sectors // joint)
+
+
+def _instants(elements: tuple[Element, ...], last: float) -> list[float]:
+    """Every instant up to a last one at which a state changes; 0 and the last are among them."""
+    changes = {0.0}
     for element in elements:
         for piece in element.pieces:
             changes |= {edge % PERIOD for edge in piece.edges}
@@ -135,29 +189,54 @@ def _instants(elements: tuple[Element, ...]) -> list[float]:
                 changes |= {piece.begin % PERIOD, piece.end % PERIOD}
     ordered = sorted(changes)
     kept = [0.0]
-    for tau in ordered[1:-1]:
-        if tau - kept[-1] > SHORTEST and tau < PERIOD - SHORTEST:
+    for tau in ordered[1:]:
+        if tau - kept[-1] > SHORTEST and tau < last - SHORTEST:
             kept.append(tau)
-    return [*kept, PERIOD]
+    return [*kept, last]
 
 
 class _Flow:
-    """The perturbation's equations z' = A(τ) z: x'' = stiffness x + damping x' − inverse Pᵀ f.
-
-    z holds x, x' and for every element as many numbers as it may remember.
-    """
+    """The perturbation's equations: of y and y' of the structure and of what elements may remember."""
 
     def __init__(
-        self, structure: Structure, elements: tuple[Element, ...], omega: float, before: float
+        self, structure: Structure, elements: tuple[Element, ...], omega: float, instants: list[float]
     ) -> None:
-        self.n = structure.M.shape[0]
-        inverse = np.asarray(np.linalg.inv(structure.M) / omega**2, dtype=np.float64)
-        self._stiffness, self._damping = -inverse @ structure.K, -omega * (inverse @ structure.C)
-        self._pulls = [inverse @ element.ports.T for element in elements]
-        self.elements = elements
+        self.n, self.elements, self.steps = structure.M.shape[0], elements, 0
+        ports = [element.ports for element in elements]
+        every = np.vstack([*ports, np.zeros((0, self.n))])
+        self._blocks = blocks_of(structure.M, structure.C, structure.K, every, omega)
+        self._joined = self._blocks.outputs @ self._blocks.inputs
+        ends = np.cumsum([0, *(len(each) for each in ports)]).tolist()
+        self._ports = [list(range(*each)) for each in pairwise(ends)]
         self.first = 2 * self.n + np.concatenate([[0], np.cumsum([e.memory for e in elements], dtype=int)])
         self.size = int(self.first[-1])
-        self.active = [element.piece_at(before) for element in elements]
+        self.active = [element.piece_at(0.5 * (instants[-2] + instants[-1])) for element in elements]
+        self._largest = 0.0
+
+    def further(self, active: list[int], wave: _Wave) -> list[int]:
+        """Return the pieces in which elements are a share of the wave later."""
+        shift = wave.ahead * (len(active) // wave.sectors)
+        return active[shift:] + active[:shift]
+
+    def places(self, wave: _Wave, sectors: int) -> NDArray[np.intp]:
+        """Return the places in the state of what is so many sectors further."""
+        rows = np.roll(np.arange(self.n), -sectors * (self.n // wave.sectors))
+        count = len(self.elements) // wave.sectors
+        memory = [
+            np.arange(self.first[j], self.first[j + 1])
+            for i in range(len(self.elements))
+            for j in [(i + sectors * count) % len(self.elements)]
+        ]
+        return np.concatenate([rows, self.n + rows, *memory])
+
+    def as_given(self, state: Real) -> Real:
+        """Return a state in the coordinates of the structure, on both sides."""
+        state = self._turned(state, self._blocks.basis)
+        return self._turned(state.T, self._blocks.inverse.T).T
+
+    def _turned(self, state: Real, matrix: Real) -> Real:
+        n = self.n
+        return np.vstack([matrix @ state[:n], matrix @ state[n : 2 * n], state[2 * n :]])
 
     def remembered(self) -> list[int]:
         """Return the places in z of what is remembered now."""
@@ -178,7 +257,8 @@ class _Flow:
                 piece, known = element.pieces[k], state[place]
                 rows = np.zeros_like(known)
                 if piece.entry is not None:
-                    rows[: piece.memory] = piece.entry.from_motion @ (element.ports @ state[: self.n])
+                    moved = self._blocks.outputs[self._ports[i]] @ state[: self.n]
+                    rows[: piece.memory] = piece.entry.from_motion @ moved
                     if piece.entry.from_memory is not None:
                         before = piece.entry.from_memory
                         rows[: piece.memory] += before @ known[: before.shape[1]]
@@ -204,53 +284,66 @@ class _Flow:
 
     def over(self, begin: float, end: float, state: Real) -> Real:
         """Return the state at the end of an interval in which no element changes its piece."""
-        if all(at < 0 or e.pieces[at].constant for e, at in zip(self.elements, self.active, strict=True)):
-            return np.asarray(expm((end - begin) * self._generator(begin)) @ state)
-        waiting = [(begin, end)]
+        present = enumerate(zip(self.elements, self.active, strict=True))
+        now = [(i, element.pieces[at]) for i, (element, at) in present if at >= 0]
+        ports = [port for i, _ in now for port in self._ports[i]]
+        turn = (end - begin) * self._fastest(now, ports, 0.5 * (begin + end))
+        steps, decoupled = math.ceil(turn / FASTEST_IN_A_STEP), len(self._blocks.stiffness) > 1
+        seconds = steps * of_a_step(self.n, len(ports), len(now), state.shape[1], decoupled=decoupled)
+        if all(piece.constant for _, piece in now) and of_an_exponential(self.size, turn) < seconds:
+            self.steps += 1
+            return np.asarray(expm((end - begin) * self._generator(now)) @ state)
+        edges = np.linspace(begin, end, max(steps, 1) + 1).tolist()
+        waiting, structure = list(pairwise(edges))[::-1], None
         while waiting:
             low, high = waiting.pop()
-            series, off = self._magnus(low, high)
-            if off > AGREES and high - low > LEAST_STEP:
-                middle = 0.5 * (low + high)
-                waiting += [(middle, high), (low, middle)]
+            h = high - low
+            if structure is None or abs(structure.h - h) > SHORTEST:
+                structure = StructureStep(self._blocks, h, ports)
+            found, forces = self._stepped(structure, low, now, state)
+            self._largest = max(self._largest, float(np.abs(forces).max(initial=0.0)))
+            tail = np.abs(np.tensordot(GAUSS.tail, forces, axes=1)).max(initial=0.0)
+            if tail > SMOOTH * self._largest and h > LEAST_STEP:
+                waiting += [(low + 0.5 * h, high), (low, low + 0.5 * h)]
                 continue
-            state = expm(series) @ state
-        return np.asarray(state)
+            self.steps += 1
+            state = found
+        return state
 
-    def _magnus(self, begin: float, end: float) -> tuple[Real, float]:
-        """Return the exponent of a step, and how far its order-4 part is from it, relative."""
-        h, middle = end - begin, 0.5 * (begin + end)
-        A1, A2, A3 = (self._generator(middle + h * place) for place in (-_GAUSS, 0.0, _GAUSS))
-        a1, a2 = h * A2, math.sqrt(15.0) * h / 3.0 * (A3 - A1)
-        a3 = 10.0 * h / 3.0 * (A3 - 2.0 * A2 + A1)
-        c1 = _commutator(a1, a2)
-        c2 = -_commutator(a1, 2.0 * a3 + c1) / 60.0
-        less = a1 + a3 / 12.0 - c1 / 12.0
-        more = a1 + a3 / 12.0 + _commutator(-20.0 * a1 - a3 + c1, a2 + c2) / 240.0
-        off = float(np.abs(more - less).sum(axis=0).max())
-        return more, off / max(float(np.abs(a1).sum(axis=0).max()), 1e-300)
+    def _stepped(
+        self, structure: StructureStep, low: float, now: list[tuple[int, Piece]], state: Real
+    ) -> tuple[Real, Real]:
+        """Return the state after a step, and the forces at its stages."""
+        n, h, contacts, begin = self.n, structure.h, [], 0
+        nodes = low + h * GAUSS.nodes
+        for i, piece in now:
+            width, memory = len(self._ports[i]), int(self.first[i]) - 2 * n
+            place, held = slice(begin, begin + width), slice(memory, memory + piece.memory)
+            contacts.append((ContactStep(piece.at(nodes), h), place, held))
+            begin += width
+        q, v, w, forces = stepped(structure, contacts, state[:n], state[n : 2 * n], state[2 * n :])
+        return np.vstack([q, v, w]), forces
 
-    def _generator(self, tau: float) -> Real:
-        """The matrix A in the present states at an angle."""
+    def _fastest(self, now: list[tuple[int, Piece]], ports: list[int], tau: float) -> float:
+        """Return a bound of what is fastest with the contacts in their states, in units of ω."""
+        tangents = block_diag(*(piece.at(np.array([tau])).tangent[0] for _, piece in now))
+        added = np.linalg.norm(tangents @ self._joined[np.ix_(ports, ports)], 2) if ports else 0.0
+        return math.sqrt(self._blocks.fastest**2 + float(added))
+
+    def _generator(self, now: list[tuple[int, Piece]]) -> Real:
+        """Return the matrix of the equations in states that are constant."""
         n, A = self.n, np.zeros((self.size, self.size))
+        stiffness, damping = self._blocks.whole
         A[:n, n : 2 * n] = np.eye(n)
-        A[n : 2 * n, n : 2 * n] = self._damping
-        A[n : 2 * n, :n] = self._stiffness
-        for i, (element, at) in enumerate(zip(self.elements, self.active, strict=True)):
-            if at < 0:
-                continue
-            piece, ports = element.pieces[at], element.ports
-            rates, place = piece.at(tau), slice(self.first[i], self.first[i] + piece.memory)
-            A[n : 2 * n, :n] -= self._pulls[i] @ rates.tangent @ ports
-            if piece.memory:
-                A[n : 2 * n, place] -= self._pulls[i] @ rates.grip
-                A[place, :n], A[place, n : 2 * n] = rates.by_motion @ ports, rates.by_rate @ ports
-                A[place, place] = rates.own
+        A[n : 2 * n, :n], A[n : 2 * n, n : 2 * n] = -stiffness, -damping
+        for i, piece in now:
+            rates, place = piece.at(np.zeros(1)), slice(self.first[i], self.first[i] + piece.memory)
+            outputs, inputs = self._blocks.outputs[self._ports[i]], self._blocks.inputs[:, self._ports[i]]
+            A[n : 2 * n, :n] -= inputs @ rates.tangent[0] @ outputs
+            A[n : 2 * n, place] -= inputs @ rates.grip[0]
+            A[place, :n], A[place, n : 2 * n] = rates.by_motion[0] @ outputs, rates.by_rate[0] @ outputs
+            A[place, place] = rates.own[0]
         return A
-
-
-def _commutator(a: Real, b: Real) -> Real:
-    return a @ b - b @ a
 
 
 def _without_neutral(
@@ -282,10 +375,9 @@ def _displacements_nothing_resists(structure: Structure, elements: tuple[Element
     rows = [structure.K]
     for element in elements:
         for piece in element.pieces:
-            for tau in (piece.begin + 0.3 * piece.lasts, piece.begin + 0.6 * piece.lasts):
-                rates = piece.at(tau)
-                follows = rates.tangent if piece.held else rates.tangent + rates.grip @ piece.carried
-                rows.append(follows @ element.ports)
+            rates = piece.at(piece.begin + piece.lasts * np.array([0.3, 0.6]))
+            follows = rates.tangent if piece.held else rates.tangent + rates.grip @ piece.carried
+            rows += list(follows @ element.ports)
     _, sizes, vectors = np.linalg.svd(np.vstack(rows), full_matrices=False)
     loose: Real = vectors[sizes <= INVARIANT * max(sizes.max(initial=0.0), 1e-300)].T
     return loose

@@ -8,13 +8,13 @@ loaded where it is needed: it brings SciPy's packages along, which an answer doe
 from __future__ import annotations
 
 import math
-import time
 from typing import TYPE_CHECKING
 
-from solver.continuation.branch import Branch
+from solver.continuation.branch import Branch, Peak
 from solver.errors import SettingError
 from solver.linear.assembly import linear_model
 from solver.linear.contact_table import port_counts
+from solver.response.stability.cost import forecast
 from solver.response.stability.uniqueness import MONOTONE, monotone
 from solver.results import units
 from solver.results.verdict import Stable, Verdict
@@ -26,33 +26,17 @@ if TYPE_CHECKING:
 
 CHEAP = 1.0  # s, forecast, up to which an answer has its multipliers by itself
 NEUTRAL = 1e-7  # of the largest modulus beside 1: nothing is said to grow or to die out so slowly
-_SEARCH = 10.0  # s for the search for a stable response beside one that is not
-_STARTS = 8
-# Seconds of one interval between two changes, measured on one core: a fixed part, and of size³.
-_AN_INTERVAL, _A_PRODUCT = 3e-4, 6e-9
-# Intervals a period of one contact: the changes of its state, and where its direction turns in slip.
-_CHANGES, _TURNS = 6, 300
+_STARTS = 8  # of the search for a stable response beside one that is not
+# Of that search, how many of its parts run: starts, and branches that are followed both ways.
+_PARTS, _UNKNOWNS = 20, 200  # with so many unknowns; with more fewer, by their square
 _NO_SOLUTION = "there is no solution"
 _LONG = "Floquet multipliers would take about {}: stability() computes them"
 _DIES_OUT = "the largest Floquet multiplier is {:.4g}: perturbations die out"
 _BESIDE_ONE = "the largest Floquet multiplier is 1 to within {:.0e}: nothing is said to grow or to die out"
 _GROWS = "{} (largest Floquet multiplier {:.4g}): the motion does not stay as it is"
+_BELOW = Verdict(stable=Stable.NOT_KNOWN, ground="the peaks above it are as much as is judged by itself")
 _ANOTHER = "; a stable response has half peak to peak {} there"
 _NONE_FOUND = "; no stable response was found there"
-
-
-def forecast(scene: Scene) -> float:
-    """Return about how long the Floquet multipliers of a response of a scene take [s]."""
-    model, sectors = linear_model(scene), scene.structure.sector_count if scene.structure.has_sectors else 1
-    contacts, ports = len(scene.contacts) * sectors, int(port_counts(scene).sum()) * sectors
-    turning = sum(_turns(contact) for contact in scene.contacts) * sectors
-    size = 2 * model.n_coordinates * sectors + ports
-    return (1 + _CHANGES * contacts + _TURNS * turning) * (_AN_INTERVAL + _A_PRODUCT * size**3)
-
-
-def _turns(contact: object) -> bool:
-    """Whether the direction of a contact's force turns while it slips, or its stiffness changes."""
-    return not getattr(contact, "limits_apart", True) or getattr(contact, "LAW", "") == "polynomial"
 
 
 def verdict_of(found: Stability) -> Verdict:
@@ -71,7 +55,7 @@ def of_solution(solution: Solution) -> Verdict:
     """Return whether a solution is stable; of one that is not, name a stable one if it is found."""
     if not solution.converged:
         return Verdict(stable=Stable.NOT_KNOWN, ground=_NO_SOLUTION)
-    known = _without_multipliers(solution.scene)
+    known = _without_multipliers(solution.scene, solution.frequency_hz)
     if known is not None:
         return known
     from solver.response.stability.floquet import stability
@@ -88,32 +72,40 @@ def of_solution(solution: Solution) -> Verdict:
 def of_peaks(branch: Branch) -> tuple[Verdict, ...]:
     """Return whether the response at each peak of a branch is stable, in the order of `Branch.peaks`.
 
-    As many as together cost little are judged, the highest first.
+    As many as together are forecast to cost little are judged, the highest first, and at least one.
     """
     found: list[Verdict] = []
-    until = time.perf_counter() + CHEAP
+    left = CHEAP
     for peak in branch.peaks:
+        by_frequency = branch.parameter == "frequency"
         scene = branch.balance.scene
-        scene = scene.at_frequency(peak.at) if branch.parameter == "frequency" else scene
-        known = _without_multipliers(scene)
-        if known is None and found and time.perf_counter() > until:
-            known = Verdict(stable=Stable.NOT_KNOWN, ground="the peaks above took the time there is for it")
+        scene = (
+            scene.at_frequency(peak.at) if by_frequency else scene.with_values({branch.parameter: peak.at})
+        )
+        hertz = peak.at if by_frequency else branch.balance.system.omega / (2.0 * math.pi)
+        known = _without_multipliers(scene, hertz)
         if known is None:
-            from solver.response.stability.floquet import branch_stability
-
-            try:
-                known = verdict_of(branch_stability(branch, at=[(peak.at, peak.solution)])[0])
-            except SettingError as error:
-                known = Verdict(stable=Stable.NOT_KNOWN, ground=str(error))
+            left -= forecast(scene, hertz)
+            known = _BELOW if found and left < 0.0 else _judged(branch, peak)
         found.append(known)
     return tuple(found)
 
 
-def _without_multipliers(scene: Scene) -> Verdict | None:
+def _judged(branch: Branch, peak: Peak) -> Verdict:
+    """Return what the multipliers say at a peak."""
+    from solver.response.stability.floquet import branch_stability
+
+    try:
+        return verdict_of(branch_stability(branch, at=[(peak.at, peak.solution)])[0])
+    except SettingError as error:
+        return Verdict(stable=Stable.NOT_KNOWN, ground=str(error))
+
+
+def _without_multipliers(scene: Scene, frequency_hz: float) -> Verdict | None:
     """Return what is known of a scene's responses without multipliers; None where they cost little."""
     if monotone(scene, linear_model(scene)):
         return Verdict(stable=Stable.YES, ground=MONOTONE)
-    seconds = forecast(scene)
+    seconds = forecast(scene, frequency_hz)
     if seconds > CHEAP:
         return Verdict(stable=Stable.NOT_KNOWN, ground=_LONG.format(units.duration(seconds)))
     return None
@@ -123,10 +115,11 @@ def _stable_beside(solution: Solution) -> str:
     """Return the words for the largest stable response of the same frequency."""
     from solver.response.stability.all_solutions import solve_all
 
-    until = time.perf_counter() + _SEARCH
+    unknowns = (2 * solution.n_harmonics + 1) * int(port_counts(solution.scene).sum())
+    parts = iter(range(math.ceil(_PARTS * min((_UNKNOWNS / unknowns) ** 2, 1.0))))
     every = solve_all(
         solution.scene, frequency_hz=solution.frequency_hz, harmonics=solution.n_harmonics, starts=_STARTS,
-        on_progress=lambda _share, _count: None, should_stop=lambda: time.perf_counter() > until,
+        on_progress=lambda _share, _count: None, should_stop=lambda: next(parts, None) is None,
     )  # fmt: skip
     stable = [each.solution for each in every.solutions if each.solution.stability.stable is Stable.YES]
     largest = max((each.half_peak_to_peak for each in stable), default=math.nan)

@@ -5,9 +5,12 @@ from __future__ import annotations
 import math
 from collections import Counter
 from dataclasses import replace
+from itertools import islice
 
 import numpy as np
 import pytest
+from contact_cases import closing_cases
+from contact_cases import evaluate as on_a_line
 from law_cases import Element as AnyElement
 from law_cases import evaluate as any_law
 from law_cases import row_of as any_row
@@ -70,6 +73,19 @@ def test_extremes_are_the_integrated_law_too():
             )
             compared += 1
     assert compared >= 4
+
+
+@pytest.mark.parametrize("seed", [0, 4, 22])
+def test_along_a_line_it_is_the_law_of_a_line_where_a_contact_closes(seed: int):
+    """It sticks or slips at once, and slips briefly within a grid interval."""
+    for case in islice(closing_cases(np.random.default_rng(seed)), 4):
+        for off in (1e-3, -1e-3, 1e-6, -1e-6, 1e-9, -1e-9):
+            mu = case.mu * (1.0 + off)
+            element = Element(
+                U=np.array([case.U, 0.0 * case.U, 0.0 * case.U]), load=case.N, row=row_of(1.0, 1.0, mu, 1.0)
+            )
+            line = on_a_line(replace(case, mu=mu)).F
+            np.testing.assert_allclose(evaluate(element).F[0], line, rtol=0.0, atol=1e-8 * np.abs(line).max())
 
 
 def test_a_slip_ends_behind_a_dip_of_its_rate():

@@ -16,7 +16,6 @@ from tests.cases.sampling import others_long
 
 HARMONICS, STEPS, POINTS = 15, 4000, 6
 MOST_DAMPING = 0.25  # beyond, a march grows by more than exp(2πζ) = 5 a period
-FAR = (20, 80, 83)  # Bouc-Wen contacts moved so far beyond their limit that the law fails, which is said
 SHARE = 0.6  # of the most damping that gas feeds
 
 
@@ -26,8 +25,7 @@ def test_a_march_repeats_modes_and_cycles_of_a_random_chain(seed: int) -> None:
     found = solver.nonlinear_mode(
         solver.Scene.from_dict(body), mode, amplitudes=(0.05 * size, 30.0 * size), harmonics=HARMONICS
     )
-    stopped = found.status is solver.NonlinearModeStatus.STOPPED
-    assert found.completed or (stopped and seed in FAR), found.status
+    assert found.completed, found.status
     light = np.flatnonzero(found.damping_ratio < MOST_DAMPING)
     chosen = light[np.unique(np.linspace(0, len(light) - 1, POINTS).astype(int))]
     assert len(chosen) > 1

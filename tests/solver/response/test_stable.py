@@ -13,7 +13,8 @@ from test_all_solutions import duffing
 
 import optim
 from solver import Scene, march, plan, solve, solve_all, sweep
-from solver.response.stability.verdict import forecast
+from solver.response.stability import verdict
+from solver.response.stability.cost import forecast
 from solver.results.verdict import Stable
 from solver.studies.instant import start_of
 
@@ -78,3 +79,16 @@ def test_a_design_is_stable_or_not():
     assert found.stable is Stable.YES
     assert found.to_json()["stable"] == "yes"
     assert "stable" in dict(found.summary().pairs)
+
+
+def test_what_is_judged_and_found_does_not_depend_on_the_clock(monkeypatch: pytest.MonkeyPatch):
+    """The same words twice; of peaks the highest alone where there is work for one."""
+    solution = solve(Scene.from_dict(BOX["scene"]), frequency_hz=BOX["hz"])
+    assert verdict.of_solution(solution) == verdict.of_solution(solution)
+    branch = sweep(duffing(), "frequency", 0.05, 0.35, harmonics=7)
+    assert len(branch.peaks) > 1
+    every = verdict.of_peaks(branch)
+    monkeypatch.setattr(verdict, "CHEAP", 1.5 * forecast(branch.balance.scene, branch.peaks[0].at))
+    first = verdict.of_peaks(branch)
+    assert first[0] == every[0]
+    assert {each.stable for each in first[1:]} == {Stable.NOT_KNOWN}

@@ -37,12 +37,14 @@ def excess(waves: Real, kappa: float, offset_x: float, offset_y: float, tau: flo
 
 @compiled
 def excess_slopes(at: Real, kappa: float, offset_x: float, offset_y: float) -> tuple[float, float]:
-    """Return slope and curvature of |t| − L from the curves `at` a point."""
+    """Return slope and curvature of |t| − L from the curves `at` a point, those ahead of it where t is 0."""
     tx, ty = offset_x + at[X], offset_y + at[Y] / kappa
     size = math.hypot(tx, ty)
-    if size == 0.0:
-        return -at[DLIMIT], -at[DDLIMIT]
     dx, dy = at[DX], at[DY] / kappa
+    if size == 0.0:
+        speed = math.hypot(dx, dy)
+        turn = (dx * at[DDX] + dy * at[DDY] / kappa) / speed if speed > 0.0 else 0.0
+        return speed - at[DLIMIT], turn - at[DDLIMIT]
     along = (tx * dx + ty * dy) / size
     bend = (dx * dx + dy * dy + tx * at[DDX] + ty * at[DDY] / kappa - along * along) / size
     return along - at[DLIMIT], bend - at[DDLIMIT]
@@ -89,6 +91,33 @@ def _inside(
     return -1.0
 
 
+@compiled
+def _behind_a_dip(
+    waves: Real, kappa: float, offset_x: float, offset_y: float, start: float, until: float, tol: float,
+    at: Real,
+) -> tuple[float, bool]:  # fmt: skip
+    """Return a place from which |t| − L rises, −1 if it does not dip first, and whether the stick ends there.
+
+    A rise and fall that follow before `until` would not show at the ends of this interval. A parabola is back
+    at its level after −2 times slope over curvature; what falls again afterwards is lower there, and still
+    rises. Where the stick begins at the limit and dips as deep as rounding, it ends there.
+    """
+    begins = excess(waves, kappa, offset_x, offset_y, start, at)
+    rate, bend = excess_slopes(at, kappa, offset_x, offset_y)
+    if rate > 0.0 or bend <= 0.0 or start - 2.0 * rate / bend >= until:
+        return -1.0, False
+    place, rise = start, 0.0
+    for share in (1.0, 0.75):
+        place = start - 2.0 * share * rate / bend
+        low = excess(waves, kappa, offset_x, offset_y, place, at)
+        rise, _ = excess_slopes(at, kappa, offset_x, offset_y)
+        if low < -tol and rise > 0.0:
+            return place, False
+    if begins >= -tol and rise > 0.0:
+        return start - 2.0 * rate / bend, True
+    return -1.0, False
+
+
 @apart
 def leave_stick(
     waves: Real, kappa: float, grid: Real, offset_x: float, offset_y: float, start: float, end: float,
@@ -105,6 +134,12 @@ def leave_stick(
     lo = start
     low = excess(waves, kappa, offset_x, offset_y, start, at)
     rate, _ = excess_slopes(at, kappa, offset_x, offset_y)
+    dipped, ends = _behind_a_dip(waves, kappa, offset_x, offset_y, start, min(j * delta, end), tol, at)
+    if ends:
+        return dipped, True
+    if dipped > 0.0:
+        lo, low = dipped, excess(waves, kappa, offset_x, offset_y, dipped, at)
+        rate, _ = excess_slopes(at, kappa, offset_x, offset_y)
     while lo < end:
         hi = min(j * delta, end)
         if hi == end:
