@@ -203,7 +203,7 @@ class Equations:
         turned[first] = phase
         rows[0, first], rows[1], rows[2] = dynamics.b, self._second_last(x, turned), mass / squared
         fill_slopes(ks, self._blocks, self.point.G, self.balance.system.span, self._slopes)
-        A = dynamics.receptance()
+        A = np.ascontiguousarray(dynamics.receptance())
         fill_motions(ks, s.contact, A, self._slopes, x, w, changes, forces, residual, J, rough)
         fill_functionals(s.back, self._slopes, rows, dynamics.solve_adjoint(rows), changes, J)
         return Evaluated(

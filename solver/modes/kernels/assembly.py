@@ -6,8 +6,11 @@ all ports by fewer motions, dF/dw = spanᵀ dF/dU span.
 
 from __future__ import annotations
 
+import numpy as np
+
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Complex, Integer, Real, coefficient_count, cosine_position
+from solver.jit.lapack import multiply
 from solver.jit.separate import apart
 
 
@@ -68,7 +71,7 @@ def fill_motions(
     rough : (r n,) filled with max|A_k| max|F|, the size of which a residual is rounding.
     """
     nk, r, width = slopes.shape
-    n = coefficient_count(ks)
+    n, pushed = coefficient_count(ks), np.empty((r, width), np.complex128)
     strongest = 0.0
     for c in range(r):
         for j in range(n):
@@ -77,6 +80,7 @@ def fill_motions(
         here = cosine_position(ks, i)
         has_sine = ks[i] > 0
         reach = 0.0
+        multiply(A[i], slopes[i], pushed)
         for c in range(r):
             for d in range(r):
                 reach = max(reach, abs(A[i, c, d]))
@@ -86,12 +90,9 @@ def fill_motions(
                 rough[c * n + here + 1] = reach * strongest
             row = c * n + here
             for j in range(width):
-                total = complex(0.0)
-                for d in range(r):
-                    total += A[i, c, d] * slopes[i, d, j]
-                J[row, j] = total.real
+                J[row, j] = pushed[c, j].real
                 if has_sine:
-                    J[row + 1, j] = -total.imag
+                    J[row + 1, j] = -pushed[c, j].imag
             J[row, row] += 1.0
             moved = _seen(contact, x, i, c)
             residual[row] = w[c, here] - moved.real
