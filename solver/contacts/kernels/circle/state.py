@@ -217,8 +217,8 @@ def _repeat(
 ) -> int:  # fmt: skip
     """Find the force at `begin` that is the same a period later; STUCK means that the slipping ended.
 
-    Where it may not end, as many periods from the unloaded state slip, it is next to ending at most: then a step
-    of Newton's method that ends it is too long.
+    Where it may not end, as many periods from the unloaded state slip, it is next to ending at most: then a
+    step of Newton's method that ends it is too long.
     """
     state, at = np.empty(STATE_SIZE), np.empty(CURVES)
     tx, ty = force[0], force[1]
