@@ -156,7 +156,8 @@ def blade_peaks(
     harmonics : highest harmonic kept.
     settings : of the continuation.
     every_branch : whether to make the whole response of every blade, with all of its peaks and its error
-        estimate; else `branches` has that of the first blade alone, in half the time.
+        estimate; else `branches` has that of the first blade alone, without the estimate, in a fraction of
+        the time.
     on_progress : called with (share done, blades so far).
     should_stop : asked between stretches of the sweep and between blades.
 
@@ -179,7 +180,7 @@ def blade_peaks(
 
     branch = sweep(
         _observing(scene, names[0]), start=start, stop=stop, harmonics=harmonics, settings=settings,
-        on_progress=progress, should_stop=should_stop,
+        errors=every_branch or len(names) == 1, on_progress=progress, should_stop=should_stop,
     )  # fmt: skip
     if len(names) > 1 and branch.completed and not every_branch:
         return _informed(_highest(branch, name, names))
@@ -212,7 +213,8 @@ def _informed(peaks: BladePeaks) -> BladePeaks:
 def _highest(branch: Branch, name: str, names: Sequence[str]) -> BladePeaks:
     """Return the highest peaks of all blades of a completed response, with its branch."""
     first = branch.peak
-    peaks = [*([] if first is None else [first]), *highest_peaks(branch, names[1:])]
+    others, branch = highest_peaks(branch, names[1:])
+    peaks = [*([] if first is None else [first]), *others]
     return BladePeaks(
         dof=name, value=np.array([peak.value for peak in peaks]),
         at_hz=np.array([peak.at for peak in peaks]), status=(branch.status,) * len(names),

@@ -20,7 +20,7 @@ from solver.continuation.branches.sweep import highest_between
 from solver.continuation.extrema.branch_error import branch_error
 from solver.continuation.extrema.extrema import Survey, band_limit
 from solver.continuation.extrema.nodes import Place, Points
-from solver.jit.fourier import Real, to_full
+from solver.jit.fourier import Flags, Real, to_full
 from solver.linear.kernels.receptance import observer_receptance, receptance
 
 COMPETES_FOR_HIGHEST = 0.8  # share of the highest point from which a maximum may turn out to be the highest
@@ -51,9 +51,9 @@ def observing(
     other = scene.model_copy(update={"observe": scene.observe.model_copy(update={"dof": dof})})
     balance = build(other, "frequency", harmonics=branch.balance.n_harmonics, effects=effects)
     workspace = Workspace.of(balance)
-    rows, measures = np.zeros((len(branch.values), balance.n_coefficients)), branch.measures.copy()
-    for i, (solution, tangent) in enumerate(zip(branch.solutions, branch.tangents, strict=True)):
-        _measure_all([workspace], solution, tangent, rows[i : i + 1], measures[i : i + 1])
+    rows, measures = (
+        found[0] for found in _measured([workspace], branch.solutions, branch.tangents, branch.measures)
+    )
     survey = Survey(
         workspace,
         Points(
@@ -76,40 +76,79 @@ def observing(
     )  # fmt: skip
 
 
-def highest_peaks(branch: Branch, dofs: Sequence[str]) -> list[Peak]:
+def highest_peaks(branch: Branch, dofs: Sequence[str]) -> tuple[list[Peak], Branch]:
     """Return the highest peak of each of several DOFs on one frequency response.
 
     The contacts are evaluated once a point for all of them, and lower maxima are not polished: a fraction of
-    what `observing` costs for each. The peaks themselves are found and polished in the same way.
+    what `observing` costs for each. The peaks themselves are found and polished in the same way. Points that
+    one DOF calls for, at changes of state and narrow resonances, are known to those behind it.
 
     Parameters
     ----------
     branch : a completed response over the frequency.
     dofs : names of the DOFs.
 
+    Returns
+    -------
+    The peaks, and the branch with every point that was solved for.
+
     Raises
     ------
     SceneError
         No such DOF.
     """
-    scene, count = branch.balance.scene, len(branch.values)
-    workspaces: list[Workspace] = []
+    scene, balance = branch.balance.scene, branch.balance
+    workspaces = [Workspace.of(balance)]
     for dof in dofs:
         other = scene.model_copy(update={"observe": scene.observe.model_copy(update={"dof": dof})})
-        balance = build(other, "frequency", harmonics=branch.balance.n_harmonics)
-        workspaces.append(Workspace.of(balance, observing_another=workspaces[0] if workspaces else None))
-    rows = np.zeros((len(dofs), count, branch.balance.n_coefficients))
-    measures = np.repeat(branch.measures[None], len(dofs), axis=0)
-    for i, (solution, tangent) in enumerate(zip(branch.solutions, branch.tangents, strict=True)):
-        _measure_all(workspaces, solution, tangent, rows[:, i], measures[:, i])
+        seen = build(other, "frequency", harmonics=balance.n_harmonics)
+        workspaces.append(Workspace.of(seen, observing_another=workspaces[0]))
+    solutions, tangents, states = branch.solutions, branch.tangents, branch.states
+    rows, measures = _measured(workspaces, solutions, tangents, branch.measures)
     found, lost = [], set[Place]()
-    for j, workspace in enumerate(workspaces):
+    for j, workspace in enumerate(workspaces[1:], 1):
         points = Points(
-            solutions=branch.solutions, tangents=branch.tangents, measures=measures[j], observed=rows[j],
-            states=branch.states,
-        )  # fmt: skip
-        found.append(Survey(workspace, points, worth=COMPETES_FOR_HIGHEST, lost=lost).peaks[0])
-    return found
+            solutions=solutions, tangents=tangents, measures=measures[j], observed=rows[j], states=states
+        )
+        survey = Survey(workspace, points, worth=COMPETES_FOR_HIGHEST, lost=lost)
+        found.append(survey.peaks[0])
+        points = survey.points
+        fresh = _fresh(points.solutions, solutions)
+        more = _measured(workspaces, points.solutions[fresh], points.tangents[fresh], points.measures[fresh])
+        rows, measures = (_joined(*both, fresh) for both in zip((rows, measures), more, strict=True))
+        solutions, tangents, states = points.solutions, points.tangents, points.states
+    return found, replace(
+        branch, values=balance.parameter.all_outside(solutions[:, -1].copy()), solutions=solutions,
+        tangents=tangents, states=states, measures=measures[0],
+        observed=to_full(rows[0], balance.system.ks, balance.highest_harmonic),
+    )  # fmt: skip
+
+
+def _fresh(solutions: Real, known: Real) -> Flags:
+    """Return which rows are not among the known ones, all of which are there in the same order."""
+    fresh, j = np.ones(len(solutions), bool), 0
+    for i, solution in enumerate(solutions):
+        if j < len(known) and np.array_equal(solution, known[j]):
+            fresh[i], j = False, j + 1
+    return fresh
+
+
+def _joined(known: Real, more: Real, fresh: Flags) -> Real:
+    """Return the rows of several DOFs, (DOFs, points, …), with those of fresh points in their places."""
+    both = np.empty((len(known), fresh.size, known.shape[2]))
+    both[:, ~fresh], both[:, fresh] = known, more
+    return both
+
+
+def _measured(
+    workspaces: Sequence[Workspace], solutions: Real, tangents: Real, like: Real
+) -> tuple[Real, Real]:
+    """Return the motions and measures of several DOFs, (DOFs, points, …); residuals are those of `like`."""
+    rows = np.zeros((len(workspaces), len(solutions), workspaces[0].balance.n_coefficients))
+    measures = np.repeat(like[None], len(workspaces), axis=0)
+    for i, (solution, tangent) in enumerate(zip(solutions, tangents, strict=True)):
+        _measure_all(workspaces, solution, tangent, rows[:, i], measures[:, i])
+    return rows, measures
 
 
 def _measure_all(
