@@ -135,7 +135,7 @@ def march(
     system = equations.system
     if rigid:
         system = system._replace(kt=_finite(system.kt), kn=_finite(system.kn))
-    steps = _steps(system, scene.forces, steps_per_period, least=moreau.STEPS if rigid else 0)
+    steps = _steps(system, scene.forces, steps_per_period, moreau.STEPS if rigid else 0)
     plan = _Plan(
         system=equations.system, dof=equations.observed, tolerance=tolerance, max_periods=max_periods,
         on_progress=on_progress, should_stop=should_stop,
@@ -208,9 +208,7 @@ def _check(frequency_hz: float, tolerance: float, max_periods: int) -> None:
         raise SettingError("max_periods", max_periods, "must be a whole number from 1 to 1e8")
 
 
-def _steps(
-    system: kernel.System, forces: tuple[Excitation, ...], wanted: int | None, *, least: int = 0
-) -> int:
+def _steps(system: kernel.System, forces: tuple[Excitation, ...], wanted: int | None, least: int = 0) -> int:
     """Steps of the finer run: the fastest motion turns less than 0.375 rad in one of them."""
     full = system.W_value.size > system.W_start.size - 1 or bool(np.any(np.abs(system.L_value) != 1.0))
     turns = 2.0 * math.pi * _fastest(system, BALANCING if full else 1)

@@ -80,6 +80,22 @@ def test_two_to_five_variables_with_cases_and_limits(seed: int) -> None:
 
 
 @pytest.mark.long
+@pytest.mark.parametrize(
+    ("seed", "cases", "objectives"),
+    [(5, 3, (0.0597915539361, 0.0731618179)), (6, 2, (0.667472287177, 0.693024))],
+)
+def test_searches_that_end_early_lose_no_local_optimum(
+    seed: int, cases: int, objectives: tuple[float, float]
+) -> None:
+    """Both optima were found by searches that all went on to their ends."""
+    found = optim.design(**random_design(seed, 2, cases=cases, limits=True))
+    assert found.certainty is Certainty.SAMPLED
+    assert [basin.objective for basin in found.basins[:2]] == pytest.approx(objectives, rel=1e-5)
+    assert found.evaluation is not None
+    assert found.evaluation.objective == pytest.approx(objectives[0], rel=1e-9)
+
+
+@pytest.mark.long
 @pytest.mark.parametrize("seed", range(100))
 def test_one_variable_of_many_scenes(seed: int) -> None:
     check_design(random_design(seed, 1, cases=1 + (seed % 4 == 3), limits=seed % 2 == 1), 625)
@@ -160,6 +176,8 @@ def test_a_plateau_is_told_whatever_way_it_is_asked(how: dict[str, Any]) -> None
 def test_a_sharp_optimum_has_no_plateau() -> None:
     found = optim.design(solver.load_scene("two-dof"), variables={"damper.N0": (20.0, 500.0)})
     assert not found.plateau
+    assert found.certainty is Certainty.CLOSED
+    assert found.to_json()["certainty"] == Certainty.CLOSED.value
     assert found.chosen_by is None
     assert found.held_by is not None
     assert found.error_estimate < 1e-3 * found.held_by.value

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from solver.balance.kernels.gauge import rebase
 from solver.balance.kernels.jacobian import factorise, step_back
 from solver.balance.kernels.mechanics import ALLOWED
 from solver.balance.kernels.newton import arc_newton
@@ -20,15 +21,21 @@ from solver.balance.kernels.output import (
     SLOPE,
     measure,
 )
+from solver.balance.kernels.residual import evaluate
 from solver.contacts.kernels.system import Evaluation, Receptance, System
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Real
 from solver.jit.lapack import copy_to, largest_entry, set_to
 from solver.jit.separate import apart
+from solver.linear.kernels.receptance import receptance
 
 _AT_A_FOLD = 1e-9  # weight of λ there
 HIGH_PEAK, LOW_PEAK, EDGE = 0, 1, 2
 _BY_CUBIC, _BY_SECANT = 2, 7  # trials up to which a cubic tells where to look, then a secant or a slope
+_BY_SLOPES = 5  # of a peak, from which the tangents of both sides do: it is a corner, where slopes jump
+# Up to this share of a peak that is polished to the last digits, and of another, one trial may be too low.
+_TOO_LOW, _LOW = 1e-13, 1e-9
+_ROUNDED = 1e-14  # relative residual that no further step makes smaller
 
 
 @apart
@@ -82,15 +89,18 @@ def between(
     """
     cubic_between(left, left_slope, right, right_slope, 1.0, share, found)
     folds = left_slope[left.size - 1] * right_slope[left.size - 1] < 0.0
-    return _on_plane(system, linear, point, left, right, folds, share, most, found, tangent, x, out)
+    return _on_plane(system, linear, point, left, right, folds, share, most, False, found, tangent, x, out)
 
 
 @apart
 def _on_plane(
     system: System, linear: Receptance, point: Evaluation, left: Real, right: Real, folds: bool, share: float,
-    most: int, found: Real, tangent: Real, x: Real, out: Real,
+    most: int, sharp: bool, found: Real, tangent: Real, x: Real, out: Real,
 ) -> tuple[bool, int]:  # fmt: skip
-    """Solve as `between` from the guess in `found`; `folds`: whether the branch turns between the points."""
+    """Solve as `between` from the guess in `found`; `folds`: whether the branch turns between the points.
+
+    `sharp`: with one step more, by the factors of the tangent.
+    """
     n = left.size - 1
     chord, plane, u = np.empty(n + 1), np.empty(n), np.empty(n)
     set_to(chord, right, -1.0, left)
@@ -115,6 +125,21 @@ def _on_plane(
     for i in range(n):
         tangent[n] += weight_u * chord[i] * chord[i]
     step_back(system, point, tangent)
+    if sharp and norm > _ROUNDED:
+        copy_to(chord[:n], point.residual)
+        chord[n] = 0.0
+        rebase(system, linear, u, point, chord)
+        step_back(system, point, chord)
+        set_to(found[:n], u, -1.0, chord[:n])
+        found[n] = p - chord[n]
+        receptance(system, found[n], linear)
+        again = evaluate(system, linear, found[:n], found[n], 0.0, point)
+        if again < norm:
+            copy_to(u, found[:n])
+            p, norm = found[n], again
+        else:
+            receptance(system, p, linear)
+            norm = evaluate(system, linear, u, p, 0.0, point)
     copy_to(found[:n], u)
     found[n] = p
     measure(system, linear, u, point, tangent[:n], tangent[n], x, out)
@@ -152,7 +177,8 @@ def refine(
     -------
     (found, Newton iterations). Every trial is a converged solution on the arc: where the cubic has its peak,
     then by secants, an edge by its slope; by bracketed secants (Illinois) where these lead out of the
-    bracket, or do not end soon, as at the corner where a contact changes its state.
+    bracket. At a corner, where a contact changes its state, the tangents of both sides meet, and bound what
+    is left to be gained.
     """
     n = left.size
     folds = left_slope[n - 1] * right_slope[n - 1] < 0.0
@@ -163,7 +189,7 @@ def refine(
     copy_to(ways[0], left_slope)
     copy_to(ways[1], right_slope)
     lo, hi, g_lo, g_hi = 0.0, 1.0, g_left, g_right
-    scale = max(abs(g_left), abs(g_right))
+    scale, low = max(abs(g_left), abs(g_right)), _TOO_LOW if close < _LOW else _LOW
     total, side = 0, 0
     last, g_last, share, g = 0.0, g_left, 1.0, g_right
     for trial in range(40):
@@ -171,6 +197,11 @@ def refine(
         if what != EDGE and trial < _BY_CUBIC:
             place = _top_of_cubic(v_left, g_left * width, v_right, g_right * width)
             ahead = lo + place * width if place > 0.0 else -1.0
+        elif what != EDGE and trial >= _BY_SLOPES and trial % 3 != 2:
+            # Past the corner a little, in turns: both sides have to come near it.
+            met = (v_right - v_left - g_right * width) / (g_left - g_right)
+            nearer = 0.02 * min(met, width - met)
+            ahead = lo + met + (nearer if trial % 3 == 0 else -nearer)
         elif what != EDGE and trial < _BY_SECANT and g != g_last:
             ahead = share - g * (share - last) / (g - g_last)
         elif what == EDGE and 0 < trial < _BY_SECANT and out[SLOPE] != 0.0:
@@ -182,13 +213,16 @@ def refine(
         last, g_last, share = share, g, ahead
         cubic_between(ends[0], ways[0], ends[1], ways[1], width, (share - lo) / width, found)
         good, iterations = _on_plane(
-            system, linear, point, left, right, folds, share, most, found, tangent, x, out
+            system, linear, point, left, right, folds, share, most, True, found, tangent, x, out
         )
         total += iterations
         if not good:
             return False, total
         g = out[MAX_ABS] - level if what == EDGE else out[slope]
         if abs(g) <= close * scale or hi - lo <= 1e-11:
+            break
+        left_over = (hi - share) * g if g > 0.0 else (lo - share) * g
+        if what != EDGE and left_over <= low * abs(out[value]):
             break
         now = -1 if (g > 0.0) == (g_lo > 0.0) else 1
         if now < 0:

@@ -18,7 +18,7 @@ from solver.balance.kernels.jacobian import factorise, step_back
 from solver.balance.kernels.residual import contact_values, evaluate
 from solver.contacts.kernels.columns import KT, MU
 from solver.contacts.kernels.normal_load import largest_load, least_load
-from solver.contacts.kernels.system import Evaluation, Receptance, System
+from solver.contacts.kernels.system import SIZE, Evaluation, Receptance, System
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Complex, Integer, Real, coefficient_count, cosine_position
 from solver.jit.lapack import copy_to, invert, set_to
@@ -27,6 +27,8 @@ from solver.linear.kernels.receptance import receptance
 
 TARGET = 1e-11  # relative residual aimed at
 ACCEPTED = 1e-9  # relative residual still a solution when rounding allows no better
+# Factors serve another step where they are at least this large and the last one left this share at most.
+_KEPT_FROM, _KEPT = 100, 0.02
 _HALVINGS = 5
 _UPHILL_STEPS = 8
 _MOST = 25
@@ -107,7 +109,7 @@ def arc_newton(
     """
     n = u.size
     rhs, best = np.empty(n + 1), np.empty(n)
-    before, norm, stalls = np.inf, np.inf, 0
+    before, norm, stalls, kept = np.inf, np.inf, 0, False
     best_p, best_norm = p, np.inf
     iteration = 0
     for iteration in range(most + 1):
@@ -125,9 +127,11 @@ def arc_newton(
             return True, iteration, p, norm
         if iteration == most or norm > 1e3 * max(before, 1e-3):
             break
+        if not (kept and norm <= _KEPT * before):
+            if factorise(system, linear, point, tangent, weight_u, weight_p) == 0.0:
+                break
+            kept = point.counts[SIZE] >= _KEPT_FROM
         before = norm
-        if factorise(system, linear, point, tangent, weight_u, weight_p) == 0.0:
-            break
         plane = weight_p * tangent[n] * (p - guess_p)
         for i in range(n):
             rhs[i] = point.residual[i]

@@ -244,8 +244,10 @@ class FrictionContact(AnyContact):
     def slopes(self) -> tuple[Real, Real] | None:
         """Stuck, what its sliders catch up is left: no more than motion and limit change.
 
-        That holds between two bounds; within a circle whose size changes no such is known.
+        That holds between two bounds; within a circle whose size changes, or rigid, no such is known.
         """
+        if self.is_rigid:
+            return None
         if len(self.RUBBING) > 1 and not (self.friction is not None and self.friction.limits_apart):
             return None
         count, normal = len(self.end_keys), self.normal_port

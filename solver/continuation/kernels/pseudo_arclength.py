@@ -18,7 +18,7 @@ from solver.balance.kernels.jacobian import factorise, step_back
 from solver.balance.kernels.newton import ACCEPTED, arc_newton, newton
 from solver.balance.kernels.output import RESIDUAL, measure, piece
 from solver.balance.kernels.residual import evaluate
-from solver.contacts.kernels.system import AT_BRANCH_POINT, Evaluation, Receptance, System
+from solver.contacts.kernels.system import AT_BRANCH_POINT, SIZE, Evaluation, Receptance, System
 from solver.continuation.kernels.predictor import predict
 from solver.continuation.kernels.state import (
     CUBIC,
@@ -58,7 +58,8 @@ _SHARP = 2.0**-8  # of the first step: a step longer than this does not turn bac
 STRAIGHT_ON = 0.98  # cosine of the turn at a branch point; more than that is a step across a sharp peak
 CLEARLY = 0.1  # share of the accepted residual below which a point is more than nearly a solution
 TOO_LONG = -1  # of a step: a shorter one is to be tried
-FROZEN_FROM = 64  # unknowns from which old factors beat new ones (measured)
+# Size of factors from which old ones beat new ones (measured); the second where forces cost more than they.
+FROZEN_FROM, FROZEN_FROM_WITH_DEAR_FORCES = 150, 400
 
 
 @apart
@@ -127,7 +128,8 @@ def _correct(
     """
     copy_to(trial, guess)
     p = p_guess
-    if trial.size >= FROZEN_FROM and point.counts[AT_BRANCH_POINT] == 1:
+    least = FROZEN_FROM if system.alone.sum() == 0 else FROZEN_FROM_WITH_DEAR_FORCES
+    if point.counts[AT_BRANCH_POINT] == 1 and point.counts[SIZE] >= least:
         good, solves, p, norm = frozen_arc(
             system, linear, trial, p_guess, walk.tangent, weight_u, weight_p, point
         )

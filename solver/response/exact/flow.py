@@ -288,7 +288,7 @@ def _first_suspect(mode: Mode, steps: _Steps, states: Real, order: list[int] | N
 
 def steps_of(mode: Mode) -> _Steps:
     """Return what a mode needs to be followed, found once."""
-    if not mode.steps:
+    if mode.steps is None:
         fastest = float(np.abs(np.linalg.eigvals(mode.A)).max())
         h = min(TURN / fastest, 2.0 * math.pi / 16)
         nw = len(mode.A)
@@ -297,9 +297,8 @@ def steps_of(mode: Mode) -> _Steps:
         powers[0] = np.eye(nw)
         for j in range(count):
             powers[j + 1] = one @ powers[j]
-        mode.steps[0] = _Steps(h, powers, mode.conditions @ mode.A * h)
-    found = mode.steps[0]
-    assert isinstance(found, _Steps)
+        mode.steps = _Steps(h, powers, mode.conditions @ mode.A * h)
+    found: _Steps = mode.steps
     return found
 
 

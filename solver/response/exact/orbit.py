@@ -127,7 +127,7 @@ def _newton(system: Piecewise, march: Flow, periods: int) -> Orbit | None:
             now = float(np.abs(away).max(initial=0.0))
             if flow.state.key != state.key or (step > 1 and now > 0.9 * distance and now > CLOSED * size):
                 return None if best is None else best[1]
-            change, open_directions, multipliers = _solved(system, flow, state, away)
+            change, open_directions, multipliers = _solved(system, flow.phi, state, away)
             distance = now
             if now <= CLOSED * size:
                 polished += 1
@@ -155,10 +155,11 @@ def _lasting(system: Piecewise, state: State) -> Flags:
     return kept
 
 
-def _solved(system: Piecewise, flow: Flow, state: State, away: Real) -> tuple[Real, Real, Complex]:
+def _solved(system: Piecewise, phi: Real | None, state: State, away: Real) -> tuple[Real, Real, Complex]:
     """Return Newton's change of w, the directions it leaves open, and the Floquet multipliers."""
-    nd, phi = system.nd, flow.phi
-    assert phi is not None
+    if phi is None:
+        raise NoMotionError
+    nd = system.nd
     allowed = _tangent(system, state)
     reduced = allowed.T @ phi[:nd, :nd] @ allowed
     left, values, right = np.linalg.svd(np.eye(len(reduced)) - reduced)

@@ -12,13 +12,14 @@ must stay positive.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from solver.contacts.laws.base import AnyContact
 from solver.contacts.laws.coulomb import Contact
 from solver.contacts.laws.elastic_normal import ElasticNormalContact
+from solver.contacts.laws.friction import FrictionContact
 from solver.contacts.laws.gap import GapSpring
 from solver.errors import SettingError
 from solver.jit.fourier import Complex, Flags, Integer, Real
@@ -100,7 +101,7 @@ class Mode:
     conditions: Real
     ends: list[tuple[int, int, int]]
     to_rates: Real
-    steps: dict[int, object] = field(default_factory=dict)
+    steps: Any = None  # what `flow` keeps of it
 
 
 class Piecewise:
@@ -172,7 +173,7 @@ class Piecewise:
 
     def _place(self, scene: Scene, ports: Real) -> None:
         """Sort the contacts into sliders with members, and springs on one side."""
-        raw: list[tuple[int, Real, AnyContact]] = []
+        raw: list[tuple[int, Real, FrictionContact]] = []
         self.gaps: list[tuple[int, Real, float, float]] = []
         first = 0
         rows: list[Real] = []
@@ -201,14 +202,11 @@ class Piecewise:
             for slider in range(len(rows))
         ]
 
-    def _member(self, number: int, contact: AnyContact, own: Real, slider: int, factor: float) -> Member:
-        load, normal, kn, rest = contact.load, None, 0.0, 0.0
-        coefficients = np.zeros(2 * self.top + 1)
-        assert load is not None
-        kept = load.coefficients[: coefficients.size]
-        coefficients[: kept.size] = kept
+    def _member(self, number: int, contact: FrictionContact, own: Real, slider: int, factor: float) -> Member:
+        normal, kn, rest = None, 0.0, 0.0
+        coefficients = contact.load.coefficients[: 2 * self.top + 1]
         given = np.zeros(self.nw)
-        given[self.nd :] = coefficients
+        given[self.nd : self.nd + coefficients.size] = coefficients
         if isinstance(contact, ElasticNormalContact):
             normal, kn = own[1], contact.kn
             rest = max(contact.N0, 0.0) if contact.prestressed else 0.0
@@ -217,8 +215,10 @@ class Piecewise:
                 given[self.nd] = rest
             else:
                 given[: self.n] += kn * normal
-        return Member(contact=number, slider=slider, factor=factor, mu=contact.friction.mu if contact.friction
-                      else 0.0, given=given, normal=normal, kn=kn, rest=rest)  # fmt: skip
+        return Member(
+            contact=number, slider=slider, factor=factor, mu=contact.mu, given=given, normal=normal, kn=kn,
+            rest=rest,
+        )  # fmt: skip
 
     def _check_independent(self) -> None:
         """Refuse rigid contacts of which some follow from the others, other than along the same motion."""

@@ -212,12 +212,17 @@ def _start_at(at: Real, kappa: float, tx: float, ty: float, state: Real) -> None
 
 @apart
 def _repeat(
-    waves: Real, kappa: float, grid: Real, begin: float, force: Real, numbers: Real, pieces: Real,
-    panels: Real, found: Real,
+    waves: Real, kappa: float, grid: Real, begin: float, force: Real, may_end: bool, numbers: Real,
+    pieces: Real, panels: Real, found: Real,
 ) -> int:  # fmt: skip
-    """Find the force at `begin` that is the same a period later; STUCK means that the slipping ended."""
+    """Find the force at `begin` that is the same a period later; STUCK means that the slipping ended.
+
+    Where it may not end, as many periods from the unloaded state slip, it is next to ending at most: then a
+    step of Newton's method that ends it is too long.
+    """
     state, at = np.empty(STATE_SIZE), np.empty(CURVES)
     tx, ty = force[0], force[1]
+    last_x, last_y = tx, ty
     before, plain = np.inf, False
     curves_at(waves, begin, at)
     for _ in range(MOST_ROUNDS):
@@ -230,7 +235,11 @@ def _repeat(
             return count
         rx, ry = state[S_TX] - tx, state[S_TY] - ty
         if state[S_SLIPPED] == 0.0:
-            return STUCK
+            if may_end:
+                return STUCK
+            tx, ty = 0.5 * (tx + last_x), 0.5 * (ty + last_y)
+            continue
+        last_x, last_y = tx, ty
         along = state[S_FACTOR] * (state[S_PX] * rx + state[S_PY] * ry)
         memory = state[S_FACTOR] * (state[S_PX] * state[S_MX] + state[S_PY] * state[S_MY])
         change = math.hypot(rx, ry)
@@ -298,14 +307,12 @@ def _closed(
             if count < 0:
                 return count
             force[0], force[1] = state[S_TX], state[S_TY]
-        how = _repeat(waves, kappa, grid, TURN * place / n, force, numbers, pieces, panels, found)
+        how = _repeat(waves, kappa, grid, TURN * place / n, force, True, numbers, pieces, panels, found)
         if how != STUCK:
             return how
     how = _settle(waves, kappa, grid, numbers, pieces, panels, found, force)
     if how == SLIPPING:
-        how = _repeat(waves, kappa, grid, 0.0, force, numbers, pieces, panels, found)
-        if how == STUCK:
-            return FAILED
+        how = _repeat(waves, kappa, grid, 0.0, force, False, numbers, pieces, panels, found)
     return how
 
 
