@@ -16,7 +16,7 @@ import numpy as np
 
 from solver.jit import lapack_loading as lapack
 from solver.jit.decorators import compiled
-from solver.jit.fourier import Complex, Index, Real
+from solver.jit.fourier import Complex, Index, Integer, Real
 from solver.jit.separate import apart
 
 OWN_UP_TO = 36  # measured crossing of our loop and LAPACK
@@ -64,6 +64,14 @@ def copy_block(target: Real, source: Real) -> None:
     for i in range(source.shape[0]):
         for j in range(source.shape[1]):
             target[i, j] = source[i, j]
+
+
+@compiled
+def take_block(source: Complex, rows: Integer, columns: Integer, target: Complex) -> None:
+    """Copy some rows and columns of a matrix, as many as the other has."""
+    for i in range(target.shape[0]):
+        for j in range(target.shape[1]):
+            target[i, j] = source[rows[i], columns[j]]
 
 
 @compiled

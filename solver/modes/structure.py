@@ -105,7 +105,7 @@ class Structure:
             Z = K + 1j * omega * C - omega**2 * M - 2j * zeta * omega**2 * fed
             return int(np.argmin(np.abs(Z)))
         Z = K + 1j * omega * C - omega**2 * M - 2j * zeta * omega**2 * fed
-        own = np.einsum("am,ab,bm->m", self.modes.conj(), Z, self.modes)
+        own = (self.modes.conj() * (Z @ self.modes)).sum(axis=0)
         return int(np.argmin(np.abs(own)))
 
     def squared_amplitude(self, x: Complex) -> float:

@@ -42,11 +42,13 @@ from solver.jit.fourier import Complex, Integer, Real, coefficient_count, cosine
 from solver.jit.lapack import (
     back_substitute,
     back_substitute_transposed,
+    copy_block,
     copy_to,
     fill,
     fill_block,
     invert,
     multiply,
+    take_block,
 )
 from solver.jit.lapack import factorise as factorise_block
 from solver.jit.separate import apart
@@ -113,22 +115,6 @@ def _part(system: System, point: Evaluation) -> None:
     point.counts[FREE], point.counts[HELD] = free, held
 
 
-@compiled
-def _take(A: Complex, rows: Integer, columns: Integer, out: Complex) -> None:
-    """Fill `out` with some rows and columns of a matrix; it has as many."""
-    for a in range(out.shape[0]):
-        for b in range(out.shape[1]):
-            out[a, b] = A[rows[a], columns[b]]
-
-
-@compiled
-def _put(block: Complex, out: Complex) -> None:
-    """Copy a matrix into the upper left block of another."""
-    for a in range(block.shape[0]):
-        for b in range(block.shape[1]):
-            out[a, b] = block[a, b]
-
-
 @apart
 def _eliminate(system: System, linear: Receptance, point: Evaluation) -> bool:
     """Fill D⁻¹, W, V and A' of all harmonics; False if one's D is singular."""
@@ -146,9 +132,9 @@ def _eliminate(system: System, linear: Receptance, point: Evaluation) -> bool:
     taken = np.empty((free, free), np.complex128)
     for i in range(system.ks.size):
         A = linear.A[0, i]
-        _take(A, gone, gone, D)
-        _take(A, gone, kept, down)
-        _take(A, kept, gone, up)
+        take_block(A, gone, gone, D)
+        take_block(A, gone, kept, down)
+        take_block(A, kept, gone, up)
         for h in range(held):
             g = point.slopes[gone[h]] - system.shift[gone[h]]
             for other in range(held):
@@ -165,9 +151,9 @@ def _eliminate(system: System, linear: Receptance, point: Evaluation) -> bool:
         for a in range(free):
             for b in range(free):
                 point.reduced[i, a, b] = A[kept[a], kept[b]] - taken[a, b]
-        _put(inverse, point.inverse[i])
-        _put(W, point.W[i])
-        _put(V, point.V[i])
+        copy_block(point.inverse[i], inverse)
+        copy_block(point.W[i], W)
+        copy_block(point.V[i], V)
     return True
 
 

@@ -21,6 +21,7 @@ from solver.jit.decorators import compiled
 from solver.jit.fourier import Complex, Real
 from solver.jit.lapack import invert, multiply
 from solver.jit.separate import apart
+from solver.linear.kernels.filled import is_filled, note
 from solver.linear.kernels.modal_products import basis_of_modes, fill_product
 
 BLOCK = 512  # modes summed at a time: their weights stay in the near cache
@@ -56,11 +57,11 @@ def receptance(system: System, p: float, out: Receptance) -> None:
     """
     if system.form == DENSE:
         _dense_receptance(system, p, out)
-    elif _is_filled(system, p, out):
+    elif is_filled(system, p, out):
         _modal_receptance(system, p, 0, out)
     else:
         _modal_receptance(system, p, system.leading.size, out)
-        _note(system, p, out)
+        note(system, p, out)
     scale_driven(system, p, out)
 
 
@@ -75,42 +76,6 @@ def observer_receptance(system: System, p: float, out: Receptance) -> None:
     else:
         _modal_receptance(system, p, 0, out)
     scale_driven(system, p, out)
-
-
-@compiled
-def _place(system: System, p: float, i: int) -> float:
-    """Return number i of those that tell what A belongs to: λ, what λ is, the frequency, and the modes."""
-    if i == 0:
-        return p
-    if i == 1:
-        return float(system.kind)
-    if i == 2:
-        return system.omega
-    address = system.contact_modes.ctypes.data
-    return float(address % 2**32) if i == 3 else float(address // 2**32)
-
-
-@compiled
-def _is_filled(system: System, p: float, out: Any) -> bool:
-    """Return whether A is that of this structure at λ = p."""
-    same = True
-    for i in range(out.filled.size):
-        same = same and out.filled[i] == _place(system, p, i)
-    return bool(same)
-
-
-@compiled
-def _note(system: System, p: float, out: Any) -> None:
-    """Keep in mind where A was filled."""
-    for i in range(out.filled.size):
-        out.filled[i] = _place(system, p, i)
-
-
-@compiled
-def forget(out: Any) -> None:
-    """Have A filled anew next time: it is changed."""
-    for i in range(out.filled.size):
-        out.filled[i] = np.nan
 
 
 @compiled
