@@ -100,8 +100,8 @@ def onset_direction(at: Real, kappa: float) -> float:
 def solve_columns(matrix: Array, right: Array) -> bool:
     """Solve matrix · x = right for all columns in place, by elimination without exchanges.
 
-    Those of a panel are rows of Radau's derivatives scaled, plus a diagonal: while directions draw together it
-    is positive, and entries grow at most twofold.
+    Those of a panel are rows of Radau's derivatives scaled, plus a diagonal: while directions draw together
+    it is positive, and entries grow at most twofold.
     """
     n, columns = matrix.shape[0], right.shape[1]
     for k in range(n):
