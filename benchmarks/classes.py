@@ -131,6 +131,57 @@ def _solved(scene: Any, frequency_hz: float, harmonics: int, *, slips: bool = Tr
     return call
 
 
+def _swept(scene: Any) -> Callable[[], Answer]:
+    """Return the call that sweeps a scene over its band with the default settings."""
+    import solver
+
+    def call() -> Answer:
+        branch = solver.sweep(scene)
+        expect(f"{scene.name}: {branch.status.value}", branch.completed)
+        return Answer(value=branch.peak.value)
+
+    return call
+
+
+def _shipped_sweep(name: str) -> Callable[[], Callable[[], Answer]]:
+    def prepare() -> Callable[[], Answer]:
+        import solver
+
+        return _swept(solver.load_scene(name))
+
+    return prepare
+
+
+def _masses_sweep(count: int, law: str) -> Callable[[], Callable[[], Answer]]:
+    def prepare() -> Callable[[], Answer]:
+        from benchmarks.space import masses
+
+        return _swept(masses(count, law))
+
+    return prepare
+
+
+@row("case-a", "case A, a response", 0.0032, runs=41)
+def _response_of_case_a() -> Callable[[], Answer]:
+    from benchmarks.problems import case_a
+
+    return _swept(case_a())
+
+
+for _name, _goal, _runs in (
+    ("two-dof", 0.006, 41), ("bladed-disk", 0.014, 41), ("platform-wedge", 0.4, 3), ("shroud-3d", 0.25, 3),
+    ("platform-cylinder", 0.4, 3),
+):  # fmt: skip
+    row(_name, f"`{_name}`, a response", _goal, runs=_runs)(_shipped_sweep(_name))
+for _law, _work, _goals in (
+    ("elastic-normal", "moving load", (0.012, 0.15, 3.0)), ("coulomb-3d", "circle", (0.1, 1.2, 12.0)),
+):  # fmt: skip
+    for _count, _goal in zip((1, 4, 16), _goals, strict=True):
+        row(f"{_law}-{_count}", f"{_work}, masses: {_count}, a branch", _goal, runs=21 if _count == 1 else 3)(
+            _masses_sweep(_count, _law)
+        )
+
+
 @row("lap-16", "lap joint in space, 16 nodes, H = 3, all stuck, a solve", 0.05, runs=9)
 def _lap_of_16() -> Callable[[], Answer]:
     return _solved(lap_joint(16), 100.0, 3, slips=False)

@@ -58,7 +58,7 @@ _SHARP = 2.0**-8  # of the first step: a step longer than this does not turn bac
 STRAIGHT_ON = 0.98  # cosine of the turn at a branch point; more than that is a step across a sharp peak
 CLEARLY = 0.1  # share of the accepted residual below which a point is more than nearly a solution
 TOO_LONG = -1  # of a step: a shorter one is to be tried
-# Size of factors from which old ones beat new ones (measured); the second where forces cost more than they.
+# Sizes from which old factors beat new ones (measured), the second where forces cost more than factors.
 FROZEN_FROM, FROZEN_FROM_WITH_DEAR_FORCES = 150, 400
 
 

@@ -174,7 +174,7 @@ def coulomb_circle(
 ) -> tuple[int, int]:  # fmt: skip
     """Fill the force of two or three ports, its Jacobian and its derivative by λ; circular limit.
 
-    Without blocks in `dF_dU` the force alone is found, for TIME of the time; `dF_dp` is left 0 then.
+    Without blocks in `dF_dU` the force alone is found, for two thirds of the time; `dF_dp` is left 0 then.
     """
     row, slope = with_second(row, slope)
     m = U.shape[0]

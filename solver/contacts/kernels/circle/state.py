@@ -71,8 +71,9 @@ TURN = 2.0 * math.pi
 FORGOTTEN = (
     24.0  # exponent of what is left of a difference, at which the exact march begins before its period
 )
-MOST_FORGETTING = 0.75  # of a period, beyond which an exact march before it costs more than it saves,
-LITTLE = 3.0  # but for what slips so little that it may end in sticking
+# Share of a period beyond which an exact march before it costs more than it saves, but for what slips so
+# little (the exponent over a period) that it may end in sticking.
+MOST_FORGETTING, LITTLE = 0.75, 3.0
 REPEATS = 3e-9  # change of the force over a period, relative to the largest limit, that counts as none
 MOST_ROUNDS = 60
 MOST_TRANSIENT = 40  # periods after which a slider that still slips is taken to do so for ever
@@ -217,8 +218,8 @@ def _repeat(
 ) -> int:  # fmt: skip
     """Find the force at `begin` that is the same a period later; STUCK means that the slipping ended.
 
-    Where it may not end, as many periods from the unloaded state slip, it is next to ending at most: then a
-    step of Newton's method that ends it is too long.
+    Where it may not end, because many periods from the unloaded state slip, a step of Newton's method that
+    ends it is too long.
     """
     state, at = np.empty(STATE_SIZE), np.empty(CURVES)
     tx, ty = force[0], force[1]
