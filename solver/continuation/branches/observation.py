@@ -154,7 +154,7 @@ def _measured(
 def _measure_all(
     workspaces: Sequence[Workspace], solution: Real, tangent: Real, rows: Real, out: Real
 ) -> None:
-    """Fill a row for each of several DOFs of one motion; `out` keeps its residual."""
+    """Fill a row for each of several DOFs of one motion; `out` keeps its residual and what it loses."""
     first = workspaces[0]
     u, p = np.ascontiguousarray(solution[:-1]), float(solution[-1])
     du, dp = np.ascontiguousarray(tangent[:-1]), float(tangent[-1])

@@ -8,7 +8,7 @@ import pytest
 import solver
 from solver.balance.balance import build
 from solver.balance.kernels.observers import measure_through_modes, modal_motion
-from solver.balance.kernels.output import MEASURES, measure
+from solver.balance.kernels.output import LOST, MEASURES, measure
 from solver.balance.kernels.residual import evaluate, evaluate_forces, prepare_forces
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.system import MODES, POLES, evaluation_by_value, receptance_by_value
@@ -84,4 +84,5 @@ def test_observers_measure_what_each_would_alone(coupled_damping: bool, form: in
         receptance(each.system, p, each.linear)
         measure(each.system, each.linear, u, first.point, du, dp, y, alone)
         np.testing.assert_allclose(x, y, rtol=0, atol=1e-12 * np.abs(y).max())
-        np.testing.assert_allclose(out, alone, rtol=1e-9, atol=1e-12 * np.abs(y).max())
+        # What a motion loses is the same whoever looks at it.
+        np.testing.assert_allclose(out[:LOST], alone[:LOST], rtol=1e-9, atol=1e-12 * np.abs(y).max())
