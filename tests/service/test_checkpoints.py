@@ -32,7 +32,7 @@ from service.jobs.parts import PartStoppedError
 from service.queue.core import Service
 
 DISK = solver.annulus(solver.load_scene("bladed-disk")).to_dict()
-SWEEP = {"scene": DISK, "from": 600, "to": 800, "harmonics": 13}
+SWEEP = {"scene": DISK, "from": 500, "to": 900, "harmonics": 13}
 MAP = {"scene": "two-dof", "parameter": "damper.N0", "from": 60, "to": 160, "steps": 20, "frequencies": 3000,
        "ridge": False, "harmonics": 3}  # fmt: skip
 SLOW = {"slow-sweep": ("sweep", SWEEP), "slow-map": ("map", MAP)}

@@ -216,7 +216,7 @@ def test_a_stop_waits_for_nobody(
     for one, text in zip(sockets, half_said, strict=True):
         one.sendall(text)
     began.wait()
-    time.sleep(0.3)
+    until(lambda: len(list(client.jobs())) == 2)  # the request that waits is known to the service
     asked = time.monotonic()
     process.send_signal(number)
     assert process.wait(PATIENCE) == 0, "nobody is waited for for 600 s"

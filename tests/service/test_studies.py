@@ -107,7 +107,7 @@ def test_a_mistuning_study_is_that_of_python_and_the_worst_responses_are_stored(
     assert [disk["seed"] for disk in result["samples"]] == [5, 6, 7, 8]
     tuned, worst = job["sweeps"]
     assert tuned["peak"]["value"] == result["tuned"]["peak"]
-    assert worst["peak"]["value"] == result["worst"]["largest"]
+    assert worst["peak"]["value"] == pytest.approx(result["worst"]["largest"], rel=1e-13)
     assert result["worst"]["magnification"] > 1.0
     again = finished(shipped, {**MISTUNING, "fresh": True})
     assert without_time(again["result"]) == without_time(result), "the same seed, the same disks"

@@ -7,6 +7,7 @@ const FLAGS = {
   history_dependent: "half peak to peak depends on the history too: march from the starts that may occur",
   all_stuck: "every contact sticks all the time",
   separation: "a contact opens during the period",
+  mean_load_above_friction: "mean load above friction: dashpots alone, or nothing, hold a part that contacts alone touch",
   not_unique: "its mirror image is a response too, and the symmetric one is unstable",
   symmetric_unstable: "a half-wave symmetric response is unstable: another one, with a mean, is seen",
   travelling_wave_assumed: "the response is assumed to be the travelling wave: compare with every sector",
