@@ -15,7 +15,7 @@ from optim.criteria.linearised import conditions, model_of
 from optim.criteria.rows import Evaluation
 from optim.methods.afterwards import looked_after, settled_status
 from optim.methods.eased import Eased
-from optim.methods.enough_harmonics import honest, with_enough
+from optim.methods.enough_harmonics import by_the_better_known, honest, most_harmonics, with_enough
 from optim.methods.evaluator import Search, StoppedError, Tally
 from optim.methods.global_look import WholeRange
 from optim.methods.kkt import FLAT_SLOPE, Local, LocalSearch
@@ -87,7 +87,8 @@ def solve_problem(
         return _by_curve(problem, on_progress, should_stop)
     tally = Tally(on_progress)
     found = _solved(problem, tally.searching, should_stop, on_best)
-    found, more = _with_enough_harmonics(found, tally, should_stop, on_best)
+    most = most_harmonics(problem.harmonics)
+    found, more = _with_enough_harmonics(found, most, tally, should_stop, on_best)
     found = looked_after(found, should_stop, tally.further, more)
     if found.status is DesignStatus.NO_RESPONSE and _undamped(found, should_stop):
         found = replace(found, status=DesignStatus.UNDAMPED)
@@ -106,29 +107,31 @@ def _undamped(found: DesignResult, should_stop: ShouldStop) -> bool:
 
 
 def _with_enough_harmonics(
-    found: DesignResult, tally: Tally, should_stop: ShouldStop, on_best: OnBest
+    found: DesignResult, most: int, tally: Tally, should_stop: ShouldStop, on_best: OnBest
 ) -> tuple[DesignResult, list[Evaluation]]:
-    """Search again with more harmonics where those asked for leave the peak of the optimum in doubt.
+    """Search again, by the right measure and with more harmonics, as long as the optimum asks for them.
 
-    The second search begins from what the first has seen. With the result come the evaluations of the first
-    optimum with more harmonics.
+    Each search begins from what the one before has seen. With the result come the evaluations of optima
+    with more harmonics.
     """
     found = found.with_errors()
-    problem, tried = with_enough(found, should_stop)
+    problem, tried = with_enough(found, most, should_stop)
     responses = sum(len(one.responses) for one in tried)
     found = replace(found, evaluations=found.evaluations + responses, work=found.work + responses)
     if problem is None:
         return found, tried
-    same = found if problem.cases is found.problem.cases else None  # by another measure nothing is known
-    again = _solved(problem, tally.again(found.evaluations), should_stop, on_best, same)
+    same = problem.cases is found.problem.cases  # by another measure nothing is known
+    again = _solved(problem, tally.again(found.evaluations), should_stop, on_best, found if same else None)
     if again.status is DesignStatus.STOPPED:
         return replace(found, status=DesignStatus.STOPPED), tried
     if again.evaluation is None or not again.evaluation.good:
         return found, tried
-    return replace(
+    again = replace(
         again, evaluations=again.evaluations + found.evaluations, work=again.work + found.work,
         seconds=again.seconds + found.seconds,
-    ).with_errors(), tried  # fmt: skip
+    )  # fmt: skip
+    again, more = _with_enough_harmonics(again, most, tally, should_stop, on_best)
+    return again if same else by_the_better_known(found, again), [*tried, *more]
 
 
 def _solved(

@@ -15,7 +15,7 @@ from optim.problem.problem import Method, Problem
 from optim.results.design import DesignResult, DesignStatus
 from optim.results.doubts import WELL_KNOWN, doubt_of
 from optim.results.json import known_parts
-from solver.results.known import HALF_PEAK_TO_PEAK
+from solver.results.known import HALF_PEAK_TO_PEAK, Known
 from solver.results.watch import ShouldStop
 from solver.scene.scene import Scene
 
@@ -23,6 +23,7 @@ CLAIMS = (DesignStatus.OPTIMAL, DesignStatus.AT_BOUND, DesignStatus.APPROXIMATE)
 MOST_HARMONICS = 60  # beyond that a design is not looked at with more
 HOPELESS = 2.0  # times what is well known: doubts foretold above it are not looked at
 _RUNGS = 4  # times the harmonics asked for, at most: more of them cost more than a search was asked to
+NO_MEAN = 1e-6  # share by which max|x| is above half peak to peak where there is no mean
 _FEW = 12  # harmonics that a search may have though it was asked for fewer
 
 
@@ -47,10 +48,17 @@ def honest(result: DesignResult) -> DesignResult:
     return replace(result, status=DesignStatus.NOT_KNOWN)
 
 
-def with_enough(result: DesignResult, should_stop: ShouldStop) -> tuple[Problem | None, list[Evaluation]]:
+def most_harmonics(asked: int) -> int:
+    """Return how many harmonics a search may have that was asked for some."""
+    return min(max(_RUNGS * asked, _FEW), MOST_HARMONICS)
+
+
+def with_enough(
+    result: DesignResult, most: int, should_stop: ShouldStop
+) -> tuple[Problem | None, list[Evaluation]]:
     """Return the problem to solve instead of one whose end is doubtful, and the evaluations that told so.
 
-    A response or two at the optimum tell how many harmonics it needs, so that at most one search follows.
+    A response or two at the optimum tell how many harmonics it needs, up to `most`.
 
     Returns
     -------
@@ -59,36 +67,59 @@ def with_enough(result: DesignResult, should_stop: ShouldStop) -> tuple[Problem 
     evaluation, tried = result.evaluation, list[Evaluation]()
     if result.status not in (*CLAIMS, DesignStatus.INFEASIBLE) or evaluation is None:
         return None, tried
-    problem = _by_its_measure(result.problem, evaluation)
-    measured = replace(problem, start=dict(result.optimum)) if problem is not result.problem else None
+    problem, start = result.problem, dict(result.optimum)
+    measured = _by_its_measure(problem, evaluation)
+    otherwise = None if measured is problem else replace(measured, start=start)
     if well_known(problem, evaluation):
-        return measured, tried
+        return otherwise, tried
     doubt, harmonics = doubt_in(problem, evaluation), 2 * problem.harmonics
-    most = max(_RUNGS * problem.harmonics, _FEW)
-    while harmonics <= min(most, MOST_HARMONICS) and not (should_stop is not None and should_stop()):
+    while harmonics <= most and not (should_stop is not None and should_stop()):
         more = replace(problem, harmonics=harmonics)
         found = evaluate(more, result.optimum, gradients=False, should_stop=should_stop)
         tried.append(found)
         if found.good and well_known(more, found):
-            return replace(more, start=dict(result.optimum)), tried
+            # With too few harmonics a mean may seem free that is not.
+            return replace(_by_its_measure(more, found), start=start), tried
         if found.good:
-            # From one doubling to the next a doubt falls by the same factor, if it falls.
+            # From one doubling to the next a doubt falls by the same factor, if it falls; not among the
+            # first harmonics, of which one may meet a resonance that those before it do not.
             left = doubt_in(more, found)
-            if left * min(left / doubt, 1.0) > HOPELESS * WELL_KNOWN:
+            if 2 * harmonics > _FEW and left * min(left / doubt, 1.0) > HOPELESS * WELL_KNOWN:
                 break
             doubt = left
         harmonics *= 2
-    return measured, tried
+    return otherwise, tried
+
+
+def by_the_better_known(before: DesignResult, after: DesignResult) -> DesignResult:
+    """Return the result after a change of measure, or before it where max|x| alone is known well enough."""
+    old, new = before.evaluation, after.evaluation
+    if old is None or (new is not None and well_known(after.problem, new)):
+        return after
+    parts = [known for _, known in known_parts(old)]
+    if not all(max(known.relative, known.relative_max_abs) <= WELL_KNOWN for known in parts):
+        return after
+    return replace(before, problem=replace(before.problem, keeps_measure=True))
 
 
 def _by_its_measure(problem: Problem, evaluation: Evaluation) -> Problem:
-    """Return the problem with half peak to peak in all cases where the mean of the peak of one is free."""
-    free = any(known.measure == HALF_PEAK_TO_PEAK for _, known in known_parts(evaluation))
-    if not free or all(case.scene.observe.centred for case in problem.cases):
+    """Return the problem with half peak to peak in all cases where the mean of the peak of one is free.
+
+    Where the peak has no mean both measures are the same, and the problem stays as it is.
+    """
+    if problem.keeps_measure or all(case.scene.observe.centred for case in problem.cases):
+        return problem
+    if not any(_lopsided(known) for _, known in known_parts(evaluation)):
         return problem
     cases = tuple(replace(case, scene=_half_peak_to_peak(case.scene)) for case in problem.cases)
     method = Method.AUTO if problem.method is Method.TRACKED else problem.method
     return replace(problem, cases=cases, method=method)
+
+
+def _lopsided(known: Known) -> bool:
+    """Return whether the mean of a peak is free and not zero."""
+    free = known.measure == HALF_PEAK_TO_PEAK
+    return free and not known.peak_max_abs <= known.value * (1.0 + NO_MEAN)
 
 
 def _half_peak_to_peak(scene: Scene) -> Scene:

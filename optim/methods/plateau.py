@@ -157,7 +157,8 @@ class _Level:
         scene = case.scene.with_values(parameter_values(self._problem.variables, values))
         there = solve(scene, frequency_hz=row.at_hz, harmonics=self._problem.harmonics)
         # Where it did not converge the responses decide.
-        return not abs(there.max_abs - row.value) > LEVEL * abs(row.value)
+        amplitude = there.half_peak_to_peak if scene.observe.centred else there.max_abs
+        return not abs(amplitude - row.value) > LEVEL * abs(row.value)
 
     def _along(self, here: Evaluation, variable: Variable) -> Along:
         """Return what evaluates designs along a variable."""

@@ -41,6 +41,9 @@ class Problem(Goals):
         How many local optima are looked for.
     tolerance : float
         Relative error of the peak up to which a performance curve suffices.
+    keeps_measure : bool
+        Whether the measure that the scene observes stays where the mean is free: designs that are compared
+        need one measure.
     """
 
     scene: Scene
@@ -50,6 +53,7 @@ class Problem(Goals):
     method: Method
     basins: int
     tolerance: float = TOLERANCE
+    keeps_measure: bool = False
 
     @property
     def plain(self) -> bool:

@@ -88,7 +88,7 @@ def pareto_front(
         An argument that is no key.
     """
     begun = time.perf_counter()
-    posed = pose(scene, **with_limits(problem, limits))
+    posed = replace(pose(scene, **with_limits(problem, limits)), keeps_measure=True)
     if isinstance(points, bool) or not isinstance(points, int) or points < FEWEST_POINTS:
         raise DesignError("points", points, f"must be a whole number >= {FEWEST_POINTS}")
     if posed.method is Method.PERFORMANCE_CURVE:

@@ -57,11 +57,12 @@ class Known(Piece):
     @property
     def relative(self) -> float:
         """Estimated error relative to the peak; infinite if one of them is not known."""
-        if self.error == 0.0:
-            return 0.0
-        if not (math.isfinite(self.error) and self.value > 0.0):
-            return math.inf
-        return self.error / self.value
+        return _relative(self.error, self.value)
+
+    @property
+    def relative_max_abs(self) -> float:
+        """The same of max|x|, whatever the measure."""
+        return _relative(self.error_estimate, self.peak_max_abs)
 
     @classmethod
     def of_json(cls, found: Mapping[str, Any]) -> Known:
@@ -90,6 +91,12 @@ class Known(Piece):
 
 
 NOTHING_KNOWN = Known()
+
+
+def _relative(error: float, value: float) -> float:
+    if error == 0.0:
+        return 0.0
+    return error / value if math.isfinite(error) and value > 0.0 else math.inf
 
 
 def worst_of(parts: Iterable[Known]) -> Known:
