@@ -99,10 +99,16 @@ def largest_entry(vector: Real) -> float:
 
 
 @apart
+def _multiply_large(left: Complex, right: Complex, out: Complex) -> None:
+    """Multiply by BLAS, as `multiply`: apart from it, as code that calls `np.dot` loads Numba's tables."""
+    np.dot(left, right, out)
+
+
+@apart
 def multiply(left: Complex, right: Complex, out: Complex) -> None:
     """Fill `out` with left @ right, all of them row after row without gaps."""
     if left.shape[0] * left.shape[1] * right.shape[1] > MULTIPLIED_UP_TO:
-        np.dot(left, right, out)
+        _multiply_large(left, right, out)
         return
     for a in range(left.shape[0]):
         for b in range(right.shape[1]):

@@ -45,4 +45,6 @@ def number(value: float, digits: int = _DIGITS) -> str:
 
 def duration(seconds: float) -> str:
     """A time in ms or s."""
+    if not math.isfinite(seconds):
+        return "an unknown time"
     return f"{seconds * 1e3:.3g} ms" if seconds < 1.0 else f"{seconds:.3g} s"

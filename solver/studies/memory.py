@@ -90,7 +90,7 @@ def dense_bytes(scene: Scene, harmonics: int, *, every_sector: bool = False) -> 
         structure=structures * (_OF_MODES if _is_diagonal(scene) else _OF_POLES) * number * n**2,
         balance=_balance(ports, leading, kept)
         + _balance(ports, leading, more)
-        + _OF_PORTS * _COMPLEX * (_TAIL * beyond + 1) * ports**2
+        + _OF_PORTS * _COMPLEX * (_TAIL * beyond + 1) * leading**2
         + _OF_RESONANCES * _COMPLEX * resonances,
     )
 
@@ -133,8 +133,8 @@ def _balance(ports: int, leading: int, ks: np.ndarray) -> int:
     unknowns, kept = ports * coefficients, leading * coefficients
     at_contacts = 2 * ports * coefficients**2
     if leading < ports:
-        # Factors, Pᵀ G P, and G P.
-        matrices = (kept + 1) ** 2 + kept**2 + unknowns * kept
+        # Factors, Pᵀ G P, and G P of one coefficient.
+        matrices = (kept + 1) ** 2 + kept**2 + ports * kept
         receptances = _OF_LEADING * leading**2 + _OF_ALL_PORTS * ports**2
         return _REAL * (matrices + at_contacts) + _COMPLEX * ks.size * receptances
     jacobian = unknowns**2 + (unknowns + 1) ** 2

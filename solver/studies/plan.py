@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -68,8 +69,8 @@ class Plan(Shown):
     seconds_a_point : float
         Estimated cost of a point of a branch [s].
     seconds_of_stability : float
-        Estimated cost of the Floquet multipliers of a response [s]; answers have them by themselves below a
-        second.
+        Estimated cost of the Floquet multipliers of a response [s], infinite (null in JSON) where it is not
+        known; answers have them by themselves below a second.
     dense_bytes : int
         Estimated memory of the dense matrices of a response [bytes].
     performance_curve : str
@@ -91,6 +92,7 @@ class Plan(Shown):
 
     def to_json(self) -> dict[str, object]:
         """Return the plan as one JSON object."""
+        seconds = self.seconds_of_stability
         return {
             "scene": self.scene,
             "effects": [
@@ -101,7 +103,7 @@ class Plan(Shown):
             "contacts": self.contacts,
             "n_harmonics": self.harmonics,
             "estimated_seconds_a_point": self.seconds_a_point,
-            "estimated_seconds_of_stability": self.seconds_of_stability,
+            "estimated_seconds_of_stability": seconds if math.isfinite(seconds) else None,
             "estimated_dense_bytes": self.dense_bytes,
             "performance_curve": self.performance_curve,
         }

@@ -46,7 +46,7 @@ class PlanAnswer(Answer):
     contacts: int
     n_harmonics: int
     estimated_seconds_a_point: float
-    estimated_seconds_of_stability: float
+    estimated_seconds_of_stability: float | None
     performance_curve: str
     estimated_dense_bytes: int
 

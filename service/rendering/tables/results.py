@@ -43,6 +43,8 @@ def plan(found: Json) -> None:
     """The effects in use and left out, the sizes and the cost."""
     effects = [("yes" if e["used"] else "no", e["name"], e["reason"]) for e in found["effects"]]
     print_table(f"Plan of {found['scene']}", _EFFECT_COLUMNS, effects)
+    seconds = found["estimated_seconds_of_stability"]
+    stability = "not known" if seconds is None else f"about {units.duration(seconds)} a response"
     print_pairs(
         "",
         [
@@ -54,7 +56,7 @@ def plan(found: Json) -> None:
             ("dense matrices", f"{found['estimated_dense_bytes'] / 1e6:.3g} MB"),
             ("performance curve", found["performance_curve"]),
             ("estimated cost", f"{units.duration(found['estimated_seconds_a_point'])} a point of a branch"),
-            ("stability", f"about {units.duration(found['estimated_seconds_of_stability'])} a response"),
+            ("stability", stability),
         ],
     )
 

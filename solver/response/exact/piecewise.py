@@ -17,10 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from solver.contacts.laws.coulomb import Contact
-from solver.contacts.laws.elastic_normal import ElasticNormalContact
-from solver.contacts.laws.friction import FrictionContact
-from solver.contacts.laws.gap import GapSpring
+from solver.contacts.laws.parts import Follows, NormalLoad, Row
 from solver.errors import SettingError
 from solver.jit.fourier import Complex, Flags, Integer, Real
 from solver.linear.assembly import linear_model
@@ -173,19 +170,20 @@ class Piecewise:
 
     def _place(self, scene: Scene, ports: Real) -> None:
         """Sort the contacts into sliders with members, and springs on one side."""
-        raw: list[tuple[int, Real, FrictionContact]] = []
+        raw: list[tuple[int, Real, Row, NormalLoad]] = []
         self.gaps: list[tuple[int, Real, float, float]] = []
         first = 0
         rows: list[Real] = []
         stiffnesses: list[float] = []
         belongs: list[tuple[int, float]] = []
         for number, contact in enumerate(scene.contacts):
-            row = ports[first]
-            if isinstance(contact, GapSpring):
-                self.gaps.append((number, row, contact.k, contact.gap))
-            elif isinstance(contact, Contact | ElasticNormalContact):
-                raw.append((number, ports[first : first + len(contact.end_keys)], contact))
-                belongs.append(_slider_of(row, contact.kt, rows, stiffnesses))
+            row, numbers = ports[first], contact.rows()[0]
+            if contact.slides_on_a_line and contact.load is not None:
+                own = ports[first : first + len(contact.end_keys)]
+                raw.append((number, own, numbers, contact.load))
+                belongs.append(_slider_of(row, numbers.kt, rows, stiffnesses))
+            elif numbers.follows is Follows.GAP:
+                self.gaps.append((number, row, numbers.kt, numbers.gap))
             else:
                 wanted = f"must be coulomb, elastic-normal or gap {_EVENTS}"
                 raise SettingError(f"{contact.name}.law", contact.LAW, wanted)
@@ -194,30 +192,30 @@ class Piecewise:
         self.kt = np.array(stiffnesses)
         self.rigid = np.isinf(self.kt)
         self.members = [
-            self._member(number, contact, own, slider, factor)
-            for (number, own, contact), (slider, factor) in zip(raw, belongs, strict=True)
+            self._member(*each, slider, factor) for each, (slider, factor) in zip(raw, belongs, strict=True)
         ]
         self.of_slider = [
             [i for i, member in enumerate(self.members) if member.slider == slider]
             for slider in range(len(rows))
         ]
 
-    def _member(self, number: int, contact: FrictionContact, own: Real, slider: int, factor: float) -> Member:
-        normal, kn, rest = None, 0.0, 0.0
-        coefficients = contact.load.coefficients[: 2 * self.top + 1]
+    def _member(
+        self, number: int, own: Real, numbers: Row, load: NormalLoad, slider: int, factor: float
+    ) -> Member:
+        normal = None
+        coefficients = load.coefficients[: 2 * self.top + 1]
         given = np.zeros(self.nw)
         given[self.nd : self.nd + coefficients.size] = coefficients
-        if isinstance(contact, ElasticNormalContact):
-            normal, kn = own[1], contact.kn
-            rest = max(contact.N0, 0.0) if contact.prestressed else 0.0
-            if math.isinf(kn):
+        if numbers.normal_port is not None:
+            normal = own[numbers.normal_port]
+            if math.isinf(numbers.kn):
                 given[:] = 0.0
-                given[self.nd] = rest
+                given[self.nd] = numbers.rest
             else:
-                given[: self.n] += kn * normal
+                given[: self.n] += numbers.kn * normal
         return Member(
-            contact=number, slider=slider, factor=factor, mu=contact.mu, given=given, normal=normal, kn=kn,
-            rest=rest,
+            contact=number, slider=slider, factor=factor, mu=numbers.mu, given=given, normal=normal,
+            kn=numbers.kn, rest=numbers.rest,
         )  # fmt: skip
 
     def _check_independent(self) -> None:

@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from solver.jit.fourier import Real
+from solver.jit.fourier import Complex
 from solver.linear.assembly import linear_model
 from solver.linear.model import LinearModel
 from solver.scene.scene import Scene
@@ -45,11 +45,15 @@ def forecast(scene: Scene, frequency_hz: float | None = None) -> float:
     Parameters
     ----------
     frequency_hz : that of the response; the middle of the band where it is left out.
+
+    Returns
+    -------
+    The time, infinite where a mode is faster than numbers can say.
     """
     model = linear_model(scene)
     sectors = scene.structure.sector_count if scene.structure.has_sectors else 1
     parts = sectors // math.gcd(scene.engine_order, sectors) if sectors > 1 else 1
-    omega = 2.0 * math.pi * (frequency_hz or math.sqrt(math.prod(scene.observe.band)))
+    omega = 2.0 * math.pi * (frequency_hz or math.prod(map(math.sqrt, scene.observe.band)))
     turning = [_turns(contact) for contact in scene.contacts]
     intervals = 1.0 + sum(_TURNS if turns else _CHANGES for turns in turning) * sectors / parts
     closed = [1.0 if contact.normal_port is None else _CLOSED for contact in scene.contacts]
@@ -77,17 +81,27 @@ def _structure(scene: Scene, model: LinearModel, omega: float) -> tuple[float, b
     stiff = np.array([k if math.isfinite(k) else 0.0 for c in scene.contacts for k in c.stiffnesses])
     for diameter in every[every <= model.sectors // 2] if model.every_diameter else every:
         K, C, M = (each[0][free][:, free] for each in model.at(np.array([diameter]), np.ones(1, np.bool_)))
-        by_K, by_C = np.linalg.solve(M, K), np.linalg.solve(M, C)
         L = (model.contact_here + model.contact_next * model.turns(np.array([diameter]))[0])[:, free]
-        added = stiff[:, None] * (L @ np.linalg.solve(M, L.conj().T))
-        fastest = max(fastest, _largest(by_K) + (float(np.linalg.norm(added, 2)) if stiff.size else 0.0))
+        found = [np.linalg.solve(M, right) for right in (K, C, L.conj().T)]
+        if not all(np.isfinite(each).all() for each in found):
+            return math.inf, False
+        (by_K, size), (by_C, _), (by_L, pulled) = map(_scaled, found)
+        springs, stiffest = _scaled(stiff)
+        added = float(np.linalg.norm(springs[:, None] * (L @ by_L), 2)) if stiff.size else 0.0
+        fastest = max(fastest, size * _largest(by_K) + stiffest * pulled * added)
         joint = float(np.linalg.norm(by_K @ by_C - by_C @ by_K))
         apart = joint <= _DECOUPLED * float(np.linalg.norm(by_K) * np.linalg.norm(by_C))
         decoupled = decoupled and apart
     return math.sqrt(fastest) / omega, decoupled
 
 
-def _largest(matrix: Real) -> float:
+def _scaled(array: Complex) -> tuple[Complex, float]:
+    """Return an array over its largest entry, and that: its products then stay in the range of numbers."""
+    size = float(np.abs(array).max(initial=0.0))
+    return array / (size or 1.0), size
+
+
+def _largest(matrix: Complex) -> float:
     """Return about the largest modulus of the eigenvalues."""
     vector, size = np.random.default_rng(0).normal(size=len(matrix)) + 0j, 0.0
     for _ in range(_POWERS):

@@ -12,7 +12,7 @@ from mistuned_cases import disk
 from moving_scenes import moving_scene
 from scipy.integrate import solve_ivp
 
-from solver import Scene, StoppedError, annulus, plan, solve, stability
+from solver import Scene, StoppedError, annulus, load_scene, plan, solve, stability
 from solver.contacts.pieces.piece import Entry, Piece, Rates, steady
 from solver.jit.fourier import Real
 from solver.response.stability import monodromy as module
@@ -205,3 +205,15 @@ def test_a_forecast_grows_with_what_there_is_to_do():
     stiff = scene.with_values({"shroud.kn": 1e6})
     assert forecast(stiff) > forecast(scene)
     assert plan(scene).seconds_of_stability == forecast(scene)
+
+
+@pytest.mark.parametrize("mass", [5e-324, 1e-300, 1e-200, 1e-155, 1e15])
+def test_a_forecast_of_any_mass_is_a_time(mass: float) -> None:
+    """Infinite at most; products of what is in range leave it nowhere, and no warning is raised."""
+    raw = load_scene("two-dof").to_dict()
+    raw["structure"]["masses"]["m1"] = mass
+    seconds = forecast(Scene.from_dict(raw))
+    assert seconds > 0.0
+    assert (plan(Scene.from_dict(raw)).to_json()["estimated_seconds_of_stability"] is None) == math.isinf(
+        seconds
+    )
