@@ -228,12 +228,7 @@ def check_range(parameter: Parameter, start: float | None, stop: float | None) -
 
 
 def check_limit(limit: float | None) -> None:
-    """Refuse a limit of the band that is no amplitude.
-
-    Raises
-    ------
-    SettingError
-    """
+    """Refuse a limit of the band that is no amplitude, by a SettingError."""
     if limit is not None and not (isinstance(limit, (int, float)) and np.isfinite(limit) and limit > 0.0):
         raise SettingError("limit", limit, "must be an amplitude > 0 m")
 

@@ -71,6 +71,9 @@ def sweep_exactly(
         of the scene that cannot stand beside rigid contacts.
     """
     begun = time.perf_counter()
+    unknown = others.keys() - {"guess", "resume", "accuracy", "effects", "errors", "on_stretch"}
+    if unknown:
+        raise TypeError(f"sweep takes no {', '.join(sorted(unknown))}")
     for name in ("guess", "resume"):
         if others.get(name) is not None:
             raise SettingError(name, "given", "is for scenes without rigid contacts: leave it out")
