@@ -13,10 +13,10 @@ if TYPE_CHECKING:
     from solver.contacts.laws.history.definition import LawParameter
     from solver.contacts.laws.history.register import register_law
     from solver.contacts.segments import Shares
-    from solver.continuation.branch import Band, Branch, BranchStatus, Peak
-    from solver.continuation.branches.sweep import sweep
+    from solver.continuation.branch import AnyBranch, Branch, BranchStatus
     from solver.continuation.extrema.error_estimate import ErrorEstimate, branch_errors
     from solver.continuation.marks import Bifurcations, Mark, MarkKind
+    from solver.continuation.peaks import Band, Peak
     from solver.continuation.segment import Stretch, joined
     from solver.continuation.settings import ContinuationSettings, Predictor
     from solver.errors import (
@@ -47,6 +47,7 @@ if TYPE_CHECKING:
     from solver.response.stability.residual_forces import AmplitudeRange, amplitude_range
     from solver.response.stability.switching import Switched, switch_branches
     from solver.response.stability.uniqueness import Uniqueness, uniqueness
+    from solver.response.sweep import sweep
     from solver.response.time_history import hysteresis_loop, motion, time_history
     from solver.response.wear import ContactWear, Measured, WearSensitivity, contact_wear
     from solver.response.wear_nonsmooth import worst_slopes
@@ -84,10 +85,11 @@ if TYPE_CHECKING:
 _HOME = {
     "AccuracyRow": "studies.convergence", "AccuracyStudy": "studies.convergence",
     "accuracy_study": "studies.convergence", "ErrorEstimate": "continuation.extrema.error_estimate",
-    "branch_errors": "continuation.extrema.error_estimate", "Band": "continuation.branch",
-    "Branch": "continuation.branch", "BranchStatus": "continuation.branch", "Peak": "continuation.branch",
+    "branch_errors": "continuation.extrema.error_estimate", "Band": "continuation.peaks",
+    "AnyBranch": "continuation.branch",
+    "Branch": "continuation.branch", "BranchStatus": "continuation.branch", "Peak": "continuation.peaks",
     "ContinuationSettings": "continuation.settings", "Predictor": "continuation.settings",
-    "sweep": "continuation.branches.sweep", "Dataset": "results.dataset", "Variable": "results.dataset",
+    "sweep": "response.sweep", "Dataset": "results.dataset", "Variable": "results.dataset",
     "Shown": "results.base", "Summary": "results.base", "progress_bar": "results.base", "load": "views.io",
     "save": "views.io", "MissingExtraError": "errors", "ResultFileError": "errors", "Issue": "errors",
     "SceneError": "errors", "SettingError": "errors", "SolverError": "errors",
@@ -152,6 +154,7 @@ __all__ = [
     "AllSolutions",
     "AmplitudeHessian",
     "AmplitudeRange",
+    "AnyBranch",
     "Band",
     "Basin",
     "Bifurcations",

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from optim.criteria.criterion import Criterion, Judged, Row
 from optim.criteria.response_gradients import Sensitivity
 from optim.problem.variables import Real
-from solver.continuation.branch import Peak
+from solver.continuation.peaks import Peak
 
 # Peaks below this share of the highest are not handed to the optimiser: within one step they cannot lead.
 COMPETES = 0.6

@@ -19,9 +19,10 @@ from optim.problem.numbers import number_pair
 from optim.studies.crossings import CampbellDiagram, CampbellStatus, Crossing, OrderResponse, Ranges
 from solver.balance.kernels.output import MAX_ABS
 from solver.balance.workspace import Workspace
-from solver.continuation.branch import Branch, Peak
+from solver.continuation.branch import Branch
 from solver.continuation.branches.sweep import sweep
 from solver.continuation.extrema.error_estimate import ErrorEstimator
+from solver.continuation.peaks import Peak
 from solver.jit.fourier import Real
 from solver.results.default_bar import shows_progress
 from solver.results.watch import OnProgress, ShouldStop, part_of

@@ -23,9 +23,10 @@ from solver.balance.parameter import resolve
 from solver.balance.parameter_derivatives import resolved
 from solver.balance.simplifications import Effects, even_harmonics_reason
 from solver.contacts.laws.harmonics import is_phase
-from solver.continuation.branch import Branch, BranchStatus, Peak
+from solver.continuation.branch import Branch, BranchStatus
 from solver.continuation.branches.sweep import sweep
 from solver.continuation.extrema.extrema import HALF_POWER
+from solver.continuation.peaks import Peak
 from solver.errors import SettingError
 from solver.results.base import Drawn, MadeOfResponses
 from solver.results.known import Known

@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from abc import abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, Protocol
 
 import numpy as np
 
 from solver.balance.balance import Balance
 from solver.balance.kernels.output import HALF_RANGE, MAX_ABS, MEAN, RESIDUAL, SLOPE
+from solver.balance.parameter import Parameter
 from solver.continuation.certificate import PeakCertificate
 from solver.continuation.kernels.state import FINISHED, LEFT_RANGE, NO_START, STALLED
+from solver.continuation.peaks import Band, Peak
 from solver.jit.fourier import Integer, Real
 from solver.results.base import Drawn
 from solver.results.known import Known
-from solver.results.told import Piece
 from solver.results.views import Views, on_demand
+from solver.scene.scene import Scene
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -62,6 +65,14 @@ class BranchStatus(Enum):
         "not what is dissipated: no such motion exists. Press parts that contacts alone hold harder, hold "
         "them by a spring, or lower kt."
     )
+    RIGID_OPENS = (
+        "Beyond the last point a contact with kn = inf opens under its load, and where it closes again is an "
+        "impact, which takes a law of its own. Press it harder, or give it a finite kn."
+    )
+    NO_ORBIT = (
+        "Beyond the last point no motion repeats that the events of the contacts were followed for: start "
+        "from the other end of the range, or give some damping."
+    )
 
 
 ENDINGS = {
@@ -72,99 +83,36 @@ ENDINGS = {
 }
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class Peak(Piece):
-    """A local maximum of the amplitude along a branch, polished to the stationary point.
+class Posed(Protocol):
+    """What a branch is of: the problem that each of its points solves."""
 
-    Attributes
-    ----------
-    value : float
-        max|x| of the observed DOF [m].
-    at : float
-        Parameter value there, in user units (Hz for a frequency).
-    solution : (n_unknowns,) array
-        Slip motions of the contacts there [m].
-    interior : bool
-        A true maximum, not an end of the branch.
-    """
+    @property
+    def scene(self) -> Scene:
+        """What vibrates, with the values that stayed fixed."""
 
-    UNITS: ClassVar[Mapping[str, str]] = {"value": "m"}
+    @property
+    def parameter(self) -> Parameter:
+        """What was continued in."""
 
-    value: float
-    at: float
-    solution: Real
-    interior: bool
+    @property
+    def n_harmonics(self) -> int:
+        """The number asked for."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class Edge(Piece):
-    """An end of an interval in which the amplitude exceeds a limit: where it equals the limit, or a fold.
+class AnyBranch(Drawn):
+    """Periodic responses over one parameter, P points in their order along it: what `sweep` returns.
+
+    A `Branch` has them by continuation of a balance of harmonics, an `ExactBranch` by exact orbits.
 
     Attributes
     ----------
-    at : float
-        Parameter value, in user units.
-    solution : (n_unknowns,) array
-        Slip motions of the contacts there [m].
-    opens : bool
-        The interval begins here; otherwise it ends here.
-    fold : bool
-        The branch turns back here, above the limit.
-    corner : bool
-        It does so where a contact changes its state: the end has no derivative.
-    """
-
-    at: float
-    solution: Real
-    opens: bool
-    fold: bool = False
-    corner: bool = False
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class Band(Piece):
-    """Where the amplitude exceeds a limit.
-
-    Attributes
-    ----------
-    limit : float
-        The limit [m].
-    width : float
-        Measure of {parameter : amplitude > limit}, in user units (Hz for a frequency).
-    intervals : tuple of (low, high)
-        Its intervals, ascending.
-    edges : tuple of Edge
-        The interval ends inside the branch (an end of the range itself is not one).
-    known : bool
-        Wherever the amplitude may cross the limit between two points, that was settled by solutions; see
-        also `Branch.peak_certificate`.
-    """
-
-    UNITS: ClassVar[Mapping[str, str]] = {"limit": "m"}
-
-    limit: float
-    width: float
-    intervals: tuple[tuple[float, float], ...]
-    edges: tuple[Edge, ...]
-    known: bool = True
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class Branch(Drawn):
-    """A branch of periodic responses over one parameter, P points in their order along it.
-
-    They are the steps of the continuation and what was solved for between them: narrow resonances and peaks.
-
-    Attributes
-    ----------
-    balance : Balance
-        What was continued; its scene holds the values that stayed fixed.
     status : BranchStatus
         How it ended.
+    start, stop : float
+        The range asked for, in user units.
     values : (P,) array
         Parameter values in user units.
-    solutions, tangents : (P, n_unknowns + 1) array
-        Slip motions [m] with λ (inside unit) last, and tangents that point onward along the branch.
     observed : (P, 2H + 1) array
         Full coefficients of the observed DOF [m], zero where a harmonic is not kept.
     measures : (P, MEASURES) array
@@ -176,24 +124,17 @@ class Branch(Drawn):
     band : Band or None
         Where the amplitude exceeds the limit asked for (peak/√2 if none was); None without a peak.
     error_estimate : float
-        Estimated error of the highest peak's value, by the harmonics left out and the residual [m], with
-        peaks that stand elsewhere if more are kept (`solver.continuation.extrema.branch_error`); NaN without
-        a peak. `solver.branch_errors` gives that of every point.
+        Estimated error of the highest peak's value [m]; NaN without a peak.
     peak_certificate : PeakCertificate
         Why no higher peak hides between two points, or why that is not known.
     flags : tuple of str
-        ``symmetric_unstable`` if a half-wave symmetric point of it is not the motion that is seen,
-        ``travelling_wave_assumed`` where one sector stands for all though the laws allow other motions,
-        ``mean_load_above_friction`` where it ends because contacts cannot hold a part's mean load.
+        Names of what is to be known of it, see the classes.
     """
 
-    balance: Balance
     status: BranchStatus
     start: float
     stop: float
     values: Real
-    solutions: Real
-    tangents: Real
     observed: Real
     measures: Real
     states: Integer
@@ -202,17 +143,67 @@ class Branch(Drawn):
     error_estimate: float
     newton_iterations: int
     rejected_steps: int
-    stepped_over: int
     seconds: float
     peak_certificate: PeakCertificate
     flags: tuple[str, ...] = ()
-    _judged: list[tuple[Verdict, ...]] = field(default_factory=list, init=False, compare=False)
-    _drifts: list[float] = field(default_factory=list, init=False, compare=False)
+
+    @property
+    @abstractmethod
+    def posed(self) -> Posed:
+        """What its points solve."""
+
+    @property
+    @abstractmethod
+    def coefficients(self) -> Real:
+        """Coefficients of every relative motion of the contacts at each point, (P, n_ports, n) [m]."""
+
+    @property
+    @abstractmethod
+    def mean_undetermined(self) -> bool | None:
+        """Whether the mean, and with it the height, of the highest peak depends on the history; None without.
+
+        It is found when it is asked for, as `solve` does.
+        """
+
+    @property
+    @abstractmethod
+    def known(self) -> Known:
+        """How well the highest peak is known; what is made of branches passes it on."""
+
+    @property
+    @abstractmethod
+    def peak_stability(self) -> tuple[Verdict, ...]:
+        """Whether the response at each of `peaks` is stable; found when asked for, where it costs little."""
+
+    @property
+    @abstractmethod
+    def drift_per_period(self) -> float:
+        """How far a part drifts in a period [m] just beyond where the branch ended as RATCHETS; else NaN."""
+
+    @property
+    @abstractmethod
+    def bifurcations(self) -> Bifurcations:
+        """Its folds, branch points and early end, and which of it is not stable; found when asked for."""
+
+    @property
+    def scene(self) -> Scene:
+        """What vibrates, with the values that stayed fixed."""
+        return self.posed.scene
+
+    @property
+    def n_harmonics(self) -> int:
+        """The number of harmonics asked for."""
+        return self.posed.n_harmonics
 
     @property
     def parameter(self) -> str:
         """Path of the parameter that was continued in."""
-        return self.balance.parameter.path
+        return self.posed.parameter.path
+
+    @property
+    def unit(self) -> str:
+        """Unit of its values."""
+        return self.posed.parameter.unit
 
     @property
     def completed(self) -> bool:
@@ -245,38 +236,9 @@ class Branch(Drawn):
         return self.measures[:, SLOPE]
 
     @property
-    def coefficients(self) -> Real:
-        """Slip motion of every contact at each point, (P, n_contacts, n) [m]."""
-        n = self.balance.n_coefficients
-        return self.solutions[:, :-1].reshape(len(self.values), -1, n)
-
-    @property
     def peak(self) -> Peak | None:
         """The highest peak, or None if the branch has no point."""
         return self.peaks[0] if self.peaks else None
-
-    @property
-    def mean_undetermined(self) -> bool | None:
-        """Whether the mean, and with it the height, of the highest peak depends on the history; None without.
-
-        It is found when it is asked for, as `solve` does.
-        """
-        if self.peak is None:
-            return None
-        return "mean_undetermined" in on_demand("solver.response.solve:peak_flags")(self)
-
-    @property
-    def known(self) -> Known:
-        """How well the highest peak is known; what is made of branches passes it on."""
-        found: Known = on_demand("solver.response.known:known_of")(self)
-        return found
-
-    @property
-    def peak_stability(self) -> tuple[Verdict, ...]:
-        """Whether the response at each of `peaks` is stable; found when asked for, where it costs little."""
-        if not self._judged:
-            self._judged.append(on_demand("solver.response.stability.verdict:of_peaks")(self))
-        return self._judged[0]
 
     @property
     def ratchets(self) -> bool:
@@ -284,32 +246,10 @@ class Branch(Drawn):
         return self.status is BranchStatus.RATCHETS
 
     @property
-    def drift_per_period(self) -> float:
-        """How far a part drifts in a period [m] just beyond where the branch ended as RATCHETS; else NaN.
-
-        As that of a solution it is found when asked for.
-        """
-        if not self.ratchets:
-            return math.nan
-        if not self._drifts:
-            self._drifts.append(on_demand("solver.response.drift:of_branch")(self))
-        return self._drifts[0]
-
-    @property
     def folds(self) -> int:
         """How often the branch turned back in its parameter; two points at one value are no turn."""
         ahead = np.sign(np.diff(self.values))
         return int(np.count_nonzero(np.diff(ahead[ahead != 0.0])))
-
-    @property
-    def bifurcations(self) -> Bifurcations:
-        """Its folds, branch points and early end, and which of it is not stable; found when asked for.
-
-        A branch of very many unknowns is not looked at, and says so: `solver.bifurcations` does it all the
-        same.
-        """
-        found: Bifurcations = on_demand("solver.response.stability.bifurcations:of_branch")(self)
-        return found
 
     VIEWS: ClassVar = Views("solver.views", "of_branch", "branch_dataset", "of_branch")
 
@@ -327,7 +267,7 @@ class Branch(Drawn):
     @property
     def speeds_rpm(self) -> Real | None:
         """Speeds of rotation [1/min] of the points along an engine-order line; None elsewhere."""
-        order = self.balance.scene.speed_order
+        order = self.scene.speed_order
         return None if order is None else 60.0 / order * self.values
 
     def to_json(self) -> dict[str, object]:
@@ -335,10 +275,10 @@ class Branch(Drawn):
         peak, band = self.peak, self.band
         judged = [each.stable.value for each in self.peak_stability]
         return {
-            "scene": self.balance.scene.name,
+            "scene": self.scene.name,
             "parameter": self.values.tolist(),
             "parameter_path": self.parameter,
-            "unit": self.balance.parameter.unit,
+            "unit": self.unit,
             "speed_rpm": None if self.speeds_rpm is None else self.speeds_rpm.tolist(),
             "amplitude": self.amplitude.tolist(),
             "half_peak_to_peak": self.half_peak_to_peak.tolist(),
@@ -355,7 +295,7 @@ class Branch(Drawn):
             "peak_certificate": self.peak_certificate.to_json(),
             **({"drift_per_period": _number(self.drift_per_period)} if self.ratchets else {}),
             "points": len(self.values),
-            "n_harmonics": self.balance.n_harmonics,
+            "n_harmonics": self.n_harmonics,
             "error_estimate": _number(self.error_estimate),
             "newton_iterations": self.newton_iterations,
             "rejected_steps": self.rejected_steps,
@@ -368,6 +308,86 @@ class Branch(Drawn):
             "completed": self.completed,
             "status": self.status.value,
         }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Branch(AnyBranch):
+    """A branch of periodic responses over one parameter, P points in their order along it.
+
+    They are the steps of the continuation and what was solved for between them: narrow resonances and peaks.
+
+    Attributes
+    ----------
+    balance : Balance
+        What was continued; its scene holds the values that stayed fixed.
+    solutions, tangents : (P, n_unknowns + 1) array
+        Slip motions [m] with λ (inside unit) last, and tangents that point onward along the branch.
+    error_estimate : float
+        Estimated error of the highest peak's value, by the harmonics left out and the residual [m], with
+        peaks that stand elsewhere if more are kept (`solver.continuation.extrema.branch_error`); NaN without
+        a peak. `solver.branch_errors` gives that of every point.
+    flags : tuple of str
+        ``symmetric_unstable`` if a half-wave symmetric point of it is not the motion that is seen,
+        ``travelling_wave_assumed`` where one sector stands for all though the laws allow other motions,
+        ``mean_load_above_friction`` where it ends because contacts cannot hold a part's mean load.
+    """
+
+    balance: Balance
+    solutions: Real
+    tangents: Real
+    stepped_over: int
+    _judged: list[tuple[Verdict, ...]] = field(default_factory=list, init=False, compare=False)
+    _drifts: list[float] = field(default_factory=list, init=False, compare=False)
+
+    @property
+    def posed(self) -> Balance:
+        """The balance."""
+        return self.balance
+
+    @property
+    def coefficients(self) -> Real:
+        """Slip motion of every contact at each point, (P, n_contacts, n) [m]."""
+        n = self.balance.n_coefficients
+        return self.solutions[:, :-1].reshape(len(self.values), -1, n)
+
+    @property
+    def mean_undetermined(self) -> bool | None:
+        """As `solve` says it of the highest peak."""
+        if self.peak is None:
+            return None
+        return "mean_undetermined" in on_demand("solver.response.solve:peak_flags")(self)
+
+    @property
+    def known(self) -> Known:
+        """By the error estimate and the flags of the highest peak."""
+        found: Known = on_demand("solver.response.known:known_of")(self)
+        return found
+
+    @property
+    def peak_stability(self) -> tuple[Verdict, ...]:
+        """By what is known of the scene, else by multipliers."""
+        if not self._judged:
+            self._judged.append(on_demand("solver.response.stability.verdict:of_peaks")(self))
+        return self._judged[0]
+
+    @property
+    def drift_per_period(self) -> float:
+        """By the balance of a motion that drifts."""
+        if not self.ratchets:
+            return math.nan
+        if not self._drifts:
+            self._drifts.append(on_demand("solver.response.drift:of_branch")(self))
+        return self._drifts[0]
+
+    @property
+    def bifurcations(self) -> Bifurcations:
+        """By the signs of the determinants along it.
+
+        A branch of very many unknowns is not looked at, and says so: `solver.bifurcations` does it all the
+        same.
+        """
+        found: Bifurcations = on_demand("solver.response.stability.bifurcations:of_branch")(self)
+        return found
 
 
 def _number(value: float) -> float | None:

@@ -17,8 +17,8 @@ from solver.linear.model import LinearModel
 from solver.scene.scene import Scene
 
 _SINGLE = (
-    "must be finite here: contacts with kt = inf or kn = inf are solved frequency by frequency, by solve and "
-    "march; elsewhere give kt = 1e4 times the stiffness beside it"
+    "must be finite here: contacts with kt = inf or kn = inf are for solve, sweep and march; elsewhere give "
+    "kt = 1e4 times the stiffness beside it"
 )
 
 
@@ -76,6 +76,21 @@ def highest_load(scene: Scene) -> int:
     return max([1, *given])
 
 
+def refuse_rigid(scene: Scene) -> None:
+    """Refuse contacts whose events are followed: there is no balance of harmonics with them.
+
+    Raises
+    ------
+    SettingError
+        A contact is rigid.
+    """
+    rigid = next((contact for contact in scene.contacts if contact.is_rigid), None)
+    if rigid is not None:
+        raise SettingError(
+            f"{rigid.name}.{'kt' if math.isinf(rigid.stiffnesses[0]) else 'kn'}", math.inf, _SINGLE
+        )
+
+
 def contact_table(scene: Scene, highest: int) -> Real:
     """Return the rows of all contacts, (n_contacts, ·), for harmonics up to `highest`.
 
@@ -84,13 +99,9 @@ def contact_table(scene: Scene, highest: int) -> Real:
     Raises
     ------
     SettingError
-        A contact is rigid: its events are solved for one frequency at a time.
+        A contact is rigid.
     """
-    rigid = next((contact for contact in scene.contacts if contact.is_rigid), None)
-    if rigid is not None:
-        raise SettingError(
-            f"{rigid.name}.{'kt' if math.isinf(rigid.stiffnesses[0]) else 'kn'}", math.inf, _SINGLE
-        )
+    refuse_rigid(scene)
     width = columns.wave_column(highest_load(scene) + 1)
     table = np.zeros((len(scene.contacts), width))
     table[:, columns.RATIO] = math.nan

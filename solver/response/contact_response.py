@@ -46,6 +46,11 @@ def state_of(code: int) -> ContactState:
     return _STATES[code]
 
 
+def code_of(state: ContactState) -> int:
+    """The number of a state, as in `Branch.states`."""
+    return next(code for code, each in _STATES.items() if each is state)
+
+
 OPENS = (ContactState.SEPARATED, ContactState.LIFTING, ContactState.TOUCHING)
 
 

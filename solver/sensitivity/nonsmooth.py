@@ -21,7 +21,7 @@ from typing import ClassVar
 import numpy as np
 
 from solver.balance.workspace import Workspace
-from solver.continuation.branch import Peak
+from solver.continuation.peaks import Peak
 from solver.jit.fourier import Real
 from solver.results.told import Piece
 from solver.sensitivity.gradient import Gradient, Sensitivities

@@ -14,7 +14,7 @@ from solver.results.told import Summary
 from solver.views.parameter_units import parameter
 
 if TYPE_CHECKING:
-    from solver.continuation.branch import Branch
+    from solver.continuation.branch import AnyBranch
     from solver.marching.result import MarchResult
     from solver.modes.driven.controlled import HeldAmplitude
     from solver.modes.driven.phase_resonance import PhaseResonance
@@ -38,7 +38,7 @@ def made(title: str, pairs: Pairs, status: str) -> Summary:
     return Summary(title=title, pairs=(*pairs, ("status", status)))
 
 
-def of_branch(branch: Branch) -> Summary:
+def of_branch(branch: AnyBranch) -> Summary:
     """Peak, band and size of a branch."""
     path, pairs = branch.parameter, []
     if branch.peak is not None:
@@ -54,11 +54,11 @@ def of_branch(branch: Branch) -> Summary:
         pairs.append(("drifts", drift_words(branch.drift_per_period, branch.flags)))
     pairs += _branch_notes(branch)
     pairs += [("points", str(len(branch.values))), ("time", units.duration(branch.seconds))]
-    title = f"{branch.balance.scene.name} over {path}, {branch.balance.n_harmonics} harmonics"
+    title = f"{branch.scene.name} over {path}, {branch.n_harmonics} harmonics"
     return made(title, pairs, branch.status.value)
 
 
-def _branch_notes(branch: Branch) -> list[tuple[str, str]]:
+def _branch_notes(branch: AnyBranch) -> list[tuple[str, str]]:
     """The certificate of a branch and its flags, as rows of a summary."""
     pairs: list[tuple[str, str]] = []
     if branch.peak is not None:
@@ -253,7 +253,7 @@ def of_least(best: LeastPeak) -> Summary:
         pairs.append(("other minima", "; ".join(others)))
     pairs += [("responses", f"{best.sweeps}, the work of {best.work:.3g}")]
     pairs.append(("time", units.duration(best.seconds)))
-    scene = "" if best.branch is None else f"of {best.branch.balance.scene.name}"
+    scene = "" if best.branch is None else f"of {best.branch.scene.name}"
     return made(f"highest peak {scene}".rstrip(), pairs, best.status.value)
 
 

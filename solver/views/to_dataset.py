@@ -13,7 +13,7 @@ from solver.views.columns import AMPLITUDE, attributes, column, harmonics
 from solver.views.mode_datasets import held_dataset, mode_dataset, performance_dataset, resonance_dataset
 
 if TYPE_CHECKING:
-    from solver.continuation.branch import Branch
+    from solver.continuation.branch import AnyBranch
     from solver.jit.fourier import Real
     from solver.marching.result import MarchResult
     from solver.response.solution import Solution
@@ -90,22 +90,21 @@ def point_variables(
     return variables
 
 
-def branch_dataset(branch: Branch) -> Dataset:
+def branch_dataset(branch: AnyBranch) -> Dataset:
     """A point a row, with the harmonics of the observed DOF and the state of every contact."""
-    balance, top = branch.balance, branch.balance.n_harmonics
     columns = {
         "parameter": branch.values, "amplitude": branch.amplitude,
         "half_peak_to_peak": branch.half_peak_to_peak, "mean": branch.mean, "residual": branch.residuals,
     }  # fmt: skip
-    names = [contact.name for contact in balance.scene.contacts]
+    names = [contact.name for contact in branch.scene.contacts]
     variables = point_variables(
-        branch.parameter, balance.parameter.unit, columns, branch.observed,
+        branch.parameter, branch.unit, columns, branch.observed,
         (names, branch.states),
     )  # fmt: skip
     peak, band = branch.peak, branch.band
     notes = attributes(
-        branch.status.value, balance.scene, parameter=branch.parameter, harmonics=top,
-        observed=balance.scene.observe.dof, peak=None if peak is None else peak.value,
+        branch.status.value, branch.scene, parameter=branch.parameter, harmonics=branch.n_harmonics,
+        observed=branch.scene.observe.dof, peak=None if peak is None else peak.value,
         peak_at=None if peak is None else peak.at, band=None if band is None else band.width,
         band_limit=None if band is None else band.limit,
     )  # fmt: skip
@@ -299,7 +298,7 @@ def least_dataset(best: LeastPeak) -> Dataset:
         "solved": column("minimum", np.array([one.solved for one in basins], dtype=bool)),
         "proven": column("minimum", np.array([one.proven for one in basins], dtype=bool)),
     }
-    scene = None if best.branch is None else best.branch.balance.scene
+    scene = None if best.branch is None else best.branch.scene
     notes = attributes(best.status.value, scene, least_at=best.at, least_peak=best.peak)
     return Dataset(kind="least", rows=("minimum",), variables=variables, attributes=notes)
 

@@ -17,27 +17,27 @@ from solver.scene.scene import AnyContact, Scene
 if TYPE_CHECKING:
     from optim.results.design import DesignResult
     from optim.robust.result import RobustResult
-    from solver import Branch
+    from solver import AnyBranch
 
 _STORED = tuple(field.name for field in fields(ContactValues) if field.name != "name")
 _ARRAYS = ("amplitude", "half_peak_to_peak", "mean", "coefficients", "observed")
 
 
 def sweep_record(
-    branch: Branch, frequency_hz: float | None = None, *, intermediate: bool = False
+    branch: AnyBranch, frequency_hz: float | None = None, *, intermediate: bool = False
 ) -> SweepRecord:
     """The branch with the columns people filter by; the scene's values are those that stayed fixed.
 
     Parameters
     ----------
-    branch : Branch
+    branch : AnyBranch
         With at least one point.
     frequency_hz : float or None
         Excitation frequency [Hz], if another parameter was swept.
     intermediate : bool
         Whether it was computed on the way to another result.
     """
-    scene, parameter = branch.balance.scene, branch.parameter
+    scene, parameter = branch.scene, branch.parameter
     peak = branch.peak
     band = branch.band if parameter == "frequency" else None
     amplitude = "excitation.amplitude"
@@ -50,7 +50,7 @@ def sweep_record(
         to_value=branch.stop,
         frequency_hz=frequency_hz,
         excitation_amplitude=None if parameter == amplitude else scene.value(amplitude),
-        harmonics=branch.balance.n_harmonics,
+        harmonics=branch.n_harmonics,
         points=len(branch.values),
         peak=None if peak is None else peak.value,
         peak_at=None if peak is None else peak.at,
@@ -75,7 +75,7 @@ def sweep_record(
     )
 
 
-def sweep_records(branches: Iterable[Branch], *, intermediate: bool = False) -> tuple[SweepRecord, ...]:
+def sweep_records(branches: Iterable[AnyBranch], *, intermediate: bool = False) -> tuple[SweepRecord, ...]:
     """The frequency responses that have points, each once; `intermediate` as of `sweep_record`."""
     once = {id(branch): branch for branch in branches if len(branch.values)}
     return tuple(sweep_record(branch, intermediate=intermediate) for branch in once.values())

@@ -158,7 +158,7 @@ def run_sweep(spec: Mapping[str, Any], _progress: Progress, should_stop: ShouldS
     if len(branch.values):
         at = int(branch.amplitude.argmax())
         # Those of all sectors where one does not stand for them.
-        names = [contact.name for contact in branch.balance.scene.contacts]
+        names = [contact.name for contact in branch.scene.contacts]
         result["states"] = _states(names, branch.states[at].tolist())
     return JobOutput(result=result, shortfall=None if branch.completed else branch.status.value)
 
@@ -207,7 +207,7 @@ def run_point(spec: Mapping[str, Any], _progress: Progress, _should_stop: Should
     return JobOutput(result=result, shortfall=None if solution.converged else solution.status.value)
 
 
-def _response(scene: Scene, harmonics: int, limit: float | None, should_stop: ShouldStop) -> solver.Branch:
+def _response(scene: Scene, harmonics: int, limit: float | None, should_stop: ShouldStop) -> solver.AnyBranch:
     low, high = scene.observe.band
     return solver.sweep(
         scene, start=low, stop=high, harmonics=harmonics, limit=limit, should_stop=should_stop,

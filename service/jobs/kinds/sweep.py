@@ -33,7 +33,7 @@ from solver.scene.examples import DISK_LOAD
 from solver.scene.scene import Scene
 
 if TYPE_CHECKING:
-    from solver import Branch, Stretch
+    from solver import AnyBranch, Stretch
 
 FREQUENCY, SPEED = "frequency", "speed"
 _EXAMPLE: dict[str, Any] = {
@@ -210,7 +210,7 @@ def run_on(
         checkpoints.begin_anew(str(error))
         branch = _follow(spec, progress, should_stop, checkpoints)
     found = branch.to_json()
-    others: tuple[Branch, ...] = ()
+    others: tuple[AnyBranch, ...] = ()
     if spec.get("stability"):
         found |= solver.bifurcations(branch, multipliers=True).of_a_branch()
     if spec.get("branches"):
@@ -228,7 +228,7 @@ def run_on(
 
 def _follow(
     spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop, checkpoints: Checkpoints
-) -> Branch:
+) -> AnyBranch:
     known = _beginning(checkpoints)
     part = len(known)
     fresh: list[Stretch] = []

@@ -13,7 +13,7 @@ import solver
 from optim.problem.cases import Case, read_cases
 from optim.problem.uncertainty_set import Coordinate, Disk, How
 from service.jobs.linear_limits import linear_limit
-from solver.continuation.branch import Branch
+from solver.continuation.branch import AnyBranch, Branch
 from solver.continuation.branches.observation import observing
 from solver.results import units
 from solver.scene.parts import LumpedStructure
@@ -32,7 +32,7 @@ class Line:
     """One response of the figure; without a branch it is not drawn."""
 
     name: str
-    branch: Branch | None
+    branch: AnyBranch | None
     color: str
     dashes: Dashes = SOLID
     width: float = 1.4
@@ -54,16 +54,18 @@ class Sweeps:
     harmonics: int
     limit: float | None
 
-    def of(self, scene: Scene) -> Branch | None:
+    def of(self, scene: Scene) -> AnyBranch | None:
         """The response over the scene's band; None where it has no point."""
         branch = solver.sweep(scene, harmonics=self.harmonics, limit=self.limit)
         return branch if len(branch.values) and branch.peak is not None else None
 
-    def worst(self, scene: Scene) -> Branch | None:
+    def worst(self, scene: Scene) -> AnyBranch | None:
         """As `of`, and of a mistuned disk the response of its worst blade."""
         branch = self.of(scene)
         structure, dof = scene.structure, scene.observe.dof
-        if branch is None or isinstance(structure, LumpedStructure) or structure.mistuning is None:
+        if not isinstance(branch, Branch) or isinstance(structure, LumpedStructure):
+            return branch
+        if structure.mistuning is None:
             return branch
         if "@" in dof:
             return branch

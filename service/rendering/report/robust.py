@@ -21,7 +21,7 @@ from service.rendering.report.sections import (
     title_section,
 )
 from service.rendering.tables.robust import effort_pairs, side_lines, uncertain_rows
-from solver.continuation.branch import Branch
+from solver.continuation.branch import AnyBranch
 from solver.results import units
 from solver.scene.scene import Scene
 from solver.views.parameter_units import parameter
@@ -98,9 +98,9 @@ def _shown(lines: Sequence[Line]) -> Line:
     return (few or lines)[-1]
 
 
-def _written_out(branch: Branch) -> bool:
+def _written_out(branch: AnyBranch) -> bool:
     """Whether a disk's sectors are contacts of their own."""
-    return any("@" in contact.name for contact in branch.balance.scene.contacts)
+    return any("@" in contact.name for contact in branch.scene.contacts)
 
 
 def _optima(given: Designed) -> str:

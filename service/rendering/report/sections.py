@@ -14,7 +14,7 @@ import solver
 from service.jobs.registry import ABOUT_THE_RUN
 from service.rendering.report.about import about_section
 from service.rendering.report.responses import Line, comparison_figure
-from solver.continuation.branch import Branch
+from solver.continuation.branch import AnyBranch
 from solver.results import units
 from solver.results.notes import flag_words
 from solver.scene.scene import Scene
@@ -106,12 +106,11 @@ def branch_table(lines: Sequence[Line]) -> str:
     return f"{table(heads, rows)}{said}"
 
 
-def motion_section(branch: Branch | None, where: str = "At the peak") -> str:
+def motion_section(branch: AnyBranch | None, where: str = "At the peak") -> str:
     """One period at the highest peak of a response."""
     if branch is None or branch.peak is None:
         return ""
-    balance = branch.balance
-    solution = solver.solve(balance.scene, frequency_hz=branch.peak.at, harmonics=branch.balance.n_harmonics)
+    solution = solver.solve(branch.scene, frequency_hz=branch.peak.at, harmonics=branch.n_harmonics)
     if not solution.converged:
         return ""
     words = "One period at the highest peak: motion, hysteresis loops, harmonics"

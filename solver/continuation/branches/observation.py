@@ -15,11 +15,12 @@ from solver.balance.kernels.residual import evaluate, evaluate_forces, prepare_f
 from solver.balance.simplifications import Effects
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.system import DENSE
-from solver.continuation.branch import Branch, Peak
+from solver.continuation.branch import Branch
 from solver.continuation.branches.sweep import highest_between
 from solver.continuation.extrema.branch_error import branch_error
 from solver.continuation.extrema.extrema import Survey, band_limit
 from solver.continuation.extrema.nodes import Place, Points
+from solver.continuation.peaks import Peak
 from solver.jit.fourier import Flags, Real, to_full
 from solver.linear.kernels.receptance import observer_receptance, receptance
 

@@ -15,10 +15,10 @@ import numpy as np
 
 from solver.balance.balance import Balance, build
 from solver.balance.kernels.output import MAX_ABS
-from solver.balance.parameter import Kind
+from solver.balance.parameter import Kind, Parameter
 from solver.balance.simplifications import Effects
 from solver.balance.workspace import Workspace
-from solver.continuation.branch import ENDINGS, Branch, BranchStatus, Peak
+from solver.continuation.branch import ENDINGS, Branch, BranchStatus
 from solver.continuation.branches.adaptive_harmonics import sweep_to
 from solver.continuation.branches.point_by_point import is_unique, rows_before_a_turn, walk_by_points
 from solver.continuation.branches.symmetry_breaking import branch_flags
@@ -31,6 +31,7 @@ from solver.continuation.kernels import state as walk_states
 from solver.continuation.kernels.pseudo_arclength import begin_walk, walk_on
 from solver.continuation.kernels.state import Control, walk_by_value
 from solver.continuation.loose_parts import balanced_part, ending
+from solver.continuation.peaks import Peak
 from solver.continuation.segment import Stretch, go_on_from, joined, rows_of, state_of
 from solver.continuation.settings import ContinuationSettings
 from solver.errors import SettingError
@@ -134,9 +135,8 @@ def sweep(
     balance = build(
         scene, parameter, harmonics=harmonics, frequency_hz=frequency_hz, effects=effects
     )  # fmt: skip
-    first, last = check_range(balance, start, stop)
-    if limit is not None and not (isinstance(limit, (int, float)) and np.isfinite(limit) and limit > 0.0):
-        raise SettingError("limit", limit, "must be an amplitude > 0 m")
+    first, last = check_range(balance.parameter, start, stop)
+    check_limit(limit)
     workspace = Workspace.of(balance)
     stretches: list[Stretch] = []
     status, count = BranchStatus.TOO_MANY_POINTS, 0
@@ -208,7 +208,7 @@ def _curve(balance: Balance, stretch: Stretch) -> tuple[Real, Real]:
     return balance.parameter.all_outside(stretch.solutions[:, -1].copy()), stretch.measures[:, MAX_ABS]
 
 
-def check_range(balance: Balance, start: float | None, stop: float | None) -> tuple[float, float]:
+def check_range(parameter: Parameter, start: float | None, stop: float | None) -> tuple[float, float]:
     """Return the range of a continuation as floats.
 
     Raises
@@ -219,12 +219,18 @@ def check_range(balance: Balance, start: float | None, stop: float | None) -> tu
     ends = []
     for name, value in (("start", start), ("stop", stop)):
         if value is None:
-            raise SettingError(name, None, f"is needed for a sweep of `{balance.parameter.path}`")
-        ends.append(balance.parameter.check(name, value))
+            raise SettingError(name, None, f"is needed for a sweep of `{parameter.path}`")
+        ends.append(parameter.check(name, value))
     first, last = ends
     if first == last:
         raise SettingError("stop", last, f"must differ from the start {first!r}")
     return first, last
+
+
+def check_limit(limit: float | None) -> None:
+    """Refuse a limit of the band that is no amplitude, by a SettingError."""
+    if limit is not None and not (isinstance(limit, (int, float)) and np.isfinite(limit) and limit > 0.0):
+        raise SettingError("limit", limit, "must be an amplitude > 0 m")
 
 
 def walk(

@@ -23,7 +23,6 @@ from solver.balance.kernels.locate import EDGE
 from solver.balance.kernels.output import HIGH, HIGH_SLOPE, LOW, LOW_SLOPE, MAX_ABS, PIECE, RESIDUAL
 from solver.balance.parameter import Kind
 from solver.balance.workspace import Workspace
-from solver.continuation.branch import Band, Edge, Peak
 from solver.continuation.certificate import PeakCertificate, certified, uncertain
 from solver.continuation.extrema.intervals import CURVES, highest_share, lowest_share, may_cross
 from solver.continuation.extrema.kernels.intervals import IS_BENT, WAVES, WORTH_POLISHING
@@ -31,6 +30,7 @@ from solver.continuation.extrema.nodes import Node, NodeSolver, Place, Points
 from solver.continuation.extrema.resonance_search import ResonanceSearch, Search
 from solver.continuation.extrema.state_changes import ChangeSearch
 from solver.continuation.folds import fold_between, motion_scales
+from solver.continuation.peaks import Band, Edge, Peak
 from solver.jit.fourier import Real
 
 SHARP_RESIDUAL = 2e-11  # of a peak; what is above was accepted because arcs allowed no better

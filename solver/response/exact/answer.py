@@ -16,7 +16,7 @@ from solver.errors import SettingError
 from solver.jit.fourier import Real
 from solver.response.contact_response import OPENS, ContactResponse, ContactState
 from solver.response.exact.flow import LiftsError, NoMotionError, exponential, first_root, steps_of, taylor
-from solver.response.exact.orbit import PERIOD, ROUNDING, Ended, Orbit, find, grazed
+from solver.response.exact.orbit import PERIOD, ROUNDING, Ended, Orbit, find, follow, grazed
 from solver.response.exact.piecewise import STICK, Mode, Piecewise, State
 from solver.response.solution import HISTORY_DEPENDENT, MEAN_UNDETERMINED, Solution, SolutionStatus
 from solver.response.stability.floquet import Stability, growth_of
@@ -108,15 +108,29 @@ def solve_exactly(scene: Scene, frequency_hz: float, harmonics: int) -> Solution
     SettingError
         A part of the scene that cannot stand beside rigid contacts, see `Piecewise`.
     """
+    return solve_beside(scene, frequency_hz, harmonics)[0]
+
+
+def solve_beside(
+    scene: Scene, frequency_hz: float, harmonics: int, near: Orbit | None = None
+) -> tuple[Solution, Orbit | None]:
+    """Return the response, to rounding, and its orbit; it is looked for beside `near`, else from rest.
+
+    Raises
+    ------
+    SettingError
+        As `solve_exactly`.
+    """
     begun = time.perf_counter()
     scene = scene.at_frequency(frequency_hz)
-    system, orbit = _orbit_of(scene, frequency_hz)
+    system, orbit = _orbit_of(scene, frequency_hz, near)
     highest = max(harmonics, system.top)
     if isinstance(orbit, SolutionStatus):
-        return _nothing(scene, frequency_hz, harmonics, highest, orbit, time.perf_counter() - begun)
+        seconds = time.perf_counter() - begun
+        return _nothing(scene, frequency_hz, harmonics, highest, orbit, seconds), None
     solution = _described(system, orbit, frequency_hz, harmonics, highest, begun)
     solution._judged.append(verdict_of(_stability(orbit, frequency_hz, begun)))  # a by-product here
-    return solution
+    return solution, orbit
 
 
 def stability_exactly(scene: Scene, frequency_hz: float) -> Stability:
@@ -134,11 +148,13 @@ def stability_exactly(scene: Scene, frequency_hz: float) -> Stability:
     return _stability(orbit, frequency_hz, begun)
 
 
-def _orbit_of(scene: Scene, frequency_hz: float) -> tuple[Piecewise, Orbit | SolutionStatus]:
+def _orbit_of(
+    scene: Scene, frequency_hz: float, near: Orbit | None = None
+) -> tuple[Piecewise, Orbit | SolutionStatus]:
     """Return the response of a scene as an orbit, or why there is none."""
     system = Piecewise(scene, 2.0 * math.pi * frequency_hz)
     try:
-        found = find(system, *system.at_rest())
+        found = find(system, *system.at_rest()) if near is None else follow(system, near)
     except LiftsError:
         return system, SolutionStatus.RIGID_OPENS
     except NoMotionError:

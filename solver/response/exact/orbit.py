@@ -14,7 +14,7 @@ from enum import Enum
 import numpy as np
 
 from solver.jit.fourier import Complex, Flags, Real
-from solver.response.exact.flow import Flow, NoMotionError, Piece
+from solver.response.exact.flow import Flow, LiftsError, NoMotionError, Piece
 from solver.response.exact.piecewise import FREE, STICK, Piecewise, State
 
 PERIOD = 2.0 * np.pi
@@ -22,6 +22,7 @@ CLOSED = 1e-11  # distance after a period, of the largest number of the state, f
 ROUNDING = 5e-13  # of the largest number of the state: of 88 orbits with proofs the worst was 4e-13 off
 _NEWTON, _POLISH = 12, 4
 MOST_PERIODS = 4000
+_FOLLOWED = 200  # periods from a neighbour's motion
 _OPEN = 1e-9  # singular values of 1 − Φ below: nothing decides that direction
 _REPEATS = 1e-9
 MOST_GRAZED = 100  # periods after which a march has decided whether what slips by next to nothing sticks
@@ -58,14 +59,16 @@ class Orbit:
     steps: int
 
 
-def find(system: Piecewise, w: Real, state: State, *, most_periods: int = MOST_PERIODS) -> Orbit | Ended:
-    """Find the periodic motion that a start leads to, at the angle 0.
+def find(
+    system: Piecewise, w: Real, state: State, *, tau: float = 0.0, most_periods: int = MOST_PERIODS
+) -> Orbit | Ended:
+    """Find the periodic motion that a start leads to, at an angle.
 
     Raises
     ------
     LiftsError, NoMotionError
     """
-    flow, periods, some = Flow(system, w, state, 0.0), 0, 2
+    flow, periods, some = Flow(system, w, state, tau), 0, 2
     while periods < most_periods:
         drifts = []
         for _ in range(some):
@@ -81,6 +84,37 @@ def find(system: Piecewise, w: Real, state: State, *, most_periods: int = MOST_P
             return Ended.RATCHETS
         some = min(2 * some, 256)
     return Ended.NOT_FOUND
+
+
+def follow(system: Piecewise, near: Orbit) -> Orbit | Ended:
+    """Find the periodic motion that begins as one of nearby values did; give up soon.
+
+    Where directions are open, where parts stand is a matter of history: a start from rest decides it, as far
+    as it settles soon.
+
+    Raises
+    ------
+    LiftsError, NoMotionError
+    """
+    piece = near.pieces[0]
+    if piece.w.size != system.nw:
+        return find(system, *system.at_rest())
+    w = system.mode(piece.state).to_rates @ piece.w
+    w[system.nd :] = system.harmonics_at(piece.tau)
+    march = Flow(system, w, piece.state.copy(), piece.tau)
+    march.run(PERIOD)
+    found: Orbit | Ended | None = _newton(system, march, 1)
+    if found is None:
+        start = march.w.copy()
+        start[system.nd :] = system.harmonics_at(march.tau)
+        found = find(system, start, march.state, tau=march.tau % PERIOD, most_periods=_FOLLOWED)
+    if isinstance(found, Orbit) and (found.open_directions.size or grazed(system, found)):
+        try:
+            rested = find(system, *system.at_rest(), most_periods=MOST_GRAZED)
+        except (LiftsError, NoMotionError):
+            return found
+        return rested if isinstance(rested, Orbit) else found
+    return found
 
 
 def grazed(system: Piecewise, orbit: Orbit) -> bool:

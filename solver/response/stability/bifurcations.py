@@ -22,7 +22,7 @@ from solver.balance.balance import Balance
 from solver.balance.kernels.jacobian import factorise
 from solver.balance.kernels.output import MAX_ABS
 from solver.balance.workspace import Workspace
-from solver.continuation.branch import Branch, BranchStatus
+from solver.continuation.branch import AnyBranch, Branch, BranchStatus
 from solver.continuation.branches.point_by_point import is_unique
 from solver.continuation.extrema.nodes import Node, NodeSolver, Points
 from solver.continuation.folds import fold_between, motion_scales
@@ -39,7 +39,7 @@ _NEAR = 1e-9  # relative width of the interval a branch point is known to
 _CROSSED = {Growth.PERIOD_DOUBLING: MarkKind.PERIOD_DOUBLING, Growth.TORUS: MarkKind.TORUS}
 
 
-def bifurcations(branch: Branch, *, multipliers: bool = False) -> Bifurcations:
+def bifurcations(branch: AnyBranch, *, multipliers: bool = False) -> Bifurcations:
     """Return which points of a branch are not stable, and its folds, branch points and early end.
 
     Parameters
@@ -54,6 +54,8 @@ def bifurcations(branch: Branch, *, multipliers: bool = False) -> Bifurcations:
         With `multipliers`: a law that does not say how it is perturbed.
     """
     begun = time.perf_counter()
+    if not isinstance(branch, Branch):
+        return branch.bifurcations  # exact orbits come with their multipliers
     if not len(branch.values):
         return Bifurcations(
             unstable=np.zeros(0, bool), marks=(), known_by="determinant", parameter=branch.parameter,

@@ -16,10 +16,11 @@ import numpy as np
 from solver.balance.balance import Balance
 from solver.balance.kernels.newton import arc_newton
 from solver.balance.workspace import Workspace
-from solver.continuation.branch import Branch
+from solver.continuation.branch import AnyBranch, Branch
 from solver.continuation.branches.sweep import sweep
 from solver.continuation.marks import Mark, MarkKind
 from solver.continuation.settings import ContinuationSettings
+from solver.errors import SettingError
 from solver.jit.fourier import Real
 from solver.response.stability.bifurcations import bifurcations
 from solver.results.told import Piece
@@ -27,6 +28,7 @@ from solver.results.told import Piece
 AWAY = (1e-3, 3e-3, 1e-2, 3e-2, 0.1)  # of the size of the motion: how far from the point the branch is met
 _ASIDE = 3.0  # times as far: a solution further from the guess is on another branch
 _MOST = 30  # Newton iterations
+_ORBITS = "must be of contacts with finite stiffnesses: exact orbits are not followed past branch points"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
@@ -59,7 +61,7 @@ class Switched(Piece):
 
 
 def switch_branches(
-    branch: Branch, *, marks: tuple[Mark, ...] | None = None, settings: ContinuationSettings | None = None
+    branch: AnyBranch, *, marks: tuple[Mark, ...] | None = None, settings: ContinuationSettings | None = None
 ) -> tuple[Switched, ...]:
     """Follow the branches that leave another at its branch points, to the ends of its range.
 
@@ -68,7 +70,14 @@ def switch_branches(
     branch : from `sweep`.
     marks : its branch points; those `bifurcations` finds if left out.
     settings : of the continuation.
+
+    Raises
+    ------
+    SettingError
+        Exact orbits, which are not continued past such points.
     """
+    if not isinstance(branch, Branch):
+        raise SettingError("branches", branch.scene.name, _ORBITS)
     found = bifurcations(branch).marks if marks is None else marks
     points = [mark for mark in found if mark.kind is MarkKind.BRANCH_POINT]
     return tuple(_switched(branch, mark, settings) for mark in points)

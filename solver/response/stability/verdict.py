@@ -10,7 +10,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from solver.continuation.branch import Branch, Peak
+from solver.continuation.branch import Branch
+from solver.continuation.peaks import Peak
 from solver.errors import SettingError
 from solver.linear.assembly import linear_model
 from solver.linear.contact_table import port_counts

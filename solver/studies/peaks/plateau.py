@@ -15,8 +15,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from solver.continuation.branch import Branch, Peak
+from solver.continuation.branch import Branch
 from solver.continuation.extrema.kernels.peak_continuation import DHEIGHT, HEIGHT, Z
+from solver.continuation.peaks import Peak
 from solver.studies.peaks.envelope_minimum import Lowest, rows_at
 from solver.studies.peaks.results import ChosenBy, LeastPeak
 from solver.studies.peaks.track import Look

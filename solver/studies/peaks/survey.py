@@ -12,8 +12,9 @@ import numpy as np
 
 from solver.balance.balance import build
 from solver.balance.simplifications import Effects
-from solver.continuation.branch import Branch, Peak
+from solver.continuation.branch import Branch
 from solver.continuation.parameter_scale import scale_of
+from solver.continuation.peaks import Peak
 from solver.jit.fourier import Real
 from solver.scene.scene import Scene
 from solver.studies.peaks.results import TrackStatus

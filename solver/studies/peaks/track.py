@@ -15,10 +15,11 @@ import numpy as np
 from solver.balance.balance import build
 from solver.balance.simplifications import Effects
 from solver.balance.workspace import Workspace
-from solver.continuation.branch import Branch, Peak
+from solver.continuation.branch import Branch
 from solver.continuation.branches.sweep import sweep, walk
 from solver.continuation.extrema.candidates import Rival, crests
 from solver.continuation.extrema.kernels.peak_continuation import DHEIGHT, DOMEGA, HEIGHT, OMEGA, Z
+from solver.continuation.peaks import Peak
 from solver.continuation.segment import Stretch
 from solver.continuation.settings import ContinuationSettings
 from solver.jit.fourier import Integer, Real

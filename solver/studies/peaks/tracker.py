@@ -19,7 +19,6 @@ from solver.balance.simplifications import Effects
 from solver.balance.speed_line import check_no_line
 from solver.contacts.kernels.system import System, by_reference
 from solver.contacts.laws.base import without_second
-from solver.continuation.branch import Peak
 from solver.continuation.extrema.candidates import Rival, rivals
 from solver.continuation.extrema.kernels import peak_continuation as kernel
 from solver.continuation.extrema.kernels.peak_continuation import (
@@ -42,6 +41,7 @@ from solver.continuation.extrema.kernels.peak_state import (
     summit_numbers,
     summit_seconds,
 )
+from solver.continuation.peaks import Peak
 from solver.errors import SettingError
 from solver.jit.fourier import Integer, Real
 from solver.linear.contact_table import second_numbers

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from solver.continuation.branch import Branch
+    from solver.continuation.branch import AnyBranch
 
 FloatArray = NDArray[np.float64]
 Intervals = tuple[tuple[float, float], ...]
@@ -54,18 +54,18 @@ class Response:
     marks: Marks = ()
 
     @classmethod
-    def of_branch(cls, branch: Branch) -> Self:
+    def of_branch(cls, branch: AnyBranch) -> Self:
         """The curve of a branch with at least one point."""
         peak = None if branch.peak is None else (branch.peak.at, branch.peak.value)
         found = branch.bifurcations
         values, amplitude, unstable = with_peak(branch.values, branch.amplitude, peak, found.unstable)
         band = branch.band
         return cls(
-            scene=branch.balance.scene.name,
+            scene=branch.scene.name,
             parameter=branch.parameter,
             values=values,
             amplitude=amplitude,
-            dof=branch.balance.scene.observe.dof,
+            dof=branch.scene.observe.dof,
             peak=peak,
             limit=None if band is None else band.limit,
             intervals=() if band is None else band.intervals,

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from matplotlib.figure import Figure
 
-from solver.continuation.branch import Branch
+from solver.continuation.branch import AnyBranch
 from solver.marching.result import MarchResult
 from solver.modes.driven.controlled import HeldAmplitude
 from solver.modes.driven.phase_resonance import PhaseResonance
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from solver.studies.response_map import ResponseMap
 
 
-def of_branch(branch: Branch, ax: Into = None, *, limit: float | None = None) -> Figure:
+def of_branch(branch: AnyBranch, ax: Into = None, *, limit: float | None = None) -> Figure:
     """Draw the response, its peak and its band; `limit` is an amplitude [m] drawn as a line."""
     return response_figure(Response.of_branch(branch), asked=Demands(limit=limit), ax=ax)
 

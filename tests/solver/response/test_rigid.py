@@ -298,7 +298,7 @@ def test_laws_that_cannot_be_rigid_name_the_field() -> None:
 def test_other_studies_refuse_by_name() -> None:
     scene = one_mass(0.4)
     for study in (
-        lambda: stickslip.sweep(scene),
+        lambda: stickslip.response_map(scene, "f.N0", 0.1, 1.0),
         lambda: stickslip.design(scene, variables={"f.N0": (0.1, 1.0)}),
         lambda: stickslip.solve_all(scene, frequency_hz=0.2),
     ):
