@@ -185,19 +185,20 @@ def test_a_sharp_optimum_has_no_plateau() -> None:
 
 
 @pytest.mark.long
-def test_the_problem_of_the_docs_ends_in_its_best_basin_and_says_that_harmonics_are_few() -> None:
+def test_the_problem_of_the_docs_ends_in_its_best_basin_with_enough_harmonics() -> None:
+    """Five harmonics are asked for; with them its peak is in doubt by half of it."""
     raw = tomllib.loads(PROBLEM.read_text())
     found = optim.design(solver.load_scene(raw.pop("scene")), **raw)
     assert found.reached
-    assert found.optimum["shroud.N0"] == pytest.approx(464.61, rel=1e-4)
+    assert raw["harmonics"] == 5
+    assert found.problem.harmonics == 10
+    assert found.optimum["shroud.N0"] == pytest.approx(475.11, rel=1e-4)
     assert found.evaluation is not None
-    assert found.evaluation.objective == pytest.approx(0.107414e-3, rel=1e-5)
+    assert found.evaluation.objective == pytest.approx(0.109475e-3, rel=1e-5)
     assert found.held_by is not None
     assert found.held_by.case == "as built"
-    assert found.error_estimate > 0.1 * found.held_by.value
-    assert any("too few harmonics" in words for words in found.warnings)
-    assert [one.harmonics for one in found.checked] == [10] * len(found.checked)
-    assert found.checked[0].objective != found.evaluation.objective
+    assert found.error_estimate < 0.01 * found.held_by.value
+    assert not found.warnings
     answer = found.to_json()
     assert answer["error_estimate"] == found.error_estimate
     assert {"case", "at", "value"} <= set(answer["held_by"])  # type: ignore[call-overload]

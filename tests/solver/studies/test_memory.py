@@ -30,13 +30,13 @@ asked = json.load(sys.stdin)
 few = solver.ContinuationSettings(most_points=8)
 for what in ("small", "scene"):
     scene = solver.Scene.from_dict(asked[what])
-    before = peak("VmRSS")
+    before = peak("VmSize")
     low, high = scene.observe.band
     if asked["do"] == "solve":
         solver.solve(scene, frequency_hz=0.5 * (low + high), harmonics=asked["harmonics"])
     else:
         solver.sweep(scene, start=low, stop=1.02 * low, harmonics=asked["harmonics"], settings=few)
-print(peak("VmHWM") - before)
+print(peak("VmPeak") - before)
 """
 
 
