@@ -298,11 +298,13 @@ def _band(orbits: Orbits, points: Sequence[Point], limit: float) -> Band:
         between: dict[float, Point] = {low.value: low, high.value: high}
 
         def above(value: float, near: Point = low, found: dict[float, Point] = between) -> float:
-            point = found.setdefault(value, found.get(value) or orbits.at(value, near))
+            if value not in found:
+                found[value] = orbits.at(value, near)
+            point = found[value]
             return point.height - limit if point.solution.converged else -limit
 
         at = float(brentq(above, low.value, high.value, xtol=_NEAREST * high.value))
-        point = orbits.at(at, low)
+        point = between.get(at) or orbits.at(at, low)
         known &= point.solution.converged
         ends.append(at)
         edges.append(Edge(at=at, solution=point.motions.ravel(), opens=high.height > limit))
