@@ -43,7 +43,7 @@ class ContinuationSettings:
     largest_step: float = 0.2
     smallest_step: float = 1e-8
     range_length: float = 14.0
-    wanted_iterations: int = 3
+    wanted_iterations: int = 6
     most_iterations: int = 8
-    largest_turn: float = 0.3
+    largest_turn: float = 1.0
     most_points: int = 20_000
