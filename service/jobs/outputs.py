@@ -39,6 +39,19 @@ class Progress(Protocol):
         """The best design so far; it goes with the next report."""
 
 
+class Silent:
+    """Progress that nobody watches."""
+
+    def __call__(self, fraction: float, points: int) -> None:
+        """Say nothing."""
+
+    def found(self, points: Sequence[Point]) -> None:
+        """Say nothing."""
+
+    def best(self, found: Best) -> None:
+        """Say nothing."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ContactValues:
     """The values of a contact during a sweep; None where the value is swept or its law has none."""

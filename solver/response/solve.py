@@ -35,8 +35,6 @@ from solver.scene.scene import Scene
 if TYPE_CHECKING:
     from solver.continuation.branch import Branch
 
-    pass
-
 NEARBY = 0.9  # of a frequency: there, an undamped resonance is no reason for a large receptance
 
 

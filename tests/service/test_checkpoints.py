@@ -27,7 +27,7 @@ from service.db.repositories import Attempt, JobRepository, NewJob
 from service.jobs.arrays import decode
 from service.jobs.checkpoints import Checkpoints, Kept, UnusableError, packed, unpacked
 from service.jobs.kinds import SHIPPED
-from service.jobs.outputs import FailureKind, JobFailure, JobOutput, Pace, Piece, ShouldStop
+from service.jobs.outputs import FailureKind, JobFailure, JobOutput, Pace, Piece, ShouldStop, Silent
 from service.jobs.parts import PartStoppedError
 from service.queue.core import Service
 
@@ -66,17 +66,6 @@ class _Nowhere:
 def expected(name: str) -> JobOutput:
     """What the job computes without an interruption, in this process."""
     return run_here(name, Checkpoints.none(), lambda: False)
-
-
-class _Silent:
-    def __call__(self, _fraction: float, _points: int) -> None:
-        pass
-
-    def found(self, _points: Any) -> None:
-        pass
-
-    def best(self, _found: object) -> None:
-        pass
 
 
 def timeless(value: Any) -> Any:
@@ -163,7 +152,7 @@ def run_here(name: str, checkpoints: Checkpoints, should_stop: ShouldStop) -> Jo
     """Run a kind in this process, as a worker does."""
     kind, body = SHIPPED[SLOW[name][0]], SLOW[name][1]
     spec = kind.resolve(kind.request.model_validate(body), _Nowhere()).spec
-    return SHIPPED.runs()[kind.name](spec, _Silent(), should_stop, checkpoints)
+    return SHIPPED.runs()[kind.name](spec, Silent(), should_stop, checkpoints)
 
 
 def stopped_midway(name: str) -> list[Piece]:
@@ -207,8 +196,8 @@ def test_the_beginning_of_another_branch_is_not_used(caplog: pytest.LogCaptureFi
     body = {**SWEEP, "set": {"shroud.N0": 90.0}, "from": 590}
     spec = kind.resolve(kind.request.model_validate(body), _Nowhere()).spec
     found = Checkpoints("a", good, lambda _kept: None, pace())
-    output = SHIPPED.runs()["sweep"](spec, _Silent(), lambda: False, found)
-    whole = kind.run(spec, _Silent(), lambda: False)
+    output = SHIPPED.runs()["sweep"](spec, Silent(), lambda: False, found)
+    whole = kind.run(spec, Silent(), lambda: False)
     assert timeless(output.result) == timeless(whole.result)
     assert "must be the beginning of the same branch" in caplog.text
 

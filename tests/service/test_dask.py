@@ -28,6 +28,7 @@ from service.db.models import Checkpoint, JobState
 from service.errors import ConfigurationError
 from service.jobs import strict_json
 from service.jobs.kinds import SHIPPED
+from service.jobs.outputs import Silent
 from service.jobs.registry import Registry
 from service.jobs.validation import validated
 from service.queue.health import check
@@ -61,17 +62,6 @@ BODIES: dict[str, dict[str, Any]] = {
     },
 }  # fmt: skip
 OF_TIME = ("seconds", "milliseconds", "pareto")  # the last: whether no other row is faster and as exact
-
-
-class Silent:
-    def __call__(self, _share: float, _points: int) -> None:
-        pass
-
-    def found(self, _points: object) -> None:
-        pass
-
-    def best(self, _found: object) -> None:
-        pass
 
 
 def settings_on(folder: Path, cluster: DaskCluster, **values: object) -> Settings:

@@ -12,7 +12,7 @@ from service.cli.commands.client import submit
 from service.cli.options.inputs import join_words
 from service.errors import InvalidRequestError
 from service.jobs.kinds.identify import IDENTIFY, IdentifyRequest
-from service.jobs.outputs import Point
+from service.jobs.outputs import Silent
 from service.jobs.validation import validated
 
 BODY: Mapping[str, Any] = {
@@ -30,14 +30,6 @@ class Shipped:
 
     def with_uploads(self, body: Mapping[str, object]) -> Mapping[str, object]:
         return body
-
-
-class Silent:
-    def __call__(self, fraction: float, points: int) -> None: ...
-
-    def found(self, points: list[Point]) -> None: ...
-
-    def best(self, found: object) -> None: ...
 
 
 def test_it_finds_what_the_data_say() -> None:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import pytest
 
 import solver
 from service.jobs.kinds import SHIPPED
-from service.jobs.outputs import Point
+from service.jobs.outputs import Silent
 from service.jobs.validation import validated
 
 TWO = {"scene": "two-dof", "harmonics": 3}
@@ -81,14 +81,6 @@ class Shipped:
 
     def with_uploads(self, body: Mapping[str, object]) -> Mapping[str, object]:
         return body
-
-
-class Silent:
-    def __call__(self, fraction: float, points: int) -> None: ...
-
-    def found(self, points: Sequence[Point]) -> None: ...
-
-    def best(self, found: object) -> None: ...
 
 
 @pytest.mark.parametrize("case", BODIES)

@@ -5,12 +5,12 @@ from __future__ import annotations
 import json
 import math
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from service.cli import main
 from service.jobs.kinds.sweep import SWEEP, SweepResult
+from service.jobs.outputs import Silent
 from solver.scene.scene import Scene
 from solver.scene.toml import toml_text
 
@@ -25,23 +25,12 @@ SCENE = {
 }  # fmt: skip
 
 
-class _Silent:
-    def __call__(self, _fraction: float, _points: int) -> None:
-        pass
-
-    def found(self, _points: Any) -> None:
-        pass
-
-    def best(self, _found: object) -> None:
-        pass
-
-
 def test_a_job_gives_the_result_and_the_stored_sweep() -> None:
     spec = {
         "scene": SCENE, "parameter": "frequency", "start": 0.12, "stop": 0.2, "frequency_hz": None,
         "harmonics": 5, "limit": None, "stability": True,
     }  # fmt: skip
-    output = SWEEP.run(spec, _Silent(), lambda: False)
+    output = SWEEP.run(spec, Silent(), lambda: False)
     told = json.loads(json.dumps(output.result, allow_nan=False))
     SweepResult.model_validate(told)
     assert output.shortfall is None

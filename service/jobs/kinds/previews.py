@@ -28,7 +28,7 @@ from service.jobs.common.sizes import (
     dofs_solved,
 )
 from service.jobs.linear_limits import linear_limit
-from service.jobs.outputs import Best, JobOutput, Point, Progress, ShouldStop
+from service.jobs.outputs import JobOutput, Progress, ShouldStop, Silent
 from service.jobs.registry import JobKind, Registry, Resolved, SceneSource
 from solver.errors import Issue
 from solver.scene.examples import DAMPER_LOAD
@@ -221,19 +221,6 @@ def _states(names: list[str], codes: list[int]) -> dict[str, str]:
     return {name: state_of(code).value for name, code in zip(names, codes, strict=True)}
 
 
-class _Silent:
-    """Progress that nobody watches."""
-
-    def __call__(self, fraction: float, points: int) -> None:
-        """Say nothing."""
-
-    def found(self, points: Sequence[Point]) -> None:
-        """Say nothing."""
-
-    def best(self, found: Best) -> None:
-        """Say nothing."""
-
-
 def warm_up() -> None:
     """Load and compile what previews need."""
     scene = solver.load_scene("two-dof")
@@ -243,7 +230,7 @@ def warm_up() -> None:
 
     spec = {"scene": scene.to_dict(), "harmonics": 3, "limit": None, "contact": None, "frequency_hz": 1.05}
     for run in (run_sweep, run_sensitivities, run_limits, run_point):
-        run(spec, _Silent(), nothing)
+        run(spec, Silent(), nothing)
 
 
 PREVIEWS = Registry(

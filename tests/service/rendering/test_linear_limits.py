@@ -12,6 +12,7 @@ from light_scenes import light_scene
 import solver
 from service.jobs.kinds.previews import run_limits
 from service.jobs.linear_limits import linear_limit
+from service.jobs.outputs import Silent
 from solver.linear.assembly import linear_model
 from solver.linear.condensation import force_amplitudes
 from solver.linear.contact_table import port_stiffnesses
@@ -20,20 +21,9 @@ from solver.response.time_history import matrices
 DEFECTS = Path(__file__).parent.parent.parent / "data" / "defects"
 
 
-class _Silent:
-    def __call__(self, fraction, points):
-        """Nobody watches."""
-
-    def found(self, points):
-        """Nobody watches."""
-
-    def best(self, found):
-        """Nobody watches."""
-
-
 def limits(scene, contact=None):
     spec = {"scene": scene.to_dict(), "contact": contact}
-    return run_limits(spec, _Silent(), lambda: False).result
+    return run_limits(spec, Silent(), lambda: False).result
 
 
 def amplitudes(scene, hz, *, stuck):
