@@ -84,7 +84,7 @@ def refuse_rigid(scene: Scene) -> None:
     SettingError
         A contact is rigid.
     """
-    rigid = next((contact for contact in scene.contacts if contact.is_rigid), None)
+    rigid = scene.rigid_contact
     if rigid is not None:
         raise SettingError(
             f"{rigid.name}.{'kt' if math.isinf(rigid.stiffnesses[0]) else 'kn'}", math.inf, _SINGLE

@@ -23,7 +23,6 @@ from solver.marching.contacts import rows
 from solver.marching.equations import Equations, equations_of_motion
 from solver.marching.kernels import state as kernel
 from solver.marching.kernels import taylor as stepping
-from solver.marching.moreau import is_rigid
 from solver.marching.result import MarchResult, MarchStatus, describe
 from solver.marching.start import MarchStart, state_at
 from solver.results.default_bar import shows_progress
@@ -131,7 +130,7 @@ def march(
     whole = annulus(scene) if scene.structure.has_sectors else scene
     omega = 2.0 * math.pi * frequency_hz
     equations = equations_of_motion(whole, omega)
-    rigid = is_rigid(whole.contacts)
+    rigid = whole.rigid_contact is not None
     system = equations.system
     if rigid:
         system = system._replace(kt=_finite(system.kt), kn=_finite(system.kn))

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from solver.contacts.laws.base import AnyContact
 from solver.errors import SettingError
 from solver.marching.equations import Equations
 from solver.marching.kernels import moreau as stepping
@@ -21,11 +20,6 @@ STEPS = 1024  # a period, of the finer run
 REPEATS = 1e-9  # relative change over a period: where a step is halved is a jump of this size
 _LAWS = {kernel.COULOMB: stepping.ELASTIC, kernel.ELASTIC_NORMAL: stepping.ELASTIC, kernel.GAP: stepping.GAP}
 _STATUS = {stepping.OPENED: MarchStatus.RIGID_OPENS, stepping.UNSOLVED: MarchStatus.CHATTER}
-
-
-def is_rigid(contacts: tuple[AnyContact, ...]) -> bool:
-    """Whether a contact has an infinite stiffness."""
-    return any(contact.is_rigid for contact in contacts)
 
 
 def stepped(equations: Equations, steps: int) -> stepping.Stepped:

@@ -70,7 +70,7 @@ def solve(
     scene = scene.at_frequency(frequency_hz)
     omega = 2.0 * math.pi * frequency_hz
     good_enough = True
-    rigid = any(contact.is_rigid for contact in scene.contacts)
+    rigid = scene.rigid_contact is not None
     if exact or rigid:
         from solver.response.exact.answer import solve_exactly  # loaded where it is asked for
 

@@ -19,7 +19,7 @@ def _exactly_where_rigid(continued: Callable[_Given, Branch]) -> Callable[_Given
     @wraps(continued)
     def sweep(*args: _Given.args, **options: _Given.kwargs) -> AnyBranch:
         scene = args[0] if args else options.get("scene")
-        if isinstance(scene, Scene) and any(contact.is_rigid for contact in scene.contacts):
+        if isinstance(scene, Scene) and scene.rigid_contact is not None:
             from solver.response.exact.sweep import sweep_exactly  # loaded where it is asked for
 
             return sweep_exactly(*args, **options)  # type: ignore[arg-type]

@@ -241,6 +241,11 @@ class Scene(Part):
         """The excitation, and the constant forces of loads and of rotation, each on a DOF."""
         return (*self.excitation, *kinematics.static_forces(self))
 
+    @property
+    def rigid_contact(self) -> AnyContact | None:
+        """The first contact with an infinite stiffness: such a scene is followed by events."""
+        return next((contact for contact in self.contacts if contact.is_rigid), None)
+
     def seen(self, name: str) -> tuple[tuple[str, float], ...] | None:
         """The DOFs, each with its factor, that a DOF or a recovered quantity of that name is a sum of."""
         if name in self.dofs:

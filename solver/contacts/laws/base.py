@@ -207,6 +207,11 @@ class AnyContact(Element, InSpace):
         return False
 
     @property
+    def tangent_varies(self) -> bool:
+        """Whether its stiffness changes without a change of state: in space while it slips, as it bends."""
+        return False
+
+    @property
     def slides_on_a_line(self) -> bool:
         """Whether its slider has the events of `solver.contacts.segments`, so that its travel is known."""
         return False

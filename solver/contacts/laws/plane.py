@@ -36,6 +36,11 @@ class SlidesInAPlane(FrictionContact):
         return self.limit == "box"
 
     @property
+    def tangent_varies(self) -> bool:
+        """Whether its force turns while it slips: where one limit is that of both directions."""
+        return not self.limits_apart
+
+    @property
     def tangential(self) -> tuple[float, float]:
         """The stiffness of each direction [N/m]."""
         return self.kt, self.kt

@@ -87,6 +87,11 @@ class PolynomialSpring(AnyContact):
         return f"the stiffness of {self.name} is negative" if first < 0.0 else None
 
     @property
+    def tangent_varies(self) -> bool:
+        """It bends."""
+        return True
+
+    @property
     def keeps_together(self) -> bool:
         """Whether it never lets two motions under the same forces move apart: one of constant stiffness."""
         return self.several_responses is None

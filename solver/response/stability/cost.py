@@ -54,7 +54,7 @@ def forecast(scene: Scene, frequency_hz: float | None = None) -> float:
     sectors = scene.structure.sector_count if scene.structure.has_sectors else 1
     parts = sectors // math.gcd(scene.engine_order, sectors) if sectors > 1 else 1
     omega = 2.0 * math.pi * (frequency_hz or math.prod(map(math.sqrt, scene.observe.band)))
-    turning = [_turns(contact) for contact in scene.contacts]
+    turning = [contact.tangent_varies for contact in scene.contacts]
     intervals = 1.0 + sum(_TURNS if turns else _CHANGES for turns in turning) * sectors / parts
     closed = [1.0 if contact.normal_port is None else _CLOSED for contact in scene.contacts]
     ports = sectors * sum(share * len(c.end_keys) for share, c in zip(closed, scene.contacts, strict=True))
@@ -67,11 +67,6 @@ def forecast(scene: Scene, frequency_hz: float | None = None) -> float:
     if not any(turning):
         whole = min(whole, intervals * of_an_exponential(size, turn / intervals))
     return _FIXED + _ELEMENT * sectors * len(closed) + whole + _MULTIPLIERS * size**3
-
-
-def _turns(contact: object) -> bool:
-    """Whether the direction of a contact's force turns while it slips, or its stiffness changes."""
-    return not getattr(contact, "limits_apart", True) or getattr(contact, "LAW", "") == "polynomial"
 
 
 def _structure(scene: Scene, model: LinearModel, omega: float) -> tuple[float, bool]:

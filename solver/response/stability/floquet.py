@@ -115,7 +115,7 @@ def stability(
     """
     if not solution.converged:
         raise SettingError("solution", solution.status.value, "must have converged")
-    if any(contact.is_rigid for contact in solution.scene.contacts):
+    if solution.scene.rigid_contact is not None:
         from solver.response.exact.answer import stability_exactly  # loaded by such scenes alone
 
         return stability_exactly(solution.scene, solution.frequency_hz)
