@@ -65,11 +65,8 @@ def solution(found: Json) -> None:
     """One response."""
     title = f"{found['scene']} at {found['frequency_hz']:g} Hz, {found['n_harmonics']} harmonics"
     if not found["converged"]:
-        drifts = (
-            [("drifts", drift_words(found["drift_per_period"], found["flags"]))] if _drifts(found) else []
-        )
         notes = [("note", words) for words in flag_words(found["flags"])]
-        print_pairs(title, [("converged", "no"), *drifts, *notes])
+        print_pairs(title, [("converged", "no"), *_drift(found), *notes])
         return
     pairs = _amplitudes(found)
     if found["error_estimate"] is not None:
@@ -89,9 +86,11 @@ def solution(found: Json) -> None:
     print_pairs(title, pairs)
 
 
-def _drifts(found: Json) -> bool:
-    """Whether a part ratchets, so that it was looked how far it drifts in a period."""
-    return "drift_per_period" in found
+def _drift(found: Json) -> list[tuple[str, str]]:
+    """Return how far a part drifts in a period, where one ratchets and it was looked for."""
+    if "drift_per_period" not in found:
+        return []
+    return [("drifts", drift_words(found["drift_per_period"], found["flags"]))]
 
 
 def all_solutions(found: Json) -> None:
@@ -132,8 +131,7 @@ def branch(found: Json) -> None:
         pairs.append(("band", _band(found)))
     effort = f"{found['newton_iterations']} Newton iterations, {found['rejected_steps']} steps rejected"
     pairs += sure_of(found)
-    if _drifts(found):
-        pairs.append(("drifts", drift_words(found["drift_per_period"], found["flags"])))
+    pairs += _drift(found)
     pairs += [("note", words) for words in flag_words(found.get("flags", ()))]
     pairs += _marks(found, path)
     pairs.append(("points", f"{found['points']} ({effort}, {found['folds']} folds)"))
