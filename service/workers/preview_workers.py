@@ -1,6 +1,6 @@
-"""Previews: computed at once by a worker process of their own, never stored.
+"""Previews: computed at once by worker processes of their own, never stored.
 
-The process starts with the first preview, or when the page is opened. Of the previews of one client only the
+The processes start with the first preview, or when the page is opened. Of the previews of one client only the
 newest is computed; those of several clients wait for each other, a few at most.
 """
 
@@ -34,6 +34,8 @@ from solver.errors import Issue
 log = logging.getLogger("stickslip.previews")
 
 MOST_WAITING = 16
+WORKERS = 2
+"""Processes: while one answer is put together and drawn, the next is computed."""
 _RETRY_SECONDS = 1
 _GRACE_SECONDS = 0.5
 _LONGEST_WAIT_SECONDS = 120.0
@@ -77,17 +79,24 @@ class Previews(Unwatched):
         The kinds of preview.
     memory_bytes : int or None
         Most memory one may take.
+    workers : int
+        Processes.
     """
 
     def __init__(
-        self, seconds: float, registry: Registry = PREVIEWS, memory_bytes: int | None = None
+        self,
+        seconds: float,
+        registry: Registry = PREVIEWS,
+        memory_bytes: int | None = None,
+        workers: int = WORKERS,
     ) -> None:
         self.registry = registry
+        self._workers = workers
         self._seconds = seconds
         self._limits = ProcessLimits(memory_bytes=memory_bytes, processor_seconds=seconds + _GRACE_SECONDS)
         self._lock = threading.RLock()
         self._waiting: deque[_Asked] = deque()
-        self._running: _Asked | None = None
+        self._running: dict[str, _Asked] = {}
         self._served: list[str] = []
         self._executor: LocalExecutor | None = None
         self._closed = False
@@ -124,14 +133,14 @@ class Previews(Unwatched):
             self._drop(asked)
 
     def begin(self) -> None:
-        """Start the worker if it does not run: for those who will want a preview in a moment."""
+        """Start the workers if they do not run: for those who will want a preview in a moment."""
         with self._lock:
             if self._closed or self._executor is not None:
                 return
             self._executor = LocalExecutor(
                 self.registry.runs(),
                 self.registry.warm_up,
-                workers=1,
+                workers=self._workers,
                 grace_seconds=_GRACE_SECONDS,
                 pace=_SILENT,
                 limits=self._limits,
@@ -139,7 +148,7 @@ class Previews(Unwatched):
             self._executor.start(self)
 
     def close(self) -> None:
-        """End the worker; whoever waits is told."""
+        """End the workers; whoever waits is told."""
         with self._lock:
             self._closed = True
             waiting, self._waiting = list(self._waiting), deque()
@@ -152,21 +161,21 @@ class Previews(Unwatched):
     def ended(self, attempt: Attempt, outcome: Outcome) -> None:
         """Answer the one who waits for it."""
         with self._lock:
-            asked, self._running = self._running, None
-        if asked is not None and asked.attempt is attempt:
+            asked = self._running.pop(attempt.job_id, None)
+        if asked is not None:
             asked.settle(asked.stopped or _answer(outcome))
         self.room()
 
     def room(self) -> None:
-        """Compute the next one."""
+        """Compute the next ones, one to a process."""
         with self._lock:
-            if self._closed or self._executor is None or self._running is not None:
-                return
-            if not self._waiting or not self._executor.free():
-                return
-            self._running = asked = self._next()
-            asked.loop.call_soon_threadsafe(asked.loop.call_later, self._seconds, self._overtime, asked)
-            self._executor.submit(asked.attempt)
+            while not self._closed and self._executor is not None and self._waiting:
+                if not self._executor.free() or len(self._running) >= self._executor.status().ready:
+                    return
+                asked = self._next()
+                self._running[asked.attempt.job_id] = asked
+                asked.loop.call_soon_threadsafe(asked.loop.call_later, self._seconds, self._overtime, asked)
+                self._executor.submit(asked.attempt)
 
     def _add(self, asked: _Asked, most: int | None) -> None:
         with self._lock:
@@ -196,8 +205,9 @@ class Previews(Unwatched):
         for other in [each for each in self._waiting if each.client == client]:
             self._waiting.remove(other)
             other.settle(ConflictError(_SUPERSEDED))
-        if self._running is not None and self._running.client == client:
-            self._stop(self._running, ConflictError(_SUPERSEDED))
+        for other in self._running.values():
+            if other.client == client:
+                self._stop(other, ConflictError(_SUPERSEDED))
 
     def _overtime(self, asked: _Asked) -> None:
         detail = f"the preview took longer than {self._seconds:g} s: submit it as a job"
@@ -212,7 +222,8 @@ class Previews(Unwatched):
             self._stop(asked, PreviewError("nobody waits for it"))
 
     def _stop(self, asked: _Asked, reason: Exception) -> None:
-        if self._running is asked and asked.stopped is None and self._executor is not None:
+        running = asked.attempt.job_id in self._running
+        if running and asked.stopped is None and self._executor is not None:
             asked.stopped = reason
             self._executor.stop_attempt(asked.attempt)
 
