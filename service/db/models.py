@@ -203,7 +203,7 @@ class Upload(Base):
     size: Mapped[int]
     sha256: Mapped[str] = mapped_column(String(64))
     created: Mapped[datetime]
-    data: Mapped[bytes] = mapped_column(LargeBinary())
+    data: Mapped[bytes] = mapped_column(LargeBinary(), deferred=True)
 
     __table_args__ = (Index(None, "owner", "id"),)
 

@@ -9,7 +9,8 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from service.db.models import NOBODY
 from service.db.pagination import Range
-from service.db.repositories.stored import Filter, Part, Row, StoredRepository
+from service.db.repositories.owned import RowT
+from service.db.repositories.stored import Filter, Part, StoredRepository
 from service.queue import cursors
 from service.settings.settings import Settings
 
@@ -57,8 +58,8 @@ class StoredQuery(BaseModel):
 
 
 def rows_of_page(
-    repository: StoredRepository[Row, Part], query: StoredQuery, settings: Settings, sees: str | None
-) -> tuple[list[Row], str | None]:
+    repository: StoredRepository[RowT, Part], query: StoredQuery, settings: Settings, sees: str | None
+) -> tuple[list[RowT], str | None]:
     """Return the rows of a page and the link to the next one, None on the last.
 
     Raises

@@ -6,7 +6,7 @@ from datetime import datetime
 
 from pydantic import Field
 
-from service.db.repositories.uploads import UploadRow
+from service.db.models import Upload
 from service.schemas.answers import Answer
 
 
@@ -22,7 +22,7 @@ class UploadAnswer(Answer):
     links: dict[str, str]
 
     @classmethod
-    def of(cls, row: UploadRow) -> UploadAnswer:
+    def of(cls, row: Upload) -> UploadAnswer:
         """The answer for a row."""
         values = {name: getattr(row, name) for name in ("id", "name", "format", "size", "sha256", "created")}
         return UploadAnswer(**values, links={"self": f"/v1/uploads/{row.id}"})

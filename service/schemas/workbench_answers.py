@@ -7,7 +7,8 @@ from typing import Any, Self
 
 from pydantic import Field
 
-from service.db.repositories.workbench.rows import ProjectRow, RunRow, ShareRow
+from service.db.repositories.runs import RunRow
+from service.db.run_models import Project, Share
 from service.jobs.outputs import Told
 from service.schemas.answers import Answer, JobAnswer
 
@@ -68,7 +69,7 @@ class ProjectAnswer(Answer):
     links: dict[str, str]
 
     @classmethod
-    def of(cls, row: ProjectRow) -> Self:
+    def of(cls, row: Project) -> Self:
         """The answer for a row."""
         values = {name: getattr(row, name) for name in cls.model_fields if name != "links"}
         about = f"/v1/projects/{row.id}"
@@ -91,7 +92,7 @@ class ShareAnswer(Answer):
     expires: datetime | None
 
     @classmethod
-    def values(cls, row: ShareRow) -> dict[str, Any]:
+    def values(cls, row: Share) -> dict[str, Any]:
         """The fields of the answer for a row."""
         return {"id": row.id, "run": row.job_id, "created": row.created, "expires": row.expires}
 

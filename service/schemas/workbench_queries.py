@@ -7,10 +7,10 @@ from typing import Annotated, Any, ClassVar
 from pydantic import AwareDatetime, BaseModel, ConfigDict, Field
 
 from service.db.models import JobState
-from service.db.repositories.workbench.rows import RunFilter
+from service.db.repositories.projects import Projects
+from service.db.repositories.runs import RunFilter, Runs
 from service.jobs.run_words import LONGEST_TAG, MOST_TAGS, Notes, ProjectName, RunName, Tags
 from service.queue import cursors
-from service.queue.workbench import Projects, Runs
 from service.schemas.workbench_answers import ProjectAnswer, ProjectPage, RunAnswer, RunPage
 from service.settings.settings import Settings
 
@@ -132,7 +132,7 @@ def run_page(runs: Runs, query: RunQuery, settings: Settings, sees: str | None, 
     """
     size = min(query.limit, settings.page_limit)
     before = None if query.cursor is None else cursors.decode(query.cursor)[1]
-    rows = runs.repository.page(query.to_filter(sees), size + 1, before)
+    rows = runs.page(query.to_filter(sees), size + 1, before)
     following = None
     if len(rows) > size:
         following = cursors.next_link(query.path, query, None, rows[size - 1].job.id)
@@ -146,7 +146,7 @@ def project_page(
     """A page of projects and the link to the next one; errors as of `run_page`."""
     size = min(query.limit, settings.page_limit)
     before = None if query.cursor is None else cursors.decode(query.cursor)[1]
-    rows = projects.repository.page(
+    rows = projects.page(
         size + 1, before, owner=sees, text=query.text, deleted=query.deleted
     )  # fmt: skip
     following = None

@@ -4,7 +4,7 @@ from service.db.repositories.designs import DesignRepository
 from service.db.repositories.jobs.repository import Attempt, JobRepository, JobRow, NewJob, Recovered
 from service.db.repositories.scenes import SceneRepository, SceneRow
 from service.db.repositories.sweeps import SweepRepository
-from service.db.repositories.uploads import UploadRepository, UploadRow
+from service.db.repositories.uploads import UploadRepository
 
 __all__ = [
     "Attempt",
@@ -17,5 +17,4 @@ __all__ = [
     "SceneRow",
     "SweepRepository",
     "UploadRepository",
-    "UploadRow",
 ]

@@ -102,7 +102,7 @@ def list_uploads(
     """Uploads, newest first."""
     size = min(query.limit, service.settings.page_limit)
     before = None if query.cursor is None else cursors.decode(query.cursor)[1]
-    rows = service.uploads.repository.page(size + 1, before, caller.sees)
+    rows = service.uploads.repository.page(size + 1, before, owner=caller.sees)
     following = None
     if len(rows) > size:
         following = cursors.next_link("/v1/uploads", query, None, rows[size - 1].id)

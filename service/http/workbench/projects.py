@@ -43,7 +43,7 @@ def list_projects(
 @writing
 def make_project(body: Made, service: ServiceDependency, caller: CallerDependency) -> Response:
     """Make a project. Two may have the same name."""
-    made = ProjectAnswer.of(service.projects.add(body.name, body.notes, caller))
+    made = ProjectAnswer.of(service.projects.add(caller.owner, body.name, body.notes))
     answer = revised(made, 201)
     answer.headers["Location"] = f"/v1/projects/{made.id}"
     return answer
@@ -53,7 +53,7 @@ def make_project(body: Made, service: ServiceDependency, caller: CallerDependenc
 @reading
 def get_project(project_id: str, service: ServiceDependency, caller: CallerDependency) -> Response:
     """A project, in the bin or not."""
-    return revised(ProjectAnswer.of(service.projects.get(project_id, caller)))
+    return revised(ProjectAnswer.of(service.projects.seen(project_id, caller.sees)))
 
 
 @router.patch("/{project_id}", response_model=ProjectAnswer, responses=REVISED)
@@ -66,7 +66,7 @@ def change_project(
     expected: ExpectedDependency,
 ) -> Response:
     """Change the name or the notes of a project; what is left out stays."""
-    row = service.projects.change(project_id, changes_of(body), expected, caller)
+    row = service.projects.change(project_id, changes_of(body), expected, caller.sees)
     return revised(ProjectAnswer.of(row))
 
 
@@ -74,11 +74,11 @@ def change_project(
 @writing
 def delete_project(project_id: str, service: ServiceDependency, caller: CallerDependency) -> Response:
     """Put a project in the bin, from which it is deleted after some days. Its runs stay where they are."""
-    return revised(ProjectAnswer.of(service.projects.put_in_bin(project_id, caller)))
+    return revised(ProjectAnswer.of(service.projects.put_in_bin(project_id, caller.sees)))
 
 
 @router.post("/{project_id}/restore", response_model=ProjectAnswer, responses=REVISED)
 @writing
 def restore_project(project_id: str, service: ServiceDependency, caller: CallerDependency) -> Response:
     """Take a project out of the bin."""
-    return revised(ProjectAnswer.of(service.projects.restore(project_id, caller)))
+    return revised(ProjectAnswer.of(service.projects.restore(project_id, caller.sees)))

@@ -64,7 +64,7 @@ def _designed(service: Service, caller: Caller, job_id: str) -> tuple[Json, Json
             )
         found = service.results(job_id, caller)
         scene = service.scene_of(job_id, caller)
-        run = service.runs.get(job_id, caller)
-        project = None if run.words.project is None else service.projects.get(run.words.project, caller)
+        run = service.runs.seen(job_id, caller.sees)
+        project = None if run.words.project is None else service.projects.seen(run.words.project, caller.sees)
     about = about_run(RunAnswer.of_run(run), None if project is None else ProjectAnswer.of(project))
     return scene, problem_of_request(row.request or {}), found.result, about

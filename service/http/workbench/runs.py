@@ -6,7 +6,7 @@ from typing import Annotated
 
 from fastapi import APIRouter, Body, Query, Request, Response
 
-from service.db.repositories.workbench.rows import RunRow
+from service.db.repositories.runs import RunRow
 from service.http.dependencies import CallerDependency, ServiceDependency, TypedRoute, listing
 from service.http.in_lane import reading, writing
 from service.http.routes.described import LISTED
@@ -51,7 +51,7 @@ def compare(a: RunId, b: RunId, service: ServiceDependency, caller: CallerDepend
 @reading
 def get_run(job_id: str, service: ServiceDependency, caller: CallerDependency) -> Response:
     """A run, in the bin or not; its id is that of its job."""
-    return _answer(service, service.runs.get(job_id, caller))
+    return _answer(service, service.runs.seen(job_id, caller.sees))
 
 
 @router.patch("/{job_id}", response_model=RunAnswer, responses=REVISED)
@@ -64,21 +64,21 @@ def change_run(
     expected: ExpectedDependency,
 ) -> Response:
     """Change project, name, notes or tags of a run; what is left out stays."""
-    return _answer(service, service.runs.change(job_id, changes_of(body), expected, caller))
+    return _answer(service, service.runs.change(job_id, changes_of(body), expected, caller.sees))
 
 
 @router.delete("/{job_id}", response_model=RunAnswer, responses=REVISED)
 @writing
 def delete_run(job_id: str, service: ServiceDependency, caller: CallerDependency) -> Response:
     """Put a run that has ended in the bin, from which it is deleted after some days with what it computed."""
-    return _answer(service, service.runs.put_in_bin(job_id, caller))
+    return _answer(service, service.runs.put_in_bin(job_id, caller.sees))
 
 
 @router.post("/{job_id}/restore", response_model=RunAnswer, responses=REVISED)
 @writing
 def restore_run(job_id: str, service: ServiceDependency, caller: CallerDependency) -> Response:
     """Take a run out of the bin."""
-    return _answer(service, service.runs.restore(job_id, caller))
+    return _answer(service, service.runs.restore(job_id, caller.sees))
 
 
 def _answer(service: Service, row: RunRow) -> Response:

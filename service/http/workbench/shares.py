@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Annotated
 
 from fastapi import APIRouter, Body, Depends, Query, Request, Response
 
 from service.auth.authenticator import Doorkeeper
-from service.auth.callers import LINK_READERS, Caller
+from service.auth.callers import KEYLESS, LINK_READERS, Caller, Scope
+from service.db.repositories.runs import RunRow
 from service.errors import NotFoundError
 from service.http.dependencies import (
     CallerDependency,
@@ -34,7 +36,7 @@ Made = Annotated[NewLink, Body(openapi_examples=_NEW)]
 @reading
 def list_shares(job_id: str, service: ServiceDependency, caller: CallerDependency) -> ShareList:
     """The links to a run, oldest first; their tokens are not kept."""
-    rows = service.shares.of_run(job_id, caller)
+    rows = service.shares.of_run(job_id, caller.sees)
     return ShareList(items=[ShareAnswer(**ShareAnswer.values(row)) for row in rows])
 
 
@@ -48,7 +50,7 @@ def share_run(
     The token is told this once. The link ends when it is deleted or `days` are over; while the run is in the
     bin it shows nothing.
     """
-    made = service.shares.add(job_id, body.days, caller)
+    made = service.shares.add(job_id, body.days, caller.sees)
     link = f"/v1/shared?token={made.token}"
     return NewShareAnswer(**NewShareAnswer.values(made.row), token=made.token, link=link)
 
@@ -57,7 +59,7 @@ def share_run(
 @writing
 def end_share(job_id: str, share_id: str, service: ServiceDependency, caller: CallerDependency) -> None:
     """End a link to a run."""
-    service.shares.end(job_id, share_id, caller)
+    service.shares.end(job_id, share_id, caller.sees)
 
 
 async def _token(
@@ -80,28 +82,33 @@ async def _reader() -> Caller:
 ReaderDependency = Annotated[Caller, Depends(_reader)]
 
 
+def _whose(run: RunRow) -> Caller:
+    """Who may read what the owner of a link's run owns: to be asked for nothing but this run."""
+    return replace(KEYLESS, owner=run.owner, scopes=frozenset({Scope.READ}))
+
+
 @router.get("/shared")
 @reading
 def shared_run(token: TokenDependency, service: ServiceDependency, caller: ReaderDependency) -> SharedRun:  # noqa: ARG001
     """The run of a link: what was asked, and how it ended."""
-    return SharedRun.of(service.shares.run_of(token)[0])
+    return SharedRun.of(service.shares.run_of(token))
 
 
 @router.get("/shared/scene", response_model=JobScene)
 @reading
 def shared_scene(token: TokenDependency, service: ServiceDependency, caller: ReaderDependency) -> Response:  # noqa: ARG001
     """The scene of a link's run, as it is computed."""
-    run, reader = service.shares.run_of(token)
-    return as_json(JobScene(job=run.job.id, scene=service.scene_of(run.job.id, reader)))
+    run = service.shares.run_of(token)
+    return as_json(JobScene(job=run.job.id, scene=service.scene_of(run.job.id, _whose(run))))
 
 
 @router.get("/shared/results", response_model=ResultsAnswer)
 @reading
 def shared_results(token: TokenDependency, service: ServiceDependency, caller: ReaderDependency) -> Response:  # noqa: ARG001
     """What the run of a link computed."""
-    run, reader = service.shares.run_of(token)
+    run = service.shares.run_of(token)
     with service.database.reading():
-        found = service.results(run.job.id, reader)
+        found = service.results(run.job.id, _whose(run))
         sweeps = SweepAnswer.of_rows(found.sweeps, service.sweeps)
     about = ResultsHead(job=found.job.id, status=found.job.state)
     body = with_raw(about, result=found.text.encode(), sweeps=raw_list(sweeps))
@@ -119,8 +126,8 @@ def shared_sweep(
     form: SweepForm = None,
 ) -> Response:
     """A sweep stored with the run of a link, in the form that `Accept` prefers."""
-    run, reader = service.shares.run_of(token)
-    sweep = service.sweep(sweep_id, reader)
+    run = service.shares.run_of(token)
+    sweep = service.sweep(sweep_id, _whose(run))
     if sweep.job_id != (run.job.result_of or run.job.id):
         raise NotFoundError(f"there is no sweep {sweep_id!r}", withheld=True)
     return sweep_answer(sweep, form, request, service)
