@@ -222,6 +222,11 @@ class Scene(Base):
     size: Mapped[int] = mapped_column(BigInteger(), default=0, server_default="0")
     body: Mapped[dict[str, Any]]
 
+    @property
+    def shipped(self) -> bool:
+        """Whether it comes with the package: such a one is in no database, and was never stored."""
+        return self.created is None
+
 
 class Sweep(Base):
     """One branch that a job computed, without its contacts and arrays: what people filter by."""

@@ -12,12 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
-from service.db.models import Design, JobState, Sweep
+from service.db.models import Design, JobState, Scene, Sweep
 from service.db.repositories import JobRow, SweepRepository
 from service.db.repositories.stored import StoredRepository
 from service.jobs.arrays import decode
 from service.jobs.outputs import ContactValues, Told, VariableValues
-from service.queue.scene_store import KnownScene, WholeScene
 
 if TYPE_CHECKING:
     from service.queue.core import Results
@@ -346,12 +345,12 @@ class SceneAnswer(Answer):
     links: dict[str, str]
 
     @classmethod
-    def of(cls, scene: KnownScene) -> Self:
+    def of(cls, scene: Scene) -> Self:
         """The answer for a scene."""
         return cls(**cls.values(scene))
 
     @classmethod
-    def values(cls, scene: KnownScene) -> dict[str, Any]:
+    def values(cls, scene: Scene) -> dict[str, Any]:
         """The fields of the answer for a scene."""
         return {
             "owner": scene.owner,
@@ -369,7 +368,7 @@ class SceneDetail(SceneAnswer):
     scene: dict[str, Any]
 
     @classmethod
-    def of_whole(cls, scene: WholeScene) -> Self:
+    def of_whole(cls, scene: Scene) -> Self:
         """The answer for a scene."""
         return cls(**cls.values(scene), scene=dict(scene.body))
 

@@ -49,10 +49,10 @@ def visible(row: OwnedT | None, sees: str | None, missing: str) -> OwnedT:
     return row
 
 
-def _identity_of(table: type[Any]) -> Any:
-    """The column of the ids of a mapped class."""
+def _key_of(table: type[Any]) -> list[Any]:
+    """The columns of the primary key of a mapped class."""
     mapper: Any = inspect(table)
-    return getattr(table, mapper.primary_key[0].key)
+    return [getattr(table, column.key) for column in mapper.primary_key]
 
 
 class Rows(Generic[RowT]):
@@ -79,11 +79,15 @@ class Rows(Generic[RowT]):
 
     @cached_property
     def _identity(self) -> Any:
-        return _identity_of(self.table)
+        return _key_of(self.table)[0]
 
-    def get(self, row_id: str) -> RowT | None:
-        """The row of an id, whoever owns it, or None."""
-        return next(iter(self._all(self._select.where(self._identity == row_id))), None)
+    def get(self, *key: str) -> RowT | None:
+        """The row of a key, in general its id, whoever owns it, or None."""
+        return next(iter(self._all(self._of(key))), None)
+
+    def _of(self, key: tuple[str, ...]) -> Select[Any]:
+        columns = _key_of(self.table)
+        return self._select.where(*(column == one for column, one in zip(columns, key, strict=True)))
 
     def _newest(
         self, limit: int, before: str | None, owner: str | None, *holds: ColumnElement[bool]
@@ -223,7 +227,7 @@ class Binned(Generic[BinnedT]):
 
     def _lock(self, connection: Connection, row_id: str, expected: Collection[int] | None) -> None:
         """Lock the row, and compare its revision."""
-        query = select(self.said.revision).where(_identity_of(self.said) == row_id).with_for_update()
+        query = select(self.said.revision).where(_key_of(self.said)[0] == row_id).with_for_update()
         revision = connection.execute(query).scalar_one_or_none()
         if expected is not None and revision not in expected:
             raise ChangedMeanwhileError(
@@ -232,5 +236,5 @@ class Binned(Generic[BinnedT]):
 
     def _write(self, connection: Connection, row_id: str, values: Mapping[str, Any]) -> None:
         counted = {"revision": self.said.revision + 1, "changed": self._now()}
-        change = update(self.said).where(_identity_of(self.said) == row_id)
+        change = update(self.said).where(_key_of(self.said)[0] == row_id)
         connection.execute(change.values(**values, **counted))

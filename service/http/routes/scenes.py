@@ -9,13 +9,13 @@ from fastapi import APIRouter, Query, Response
 from pydantic import BaseModel, ConfigDict, Field
 
 from service.auth.callers import Caller
+from service.db.models import Scene
 from service.http.computed import computed
 from service.http.dependencies import CallerDependency, JsonBody, ServiceDependency
 from service.http.in_lane import reading
 from service.jobs.answering import STORE
 from service.queue import cursors
 from service.queue.core import Service
-from service.queue.scene_store import WholeScene
 from service.schemas.answers import SceneAnswer, SceneDetail, SceneList
 
 router = APIRouter(prefix="/v1/scenes", tags=["scenes"])
@@ -66,6 +66,6 @@ async def store_scene(
     return SceneDetail.of_whole(scene)
 
 
-def _keep(service: Service, caller: Caller, found: dict[str, Any]) -> tuple[WholeScene, bool]:
+def _keep(service: Service, caller: Caller, found: dict[str, Any]) -> tuple[Scene, bool]:
     tables = json.loads(found["tables"])
     return service.scenes.of(caller).keep(found["name"], found["scene_hash"], tables)
