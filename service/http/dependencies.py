@@ -34,10 +34,8 @@ from service.jobs.validation import issues_of
 from service.queue.core import Service
 from service.queue.subscriptions import Event
 from service.rendering.representations import JSON, LIST_MEDIA, chosen, csv_of_items
-from service.schemas.answers import DesignPage, JobPage, SweepPage
+from service.schemas.answers import Page
 from service.schemas.problems import service_problem
-from service.schemas.upload_answers import UploadPage
-from service.schemas.workbench_answers import ProjectPage, RunPage
 from solver.errors import Issue
 
 _PREFER_WAIT = re.compile(r"(?:^|[,;\s])wait\s*=\s*\"?(\d{1,6})\"?(?:$|[,;\s])", re.IGNORECASE)
@@ -45,7 +43,6 @@ _KEY = re.compile(r"[\x21-\x7e]{1,200}")
 _LOOK_AGAIN_SECONDS = 2.0
 
 AnswerT = TypeVar("AnswerT")
-Page = SweepPage | DesignPage | JobPage | UploadPage | RunPage | ProjectPage
 
 
 def service_behind(request: Request) -> Service:
@@ -219,7 +216,7 @@ def raw_list(answers: Sequence[BaseModel]) -> bytes:
     return b"[" + b",".join(one.__pydantic_serializer__.to_json(one) for one in answers) + b"]"
 
 
-def listing(request: Request, page: Page) -> Response:
+def listing(request: Request, page: Page[Any]) -> Response:
     """A page of a list as JSON or CSV, with a link to the next one in its header too (RFC 8288)."""
     kind = chosen(request.headers.get("accept"), LIST_MEDIA)
     headers = {"Vary": "Accept"}

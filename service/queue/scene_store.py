@@ -12,6 +12,7 @@ from service.db.repositories import SceneRepository
 from service.errors import ConflictError, NotFoundError
 from service.jobs.common.scenes import read_scene
 from service.jobs.strict_json import digest, encoded
+from service.queue.cursors import Position
 from service.uploads.uploads import Uploads
 from solver.scene.scene import load_scene, shipped_scenes
 
@@ -57,25 +58,15 @@ class SceneStore:
             raise NotFoundError(f"there is no scene {name!r}: shipped are {known}, GET /v1/scenes lists all")
         return row
 
-    def page(self, size: int, after: str | None = None) -> tuple[list[Scene], str | None]:
-        """Shipped scenes, then `size` of the stored ones that the caller may see, by name, without tables.
+    def page(self, limit: int, after: Position | None = None) -> list[Scene]:
+        """Stored scenes that the caller may see, by name, without tables, those behind a position."""
+        name, _, owner = ("", "", "") if after is None else after[1].partition(_BETWEEN)
+        return self.repository.page(self.caller.sees, None if after is None else (name, owner), limit)
 
-        Parameters
-        ----------
-        after : where the page before ended; shipped scenes are on the first one.
-
-        Returns
-        -------
-        The scenes, and where the page ended if more follow.
-        """
-        position = None
-        if after is not None:
-            name, _, owner = after.partition(_BETWEEN)
-            position = (name, owner)
-        rows = self.repository.page(self.caller.sees, position, size + 1)
-        stored = rows[:size]
-        end = None if len(rows) <= size else f"{stored[-1].name}{_BETWEEN}{stored[-1].owner}"
-        return [*map(_shipped, shipped_scenes() if after is None else ()), *stored], end
+    @staticmethod
+    def position(scene: Scene) -> Position:
+        """Where a page that ends with this scene goes on."""
+        return None, f"{scene.name}{_BETWEEN}{scene.owner}"
 
     def add(self, body: Mapping[str, object]) -> tuple[Scene, bool]:
         """Store a scene under its own name; whether it is new.
@@ -105,6 +96,11 @@ class SceneStore:
                 "give this one another `name`"
             )
         return known, added
+
+
+def shipped() -> list[Scene]:
+    """The scenes that come with the package."""
+    return [_shipped(name) for name in shipped_scenes()]
 
 
 @cache

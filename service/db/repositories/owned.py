@@ -151,7 +151,7 @@ class Binned(Generic[BinnedT]):
     what: str
     said: Any
     """The mapped class with `revision`, `changed` and `deleted`."""
-    get: Callable[[str], BinnedT | None]
+    get: Callable[..., BinnedT | None]
     """The thing of an id, in the bin or not, whoever owns it."""
 
     def __init__(self, database: Database, now: Clock, bin_days: float) -> None:

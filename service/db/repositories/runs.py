@@ -49,6 +49,11 @@ class RunRow:
     sweeps: int = 0
 
     @property
+    def id(self) -> str:
+        """Its id, that of the job."""
+        return self.job.id
+
+    @property
     def owner(self) -> str:
         """Whom it belongs to."""
         return self.job.owner

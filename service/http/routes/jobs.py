@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
-from typing import Annotated, Any
-from urllib.parse import urlencode
+from typing import Annotated, Any, ClassVar
 
 from fastapi import APIRouter, Depends, Query, Request, Response
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from service.auth.callers import Caller
 from service.db.models import JobState
@@ -40,7 +39,6 @@ from service.jobs.kinds.registry.bodies import (
     request_of,
 )
 from service.jobs.registry import JobRequest, Registry
-from service.queue import cursors
 from service.queue.core import Service
 from service.schemas.answers import (
     FinishedJob,
@@ -51,6 +49,7 @@ from service.schemas.answers import (
     ResultsHead,
     SweepAnswer,
 )
+from service.schemas.pages import Cursor, Limit, ListQuery, newest
 
 router = APIRouter(prefix="/v1", tags=["jobs"])
 
@@ -69,16 +68,16 @@ _SUBMITTED: dict[str, Any] = {
 }
 
 
-class JobQuery(BaseModel):
+class JobQuery(ListQuery):
     """Which jobs to list."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    path: ClassVar[str] = "/v1/jobs"
 
     status: JobState | None = None
     kind: str | None = Field(default=None, max_length=32)
     scene: str | None = Field(default=None, max_length=200)
-    limit: int = Field(default=100, ge=1, le=10_000)
-    cursor: str | None = Field(default=None, max_length=500)
+    limit: Limit = 100
+    cursor: Cursor = None
 
 
 @router.get("/jobs", response_model=JobPage, responses=LISTED)
@@ -90,22 +89,11 @@ def list_jobs(
     query: Annotated[JobQuery, Query()],
 ) -> Response:
     """Jobs, newest first."""
-    size = min(query.limit, service.settings.page_limit)
-    before = None if query.cursor is None else cursors.decode(query.cursor)[1]
-    rows = service.jobs.page(
-        owner=caller.sees,
-        state=query.status,
-        kind=query.kind,
-        scene=query.scene,
-        before=before,
-        limit=size + 1,
+    found = partial(
+        service.jobs.page, owner=caller.sees, state=query.status, kind=query.kind, scene=query.scene
     )
-    following = None
-    if len(rows) > size:
-        words = query.model_dump(exclude_none=True, exclude={"cursor"}, mode="json")
-        following = "/v1/jobs?" + urlencode({**words, "cursor": cursors.encode(None, rows[size - 1].id)})
-    items = [_answer(service, row) for row in rows[:size]]
-    return listing(request, JobPage(items=items, next=following))
+    rows, following = newest(query, service.settings, found)
+    return listing(request, JobPage(items=[_answer(service, row) for row in rows], next=following))
 
 
 @router.get("/jobs/{job_id}", response_model=JobAnswer)

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import json
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 from fastapi import APIRouter, Query, Response
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from service.auth.callers import Caller
 from service.db.models import Scene
@@ -14,20 +14,21 @@ from service.http.computed import computed
 from service.http.dependencies import CallerDependency, JsonBody, ServiceDependency
 from service.http.in_lane import reading
 from service.jobs.answering import STORE
-from service.queue import cursors
 from service.queue.core import Service
+from service.queue.scene_store import SceneStore, shipped
 from service.schemas.answers import SceneAnswer, SceneDetail, SceneList
+from service.schemas.pages import Cursor, Limit, ListQuery, page_of
 
 router = APIRouter(prefix="/v1/scenes", tags=["scenes"])
 
 
-class SceneQuery(BaseModel):
+class SceneQuery(ListQuery):
     """Which scenes to list."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    path: ClassVar[str] = "/v1/scenes"
 
-    limit: int = Field(default=1000, ge=1, le=10_000, description="Of the stored scenes.")
-    cursor: str | None = Field(default=None, max_length=500)
+    limit: Limit = Field(default=1000, description="Of the stored scenes.")
+    cursor: Cursor = None
 
 
 @router.get("")
@@ -36,10 +37,8 @@ def list_scenes(
     service: ServiceDependency, caller: CallerDependency, query: Annotated[SceneQuery, Query()]
 ) -> SceneList:
     """Shipped scenes, on the first page, and stored ones by name."""
-    size = min(query.limit, service.settings.page_limit)
-    after = None if query.cursor is None else cursors.decode(query.cursor)[1]
-    scenes, end = service.scenes.of(caller).page(size, after)
-    following = None if end is None else cursors.next_link("/v1/scenes", query, None, end)
+    stored, following = page_of(query, service.settings, service.scenes.of(caller).page, SceneStore.position)
+    scenes = [*(shipped() if query.cursor is None else ()), *stored]
     return SceneList(items=[SceneAnswer.of(scene) for scene in scenes], next=following)
 
 
@@ -47,7 +46,7 @@ def list_scenes(
 @reading
 def get_scene(name: str, service: ServiceDependency, caller: CallerDependency) -> SceneDetail:
     """A scene with its tables: a shipped one, or one of one's own."""
-    return SceneDetail.of_whole(service.scenes.of(caller).get(name))
+    return _whole(service.scenes.of(caller).get(name))
 
 
 @router.post(
@@ -63,7 +62,11 @@ async def store_scene(
     scene, added = await service.lanes.writes.run(caller.owner, _keep, service, caller, found)
     response.status_code = 201 if added else 200
     response.headers["Location"] = f"/v1/scenes/{scene.name}"
-    return SceneDetail.of_whole(scene)
+    return _whole(scene)
+
+
+def _whole(scene: Scene) -> SceneDetail:
+    return SceneDetail.of(scene, scene=dict(scene.body))
 
 
 def _keep(service: Service, caller: Caller, found: dict[str, Any]) -> tuple[Scene, bool]:

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import tempfile
+from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 from fastapi import APIRouter, Query, Request, Response
 from fastapi.responses import JSONResponse
-from pydantic import BaseModel, ConfigDict, Field, GetJsonSchemaHandler
+from pydantic import Field, GetJsonSchemaHandler
 from pydantic_core import CoreSchema
 
 from service.http.bodies import saved
 from service.http.dependencies import CallerDependency, ServiceDependency, listing
 from service.http.in_lane import reading, writing
 from service.http.routes.described import LISTED
-from service.queue import cursors
+from service.schemas.pages import Cursor, Limit, ListQuery, newest
 from service.schemas.upload_answers import NewUpload, UploadAnswer, UploadedArray, UploadPage
 from service.uploads.uploads import Arrived, file_name, format_of
 
@@ -48,13 +49,13 @@ Format = Annotated[
 ]
 
 
-class UploadQuery(BaseModel):
+class UploadQuery(ListQuery):
     """Which uploads to list."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    path: ClassVar[str] = "/v1/uploads"
 
-    limit: int = Field(default=100, ge=1, le=10_000)
-    cursor: str | None = Field(default=None, max_length=500)
+    limit: Limit = 100
+    cursor: Cursor = None
 
 
 @router.post(
@@ -86,7 +87,7 @@ async def upload(
         row, found, added = await service.lanes.uploads.run(
             caller.owner, service.uploads.add, arrived, caller
         )
-    answer = NewUpload(**UploadAnswer.of(row).model_dump(), contents=[UploadedArray(**one) for one in found])
+    answer = NewUpload.of(row, contents=[UploadedArray(**one) for one in found])
     headers = {"Location": f"/v1/uploads/{row.id}"}
     return JSONResponse(answer.model_dump(mode="json"), 201 if added else 200, headers)
 
@@ -100,13 +101,9 @@ def list_uploads(
     query: Annotated[UploadQuery, Query()],
 ) -> Response:
     """Uploads, newest first."""
-    size = min(query.limit, service.settings.page_limit)
-    before = None if query.cursor is None else cursors.decode(query.cursor)[1]
-    rows = service.uploads.repository.page(size + 1, before, owner=caller.sees)
-    following = None
-    if len(rows) > size:
-        following = cursors.next_link("/v1/uploads", query, None, rows[size - 1].id)
-    return listing(request, UploadPage(items=[UploadAnswer.of(row) for row in rows[:size]], next=following))
+    found = partial(service.uploads.repository.page, owner=caller.sees)
+    rows, following = newest(query, service.settings, found)
+    return listing(request, UploadPage(items=[UploadAnswer.of(row) for row in rows], next=following))
 
 
 @router.get("/{upload_id}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Annotated
 
 from fastapi import APIRouter, Body, Query, Request, Response
@@ -10,13 +11,13 @@ from service.http.dependencies import CallerDependency, ServiceDependency, Typed
 from service.http.in_lane import reading, writing
 from service.http.routes.described import LISTED
 from service.http.workbench.revisions import REVISED, ExpectedDependency, revised
+from service.schemas.pages import newest
 from service.schemas.workbench_answers import ProjectAnswer, ProjectPage
 from service.schemas.workbench_queries import (
     NewProject,
     ProjectChanges,
     ProjectQuery,
     changes_of,
-    project_page,
 )
 
 router = APIRouter(prefix="/v1/projects", tags=["projects"], route_class=TypedRoute)
@@ -36,7 +37,9 @@ def list_projects(
     query: Annotated[ProjectQuery, Query()],
 ) -> Response:
     """Projects that meet every filter, newest first."""
-    return listing(request, project_page(service.projects, query, service.settings, caller.sees))
+    found = partial(service.projects.page, owner=caller.sees, text=query.text, deleted=query.deleted)
+    rows, following = newest(query, service.settings, found)
+    return listing(request, ProjectPage(items=[ProjectAnswer.of(row) for row in rows], next=following))
 
 
 @router.post("", status_code=201, response_model=ProjectAnswer)

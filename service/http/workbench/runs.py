@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Annotated
 
 from fastapi import APIRouter, Body, Query, Request, Response
@@ -13,8 +14,9 @@ from service.http.routes.described import LISTED
 from service.http.workbench.revisions import REVISED, ExpectedDependency, revised
 from service.queue.core import Service
 from service.schemas.comparisons import comparison
+from service.schemas.pages import newest
 from service.schemas.workbench_answers import Comparison, RunAnswer, RunPage
-from service.schemas.workbench_queries import RunChanges, RunQuery, changes_of, run_page
+from service.schemas.workbench_queries import RunChanges, RunQuery, changes_of
 
 router = APIRouter(prefix="/v1/runs", tags=["runs"], route_class=TypedRoute)
 
@@ -35,8 +37,11 @@ def list_runs(
 
     `status=accepted&status=running` are all that are under way.
     """
-    live = service.queue.live_progress
-    return listing(request, run_page(service.runs, query, service.settings, caller.sees, live))
+    rows, following = newest(
+        query, service.settings, partial(service.runs.page, query.to_filter(caller.sees))
+    )
+    items = [RunAnswer.of_run(row, service.queue.live_progress(row.id)) for row in rows]
+    return listing(request, RunPage(items=items, next=following))
 
 
 @router.get("/compare")

@@ -37,7 +37,7 @@ Made = Annotated[NewLink, Body(openapi_examples=_NEW)]
 def list_shares(job_id: str, service: ServiceDependency, caller: CallerDependency) -> ShareList:
     """The links to a run, oldest first; their tokens are not kept."""
     rows = service.shares.of_run(job_id, caller.sees)
-    return ShareList(items=[ShareAnswer(**ShareAnswer.values(row)) for row in rows])
+    return ShareList(items=[ShareAnswer.of(row) for row in rows])
 
 
 @router.post("/runs/{job_id}/shares", status_code=201)
@@ -52,7 +52,7 @@ def share_run(
     """
     made = service.shares.add(job_id, body.days, caller.sees)
     link = f"/v1/shared?token={made.token}"
-    return NewShareAnswer(**NewShareAnswer.values(made.row), token=made.token, link=link)
+    return NewShareAnswer.of(made.row, token=made.token, link=link)
 
 
 @router.delete("/runs/{job_id}/shares/{share_id}", status_code=204)

@@ -141,13 +141,13 @@ class JobRepository:
 
     def page(
         self,
+        limit: int = 100,
+        before: str | None = None,
         *,
         owner: str | None = NOBODY,
         state: JobState | None = None,
         kind: str | None = None,
         scene: str | None = None,
-        before: str | None = None,
-        limit: int = 100,
     ) -> list[JobRow]:
         """Jobs outside of the bin, of an owner or of everybody (None), newest first, older than `before`."""
         query = select(*_LISTED).where(~in_the_bin(Job.id)).order_by(Job.id.desc()).limit(limit)
