@@ -11,6 +11,7 @@ import hashlib
 import re
 from collections.abc import AsyncIterator, Callable, Coroutine, Mapping, Sequence
 from contextlib import asynccontextmanager
+from dataclasses import dataclass
 from typing import Annotated, Any, TypeVar
 
 from fastapi import Body, Depends, Request, Response
@@ -67,6 +68,30 @@ async def caller_of(request: Request) -> Caller:
 
 
 CallerDependency = Annotated[Caller, Depends(caller_of)]
+
+
+@dataclass(frozen=True, slots=True)
+class Context:
+    """What every look-up has: the request, the service behind the app, and who asks."""
+
+    request: Request
+    service: Service
+    caller: Caller
+    token: str = ""
+    """Of the link that it is asked by, if it is."""
+
+    @property
+    def sees(self) -> str | None:
+        """The owner whose things are seen; None for everybody's."""
+        return self.caller.sees
+
+
+async def context_of(request: Request) -> Context:
+    """The context of a request."""
+    return Context(request, service_behind(request), await caller_of(request))
+
+
+InContext = Annotated[Context, Depends(context_of)]
 
 
 async def json_body(request: Request) -> AsyncIterator[dict[str, Any]]:
@@ -216,9 +241,9 @@ def raw_list(answers: Sequence[BaseModel]) -> bytes:
     return b"[" + b",".join(one.__pydantic_serializer__.to_json(one) for one in answers) + b"]"
 
 
-def listing(request: Request, page: Page[Any]) -> Response:
+def listing(context: Context, page: Page[Any]) -> Response:
     """A page of a list as JSON or CSV, with a link to the next one in its header too (RFC 8288)."""
-    kind = chosen(request.headers.get("accept"), LIST_MEDIA)
+    kind = chosen(context.request.headers.get("accept"), LIST_MEDIA)
     headers = {"Vary": "Accept"}
     if page.next is not None:
         headers["Link"] = f'<{page.next}>; rel="next"'

@@ -16,6 +16,7 @@ from service.db.repositories import JobRow
 from service.http.computed import prepared
 from service.http.dependencies import (
     CallerDependency,
+    InContext,
     ServiceDependency,
     TypedRoute,
     as_json,
@@ -82,25 +83,20 @@ class JobQuery(ListQuery):
 
 @router.get("/jobs", response_model=JobPage, responses=LISTED)
 @reading
-def list_jobs(
-    request: Request,
-    service: ServiceDependency,
-    caller: CallerDependency,
-    query: Annotated[JobQuery, Query()],
-) -> Response:
+def list_jobs(context: InContext, query: Annotated[JobQuery, Query()]) -> Response:
     """Jobs, newest first."""
     found = partial(
-        service.jobs.page, owner=caller.sees, state=query.status, kind=query.kind, scene=query.scene
+        context.service.jobs.page, owner=context.sees, state=query.status, kind=query.kind, scene=query.scene
     )
-    rows, following = newest(query, service.settings, found)
-    return listing(request, JobPage(items=[_answer(service, row) for row in rows], next=following))
+    rows, following = newest(query, context.service.settings, found)
+    return listing(context, JobPage(items=[_answer(context.service, row) for row in rows], next=following))
 
 
 @router.get("/jobs/{job_id}", response_model=JobAnswer)
 @reading
-def get_job(job_id: str, service: ServiceDependency, caller: CallerDependency) -> Response:
+def get_job(job_id: str, context: InContext) -> Response:
     """A job."""
-    return as_json(_answer(service, service.job(job_id, caller)))
+    return as_json(_answer(context.service, context.service.job(job_id, context.caller)))
 
 
 @router.delete("/jobs/{job_id}")
@@ -115,18 +111,23 @@ async def dismiss(job_id: str, service: ServiceDependency, caller: CallerDepende
 
 @router.get("/jobs/{job_id}/scene", response_model=JobScene)
 @reading
-def scene_of(job_id: str, service: ServiceDependency, caller: CallerDependency) -> Response:
+def scene_of(job_id: str, context: InContext) -> Response:
     """The scene of a job as it is computed: with its values set, and what its uploads held.
 
     It stays what it was when the stored scene or the upload it was made of is replaced or deleted.
     """
-    return as_json(JobScene(job=job_id, scene=service.scene_of(job_id, caller)))
+    return as_json(JobScene(job=job_id, scene=context.service.scene_of(job_id, context.caller)))
 
 
 @router.get("/jobs/{job_id}/results", response_model=ResultsAnswer)
 @reading
-def results(job_id: str, service: ServiceDependency, caller: CallerDependency) -> Response:
+def results(job_id: str, context: InContext) -> Response:
     """What a job computed."""
+    return results_answer(context.service, job_id, context.caller)
+
+
+def results_answer(service: Service, job_id: str, caller: Caller) -> Response:
+    """What a job computed, to a caller."""
     with service.database.reading():
         found = service.results(job_id, caller)
         sweeps = SweepAnswer.of_rows(found.sweeps, service.sweeps)

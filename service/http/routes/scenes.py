@@ -11,11 +11,11 @@ from pydantic import Field
 from service.auth.callers import Caller
 from service.db.models import Scene
 from service.http.computed import computed
-from service.http.dependencies import CallerDependency, JsonBody, ServiceDependency
+from service.http.dependencies import CallerDependency, InContext, JsonBody, ServiceDependency
 from service.http.in_lane import reading
 from service.jobs.answering import STORE
 from service.queue.core import Service
-from service.queue.scene_store import SceneStore, shipped
+from service.queue.scene_store import shipped
 from service.schemas.answers import SceneAnswer, SceneDetail, SceneList
 from service.schemas.pages import Cursor, Limit, ListQuery, page_of
 
@@ -33,20 +33,19 @@ class SceneQuery(ListQuery):
 
 @router.get("")
 @reading
-def list_scenes(
-    service: ServiceDependency, caller: CallerDependency, query: Annotated[SceneQuery, Query()]
-) -> SceneList:
+def list_scenes(context: InContext, query: Annotated[SceneQuery, Query()]) -> SceneList:
     """Shipped scenes, on the first page, and stored ones by name."""
-    stored, following = page_of(query, service.settings, service.scenes.of(caller).page, SceneStore.position)
+    known = context.service.scenes.of(context.caller)
+    stored, following = page_of(query, context.service.settings, known.page, known.position)
     scenes = [*(shipped() if query.cursor is None else ()), *stored]
     return SceneList(items=[SceneAnswer.of(scene) for scene in scenes], next=following)
 
 
 @router.get("/{name}")
 @reading
-def get_scene(name: str, service: ServiceDependency, caller: CallerDependency) -> SceneDetail:
+def get_scene(name: str, context: InContext) -> SceneDetail:
     """A scene with its tables: a shipped one, or one of one's own."""
-    return _whole(service.scenes.of(caller).get(name))
+    return _whole(context.service.scenes.of(context.caller).get(name))
 
 
 @router.post(

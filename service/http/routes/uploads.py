@@ -13,7 +13,7 @@ from pydantic import Field, GetJsonSchemaHandler
 from pydantic_core import CoreSchema
 
 from service.http.bodies import saved
-from service.http.dependencies import CallerDependency, ServiceDependency, listing
+from service.http.dependencies import CallerDependency, InContext, ServiceDependency, listing
 from service.http.in_lane import reading, writing
 from service.http.routes.described import LISTED
 from service.schemas.pages import Cursor, Limit, ListQuery, newest
@@ -94,30 +94,25 @@ async def upload(
 
 @router.get("", response_model=UploadPage, responses=LISTED)
 @reading
-def list_uploads(
-    request: Request,
-    service: ServiceDependency,
-    caller: CallerDependency,
-    query: Annotated[UploadQuery, Query()],
-) -> Response:
+def list_uploads(context: InContext, query: Annotated[UploadQuery, Query()]) -> Response:
     """Uploads, newest first."""
-    found = partial(service.uploads.repository.page, owner=caller.sees)
-    rows, following = newest(query, service.settings, found)
-    return listing(request, UploadPage(items=[UploadAnswer.of(row) for row in rows], next=following))
+    found = partial(context.service.uploads.repository.page, owner=context.sees)
+    rows, following = newest(query, context.service.settings, found)
+    return listing(context, UploadPage(items=[UploadAnswer.of(row) for row in rows], next=following))
 
 
 @router.get("/{upload_id}")
 @reading
-def get_upload(upload_id: str, service: ServiceDependency, caller: CallerDependency) -> UploadAnswer:
+def get_upload(upload_id: str, context: InContext) -> UploadAnswer:
     """An upload, without its bytes."""
-    return UploadAnswer.of(service.uploads.get(upload_id, caller))
+    return UploadAnswer.of(context.service.uploads.get(upload_id, context.caller))
 
 
 @router.delete("/{upload_id}", status_code=204)
 @writing
-def delete_upload(upload_id: str, service: ServiceDependency, caller: CallerDependency) -> None:
+def delete_upload(upload_id: str, context: InContext) -> None:
     """Forget an upload. Scenes and jobs that were made with it keep what it held."""
-    service.uploads.delete(upload_id, caller)
+    context.service.uploads.delete(upload_id, context.caller)
 
 
 def upload_media() -> tuple[str, ...]:
