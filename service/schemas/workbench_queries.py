@@ -45,11 +45,7 @@ class RunQuery(ListQuery):
 
     def to_filter(self, sees: str | None) -> RunFilter:
         """The query of the repository; of what belongs to `sees`, or to everybody (None)."""
-        return RunFilter(
-            owner=sees, of_owner=self.owner, states=self.status, kind=self.kind, scene=self.scene,
-            project=self.project, tags=self.tag, text=self.text, after=self.created_after,
-            before=self.created_before, deleted=self.deleted,
-        )  # fmt: skip
+        return RunFilter(sees=sees, **self.model_dump(exclude={"limit", "cursor"}))
 
 
 class ProjectQuery(ListQuery):

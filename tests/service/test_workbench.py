@@ -304,19 +304,19 @@ def test_every_filter_holds_on_both_databases(database: Database) -> None:
     assert len(jobs.page(owner=None)) == 3, "what was refused is not there"
 
     def found(**wanted: Any) -> list[str]:
-        return [row.job.id for row in runs.page(RunFilter(**{"owner": "ann", **wanted}), 10)]
+        return [row.job.id for row in runs.page(RunFilter(**{"sees": "ann", **wanted}), 10)]
 
     assert found() == [hard, soft]
-    assert found(owner=None) == [other, hard, soft]
-    assert found(owner=None, of_owner="ben") == [other]
-    assert found(project=project) == found(tags=("x", "y")) == found(text="SOFTER") == [soft]
+    assert found(sees=None) == [other, hard, soft]
+    assert found(sees=None, owner="ben") == [other]
+    assert found(project=project) == found(tag=("x", "y")) == found(text="SOFTER") == [soft]
     assert found(text="a_b") == [soft]
     assert found(text="aXb") == found(text="%") == []
-    assert found(states=[JobState.RUNNING]) == []
-    assert found(states=[JobState.RUNNING, JobState.ACCEPTED], kind="iteration") == [hard, soft]
+    assert found(status=[JobState.RUNNING]) == []
+    assert found(status=[JobState.RUNNING, JobState.ACCEPTED], kind="iteration") == [hard, soft]
     created = {row.id: row.created for row in jobs.page(owner="ann")}
-    assert found(after=created[soft], before=created[hard]) == [soft]
-    assert [row.job.id for row in runs.page(RunFilter(owner="ann"), 10, before=hard)] == [soft]
+    assert found(created_after=created[soft], created_before=created[hard]) == [soft]
+    assert [row.job.id for row in runs.page(RunFilter(sees="ann"), 10, before=hard)] == [soft]
     runs.change(soft, {"tags": ("z",), "project": None}, expected={1})
     with pytest.raises(ChangedMeanwhileError):
         runs.change(soft, {"name": "late"}, expected={1})

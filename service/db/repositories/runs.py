@@ -65,30 +65,30 @@ class RunFilter:
 
     Attributes
     ----------
-    owner : str or None
-        Whose; None for everybody's.
-    states : sequence of JobState
+    sees : str or None
+        Whose runs are there; None for everybody's.
+    status : sequence of JobState
         In one of them; any if empty.
-    tags : sequence of str
+    tag : sequence of str
         Marked with all of them.
     text : str or None
         In the name or the notes, whatever its case.
-    after, before : datetime or None
+    created_after, created_before : datetime or None
         Handed in at the earliest, and earlier than.
     deleted : bool
         Those in the bin in place of those outside.
     """
 
-    owner: str | None = NOBODY
-    of_owner: str | None = None
-    states: Sequence[JobState] = ()
+    sees: str | None = NOBODY
+    owner: str | None = None
+    status: Sequence[JobState] = ()
     kind: str | None = None
     scene: str | None = None
     project: str | None = None
-    tags: Sequence[str] = ()
+    tag: Sequence[str] = ()
     text: str | None = None
-    after: datetime | None = None
-    before: datetime | None = None
+    created_after: datetime | None = None
+    created_before: datetime | None = None
     deleted: bool = False
 
 
@@ -112,7 +112,7 @@ class Runs(Binned[RunRow]):
         if not wanted.deleted:
             query = query.where(~in_the_bin(Job.id))
         with self._db.reading() as connection:
-            conditions += owner_condition(connection, Job.id, Job.owner, wanted.owner, leads=leads)
+            conditions += owner_condition(connection, Job.id, Job.owner, wanted.sees, leads=leads)
             return _rows(connection, met(connection, query, Job.id, conditions))
 
     def put_in_bin(self, row_id: str, sees: str | None = None) -> RunRow:
@@ -149,14 +149,15 @@ def _conditions(wanted: RunFilter) -> list[Condition]:
     equal = (
         (Job.kind, wanted.kind),
         (Job.scene_name, wanted.scene),
-        (Job.owner, wanted.of_owner),
+        (Job.owner, wanted.owner),
     )
     found = [column == value for column, value in equal if value is not None]
-    if wanted.states:
-        found.append(Job.state.in_(list(wanted.states)))
+    if wanted.status:
+        found.append(Job.state.in_(list(wanted.status)))
     conditions = plain_conditions(Job.id, found)
-    times = [Job.created >= wanted.after] if wanted.after is not None else []
-    times += [Job.created < wanted.before] if wanted.before is not None else []
+    after, before = wanted.created_after, wanted.created_before
+    times = [Job.created >= after] if after is not None else []
+    times += [Job.created < before] if before is not None else []
     conditions += [Condition(ids=select(Job.id), holds=holds, few=_NEVER_LEADS) for holds in times]
     if wanted.project is not None:
         conditions.append(_said(Run.project_id == wanted.project))
@@ -165,7 +166,7 @@ def _conditions(wanted: RunFilter) -> list[Condition]:
     if wanted.text is not None:
         text = or_(*(one.icontains(wanted.text, autoescape=True) for one in (Run.name, Run.notes)))
         conditions.append(_said(text, few=_NEVER_LEADS))
-    for tag in wanted.tags:
+    for tag in wanted.tag:
         ids = select(RunTag.job_id).where(RunTag.tag == tag)
         holds = ids.where(RunTag.job_id == Job.id).correlate(Job).exists()
         conditions.append(Condition(ids=ids, holds=holds, apart=True))
