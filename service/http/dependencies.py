@@ -52,24 +52,6 @@ def service_behind(request: Request) -> Service:
     return service
 
 
-# Dependencies are asynchronous: others would be run in a thread each, which costs more than they do.
-async def service_of(request: Request) -> Service:
-    """The service behind the app."""
-    return service_behind(request)
-
-
-ServiceDependency = Annotated[Service, Depends(service_of)]
-
-
-async def caller_of(request: Request) -> Caller:
-    """Who asks: the gate has put them there."""
-    caller: Caller = getattr(request.state, "caller", KEYLESS)
-    return caller
-
-
-CallerDependency = Annotated[Caller, Depends(caller_of)]
-
-
 @dataclass(frozen=True, slots=True)
 class Context:
     """What every look-up has: the request, the service behind the app, and who asks."""
@@ -86,15 +68,16 @@ class Context:
         return self.caller.sees
 
 
+# Dependencies are asynchronous: others would be run in a thread each, which costs more than they do.
 async def context_of(request: Request) -> Context:
-    """The context of a request."""
-    return Context(request, service_behind(request), await caller_of(request))
+    """The context of a request; the gate has put there who asks."""
+    return Context(request, service_behind(request), getattr(request.state, "caller", KEYLESS))
 
 
 InContext = Annotated[Context, Depends(context_of)]
 
 
-async def json_body(request: Request) -> AsyncIterator[dict[str, Any]]:
+async def json_body(context: InContext) -> AsyncIterator[dict[str, Any]]:
     """The body of a request as a JSON object, no larger than the settings allow, until it is answered.
 
     Raises
@@ -102,13 +85,13 @@ async def json_body(request: Request) -> AsyncIterator[dict[str, Any]]:
     UnsupportedMediaError, BodyTooLargeError, SlowBodyError, MalformedBodyError, InvalidRequestError
         For a body that is not that.
     """
+    request, settings = context.request, context.service.settings
     kind = request.headers.get("content-type", "").split(";")[0].strip().lower()
     if kind != "application/json" and not kind.endswith("+json"):
         raise UnsupportedMediaError(f"`Content-Type` must be application/json, got {kind or 'none'}")
-    settings = service_behind(request).settings
     data = await whole(request, settings.max_body_bytes, settings.body_seconds)
     turns: Turns = request.app.state.turns
-    async with turns.of((await caller_of(request)).owner, len(data)):
+    async with turns.of(context.caller.owner, len(data)):
         value = await turns.parsed(data)
         del data
         if not isinstance(value, dict):
@@ -157,7 +140,7 @@ class TypedRoute(APIRoute):
         of_kinds = getattr(field.field_info, "discriminator", None) is not None
 
         async def read_and_handle(request: Request) -> Response:
-            async with reading(request) as value:
+            async with reading(await context_of(request)) as value:
                 try:
                     return await handle(_ReadRequest(request, value))
                 except RequestValidationError as error:
@@ -253,10 +236,9 @@ def listing(context: Context, page: Page[Any]) -> Response:
 
 
 async def wait_for_end(
-    service: Service,
+    context: Context,
     job_id: str,
     seconds: float,
-    caller: Caller,
     answer: Callable[[JobRow], AnswerT],
     known: JobRow | None = None,
 ) -> AnswerT:
@@ -264,10 +246,11 @@ async def wait_for_end(
 
     Parameters
     ----------
-    service, job_id, seconds, caller : where to look, for which job, how long [s], as whom.
+    context, job_id, seconds : where to look and as whom, for which job, how long [s].
     answer : makes of the row what is wanted, in the same transaction.
     known : the row as it was a moment ago: it is not looked at before something happens.
     """
+    service, caller = context.service, context.caller
     loop = asyncio.get_running_loop()
     changed = asyncio.Event()
 

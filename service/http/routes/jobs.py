@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Annotated, Any, ClassVar
 
-from fastapi import APIRouter, Depends, Query, Request, Response
+from fastapi import APIRouter, Depends, Query, Response
 from pydantic import Field
 
 from service.auth.callers import Caller
@@ -15,9 +15,8 @@ from service.db.models import JobState
 from service.db.repositories import JobRow
 from service.http.computed import prepared
 from service.http.dependencies import (
-    CallerDependency,
+    Context,
     InContext,
-    ServiceDependency,
     TypedRoute,
     as_json,
     idempotency_key,
@@ -100,12 +99,13 @@ def get_job(job_id: str, context: InContext) -> Response:
 
 
 @router.delete("/jobs/{job_id}")
-async def dismiss(job_id: str, service: ServiceDependency, caller: CallerDependency) -> JobAnswer:
+async def dismiss(job_id: str, context: InContext) -> JobAnswer:
     """Dismiss a job. A running one is stopped within the grace; the answer waits for that."""
+    service, caller = context.service, context.caller
     row = await service.lanes.writes.run(caller.owner, service.dismiss, job_id, caller)
     if not row.state.finished:
         patience = service.settings.grace_seconds + _STOP_MARGIN_SECONDS
-        row = await wait_for_end(service, job_id, patience, caller, lambda found: found)
+        row = await wait_for_end(context, job_id, patience, lambda found: found)
     return _answer(service, row)
 
 
@@ -144,11 +144,12 @@ class Asked:
     seconds: float | None
 
 
-async def asked(request: Request, service: ServiceDependency) -> Asked:
+async def asked(context: InContext) -> Asked:
     """Read the headers of a submission; `idempotency_key` lists the errors."""
+    headers = context.request.headers
     return Asked(
-        key=idempotency_key(request.headers),
-        seconds=preferred_wait(request.headers, service.settings.max_wait_seconds),
+        key=idempotency_key(headers),
+        seconds=preferred_wait(headers, context.service.settings.max_wait_seconds),
     )
 
 
@@ -158,27 +159,14 @@ AskedDependency = Annotated[Asked, Depends(asked)]
 def submissions(registry: Registry) -> APIRouter:
     """The routes that take jobs; their bodies are those of the kinds there are."""
 
-    async def submit(
-        request: Request,
-        body: JobRequest,
-        service: ServiceDependency,
-        caller: CallerDependency,
-        asked: AskedDependency,
-    ) -> Response:
+    async def submit(body: JobRequest, context: InContext, asked: AskedDependency) -> Response:
         """Accept a job. With `Prefer: wait=N` the answer waits up to N seconds for its end."""
-        raw = await request.json()
-        return await _submit(service, caller, asked, raw, body)
+        return await _submit(context, asked, await context.request.json(), body)
 
-    async def submit_design(
-        request: Request,
-        body: JobRequest,
-        service: ServiceDependency,
-        caller: CallerDependency,
-        asked: AskedDependency,
-    ) -> Response:
+    async def submit_design(body: JobRequest, context: InContext, asked: AskedDependency) -> Response:
         """Accept a design: a job of the kind `design`."""
-        raw = await request.json()
-        return await _submit(service, caller, asked, {**raw, KIND: DESIGN}, body)
+        raw = await context.request.json()
+        return await _submit(context, asked, {**raw, KIND: DESIGN}, body)
 
     taking = APIRouter(prefix="/v1", tags=["jobs"], route_class=TypedRoute)
     takes_body(submit, any_body(registry), examples(registry), by=KIND if len(registry) > 1 else None)
@@ -188,11 +176,10 @@ def submissions(registry: Registry) -> APIRouter:
     return taking
 
 
-async def _submit(
-    service: Service, caller: Caller, asked: Asked, raw: dict[str, Any], body: JobRequest
-) -> Response:
+async def _submit(context: Context, asked: Asked, raw: dict[str, Any], body: JobRequest) -> Response:
+    service, caller = context.service, context.caller
     kind = service.registry.get(raw[KIND])
-    found = await prepared(service, caller, kind, raw)
+    found = await prepared(context, kind, raw)
     row, _ = await service.lanes.writes.run(
         caller.owner, service.accept, kind, request_of(kind, body), raw, asked.key, caller, found
     )
@@ -200,7 +187,7 @@ async def _submit(
     answer = partial(_job_or_result, service, headers)
     if asked.seconds is not None:
         headers["Preference-Applied"] = f"wait={asked.seconds:g}"
-        return await wait_for_end(service, row.id, asked.seconds, caller, answer, row)
+        return await wait_for_end(context, row.id, asked.seconds, answer, row)
     if row.state.finished:
         return await service.lanes.reads.run(caller.owner, answer, row)
     return answer(row)

@@ -8,13 +8,11 @@ from typing import Annotated, Any, ClassVar
 from fastapi import APIRouter, Query, Response
 from pydantic import Field
 
-from service.auth.callers import Caller
 from service.db.models import Scene
 from service.http.computed import computed
-from service.http.dependencies import CallerDependency, InContext, JsonBody, ServiceDependency
+from service.http.dependencies import Context, InContext, JsonBody
 from service.http.in_lane import reading
 from service.jobs.answering import STORE
-from service.queue.core import Service
 from service.queue.scene_store import shipped
 from service.schemas.answers import SceneAnswer, SceneDetail, SceneList
 from service.schemas.pages import Cursor, Limit, ListQuery, page_of
@@ -53,12 +51,11 @@ def get_scene(name: str, context: InContext) -> SceneDetail:
     status_code=201,
     responses={200: {"model": SceneDetail, "description": "The same scene was stored before."}},
 )
-async def store_scene(
-    body: JsonBody, service: ServiceDependency, caller: CallerDependency, response: Response
-) -> SceneDetail:
+async def store_scene(body: JsonBody, context: InContext, response: Response) -> SceneDetail:
     """Store a scene under its `name`; a name keeps its meaning for ever."""
-    found = await computed(service, caller, STORE, body, about="")
-    scene, added = await service.lanes.writes.run(caller.owner, _keep, service, caller, found)
+    found = await computed(context, STORE, body, about="")
+    writes = context.service.lanes.writes
+    scene, added = await writes.run(context.caller.owner, _keep, context, found)
     response.status_code = 201 if added else 200
     response.headers["Location"] = f"/v1/scenes/{scene.name}"
     return _whole(scene)
@@ -68,6 +65,6 @@ def _whole(scene: Scene) -> SceneDetail:
     return SceneDetail.of(scene, scene=dict(scene.body))
 
 
-def _keep(service: Service, caller: Caller, found: dict[str, Any]) -> tuple[Scene, bool]:
+def _keep(context: Context, found: dict[str, Any]) -> tuple[Scene, bool]:
     tables = json.loads(found["tables"])
-    return service.scenes.of(caller).keep(found["name"], found["scene_hash"], tables)
+    return context.service.scenes.of(context.caller).keep(found["name"], found["scene_hash"], tables)

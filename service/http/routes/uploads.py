@@ -7,13 +7,13 @@ from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
-from fastapi import APIRouter, Query, Request, Response
+from fastapi import APIRouter, Query, Response
 from fastapi.responses import JSONResponse
 from pydantic import Field, GetJsonSchemaHandler
 from pydantic_core import CoreSchema
 
 from service.http.bodies import saved
-from service.http.dependencies import CallerDependency, InContext, ServiceDependency, listing
+from service.http.dependencies import InContext, listing
 from service.http.in_lane import reading, writing
 from service.http.routes.described import LISTED
 from service.schemas.pages import Cursor, Limit, ListQuery, newest
@@ -64,18 +64,13 @@ class UploadQuery(ListQuery):
     response_model=NewUpload,
     responses={200: {"model": NewUpload, "description": "The same file was uploaded before."}},
 )
-async def upload(
-    request: Request,
-    service: ServiceDependency,
-    caller: CallerDependency,
-    name: FileName = "matrices",
-    form: Format = None,
-) -> Response:
+async def upload(context: InContext, name: FileName = "matrices", form: Format = None) -> Response:
     """Store a file of a matrix, several matrices or modes: the body is the file.
 
     It is read at once, within limits, and refused if it holds nothing usable. In a scene, `upload:ID` stands
     where `M`, `K`, `C` or `modes` of a structure of kind `matrices` would name a file.
     """
+    request, service, caller = context.request, context.service, context.caller
     media = request.headers.get("content-type", "").split(";")[0].strip().lower()
     known = format_of(form, name, media)
     settings = service.settings
