@@ -264,11 +264,11 @@ def binned(database: Database) -> tuple[Database, dict[str, str]]:
     found["user"] = ended(database, 9.0, output, spec_hash="3" * 64, fresh=False)
     shares = Shares(database, Runs(database, utc_now, 7.0), utc_now)
     for days in (-1.0, 1.0):
-        shares.add(found["user"], days, most=2)
+        shares.add(found["user"], days, None, most=2)
     with pytest.raises(StorageFullError):
-        shares.add(found["user"], None, most=2)
+        shares.add(found["user"], None, None, most=2)
     for name, days in (("old", 8.0), ("design", 8.0), ("young", 1.0), ("source", 8.0)):
-        Runs(database, lambda days=days: utc_now() - days * DAY, 7.0).put_in_bin(found[name])
+        Runs(database, lambda days=days: utc_now() - days * DAY, 7.0).put_in_bin(found[name], None)
     return database, found
 
 
@@ -278,8 +278,8 @@ def test_what_was_in_the_bin_for_days_is_deleted_for_good(
     database, made = binned
     projects = Projects(database, lambda: utc_now() - 8.0 * DAY, 7.0)
     project, kept = (projects.add("", name, "", most=9).id for name in ("thrown away", "kept"))
-    Runs(database, utc_now, 7.0).change(made["user"], {"project": project})
-    projects.put_in_bin(project)
+    Runs(database, utc_now, 7.0).change(made["user"], {"project": project}, None, None)
+    projects.put_in_bin(project, None)
     assert RetentionRepository(database).count(before(7), keep_designs=True).projects == 1
     retention = Retention(database, make_settings(), utc_now)
     assert retention.once() == Pruned(jobs=2, sweeps=2, projects=1, links=1)
@@ -299,5 +299,5 @@ def test_a_run_whose_time_in_the_bin_is_over_is_not_restored(
     database, made = binned
     runs = Runs(database, utc_now, 7.0)
     with pytest.raises(ConflictError, match="in the bin for more than 7 days"):
-        runs.restore(made["old"])
-    assert runs.restore(made["young"]).deleted is None
+        runs.restore(made["old"], None)
+    assert runs.restore(made["young"], None).deleted is None

@@ -317,17 +317,17 @@ def test_every_filter_holds_on_both_databases(database: Database) -> None:
     created = {row.id: row.created for row in jobs.page(owner="ann")}
     assert found(created_after=created[soft], created_before=created[hard]) == [soft]
     assert [row.job.id for row in runs.page(RunFilter(sees="ann"), 10, before=hard)] == [soft]
-    runs.change(soft, {"tags": ("z",), "project": None}, expected={1})
+    runs.change(soft, {"tags": ("z",), "project": None}, {1}, None)
     with pytest.raises(ChangedMeanwhileError):
-        runs.change(soft, {"name": "late"}, expected={1})
+        runs.change(soft, {"name": "late"}, {1}, None)
     changed = runs.get(soft)
     assert changed is not None
     assert (changed.words, changed.revision) == (RunWords(name="Softer", notes="a_b", tags=("z",)), 2)
     with pytest.raises(ConflictError, match="dismiss it first"):
-        runs.put_in_bin(hard)
+        runs.put_in_bin(hard, None)
     jobs.cancel(hard)
-    runs.put_in_bin(hard)
+    runs.put_in_bin(hard, None)
     assert found() == [row.id for row in jobs.page(owner="ann")] == [soft]
     assert found(deleted=True) == [hard]
-    runs.restore(hard)
+    runs.restore(hard, None)
     assert found() == [hard, soft]

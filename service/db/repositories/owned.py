@@ -174,8 +174,8 @@ class Binned(Generic[BinnedT]):
         self,
         row_id: str,
         changes: Mapping[str, Any],
-        expected: Collection[int] | None = None,
-        sees: str | None = None,
+        expected: Collection[int] | None,
+        sees: str | None,
     ) -> BinnedT:
         """Change what is said of a thing.
 
@@ -200,14 +200,14 @@ class Binned(Generic[BinnedT]):
                 self._write(connection, row_id, changes)
         return self.seen(row_id, sees)
 
-    def put_in_bin(self, row_id: str, sees: str | None = None) -> BinnedT:
+    def put_in_bin(self, row_id: str, sees: str | None) -> BinnedT:
         """Put a thing in the bin; one that is there stays since then."""
         if self.seen(row_id, sees).deleted is None:
             since = func.coalesce(self.said.deleted, literal(self._now(), self.said.deleted.type))
             self._move(row_id, since)
         return self.seen(row_id, sees)
 
-    def restore(self, row_id: str, sees: str | None = None) -> BinnedT:
+    def restore(self, row_id: str, sees: str | None) -> BinnedT:
         """Take a thing out of the bin (ConflictError if its time there is over)."""
         deleted = self.seen(row_id, sees).deleted
         # What is older may be being deleted at this moment.

@@ -115,7 +115,7 @@ class Runs(Binned[RunRow]):
             conditions += owner_condition(connection, Job.id, Job.owner, wanted.sees, leads=leads)
             return _rows(connection, met(connection, query, Job.id, conditions))
 
-    def put_in_bin(self, row_id: str, sees: str | None = None) -> RunRow:
+    def put_in_bin(self, row_id: str, sees: str | None) -> RunRow:
         """Put a run in the bin (ConflictError if it has not ended); one that is there stays since then."""
         state = self.seen(row_id, sees).job.state
         if not state.finished:

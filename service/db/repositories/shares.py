@@ -27,9 +27,7 @@ class Shares(Rows[Share]):
         super().__init__(database, now)
         self._runs = runs
 
-    def add(
-        self, job_id: str, days: float | None, sees: str | None = None, most: int = MOST_SHARES
-    ) -> Made[Share]:
+    def add(self, job_id: str, days: float | None, sees: str | None, most: int = MOST_SHARES) -> Made[Share]:
         """Make a link to a run.
 
         Parameters
@@ -51,12 +49,12 @@ class Shares(Rows[Share]):
             self._require_room(connection, Share.job_id == job_id, most, words)
             return Made(self._insert(connection, row), token)
 
-    def of_run(self, job_id: str, sees: str | None = None) -> list[Share]:
+    def of_run(self, job_id: str, sees: str | None) -> list[Share]:
         """The links to a run, without their tokens, oldest first."""
         self._runs.seen(job_id, sees)
         return self._all(self._select.where(Share.job_id == job_id).order_by(Share.created, Share.id))
 
-    def end(self, job_id: str, share_id: str, sees: str | None = None) -> None:
+    def end(self, job_id: str, share_id: str, sees: str | None) -> None:
         """End a link to a run (NotFoundError if there is none)."""
         self._runs.seen(job_id, sees)
         if not self._updated(delete(Share).where(Share.id == share_id, Share.job_id == job_id)):
