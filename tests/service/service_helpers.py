@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 import threading
 import time
+import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -139,3 +141,9 @@ def until(condition: Callable[[], object], seconds: float = PATIENCE) -> None:
 def pids(file: Path) -> list[int]:
     """Process numbers that the private kinds wrote, one for each attempt."""
     return [int(line) for line in file.read_text().split()] if file.exists() else []
+
+
+def pdf_objects(pdf: bytes) -> bytes:
+    """What stands in the compressed streams of a PDF."""
+    streams = re.findall(rb"stream\r?\n(.*?)\r?\nendstream", pdf, re.DOTALL)
+    return b"\n".join(zlib.decompress(one) for one in streams if one.startswith(b"x"))
