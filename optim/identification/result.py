@@ -143,7 +143,9 @@ class Identification(Drawn):
     harmonics: int
     seconds: float
 
-    VIEWS: ClassVar = Views("optim.views", "of_identification", "identification_dataset", "of_identification")
+    VIEWS: ClassVar = Views(
+        "optim.views", "of_identification", "identification_dataset", "identification:identification_figure"
+    )
 
     @property
     def reached(self) -> bool:

@@ -265,7 +265,7 @@ class RobustResult(MadeOfResponses, Drawn):
             return math.nan
         return 1.0 - self.robust.worst_peak / self.nominal.worst_peak
 
-    VIEWS: ClassVar = Views("optim.views", "of_robust", "robust_dataset", "of_robust")
+    VIEWS: ClassVar = Views("optim.views", "of_robust", "robust_dataset", "designs:robust_figure")
 
     def known_parts(self) -> Iterable[Known]:
         """The robust optimum, nominal and in its worst scenario; the nominal one where there is no other."""

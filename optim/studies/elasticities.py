@@ -136,7 +136,9 @@ class SensitivityResult(MadeOfResponses, Drawn):
         """Return the per cent of the band for one per cent of a parameter; NaN where none."""
         return row.band * row.value / self.band_hz if row.relative and self.band_hz > 0.0 else math.nan
 
-    VIEWS: ClassVar = Views("optim.views", "of_sensitivities", "sensitivities_dataset", "of_sensitivities")
+    VIEWS: ClassVar = Views(
+        "optim.views", "of_sensitivities", "sensitivities_dataset", "shares:sensitivities_figure"
+    )
 
     def known_parts(self) -> Iterable[Known]:
         """The response."""

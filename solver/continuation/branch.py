@@ -262,7 +262,7 @@ class AnyBranch(Drawn):
         ax : axes to draw into, else a new figure.
         limit : amplitude [m] drawn as a line.
         """
-        figure: Figure = self.VIEWS.call("plots.figures", self, ax, limit=limit)
+        figure: Figure = self.VIEWS.call("plots.figures", self, ax=ax, limit=limit)
         return figure
 
     @property

@@ -124,7 +124,7 @@ class MarchResult(Drawn):
         ax : axes to draw into, else a new figure.
         scene : what was marched, for the title.
         """
-        figure: Figure = self.VIEWS.call("plots.figures", self, ax, scene=scene)
+        figure: Figure = self.VIEWS.call("plots.figures", self, ax=ax, scene=scene)
         return figure
 
     def to_json(self) -> dict[str, object]:

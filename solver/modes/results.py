@@ -73,7 +73,7 @@ class NonlinearMode(Drawn):
         The unknowns of every point, for `solver.mode_gradient`; `whole_matrices` says of which equations.
     """
 
-    VIEWS: ClassVar = Views("solver.views", "of_mode", "mode_dataset", "of_mode")
+    VIEWS: ClassVar = Views("solver.views", "of_mode", "mode_dataset", "modes:mode_figure")
 
     scene: Scene
     mode: int

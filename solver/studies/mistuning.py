@@ -146,7 +146,7 @@ class MistuningStudy(MadeOfResponses, Drawn):
         """The disk with the highest peak."""
         return max((d for d in self.disks if d.known), key=lambda disk: disk.magnification, default=None)
 
-    VIEWS: ClassVar = Views("solver.views", "of_mistuning", "mistuning_dataset", "of_mistuning")
+    VIEWS: ClassVar = Views("solver.views", "of_mistuning", "mistuning_dataset", "disks:mistuning_figure")
 
     def known_parts(self) -> Iterable[Known]:
         """The highest blades of the tuned disk and of every other."""

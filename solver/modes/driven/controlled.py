@@ -95,7 +95,7 @@ class HeldAmplitude(Drawn):
         What it took.
     """
 
-    VIEWS: ClassVar = Views("solver.views", "of_held", "held_dataset", "of_held")
+    VIEWS: ClassVar = Views("solver.views", "of_held", "held_dataset", "modes:held_figure")
 
     scene: Scene
     held: float
