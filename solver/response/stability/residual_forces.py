@@ -67,14 +67,13 @@ class AmplitudeRange(Piece):
 
     def to_json(self) -> dict[str, object]:
         """Return the range as one JSON object."""
-
-        def ends(pair: tuple[float, float]) -> list[float | None]:
-            return json_numbers(pair)
-
         return {
-            "max_abs": ends(self.max_abs), "half_peak_to_peak": ends(self.half_peak_to_peak),
-            "mean": ends(self.mean), "contacts": list(self.contacts), "exact": self.exact,
-        }  # fmt: skip
+            "max_abs": json_numbers(self.max_abs),
+            "half_peak_to_peak": json_numbers(self.half_peak_to_peak),
+            "mean": json_numbers(self.mean),
+            "contacts": list(self.contacts),
+            "exact": self.exact,
+        }
 
 
 def amplitude_range(solution: Solution, effects: Effects | None = None) -> AmplitudeRange | None:
