@@ -26,7 +26,7 @@ from solver.balance.workspace import Workspace
 from solver.continuation.certificate import PeakCertificate, certified, uncertain
 from solver.continuation.extrema.intervals import CURVES, highest_share, lowest_share, may_cross
 from solver.continuation.extrema.kernels.intervals import IS_BENT, WAVES, WORTH_POLISHING
-from solver.continuation.extrema.nodes import Node, NodeSolver, Place, Points
+from solver.continuation.extrema.nodes import Node, NodeSolver, Points
 from solver.continuation.extrema.resonance_search import ResonanceSearch, Search
 from solver.continuation.extrema.state_changes import ChangeSearch
 from solver.continuation.folds import fold_between, motion_scales
@@ -55,19 +55,14 @@ class Survey:
 
     Parameters
     ----------
-    workspace, points : the branch.
+    solver, nodes : of the branch.
     worth : share of the highest point below which no maximum is polished. By default all but the smallest
         are; who looks for the highest alone needs no more than those that compete with it.
-    lost : as of `NodeSolver`.
     """
 
-    def __init__(
-        self, workspace: Workspace, points: Points, worth: float = WORTH_POLISHING,
-        lost: set[Place] | None = None,
-    ) -> None:  # fmt: skip
-        self._workspace, self._points, self._worth = workspace, points, worth
-        self._solver = NodeSolver(workspace, lost)
-        self._nodes = self._solver.nodes_of(points)
+    def __init__(self, solver: NodeSolver, nodes: list[Node], worth: float = WORTH_POLISHING) -> None:
+        self._workspace, self._worth = solver.workspace, worth
+        self._solver, self._nodes = solver, nodes
         self._peaks: list[Peak] = []
         self._undone: list[tuple[float, str]] = []  # λ and why
         self._search = Search(nodes=self._nodes)
@@ -80,6 +75,12 @@ class Survey:
             self._densify()
             self._find_peaks()
 
+    @classmethod
+    def of(cls, workspace: Workspace, points: Points) -> Survey:
+        """Return the survey of a branch."""
+        solver = NodeSolver(workspace)
+        return cls(solver, solver.nodes_of(points))
+
     @property
     def spent(self) -> int:
         """Newton iterations."""
@@ -91,9 +92,14 @@ class Survey:
         return tuple(sorted(self._peaks, key=lambda peak: -peak.value))
 
     @property
-    def points(self) -> Points:
+    def nodes(self) -> list[Node]:
         """The branch with everything that was solved for between its points, peaks included."""
-        return self._solver.points_of(self._nodes, self._points)
+        return self._nodes
+
+    @property
+    def points(self) -> Points:
+        """The same as rows."""
+        return self._solver.points_of(self._nodes)
 
     def certificate(self, *, completed: bool) -> PeakCertificate:
         """Say why no higher peak hides between two points, or why that is not known."""

@@ -19,7 +19,7 @@ from itertools import pairwise
 import numpy as np
 
 from solver.balance.kernels.output import HIGH, HIGH_SLOPE, LOW, LOW_SLOPE, MAX_ABS
-from solver.continuation.extrema.contact_springs import LocalModel, Resonance, unknowns
+from solver.continuation.extrema.contact_springs import Resonance, unknowns
 from solver.continuation.extrema.kernels.suspects import find_suspects
 from solver.continuation.extrema.node_table import NodeTable
 from solver.continuation.extrema.nodes import Node, NodeSolver, numbers_of
@@ -111,7 +111,7 @@ class ResonanceSearch:
 
     def __init__(self, solver: NodeSolver) -> None:
         self._solver, self._loop = solver, solver.workspace.loop
-        self._model = LocalModel(solver)
+        self._model = solver.model
         self._added = 0
 
     def run(self, nodes: list[Node]) -> Search:
