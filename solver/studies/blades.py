@@ -12,6 +12,7 @@ import numpy as np
 from solver.contacts.kernels.stick_slip_events import largest
 from solver.continuation.branch import Branch, BranchStatus
 from solver.continuation.branches.observation import highest_peaks, observing
+from solver.continuation.branches.samples import sampled
 from solver.continuation.branches.sweep import sweep
 from solver.continuation.settings import ContinuationSettings
 from solver.errors import SettingError
@@ -177,11 +178,13 @@ def blade_peaks(
         if on_progress is not None:
             on_progress(share if len(names) == 1 else _OF_THE_SWEEP * share, 0)
 
-    whole = every_branch or len(names) == 1
-    branch = sweep(
-        _observing(scene, names[0]), start=start, stop=stop, harmonics=harmonics, settings=settings,
-        errors=whole, peaks=whole, on_progress=progress, should_stop=should_stop,
-    )  # fmt: skip
+    whole, seen = every_branch or len(names) == 1, _observing(scene, names[0])
+    branch = None if whole else sampled(seen, start, stop, harmonics, should_stop)
+    if branch is None:
+        branch = sweep(
+            seen, start=start, stop=stop, harmonics=harmonics, settings=settings, errors=whole, peaks=whole,
+            on_progress=progress, should_stop=should_stop,
+        )  # fmt: skip
     if not whole and branch.completed:
         peaks, worst = highest_peaks(branch, names)
         return BladePeaks(

@@ -23,8 +23,6 @@ from solver.continuation.peaks import Peak
 from solver.jit.fourier import Real
 from solver.linear.kernels.receptance import observer_receptance, receptance
 
-COMPETES_FOR_HIGHEST = 0.8  # share of the highest point from which a maximum may turn out to be the highest
-
 
 def observing(branch: Branch, dof: str, *, limit: float | None = None) -> Branch:
     """Return a frequency response with another DOF observed: the same solutions, its own peaks and band.
@@ -84,7 +82,7 @@ def highest_peaks(branch: Branch, dofs: Sequence[str]) -> tuple[list[Peak], Bran
     found: list[Peak] = []
     worst, peaks, certificate = 0, branch.peaks, branch.peak_certificate
     for j in range(len(dofs)):
-        survey = Survey(solver, observers.seen_by(j, nodes), worth=COMPETES_FOR_HIGHEST)
+        survey = Survey(solver, observers.seen_by(j, nodes), highest_alone=True)
         nodes = survey.nodes
         found.append(survey.peaks[0])
         if j == 0 or found[j].value > found[worst].value:

@@ -340,7 +340,7 @@ def _finish(
         stepped_over=whole.stepped_over, seconds=math.nan, flags=(),
         peak_certificate=uncertain("peaks between its points were not looked for"),
     )  # fmt: skip
-    points = _points(whole)
+    points = points_of(whole)
     branch = surveyed(walked, Survey.of(workspace, points), limit) if peaks else with_points(walked, points)
     flags = branch_flags(workspace, branch.solutions), _drive_flags(workspace, whole, status, start, stop)
     return replace(branch, flags=flags[0] + flags[1], seconds=time.perf_counter() - begun)
@@ -396,7 +396,8 @@ def _drive_flags(
     return () if all(map(workspace.friction_can_hold, beyond)) else (ABOVE_FRICTION,)
 
 
-def _points(whole: Stretch) -> Points:
+def points_of(whole: Stretch) -> Points:
+    """Return the rows of a stretch."""
     return Points(
         solutions=whole.solutions, tangents=whole.tangents, measures=whole.measures, observed=whole.observed,
         states=whole.states,
@@ -412,5 +413,5 @@ def highest_between(balance: Balance, low: float, high: float, guess: Real) -> P
         stretches.append(stretch)
         if sum(len(each.solutions) for each in stretches) >= _MOST_FOLLOWED:
             break
-    survey = Survey.of(workspace, _points(joined(stretches)))
+    survey = Survey.of(workspace, points_of(joined(stretches)))
     return survey.peaks[0] if survey.peaks else None

@@ -281,6 +281,15 @@ class NodeSolver:
         near = sides > 0
         return self._added(found[near], ways[near], measures[near], x[near], states[near])
 
+    def middle(self, left: Node, right: Node) -> Node | None:
+        """Return the node at the λ between two far apart, from the cubic through them or from each."""
+        if left.tangent[-1] * right.tangent[-1] <= 0.0:
+            return None
+        p, length, (a, b) = 0.5 * (left.at + right.at), right.at - left.at, (left.solution, right.solution)
+        bend = left.tangent / left.tangent[-1] - right.tangent / right.tangent[-1]
+        cubic = 0.5 * (a + b) + 0.125 * length * bend
+        return self.at(p, [cubic[:-1], a[:-1], b[:-1]], math.copysign(1.0, length))
+
     def _aside(self, left: Node, right: Node, p: float) -> Node | None:
         """Return the node at λ = `p` between two, or None if the branch turns there or has no solution.
 
@@ -328,14 +337,17 @@ class NodeSolver:
                 high, g_high, g_low, side = node, g, g_low * (0.5 if side > 0 else 1.0), 1
         return None
 
-    def at(self, p: float, guesses: Sequence[Real], onward: float) -> Node | None:
+    def at(
+        self, p: float, guesses: Sequence[Real], onward: float, *, from_nothing: bool = True
+    ) -> Node | None:
         """Return the node at λ = `p`, or None if no solution is found there.
 
         Parameters
         ----------
-        guesses : slip motions to start from, one after the other; at last from nothing, where there is one
-            solution only: elsewhere that may be of another branch.
+        guesses : slip motions to start from, one after the other.
         onward : the sign of dλ along the branch.
+        from_nothing : whether to start from nothing at last, where there is one solution only: elsewhere
+            that may be of another branch.
         """
         workspace = self.workspace
         found = None
@@ -344,7 +356,7 @@ class NodeSolver:
             self.spent += found.iterations
             if found.converged:
                 break
-        if found is None or (not found.converged and self._one_solution):
+        if found is None or (not found.converged and self._one_solution and from_nothing):
             found = workspace.solve(p)
             self.spent += found.iterations
         if not found.converged:
