@@ -179,7 +179,9 @@ def blade_peaks(
             on_progress(share if len(names) == 1 else _OF_THE_SWEEP * share, 0)
 
     whole, seen = every_branch or len(names) == 1, _observing(scene, names[0])
-    branch = None if whole else sampled(seen, start, stop, harmonics, should_stop)
+    branch = None if whole or settings is not None else sampled(seen, start, stop, harmonics, should_stop)
+    if branch is not None and branch.completed:
+        progress(1.0, len(branch.values))
     if branch is None:
         branch = sweep(
             seen, start=start, stop=stop, harmonics=harmonics, settings=settings, errors=whole, peaks=whole,

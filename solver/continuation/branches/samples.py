@@ -1,4 +1,4 @@
-"""A frequency response solved at frequencies evenly over a range, where no path has to be followed.
+"""A frequency response solved at frequencies all over a range, where no path has to be followed.
 
 Where the response is unique (`solver.continuation.branches.point_by_point`) every solution at a frequency is
 the response there, whatever it was found from. Steps along an arc are short wherever contacts change, also
@@ -25,11 +25,11 @@ from solver.continuation.certificate import uncertain
 from solver.continuation.extrema.nodes import Node, NodeSolver
 from solver.continuation.segment import joined
 from solver.continuation.settings import ContinuationSettings
-from solver.jit.fourier import Real, to_full
+from solver.jit.fourier import to_full
 from solver.results.watch import ShouldStop
 from solver.scene.scene import Scene
 
-INTERVALS = 40  # of the range
+LEAST, STEP = 40, 0.015  # intervals of a range at least, and share of a frequency that one is long at most
 
 
 def sampled(
@@ -38,7 +38,7 @@ def sampled(
 ) -> Branch | None:  # fmt: skip
     """Return the response at a few frequencies of a range [Hz], without peaks.
 
-    None if it is not unique, a frequency has no solution, or `should_stop` said so.
+    None if it is not unique, or a frequency has no solution.
     """
     begun = time.perf_counter()
     balance = build(scene, harmonics=harmonics)
@@ -51,12 +51,21 @@ def sampled(
     workspace = Workspace.of(balance)
     solver = NodeSolver(workspace)
     first, last = map(balance.parameter.inside, (start, stop))
-    nodes = _nodes(solver, np.linspace(first, last, INTERVALS + 1), should_stop)
-    if nodes is None:
-        return None
+    count = max(LEAST, math.ceil(abs(math.log(last / first)) / STEP))
+    places = np.geomspace(first, last, count + 1).tolist()
+    node, status = solver.at(places[0], [], math.copysign(1.0, last - first)), BranchStatus.COMPLETED
+    nodes = [] if node is None else [node]
+    for p in places[1:]:
+        if should_stop is not None and should_stop():
+            status = BranchStatus.STOPPED
+            break
+        more = _until(solver, nodes[-1], p, count) if nodes else []
+        if not more:
+            return None
+        nodes += more
     points = solver.points_of(nodes)
     return Branch(
-        balance=balance, status=BranchStatus.COMPLETED, start=start, stop=stop,
+        balance=balance, status=status, start=start, stop=stop,
         values=balance.parameter.all_outside(points.solutions[:, -1].copy()), solutions=points.solutions,
         tangents=points.tangents, states=points.states, measures=points.measures,
         observed=to_full(points.observed, balance.system.ks, balance.highest_harmonic), peaks=(), band=None,
@@ -66,29 +75,19 @@ def sampled(
     )  # fmt: skip
 
 
-def _nodes(solver: NodeSolver, places: Real, should_stop: ShouldStop) -> list[Node] | None:
-    """Return the nodes at some λ, with those of the arc where Newton's method does not lead to the next."""
-    onward = math.copysign(1.0, places[-1] - places[0])
-    node = solver.at(float(places[0]), [], onward)
-    nodes = [] if node is None else [node]
-    for p in places[1:].tolist():
-        if not nodes or (should_stop is not None and should_stop()):
-            return None
-        last = nodes[-1]
-        ahead = last.solution[:-1] + (p - last.at) * last.tangent[:-1] / last.tangent[-1]
-        node = solver.at(p, [ahead], onward, from_nothing=False)
-        between = _arc(solver, last, p) if node is None else [node]
-        if not between:
-            return None
-        nodes += between
-    return nodes
+def _until(solver: NodeSolver, last: Node, p: float, intervals: int) -> list[Node]:
+    """Return the node at the next of so many λ, or those of the arc there where Newton's method fails.
 
-
-def _arc(solver: NodeSolver, last: Node, p: float) -> list[Node]:
-    """Return the nodes of the arc behind one until λ = p; none if it does not lead there."""
+    None where the arc does not lead there either.
+    """
+    length = p - last.at
+    ahead = last.solution[:-1] + length * last.tangent[:-1] / last.tangent[-1]
+    node = solver.at(p, [ahead], math.copysign(1.0, length), from_nothing=False)
+    if node is not None:
+        return [node]
     outside = solver.workspace.balance.parameter.outside
     settings = ContinuationSettings()
-    settings = replace(settings, range_length=settings.range_length / INTERVALS)
+    settings = replace(settings, range_length=settings.range_length / intervals)
     ends = float(outside(last.at)), float(outside(p))
     arc = joined(list(walk(solver.workspace, *ends, settings, last.solution[:-1])))
     return solver.nodes_of(points_of(arc))[1:] if arc.status is BranchStatus.COMPLETED else []
