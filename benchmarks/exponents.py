@@ -113,7 +113,7 @@ def exponents(folder: Path | None = None) -> None:
 def _draw(family: Family, seconds: list[float], exponent: float, folder: Path) -> None:
     from matplotlib.figure import Figure
 
-    from solver.views.plots.style import BLUE, GREY, styled
+    from solver.views.plots.style import BLUE, GREY, plain_log, styled
 
     with styled():
         page: Any = Figure(figsize=(4.2, 3.0), layout="constrained")
@@ -122,9 +122,9 @@ def _draw(family: Family, seconds: list[float], exponent: float, folder: Path) -
         middle = np.exp(np.mean(np.log(seconds)) - exponent * np.mean(np.log(sizes)))
         axes.loglog(sizes, middle * sizes**exponent, color=GREY, linestyle="--")
         axes.loglog(sizes, seconds, color=BLUE, marker="o", linestyle="none")
-        axes.set(
-            xlabel=family.name, ylabel="time of the process [s]", title=f"{family.what}: n^{exponent:.2f}"
-        )
+        axes.set(xlabel=family.name, ylabel="time of the process [s]")
+        axes.set_title(f"{family.what}\n$n^{{{exponent:.2f}}}$")
+        plain_log(axes.yaxis)
         axes.set_xticks(sizes, [str(size) for size in family.sizes])
         axes.minorticks_off()
         page.savefig(folder / f"cost-{family.name}.png", dpi=90)
