@@ -188,11 +188,11 @@ def blade_peaks(
             on_progress=progress, should_stop=should_stop,
         )  # fmt: skip
     if not whole and branch.completed:
-        peaks, worst = highest_peaks(branch, names)
+        peaks, highest = highest_peaks(branch, names)
         return BladePeaks(
             dof=name, value=np.array([peak.value for peak in peaks]),
             at_hz=np.array([peak.at for peak in peaks]), status=(branch.status,) * len(names),
-            branches=(worst,), highest=worst.known,
+            branches=(highest,), highest=highest.known,
         )  # fmt: skip
     branches = [branch] * repeats
     for done, each in enumerate(names[1:], 1):
