@@ -29,11 +29,13 @@ from solver.continuation.kernels.state import (
     LEFT_RANGE,
     NO_START,
     NORM,
+    NUMBERS,
     ORIENTATION,
     PIECE,
     REJECTED,
     ROUGH,
     RUNNING,
+    SMOOTH,
     STALLED,
     STEP,
     STEPPED_OVER,
@@ -68,7 +70,10 @@ def begin_walk(
 ) -> tuple[int, Walk]:
     """Begin a branch at a solution `u` for the start of the range: its first point and tangent."""
     nt, p = u.size, control.start
-    walk = new_walk(np.zeros(nt), np.zeros(nt + 1), np.zeros(nt + 1), np.zeros(nt + 1), np.zeros(12))
+    walk = new_walk(
+        np.zeros(nt), np.zeros(nt + 1), np.zeros(nt + 1), np.zeros(nt + 1), np.zeros(nt + 1), np.zeros(nt + 1),
+        np.zeros(NUMBERS),
+    )  # fmt: skip
     copy_to(walk.u, u)
     walk.numbers[P] = p
     walk.numbers[STEP] = control.first_step
@@ -109,6 +114,7 @@ def _turn(system: System, linear: Receptance, point: Evaluation, control: Contro
             walk.numbers[ORIENTATION] = sign
         else:
             length = -length
+    walk.numbers[SMOOTH] = walk.numbers[SMOOTH] + 1.0 if piece(point) == walk.numbers[PIECE] else 0.0
     walk.numbers[PIECE] = piece(point)
     for i in range(n + 1):
         walk.tangent[i] = rhs[i] / length
