@@ -16,7 +16,16 @@ from solver.balance.workspace import Workspace
 from solver.contacts.kernels.system import AT_BRANCH_POINT, evaluation_by_value
 from solver.continuation.branch import BranchStatus
 from solver.continuation.kernels.pseudo_arclength import begin_walk
-from solver.continuation.kernels.state import COUNT, ITERATIONS, NUMBERS, Control, P, Walk, walk_by_value, weights
+from solver.continuation.kernels.state import (
+    COUNT,
+    ITERATIONS,
+    NUMBERS,
+    Control,
+    P,
+    Walk,
+    walk_by_value,
+    weights,
+)
 from solver.errors import SettingError
 from solver.jit.fourier import Integer, Real
 from solver.linear.kernels.receptance import receptance

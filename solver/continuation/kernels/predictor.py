@@ -28,7 +28,7 @@ def predict(system: System, walk: Walk, control: Control, step: float, guess: Re
             for i in range(n):
                 guess[i] = walk.u[i] + scale * (walk.u[i] - walk.before[i])
             return p + scale * (p - walk.before[n])
-    if control.predictor == CUBIC and walk.numbers[COUNT] > 0 and walk.numbers[ROUGH] == 0.0:
+    if control.predictor == CUBIC and walk.numbers[SMOOTH] > 0.0 and walk.numbers[ROUGH] == 0.0:
         return extrapolate(system, walk, control, step, guess)
     set_to(guess, walk.u, step, walk.tangent)
     return p + step * walk.tangent[n]
@@ -47,7 +47,10 @@ def extrapolate(system: System, walk: Walk, control: Control, step: float, guess
     copy_to(here[:n], walk.u)
     here[n] = walk.numbers[P]
     at, sizes = np.zeros(3), np.ones(3)
-    sizes[0], sizes[1] = _size(walk.tangent, weight_u, weight_p), _size(walk.before_tangent, weight_u, weight_p)
+    sizes[0], sizes[1] = (
+        _size(walk.tangent, weight_u, weight_p),
+        _size(walk.before_tangent, weight_u, weight_p),
+    )
     at[1] = -_arc(here, walk.tangent, walk.before, walk.before_tangent, sizes, weight_u, weight_p)
     if not step < -3.0 * at[1]:
         set_to(guess, walk.u, step, walk.tangent)
@@ -56,7 +59,13 @@ def extrapolate(system: System, walk: Walk, control: Control, step: float, guess
     if walk.numbers[SMOOTH] >= 2.0:
         count, sizes[2] = 3, _size(walk.earlier_tangent, weight_u, weight_p)
         at[2] = at[1] - _arc(
-            walk.before, walk.before_tangent, walk.earlier, walk.earlier_tangent, sizes[1:], weight_u, weight_p
+            walk.before,
+            walk.before_tangent,
+            walk.earlier,
+            walk.earlier_tangent,
+            sizes[1:],
+            weight_u,
+            weight_p,
         )
     ahead = np.zeros(n + 1)
     for k in range(count):
