@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from solver.balance.kernels.output import force_slope
-from solver.balance.kernels.residual import evaluate
+from solver.balance.kernels.residual import contact_forces, evaluate
 from solver.contacts.kernels.system import Evaluation, Receptance, System
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Complex, Real, coefficient_count, cosine_position
@@ -77,14 +77,9 @@ def linearise(
 
 @apart
 def forces_at(
-    system: System,
-    linear: Receptance,
-    point: Evaluation,
-    solutions: Real,
-    forces: Complex,
-    stiffness: Complex,
+    system: System, point: Evaluation, solutions: Real, forces: Complex, stiffness: Complex
 ) -> None:
-    """Evaluate the contacts at points.
+    """Evaluate the contacts at points; NaN where a law fails.
 
     Parameters
     ----------
@@ -95,7 +90,7 @@ def forces_at(
     nt, n = solutions.shape[1] - 1, coefficient_count(system.ks)
     for row in range(solutions.shape[0]):
         u = solutions[row, :nt]
-        evaluate(system, linear, u, solutions[row, nt], 0.0, point)
+        contact_forces(system, u, solutions[row, nt], 0.0, False, point)
         for i in range(system.ks.size):
             for c in range(system.owner.size):
                 carried = system.shift[c] * _amplitude(system, i, u, c * n)

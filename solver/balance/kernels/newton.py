@@ -29,7 +29,7 @@ TARGET = 1e-11  # relative residual aimed at
 ACCEPTED = 1e-9  # relative residual still a solution when rounding allows no better
 # Factors serve another step where they are at least this large and the last one left this share at most.
 _KEPT_FROM, _KEPT = 100, 0.02
-# A step along an arc is given up if after so many iterations it is no nearer than this share of the beginning.
+# A step along an arc is given up if so many iterations leave more than this share of the first residual.
 _TRIED, _NO_NEARER = 3, 0.7
 _HALVINGS = 5
 _UPHILL_STEPS = 8

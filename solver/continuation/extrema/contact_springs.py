@@ -79,14 +79,7 @@ class LocalModel:
             self._rows[chosen] = first + np.arange(chosen.size)
             stiffness = np.empty((chosen.size, *self.stiffness.shape[1:]), np.complex128)
             forces = np.empty(stiffness.shape[:3], np.complex128)
-            forces_at(
-                workspace.system,
-                workspace.linear,
-                workspace.point,
-                table.solutions[chosen],
-                forces,
-                stiffness,
-            )
+            forces_at(workspace.system, workspace.point, table.solutions[chosen], forces, stiffness)
             self.stiffness = np.concatenate([self.stiffness, stiffness]) if first else stiffness
         return self._rows[numbers]
 

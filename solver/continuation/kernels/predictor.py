@@ -1,4 +1,4 @@
-"""Where the next point of a branch is expected: on the tangent, the secant, or the polynomial of the last ones."""
+"""Where the next point of a branch is expected: on the tangent, the secant, or a polynomial of the last."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ def _size(way: Real, weight_u: float, weight_p: float) -> float:
 def _arc(
     here: Real, way: Real, there: Real, other: Real, sizes: Real, weight_u: float, weight_p: float
 ) -> float:
-    """Return the arc length between two points: of a chord c whose tangents differ by κ it is c (1 + κ²/24)."""
+    """Return the arc length between two points: c (1 + κ²/24) where the tangents at a chord c differ by κ."""
     n = here.size - 1
     chord = weight_p * (here[n] - there[n]) ** 2
     turn = weight_p * (way[n] / sizes[0] - other[n] / sizes[1]) ** 2
