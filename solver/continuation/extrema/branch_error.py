@@ -30,7 +30,7 @@ from solver.continuation.extrema.kernels.suspects import find_reaching
 from solver.continuation.extrema.nodes import Points
 from solver.continuation.peaks import Peak
 from solver.jit.fourier import Complex, Flags, Real
-from solver.scene.harmonics import spread
+from solver.scene.harmonics import among, spread
 
 # Follows a balance between two λ from a first guess; returns the highest peak there, None without a solution.
 Follow = Callable[[Balance, float, float, Real], Peak | None]
@@ -118,7 +118,7 @@ class _Look:
         self._loop = larger.loop
         self._samples: list[_Sample] = []
         ks = larger.balance.system.ks
-        self._beyond = np.flatnonzero(~np.isin(ks, balance.system.ks))
+        self._beyond = np.flatnonzero(~among(balance.system.ks, ks))
 
     def _sampled(self) -> list[_Sample]:
         """Return points all along the branch, without those where the contacts have no force."""
