@@ -279,5 +279,5 @@ def _chosen(points: Points, count: int) -> list[int]:
     span = max(float(np.ptp(at)), 1e-300)
     steps = np.abs(np.diff(at)) / span + np.abs(np.diff(amplitude)) / max(float(np.ptp(amplitude)), 1e-300)
     along = np.append(0.0, np.cumsum(steps))
-    wanted = np.searchsorted(along, np.linspace(0.0, along[-1], count))
-    return [int(i) for i in np.unique(np.minimum(wanted, at.size - 1))]
+    wanted = np.searchsorted(along, along[-1] / (count - 1) * np.arange(count))
+    return sorted(set(np.minimum(wanted, at.size - 1).tolist()))
