@@ -40,7 +40,7 @@ class ContinuationSettings:
 
     predictor: Predictor = Predictor.CUBIC
     first_step: float = 0.02
-    largest_step: float = 0.4
+    largest_step: float = 0.2
     smallest_step: float = 1e-8
     range_length: float = 14.0
     wanted_iterations: int = 6

@@ -61,12 +61,8 @@ def to_full(coefficients: Real, ks: Integer, n_harmonics: int) -> Real:
     (..., 2H + 1) coefficients, zero where a harmonic is not in `ks`.
     """
     full = np.zeros((*coefficients.shape[:-1], 2 * n_harmonics + 1))
-    for i, k in enumerate(ks):
-        here = cosine_position(ks, i)
-        if k == 0:
-            full[..., 0] = coefficients[..., here]
-        else:
-            full[..., 2 * k - 1 : 2 * k + 1] = coefficients[..., here : here + 2]
+    pairs = np.stack([2 * ks - 1, 2 * ks], axis=1).reshape(-1)
+    full[..., pairs[1:] if ks[0] == 0 else pairs] = coefficients
     return full
 
 

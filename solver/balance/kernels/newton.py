@@ -36,6 +36,16 @@ _UPHILL_STEPS = 8
 _MOST = 25
 
 
+@compiled
+def is_close(norm: float, before: float) -> bool:
+    """Return whether another step with the factors of the last one will do.
+
+    A step of Newton's method from a distance e leaves C e², one with the factors of the last point C e as
+    much of that again.
+    """
+    return norm * norm <= 0.1 * TARGET * before
+
+
 @apart
 def newton(
     system: System, linear: Receptance, u: Real, p: float, added: float, point: Evaluation
@@ -50,6 +60,7 @@ def newton(
     trial, kept, step = np.empty(n), np.empty(n), np.empty(n)
     copy_to(trial, u)
     norm, best, length, least, least_length = np.inf, np.inf, 0.0, np.inf, 1.0
+    before = 0.0
     iteration, halvings, uphill, must_take = 0, 0, 0, True
     while True:
         fresh = evaluate(system, linear, trial, p, added, point)
@@ -78,8 +89,9 @@ def newton(
             return True, iteration, norm
         if iteration >= _MOST:
             break
-        if factorise(system, linear, point, step, 0.0, 0.0) == 0.0:
+        if not is_close(norm, before) and factorise(system, linear, point, step, 0.0, 0.0) == 0.0:
             break
+        before = norm
         copy_to(step, point.residual)
         rebase(system, linear, u, point, step)
         step_back(system, point, step)
@@ -132,10 +144,11 @@ def arc_newton(
         hopeless = iteration >= _TRIED and norm > _NO_NEARER * first and norm > ACCEPTED
         if iteration == most or hopeless or norm > 1e3 * max(before, 1e-3):
             break
-        if not (kept and norm <= _KEPT * before):
+        serves = is_close(norm, before) or (norm <= _KEPT * before and point.counts[SIZE] >= _KEPT_FROM)
+        if not (kept and serves):
             if factorise(system, linear, point, tangent, weight_u, weight_p) == 0.0:
                 break
-            kept = point.counts[SIZE] >= _KEPT_FROM
+            kept = True
         before = norm
         plane = weight_p * tangent[n] * (p - guess_p)
         for i in range(n):

@@ -43,7 +43,7 @@ from solver.scene.bodies.paths import SPEED
 from solver.scene.parameter_paths import FREQUENCY
 from solver.scene.scene import Scene
 
-_STRETCH = 32  # points between two looks at the caller, at most
+_STRETCH = 64  # points between two looks at the caller, at most
 _SHORT_STRETCH = 4  # the first of them where a point may take long
 _LARGE = 400  # unknowns from which it may
 _STRETCH_SECONDS = 0.5
