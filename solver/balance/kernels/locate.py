@@ -34,7 +34,7 @@ HIGH_PEAK, LOW_PEAK, EDGE = 0, 1, 2
 _BY_CUBIC, _BY_SECANT = 2, 7  # trials up to which a cubic tells where to look, then a secant or a slope
 _BY_SLOPES = 5  # of a peak, from which the tangents of both sides do: it is a corner, where slopes jump
 # Up to this share of a peak that is polished to the last digits, and of another, one trial may be too low.
-_TOO_LOW, _LOW = 1e-13, 1e-9
+_TOO_LOW, _LOW = 1e-16, 1e-9
 _ASTRAY = 0.4  # share of the chord: a cubic that strays further from it is no guess
 _ROUNDED = 1e-14  # relative residual that no further step makes smaller
 

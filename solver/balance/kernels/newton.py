@@ -43,7 +43,7 @@ def is_close(norm: float, before: float) -> bool:
     A step of Newton's method from a distance e leaves C e², one with the factors of the last point C e as
     much of that again.
     """
-    return norm * norm <= 0.1 * TARGET * before
+    return norm * norm <= 1e-3 * TARGET * before
 
 
 @apart
