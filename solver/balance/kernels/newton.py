@@ -36,16 +36,6 @@ _UPHILL_STEPS = 8
 _MOST = 25
 
 
-@compiled
-def is_close(norm: float, before: float) -> bool:
-    """Return whether another step with the factors of the last one will do.
-
-    A step of Newton's method from a distance e leaves C e², one with the factors of the last point C e as
-    much of that again.
-    """
-    return norm * norm <= 1e-3 * TARGET * before
-
-
 @apart
 def newton(
     system: System, linear: Receptance, u: Real, p: float, added: float, point: Evaluation
@@ -60,7 +50,6 @@ def newton(
     trial, kept, step = np.empty(n), np.empty(n), np.empty(n)
     copy_to(trial, u)
     norm, best, length, least, least_length = np.inf, np.inf, 0.0, np.inf, 1.0
-    before = 0.0
     iteration, halvings, uphill, must_take = 0, 0, 0, True
     while True:
         fresh = evaluate(system, linear, trial, p, added, point)
@@ -89,9 +78,8 @@ def newton(
             return True, iteration, norm
         if iteration >= _MOST:
             break
-        if not is_close(norm, before) and factorise(system, linear, point, step, 0.0, 0.0) == 0.0:
+        if factorise(system, linear, point, step, 0.0, 0.0) == 0.0:
             break
-        before = norm
         copy_to(step, point.residual)
         rebase(system, linear, u, point, step)
         step_back(system, point, step)
@@ -104,6 +92,15 @@ def newton(
     copy_to(u, kept)
     norm = evaluate(system, linear, u, p, added, point)
     return norm <= ACCEPTED, iteration, norm
+
+
+@compiled
+def _is_close(norm: float, before: float) -> bool:
+    """Return whether another step with the factors of the last one will do.
+
+    A step of Newton's method from a distance e leaves C e², one more with its factors C e times that.
+    """
+    return norm * norm <= 1e-3 * TARGET * before
 
 
 @apart
@@ -144,7 +141,7 @@ def arc_newton(
         hopeless = iteration >= _TRIED and norm > _NO_NEARER * first and norm > ACCEPTED
         if iteration == most or hopeless or norm > 1e3 * max(before, 1e-3):
             break
-        serves = is_close(norm, before) or (norm <= _KEPT * before and point.counts[SIZE] >= _KEPT_FROM)
+        serves = _is_close(norm, before) or (norm <= _KEPT * before and point.counts[SIZE] >= _KEPT_FROM)
         if not (kept and serves):
             if factorise(system, linear, point, tangent, weight_u, weight_p) == 0.0:
                 break
