@@ -31,7 +31,7 @@ from solver.linear.lumped_matrices import (
     numbers_of,
     topology_of,
 )
-from solver.linear.model import ForceTerm, LinearModel, LinearModelDerivative
+from solver.linear.model import ForceTerm, Identity, LinearModel, LinearModelDerivative
 from solver.linear.moving_base import base_motions, derivative_with_base, with_base
 from solver.linear.sector_matrices import ProportionalDamping, sector_matrices
 from solver.matrices.values import frozen
@@ -64,7 +64,12 @@ def linear_model(scene: Scene) -> LinearModel:
     Where one sector does not stand for all they are those of the whole annulus. The matrices are cached:
     changing contacts or excitation costs microseconds.
     """
-    scene = written_out(scene)
+    return _linear_model(Identity(scene))
+
+
+@lru_cache(maxsize=2)
+def _linear_model(of: Identity[Scene]) -> LinearModel:
+    scene = written_out(of.it)
     model, base = _without_base(scene), base_motions(scene)
     return with_base(model, scene, base) if base else model
 

@@ -17,7 +17,7 @@ from solver.contacts.kernels.normal_load import fill_load, tie
 from solver.contacts.kernels.stick_slip_events import BEGAN, FAILED, SEPARATED, STUCK, UNLOADED
 from solver.contacts.kernels.system import FREQUENCY, LEVEL, Evaluation, Receptance, System
 from solver.jit.decorators import compiled
-from solver.jit.fourier import Complex, Real, coefficient_count, cosine_position
+from solver.jit.fourier import Complex, Real, coefficient_count, cosine_position, magnitude
 from solver.jit.lapack import copy_block, fill
 from solver.jit.separate import apart
 from solver.linear.kernels.modal_responses import driven_motions, goes_through_modes, modal_responses
@@ -285,10 +285,10 @@ def _residual(
             else:
                 response, dresponse, reach = _response(system, linear, u, i, c, out)
             free, dfree = linear.u_linear[0, i, c], linear.u_linear[1, i, c]
-            scale = max(scale, abs(free), reach * force_scale)
+            scale = max(scale, magnitude(free), reach * force_scale)
             if has_sine:
                 # The mean of a part that nothing holds may drift without bound: it must not hide a residual.
-                scale = max(scale, abs(response))
+                scale = max(scale, magnitude(response))
             r[row] = u[row] - free.real + response.real
             dr[row] = -dfree.real + dresponse.real
             residual = max(residual, abs(r[row]))

@@ -26,7 +26,7 @@ from solver.balance.workspace import Workspace
 from solver.continuation.certificate import PeakCertificate, certified, uncertain
 from solver.continuation.extrema.intervals import CURVES, highest_share, lowest_share, may_cross
 from solver.continuation.extrema.kernels.intervals import IS_BENT, WAVES, WORTH_POLISHING
-from solver.continuation.extrema.nodes import Node, NodeSolver, Points
+from solver.continuation.extrema.nodes import Node, NodeSolver, Points, numbers_of
 from solver.continuation.extrema.resonance_search import ResonanceSearch, Search
 from solver.continuation.extrema.state_changes import ChangeSearch
 from solver.continuation.folds import fold_between, motion_scales
@@ -284,10 +284,10 @@ class Survey:
             found, sure = self._dipped(nodes[-1], right, limit, MOST_DIPS) if wanted else ([], True)
             known &= sure
             nodes += [*found, right]
-        for left, right in pairwise(nodes):
+        above = np.array([node.measures[MAX_ABS] for node in nodes]) > limit
+        for j in np.flatnonzero(above[1:] | above[:-1]).tolist():
+            left, right = nodes[j], nodes[j + 1]
             gaps = left.measures[MAX_ABS] - limit, right.measures[MAX_ABS] - limit
-            if gaps[0] <= 0.0 and gaps[1] <= 0.0:
-                continue
             begin, end = left.solution, right.solution
             if (gaps[0] > 0.0) != (gaps[1] > 0.0):
                 edge = self._edge(left, right, limit, gaps)
@@ -315,11 +315,14 @@ class Survey:
 
     def _with_folds(self, limit: float) -> tuple[list[Node], list[tuple[Node, bool]]]:
         """Return the nodes with the folds above the limit among them, and these (and whether smooth)."""
+        onward = self._solver.table.tangents[numbers_of(self._nodes), -1]
+        turns = onward[1:] * onward[:-1] < 0.0
+        if not turns.any():
+            return self._nodes, []
         nodes: list[Node] = [self._nodes[0]]
         folds = []
-        for left, right in pairwise(self._nodes):
-            turns = left.tangent[-1] * right.tangent[-1] < 0.0
-            if turns and max(left.measures[MAX_ABS], right.measures[MAX_ABS]) > limit:
+        for (left, right), turned in zip(pairwise(self._nodes), turns.tolist(), strict=True):
+            if turned and max(left.measures[MAX_ABS], right.measures[MAX_ABS]) > limit:
                 by_share = motion_scales(left, right)
                 ends = float(left.tangent[-1] * by_share[0]), float(right.tangent[-1] * by_share[1])
                 found = fold_between(partial(self._solver.between, left, right), *ends)
