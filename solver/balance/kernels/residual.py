@@ -109,14 +109,14 @@ def _evaluate(
             return np.nan
     table, load, slope, dload = contact_values(system, p, added)
     for e in range(system.laws.size):
-        good = _element(system, e, u, table[e], load[e], slope[e], dload[e], alone, out)
+        good = element(system, e, u, table[e], load[e], slope[e], dload[e], alone, out)
         if not good:
             return np.nan
     return _residual(system, linear, u, p, least_size(system, p), alone, out)
 
 
 @compiled
-def _element(
+def element(
     system: System, e: int, u: Real, table: Real, load: Real, slope: Real, dload: Real, alone: bool,
     out: Evaluation,
 ) -> bool:  # fmt: skip
