@@ -128,7 +128,7 @@ class _Look:
         ks, nc = larger.balance.system.ks, larger.balance.n_ports
         forces = np.empty((len(chosen), ks.size, nc), np.complex128)
         stiffness = np.empty((len(chosen), ks.size, nc, nc), np.complex128)
-        forces_at(larger.system, larger.linear, larger.point, rows, forces, stiffness)
+        forces_at(larger.system, larger.point, rows, forces, stiffness)
         return [
             _Sample(
                 at=float(rows[j, -1]), amplitude=float(self._points.measures[i, MAX_ABS]), u=rows[j, :-1],
@@ -207,7 +207,7 @@ class _Look:
         rows = self._wide_rows(_chosen(points, _FEW_SAMPLES))
         forces = np.empty((len(rows), system.ks.size, nc), np.complex128)
         nothing = np.empty((0, system.ks.size, nc, nc), np.complex128)
-        forces_at(larger.system, larger.linear, larger.point, rows, forces, nothing)
+        forces_at(larger.system, larger.point, rows, forces, nothing)
         may = np.empty(self._beyond.size, bool)
         find_reaching(
             larger.system, *self._loop.range, points.solutions, points.measures[:, MAX_ABS], forces,
