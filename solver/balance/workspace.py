@@ -139,11 +139,11 @@ class Workspace:
 
         From nothing, Newton starts at the fully stuck response; if that fails, the harmonics are added
         little by little, beginning with the first alone, and the contacts are made soft and then stiffer
-        (under constant forces in the other order, and the excitation is raised from the static equilibrium);
-        if that fails too, the load is walked down rung by rung from full stick, and at last the excitation
-        is raised from nothing. Where contacts alone hold a part, it is looked first whether friction can hold
-        its mean load, and where no contact holds it, whether a force drives it away. What is found obeys
-        mechanics, see `solver.balance.kernels.mechanics`.
+        (under constant forces these two come before it, and the excitation is raised from the static
+        equilibrium); if that fails too, the load is walked down rung by rung from full stick, and at last the
+        excitation is raised from nothing. Where contacts alone hold a part, it is looked first whether
+        friction can hold its mean load, and where no contact holds it, whether a force drives it away. What
+        is found obeys mechanics, see `solver.balance.kernels.mechanics`.
         """
         ways = self._ways()
         if not len(self.balance.system.loose) or self.balance.system.hold:
@@ -185,7 +185,8 @@ class Workspace:
     def _ways(self) -> tuple[Way, ...]:
         """Return the ways to a solution from nothing in their order, each as `newton` with u in place.
 
-        Under constant forces the contacts are soft at first: their load is not known before the equilibrium.
+        Under constant forces full stick comes late: the load is not known before the equilibrium, and stiff
+        contacts may slip far beyond what their springs give.
         """
         system, linear, point = self.system, self.linear, self.point
         stuck = partial(_in_place, from_stuck, system, linear, point)
@@ -193,7 +194,7 @@ class Workspace:
         soft = partial(solve_softened, self.balance.system, linear, point)
         at_rest = partial(self._by_level, at_rest=True)
         if self.balance.system.constant_mean:
-            return stuck, soft, at_rest, self._from_fewer, rungs, self._by_level
+            return self._from_fewer, soft, stuck, at_rest, rungs, self._by_level
         if np.any(self.balance.system.shift):  # contacts hold it: the less they stick the farther it may seem
             return stuck, rungs, self._from_fewer, soft, self._by_level
         return stuck, self._from_fewer, soft, rungs, self._by_level

@@ -25,7 +25,7 @@ class ContinuationSettings:
     predictor : Predictor
         How the next point is guessed.
     first_step, largest_step, smallest_step : float
-        Arc length steps.
+        Arc length steps; the largest is 2.5 times this from 1000 unknowns on, where a point is dear.
     range_length : float
         Arc length of the whole range of λ if u did not change: more gives a finer branch.
     wanted_iterations : int

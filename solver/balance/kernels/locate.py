@@ -32,7 +32,10 @@ from solver.linear.kernels.receptance import receptance
 _AT_A_FOLD = 1e-9  # weight of λ there
 HIGH_PEAK, LOW_PEAK, EDGE = 0, 1, 2
 _BY_CUBIC, _BY_SECANT = 2, 7  # trials up to which a cubic tells where to look, then a secant or a slope
-_BY_SLOPES = 5  # of a peak, from which the tangents of both sides do: it is a corner, where slopes jump
+# A slope that stays above this share of that at the end it replaces is one side of a corner, where it jumps.
+_JUMPS = 0.5
+_MET = 1e-11  # of a peak, to which both tangents have foretold it
+_PAST, _FARTHER = 0.02, 10.0  # share of the nearer side a trial goes past a corner; times that if in vain
 # Up to this share of a peak that is polished to the last digits, and of another, one trial may be too low.
 _TOO_LOW, _LOW = 1e-16, 1e-9
 _ASTRAY = 0.4  # share of the chord: a cubic that strays further from it is no guess
@@ -187,8 +190,8 @@ def refine(
     -------
     (found, Newton iterations). Every trial is a converged solution on the arc: where the cubic has its peak,
     then by secants, an edge by its slope; by bracketed secants (Illinois) where these lead out of the
-    bracket. At a corner, where a contact changes its state, the tangents of both sides meet, and bound what
-    is left to be gained.
+    bracket. At a corner, where a contact changes its state, the tangents of both sides meet: trials go a
+    little past that place, towards the side that is farther from it.
     """
     n = left.size
     folds = left_slope[n - 1] * right_slope[n - 1] < 0.0
@@ -200,18 +203,17 @@ def refine(
     copy_to(ways[1], right_slope)
     lo, hi, g_lo, g_hi = 0.0, 1.0, g_left, g_right
     scale, low = max(abs(g_left), abs(g_right)), _TOO_LOW if close < _LOW else _LOW
-    total, side = 0, 0
+    total, side, corner, past, top = 0, 0, False, _PAST, math.inf
     last, g_last, share, g = 0.0, g_left, 1.0, g_right
     for trial in range(40):
-        ahead, width = -1.0, hi - lo
-        if what != EDGE and trial < _BY_CUBIC:
+        ahead, width, aim = -1.0, hi - lo, 0
+        if what != EDGE and corner:
+            met = (v_right - v_left - g_right * width) / (g_left - g_right)
+            aim, top = 1 if met < 0.5 * width else -1, v_left + g_left * met
+            ahead = lo + met + aim * past * min(met, width - met)
+        elif what != EDGE and trial < _BY_CUBIC:
             place = _top_of_cubic(v_left, g_left * width, v_right, g_right * width)
             ahead = lo + place * width if place > 0.0 else -1.0
-        elif what != EDGE and trial >= _BY_SLOPES and trial % 3 != 2:
-            # Past the corner a little, in turns: both sides have to come near it.
-            met = (v_right - v_left - g_right * width) / (g_left - g_right)
-            nearer = 0.02 * min(met, width - met)
-            ahead = lo + met + (nearer if trial % 3 == 0 else -nearer)
         elif what != EDGE and trial < _BY_SECANT and g != g_last:
             ahead = share - g * (share - last) / (g - g_last)
         elif what == EDGE and 0 < trial < _BY_SECANT and out[SLOPE] != 0.0:
@@ -234,7 +236,11 @@ def refine(
         left_over = (hi - share) * g if g > 0.0 else (lo - share) * g
         if what != EDGE and left_over <= low * abs(out[value]):
             break
+        if aim != 0 and abs(top - out[value]) <= _MET * abs(out[value]):
+            break
         now = -1 if (g > 0.0) == (g_lo > 0.0) else 1
+        corner = abs(g) > _JUMPS * abs(g_left if now < 0 else g_right)
+        past = _FARTHER * past if now * aim < 0 else _PAST
         if now < 0:
             lo, g_lo, g_left, v_left = share, g, g, out[value]
             g_hi = 0.5 * g_hi if side == now else g_hi

@@ -31,6 +31,7 @@ ACCEPTED = 1e-9  # relative residual still a solution when rounding allows no be
 _KEPT_FROM, _KEPT = 100, 0.02
 # A step along an arc is given up if so many iterations leave more than this share of the first residual.
 _TRIED, _NO_NEARER = 3, 0.7
+_IN_VAIN = 2  # steps in a row that bring the residual no lower, after which one so large is given up
 _HALVINGS = 5
 _UPHILL_STEPS = 8
 _MOST = 25
@@ -120,7 +121,7 @@ def arc_newton(
     """
     n = u.size
     rhs, best = np.empty(n + 1), np.empty(n)
-    before, norm, first, stalls, kept = np.inf, np.inf, np.inf, 0, False
+    before, norm, first, stalls, vain, kept = np.inf, np.inf, np.inf, 0, 0, False
     best_p, best_norm = p, np.inf
     iteration = 0
     for iteration in range(most + 1):
@@ -128,9 +129,10 @@ def arc_newton(
         norm = evaluate(system, linear, u, p, 0.0, point)
         if not math.isfinite(norm):
             break
+        vain += 1
         if norm < best_norm:
             copy_to(best, u)
-            best_p, best_norm = p, norm
+            best_p, best_norm, vain = p, norm, 0
         # A first stall far above the target may be a kink on the way; a second one is rounding.
         stalls = stalls + 1 if norm > 0.5 * before else 0
         settled = norm <= 0.1 * ACCEPTED or stalls > 1
@@ -141,6 +143,8 @@ def arc_newton(
         hopeless = iteration >= _TRIED and norm > _NO_NEARER * first and norm > ACCEPTED
         if iteration == most or hopeless or norm > 1e3 * max(before, 1e-3):
             break
+        if vain >= _IN_VAIN and point.counts[SIZE] >= _KEPT_FROM:
+            break  # between pieces that contacts change to and fro it goes round in circles
         serves = _is_close(norm, before) or (norm <= _KEPT * before and point.counts[SIZE] >= _KEPT_FROM)
         if not (kept and serves):
             if factorise(system, linear, point, tangent, weight_u, weight_p) == 0.0:

@@ -120,13 +120,13 @@ def evaluate_contacts(system: System, u: Real, p: float, added: float, alone: bo
     """
     table, load, slope, dload = contact_values(system, p, added)
     for e in range(system.laws.size):
-        if not _element(system, e, u, table[e], load[e], slope[e], dload[e], alone, out):
+        if not element(system, e, u, table[e], load[e], slope[e], dload[e], alone, out):
             return False
     return True
 
 
 @compiled
-def _element(
+def element(
     system: System, e: int, u: Real, table: Real, load: Real, slope: Real, dload: Real, alone: bool,
     out: Evaluation,
 ) -> bool:  # fmt: skip

@@ -47,6 +47,8 @@ from solver.scene.scene import Scene
 _STRETCH = 64  # points between two looks at the caller, at most
 _SHORT_STRETCH = 4  # the first of them where a point may take long
 _LARGE = 400  # unknowns from which it may
+# Unknowns from which a point is so dear that steps are longer, and how much: the survey adds what it needs.
+_DEAR, _LONGER = 1000, 2.5
 _STRETCH_SECONDS = 0.5
 _MOST_FOLLOWED = 500  # points of a look at a resonance beside the branch
 _LOST = (
@@ -258,6 +260,8 @@ def walk(
         most_iterations=settings.most_iterations, predictor=int(settings.predictor),
         largest_turn=settings.largest_turn, range_weight=settings.range_length,
     )  # fmt: skip
+    if balance.n_unknowns >= _DEAR:
+        control = control._replace(largest_step=_LONGER * control.largest_step)
     linear, point = workspace.linear, workspace.point
     if resume is None:
         found = solve_from_nothing(workspace, control.start, guess)

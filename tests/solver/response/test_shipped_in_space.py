@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from cases.random_space import Outcome, judge
 
@@ -74,3 +75,17 @@ def test_the_estimate_covers_the_error_of_random_scenes_in_space() -> None:
     assert len(covered) >= 0.95 * len(known)
     wrong = [each.seed for each in verdicts if each.outcome is Outcome.WRONG and each.estimate < 1.0]
     assert wrong == []
+
+
+def test_a_peak_where_contacts_begin_to_slip_is_found_to_its_last_digits() -> None:
+    """Solved by itself, no frequency beside the corner has a higher response than the peak of the sweep."""
+    scene = solver.load_scene("shroud-3d")
+    corner = min(solver.sweep(scene).peaks, key=lambda peak: abs(peak.at - 397.36))
+    assert corner.interior
+    beside = [
+        solver.solve(scene, frequency_hz=corner.at + side * off).max_abs
+        for side in (-1.0, 1.0)
+        for off in np.geomspace(1e-8, 1e-4, 9)
+    ]
+    assert max(beside) <= corner.value * (1.0 + 1e-10)
+    assert max(beside) >= corner.value * (1.0 - 1e-8)

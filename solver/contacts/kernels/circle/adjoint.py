@@ -105,11 +105,12 @@ def _weigh(kept: Array, c: Number, s: Number, weights: Array, F: Array, line: Ar
 @apart
 def panel_back(
     packed: Array, kappa: Number, all_ks: Integer, panel: Array, weights: Array, of_motion: Integer,
-    active: bool, eta: Array, sums: Array, F: Array, table: Array, adjoint: Array, G: Array,
+    active: bool, eta: Array, sums: Array, F: Array, table: Array, adjoint: Array,
 ) -> None:  # fmt: skip
     """Go back over a panel of a slip: η (of θ) at its begin from that at its end.
 
-    `table` (STAGES, 3·size + 1), −∂R/∂(X, Y, L, κ), and `adjoint` (STAGES, m) are scratch.
+    What the panel adds to the gradient is adjointᵀ · table, with `table` (STAGES, 3·size + 1) of
+    −∂R/∂(X, Y, L, κ) and `adjoint` (STAGES, m), filled.
     """
     dtype, m, n = packed.dtype, eta.size, of_motion.size
     size = packed.shape[1]
@@ -150,24 +151,8 @@ def panel_back(
     for r in range(m):
         adjoint[STAGES - 1, r] += eta[r]
     solve_columns(matrix, adjoint)
-    _gather(adjoint, table, G)
     for r in range(m):
         eta[r] = -first[0] * adjoint[0, r]
     for i in range(1, STAGES):
         for r in range(m):
             eta[r] -= first[i] * adjoint[i, r]
-
-
-@compiled
-def _gather(adjoint: Array, table: Array, G: Array) -> None:
-    """Add adjointᵀ · table, five nodes of the panel at once."""
-    for r in range(adjoint.shape[1]):
-        for p in range(0, STAGES, 5):
-            a, b, c, d, e = (
-                adjoint[p, r], adjoint[p + 1, r], adjoint[p + 2, r], adjoint[p + 3, r], adjoint[p + 4, r],
-            )  # fmt: skip
-            for j in range(table.shape[1]):
-                G[r, j] += (
-                    a * table[p, j] + b * table[p + 1, j] + c * table[p + 2, j] + d * table[p + 3, j]
-                    + e * table[p + 4, j]
-                )  # fmt: skip

@@ -54,7 +54,7 @@ from solver.contacts.kernels.circle.path import (
     projection,
 )
 from solver.contacts.kernels.circle.radau import STAGES
-from solver.contacts.kernels.circle.state import CLOSES, HOW, PIECES, SETTLES
+from solver.contacts.kernels.circle.state import CLOSES, HOW, PANELS, PIECES, SETTLES
 from solver.contacts.kernels.coulomb.force import bases_at, moment_rows, products
 from solver.contacts.kernels.stick_slip_events import AFTER_SEPARATION, STICK, UNLOADED
 from solver.jit.decorators import compiled
@@ -282,7 +282,8 @@ def circle_gradient(
     rows, count = G.shape[0] - 2, int(found[PIECES])
     psi, eta = np.zeros((2, rows + 2), dtype), np.zeros(rows + 2, dtype)
     sums = np.zeros((6, ks[-1] + all_ks[-1] + 1), dtype)
-    table, adjoint = np.empty((STAGES, 3 * size + 1), dtype), np.empty((STAGES, rows + 2), dtype)
+    nodes, used = STAGES * int(found[PANELS].real), 0
+    table, adjoint = np.empty((nodes, 3 * size + 1), dtype), np.empty((nodes, rows + 2), dtype)
     packed = np.empty((3, size), dtype)
     for x in range(3):
         pack(waves[x], all_ks, packed[x])
@@ -304,9 +305,12 @@ def circle_gradient(
             continue
         _slip_end(waves, all_ks, row[END], panels[last, START + STAGES], psi, eta, G)
         for p in range(last, int(row[FIRST].real) - 1, -1):
+            here = slice(used, used + STAGES)
             panel_back(
-                packed, kappa, all_ks, panels[p], weights, of_motion, active, eta, sums, F, table, adjoint, G
-            )
+                packed, kappa, all_ks, panels[p], weights, of_motion, active, eta, sums, F, table[here],
+                adjoint[here],
+            )  # fmt: skip
+            used += STAGES
         theta = panels[int(row[FIRST].real), START]
         if not follows and row[BEGAN] == AFTER_SEPARATION:
             _contact_back(waves, kappa, all_ks, row[BEGIN], theta, eta, G)
@@ -314,6 +318,7 @@ def circle_gradient(
             continue
         after_stick = follows and pieces[index - 1, MOTION] == STICK
         _slip_begin(waves, kappa, all_ks, row[BEGIN], theta, after_stick, eta, psi, G)
+    G += np.dot(adjoint[:used].T, table[:used])
     _linear_parts(packed, kappa, ks, all_ks, of_motion, weights, sums, F, G)
     if found[HOW] == CLOSES:
         _close(psi, rows, G)

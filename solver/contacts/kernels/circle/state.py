@@ -26,7 +26,10 @@ from solver.contacts.kernels.circle.panels import (
     slip_rate,
 )
 from solver.contacts.kernels.circle.path import (
+    BEGIN,
+    END,
     LONGEST,
+    MOTION,
     PANEL_COLUMNS,
     PIECE_COLUMNS,
     S_BEGAN,
@@ -77,6 +80,13 @@ MOST_FORGETTING, LITTLE = 0.75, 3.0
 REPEATS = 3e-9  # change of the force over a period, relative to the largest limit, that counts as none
 MOST_ROUNDS = 60
 MOST_TRANSIENT = 40  # periods after which a slider that still slips is taken to do so for ever
+# Periods after which a motion that slips for ever is looked for already, in so many rounds. It is believed
+# where its slips last too long to fade away [rad], or fade so slowly (what is left of a difference after a
+# period) that more periods would not end them.
+EARLY, EARLY_ROUNDS, LASTING, SLOWLY = 3, 20, 0.03, 0.95
+# Where as good as all of a difference is left after a period, its last slip has just ended; so much nearer to
+# what still slipped the search goes on.
+NEUTRAL, NEARER = 1.0 - 1e-5, 0.25
 WAVES_PER_PANEL = 9.0  # rad that the highest harmonic turns in one panel, at most
 # How the path was found, and so how its derivatives go on: each interval from no force, one period that
 # repeats, or from the unloaded state to a last period that sticks (or sticks from the first).
@@ -213,8 +223,8 @@ def _start_at(at: Real, kappa: float, tx: float, ty: float, state: Real) -> None
 
 @apart
 def _repeat(
-    waves: Real, kappa: float, grid: Real, begin: float, force: Real, may_end: bool, numbers: Real,
-    pieces: Real, panels: Real, found: Real,
+    waves: Real, kappa: float, grid: Real, begin: float, force: Real, may_end: bool, rounds: int,
+    numbers: Real, pieces: Real, panels: Real, found: Real,
 ) -> int:  # fmt: skip
     """Find the force at `begin` that is the same a period later; STUCK means that the slipping ended.
 
@@ -226,7 +236,7 @@ def _repeat(
     last_x, last_y = tx, ty
     before, plain = np.inf, False
     curves_at(waves, begin, at)
-    for _ in range(MOST_ROUNDS):
+    for _ in range(rounds):
         _start_at(at, kappa, tx, ty, state)
         tx, ty = state[S_TX], state[S_TY]
         count, filled = march_path(
@@ -235,14 +245,15 @@ def _repeat(
         if count < 0:
             return count
         rx, ry = state[S_TX] - tx, state[S_TY] - ty
-        if state[S_SLIPPED] == 0.0:
-            if may_end:
-                return STUCK
-            tx, ty = 0.5 * (tx + last_x), 0.5 * (ty + last_y)
+        if state[S_SLIPPED] == 0.0 and may_end:
+            return STUCK
+        memory = state[S_FACTOR] * (state[S_PX] * state[S_MX] + state[S_PY] * state[S_MY])
+        ended = state[S_SLIPPED] == 0.0 or (memory >= NEUTRAL and not may_end)
+        if ended and (tx != last_x or ty != last_y):
+            tx, ty = tx + NEARER * (last_x - tx), ty + NEARER * (last_y - ty)
             continue
         last_x, last_y = tx, ty
         along = state[S_FACTOR] * (state[S_PX] * rx + state[S_PY] * ry)
-        memory = state[S_FACTOR] * (state[S_PX] * state[S_MX] + state[S_PY] * state[S_MY])
         change = math.hypot(rx, ry)
         plain = (change > 0.5 * before and not plain) or memory >= 1.0
         before = change
@@ -256,10 +267,21 @@ def _repeat(
     return FAILED
 
 
+@compiled
+def _lasts(pieces: Real, found: Real) -> bool:
+    """Return whether the slips of a path that repeats go on for ever, or fade away very slowly."""
+    slipped = 0.0
+    for i in range(int(found[PIECES])):
+        if pieces[i, MOTION] == SLIP:
+            slipped += pieces[i, END] - pieces[i, BEGIN]
+    left = found[FACTOR] * (found[PX] * found[MX] + found[PY] * found[MY])
+    return bool(slipped >= LASTING or left >= SLOWLY)
+
+
 @apart
 def _settle(
-    waves: Real, kappa: float, grid: Real, numbers: Real, pieces: Real, panels: Real, found: Real,
-    force: Real,
+    waves: Real, kappa: float, grid: Real, periods: int, numbers: Real, pieces: Real, panels: Real,
+    found: Real, force: Real,
 ) -> int:  # fmt: skip
     """March from the unloaded state until a period passes without slip; SLIPPING if none does."""
     state, at = np.empty(STATE_SIZE), np.empty(CURVES)
@@ -274,7 +296,7 @@ def _settle(
     # What a transient leaves stays: it is not averaged over a period as a motion that repeats.
     numbers[TAIL_SIZE] = 1e-2 * SMALL_TAIL
     count, filled = 0, 0
-    for period in range(MOST_TRANSIENT):
+    for period in range(periods):
         before = filled
         count, filled = march_path(
             waves, kappa, grid, period * TURN, (period + 1) * TURN, state, numbers, pieces, panels, count,
@@ -308,12 +330,20 @@ def _closed(
             if count < 0:
                 return count
             force[0], force[1] = state[S_TX], state[S_TY]
-        how = _repeat(waves, kappa, grid, TURN * place / n, force, True, numbers, pieces, panels, found)
+        how = _repeat(
+            waves, kappa, grid, TURN * place / n, force, True, MOST_ROUNDS, numbers, pieces, panels, found
+        )
         if how != STUCK:
             return how
-    how = _settle(waves, kappa, grid, numbers, pieces, panels, found, force)
+    how = _settle(waves, kappa, grid, EARLY, numbers, pieces, panels, found, force)
+    if how != SLIPPING:
+        return how
+    how = _repeat(waves, kappa, grid, 0.0, force, False, EARLY_ROUNDS, numbers, pieces, panels, found)
+    if how == SLIPPING and _lasts(pieces, found):
+        return how
+    how = _settle(waves, kappa, grid, MOST_TRANSIENT, numbers, pieces, panels, found, force)
     if how == SLIPPING:
-        how = _repeat(waves, kappa, grid, 0.0, force, False, numbers, pieces, panels, found)
+        how = _repeat(waves, kappa, grid, 0.0, force, False, MOST_ROUNDS, numbers, pieces, panels, found)
     return how
 
 

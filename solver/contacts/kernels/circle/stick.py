@@ -29,20 +29,26 @@ from solver.jit.separate import apart
 
 
 @compiled
+def length(x: float, y: float) -> float:
+    """Return √(x² + y²); forces are far from where their squares overflow, which `math.hypot` guards for."""
+    return math.sqrt(x * x + y * y)
+
+
+@compiled
 def excess(waves: Real, kappa: float, offset_x: float, offset_y: float, tau: float, at: Real) -> float:
     """Return |t| − L of a stick with t = offset + (X, Y/κ); fills `at` with the curves."""
     curves_at(waves, tau, at)
-    return math.hypot(offset_x + at[X], offset_y + at[Y] / kappa) - at[LIMIT]
+    return length(offset_x + at[X], offset_y + at[Y] / kappa) - at[LIMIT]
 
 
 @compiled
 def excess_slopes(at: Real, kappa: float, offset_x: float, offset_y: float) -> tuple[float, float]:
     """Return slope and curvature of |t| − L from the curves `at` a point, those ahead of it where t is 0."""
     tx, ty = offset_x + at[X], offset_y + at[Y] / kappa
-    size = math.hypot(tx, ty)
+    size = length(tx, ty)
     dx, dy = at[DX], at[DY] / kappa
     if size == 0.0:
-        speed = math.hypot(dx, dy)
+        speed = length(dx, dy)
         turn = (dx * at[DDX] + dy * at[DDY] / kappa) / speed if speed > 0.0 else 0.0
         return speed - at[DLIMIT], turn - at[DDLIMIT]
     along = (tx * dx + ty * dy) / size
@@ -148,7 +154,7 @@ def leave_stick(
         else:
             g = j % n
             tx, ty = offset_x + grid[0, g], offset_y + grid[1, g] / kappa
-            size = math.hypot(tx, ty)
+            size = length(tx, ty)
             high, rate_high = size - grid[2, g], -grid[5, g]
             if size > 0.0:
                 rate_high += (tx * grid[3, g] + ty * grid[4, g] / kappa) / size

@@ -26,7 +26,7 @@ from solver.balance.kernels.output import (
     measure,
     piece,
 )
-from solver.balance.kernels.residual import contact_values, evaluate
+from solver.balance.kernels.residual import contact_values, element
 from solver.contacts.kernels.columns import KT, MU
 from solver.contacts.kernels.state_durations import find_segments
 from solver.contacts.kernels.stick_slip_events import piece_of
@@ -54,30 +54,39 @@ def _interpolated(rows: Real, ways: Real, t: float, u: Real) -> None:
 
 
 @apart
-def _piece_at(system: System, linear: Receptance, point: Evaluation, u: Real, p: float) -> float:
-    """Return `piece` for the motions u at λ = p, by the events of the contacts alone where that goes."""
-    simple = system.samples == 0
-    for e in range(system.laws.size):
-        simple = simple and system.jenkins[e] == 1
-    if not simple:
-        # The receptance may be that of anywhere: the residual is not looked at.
-        evaluate(system, linear, u, p, 0.0, point)
-        return piece(point)
+def _find_pieces(system: System, u: Real, p: float, asked: Integer, point: Evaluation) -> None:
+    """Fill `point.pieces` of the elements asked for (1) from the motions u at λ = p."""
     n = coefficient_count(system.ks)
-    table, load, _, _ = contact_values(system, p, 0.0)
+    table, load, slope, dload = contact_values(system, p, 0.0)
     for e in range(system.laws.size):
+        if asked[e] == 0:
+            continue
+        if system.jenkins[e] == 0 or system.samples > 0:
+            element(system, e, u, table[e], load[e], slope[e], dload[e], True, point)
+            continue
         c = system.first_port[e]
         _, count = find_segments(
             u[c * n : (c + 1) * n], system.ks, load[e], system.load_ks, table[e, KT], table[e, MU],
             system.cos_table, system.sin_table, point.segments,
         )  # fmt: skip
         point.pieces[e] = piece_of(point.segments, count)
-    return piece(point)
+
+
+@compiled
+def _changing(system: System, rows: Real, pieces: Integer, asked: Integer, point: Evaluation) -> None:
+    """Fill `pieces` (ne,) with those at the first of two solutions; keep of `asked` (1) where they change."""
+    n = rows.shape[1] - 1
+    _find_pieces(system, rows[0, :n], rows[0, n], asked, point)
+    for e in range(pieces.size):
+        pieces[e] = point.pieces[e]
+    _find_pieces(system, rows[1, :n], rows[1, n], asked, point)
+    for e in range(pieces.size):
+        asked[e] = 1 if point.pieces[e] != pieces[e] else 0
 
 
 @compiled
 def _foretold(
-    system: System, linear: Receptance, point: Evaluation, rows: Real, ways: Real, here: float, u: Real
+    system: System, point: Evaluation, rows: Real, ways: Real, pieces: Integer, asked: Integer, u: Real
 ) -> float:
     """Return the λ at which a piece changes if the motion between two solutions is a cubic."""
     n = u.size
@@ -85,7 +94,11 @@ def _foretold(
     for _ in range(_FORETOLD):
         t = 0.5 * (before + after)
         _interpolated(rows, ways, t, u)
-        if _piece_at(system, linear, point, u, rows[0, n] + t * (rows[1, n] - rows[0, n])) != here:
+        _find_pieces(system, u, rows[0, n] + t * (rows[1, n] - rows[0, n]), asked, point)
+        changed = False
+        for e in range(pieces.size):
+            changed = changed or (asked[e] == 1 and point.pieces[e] != pieces[e])
+        if changed:
             after = t
         else:
             before = t
@@ -151,10 +164,12 @@ def locate_change(
     n = found.shape[1] - 1
     row, way, at, out = np.empty(n), np.empty(n + 1), np.empty(x.shape[1]), np.empty(measures.shape[1])
     last, behind, total = 0.0, False, 0
+    pieces, asked = np.empty(states.shape[1], np.int64), np.ones(states.shape[1], np.int64)
+    _changing(system, found, pieces, asked, point)
     sides[0], sides[1] = 0, 0
     for _ in range(trials):
         lo, hi = found[0, n], found[1, n]
-        p = _foretold(system, linear, point, found, ways, measures[0, PIECE], row)
+        p = _foretold(system, point, found, ways, pieces, asked, row)
         if sides[0] + sides[1] > 0:
             beyond = max(_BEYOND * abs(p - last), abs(hi - lo) * 0.5**_FORETOLD)
             p += math.copysign(beyond, (hi - lo) * (-1.0 if behind else 1.0))
