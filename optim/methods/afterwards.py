@@ -110,7 +110,7 @@ def _improved(result: DesignResult, begin: Evaluation, should_stop: ShouldStop, 
     status = result.status
     if status in (DesignStatus.OPTIMAL, DesignStatus.AT_BOUND, DesignStatus.KINK):
         status = settled_status(local.conditions) if local.settled else DesignStatus.KINK
-    responses = sum(len(one.responses) for one in search.history)
+    responses = sum(one.computed for one in search.history)
     return replace(
         result, method=Method.MINIMAX, status=status, evaluation=local.evaluation,
         conditions=local.conditions,
@@ -161,8 +161,12 @@ def _checked(
         same = (one for one in more if one.values == values and one.harmonics == problem.harmonics)
         found = next(same, None)
         if found is None:
-            found = evaluate(problem, values, gradients=False, errors=False, should_stop=should_stop)
-            responses += len(found.responses)
+            seen = (one for one in (result.evaluation, *result.history) if one.values == values)
+            found = evaluate(
+                problem, values, gradients=False, errors=False, should_stop=should_stop,
+                before=next(seen, None),
+            )  # fmt: skip
+            responses += found.computed
             tick()
         good = found.good and bool(found.peaks)
         checked.append(

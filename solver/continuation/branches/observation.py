@@ -28,9 +28,10 @@ COMPETES_FOR_HIGHEST = 0.8  # share of the highest point from which a maximum ma
 
 
 def observing(
-    branch: Branch, dof: str, *, limit: float | None = None, effects: Effects | None = None
-) -> Branch:
-    """Return a frequency response with another DOF observed: the same solutions, its own peaks and band.
+    branch: Branch, dof: str, *, measure: str | None = None, limit: float | None = None,
+    effects: Effects | None = None,
+) -> Branch:  # fmt: skip
+    """Return a frequency response observed otherwise: the same solutions, its own peaks and band.
 
     It costs one evaluation a point, no continuation. Between points it is as good as the branch is dense;
     near the top of the new DOF the survey of the peaks adds points of its own.
@@ -39,6 +40,7 @@ def observing(
     ----------
     branch : a completed response over the frequency.
     dof : name of the DOF.
+    measure : of its motion, as in a scene; that of the branch if left out.
     limit : amplitude [m] above which the band is measured; peak/√2 if left out.
     effects : those the branch was computed with.
 
@@ -49,7 +51,8 @@ def observing(
     """
     begun = time.perf_counter()
     scene = branch.balance.scene
-    other = scene.model_copy(update={"observe": scene.observe.model_copy(update={"dof": dof})})
+    update = {"dof": dof, "measure": measure or scene.observe.measure}
+    other = scene.model_copy(update={"observe": scene.observe.model_copy(update=update)})
     balance = build(other, "frequency", harmonics=branch.balance.n_harmonics, effects=effects)
     workspace = Workspace.of(balance)
     rows, measures = (
