@@ -89,7 +89,13 @@ def solve_problem(
     found = _solved(problem, tally.searching, should_stop, on_best)
     most = most_harmonics(problem.harmonics)
     found, more = _with_enough_harmonics(found, most, tally, should_stop, on_best)
-    found = looked_after(found, should_stop, tally.further, more)
+    chosen = looked_after(found, should_stop, tally.further, more)
+    if chosen.optimum != found.optimum:
+        # What is chosen of a plateau may be known less well than what was found on it.
+        found, more = _with_enough_harmonics(chosen, most, tally, should_stop, on_best)
+        again = found.problem is not chosen.problem
+        chosen = looked_after(found, should_stop, tally.further, more) if again else found
+    found = honest(chosen)
     if found.status is DesignStatus.NO_RESPONSE and _undamped(found, should_stop):
         found = replace(found, status=DesignStatus.UNDAMPED)
     if found.evaluation is not None:

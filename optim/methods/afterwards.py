@@ -10,7 +10,7 @@ from dataclasses import replace
 from optim.criteria.evaluation import evaluate, natural_scales
 from optim.criteria.linearised import Conditions, conditions, model_of
 from optim.criteria.rows import Evaluation
-from optim.methods.enough_harmonics import MOST_HARMONICS, honest
+from optim.methods.enough_harmonics import MOST_HARMONICS
 from optim.methods.evaluator import Search, StoppedError
 from optim.methods.kkt import KEPT, KKT_TOLERANCE
 from optim.methods.plateau import Plateau, Tick, nothing, plateau_of
@@ -52,7 +52,7 @@ def looked_after(
             found = _checked(_level(found, should_stop, tick).with_errors(), should_stop, tick, more)
         except StoppedError:
             found = replace(found, status=DesignStatus.STOPPED)
-    return replace(honest(_proven(found)), seconds=result.seconds + time.perf_counter() - begun)
+    return replace(_proven(found), seconds=result.seconds + time.perf_counter() - begun)
 
 
 def _proven(result: DesignResult) -> DesignResult:
