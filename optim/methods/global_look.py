@@ -268,7 +268,10 @@ class WholeRange:
         return [taylor_of(model, feasibility=feasibility) for model in models]
 
     def _begins(self) -> list[Evaluation]:
-        """Return the design of the look to start from: beaten by no neighbour, and may lead below the best."""
+        """Return the next design of the look to start from, if any.
+
+        No neighbour beats it, and it may lead below the best.
+        """
         models = self._models()
         if not models:
             return []
