@@ -245,11 +245,10 @@ class WholeRange:
         return True
 
     def behind(self, best: tuple[float, float]) -> bool:
-        """Return whether a standing is far behind the best end."""
+        """Return whether a standing is far behind the best end: breaks limits, or leads to no basin wanted."""
         violation, objective = self._best()
-        if self._distinct() < self.search.problem.basins:
-            return False
-        return violation == 0.0 and (best[0] > FAR_OFF or best[1] > WORTH * objective)
+        idle = self._distinct() >= self.search.problem.basins and best[1] > WORTH * objective
+        return violation == 0.0 and (best[0] > FAR_OFF or idle)
 
     def _ended(self, there: Evaluation) -> Local:
         return ended(there, self.search.model(there), self.search.variables)
