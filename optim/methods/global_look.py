@@ -245,7 +245,7 @@ class WholeRange:
         return True
 
     def behind(self, best: tuple[float, float]) -> bool:
-        """Return whether a standing is far behind the best end: breaks limits, or leads to no basin wanted."""
+        """Return whether a standing breaks limits that an end keeps, or leads far above all basins wanted."""
         violation, objective = self._best()
         idle = self._distinct() >= self.search.problem.basins and best[1] > WORTH * objective
         return violation == 0.0 and (best[0] > FAR_OFF or idle)
