@@ -15,6 +15,7 @@ from optim.criteria.evaluation import evaluate
 from optim.methods import enough_harmonics as enough
 from optim.problem.problem import pose
 from solver.contacts.kernels.circle import hessian
+from solver.continuation.branch import Branch
 from solver.continuation.branches.observation import observing
 
 LOAD = {"damper.N0": (20.0, 3000.0)}
@@ -40,6 +41,7 @@ def test_cases_that_observe_another_dof_share_a_response_wherever_they_stand() -
 def test_another_measure_is_read_off_a_response() -> None:
     branch = solver.sweep(lopsided(), harmonics=7)
     swept = solver.sweep(lopsided(measure=HALF), harmonics=7)
+    assert isinstance(branch, Branch)
     seen = observing(branch, "b", measure=HALF)
     assert seen.peak is not None
     assert swept.peak is not None
@@ -51,8 +53,8 @@ def test_another_measure_is_read_off_a_response() -> None:
 def test_a_search_by_another_measure_computes_no_design_again() -> None:
     values = {"slides.N0": 1.5}
     wanted = {"variables": {"slides.N0": (0.5, 3.0)}, "harmonics": 5}
-    first = evaluate(pose(lopsided(), **wanted), values, gradients=False)  # type: ignore[arg-type]
-    problem = pose(lopsided(measure=HALF), **wanted)  # type: ignore[arg-type]
+    first = evaluate(pose(lopsided(), **wanted), values, gradients=False)
+    problem = pose(lopsided(measure=HALF), **wanted)
     named = replace(first, responses=(replace(first.responses[0], case=problem.cases[0].name),))
     again = evaluate(problem, values, gradients=False, before=named)
     assert again.computed == 0
@@ -80,6 +82,7 @@ def test_the_peak_alone_tells_what_its_response_would_be_in_doubt_by() -> None:
 
 
 def test_a_force_that_is_zero_has_no_direction() -> None:
-    assert hessian._direction.py_func(0.3, 1.0 + 0j, 1e-30j) == pytest.approx(0.0, abs=0.05)
+    direction = hessian._direction.py_func  # type: ignore[attr-defined]
+    assert direction(0.3, 1.0 + 0j, 1e-30j) == pytest.approx(0.0, abs=0.05)
     with np.errstate(invalid="ignore"):
-        assert math.isnan(hessian._direction.py_func(0.3, 0j, 0j).real)
+        assert math.isnan(direction(0.3, 0j, 0j).real)
