@@ -41,11 +41,13 @@ class Answer:
     value : must be equal in all checkouts.
     parts : into so many points the time is divided.
     figure : stands in the table instead of the time.
+    responses : that a design took.
     """
 
     value: float
     parts: int = 1
     figure: float | None = None
+    responses: int | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -329,15 +331,16 @@ def _forecasts() -> Callable[[], Answer]:
 
 
 def _designed(scene: Any, wanted: dict[str, Any], *, robust: bool = False) -> Callable[[], Answer]:
-    """Return the call that designs a scene and tells how many responses that took."""
+    """Return the call that designs a scene."""
     import optim
 
     def call() -> Answer:
         found = (optim.robust_design if robust else optim.design)(scene, **wanted)
-        responses = found.responses if robust else found.evaluations
-        print(f"{scene.name}: {responses} responses, {found.status.name}", file=sys.stderr, flush=True)
         expect(f"{scene.name} has an optimum", math.isfinite(found.objective if robust else found.peak.value))
-        return Answer(value=found.objective if robust else found.evaluation.objective)
+        return Answer(
+            value=found.objective if robust else found.evaluation.objective,
+            responses=found.responses if robust else found.evaluations,
+        )
 
     return call
 
@@ -349,23 +352,31 @@ def _wedge(low: float, high: float) -> Callable[[], Answer]:
     return _designed(solver.load_scene("platform-wedge"), wanted)
 
 
-@row("design-wedge", "design of `wedge.mass`, 4 contact points, H = 3, 0.005 to 0.05 kg", 8.0, runs=1)
+@row("design-wedge-005", "design of `wedge.mass`, 4 contact points, H = 3, 0.005 to 0.05 kg", 8.0, runs=1)
 def _wedge_design() -> Callable[[], Answer]:
     return _wedge(0.005, 0.05)
 
 
-@row("design-wedge-light", "the same, 0.001 to 0.03 kg", 8.0, runs=1)
+@row("design-wedge-001", "the same, 0.001 to 0.03 kg", 8.0, runs=1)
 def _light_wedge_design() -> Callable[[], Answer]:
     return _wedge(0.001, 0.03)
 
 
-@row("design-five", "design of `bladed-disk`: five variables, three criteria", 3.0, runs=2)
-def _five_variables() -> Callable[[], Answer]:
-    import solver
-    from benchmarks.designing import FIVE
+def _five_variables(name: str) -> Callable[[], Callable[[], Answer]]:
+    def prepare() -> Callable[[], Answer]:
+        import solver
+        from benchmarks.designing import FIVE
 
-    variables, limits = FIVE["bladed-disk"]
-    return _designed(solver.load_scene("bladed-disk"), {"variables": variables, **limits})
+        variables, limits = FIVE[name]
+        return _designed(solver.load_scene(name), {"variables": variables, **limits})
+
+    return prepare
+
+
+for _name in ("two-dof", "bladed-disk"):
+    row(f"design-five-{_name}", f"design of `{_name}`: five variables, three criteria", 3.0, runs=2)(
+        _five_variables(_name)
+    )
 
 
 @row("design-robust", "robust design of `bladed-disk`: kt and mu in intervals", 4.0, runs=2)
@@ -401,7 +412,8 @@ def serve() -> None:
         spent = (time.process_time() - begun) / found.parts
         mib = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / MIB
         figure = spent if found.figure is None else found.figure
-        print(json.dumps({"figure": figure, "value": found.value, "mib": mib}), flush=True)
+        answer = {"figure": figure, "value": found.value, "mib": mib, "responses": found.responses}
+        print(json.dumps(answer), flush=True)
 
 
 def _measure(which: Row, folders: list[Path]) -> tuple[str, ...]:
@@ -425,13 +437,20 @@ def _measure(which: Row, folders: list[Path]) -> tuple[str, ...]:
             off = 0.0 if each is None else abs(each["value"] / ours["value"] - 1.0)
             expect(f"{which.name}: results are {off:.1e} apart", off <= AGREE)
     ratios = [
-        f"{each:.3g}" + (f" ({each / figures[0]:.1f} ×)" if each == each else "") for each in figures[1:]
+        f"{each:.3g}" + (f" ({each / figures[0]:.1f} ×)" if each == each else "") + _responses(answers[-1])
+        for each, answers in zip(figures[1:], found[1:], strict=True)
     ]
     met = "yes" if figures[0] <= which.goal else "no"
     return (
-        which.name, which.work, f"{which.goal:g} {which.unit}", f"{figures[0]:.3g}", met,
+        which.name, which.work, f"{which.goal:g} {which.unit}", f"{figures[0]:.3g}" + _responses(ours), met,
         f"{ours['mib']:.0f}", *ratios,
     )  # fmt: skip
+
+
+def _responses(answer: dict[str, Any] | None) -> str:
+    """Return in words how many responses a design took."""
+    responses = None if answer is None else answer.get("responses")
+    return "" if responses is None else f", {responses} responses"
 
 
 def _print_table(names: list[str], others: list[Path]) -> None:

@@ -89,7 +89,13 @@ def solve_problem(
     found = _solved(problem, tally.searching, should_stop, on_best)
     most = most_harmonics(problem.harmonics)
     found, more = _with_enough_harmonics(found, most, tally, should_stop, on_best)
-    found = looked_after(found, should_stop, tally.further, more)
+    chosen = looked_after(found, should_stop, tally.further, more)
+    if chosen.optimum != found.optimum:
+        # What is chosen of a plateau may be known less well than what was found on it.
+        found, more = _with_enough_harmonics(chosen, most, tally, should_stop, on_best)
+        again = found.problem is not chosen.problem
+        chosen = looked_after(found, should_stop, tally.further, more) if again else found
+    found = honest(chosen)
     if found.status is DesignStatus.NO_RESPONSE and _undamped(found, should_stop):
         found = replace(found, status=DesignStatus.UNDAMPED)
     if found.evaluation is not None:
@@ -116,12 +122,12 @@ def _with_enough_harmonics(
     """
     found = found.with_errors()
     problem, tried = with_enough(found, most, should_stop)
-    responses = sum(len(one.responses) for one in tried)
+    responses = sum(one.computed for one in tried)
     found = replace(found, evaluations=found.evaluations + responses, work=found.work + responses)
     if problem is None:
         return found, tried
-    same = problem.cases is found.problem.cases  # by another measure nothing is known
-    again = _solved(problem, tally.again(found.evaluations), should_stop, on_best, found if same else None)
+    same = problem.cases is found.problem.cases
+    again = _solved(problem, tally.again(found.evaluations), should_stop, on_best, found)
     if again.status is DesignStatus.STOPPED:
         return replace(found, status=DesignStatus.STOPPED), tried
     if again.evaluation is None or not again.evaluation.good:
@@ -138,7 +144,7 @@ def _solved(
     problem: Problem, on_progress: OnProgress, should_stop: ShouldStop, on_best: OnBest,
     before: DesignResult | None = None,
 ) -> DesignResult:  # fmt: skip
-    """Search the best design of a problem by its method; `before`: of a search with fewer harmonics."""
+    """Search the best design of a problem by its method; `before`: of a search before with less known."""
     begun = time.perf_counter()
     tracked = None
     trackable = problem.method in (Method.AUTO, Method.TRACKED) and problem.why_not_tracked is None
@@ -148,11 +154,14 @@ def _solved(
         tracked = tracked_optimum(problem, on_progress=on_progress, should_stop=should_stop, on_best=on_best)
         if problem.method is Method.TRACKED or tracked.status is not DesignStatus.NOT_TRACKED:
             return _of_tracked(problem, tracked, time.perf_counter() - begun)
-    search = Search(problem, on_progress, should_stop, on_best=on_best)
+    earlier = () if before is None else (*before.history, *before.looked_at)
+    search = Search(problem, on_progress, should_stop, on_best=on_best, before=earlier)
     eased = Eased.of(search, tracked)
     if eased.proven is not None:
         return _of_tracked(problem, eased.proven, time.perf_counter() - begun)
     found: list[Local] = []
+    if before is not None and before.problem.cases is not problem.cases:
+        before = None  # by another measure nothing is known but responses
     seen = () if before is None else before.looked_at
     whole = WholeRange(search, local_search_of(problem.method), found, seen)
     others = () if before is None else [dict(basin.values) for basin in before.basins[1:]]
@@ -239,7 +248,7 @@ def _result(search: Search, whole: WholeRange, status: DesignStatus, begun: floa
     best = min(whole.found, key=lambda local: local.standing, default=None)
     evaluation = best.evaluation if best else min(search.good(), key=search.merit, default=None)
     method = Method.IPOPT if search.problem.method is Method.IPOPT else Method.MINIMAX
-    responses = search.scouted + sum(len(e.responses) for e in search.history)
+    responses = search.scouted + sum(e.computed for e in search.history)
     return DesignResult(
         problem=search.problem, method=method, status=status, evaluation=evaluation,
         conditions=None if best is None else best.conditions, basins=basins_of(search, whole.found),

@@ -10,18 +10,20 @@ from optim.criteria.registry import criteria
 from optim.criteria.rows import Evaluation, Response
 from optim.problem.cases import Case
 from optim.problem.problem import Problem
-from optim.problem.variables import parameter_values
+from optim.problem.variables import Real, parameter_values
+from solver.balance.balance import build
 from solver.balance.simplifications import Effects, even_harmonics_reason
 from solver.continuation.branch import Branch
 from solver.continuation.branches.observation import observing
 from solver.continuation.branches.sweep import sweep
 from solver.results.watch import ShouldStop
 from solver.scene.scene import Scene
+from solver.studies.peaks.seeds import fitted
 
 
 def evaluate(
     problem: Problem, values: Mapping[str, float], *, gradients: bool = True, errors: bool = True,
-    should_stop: ShouldStop = None,
+    should_stop: ShouldStop = None, before: Evaluation | None = None,
 ) -> Evaluation:  # fmt: skip
     """Compute everything a design is judged by.
 
@@ -32,6 +34,8 @@ def evaluate(
     gradients : compute them (otherwise they are NaN).
     errors : estimate those of the peaks; `Evaluation.with_errors` does it later if not.
     should_stop : asked while the responses are computed.
+    before : the same design by another measure, whose responses serve here, or with other harmonics, whose
+        responses begin where these do.
 
     Returns
     -------
@@ -41,7 +45,8 @@ def evaluate(
     rows: list[Row] = []
     for case in problem.cases:
         known = [response.branch for response in responses if response.case == case.beside]
-        found = _case(problem, case, values, known, gradients, errors, should_stop)
+        earlier = [] if before is None else [one.branch for one in before.responses if one.case == case.name]
+        found = _case(problem, case, values, known, earlier, gradients, errors, should_stop)
         responses += found[0]
         rows += found[1]
         if not all(response.branch.completed for response in found[0]):
@@ -50,26 +55,45 @@ def evaluate(
 
 
 def _case(
-    problem: Problem, case: Case, values: Mapping[str, float], known: Sequence[Branch], gradients: bool,
-    errors: bool, should_stop: ShouldStop,
+    problem: Problem, case: Case, values: Mapping[str, float], known: Sequence[Branch],
+    earlier: Sequence[Branch], gradients: bool, errors: bool, should_stop: ShouldStop,
 ) -> tuple[list[Response], list[Row]]:  # fmt: skip
-    """Compute the responses and rows of one case; `known` are those of a case with another DOF alone."""
+    """Compute the responses and rows of one case.
+
+    Parameters
+    ----------
+    known : responses of a case with another DOF alone.
+    earlier : of the same design by another measure, or with other harmonics.
+    """
     here = case.scene.with_values(parameter_values(problem.variables, values))
     effects = effects_of(problem, here)
     judge = Judge(problem=problem, case=case, gradients=gradients)
     responses: list[Response] = []
     rows: list[Row] = []
     for i, over in enumerate(ranges_of(problem, case)):
-        if known:
-            branch = observing(known[i], here.observe.dof, limit=problem.limit)
+        there = known[i] if known else earlier[i] if i < len(earlier) else None
+        shared = there is not None and there.balance.n_harmonics == problem.harmonics
+        if there is not None and shared:
+            branch = there
+            if there.completed:
+                branch = observing(there, here.observe.dof, measure=here.observe.measure, limit=problem.limit)
         else:
             branch = sweep(
                 here, start=over.low, stop=over.high, harmonics=problem.harmonics, limit=problem.limit,
                 effects=effects, errors=errors, should_stop=should_stop,
+                guess=None if there is None else _begin(problem, here, effects, there),
             )  # fmt: skip
-        responses.append(Response(case=case.name, branch=branch))
+        responses.append(Response(case=case.name, branch=branch, shared=shared))
         rows += judge.rows(branch, over)
     return responses, rows
+
+
+def _begin(problem: Problem, scene: Scene, effects: Effects, branch: Branch) -> Real | None:
+    """Return where a response begins, by that of the same design with other harmonics."""
+    if not len(branch.solutions):
+        return None
+    balance = build(scene, "frequency", harmonics=problem.harmonics, frequency_hz=None, effects=effects)
+    return fitted(branch.solutions[0, :-1], branch.balance.system.ks, balance)
 
 
 def effects_of(problem: Problem, scene: Scene) -> Effects:

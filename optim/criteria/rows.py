@@ -18,10 +18,14 @@ from solver.continuation.branch import Branch
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Response:
-    """A frequency response computed for a design: its case and the branch."""
+    """A frequency response of a design: its case and the branch, and whether it served something else first.
+
+    What was followed for another case, or by another measure, is not computed again.
+    """
 
     case: str
     branch: Branch
+    shared: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -83,6 +87,11 @@ class Evaluation:
     def harmonics(self) -> int:
         """Of the balances behind it; 0 without a response."""
         return max((one.branch.balance.n_harmonics for one in self.responses), default=0)
+
+    @property
+    def computed(self) -> int:
+        """How many responses were computed for it."""
+        return sum(not one.shared for one in self.responses)
 
     @property
     def branch(self) -> Branch:

@@ -10,7 +10,7 @@ from dataclasses import replace
 from optim.criteria.evaluation import evaluate, natural_scales
 from optim.criteria.linearised import Conditions, conditions, model_of
 from optim.criteria.rows import Evaluation
-from optim.methods.enough_harmonics import MOST_HARMONICS, honest
+from optim.methods.enough_harmonics import MOST_HARMONICS
 from optim.methods.evaluator import Search, StoppedError
 from optim.methods.kkt import KEPT, KKT_TOLERANCE
 from optim.methods.plateau import Plateau, Tick, nothing, plateau_of
@@ -52,7 +52,7 @@ def looked_after(
             found = _checked(_level(found, should_stop, tick).with_errors(), should_stop, tick, more)
         except StoppedError:
             found = replace(found, status=DesignStatus.STOPPED)
-    return replace(honest(_proven(found)), seconds=result.seconds + time.perf_counter() - begun)
+    return replace(_proven(found), seconds=result.seconds + time.perf_counter() - begun)
 
 
 def _proven(result: DesignResult) -> DesignResult:
@@ -110,7 +110,7 @@ def _improved(result: DesignResult, begin: Evaluation, should_stop: ShouldStop, 
     status = result.status
     if status in (DesignStatus.OPTIMAL, DesignStatus.AT_BOUND, DesignStatus.KINK):
         status = settled_status(local.conditions) if local.settled else DesignStatus.KINK
-    responses = sum(len(one.responses) for one in search.history)
+    responses = sum(one.computed for one in search.history)
     return replace(
         result, method=Method.MINIMAX, status=status, evaluation=local.evaluation,
         conditions=local.conditions,
@@ -161,8 +161,12 @@ def _checked(
         same = (one for one in more if one.values == values and one.harmonics == problem.harmonics)
         found = next(same, None)
         if found is None:
-            found = evaluate(problem, values, gradients=False, errors=False, should_stop=should_stop)
-            responses += len(found.responses)
+            seen = (one for one in (result.evaluation, *result.history) if one.values == values)
+            found = evaluate(
+                problem, values, gradients=False, errors=False, should_stop=should_stop,
+                before=next(seen, None),
+            )  # fmt: skip
+            responses += found.computed
             tick()
         good = found.good and bool(found.peaks)
         checked.append(

@@ -81,7 +81,7 @@ def _kept(search: Search, tracked: Tracked) -> Tracked | None:
         return None
     if not evaluation.good or evaluation.violation(search.scales) > 0.0:
         return None
-    responses = len(evaluation.responses)
+    responses = evaluation.computed
     return replace(
         tracked, evaluation=evaluation, sweeps=tracked.sweeps + responses, work=tracked.work + responses
     )

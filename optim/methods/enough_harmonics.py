@@ -14,10 +14,15 @@ from optim.criteria.rows import Evaluation
 from optim.problem.problem import Method, Problem
 from optim.results.design import DesignResult, DesignStatus
 from optim.results.doubts import WELL_KNOWN, doubt_of
-from optim.results.json import known_parts
+from optim.results.json import known_parts, over_bands
+from solver.balance.balance import build
+from solver.balance.kernels.output import HALF_RANGE, MAX_ABS
+from solver.balance.workspace import Workspace
+from solver.continuation.extrema.error_estimate import ErrorEstimator
 from solver.results.known import HALF_PEAK_TO_PEAK, Known
 from solver.results.watch import ShouldStop
 from solver.scene.scene import Scene
+from solver.studies.peaks.seeds import fitted
 
 CLAIMS = (DesignStatus.OPTIMAL, DesignStatus.AT_BOUND, DesignStatus.APPROXIMATE)
 MOST_HARMONICS = 60  # beyond that a design is not looked at with more
@@ -34,7 +39,35 @@ def well_known(problem: Problem, evaluation: Evaluation) -> bool:
 
 def doubt_in(problem: Problem, evaluation: Evaluation) -> float:
     """Return the share by which the highest peak of a design may be higher."""
-    return doubt_of(evaluation, {case.name: case.weight for case in problem.cases})
+    return doubt_of(known_parts(evaluation), {case.name: case.weight for case in problem.cases})
+
+
+def _doubt_at_peaks(problem: Problem, evaluation: Evaluation) -> float:
+    """Return that share with the harmonics of a problem, by the peaks of a response with fewer.
+
+    Each is solved for where it stands, without a response: no less is left in doubt of one. 0 where that
+    finds nothing.
+    """
+    parts = []
+    for case, branch in over_bands(evaluation).items():
+        peak = branch.peaks[0]
+        balance = build(
+            branch.balance.scene, "frequency", harmonics=problem.harmonics, frequency_hz=None,
+            effects=branch.balance.effects,
+        )  # fmt: skip
+        workspace, p = Workspace.of(balance), balance.parameter.inside(peak.at)
+        there = workspace.solve_from(p, fitted(peak.solution, branch.balance.system.ks, balance))
+        measures = workspace.measure(there.u, p) if there.converged else None
+        if measures is None:
+            return 0.0
+        error = ErrorEstimator(workspace).at(there.u, p, across=peak.interior)
+        known = replace(
+            branch.known, peak_max_abs=float(measures.values[MAX_ABS]), error_estimate=error.max_abs,
+            peak_half_peak_to_peak=float(measures.values[HALF_RANGE]),
+            half_peak_to_peak_error=error.half_peak_to_peak,
+        )  # fmt: skip
+        parts.append((case, known))
+    return doubt_of(parts, {case.name: case.weight for case in problem.cases})
 
 
 def honest(result: DesignResult) -> DesignResult:
@@ -73,21 +106,22 @@ def with_enough(
     if well_known(problem, evaluation):
         return otherwise, tried
     doubt, harmonics = doubt_in(problem, evaluation), 2 * problem.harmonics
+    last = evaluation
     while harmonics <= most and not (should_stop is not None and should_stop()):
         more = replace(problem, harmonics=harmonics)
-        found = evaluate(more, result.optimum, gradients=False, should_stop=should_stop)
-        tried.append(found)
-        if found.good and well_known(more, found):
-            # With too few harmonics a mean may seem free that is not.
-            return replace(_by_its_measure(more, found), start=start), tried
-        if found.good:
-            # From one doubling to the next a doubt falls by the same factor, if it falls; not among the
-            # first harmonics, of which one may meet a resonance that those before it do not.
-            left = doubt_in(more, found)
-            if 2 * harmonics > _FEW and left * min(left / doubt, 1.0) > HOPELESS * WELL_KNOWN:
-                break
-            doubt = left
-        harmonics *= 2
+        left = _doubt_at_peaks(more, last) if tried else 0.0
+        if left <= WELL_KNOWN:
+            found = evaluate(more, start, gradients=False, should_stop=should_stop, before=last)
+            tried.append(found)
+            if found.good and well_known(more, found):
+                # With too few harmonics a mean may seem free that is not.
+                return replace(_by_its_measure(more, found), start=start), tried
+            last, left = (found, doubt_in(more, found)) if found.good else (last, doubt)
+        # From one doubling to the next a doubt falls by the same factor, if it falls; not among the first
+        # harmonics, of which one may meet a resonance that those before it do not.
+        if 2 * harmonics > _FEW and left * min(left / doubt, 1.0) > HOPELESS * WELL_KNOWN:
+            break
+        doubt, harmonics = left, 2 * harmonics
     return otherwise, tried
 
 

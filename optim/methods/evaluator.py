@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 
 from optim.criteria.evaluation import evaluate, natural_scales
@@ -36,6 +36,7 @@ class Search:
     def __init__(
         self, problem: Problem, on_progress: OnProgress = None, should_stop: ShouldStop = None,
         most: int = MOST_EVALUATIONS, *, on_best: OnBest = None, above: Search | None = None,
+        before: Iterable[Evaluation] = (),
     ) -> None:  # fmt: skip
         self.problem = problem
         self.history: list[Evaluation] = []
@@ -50,6 +51,8 @@ class Search:
         self._scout: Search | None = None
         self._least = (math.inf, math.inf)
         self._known: dict[tuple[float, ...], Evaluation] = {}
+        # Of another search: by another measure, or with other harmonics.
+        self._earlier = {self._place(one.values): one for one in before}
 
     def __call__(self, values: Mapping[str, float]) -> Evaluation:
         """Evaluate one design with gradients, each once.
@@ -60,15 +63,20 @@ class Search:
             The caller asked to stop, or the evaluations are used up.
         """
         self.check()
-        place = tuple(values[variable.name] for variable in self.variables)
+        place = self._place(values)
         if place in self._known:
             return self._known[place]
         if len(self.history) >= self._most:
             raise StoppedError(DesignStatus.TOO_MANY)
-        evaluation = evaluate(self.problem, values, errors=False, should_stop=self.should_stop)
+        evaluation = evaluate(
+            self.problem, values, errors=False, should_stop=self.should_stop, before=self._earlier.get(place)
+        )  # fmt: skip
         self._known[place] = evaluation
         self.keep(evaluation)
         return evaluation
+
+    def _place(self, values: Mapping[str, float]) -> tuple[float, ...]:
+        return tuple(values[variable.name] for variable in self.variables)
 
     @property
     def count(self) -> int:
@@ -79,13 +87,16 @@ class Search:
     def scout(self, harmonics: int) -> Search:
         """Return a search of the same problem with fewer harmonics, to be handed to `scouting_done`."""
         fewer = replace(self.problem, harmonics=harmonics)
-        self._scout = Search(fewer, self.on_progress, self.should_stop, on_best=self.on_best, above=self)
+        self._scout = Search(
+            fewer, self.on_progress, self.should_stop, on_best=self.on_best, above=self,
+            before=self._earlier.values(),
+        )  # fmt: skip
         return self._scout
 
     def scouting_done(self, scout: Search) -> None:
         """Count what a scout looked at; its numbers are not exact enough to be kept."""
         self._before, self._scout = self._before + len(scout.history), None
-        self.scouted += sum(len(evaluation.responses) for evaluation in scout.history)
+        self.scouted += sum(evaluation.computed for evaluation in scout.history)
 
     def easing(self, _share: float, sweeps: int) -> None:
         """Hear of responses to a problem without its limits."""

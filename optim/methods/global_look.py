@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -30,11 +31,15 @@ from optim.methods.kkt import (
     without_limits,
 )
 from optim.methods.polish import polished
-from optim.methods.surrogate import Taylor, candidates, places, promising, taylor_of
+from optim.methods.surrogate import Taylor, between, candidates, places, promising, taylor_of
 from optim.problem.variables import Real, scaled, unscaled
 
 FEWEST = 3  # harmonics of a look with several variables, at least
+SURE = 3  # designs of a look for each variable, before what was seen says which others are worth one
+LOOSE = 2.0  # spreads by which a prediction may be too high there
 WORTH = 1.3  # how much higher than the best end the potential of a design to start from may be
+PATIENCE = 20  # designs of a local search, after which it ends if it is far behind the best end
+FAR_OFF = 0.01  # relative excess over a limit that is
 BETTER = 1e-6  # relative difference from which a design is better than another
 BATCH = 4  # designs a round and variable
 IDLE = 3  # rounds in a row that find nothing, after which a look is finished
@@ -67,6 +72,7 @@ class WholeRange:
         self._ends: list[tuple[Local, Evaluation]] = []  # with the numbers of the look
         self._apart = APART.get(self._n, APART_MANY)
         self._off = 0.0  # natural logarithm by which the look's harmonics are off
+        self._slack = 0.0  # relative excess over limits that they show of designs that keep them
 
     @property
     def looked_at(self) -> tuple[Evaluation, ...]:
@@ -82,7 +88,8 @@ class WholeRange:
         """
         try:
             for z in () if self._seen else places(self._n):
-                self._look(z)
+                if self._worth(z):
+                    self._look(z)
             begins = [e for values in given if (e := self.search(values)).good]
             if not self._seen and not begins:
                 return None
@@ -95,6 +102,16 @@ class WholeRange:
             if self._scout is not self.search:
                 self.search.scouting_done(self._scout)
         return False
+
+    def _worth(self, z: Real) -> bool:
+        """Return whether a place of the look may be one to start from, as far as what was seen tells."""
+        if self._n == 1 or len(self._seen) <= SURE * self._n:
+            return True
+        models = self._models()
+        known = np.array([model.place for model in models])
+        mean, spread = between(models, known, z[None, :])
+        least = min(model.value for model in models)
+        return bool(mean[0] - LOOSE * spread[0] < WORTH * least)
 
     def _flat(self) -> bool:
         """Return whether no design depends on any variable, with all harmonics too."""
@@ -131,9 +148,15 @@ class WholeRange:
         idle, most = 0, max(self.search.problem.basins, min(2 + self._n, MOST_BEGINS))
         for turn in range(MOST_ROUNDS):
             before = self._best()
-            for begin in self._begins(most):
-                for exact in self._exact([begin]):
+            for _ in range(most):
+                # One at a time: the end of one may lie lower than another can lead.
+                begins = self._begins()
+                for begin in begins:
+                    self._starts.append(scaled(self.search.variables, begin.values))
+                for exact in self._exact(begins):
                     self._descend(exact)
+                if not begins:
+                    break
             after = self._best()
             idle = 0 if turn == 0 or _beats(after, before) else idle + 1
             enough = IDLE if self._n <= 2 else IDLE_MANY
@@ -170,6 +193,8 @@ class WholeRange:
             if self._scout is not self.search:
                 exact, rough = best.evaluation.objective, there.objective
                 self._off = max(self._off, abs(math.log(max(exact, 1e-300) / max(rough, 1e-300))))
+                if best.feasible:
+                    self._slack = max(self._slack, self._scout.model(there).violation)
             self._seen.append(there)
 
     def _eased(self, begin: Evaluation) -> Evaluation:
@@ -219,18 +244,34 @@ class WholeRange:
             last = one.value
         return True
 
+    def behind(self, best: tuple[float, float]) -> bool:
+        """Return whether a standing breaks limits that an end keeps, or leads far above all basins wanted."""
+        violation, objective = self._best()
+        idle = self._distinct() >= self.search.problem.basins and best[1] > WORTH * objective
+        return violation == 0.0 and (best[0] > FAR_OFF or idle)
+
     def _ended(self, there: Evaluation) -> Local:
         return ended(there, self.search.model(there), self.search.variables)
 
     def _infeasible(self) -> bool:
         """Return whether no design known keeps all limits."""
         known = (*self._seen, *(local.evaluation for local in self.found))
-        return all(self._scout.model(e).violation > 0.0 for e in known)
+        return all(self._scout.model(e).violation > KEPT for e in known)
 
-    def _begins(self, most: int) -> list[Evaluation]:
-        """Return designs of the look to start from: beaten by no neighbour, and may lead below the best."""
+    def _models(self) -> list[Taylor]:
+        """Return what the designs of the look tell of others: of what is minimised, or of the limits."""
         feasibility = self._infeasible()
-        models = [taylor_of(self._scout.model(e), feasibility=feasibility) for e in self._seen]
+        models = [self._scout.model(e) for e in self._seen]
+        if not feasibility:
+            models = [replace(model, excess=model.excess - self._slack) for model in models]
+        return [taylor_of(model, feasibility=feasibility) for model in models]
+
+    def _begins(self) -> list[Evaluation]:
+        """Return the next design of the look to start from, if any.
+
+        No neighbour beats it, and it may lead below the best.
+        """
+        models = self._models()
         if not models:
             return []
         known = np.array([model.place for model in models])
@@ -251,13 +292,12 @@ class WholeRange:
         best = values.min() * math.exp(self._off)
         ends = [scaled(self.search.variables, local.evaluation.values) for local in self.found]
         started = np.array([*self._starts, *ends]).reshape(-1, self._n)
-        chosen: list[Evaluation] = []
+        wanted = self._distinct() < self.search.problem.basins
         for i in sorted(potential, key=lambda i: potential[i]):
             fresh = not len(started) or np.abs(started - known[i]).max(axis=1).min() >= self._apart
-            wanted = self._distinct() + len(chosen) < self.search.problem.basins
-            if fresh and len(chosen) < most and (wanted or potential[i] <= WORTH * best):
-                chosen.append(self._seen[i])
-        return chosen
+            if fresh and (wanted or potential[i] <= WORTH * best):
+                return [self._seen[i]]
+        return []
 
     def _distinct(self) -> int:
         """Return how many ends differ."""
@@ -273,8 +313,7 @@ class WholeRange:
 
     def _further(self, turn: int) -> list[Real]:
         """Return places to look at, where what is known leaves room for something better than the best."""
-        feasibility = self._infeasible()
-        models = [taylor_of(self._scout.model(e), feasibility=feasibility) for e in self._seen]
+        models = self._models()
         if not models:
             return []
         enough = min(model.value for model in models)
@@ -300,14 +339,14 @@ class WholeRange:
 
 
 class JoinedError(Exception):
-    """A local search leads to an end that is known."""
+    """A local search leads to an end that is known, or stays far behind it."""
 
 
 class _Watched:
     """Evaluates for a local search, and ends it once it leads to an end that is known."""
 
     def __init__(self, whole: WholeRange) -> None:
-        self._whole, self._best, self._better = whole, (math.inf, math.inf), 0
+        self._whole, self._best, self._better, self._count = whole, (math.inf, math.inf), 0, 0
 
     def __call__(self, values: Mapping[str, float]) -> Evaluation:
         """Evaluate a design.
@@ -315,9 +354,10 @@ class _Watched:
         Raises
         ------
         JoinedError
-            It is on the way to an end that is known.
+            It is on the way to an end that is known, or stays far behind it.
         """
         found = self._whole.search(values)
+        self._count += 1
         if not found.good:
             return found
         here = standing(self._whole.search.model(found))
@@ -325,6 +365,8 @@ class _Watched:
             self._best, self._better = here, self._better + 1
             if self._better % LOOK_AHEAD == 0 and self._whole.joins(found):
                 raise JoinedError
+        if self._count >= PATIENCE and self._whole.behind(self._best):
+            raise JoinedError
         return found
 
 

@@ -120,7 +120,7 @@ class _Level:
         found = evaluate(
             self._problem, values, gradients=gradients, errors=False, should_stop=self._should_stop
         )  # fmt: skip
-        self.responses += len(found.responses)
+        self.responses += found.computed
         self._tick()
         if found.good and found.objective < self._lower and self._good(found):
             self.better, self._lower = found, found.objective

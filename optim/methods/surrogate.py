@@ -44,7 +44,7 @@ def places(n: int, known: int = 0) -> Real:
         faces[2 * i, i], faces[2 * i + 1, i] = 0.0, 1.0
     between = quasi_random(n, 2 ** math.ceil(math.log2(LOOKS_EACH * n)))
     # The first place of the sequence is a corner, the second the middle.
-    return np.vstack([middle, corners(n), faces, between[2 + known :]])
+    return np.vstack([middle, faces, between[2 + known :], corners(n)])
 
 
 def quasi_random(n: int, count: int, seed: int | None = None) -> Real:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from optim.errors import DesignError
 from optim.problem.numbers import number_pair, positive, whole
@@ -75,7 +75,21 @@ def read_cases(scene: Scene, cases: Sequence[Mapping[str, object]] | None) -> tu
         raise DesignError("cases", cases, "must be a list of at least one table")
     read = [case for i, table in enumerate(cases) for case in read_case(scene, i, table)]
     check_names(read)
-    return tuple(read)
+    return tuple(replace(case, beside=_served_by(case, read[:i])) for i, case in enumerate(read))
+
+
+def _served_by(case: Case, earlier: Sequence[Case]) -> str | None:
+    """Return the name of the first case whose response serves another one; None if there is none.
+
+    A DOF of another sector may call for the whole annulus: it gets a response of its own.
+    """
+    here = case.scene.observe
+    for one in earlier:
+        seen = one.scene.observe.model_copy(update={"dof": here.dof})
+        same = one.order == case.order and seen == here and "@" not in here.dof + one.scene.observe.dof
+        if same and one.scene.model_copy(update={"observe": here}) == case.scene:
+            return one.name
+    return None
 
 
 def check_names(cases: Sequence[Case]) -> None:
@@ -110,15 +124,10 @@ def read_case(scene: Scene, index: int, table: object) -> list[Case]:
     if not isinstance(dofs, Sequence) or not dofs or not all(isinstance(dof, str) for dof in dofs):
         raise DesignError((*where, "observe"), observed, "must be the name of a DOF, or a list of them")
     names = [name if len(dofs) == 1 else f"{name}, {dof}" for dof in dofs]
-    # A DOF of another sector may call for the whole annulus: it gets a response of its own.
-    first = next((i for i, dof in enumerate(dofs) if "@" not in dof), None)
     return [
-        Case(
-            name=names[i], scene=_observing(here, where, dof, band), weight=weight, order=order,
-            beside=names[first] if first is not None and i > first and "@" not in dof else None,
-        )
-        for i, dof in enumerate(dofs)
-    ]  # fmt: skip
+        Case(name=one, scene=_observing(here, where, dof, band), weight=weight, order=order)
+        for one, dof in zip(names, dofs, strict=True)
+    ]
 
 
 def _with_values(scene: Scene, where: Place, values: Mapping[str, float]) -> Scene:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from optim.criteria.rows import Evaluation
 from optim.results.basins import Checked
@@ -88,15 +88,15 @@ def _flags(evaluation: Evaluation) -> list[str]:
     return flag_words(dict.fromkeys((*own, *at_peaks)))
 
 
-def doubt_of(evaluation: Evaluation, weights: Mapping[str, float]) -> float:
+def doubt_of(known_parts: Iterable[tuple[str, Known]], weights: Mapping[str, float]) -> float:
     """Return by which share the highest weighted peak may be higher than it is, by the estimated errors.
 
     Parameters
     ----------
-    evaluation : of a design.
+    known_parts : of a design, each with the name of its case.
     weights : of the cases.
     """
-    parts = [(weights[case], known) for case, known in known_parts(evaluation)]
+    parts = [(weights[case], known) for case, known in known_parts]
     # Each in its own measure; a case far below the highest may be wrong by more.
     top = max((weight * known.value for weight, known in parts), default=math.nan)
     if not top > 0.0:

@@ -141,7 +141,7 @@ class _Chain:
         evaluation = evaluate(
             problem, values, gradients=gradients, errors=False, should_stop=should_stop
         )  # fmt: skip
-        return list(evaluation.rows), len(evaluation.responses)
+        return list(evaluation.rows), evaluation.computed
 
     def known(self, case: Case, should_stop: ShouldStop) -> list[Known]:
         """Return how well the peaks of a case are known."""

@@ -218,34 +218,46 @@ class _Ascent:
         return max(self._value(found) for _, found in self._tried)
 
     def _climbs(self) -> None:
-        """Climb from the places that are worse than their neighbours and not far below the worst."""
+        """Climb from the places that are worse than their neighbours and may lead above the worst."""
         known = np.array([place for place, _ in self._tried])
         values = np.array([self._value(found) for _, found in self._tried])
         count = min(2 * known.shape[1] + 1, len(known))
         distance = np.abs(known[:, None, :] - known).max(axis=2)
         near = np.argpartition(distance, count - 1, axis=1)[:, :count]
+        reach = np.sort(distance, axis=1)[:, min(2, len(known) - 1)]
         tops = np.flatnonzero(values >= values[near].max(axis=1))
         enough = values.max() - (1.0 - NEAR_TOP) * abs(values.max())
         chosen = [i for i in tops[np.argsort(-values[tops])] if values[i] >= enough]
         for i in chosen[:THOROUGH_CLIMBS]:
             place, found = self._tried[i]
             fresh = all(np.abs(place - other).max() > SAME for other in self._climbed)
-            if fresh and not self._is_top(place, found):
-                self._climb(place)
+            model = self._model(place, found)
+            if fresh and model is not None and not self._is_top(place, found):
+                around = place + reach[i] * (2.0 * candidates(place.size, 0) - 1.0)
+                there = self._unit(list(around))
+                worst = self._worst()
+                if model.at(there).max() > worst + WORSE * abs(worst):
+                    self._climb(place)
+
+    def _unit(self, places: Sequence[Real]) -> Real:
+        """Return places of the set in the unit box, (k, n)."""
+        return 0.5 * (np.array([self._set.inside(place) for place in places]) + 1.0)
+
+    def _model(self, place: Real, found: Outcome) -> Taylor | None:
+        """Return what a place tells of others in the unit box; None without slopes."""
+        slopes = self._slopes(found)
+        if not slopes:
+            return None
+        by_z = 2.0 * np.array([slope for _, slope in slopes])
+        return Taylor(place=0.5 * (place + 1.0), groups=((np.array([value for value, _ in slopes]), by_z),))
 
     def _room(self, turn: int) -> list[Real]:
         """Return places, of the unit box, whose neighbours leave room for something worse than all seen."""
-        models = []
-        for place, found in self._tried:
-            slopes = self._slopes(found)
-            if slopes:
-                values = np.array([value for value, _ in slopes])
-                by_z = 2.0 * np.array([slope for _, slope in slopes])
-                models.append(Taylor(place=0.5 * (place + 1.0), groups=((values, by_z),)))
+        models = [model for one in self._tried if (model := self._model(*one)) is not None]
         if not models:
             return []
         n = len(self._set.centre)
-        there = 0.5 * (np.array([self._set.inside(2.0 * z - 1.0) for z in candidates(n, turn)]) + 1.0)
+        there = self._unit(list(2.0 * candidates(n, turn) - 1.0))
         worst = self._worst()
         return promising(models, there, worst + WORSE * abs(worst), APART, BATCH * n, above=True)
 

@@ -97,7 +97,7 @@ def _across(sensitivities: Sensitivities, peak: Peak, distance: float) -> Real |
 def _beside(sensitivities: Sensitivities, peak: Peak, distance: float) -> Gradient | None:
     """Return the gradient at the solution beside a peak; None if there is none on the same branch."""
     at_hz = peak.at * (1.0 + distance)
-    found = Workspace.of(sensitivities.balance).solve(2.0 * math.pi * at_hz, peak.solution)
+    found = Workspace.of(sensitivities.balance).solve_from(2.0 * math.pi * at_hz, peak.solution)
     change = np.abs(found.u - peak.solution).max(initial=0.0)
     if not found.converged or change > FAR * np.abs(peak.solution).max(initial=0.0):
         return None

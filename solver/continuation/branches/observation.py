@@ -24,8 +24,8 @@ from solver.jit.fourier import Real
 from solver.linear.kernels.receptance import observer_receptance, receptance
 
 
-def observing(branch: Branch, dof: str, *, limit: float | None = None) -> Branch:
-    """Return a frequency response with another DOF observed: the same solutions, its own peaks and band.
+def observing(branch: Branch, dof: str, *, measure: str | None = None, limit: float | None = None) -> Branch:
+    """Return a frequency response observed otherwise: the same solutions, its own peaks and band.
 
     It costs one evaluation a point, no continuation. Between points it is as good as the branch is dense;
     near the top of the new DOF the survey of the peaks adds points of its own.
@@ -34,6 +34,7 @@ def observing(branch: Branch, dof: str, *, limit: float | None = None) -> Branch
     ----------
     branch : a completed response over the frequency.
     dof : name of the DOF.
+    measure : of its motion, as in a scene; that of the branch if left out.
     limit : amplitude [m] above which the band is measured; peak/√2 if left out.
 
     Raises
@@ -42,7 +43,7 @@ def observing(branch: Branch, dof: str, *, limit: float | None = None) -> Branch
         No such DOF.
     """
     begun = time.perf_counter()
-    workspace = _workspaces(branch, [dof])[0]
+    workspace = _workspaces(branch, [dof], measure)[0]
     x, measures = _measured([workspace], branch.solutions, branch.tangents, branch.measures)
     seen = replace(branch, balance=workspace.balance, error_estimate=math.nan, newton_iterations=0)
     survey = Survey.of(workspace, _points(branch, x[0], measures[0]))
@@ -104,11 +105,12 @@ def _points(branch: Branch, x: Real, measures: Real) -> Points:
     )  # fmt: skip
 
 
-def _workspaces(branch: Branch, dofs: Sequence[str]) -> list[Workspace]:
+def _workspaces(branch: Branch, dofs: Sequence[str], measure: str | None = None) -> list[Workspace]:
     """Return a workspace with each DOF observed; all share what is known of the resonances."""
     posed, workspaces = branch.balance, list[Workspace]()
+    how = {"measure": measure or posed.scene.observe.measure}
     for dof in dofs:
-        seen = posed.scene.observe.model_copy(update={"dof": dof})
+        seen = posed.scene.observe.model_copy(update={"dof": dof, **how})
         other = posed.scene.model_copy(update={"observe": seen})
         balance = build(other, harmonics=posed.n_harmonics, effects=posed.effects)
         workspaces.append(Workspace.of(balance, observing_another=workspaces[0] if workspaces else None))

@@ -96,9 +96,12 @@ def _end_of_stick(
 
 @compiled
 def _direction(theta: float, tx: Number, ty: Number) -> Number:
-    """Return the direction of (tx, ty), whose real part is near `theta`."""
+    """Return the direction of (tx, ty), whose real part is near `theta`; NaN of a force that is 0."""
     c, s = np.cos(theta), np.sin(theta)
-    return theta + (c * ty - s * tx) / (c * tx + s * ty)
+    along = c * tx + s * ty
+    if along == 0.0:
+        along = complex(np.nan, np.nan)
+    return theta + (c * ty - s * tx) / along
 
 
 @apart
