@@ -12,8 +12,8 @@ from pathlib import Path
 os.environ |= {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL")}
 sys.path[:0] = [str(Path(__file__).parents[1] / folder) for folder in ("cases", "service")]
 
-from tests.golden.faces import DATA, differences, joined
-from tests.golden.made import FILES
+from tests.golden.faces import DATA, differences, joined  # noqa: E402 - behind the paths
+from tests.golden.made import FILES  # noqa: E402
 
 
 def main() -> int:

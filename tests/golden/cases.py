@@ -56,9 +56,10 @@ class Case(NamedTuple):
 
 
 def own_scenes() -> dict[str, Scene]:
-    """Four beside those that are shipped: a load that moves, a gap, two laws at once, a law with a history."""
+    """Four beside those that are shipped: a load that moves, a gap, two laws, a law with a history."""
     return {
-        "rub": scene(RUB), "gap": scene(GAP, amplitude=0.3), "cubic": scene(CUBIC, _RUB), "ring": cyclic(_DAHL),
+        "rub": scene(RUB), "gap": scene(GAP, amplitude=0.3), "cubic": scene(CUBIC, _RUB),
+        "ring": cyclic(_DAHL),
     }  # fmt: skip
 
 

@@ -9,6 +9,7 @@ import math
 import os
 import re
 from collections.abc import Iterable, Iterator, Mapping
+from difflib import SequenceMatcher
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
@@ -57,8 +58,9 @@ def rounded(value: Any, key: str = "") -> Any:
 
 
 def _range(numbers: list[float], key: str) -> Any:
-    ends = [] if _COUNTED.search(key) or not numbers else [rounded(float(one)) for one in (min(numbers), max(numbers))]
-    return ["numbers", *ends]
+    if _COUNTED.search(key) or not numbers:
+        return ["numbers"]
+    return ["numbers", *(rounded(float(one)) for one in (min(numbers), max(numbers)))]
 
 
 def plain(text: str) -> str:
@@ -73,10 +75,14 @@ def plain(text: str) -> str:
 
 def differences(wanted: str, got: str) -> list[str]:
     """Lines that differ: words exactly, numbers by more than they were rounded."""
-    pairs = list(zip(wanted.splitlines(), got.splitlines(), strict=False))
-    found = [f"- {one}\n+ {other}" for one, other in pairs if not _same(one, other)]
-    many, more = len(wanted.splitlines()), len(got.splitlines())
-    return found + ([f"{many} lines, got {more}"] if many != more else [])
+    old, new = wanted.splitlines(), got.splitlines()
+    found: list[str] = []
+    for how, a, b, c, d in SequenceMatcher(None, old, new, autojunk=False).get_opcodes():
+        if how == "replace" and b - a == d - c and all(map(_same, old[a:b], new[c:d])):
+            continue
+        if how != "equal":
+            found += [*(f"- {line}" for line in old[a:b]), *(f"+ {line}" for line in new[c:d])]
+    return found
 
 
 def _same(wanted: str, got: str) -> bool:

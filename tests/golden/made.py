@@ -17,7 +17,7 @@ from tests.golden.refused import application, bodies, refusals
 
 
 def description(folder: Path) -> dict[str, str]:
-    """The description of the API: bodies and results of the kinds line by line, of all else what tells a change."""
+    """The description of the API: bodies and results of kinds by lines, of all else what tells a change."""
     app = application(folder)
     try:
         found = app.openapi()
@@ -32,7 +32,8 @@ def description(folder: Path) -> dict[str, str]:
     parts["schemas"] = _digests(schemas)
     for kind, named in found.pop("components").items():
         parts[kind] = _digests(named)
-    asked = {f"{method} {path}": one for path, methods in found.pop("paths").items() for method, one in methods.items()}
+    every = found.pop("paths").items()
+    asked = {f"{method} {path}": one for path, methods in every for method, one in methods.items()}
     return {**parts, "operations": _digests(asked), "head": _digests(found)}
 
 
@@ -53,7 +54,7 @@ def _help(_folder: Path) -> dict[str, str]:
 
 def _tables(_folder: Path) -> dict[str, str]:
     """The tables of docs/, and the sources that are written."""
-    found = {f"docs/{page} {name}": table() for page, tables in TABLES.items() for name, table in tables.items()}
+    found = {f"docs/{page} {name}": made() for page, each in TABLES.items() for name, made in each.items()}
     found |= {"docs/jobs.md kinds": kinds_table(SHIPPED), "docs/jobs.md again": interrupted_table(SHIPPED)}
     return {name: text.strip() for name, text in found.items()} | {
         file: source().strip() for file, source in SOURCES.items()

@@ -26,13 +26,15 @@ _WRONG: tuple[Any, ...] = ("x", -1, [], None)
 _MEANT: dict[str, tuple[dict[str, Any], ...]] = {
     "sweep": (
         {"from": 2, "to": 2}, {"from": -1}, {"parameter": "damper.N2"}, {"parameter": "damper.N0"},
-        {"frequency_hz": 1}, {**LOAD, "to": 50, "frequency_hz": 1}, {**LOAD, "frequency_hz": 0}, {"harmonics": 201},
+        {"frequency_hz": 1}, {**LOAD, "to": 50, "frequency_hz": 1}, {**LOAD, "frequency_hz": 0},
+        {"harmonics": 201},
         {"set": {"damper.mu": -1}}, {"set": {"nothing.mu": 1}}, {"scene": "nothing"}, {"scene": 7},
         {"scene": {"name": "x"}}, {"set": {"damper.N0": "1"}}, {"stability": "yes"}, {"priority": 101},
         {"fresh": 1}, {"max_seconds": 0}, {"tags": "x"}, {"project": 1}, {"name": 1},
     ),
     "map": (
-        {**LOAD, "to": 50}, {**LOAD, "parameter": "frequency"}, {**LOAD, "steps": 1}, {**LOAD, "steps": 10**6},
+        {**LOAD, "to": 50}, {**LOAD, "parameter": "frequency"}, {**LOAD, "steps": 1},
+        {**LOAD, "steps": 10**6},
         {**LOAD, "frequencies": 1}, {**LOAD, "from": -50}, {**LOAD, "steps": 3000, "frequencies": 3000},
     ),
     "peaks": (
@@ -63,7 +65,8 @@ _MEANT: dict[str, tuple[dict[str, Any], ...]] = {
     ),
     "design": (
         {"variables": {"damper.N0": [2, 1]}}, {"variables": {"nothing.N0": [1, 2]}}, {"max_band_hz": -1},
-        {"weights": {"peak": 1, "x": 2}}, {"uncertain": {"damper.mu": [0.4, 0.2]}}, {"aim": "x"}, {"samples": 4},
+        {"weights": {"peak": 1, "x": 2}}, {"uncertain": {"damper.mu": [0.4, 0.2]}}, {"aim": "x"},
+        {"samples": 4},
         {"start": {"damper.N0": 1e9}}, {"cases": [{"observe": "x"}]}, {"method": "x"}, {"limit": 0},
     ),
     "pareto": ({"points": 2}, {"weights": {"peak": 1}}, {"variables": {"damper.N0": [1, 1]}}),

@@ -50,6 +50,6 @@ def test_every_case_is_kept_and_no_other() -> None:
 
 def test_a_difference_is_seen() -> None:
     assert differences("peak: 1.234 m", "peak: 1.2341 m") == []
-    assert differences("peak: 1.234 m", "peak: 1.24 m") == ["- peak: 1.234 m\n+ peak: 1.24 m"]
+    assert differences("peak: 1.234 m", "peak: 1.24 m") == ["- peak: 1.234 m", "+ peak: 1.24 m"]
     assert differences("peak: 1.234 m", "peak: 1.234 mm") != []
-    assert differences("one\ntwo", "one") == ["2 lines, got 1"]
+    assert differences("one\ntwo", "one") == ["- two"]
