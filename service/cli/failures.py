@@ -32,9 +32,7 @@ _OPTIONS = {
     "unknowns": "--unknown",
     "priors": "--prior",
     "candidates": "--candidate",
-    "speeds_rpm": "--speeds",
     "orders": "--order",
-    "band_hz": "--band",
     "steps_per_period": "--steps",
     "max_periods": "--max-periods",
 }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from service.cli.lazy import Entry
+from service.cli.lazy import STUDY, Entry
 
 COMMANDS = (
     Entry("scenes", "commands.solver.scenes", "List the shipped scenes."),
@@ -34,10 +34,7 @@ COMMANDS = (
         "map", "commands.track.response_map",
         "Map the response over frequency and a parameter, with the ridge of its peaks.",
     ),
-    Entry(
-        "campbell", "commands.campbell.campbell",
-        "Find the speeds at which orders of the running speed meet resonances.",
-    ),
+    Entry("campbell", STUDY, "Find the speeds at which orders of the running speed meet resonances."),
     Entry(
         "interference", "commands.interference.interference",
         "Draw natural frequencies over the nodal diameter, with the engine orders that meet them.",

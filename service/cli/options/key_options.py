@@ -12,16 +12,18 @@ from typing import Annotated, Any, get_args, get_origin
 import typer
 from typer.models import OptionInfo
 
+from service.cli import completion
 from service.cli.options import inputs
 from service.cli.options import shared as options
 from service.cli.options.inputs import number, whole_number
 from service.errors import InputError
-from service.jobs.registry import JobKind
+from service.jobs.registry import Flag, JobKind
 
 SCENE = "scene"
 Schema = Mapping[str, Any]
 Command = Callable[..., None]
 
+_PAIR, _PATH = "LO HI", "PATH"
 _TAKEN = ("--wait", "--json", "--url", "--key-file", "--help")
 _SCALARS: dict[str, tuple[Any, Callable[[str], Any] | None, str]] = {
     "number": (float, number, "X"),
@@ -36,8 +38,8 @@ class KeyOption:
 
     Attributes
     ----------
-    key : str
-        Of the body.
+    key, name : str
+        Of the body, and of the field that is called so there.
     flag : str
         As it is written, with its hyphens.
     parameter : inspect.Parameter
@@ -47,6 +49,7 @@ class KeyOption:
     """
 
     key: str
+    name: str
     flag: str
     parameter: inspect.Parameter
     schema: Schema
@@ -66,7 +69,7 @@ class KeyOption:
                 raise InputError(f"`{self.flag}` must be a finite number, got {one!r}")
         kind = self.schema.get("type")
         if kind == "boolean":
-            return given is not self.flag.startswith("--no-")
+            return given is not (self.parameter.default is False and self.schema.get("default") is True)
         if isinstance(given, tuple):
             return list(given) if _is_pair(self.schema) else [list(given)]
         if kind == "object" and isinstance(given, list):
@@ -103,14 +106,16 @@ def key_options(kind: JobKind, local: Command | None) -> list[KeyOption]:
     needed = described.get("required", ())
     known = {} if local is None else options_of(local)
     found = []
-    for key, whole in described["properties"].items():
+    for name, field in kind.request.model_fields.items():
+        key = field.alias or name
         if key != SCENE:
+            whole = described["properties"][key]
             schema = _without_null(whole)
-            flag = _flag(kind, key, schema)
-            mine = known.get(flag) or _made(flag, schema, whole, needed=key in needed)
-            name = f"key_{key}"
-            parameter = mine.replace(name=name, kind=inspect.Parameter.KEYWORD_ONLY)
-            found.append(KeyOption(key, flag, parameter, schema))
+            said = next((one for one in field.metadata if isinstance(one, Flag)), Flag())
+            flag = said.name or _flag(kind, key, schema)
+            mine = known.get(flag) or _made(flag, said.metavar, schema, whole, needed=key in needed)
+            parameter = mine.replace(name=f"key_{key}", kind=inspect.Parameter.KEYWORD_ONLY)
+            found.append(KeyOption(key, name, flag, parameter, schema))
     order = [*known, *(one.flag for one in found)]
     return sorted(found, key=lambda one: order.index(one.flag))
 
@@ -140,7 +145,7 @@ def _flag(kind: JobKind, key: str, schema: Schema) -> str:
     return f"{flag}-key" if flag in _TAKEN else flag
 
 
-def _made(flag: str, schema: Schema, whole: Schema, *, needed: bool) -> inspect.Parameter:
+def _made(flag: str, metavar: str, schema: Schema, whole: Schema, *, needed: bool) -> inspect.Parameter:
     """An option of the schema of its key."""
     if flag == "--set":
         return _parameter(options.Values, None)
@@ -152,10 +157,13 @@ def _made(flag: str, schema: Schema, whole: Schema, *, needed: bool) -> inspect.
     if kind == "boolean":
         words = f"Switch off: {words}" if flag.startswith("--no-") else words
         return _parameter(Annotated[bool, typer.Option(flag, help=words)], False)
-    type_, parser, metavar = _read_as(schema)
+    type_, parser, shown = _read_as(schema)
+    if metavar == _PAIR:  # one of the ranges that a list may hold
+        type_, parser = tuple[float, float], None
     if get_origin(type_) is list and kind == "array":
         words = f"{words} Repeatable."
-    told = typer.Option(flag, metavar=metavar, parser=parser, help=words)
+    offered = completion.paths if metavar == _PATH else None
+    told = typer.Option(flag, metavar=metavar or shown, parser=parser, help=words, autocompletion=offered)
     if needed:
         return _parameter(Annotated[type_, told], inspect.Parameter.empty)
     return _parameter(
@@ -167,7 +175,7 @@ def _read_as(schema: Schema) -> tuple[Any, Callable[[str], Any] | None, str]:
     """Type, parser and metavariable of an option."""
     kind = schema.get("type")
     if _is_pair(schema):
-        return tuple[float, float], None, "LO HI"
+        return tuple[float, float], None, _PAIR
     if kind in _SCALARS:
         type_, parser, metavar = _SCALARS[kind]
         return type_, parser, "|".join(map(str, schema.get("enum", ()))) or metavar

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Mapping
 from functools import lru_cache
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import BeforeValidator, Field, WithJsonSchema
 
@@ -21,7 +21,9 @@ from service.jobs.registry import JobRequest, Resolved, SceneSource
 from service.jobs.strict_json import digest
 from solver.errors import Issue, SceneError, SettingError, pointer
 from solver.scene.examples import DAMPER_LOAD
-from solver.scene.scene import Scene, load_scene, shipped_scenes
+
+if TYPE_CHECKING:
+    from solver.scene.scene import Scene
 
 MOST_SET = 1000
 UPLOAD = "upload:"
@@ -108,6 +110,8 @@ def resolve_scene(request: SceneRequest, source: SceneSource) -> Scene:
 @lru_cache(maxsize=64)
 def shipped_scene(name: str) -> Scene | None:
     """The scene of this name that comes with the package, read once; None for another one."""
+    from solver.scene.scene import load_scene, shipped_scenes
+
     return load_scene(name) if name in shipped_scenes() else None
 
 
@@ -171,6 +175,9 @@ def read_scene(body: Mapping[str, object], prefix: str = "") -> Scene:
     InvalidRequestError
         Lists everything that is wrong, with pointers below `prefix`.
     """
+    # Loaded here: the help of a command needs the keys alone.
+    from solver.scene.scene import Scene
+
     try:
         return Scene.from_dict(body)
     except SceneError as error:

@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from typing import TYPE_CHECKING
 
 from service.jobs.common.scenes import refusal
 from solver.errors import Issue
-from solver.scene.scene import Scene
+
+if TYPE_CHECKING:
+    from solver.scene.scene import Scene
 
 MOST_POINTS = 500_000
 """Of a map: its result is text, some 40 bytes a point."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import optim
 import solver
 from service.jobs.kinds.accuracy import ACCURACY
-from service.jobs.kinds.campbell import CAMPBELL
 from service.jobs.kinds.controlled import CONTROLLED
 from service.jobs.kinds.design import DESIGN
 from service.jobs.kinds.identify import IDENTIFY
@@ -19,6 +18,7 @@ from service.jobs.kinds.peaks import PEAKS
 from service.jobs.kinds.solve import SOLVE
 from service.jobs.kinds.sweep import SWEEP
 from service.jobs.registry import Registry
+from service.jobs.studies.campbell import Campbell
 
 
 def warm_up() -> None:
@@ -39,7 +39,7 @@ SHIPPED = Registry(
         SOLVE,
         MARCH,
         ACCURACY,
-        CAMPBELL,
+        Campbell.as_kind(),
         INTERFERENCE,
         MISTUNING,
         IDENTIFY,

@@ -10,6 +10,7 @@ from pydantic import ConfigDict, Field
 
 import solver
 from service.jobs.common.records import sweep_records
+from service.jobs.common.results import Amplitude, EndedResult, Table
 from service.jobs.common.scenes import (
     FrequencyHz,
     Harmonics,
@@ -21,7 +22,6 @@ from service.jobs.common.scenes import (
     resolved,
 )
 from service.jobs.kind_view import Json, KindView, NothingToDrawError, ReadSweep, StoredSweep
-from service.jobs.kinds.registry.results import Amplitude, EndedResult, Table
 from service.jobs.outputs import JobOutput, Progress, ShouldStop
 from service.jobs.registry import JobKind, Resolved, SceneSource
 from solver.errors import pointer

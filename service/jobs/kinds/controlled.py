@@ -9,6 +9,7 @@ from pydantic import ConfigDict, Field
 
 import solver
 from optim.criteria.json_types import Name
+from service.jobs.common.results import Curve, EndedResult, Table
 from service.jobs.common.scenes import (
     HarmonicRequest,
     PositiveNumber,
@@ -19,7 +20,6 @@ from service.jobs.common.scenes import (
 )
 from service.jobs.common.sizes import balance_issues
 from service.jobs.kind_view import Json, KindView, NothingToDrawError, ReadSweep, StoredSweep
-from service.jobs.kinds.registry.results import Curve, EndedResult, Table
 from service.jobs.outputs import JobOutput, Progress, ShouldStop
 from service.jobs.registry import JobKind, Resolved, SceneSource
 from solver.errors import Issue

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 from pydantic import ConfigDict, Field
 
 import solver
+from service.jobs.common.results import EndedResult, Table
 from service.jobs.common.scenes import PositiveNumber, SceneRequest, refusal, require, resolve_scene, resolved
 from service.jobs.common.sizes import memory_issues
 from service.jobs.kind_view import Json, KindView, NothingToDrawError, ReadSweep, StoredSweep
-from service.jobs.kinds.registry.results import EndedResult, Table
 from service.jobs.outputs import JobOutput, Progress, ShouldStop
 from service.jobs.registry import JobKind, Resolved, SceneSource
 from solver.errors import SettingError, pointer

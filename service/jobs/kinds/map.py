@@ -12,11 +12,11 @@ from service.jobs import strict_json
 from service.jobs.arrays import decode, encode
 from service.jobs.common.ranges import RangeRequest, law_issues, range_issues
 from service.jobs.common.records import packed, sweep_records, unpacked
+from service.jobs.common.results import Curve, EndedResult, KnownResult
 from service.jobs.common.scenes import refusal, require, resolve_scene, resolved
 from service.jobs.common.sizes import MOST_POINTS, balance_issues
 from service.jobs.kind_view import Json, KindView, ReadSweep, StoredSweep
 from service.jobs.kinds.peaks import PeaksResult
-from service.jobs.kinds.registry.results import Curve, EndedResult, KnownResult
 from service.jobs.outputs import JobOutput, OnProgress, ShouldStop
 from service.jobs.parts import Part, PartOutput, Parts, PartStoppedError
 from service.jobs.registry import JobKind, Resolved, SceneSource

@@ -9,10 +9,10 @@ from pydantic import ConfigDict, Field
 
 import solver
 from service.jobs.common.periods import history_of
+from service.jobs.common.results import Amplitude, KindResult, Table
 from service.jobs.common.scenes import FrequencyHz, SceneRequest, require, resolve_scene, resolved
 from service.jobs.common.sizes import march_issues
 from service.jobs.kind_view import Json, KindView, ReadSweep, StoredSweep
-from service.jobs.kinds.registry.results import Amplitude, KindResult, Table
 from service.jobs.outputs import JobOutput, Progress, ShouldStop
 from service.jobs.registry import JobKind, Resolved, SceneSource
 from solver.scene.scene import Scene

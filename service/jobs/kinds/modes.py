@@ -9,6 +9,7 @@ from pydantic import ConfigDict, Field, RootModel
 
 import solver
 from service.jobs.common.modes import MOST_PEAKS, MOST_POINTS, exact_peaks, excitations, motions_of
+from service.jobs.common.results import Curve, EndedResult, Table
 from service.jobs.common.scenes import (
     HarmonicRequest,
     Number,
@@ -20,7 +21,6 @@ from service.jobs.common.scenes import (
 )
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
 from service.jobs.kind_view import Json, KindView, NothingToDrawError, ReadSweep, StoredSweep
-from service.jobs.kinds.registry.results import Curve, EndedResult, Table
 from service.jobs.outputs import JobOutput, Progress, ShouldStop
 from service.jobs.registry import JobKind, Resolved, SceneSource
 from solver.errors import Issue, SettingError, pointer

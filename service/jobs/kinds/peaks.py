@@ -10,10 +10,10 @@ from pydantic import ConfigDict, Field
 import solver
 from service.jobs.common.ranges import RangeRequest, law_issues, range_issues
 from service.jobs.common.records import sweep_records
+from service.jobs.common.results import Curve, EndedResult, KnownResult, Table
 from service.jobs.common.scenes import require, resolve_scene, resolved
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
 from service.jobs.kind_view import Json, KindView, NothingToDrawError, ReadSweep, StoredSweep
-from service.jobs.kinds.registry.results import Curve, EndedResult, KnownResult, Table
 from service.jobs.outputs import JobOutput, Progress, ShouldStop
 from service.jobs.registry import JobKind, Resolved, SceneSource
 from solver.scene.examples import DISK_LOAD

@@ -1,0 +1,140 @@
+"""A study: its keys, each said once, what it computes and what people see of it.
+
+From one class follow the body of a request with its schema and its refusals, the kind of job, the spec that a
+worker is given, the command of its name and ``submit``, and the row in the documentation. The keys have the
+names of the arguments of the function that computes.
+"""
+
+from __future__ import annotations
+
+import enum
+import inspect
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol
+
+from pydantic import BaseModel, ConfigDict
+
+from service.jobs.common.scenes import HarmonicRequest, SceneRequest, require, resolve_scene, resolved
+from service.jobs.kind_view import Json, KindView, NothingToDrawError, ReadSweep, StoredSweep
+from service.jobs.outputs import JobOutput, OnProgress, Progress, ShouldStop
+from service.jobs.registry import JobKind, Resolved, SceneSource
+from solver.errors import Issue
+from solver.results.views import on_demand
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from solver import AnyBranch
+    from solver.results.dataset import Dataset
+    from solver.scene.scene import Scene
+
+
+class Watch(NamedTuple):
+    """Who watches a computation: how far it is, and whether it is to end."""
+
+    on_progress: OnProgress | None = None
+    should_stop: ShouldStop | None = None
+
+
+class Found(Protocol):
+    """A result of a study."""
+
+    @property
+    def completed(self) -> bool:
+        """Whether it came to its end."""
+
+    @property
+    def status(self) -> enum.Enum:
+        """How it ended; the value is a sentence that says what to try."""
+
+    def to_json(self) -> dict[str, Any]:
+        """The result as JSON."""
+
+    def to_dataset(self) -> Dataset:
+        """The result as named arrays."""
+
+    def plot(self) -> Figure:
+        """The picture of it."""
+
+
+class Study(SceneRequest):
+    """Root of the studies: the keys are fields, an alias is how bodies and options call one.
+
+    A subclass says its NAME, the FUNCTION that computes (``"solver:track_peak"``), the model of its RESULT,
+    and for people what it SHOWS, which SWEEPS it stores and what its progress has COUNTED. Its docstring is
+    the help of the command, the first line of which is its summary.
+    """
+
+    model_config = ConfigDict(validate_by_alias=True)
+
+    NAME: ClassVar[str]
+    FUNCTION: ClassVar[str]
+    RESULT: ClassVar[type[BaseModel]]
+    SHOWS: ClassVar[str]
+    SWEEPS: ClassVar[str] = ""
+    COUNTED: ClassVar[str] = "points"
+
+    def issues(self, scene: Scene) -> list[Issue]:
+        """Return what is wrong or too large for the scene, beyond the types of the keys."""
+        raise NotImplementedError
+
+    @classmethod
+    def compute(cls, scene: Scene, asked: Mapping[str, Any], watch: Watch) -> Any:
+        """Compute what was asked, by keys that are the function's; left out, its own defaults count."""
+        return on_demand(cls.FUNCTION)(scene, **asked, **watch._asdict())
+
+    @classmethod
+    def branches(cls, _found: Any) -> Iterable[AnyBranch]:
+        """Return the branches to be stored."""
+        return ()
+
+    @classmethod
+    def empty(cls, _result: Json) -> str:
+        """Return why there is nothing to draw; empty if there is."""
+        return ""
+
+    @classmethod
+    def figure(cls, result: Json, sweeps: Sequence[StoredSweep], read: ReadSweep) -> Figure:
+        """Return the picture of a stored result that is not empty."""
+        raise NotImplementedError
+
+    @classmethod
+    def keys(cls) -> list[str]:
+        """Return the names of what is asked beside the scene, in order."""
+        of_harmonics = [name for name in HarmonicRequest.model_fields if name in cls.model_fields]
+        apart = {*SceneRequest.model_fields, *of_harmonics}
+        own = [name for name in cls.model_fields if name not in apart]
+        return own + [name for name in of_harmonics if name not in SceneRequest.model_fields]
+
+    @classmethod
+    def run(cls, spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop) -> JobOutput:
+        """Compute a spec, in a worker."""
+        from service.jobs.common.records import sweep_records
+        from solver.scene.scene import Scene
+
+        asked = {name: value for name, value in spec.items() if name != "scene"}
+        found = cls.compute(Scene.from_dict(spec["scene"]), asked, Watch(progress, should_stop))
+        return JobOutput.of(found, reached=found.completed, sweeps=sweep_records(cls.branches(found)))
+
+    @classmethod
+    def draw(cls, result: Json, sweeps: Sequence[StoredSweep], read: ReadSweep) -> Figure:
+        """Return the picture of a stored result."""
+        if why := cls.empty(result):
+            raise NothingToDrawError(why)
+        return cls.figure(result, sweeps, read)
+
+    @classmethod
+    def as_kind(cls) -> JobKind:
+        """Return the kind of job."""
+        summary = (inspect.getdoc(cls) or "").partition("\n")[0]
+        return JobKind(
+            name=cls.NAME, summary=summary, request=cls, resolve=resolve, run=cls.run, result=cls.RESULT,
+            view=KindView(result=cls.SHOWS, sweeps=cls.SWEEPS, draw=cls.draw),
+        )  # fmt: skip
+
+
+def resolve(request: Study, source: SceneSource) -> Resolved:
+    """Look up the scene of a study and check what is asked of it; the spec has its keys."""
+    scene = resolve_scene(request, source)
+    require(request.issues(scene))
+    return resolved(scene, **request.model_dump(mode="json", include=set(request.keys())))
