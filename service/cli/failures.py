@@ -24,7 +24,6 @@ _OPTIONS = {
     "accuracy": "--accuracy",
     "effects": "--effects",
     "parameter": "--parameter",
-    "checks": "--checks",
     "steps": "--steps",
     "frequencies": "--frequencies",
     "limit": "--limit",

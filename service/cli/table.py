@@ -29,7 +29,7 @@ COMMANDS = (
         "results", "commands.client.jobs.results", "Print what a job computed, or list the stored designs.",
         keyed=True,
     ),
-    Entry("peaks", "commands.track.peaks", "Track the highest peak over a parameter."),
+    Entry("peaks", STUDY, "Track the highest peak over a parameter."),
     Entry(
         "map", "commands.track.response_map",
         "Map the response over frequency and a parameter, with the ridge of its peaks.",

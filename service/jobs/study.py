@@ -9,14 +9,14 @@ from __future__ import annotations
 
 import enum
 import inspect
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol
 
 from pydantic import BaseModel, ConfigDict
 
 from service.jobs.common.scenes import HarmonicRequest, SceneRequest, require, resolve_scene, resolved
 from service.jobs.kind_view import Json, KindView, NothingToDrawError, ReadSweep, StoredSweep
-from service.jobs.outputs import JobOutput, OnProgress, Progress, ShouldStop
+from service.jobs.outputs import JobOutput, OnProgress, Progress, ShouldStop, SweepRecord
 from service.jobs.registry import JobKind, Resolved, SceneSource
 from solver.errors import Issue
 from solver.results.views import on_demand
@@ -24,7 +24,6 @@ from solver.results.views import on_demand
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from solver import AnyBranch
     from solver.results.dataset import Dataset
     from solver.scene.scene import Scene
 
@@ -84,8 +83,8 @@ class Study(SceneRequest):
         return on_demand(cls.FUNCTION)(scene, **asked, **watch._asdict())
 
     @classmethod
-    def branches(cls, _found: Any) -> Iterable[AnyBranch]:
-        """Return the branches to be stored."""
+    def sweeps(cls, _found: Any) -> tuple[SweepRecord, ...]:
+        """Return the responses to be stored."""
         return ()
 
     @classmethod
@@ -109,12 +108,11 @@ class Study(SceneRequest):
     @classmethod
     def run(cls, spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop) -> JobOutput:
         """Compute a spec, in a worker."""
-        from service.jobs.common.records import sweep_records
         from solver.scene.scene import Scene
 
         asked = {name: value for name, value in spec.items() if name != "scene"}
         found = cls.compute(Scene.from_dict(spec["scene"]), asked, Watch(progress, should_stop))
-        return JobOutput.of(found, reached=found.completed, sweeps=sweep_records(cls.branches(found)))
+        return JobOutput.of(found, reached=found.completed, sweeps=cls.sweeps(found))
 
     @classmethod
     def draw(cls, result: Json, sweeps: Sequence[StoredSweep], read: ReadSweep) -> Figure:

@@ -1,4 +1,4 @@
-"""The commands over a parameter and the frequency at once: peaks and map."""
+"""`stickslip map`: the response over frequency and a parameter."""
 
 from __future__ import annotations
 
@@ -26,45 +26,12 @@ Followed = Annotated[
 ]  # fmt: skip
 Start = Annotated[float, amount("--from", "A", "Start of the range.")]
 Stop = Annotated[float, amount("--to", "B", "End of the range.")]
-Checks = Annotated[
-    int,
-    count("--checks", "N", "Sweeps between the ends that look for peaks nothing has followed."),
-]
 Steps = Annotated[int, count("--steps", "N", "Values of the parameter.")]
 Frequencies = Annotated[int, count("--frequencies", "N", "Frequencies over the band.")]
 
 NoRidge = Annotated[
     bool, typer.Option("--no-ridge", help="Do not track the peaks: faster, and for contacts of every law.")
 ]
-
-
-def peaks(
-    name: options.Scene,
-    parameter: Followed,
-    start: Start,
-    stop: Stop,
-    values: options.Values = None,
-    checks: Checks = 3,
-    harmonics: options.Harmonics = 11,
-    plot: options.Plot = None,
-    out: options.Out = None,
-    as_json: options.Json = False,
-) -> None:
-    """Track the highest peak over a parameter.
-
-    With exact derivatives; sweeps check that no peak was missed, and the least highest peak is found.
-    """
-    import solver
-
-    outputs = Outputs.asked(plot, out)
-    scene = inputs.scene(name, values)
-    with inputs.path_of("--parameter"), bar("peaks", "sweeps") as on_progress:
-        track = solver.track_peak(
-            scene, parameter, start, stop, harmonics=harmonics, checks=checks, on_progress=on_progress
-        )
-    outputs.write(track, track.plot if track.parameter.size else None)
-    show(track.to_json(), track_reports.track, as_json=as_json)
-    end(track.completed, track.status.value)
 
 
 def response_map(

@@ -17,7 +17,7 @@ from optim.criteria.json_types import Number as Number
 from optim.criteria.json_types import ParameterPath as ParameterPath
 from optim.criteria.json_types import PositiveNumber as PositiveNumber
 from service.errors import InvalidRequestError
-from service.jobs.registry import JobRequest, Resolved, SceneSource
+from service.jobs.registry import Flag, JobRequest, Resolved, SceneSource
 from service.jobs.strict_json import digest
 from solver.errors import Issue, SceneError, SettingError, pointer
 from solver.scene.examples import DAMPER_LOAD
@@ -84,7 +84,9 @@ class HarmonicRequest(SceneRequest):
         Highest harmonic of the balance.
     """
 
-    harmonics: Harmonics = Field(default=11, description="Highest harmonic of the balance.")
+    harmonics: Annotated[Harmonics, Flag(metavar="H")] = Field(
+        default=11, description="Highest harmonic of the balance."
+    )
 
 
 def resolve_scene(request: SceneRequest, source: SceneSource) -> Scene:

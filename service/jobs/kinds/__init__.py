@@ -14,11 +14,11 @@ from service.jobs.kinds.march import MARCH
 from service.jobs.kinds.mistuning import MISTUNING
 from service.jobs.kinds.modes import MODES
 from service.jobs.kinds.pareto import PARETO
-from service.jobs.kinds.peaks import PEAKS
 from service.jobs.kinds.solve import SOLVE
 from service.jobs.kinds.sweep import SWEEP
 from service.jobs.registry import Registry
 from service.jobs.studies.campbell import Campbell
+from service.jobs.studies.peaks import Peaks
 
 
 def warm_up() -> None:
@@ -33,7 +33,7 @@ SHIPPED = Registry(
     [
         SWEEP,
         MAP,
-        PEAKS,
+        Peaks.as_kind(),
         DESIGN,
         PARETO,
         SOLVE,

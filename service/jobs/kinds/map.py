@@ -16,10 +16,10 @@ from service.jobs.common.results import Curve, EndedResult, KnownResult
 from service.jobs.common.scenes import refusal, require, resolve_scene, resolved
 from service.jobs.common.sizes import MOST_POINTS, balance_issues
 from service.jobs.kind_view import Json, KindView, ReadSweep, StoredSweep
-from service.jobs.kinds.peaks import PeaksResult
 from service.jobs.outputs import JobOutput, OnProgress, ShouldStop
 from service.jobs.parts import Part, PartOutput, Parts, PartStoppedError
 from service.jobs.registry import JobKind, Resolved, SceneSource
+from service.jobs.studies.peaks import PeaksResult
 from solver.errors import Issue
 from solver.results.known import Known, worst_of
 from solver.scene.examples import DISK_LOAD
@@ -92,8 +92,8 @@ def resolve(request: MapRequest, source: SceneSource) -> Resolved:
     return resolved(
         scene,
         parameter=request.parameter,
-        start=request.from_,
-        stop=request.to,
+        start=request.start,
+        stop=request.stop,
         steps=request.steps,
         frequencies=request.frequencies,
         ridge=request.ridge,

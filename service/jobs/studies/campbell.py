@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated
 
 from pydantic import ConfigDict, Field
@@ -13,6 +13,7 @@ from service.jobs.common.results import Amplitude, EndedResult, KnownResult, Tab
 from service.jobs.common.scenes import HarmonicRequest, refusal
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
 from service.jobs.kind_view import Json, ReadSweep, StoredSweep
+from service.jobs.outputs import SweepRecord
 from service.jobs.registry import Flag
 from service.jobs.study import Study
 from solver.errors import Issue, pointer
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from optim.studies.crossings import CampbellDiagram
-    from solver import AnyBranch
     from solver.scene.scene import Scene
     from solver.views.plots.curves import Response
 
@@ -90,9 +90,11 @@ class Campbell(Study, HarmonicRequest):
         return found + balance_issues("/orders", scene, self.harmonics, points)
 
     @classmethod
-    def branches(cls, found: CampbellDiagram) -> Iterable[AnyBranch]:
+    def sweeps(cls, found: CampbellDiagram) -> tuple[SweepRecord, ...]:
         """Return the response of every order."""
-        return (one.branch for one in found.orders)
+        from service.jobs.common.records import sweep_records
+
+        return sweep_records(one.branch for one in found.orders)
 
     @classmethod
     def empty(cls, result: Json) -> str:
