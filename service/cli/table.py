@@ -36,13 +36,12 @@ COMMANDS = (
     ),
     Entry("campbell", STUDY, "Find the speeds at which orders of the running speed meet resonances."),
     Entry(
-        "interference", "commands.interference.interference",
+        "interference", STUDY,
         "Draw natural frequencies over the nodal diameter, with the engine orders that meet them.",
     ),
     Entry("modes", "commands.modes.modes", "Follow a mode's frequency and damping over its amplitude."),
     Entry(
-        "controlled", "commands.controlled.controlled",
-        "Follow the response over the frequency with one amplitude held, as rigs do.",
+        "controlled", STUDY, "Follow the response over the frequency with one amplitude held, as rigs do.",
     ),
     Entry("mistuning", "commands.mistuning.mistuning", "Study disks whose blades are not quite equal."),
     Entry(

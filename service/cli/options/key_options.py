@@ -69,7 +69,7 @@ class KeyOption:
                 raise InputError(f"`{self.flag}` must be a finite number, got {one!r}")
         kind = self.schema.get("type")
         if kind == "boolean":
-            return given is not (self.parameter.default is False and self.schema.get("default") is True)
+            return given is not (self.schema.get("default") is True)
         if isinstance(given, tuple):
             return list(given) if _is_pair(self.schema) else [list(given)]
         if kind == "object" and isinstance(given, list):
@@ -155,7 +155,7 @@ def _made(flag: str, metavar: str, schema: Schema, whole: Schema, *, needed: boo
         both = f"{flag}/--no-{flag.removeprefix('--')}"
         return _parameter(Annotated[bool, typer.Option(both, help=words)], inspect.Parameter.empty)
     if kind == "boolean":
-        words = f"Switch off: {words}" if flag.startswith("--no-") else words
+        words = f"Switch off: {words}" if default is True else words
         return _parameter(Annotated[bool, typer.Option(flag, help=words)], False)
     type_, parser, shown = _read_as(schema)
     if metavar == _PAIR:  # one of the ranges that a list may hold

@@ -196,6 +196,15 @@ def check(where: str, attempt: Callable[[], object]) -> list[Issue]:
     return []
 
 
+def check_named(attempt: Callable[[], object]) -> list[Issue]:
+    """As `check`, at the key that the error names."""
+    try:
+        attempt()
+    except SettingError as error:
+        return [Issue(pointer=pointer(error.name), message=str(error))]
+    return []
+
+
 def refusal(where: str, message: str) -> Issue:
     """Something wrong with the field at the pointer `where`."""
     return Issue(pointer=where, message=message)

@@ -5,10 +5,8 @@ from __future__ import annotations
 import optim
 import solver
 from service.jobs.kinds.accuracy import ACCURACY
-from service.jobs.kinds.controlled import CONTROLLED
 from service.jobs.kinds.design import DESIGN
 from service.jobs.kinds.identify import IDENTIFY
-from service.jobs.kinds.interference import INTERFERENCE
 from service.jobs.kinds.map import MAP
 from service.jobs.kinds.march import MARCH
 from service.jobs.kinds.mistuning import MISTUNING
@@ -18,6 +16,8 @@ from service.jobs.kinds.solve import SOLVE
 from service.jobs.kinds.sweep import SWEEP
 from service.jobs.registry import Registry
 from service.jobs.studies.campbell import Campbell
+from service.jobs.studies.controlled import Controlled
+from service.jobs.studies.interference import Interference
 from service.jobs.studies.peaks import Peaks
 
 
@@ -40,11 +40,11 @@ SHIPPED = Registry(
         MARCH,
         ACCURACY,
         Campbell.as_kind(),
-        INTERFERENCE,
+        Interference.as_kind(),
         MISTUNING,
         IDENTIFY,
         MODES,
-        CONTROLLED,
+        Controlled.as_kind(),
     ],
     warm_up,
 )
