@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable
 from typing import Any
 
 from optim.errors import DesignError
 from service.cli.failures import end
 from service.cli.options import inputs
 from service.cli.options import shared as options
-from service.cli.options.key_options import key_options
+from service.cli.options.key_options import as_options, key_options
 from service.cli.output_files import Outputs
 from service.cli.progress import bar
-from service.errors import InputError
+from service.errors import InputError, InvalidRequestError
 from service.jobs.study import Study, Watch
 from service.rendering.tables import results as tables
 from service.rendering.tables.text import show
-from solver.errors import SettingError
+from solver.errors import Issue, SettingError
 from solver.results.views import on_demand
 
 
@@ -31,7 +30,8 @@ def command_of(study: type[Study]) -> Callable[..., None]:
     """Return the command of a study, with an option for each key."""
     own = study.keys()
     made = {one.name: one for one in key_options(study.as_kind(), None)}
-    flags = {name: made[name].flag for name in own}
+    flags = {word: made[name].flag for name in own for word in (name, made[name].key)}
+    flags["path"] = flags.get("parameter", "--set")
 
     def command(
         name: str, values: list[str] | None, plot: str | None, out: str | None, as_json: bool, **given: Any
@@ -40,12 +40,17 @@ def command_of(study: type[Study]) -> Callable[..., None]:
         scene = inputs.scene(name, values)
         read = {key: made[key].in_body(given[made[key].parameter.name]) for key in own}
         asked = {key: value for key, value in read.items() if value is not None}
-        with _options_named(flags), bar(study.NAME, study.COUNTED) as on_progress:
-            found = study.compute(scene, asked, Watch(on_progress))
-        answer = found.to_json()
-        outputs.write(found, None if study.empty(answer) else found.plot)
-        show(answer, tables.of_kind(study.NAME), as_json=as_json)
-        end(found.completed, found.status.value)
+        wrong = [as_options(one.message, flags) for one in study.model_construct(**asked).issues(scene)]
+        if wrong:
+            raise InvalidRequestError([Issue(pointer="", message=one) for one in wrong])
+        try:
+            with bar(study.NAME, study.COUNTED) as on_progress:
+                answer = study.compute(scene, asked, Watch(on_progress))
+        except (SettingError, DesignError) as error:
+            raise InputError(as_options(str(error), flags)) from error
+        outputs.write(answer.result, None if study.empty(answer.json) else answer.result.plot)
+        show(answer.json, tables.of_kind(study.NAME), as_json=as_json)
+        end(answer.reached, answer.status)
 
     listed = [
         _keyword("name", options.Scene), *(made[key].parameter for key in own),
@@ -60,17 +65,3 @@ def command_of(study: type[Study]) -> Callable[..., None]:
 
 def _keyword(name: str, annotation: Any, default: Any = inspect.Parameter.empty) -> inspect.Parameter:
     return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
-
-
-@contextmanager
-def _options_named(flags: Mapping[str, str]) -> Iterator[None]:
-    """Name the option in the refusal of an argument."""
-    try:
-        yield
-    except (SettingError, DesignError) as error:
-        name = "parameter" if error.name == "path" else error.name
-        # One of several values of a key has its number behind the name.
-        flag = flags.get(name.partition("[")[0])
-        if flag is None:
-            raise
-        raise InputError(str(error).replace(f"`{error.name}`", f"`{flag}`", 1)) from error

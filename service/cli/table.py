@@ -39,7 +39,7 @@ COMMANDS = (
         "interference", STUDY,
         "Draw natural frequencies over the nodal diameter, with the engine orders that meet them.",
     ),
-    Entry("modes", "commands.modes.modes", "Follow a mode's frequency and damping over its amplitude."),
+    Entry("modes", STUDY, "Follow a mode's frequency and damping over its amplitude."),
     Entry(
         "controlled", STUDY, "Follow the response over the frequency with one amplitude held, as rigs do.",
     ),

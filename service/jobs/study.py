@@ -20,6 +20,7 @@ from service.jobs.outputs import JobOutput, OnProgress, Progress, ShouldStop, Sw
 from service.jobs.registry import JobKind, Resolved, SceneSource
 from solver.errors import Issue
 from solver.results.views import on_demand
+from solver.results.watch import part_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -33,6 +34,10 @@ class Watch(NamedTuple):
 
     on_progress: OnProgress | None = None
     should_stop: ShouldStop | None = None
+
+    def part(self, begin: float, end: float, before: int = 0) -> Watch:
+        """Return who watches a part, from `begin` to `end` of the whole, behind so many points."""
+        return Watch(part_of(self.on_progress, begin, end, before), self.should_stop)
 
 
 class Found(Protocol):
@@ -56,6 +61,24 @@ class Found(Protocol):
         """The picture of it."""
 
 
+class Answer(NamedTuple):
+    """What a study found: the result that is drawn and written, its JSON, and how it ended."""
+
+    result: Found
+    json: dict[str, Any]
+    reached: bool
+    status: str
+
+    @classmethod
+    def of(cls, found: Found) -> Answer:
+        """Return what a result says of itself."""
+        return cls(found, found.to_json(), found.completed, str(found.status.value))
+
+    def beside(self, result: Found, **further: Any) -> Answer:
+        """Return the answer with further keys, drawn and written as another result."""
+        return self._replace(result=result, json={**self.json, **further})
+
+
 class Study(SceneRequest):
     """Root of the studies: the keys are fields, an alias is how bodies and options call one.
 
@@ -73,14 +96,18 @@ class Study(SceneRequest):
     SWEEPS: ClassVar[str] = ""
     COUNTED: ClassVar[str] = "points"
 
-    def issues(self, scene: Scene) -> list[Issue]:
-        """Return what is wrong or too large for the scene, beyond the types of the keys."""
+    def issues(self, _scene: Scene) -> list[Issue]:
+        """Return what is wrong for the scene, beyond the types of the keys."""
+        return []
+
+    def sizes(self, scene: Scene) -> list[Issue]:
+        """Return what is too large for one job."""
         raise NotImplementedError
 
     @classmethod
-    def compute(cls, scene: Scene, asked: Mapping[str, Any], watch: Watch) -> Any:
+    def compute(cls, scene: Scene, asked: Mapping[str, Any], watch: Watch) -> Answer:
         """Compute what was asked, by keys that are the function's; left out, its own defaults count."""
-        return on_demand(cls.FUNCTION)(scene, **asked, **watch._asdict())
+        return Answer.of(on_demand(cls.FUNCTION)(scene, **asked, **watch._asdict()))
 
     @classmethod
     def sweeps(cls, _found: Any) -> tuple[SweepRecord, ...]:
@@ -111,8 +138,11 @@ class Study(SceneRequest):
         from solver.scene.scene import Scene
 
         asked = {name: value for name, value in spec.items() if name != "scene"}
-        found = cls.compute(Scene.from_dict(spec["scene"]), asked, Watch(progress, should_stop))
-        return JobOutput.of(found, reached=found.completed, sweeps=cls.sweeps(found))
+        answer = cls.compute(Scene.from_dict(spec["scene"]), asked, Watch(progress, should_stop))
+        return JobOutput(
+            result=answer.json, sweeps=cls.sweeps(answer.result),
+            shortfall=None if answer.reached else answer.status,
+        )  # fmt: skip
 
     @classmethod
     def draw(cls, result: Json, sweeps: Sequence[StoredSweep], read: ReadSweep) -> Figure:
@@ -134,5 +164,5 @@ class Study(SceneRequest):
 def resolve(request: Study, source: SceneSource) -> Resolved:
     """Look up the scene of a study and check what is asked of it; the spec has its keys."""
     scene = resolve_scene(request, source)
-    require(request.issues(scene))
+    require(request.issues(scene) or request.sizes(scene))
     return resolved(scene, **request.model_dump(mode="json", include=set(request.keys())))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import json
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, get_args, get_origin
@@ -105,17 +106,20 @@ def key_options(kind: JobKind, local: Command | None) -> list[KeyOption]:
     described = kind.request.model_json_schema()
     needed = described.get("required", ())
     known = {} if local is None else options_of(local)
+    asked = {f.alias or name: (name, f) for name, f in kind.request.model_fields.items() if name != SCENE}
+    schemas = {key: _without_null(described["properties"][key]) for key in asked}
+    said = {
+        key: next((one for one in f.metadata if isinstance(one, Flag)), Flag())
+        for key, (_, f) in asked.items()
+    }
+    flags = {key: said[key].name or _flag(kind, key, schema) for key, schema in schemas.items()}
     found = []
-    for name, field in kind.request.model_fields.items():
-        key = field.alias or name
-        if key != SCENE:
-            whole = described["properties"][key]
-            schema = _without_null(whole)
-            said = next((one for one in field.metadata if isinstance(one, Flag)), Flag())
-            flag = said.name or _flag(kind, key, schema)
-            mine = known.get(flag) or _made(flag, said.metavar, schema, whole, needed=key in needed)
-            parameter = mine.replace(name=f"key_{key}", kind=inspect.Parameter.KEYWORD_ONLY)
-            found.append(KeyOption(key, name, flag, parameter, schema))
+    for key, flag in flags.items():
+        whole, schema = described["properties"][key], schemas[key]
+        words = as_options(whole.get("description", ""), flags)
+        mine = known.get(flag) or _made(flag, said[key].metavar, schema, whole, words, needed=key in needed)
+        parameter = mine.replace(name=f"key_{key}", kind=inspect.Parameter.KEYWORD_ONLY)
+        found.append(KeyOption(key, asked[key][0], flag, parameter, schema))
     order = [*known, *(one.flag for one in found)]
     return sorted(found, key=lambda one: order.index(one.flag))
 
@@ -145,12 +149,21 @@ def _flag(kind: JobKind, key: str, schema: Schema) -> str:
     return f"{flag}-key" if flag in _TAKEN else flag
 
 
-def _made(flag: str, metavar: str, schema: Schema, whole: Schema, *, needed: bool) -> inspect.Parameter:
+def as_options(words: str, flags: Mapping[str, str]) -> str:
+    """Return words with the options in place of the keys."""
+    # One of several values of a key has its number behind the name.
+    return re.sub(
+        r"`(\w+)(?:\[\d+\])?", lambda found: f"`{flags[found[1]]}" if found[1] in flags else found[0], words
+    )
+
+
+def _made(
+    flag: str, metavar: str, schema: Schema, whole: Schema, words: str, *, needed: bool
+) -> inspect.Parameter:
     """An option of the schema of its key."""
     if flag == "--set":
         return _parameter(options.Values, None)
     kind, default = schema.get("type"), whole.get("default")
-    words = whole.get("description", "")
     if kind == "boolean" and needed:
         both = f"{flag}/--no-{flag.removeprefix('--')}"
         return _parameter(Annotated[bool, typer.Option(both, help=words)], inspect.Parameter.empty)

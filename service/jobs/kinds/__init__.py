@@ -10,7 +10,6 @@ from service.jobs.kinds.identify import IDENTIFY
 from service.jobs.kinds.map import MAP
 from service.jobs.kinds.march import MARCH
 from service.jobs.kinds.mistuning import MISTUNING
-from service.jobs.kinds.modes import MODES
 from service.jobs.kinds.pareto import PARETO
 from service.jobs.kinds.solve import SOLVE
 from service.jobs.kinds.sweep import SWEEP
@@ -18,6 +17,7 @@ from service.jobs.registry import Registry
 from service.jobs.studies.campbell import Campbell
 from service.jobs.studies.controlled import Controlled
 from service.jobs.studies.interference import Interference
+from service.jobs.studies.modes import Modes
 from service.jobs.studies.peaks import Peaks
 
 
@@ -43,7 +43,7 @@ SHIPPED = Registry(
         Interference.as_kind(),
         MISTUNING,
         IDENTIFY,
-        MODES,
+        Modes.as_kind(),
         Controlled.as_kind(),
     ],
     warm_up,

@@ -71,8 +71,8 @@ class Campbell(Study, HarmonicRequest):
         description="Frequencies looked at [Hz]; the scene's band and those of the running speeds.",
     )
 
-    def issues(self, scene: Scene) -> list[Issue]:
-        """Return what is wrong with speeds and band, or too large."""
+    def issues(self, _scene: Scene) -> list[Issue]:
+        """Return what is wrong with speeds and band."""
         found = [
             refusal(pointer("speeds_rpm", i), f"`speeds_rpm[{i}]` {wanted}, got {pair}")
             for i, pair in enumerate(self.speeds_rpm)
@@ -86,8 +86,12 @@ class Campbell(Study, HarmonicRequest):
             found.append(
                 refusal("/band_hz", f"`band_hz` must have 0 < low < high [Hz], got {self.band_hz!r}")
             )
+        return found
+
+    def sizes(self, scene: Scene) -> list[Issue]:
+        """Return what is too large."""
         points = len(self.orders or [1]) * POINTS_OF_A_SWEEP
-        return found + balance_issues("/orders", scene, self.harmonics, points)
+        return balance_issues("/orders", scene, self.harmonics, points)
 
     @classmethod
     def sweeps(cls, found: CampbellDiagram) -> tuple[SweepRecord, ...]:

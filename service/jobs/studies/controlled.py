@@ -13,7 +13,7 @@ from service.jobs.common.scenes import HarmonicRequest, PositiveNumber, refusal
 from service.jobs.common.sizes import balance_issues
 from service.jobs.kind_view import Json, ReadSweep, StoredSweep
 from service.jobs.registry import Flag
-from service.jobs.study import Study, Watch
+from service.jobs.study import Answer, Study, Watch
 from solver.errors import Issue
 
 if TYPE_CHECKING:
@@ -72,7 +72,7 @@ class Controlled(Study, HarmonicRequest):
     )
 
     def issues(self, scene: Scene) -> list[Issue]:
-        """Return what is wrong with range and DOF for the scene, or too large."""
+        """Return what is wrong with range and DOF for the scene."""
         issues: list[Issue] = []
         low = scene.observe.band[0] if self.start is None else self.start
         high = scene.observe.band[1] if self.stop is None else self.stop
@@ -85,10 +85,14 @@ class Controlled(Study, HarmonicRequest):
             issues.append(
                 refusal("/scene", "must have an excitation of harmonic 1 alone: it holds the amplitude")
             )
-        return issues or balance_issues("/harmonics", scene, self.harmonics, _POINTS)
+        return issues
+
+    def sizes(self, scene: Scene) -> list[Issue]:
+        """Return what is too large."""
+        return balance_issues("/harmonics", scene, self.harmonics, _POINTS)
 
     @classmethod
-    def compute(cls, scene: Scene, asked: Mapping[str, Any], watch: Watch) -> Any:
+    def compute(cls, scene: Scene, asked: Mapping[str, Any], watch: Watch) -> Answer:
         """Follow the responses; of large structures stability is left out unless it is asked for."""
         given = {name: value for name, value in asked.items() if name != "no_stability"}
         if asked.get("no_stability"):

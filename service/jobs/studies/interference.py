@@ -70,13 +70,17 @@ class Interference(Study):
     )
 
     def issues(self, scene: Scene) -> list[Issue]:
-        """Return why it is no disk, or a speed that cannot be, or a too large one."""
-        # Loaded here: they bring the compiled loops along, which a service that only lists does not need.
+        """Return why it is no disk, or a speed that cannot be."""
+        # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
         from solver.studies.interference import checked_speed
+
+        return check_named(partial(checked_speed, scene, self.speed_rpm, self.orders))
+
+    def sizes(self, scene: Scene) -> list[Issue]:
+        """Return what is too large."""
         from solver.studies.mistuning import without_mistuning
 
-        wrong = check_named(partial(checked_speed, scene, self.speed_rpm, self.orders))
-        return wrong or memory_issues(without_mistuning(scene), 1)
+        return memory_issues(without_mistuning(scene), 1)
 
     @classmethod
     def empty(cls, result: Json) -> str:
