@@ -32,8 +32,6 @@ _OPTIONS = {
     "priors": "--prior",
     "candidates": "--candidate",
     "orders": "--order",
-    "steps_per_period": "--steps",
-    "max_periods": "--max-periods",
 }
 # What is not the user's input: the state of a file or of a service.
 _STATE = (

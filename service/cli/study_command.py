@@ -48,7 +48,9 @@ def command_of(study: type[Study]) -> Callable[..., None]:
                 answer = study.compute(scene, asked, Watch(on_progress))
         except (SettingError, DesignError) as error:
             raise InputError(as_options(str(error), flags)) from error
-        outputs.write(answer.result, None if study.empty(answer.json) else answer.result.plot)
+        if answer.result is not None:
+            draw = None if study.empty(answer.json) else answer.plot
+            outputs.write(answer.result, draw, scene=scene)
         show(answer.json, tables.of_kind(study.NAME), as_json=as_json)
         end(answer.reached, answer.status)
 

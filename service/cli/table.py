@@ -9,7 +9,7 @@ COMMANDS = (
     Entry("plan", "commands.solver.plan", "Say which effects a scene calls for, and why."),
     Entry("solve", "commands.solver.solve", "Compute one periodic response, or look for all of them."),
     Entry("sweep", "commands.solver.sweep", "Follow the response over a parameter."),
-    Entry("accuracy", "commands.solver.accuracy", "Measure what accuracy costs."),
+    Entry("accuracy", STUDY, "Measure what accuracy costs."),
     Entry("design", "commands.design.design", "Find the best damper."),
     Entry("pareto", "commands.design.pareto", "Find the front of peak against resonance band."),
     Entry(
@@ -20,7 +20,7 @@ COMMANDS = (
         "sensitivities", "commands.sensitivities.sensitivities",
         "Say what matters: per cent of the peaks and the band for one per cent of each parameter.",
     ),
-    Entry("march", "commands.solver.march", "March in time until the motion repeats."),
+    Entry("march", STUDY, "March in time until the motion repeats."),
     Entry("demo", "commands.service.demo", "Run the main job end to end, with pictures."),
     Entry("serve", "commands.service.serve", "Serve the REST API and work off its queue."),
     Entry("worker", "commands.service.worker", "Work off a queue without HTTP."),

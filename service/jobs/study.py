@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import enum
 import inspect
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol
 
 from pydantic import BaseModel, ConfigDict
@@ -62,29 +62,31 @@ class Found(Protocol):
 
 
 class Answer(NamedTuple):
-    """What a study found: the result that is drawn and written, its JSON, and how it ended."""
+    """What a study found: the result that is written, its JSON, how it ended, and what draws it."""
 
-    result: Found
+    result: Found | None
     json: dict[str, Any]
     reached: bool
     status: str
+    plot: Callable[[], Figure] | None = None
 
     @classmethod
     def of(cls, found: Found) -> Answer:
         """Return what a result says of itself."""
-        return cls(found, found.to_json(), found.completed, str(found.status.value))
+        return cls(found, found.to_json(), found.completed, str(found.status.value), found.plot)
 
     def beside(self, result: Found, **further: Any) -> Answer:
         """Return the answer with further keys, drawn and written as another result."""
-        return self._replace(result=result, json={**self.json, **further})
+        return self._replace(result=result, json={**self.json, **further}, plot=result.plot)
 
 
 class Study(SceneRequest):
     """Root of the studies: the keys are fields, an alias is how bodies and options call one.
 
-    A subclass says its NAME, the FUNCTION that computes (``"solver:track_peak"``), the model of its RESULT,
-    and for people what it SHOWS, which SWEEPS it stores and what its progress has COUNTED. Its docstring is
-    the help of the command, the first line of which is its summary.
+    A subclass says its NAME, the FUNCTION that computes (``"solver:track_peak"``) and the model of its RESULT;
+    for people what it SHOWS, which SWEEPS it stores and what its progress has COUNTED; of its picture the
+    function that makes the FIGURE, and the key that is EMPTY where there is none, with what is said then. Its
+    docstring is the help of the command, the first line of which is its summary.
     """
 
     model_config = ConfigDict(validate_by_alias=True)
@@ -95,6 +97,8 @@ class Study(SceneRequest):
     SHOWS: ClassVar[str]
     SWEEPS: ClassVar[str] = ""
     COUNTED: ClassVar[str] = "points"
+    EMPTY: ClassVar[tuple[str, str]]
+    FIGURE: ClassVar[str]
 
     def issues(self, _scene: Scene) -> list[Issue]:
         """Return what is wrong for the scene, beyond the types of the keys."""
@@ -115,14 +119,16 @@ class Study(SceneRequest):
         return ()
 
     @classmethod
-    def empty(cls, _result: Json) -> str:
+    def empty(cls, result: Json) -> str:
         """Return why there is nothing to draw; empty if there is."""
-        return ""
+        key, why = cls.EMPTY
+        return "" if result[key] else why
 
     @classmethod
-    def figure(cls, result: Json, sweeps: Sequence[StoredSweep], read: ReadSweep) -> Figure:
+    def figure(cls, result: Json, _sweeps: Sequence[StoredSweep], _read: ReadSweep) -> Figure:
         """Return the picture of a stored result that is not empty."""
-        raise NotImplementedError
+        made: Figure = on_demand(cls.FIGURE)(result)
+        return made
 
     @classmethod
     def keys(cls) -> list[str]:
@@ -137,7 +143,7 @@ class Study(SceneRequest):
         """Compute a spec, in a worker."""
         from solver.scene.scene import Scene
 
-        asked = {name: value for name, value in spec.items() if name != "scene"}
+        asked = {name: value for name, value in spec.items() if name != "scene" and value is not None}
         answer = cls.compute(Scene.from_dict(spec["scene"]), asked, Watch(progress, should_stop))
         return JobOutput(
             result=answer.json, sweeps=cls.sweeps(answer.result),

@@ -10,6 +10,7 @@ import os
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from difflib import SequenceMatcher
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
@@ -25,8 +26,9 @@ _FEW = 6
 _LINE = 110
 # What another step control, processor or clock would change: it is looked at elsewhere.
 _COUNTED = re.compile(
-    r"seconds|time|error|residual|iterations|rejected|points|evaluations|responses|work|effort|pareto"
+    r"seconds|time|error|residual|iterations|rejected|points|evaluations|responses|work|effort|pareto|closed form|[0-9#] samples"
 )
+_WAY = re.compile(r"closed form|# samples")  # which of them pays, the clock decides
 _DURATION = re.compile(r"# (?:µs|ms|s|min)\b")
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?")
 
@@ -69,8 +71,9 @@ def plain(text: str) -> str:
     for line in text.splitlines():
         line = re.sub(r" {2,}", "  ", line.rstrip())
         line = re.sub(rf"± {_NUMBER.pattern}", "± #", line)
-        lines.append(_DURATION.sub("# s", _NUMBER.sub("#", line)) if _COUNTED.search(line) else line)
-    return "\n".join(lines)
+        told = _DURATION.sub("# s", _NUMBER.sub("#", line)) if _COUNTED.search(line) else line
+        lines.append(_WAY.sub("way", told).lstrip("* ") if _WAY.search(told) else told)
+    return "\n".join(line for line, _ in groupby(lines))
 
 
 def differences(wanted: str, got: str) -> list[str]:
@@ -122,7 +125,8 @@ class Studies:
             lines += [f"  {key}: {json.dumps(value, ensure_ascii=False)}" for key, value in told.items()]
         for result in results:
             pairs = ((name, value) for name, value in result.summary().pairs)
-            lines += [f"  summary {plain(f'{name}: {value}')}" for name, value in pairs]
+            told_pairs = plain("\n".join(f"{name}: {value}" for name, value in pairs))
+            lines += [f"  summary {line}" for line in told_pairs.splitlines()]
             data = result.to_dataset()
             lines += [
                 f"  column {name} ({', '.join(one.dims)}) [{one.unit}] {one.about}"

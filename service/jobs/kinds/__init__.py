@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import optim
 import solver
-from service.jobs.kinds.accuracy import ACCURACY
 from service.jobs.kinds.design import DESIGN
 from service.jobs.kinds.identify import IDENTIFY
 from service.jobs.kinds.map import MAP
-from service.jobs.kinds.march import MARCH
 from service.jobs.kinds.mistuning import MISTUNING
 from service.jobs.kinds.pareto import PARETO
 from service.jobs.kinds.solve import SOLVE
 from service.jobs.kinds.sweep import SWEEP
 from service.jobs.registry import Registry
+from service.jobs.studies.accuracy import Accuracy
 from service.jobs.studies.campbell import Campbell
 from service.jobs.studies.controlled import Controlled
 from service.jobs.studies.interference import Interference
+from service.jobs.studies.march import March
 from service.jobs.studies.modes import Modes
 from service.jobs.studies.peaks import Peaks
 
@@ -37,8 +37,8 @@ SHIPPED = Registry(
         DESIGN,
         PARETO,
         SOLVE,
-        MARCH,
-        ACCURACY,
+        March.as_kind(),
+        Accuracy.as_kind(),
         Campbell.as_kind(),
         Interference.as_kind(),
         MISTUNING,

@@ -12,7 +12,7 @@ from optim.criteria.json_types import Pair, PositiveNumber, Ranges
 from service.jobs.common.results import Amplitude, EndedResult, KnownResult, Table
 from service.jobs.common.scenes import HarmonicRequest, refusal
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
-from service.jobs.kind_view import Json, ReadSweep, StoredSweep
+from service.jobs.kind_view import Json, NothingToDrawError, ReadSweep, StoredSweep
 from service.jobs.outputs import SweepRecord
 from service.jobs.registry import Flag
 from service.jobs.study import Study
@@ -52,6 +52,7 @@ class Campbell(Study, HarmonicRequest):
     model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE]})
     NAME, FUNCTION, RESULT = "campbell", "optim:campbell_diagram", CampbellResult
     SHOWS = "crossings and speeds above the limit ([Campbell diagrams](campbell.md))"
+    EMPTY = ("orders", "it stored no sweep to draw")
     SWEEPS = "one an order; one for all without sectors"
 
     speeds_rpm: Annotated[Ranges, Flag("--speeds", "LO HI")] = Field(
@@ -101,17 +102,14 @@ class Campbell(Study, HarmonicRequest):
         return sweep_records(one.branch for one in found.orders)
 
     @classmethod
-    def empty(cls, result: Json) -> str:
-        """Return why there is nothing to draw."""
-        return "" if result["orders"] else "it stored no sweep to draw"
-
-    @classmethod
     def figure(cls, result: Json, sweeps: Sequence[StoredSweep], read: ReadSweep) -> Figure:
         """Return each order with the stored response whose highest peak is its own."""
         from optim.views.plots.campbell import campbell_figure
         from service.jobs.stored_curves import response_of
 
         curves = [response_of(read(sweep.id)) for sweep in sweeps if sweep.points]
+        if not curves:
+            raise NothingToDrawError(cls.EMPTY[1])
 
         def distance(curve: Response, order: Json) -> float:
             heights = [float(peak["value"]) for peak in order["peaks"]] or [math.nan]

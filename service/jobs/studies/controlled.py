@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import ConfigDict, Field
@@ -11,14 +11,11 @@ from optim.criteria.json_types import Name
 from service.jobs.common.results import Curve, EndedResult, Table
 from service.jobs.common.scenes import HarmonicRequest, PositiveNumber, refusal
 from service.jobs.common.sizes import balance_issues
-from service.jobs.kind_view import Json, ReadSweep, StoredSweep
 from service.jobs.registry import Flag
 from service.jobs.study import Answer, Study, Watch
 from solver.errors import Issue
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from solver.scene.scene import Scene
 
 _POINTS = 200  # a curve seldom has more
@@ -54,6 +51,8 @@ class Controlled(Study, HarmonicRequest):
     model_config = ConfigDict(json_schema_extra={"examples": [{"scene": "two-dof", "amplitude": 1.0}]})
     NAME, FUNCTION, RESULT = "controlled", "solver:held_amplitude", ControlledResult
     SHOWS = "force and phase over the frequency ([a held amplitude](modes.md#a-held-amplitude))"
+    EMPTY = ("frequency", "no response with this amplitude was found")
+    FIGURE = "solver.views.plots.modes:held_figure"
 
     amplitude: Annotated[PositiveNumber, Flag(metavar="A")] = Field(
         description="Amplitude of harmonic 1 that is held [m]."
@@ -98,18 +97,6 @@ class Controlled(Study, HarmonicRequest):
         if asked.get("no_stability"):
             given["stability"] = False
         return super().compute(scene, given, watch)
-
-    @classmethod
-    def empty(cls, result: Json) -> str:
-        """Return why there is nothing to draw."""
-        return "" if result["frequency"] else "no response with this amplitude was found"
-
-    @classmethod
-    def figure(cls, result: Json, _sweeps: Sequence[StoredSweep], _read: ReadSweep) -> Figure:
-        """Return force and phase over the frequency."""
-        from solver.views.plots.modes import held_figure
-
-        return held_figure(result)
 
 
 STUDY = Controlled

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,14 +10,12 @@ from pydantic import ConfigDict, Field
 from service.jobs.common.results import EndedResult, Table
 from service.jobs.common.scenes import PositiveNumber, check_named
 from service.jobs.common.sizes import memory_issues
-from service.jobs.kind_view import Json, ReadSweep, StoredSweep
+from service.jobs.kind_view import Json
 from service.jobs.registry import Flag
 from service.jobs.study import Study
 from solver.errors import Issue
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from solver.scene.scene import Scene
 
 _MOST_RPM = 6e10  # a revolution at the highest frequency that is accepted anywhere
@@ -51,6 +48,7 @@ class Interference(Study):
     model_config = ConfigDict(json_schema_extra={"examples": [{"scene": "bladed-disk", "speed_rpm": 11000}]})
     NAME, FUNCTION, RESULT = "interference", "solver:interference_diagram", InterferenceResult
     SHOWS = "frequencies at each nodal diameter, orders that meet them ([interference](disks.md))"
+    FIGURE = "solver.views.plots.interference:interference_figure"
     COUNTED = "nodal diameters"
 
     speed_rpm: Annotated[_Speed | None, Flag("--speed", "RPM")] = Field(
@@ -87,13 +85,6 @@ class Interference(Study):
         """Return why there is nothing to draw."""
         some = any(point["open_hz"] for point in result["diameters"])
         return "" if some else "it has no natural frequency to draw"
-
-    @classmethod
-    def figure(cls, result: Json, _sweeps: Sequence[StoredSweep], _read: ReadSweep) -> Figure:
-        """Return the frequencies over the nodal diameter, with the orders."""
-        from solver.views.plots.interference import interference_figure
-
-        return interference_figure(result)
 
 
 STUDY = Interference

@@ -79,6 +79,7 @@ class Modes(Study, HarmonicRequest):
     )
     NAME, FUNCTION, RESULT = "modes", "solver:nonlinear_mode", ModesResult
     SHOWS = "frequency and damping ratio over the amplitude ([modes](modes.md))"
+    EMPTY = ("amplitude", "no point of the mode was found")
 
     mode: Annotated[int, Field(strict=True, ge=1, le=100_000), Flag(metavar="N")] = Field(
         default=1, description="Which mode, 1 the slowest, contacts as they are at rest."
@@ -173,11 +174,6 @@ class Modes(Study, HarmonicRequest):
 
             answer.json["motions"] = motions_of(found)
         return answer
-
-    @classmethod
-    def empty(cls, result: Json) -> str:
-        """Return why there is nothing to draw."""
-        return "" if result["amplitude"] else "no point of the mode was found"
 
     @classmethod
     def figure(cls, result: Json, _sweeps: Sequence[StoredSweep], _read: ReadSweep) -> Figure:

@@ -55,6 +55,7 @@ class Peaks(Study, RangeRequest):
     )
     NAME, FUNCTION, RESULT = "peaks", "solver:track_peak", PeaksResult
     SHOWS = "the highest peak over the parameter, where it is least ([peaks](peaks.md))"
+    EMPTY = ("parameter", "no peak was tracked")
     SWEEPS, COUNTED = "those that look for peaks", "sweeps"
 
     checks: Annotated[int, Field(strict=True, ge=0, le=200), Flag(metavar="N")] = Field(
@@ -76,11 +77,6 @@ class Peaks(Study, RangeRequest):
         from service.jobs.common.records import sweep_records
 
         return sweep_records(found.branches, intermediate=True)
-
-    @classmethod
-    def empty(cls, result: Json) -> str:
-        """Return why there is nothing to draw."""
-        return "" if result["parameter"] else "no peak was tracked"
 
     @classmethod
     def figure(cls, result: Json, _sweeps: Sequence[StoredSweep], _read: ReadSweep) -> Figure:
