@@ -4,10 +4,15 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
+import typer
+
 from optim.errors import DesignError
+from service.cli.commands.client.jobs import print_result
 from service.cli.failures import end
+from service.cli.lazy import LazyGroup
 from service.cli.options import inputs
 from service.cli.options import shared as options
 from service.cli.options.key_options import as_options, key_options
@@ -15,7 +20,6 @@ from service.cli.output_files import Outputs
 from service.cli.progress import bar
 from service.errors import InputError, InvalidRequestError
 from service.jobs.study import Study, Watch
-from service.rendering.tables import results as tables
 from service.rendering.tables.text import show
 from solver.errors import Issue, SettingError
 from solver.results.views import on_demand
@@ -24,6 +28,17 @@ from solver.results.views import on_demand
 def command_named(name: str) -> Callable[..., None]:
     """Return the command of a study that comes with the service."""
     return command_of(on_demand(f"service.jobs.studies.{name}:STUDY"))
+
+
+def add_others(group: LazyGroup) -> None:
+    """Add the commands of the studies that the setting `kinds` names."""
+    from service.settings.kinds import registry_here
+
+    for kind in registry_here():
+        if issubclass(kind.request, Study) and kind.name not in group.commands:
+            alone = typer.Typer(add_completion=False, rich_markup_mode=None)
+            alone.command(kind.name)(command_of(kind.request))
+            group.add_command(typer.main.get_command(alone))
 
 
 def command_of(study: type[Study]) -> Callable[..., None]:
@@ -51,7 +66,7 @@ def command_of(study: type[Study]) -> Callable[..., None]:
         if answer.result is not None:
             draw = None if study.empty(answer.json) else answer.plot
             outputs.write(answer.result, draw, scene=scene)
-        show(answer.json, tables.of_kind(study.NAME), as_json=as_json)
+        show(answer.json, partial(print_result, study.NAME), as_json=as_json)
         end(answer.reached, answer.status)
 
     listed = [

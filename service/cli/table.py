@@ -17,7 +17,7 @@ COMMANDS = (
         "Find parameters from measured responses and hysteresis loops.",
     ),
     Entry(
-        "sensitivities", "commands.sensitivities.sensitivities",
+        "sensitivities", STUDY,
         "Say what matters: per cent of the peaks and the band for one per cent of each parameter.",
     ),
     Entry("march", STUDY, "March in time until the motion repeats."),

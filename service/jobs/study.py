@@ -75,6 +75,11 @@ class Answer(NamedTuple):
         """Return what a result says of itself."""
         return cls(found, found.to_json(), found.completed, str(found.status.value), found.plot)
 
+    @classmethod
+    def told(cls, json: dict[str, Any]) -> Answer:
+        """Return an answer of which there is nothing but its JSON."""
+        return cls(None, json, True, "")
+
     def beside(self, result: Found, **further: Any) -> Answer:
         """Return the answer with further keys, drawn and written as another result."""
         return self._replace(result=result, json={**self.json, **further}, plot=result.plot)
@@ -83,10 +88,10 @@ class Answer(NamedTuple):
 class Study(SceneRequest):
     """Root of the studies: the keys are fields, an alias is how bodies and options call one.
 
-    A subclass says its NAME, the FUNCTION that computes (``"solver:track_peak"``) and the model of its RESULT;
-    for people what it SHOWS, which SWEEPS it stores and what its progress has COUNTED; of its picture the
-    function that makes the FIGURE, and the key that is EMPTY where there is none, with what is said then. Its
-    docstring is the help of the command, the first line of which is its summary.
+    A subclass says its NAME, the FUNCTION that computes (``"solver:track_peak"``), the model of its RESULT;
+    for people what it SHOWS, which SWEEPS it stores, what its progress has COUNTED; of its picture what
+    makes the FIGURE, and the key that is EMPTY where there is none, with what is said then. Its docstring
+    is the help of the command, the first line of which is its summary.
     """
 
     model_config = ConfigDict(validate_by_alias=True)

@@ -26,7 +26,8 @@ _FEW = 6
 _LINE = 110
 # What another step control, processor or clock would change: it is looked at elsewhere.
 _COUNTED = re.compile(
-    r"seconds|time|error|residual|iterations|rejected|points|evaluations|responses|work|effort|pareto|closed form|[0-9#] samples"
+    r"seconds|time|error|residual|iterations|rejected|points|evaluations|responses|work|effort|pareto|"
+    r"closed form|[0-9#] samples"
 )
 _WAY = re.compile(r"closed form|# samples")  # which of them pays, the clock decides
 _DURATION = re.compile(r"# (?:µs|ms|s|min)\b")

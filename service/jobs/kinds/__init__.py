@@ -19,6 +19,7 @@ from service.jobs.studies.interference import Interference
 from service.jobs.studies.march import March
 from service.jobs.studies.modes import Modes
 from service.jobs.studies.peaks import Peaks
+from service.jobs.studies.sensitivities import Sensitivities
 
 
 def warm_up() -> None:
@@ -45,6 +46,7 @@ SHIPPED = Registry(
         IDENTIFY,
         Modes.as_kind(),
         Controlled.as_kind(),
+        Sensitivities.as_kind(),
     ],
     warm_up,
 )
