@@ -24,8 +24,6 @@ _OPTIONS = {
     "accuracy": "--accuracy",
     "effects": "--effects",
     "parameter": "--parameter",
-    "steps": "--steps",
-    "frequencies": "--frequencies",
     "limit": "--limit",
     "variables": "--variable",
     "unknowns": "--unknown",

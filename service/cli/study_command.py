@@ -43,7 +43,7 @@ def add_others(group: LazyGroup) -> None:
 
 def command_of(study: type[Study]) -> Callable[..., None]:
     """Return the command of a study, with an option for each key."""
-    own = study.keys()
+    own = study.own_keys()
     made = {one.name: one for one in key_options(study.as_kind(), None)}
     flags = {word: made[name].flag for name in own for word in (name, made[name].key)}
     flags["path"] = flags.get("parameter", "--set")

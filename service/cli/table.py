@@ -30,10 +30,7 @@ COMMANDS = (
         keyed=True,
     ),
     Entry("peaks", STUDY, "Track the highest peak over a parameter."),
-    Entry(
-        "map", "commands.track.response_map",
-        "Map the response over frequency and a parameter, with the ridge of its peaks.",
-    ),
+    Entry("map", STUDY, "Map the response over frequency and a parameter, with the ridge of its peaks."),
     Entry("campbell", STUDY, "Find the speeds at which orders of the running speed meet resonances."),
     Entry(
         "interference", STUDY,

@@ -136,7 +136,7 @@ class Study(SceneRequest):
         return made
 
     @classmethod
-    def keys(cls) -> list[str]:
+    def own_keys(cls) -> list[str]:
         """Return the names of what is asked beside the scene, in order."""
         of_harmonics = [name for name in HarmonicRequest.model_fields if name in cls.model_fields]
         apart = {*SceneRequest.model_fields, *of_harmonics}
@@ -176,4 +176,4 @@ def resolve(request: Study, source: SceneSource) -> Resolved:
     """Look up the scene of a study and check what is asked of it; the spec has its keys."""
     scene = resolve_scene(request, source)
     require(request.issues(scene) or request.sizes(scene))
-    return resolved(scene, **request.model_dump(mode="json", include=set(request.keys())))
+    return resolved(scene, **request.model_dump(mode="json", include=set(request.own_keys())))

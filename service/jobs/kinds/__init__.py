@@ -6,7 +6,6 @@ import optim
 import solver
 from service.jobs.kinds.design import DESIGN
 from service.jobs.kinds.identify import IDENTIFY
-from service.jobs.kinds.map import MAP
 from service.jobs.kinds.mistuning import MISTUNING
 from service.jobs.kinds.pareto import PARETO
 from service.jobs.kinds.solve import SOLVE
@@ -16,6 +15,7 @@ from service.jobs.studies.accuracy import Accuracy
 from service.jobs.studies.campbell import Campbell
 from service.jobs.studies.controlled import Controlled
 from service.jobs.studies.interference import Interference
+from service.jobs.studies.map import Map
 from service.jobs.studies.march import March
 from service.jobs.studies.modes import Modes
 from service.jobs.studies.peaks import Peaks
@@ -33,7 +33,7 @@ def warm_up() -> None:
 SHIPPED = Registry(
     [
         SWEEP,
-        MAP,
+        Map.as_kind(),
         Peaks.as_kind(),
         DESIGN,
         PARETO,
