@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable
 from functools import partial
+from importlib import import_module
 from typing import Any
 
 import typer
@@ -22,12 +23,12 @@ from service.errors import InputError, InvalidRequestError
 from service.jobs.study import Study, Watch
 from service.rendering.tables.text import show
 from solver.errors import Issue, SettingError
-from solver.results.views import on_demand
 
 
 def command_named(name: str) -> Callable[..., None]:
     """Return the command of a study that comes with the service."""
-    return command_of(on_demand(f"service.jobs.studies.{name}:STUDY"))
+    study: type[Study] = import_module(f"service.jobs.studies.{name}").STUDY
+    return command_of(study)
 
 
 def add_others(group: LazyGroup) -> None:

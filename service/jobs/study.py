@@ -40,7 +40,17 @@ class Watch(NamedTuple):
         return Watch(part_of(self.on_progress, begin, end, before), self.should_stop)
 
 
-class Found(Protocol):
+class Written(Protocol):
+    """What can be drawn, and written as a table."""
+
+    def to_dataset(self) -> Dataset:
+        """The result as named arrays."""
+
+    def plot(self) -> Figure:
+        """The picture of it."""
+
+
+class Found(Written, Protocol):
     """A result of a study."""
 
     @property
@@ -54,17 +64,11 @@ class Found(Protocol):
     def to_json(self) -> dict[str, Any]:
         """The result as JSON."""
 
-    def to_dataset(self) -> Dataset:
-        """The result as named arrays."""
-
-    def plot(self) -> Figure:
-        """The picture of it."""
-
 
 class Answer(NamedTuple):
     """What a study found: the result that is written, its JSON, how it ended, and what draws it."""
 
-    result: Found | None
+    result: Written | None
     json: dict[str, Any]
     reached: bool
     status: str
@@ -80,7 +84,7 @@ class Answer(NamedTuple):
         """Return an answer of which there is nothing but its JSON."""
         return cls(None, json, True, "")
 
-    def beside(self, result: Found, **further: Any) -> Answer:
+    def beside(self, result: Written, **further: Any) -> Answer:
         """Return the answer with further keys, drawn and written as another result."""
         return self._replace(result=result, json={**self.json, **further}, plot=result.plot)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import ConfigDict, Field
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from solver import AccuracyStudy
     from solver.scene.scene import Scene
 
-_EXAMPLE = {"scene": "two-dof", "frequency_hz": 1.2, "harmonics": [1, 3, 7], "samples": [64]}
+_EXAMPLE: dict[str, Any] = {"scene": "two-dof", "frequency_hz": 1.2, "harmonics": [1, 3, 7], "samples": [64]}
 _MOST_WAYS = 30
 _MOST_SAMPLED = 50_000_000
 _Harmonics = Annotated[list[Harmonics], Field(min_length=1, max_length=_MOST_WAYS)]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import ConfigDict, Field
 
@@ -25,7 +25,12 @@ if TYPE_CHECKING:
     from solver.scene.scene import Scene
     from solver.views.plots.curves import Response
 
-_EXAMPLE = {"scene": "bladed-disk", "speeds_rpm": [[40000, 50000]], "orders": [1, 2, 3], "limit": 8e-5}
+_EXAMPLE: dict[str, Any] = {
+    "scene": "bladed-disk",
+    "speeds_rpm": [[40000, 50000]],
+    "orders": [1, 2, 3],
+    "limit": 8e-5,
+}
 _MOST_RPM = 6e10  # a revolution at the highest frequency that is accepted anywhere
 _Order = Annotated[int, Field(strict=True, ge=1, le=10_000)]
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from solver.scene.scene import Scene
     from solver.studies.response_map import MapGrid
 
-_EXAMPLE = {
+_EXAMPLE: dict[str, Any] = {
     "scene": "bladed-disk", "parameter": DISK_LOAD, "from": 20, "to": 3000, "steps": 60, "frequencies": 400,
 }  # fmt: skip
 _Count = Annotated[int, Field(strict=True, ge=2, le=MOST_POINTS // 2)]
