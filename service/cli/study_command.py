@@ -9,11 +9,11 @@ from importlib import import_module
 from typing import Any
 
 import typer
+from typer.core import TyperGroup
 
 from optim.errors import DesignError
 from service.cli.commands.client.jobs import print_result
 from service.cli.failures import end
-from service.cli.lazy import LazyGroup
 from service.cli.options import inputs
 from service.cli.options import shared as options
 from service.cli.options.key_options import as_options, key_options
@@ -31,7 +31,7 @@ def command_named(name: str) -> Callable[..., None]:
     return command_of(study)
 
 
-def add_others(group: LazyGroup) -> None:
+def add_others(group: TyperGroup) -> None:
     """Add the commands of the studies that the setting `kinds` names."""
     from service.settings.kinds import registry_here
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 import solver
-from service.jobs.studies.modes import MOST_POINTS
+from service.jobs.common.sizes import MOST_MOTIONS
 from service.jobs.study import Watch
 
 MOST_CONTACTS = 40
@@ -30,7 +30,7 @@ def motions_of(found: solver.NonlinearMode) -> dict[str, Any]:
     contacts or degrees of freedom than fit, the first are given.
     """
     count = found.amplitude.size
-    points = [int(i) for i in np.unique(np.linspace(0, max(count - 1, 0), min(count, MOST_POINTS)).round())]
+    points = [int(i) for i in np.unique(np.linspace(0, max(count - 1, 0), min(count, MOST_MOTIONS)).round())]
     points = points if count else []
     loops = []
     for name in found.contact_names[:MOST_CONTACTS]:

@@ -23,6 +23,8 @@ MOST_STEPS = 100_000_000_000
 """Time steps × DOFs of a march: hours of one processor."""
 FEWEST_STEPS = 256
 """Of a period, where the solver chooses them."""
+MOST_MOTIONS = 40
+"""Points of the curve of a mode with loops and shapes."""
 POINTS_OF_A_SWEEP = 20
 """Fewer a frequency response seldom has."""
 

@@ -9,7 +9,7 @@ from pydantic import ConfigDict, Field, RootModel
 
 from service.jobs.common.results import Curve, EndedResult, Table
 from service.jobs.common.scenes import HarmonicRequest, Number, PositiveNumber, check_named, refusal
-from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
+from service.jobs.common.sizes import MOST_MOTIONS, POINTS_OF_A_SWEEP, balance_issues
 from service.jobs.kind_view import Json, ReadSweep, StoredSweep
 from service.jobs.registry import Flag
 from service.jobs.study import Answer, Study, Watch
@@ -20,9 +20,7 @@ if TYPE_CHECKING:
 
     from solver.scene.scene import Scene
 
-MOST_POINTS = 40
-"""Points of the curve with loops and shapes."""
-MOST_PEAKS = 40
+_MOST_PEAKS = 40
 _POINTS = 200  # a curve seldom has more
 _OF_THE_CURVE = 0.3  # share of the progress, where exact peaks follow
 _Diameter = Annotated[int, Field(strict=True, ge=-10_000, le=10_000)]
@@ -103,9 +101,9 @@ class Modes(Study, HarmonicRequest):
         default=False, description="With `aero_damping`: the gas feeds this mode alone, not every one."
     )
     motions: Annotated[bool, Field(strict=True)] = Field(
-        default=False, description=f"Loops and shapes of up to {MOST_POINTS} points too."
+        default=False, description=f"Loops and shapes of up to {MOST_MOTIONS} points too."
     )
-    exact_peaks: Annotated[int, Field(strict=True, ge=0, le=MOST_PEAKS), Flag(metavar="N")] = Field(
+    exact_peaks: Annotated[int, Field(strict=True, ge=0, le=_MOST_PEAKS), Flag(metavar="N")] = Field(
         default=0, description="With `performance`: of so many excitations the whole response as well."
     )
     disturbance: Annotated[PositiveNumber | None, Flag(metavar="A")] = Field(
