@@ -40,8 +40,13 @@ def _root(
 ) -> None: ...
 
 
-def command() -> LazyGroup:
-    """Return `stickslip` with every command under it, each imported when it is used."""
+def command(asked: str = "") -> LazyGroup:
+    """Return `stickslip` with every command under it, each imported when it is used.
+
+    Parameters
+    ----------
+    asked : the command that is used: what is no command of the package may be a study of another one.
+    """
     root = typer.main.get_command(_app)
     if not isinstance(root, LazyGroup):
         raise TypeError(f"typer made {type(root).__name__} of the application")
@@ -49,6 +54,10 @@ def command() -> LazyGroup:
     root.add_command(DeferredGroup(SUBMIT))
     for name, summary, entries in GROUPS:
         root.add_command(group(name, summary, entries))
+    if os.environ.get("STICKSLIP_KINDS") and asked not in root.commands:
+        from service.cli.study_command import add_others
+
+        add_others(root)
     return root
 
 
@@ -58,7 +67,7 @@ def run(arguments: Sequence[str] | None) -> int:
     # The commands have bars of their own, and what a service computes is watched elsewhere.
     os.environ.setdefault("STICKSLIP_PROGRESS", "0")
     try:
-        command()(args=join_words(given), prog_name="stickslip")
+        command(given[0] if given else "")(args=join_words(given), prog_name="stickslip")
     except REPORTED as error:
         return report(error)
     except SystemExit as end:

@@ -24,19 +24,12 @@ _OPTIONS = {
     "accuracy": "--accuracy",
     "effects": "--effects",
     "parameter": "--parameter",
-    "checks": "--checks",
-    "steps": "--steps",
-    "frequencies": "--frequencies",
     "limit": "--limit",
     "variables": "--variable",
     "unknowns": "--unknown",
     "priors": "--prior",
     "candidates": "--candidate",
-    "speeds_rpm": "--speeds",
     "orders": "--order",
-    "band_hz": "--band",
-    "steps_per_period": "--steps",
-    "max_periods": "--max-periods",
 }
 # What is not the user's input: the state of a file or of a service.
 _STATE = (

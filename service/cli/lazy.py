@@ -11,6 +11,8 @@ from typer.core import TyperCommand, TyperGroup
 
 from solver.results.views import on_demand
 
+STUDY = "study"
+
 
 @dataclass(frozen=True, slots=True)
 class Entry:
@@ -21,7 +23,7 @@ class Entry:
     name : str
         As the user writes it.
     home : str
-        Module of `service.cli` and function, ``"commands.solver.solve"``.
+        Module of `service.cli` and function, ``"commands.solver.solve"``; `STUDY` for the command of a study.
     summary : str
         The first line of the function's docstring, which `--help` shows.
     keyed : bool
@@ -35,6 +37,10 @@ class Entry:
 
     def function(self) -> Any:
         """Import the module and return what stands there."""
+        if self.home == STUDY:
+            from service.cli.study_command import command_named
+
+            return command_named(self.name)
         module, _, name = self.home.rpartition(".")
         return on_demand(f"service.cli.{module}:{name}")
 

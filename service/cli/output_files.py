@@ -55,7 +55,7 @@ class Outputs:
         ----------
         result : what was computed.
         draw : makes its picture; None where there is nothing to draw.
-        scene : of results that do not know theirs.
+        scene : of a result that does not know its own.
         """
         if self.picture is None and self.file is None:
             return
@@ -64,7 +64,7 @@ class Outputs:
         from solver.views.io import save, scene_attributes
 
         data = result.to_dataset()
-        if scene is not None:
+        if scene is not None and "scene" not in data.attributes:
             data = replace(data, attributes={**data.attributes, **scene_attributes(scene)})
         if self.picture is not None and draw is not None:
             from solver.views.plots import saving

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from service.cli.lazy import Entry
+from service.cli.lazy import STUDY, Entry
 
 COMMANDS = (
     Entry("scenes", "commands.solver.scenes", "List the shipped scenes."),
     Entry("plan", "commands.solver.plan", "Say which effects a scene calls for, and why."),
     Entry("solve", "commands.solver.solve", "Compute one periodic response, or look for all of them."),
     Entry("sweep", "commands.solver.sweep", "Follow the response over a parameter."),
-    Entry("accuracy", "commands.solver.accuracy", "Measure what accuracy costs."),
+    Entry("accuracy", STUDY, "Measure what accuracy costs."),
     Entry("design", "commands.design.design", "Find the best damper."),
     Entry("pareto", "commands.design.pareto", "Find the front of peak against resonance band."),
     Entry(
@@ -17,10 +17,10 @@ COMMANDS = (
         "Find parameters from measured responses and hysteresis loops.",
     ),
     Entry(
-        "sensitivities", "commands.sensitivities.sensitivities",
+        "sensitivities", STUDY,
         "Say what matters: per cent of the peaks and the band for one per cent of each parameter.",
     ),
-    Entry("march", "commands.solver.march", "March in time until the motion repeats."),
+    Entry("march", STUDY, "March in time until the motion repeats."),
     Entry("demo", "commands.service.demo", "Run the main job end to end, with pictures."),
     Entry("serve", "commands.service.serve", "Serve the REST API and work off its queue."),
     Entry("worker", "commands.service.worker", "Work off a queue without HTTP."),
@@ -29,23 +29,16 @@ COMMANDS = (
         "results", "commands.client.jobs.results", "Print what a job computed, or list the stored designs.",
         keyed=True,
     ),
-    Entry("peaks", "commands.track.peaks", "Track the highest peak over a parameter."),
+    Entry("peaks", STUDY, "Track the highest peak over a parameter."),
+    Entry("map", STUDY, "Map the response over frequency and a parameter, with the ridge of its peaks."),
+    Entry("campbell", STUDY, "Find the speeds at which orders of the running speed meet resonances."),
     Entry(
-        "map", "commands.track.response_map",
-        "Map the response over frequency and a parameter, with the ridge of its peaks.",
-    ),
-    Entry(
-        "campbell", "commands.campbell.campbell",
-        "Find the speeds at which orders of the running speed meet resonances.",
-    ),
-    Entry(
-        "interference", "commands.interference.interference",
+        "interference", STUDY,
         "Draw natural frequencies over the nodal diameter, with the engine orders that meet them.",
     ),
-    Entry("modes", "commands.modes.modes", "Follow a mode's frequency and damping over its amplitude."),
+    Entry("modes", STUDY, "Follow a mode's frequency and damping over its amplitude."),
     Entry(
-        "controlled", "commands.controlled.controlled",
-        "Follow the response over the frequency with one amplitude held, as rigs do.",
+        "controlled", STUDY, "Follow the response over the frequency with one amplitude held, as rigs do.",
     ),
     Entry("mistuning", "commands.mistuning.mistuning", "Study disks whose blades are not quite equal."),
     Entry(

@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -62,6 +62,13 @@ class JobRequest(BaseModel):
     name: RunName = Field(default="", exclude=True, description="Name of the run, to be found again by.")
     notes: Notes = Field(default="", exclude=True, description="Notes on the run.")
     tags: Tags = Field(default=(), exclude=True, description="Words the run is marked with.")
+
+
+class Flag(NamedTuple):
+    """How the option of a key is written, and what stands for its value, where key and type do not say it."""
+
+    name: str = ""
+    metavar: str = ""
 
 
 ABOUT_THE_RUN = ("project", "name", "notes", "tags")

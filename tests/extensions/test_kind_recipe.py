@@ -1,38 +1,66 @@
-"""The recipe of CONTRIBUTING.md for a kind of job."""
+"""The recipe of CONTRIBUTING.md for a study."""
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 
 import pytest
 
-import optim
 import solver
+from service.cli import main
 from service.client.embedded import EmbeddedService
 from service.db.models import JobState
+from service.errors import InvalidRequestError
 from service.jobs.kinds.registry.loading import registry_of
 from service.jobs.kinds.registry.table import kinds_table
 from service.settings.settings import load_settings
+from solver.studies.natural_frequencies import natural_frequencies
 
 ROOT = Path(__file__).parents[2]
+KINDS = ("a_recipe:Frequencies",)
 
 
-def test_the_recipe_works_as_it_stands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The file that CONTRIBUTING.md has for a kind, and the row of the table it promises."""
-    recipe = (ROOT / "CONTRIBUTING.md").read_text("utf-8")
-    [code] = re.findall(r"^```python\n(.*?)^```$", recipe, re.DOTALL | re.MULTILINE)
+@pytest.fixture
+def recipe(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    """The text of the recipe; its file can be imported."""
+    text = (ROOT / "CONTRIBUTING.md").read_text("utf-8")
+    [code] = re.findall(r"^```python\n(.*?)^```$", text, re.DOTALL | re.MULTILINE)
     (tmp_path / "a_recipe.py").write_text(code, "utf-8")
     monkeypatch.syspath_prepend(tmp_path)
-    kinds = ("a_recipe:SENSITIVITIES",)
-    [row] = re.findall(r"^\+(\| `sensitivities` .*)$", recipe, re.MULTILINE)
-    assert row in kinds_table(registry_of(kinds)).splitlines()
-    settings = load_settings(database=f"sqlite:///{tmp_path}/jobs.db", workers=1, kinds=kinds)
+    assert len(code.splitlines()) <= 120
+    return text
+
+
+def wanted(*, stuck: bool) -> list[float]:
+    return [f for f in natural_frequencies(solver.load_scene("two-dof"), stuck=stuck).tolist() if f <= 2.0]
+
+
+def test_the_service_takes_it_as_it_stands(recipe: str, tmp_path: Path) -> None:
+    [row] = re.findall(r"^\+(\| `frequencies` .*)$", recipe, re.MULTILINE)
+    assert row in kinds_table(registry_of(KINDS)).splitlines()
+    settings = load_settings(database=f"sqlite:///{tmp_path}/jobs.db", workers=1, kinds=KINDS)
     with EmbeddedService(settings) as service:
-        [example] = registry_of(kinds)["sensitivities"].request.model_json_schema()["examples"]
-        job = service.wait(service.submit("sensitivities", example))
+        [example] = registry_of(KINDS)["frequencies"].request.model_json_schema()["examples"]
+        job = service.wait(service.submit("frequencies", example))
         answer = service.results(job.id)
+        with pytest.raises(InvalidRequestError, match="up_to_hz"):
+            service.submit("frequencies", {**example, "up_to_hz": -1})
     assert job.status is JobState.SUCCESSFUL, job.error
-    wanted = optim.sensitivities(solver.load_scene("two-dof"), harmonics=5).to_json()
-    assert answer.result["rows"] == wanted["rows"]
-    assert [sweep.peak.value for sweep in answer.sweeps if sweep.peak] == [answer.result["peaks"][0]["value"]]
+    assert answer.result == {"stuck_hz": wanted(stuck=True), "open_hz": wanted(stuck=False)}
+
+
+@pytest.mark.usefixtures("recipe")
+def test_the_command_has_it(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setenv("STICKSLIP_KINDS", json.dumps(KINDS))
+    assert main(["frequencies", "two-dof", "--up-to", "2", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == {
+        "stuck_hz": wanted(stuck=True), "open_hz": wanted(stuck=False)
+    }  # fmt: skip
+    assert main(["frequencies", "two-dof", "--up-to", "2"]) == 0
+    assert "stuck_hz" in capsys.readouterr().out
+    assert main(["frequencies", "--help"]) == 0
+    assert "--up-to HZ" in capsys.readouterr().out
+    assert main(["--help"]) == 0
+    assert "List natural frequencies" in capsys.readouterr().out

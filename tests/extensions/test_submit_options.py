@@ -32,6 +32,7 @@ class ShapesRequest(SceneRequest):
     nested: list[dict[str, Any]] | None = None
     off: bool = False
     on: bool = True
+    no_echo: bool = False
     url: str | None = None
     renamed: Annotated[int, Field(description="Called otherwise.")] = 0
 
@@ -92,6 +93,7 @@ def run(one: JobKind, *words: str) -> Any:
         (["--nested", '[{"a": 1}]'], {"nested": [{"a": 1}]}),
         (["--off"], {"off": True}),
         (["--no-on"], {"on": False}),
+        (["--no-echo"], {"no_echo": True}),
         (["--url-key", "x"], {"url": "x"}),
         (["--other", "4"], {"renamed": 4}),
         (["--set", "damper.N0=80"], {"set": {"damper.N0": 80.0}}),

@@ -15,9 +15,9 @@ from pydantic import Field
 from service.jobs.arrays import encode
 from service.jobs.checkpoints import Checkpoints, RunParts
 from service.jobs.kinds import sweep
-from service.jobs.kinds.map import MAP
 from service.jobs.outputs import ContactValues, JobOutput, Progress, ShouldStop, SweepRecord
 from service.jobs.registry import JobKind, JobRequest, Registry, Resolved
+from service.jobs.studies import map as maps
 from solver.errors import Issue, SceneError, SettingError
 
 
@@ -181,7 +181,7 @@ def slow_map(
     spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop, checkpoints: Checkpoints
 ) -> JobOutput:
     """The kind `map`, slowly."""
-    return RunParts(MAP.parts)(spec, progress, slow(should_stop), checkpoints)
+    return RunParts(maps.PARTS)(spec, progress, slow(should_stop), checkpoints)
 
 
 _RUNS = {
@@ -206,7 +206,7 @@ def confused(_request: IterationRequest, _source: object) -> Resolved:
 
 SLOW = (
     replace(sweep.SWEEP, name="slow-sweep", run_on=slow_sweep),
-    replace(MAP, name="slow-map", parts=None, run_on=slow_map),
+    replace(maps.Map.as_kind(), name="slow-map", parts=None, run_on=slow_map),
 )
 PRIVATE = Registry(
     JobKind(name=name, summary=name, request=IterationRequest, resolve=as_it_is, run=run)

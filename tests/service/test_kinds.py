@@ -303,6 +303,7 @@ def test_the_description_is_whole(shipped: httpx.Client) -> None:
         "identify",
         "modes",
         "controlled",
+        "sensitivities",
     }
     for kind, schema in kinds.items():
         assert schema["examples"], kind

@@ -1,4 +1,4 @@
-"""The commands that compute here and now: scenes, plan, solve, sweep, march.
+"""The commands that compute here and now: scenes, plan, solve, sweep.
 
 What is heavy is imported inside the commands: `stickslip solve` starts without CVXPY, Matplotlib or the
 service.
@@ -128,54 +128,3 @@ def sweep(
         found["branches"] = [each.to_json() for each in solver.switch_branches(branch)]
     show(found, reports.branch, as_json=as_json)
     end(branch.completed, branch.status.value)
-
-
-def accuracy(
-    name: options.Scene,
-    frequency: options.StudyFrequency = None,
-    values: options.Values = None,
-    plot: options.Plot = None,
-    out: options.Out = None,
-    as_json: options.Json = False,
-) -> None:
-    """Measure what accuracy costs.
-
-    Error against time of one point, for numbers of harmonics, contact forces in closed form and by samples.
-    """
-    import solver
-
-    outputs = Outputs.asked(plot, out)
-    scene = inputs.scene(name, values)
-    with bar("accuracy", "rows") as on_progress:
-        study = solver.accuracy_study(scene, frequency, on_progress=on_progress)
-    outputs.write(study, study.plot, scene=scene)
-    show(study.to_json(), reports.accuracy, as_json=as_json)
-
-
-def march(
-    name: options.Scene,
-    frequency: options.Frequency,
-    values: options.Values = None,
-    steps: options.Steps = None,
-    max_periods: options.MaxPeriods = 20_000,
-    plot: options.Plot = None,
-    out: options.Out = None,
-    as_json: options.Json = False,
-) -> None:
-    """March in time until the motion repeats.
-
-    The independent referee of solve; of a cyclic scene the whole annulus is marched.
-    """
-    import solver
-
-    outputs = Outputs.asked(plot, out)
-    scene = inputs.scene(name, values)
-    with bar("march", "periods") as on_progress:
-        marched = solver.march(
-            scene, frequency_hz=frequency, steps_per_period=steps, max_periods=max_periods,
-            on_progress=on_progress,
-        )  # fmt: skip
-    if marched.converged:
-        outputs.write(marched, partial(marched.plot, scene=scene), scene=scene)
-    show(marched.to_json(), reports.march, as_json=as_json)
-    end(marched.converged, marched.status.value)

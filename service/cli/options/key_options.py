@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import json
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, get_args, get_origin
@@ -12,16 +13,18 @@ from typing import Annotated, Any, get_args, get_origin
 import typer
 from typer.models import OptionInfo
 
+from service.cli import completion
 from service.cli.options import inputs
 from service.cli.options import shared as options
 from service.cli.options.inputs import number, whole_number
 from service.errors import InputError
-from service.jobs.registry import JobKind
+from service.jobs.registry import Flag, JobKind
 
 SCENE = "scene"
 Schema = Mapping[str, Any]
 Command = Callable[..., None]
 
+_PAIR, _PATH = "LO HI", "PATH"
 _TAKEN = ("--wait", "--json", "--url", "--key-file", "--help")
 _SCALARS: dict[str, tuple[Any, Callable[[str], Any] | None, str]] = {
     "number": (float, number, "X"),
@@ -36,8 +39,8 @@ class KeyOption:
 
     Attributes
     ----------
-    key : str
-        Of the body.
+    key, name : str
+        Of the body, and of the field that is called so there.
     flag : str
         As it is written, with its hyphens.
     parameter : inspect.Parameter
@@ -47,6 +50,7 @@ class KeyOption:
     """
 
     key: str
+    name: str
     flag: str
     parameter: inspect.Parameter
     schema: Schema
@@ -66,7 +70,7 @@ class KeyOption:
                 raise InputError(f"`{self.flag}` must be a finite number, got {one!r}")
         kind = self.schema.get("type")
         if kind == "boolean":
-            return given is not self.flag.startswith("--no-")
+            return given is not (self.schema.get("default") is True)
         if isinstance(given, tuple):
             return list(given) if _is_pair(self.schema) else [list(given)]
         if kind == "object" and isinstance(given, list):
@@ -102,15 +106,20 @@ def key_options(kind: JobKind, local: Command | None) -> list[KeyOption]:
     described = kind.request.model_json_schema()
     needed = described.get("required", ())
     known = {} if local is None else options_of(local)
+    asked = {f.alias or name: (name, f) for name, f in kind.request.model_fields.items() if name != SCENE}
+    schemas = {key: _without_null(described["properties"][key]) for key in asked}
+    said = {
+        key: next((one for one in f.metadata if isinstance(one, Flag)), Flag())
+        for key, (_, f) in asked.items()
+    }
+    flags = {key: said[key].name or _flag(kind, key, schema) for key, schema in schemas.items()}
     found = []
-    for key, whole in described["properties"].items():
-        if key != SCENE:
-            schema = _without_null(whole)
-            flag = _flag(kind, key, schema)
-            mine = known.get(flag) or _made(flag, schema, whole, needed=key in needed)
-            name = f"key_{key}"
-            parameter = mine.replace(name=name, kind=inspect.Parameter.KEYWORD_ONLY)
-            found.append(KeyOption(key, flag, parameter, schema))
+    for key, flag in flags.items():
+        whole, schema = described["properties"][key], schemas[key]
+        words = as_options(whole.get("description", ""), flags)
+        mine = known.get(flag) or _made(flag, said[key].metavar, schema, whole, words, needed=key in needed)
+        parameter = mine.replace(name=f"key_{key}", kind=inspect.Parameter.KEYWORD_ONLY)
+        found.append(KeyOption(key, asked[key][0], flag, parameter, schema))
     order = [*known, *(one.flag for one in found)]
     return sorted(found, key=lambda one: order.index(one.flag))
 
@@ -140,22 +149,34 @@ def _flag(kind: JobKind, key: str, schema: Schema) -> str:
     return f"{flag}-key" if flag in _TAKEN else flag
 
 
-def _made(flag: str, schema: Schema, whole: Schema, *, needed: bool) -> inspect.Parameter:
+def as_options(words: str, flags: Mapping[str, str]) -> str:
+    """Return words with the options in place of the keys."""
+    # One of several values of a key has its number behind the name.
+    return re.sub(
+        r"`(\w+)(?:\[\d+\])?", lambda found: f"`{flags[found[1]]}" if found[1] in flags else found[0], words
+    )
+
+
+def _made(
+    flag: str, metavar: str, schema: Schema, whole: Schema, words: str, *, needed: bool
+) -> inspect.Parameter:
     """An option of the schema of its key."""
     if flag == "--set":
         return _parameter(options.Values, None)
     kind, default = schema.get("type"), whole.get("default")
-    words = whole.get("description", "")
     if kind == "boolean" and needed:
         both = f"{flag}/--no-{flag.removeprefix('--')}"
         return _parameter(Annotated[bool, typer.Option(both, help=words)], inspect.Parameter.empty)
     if kind == "boolean":
-        words = f"Switch off: {words}" if flag.startswith("--no-") else words
+        words = f"Switch off: {words}" if default is True else words
         return _parameter(Annotated[bool, typer.Option(flag, help=words)], False)
-    type_, parser, metavar = _read_as(schema)
+    type_, parser, shown = _read_as(schema)
+    if metavar == _PAIR:  # one of the ranges that a list may hold
+        type_, parser = tuple[float, float], None
     if get_origin(type_) is list and kind == "array":
         words = f"{words} Repeatable."
-    told = typer.Option(flag, metavar=metavar, parser=parser, help=words)
+    offered = completion.paths if metavar == _PATH else None
+    told = typer.Option(flag, metavar=metavar or shown, parser=parser, help=words, autocompletion=offered)
     if needed:
         return _parameter(Annotated[type_, told], inspect.Parameter.empty)
     return _parameter(
@@ -167,7 +188,7 @@ def _read_as(schema: Schema) -> tuple[Any, Callable[[str], Any] | None, str]:
     """Type, parser and metavariable of an option."""
     kind = schema.get("type")
     if _is_pair(schema):
-        return tuple[float, float], None, "LO HI"
+        return tuple[float, float], None, _PAIR
     if kind in _SCALARS:
         type_, parser, metavar = _SCALARS[kind]
         return type_, parser, "|".join(map(str, schema.get("enum", ()))) or metavar

@@ -38,12 +38,6 @@ FixedFrequency = Annotated[
     float | None,
     amount("--frequency", "HZ", "Excitation frequency [Hz], needed when another parameter is swept."),
 ]
-StudyFrequency = Annotated[
-    float | None,
-    amount(
-        "--frequency", "HZ", "Excitation frequency [Hz]; the highest peak of the scene's band if left out."
-    ),
-]
 Harmonics = Annotated[int, count("--harmonics", "H", "Highest harmonic kept.")]
 Accuracy = Annotated[
     float | None,
@@ -99,14 +93,6 @@ To = Annotated[float | None, amount("--to", "B", "End of the range.")]
 Limit = Annotated[
     float | None,
     amount("--limit", "A", "Amplitude [m] above which the resonance band is measured; peak/√2 if left out."),
-]
-Steps = Annotated[
-    int | None,
-    count("--steps", "N", "Steps per period; chosen if left out."),
-]
-MaxPeriods = Annotated[
-    int,
-    count("--max-periods", "N", "Periods to march at most."),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 Plot = Annotated[

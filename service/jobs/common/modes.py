@@ -8,17 +8,13 @@ from typing import Any
 import numpy as np
 
 import solver
-from service.jobs.outputs import OnProgress, ShouldStop
-from solver.results.watch import part_of
-from solver.scene.scene import Scene
+from service.jobs.common.sizes import MOST_MOTIONS
+from service.jobs.study import Watch
 
-MOST_POINTS = 40
-"""Points of the curve with loops and shapes."""
 MOST_CONTACTS = 40
 MOST_DOFS = 400
 SAMPLES = 97
 """Of a loop, its first again at the end."""
-MOST_PEAKS = 40
 FAR = 100.0
 _AMPLITUDE = "excitation.amplitude"
 
@@ -34,7 +30,7 @@ def motions_of(found: solver.NonlinearMode) -> dict[str, Any]:
     contacts or degrees of freedom than fit, the first are given.
     """
     count = found.amplitude.size
-    points = [int(i) for i in np.unique(np.linspace(0, max(count - 1, 0), min(count, MOST_POINTS)).round())]
+    points = [int(i) for i in np.unique(np.linspace(0, max(count - 1, 0), min(count, MOST_MOTIONS)).round())]
     points = points if count else []
     loops = []
     for name in found.contact_names[:MOST_CONTACTS]:
@@ -68,36 +64,27 @@ def excitations(curve: solver.PerformanceCurve, band: Sequence[float], count: in
 
 
 def exact_peaks(
-    scene: Scene,
-    factors: Sequence[float],
-    harmonics: int,
-    on_progress: OnProgress | None,
-    should_stop: ShouldStop,
+    found: solver.NonlinearMode, curve: solver.PerformanceCurve, count: int, watch: Watch
 ) -> list[dict[str, Any]]:
-    """The highest peak of the whole response at each factor on the excitation; null where it has none.
+    """The highest peak of the whole response at so many factors on the excitation; null where it has none.
 
-    Parameters
-    ----------
-    scene : with the excitation that counts as 1.
-    factors : on every force.
-    harmonics : highest harmonic kept.
-    on_progress : called with (share done, points so far).
-    should_stop : asked within the sweeps; what was not computed then is left out.
+    What was not computed when it was to end is left out.
     """
-    found: list[dict[str, Any]] = []
-    own = scene.value(_AMPLITUDE)
+    told: list[dict[str, Any]] = []
+    own = found.scene.value(_AMPLITUDE)
+    factors = excitations(curve, found.scene.observe.band, count)
     for i, factor in enumerate(factors):
-        if should_stop is not None and should_stop():
+        if watch.should_stop is not None and watch.should_stop():
             break
         branch = solver.sweep(
-            scene.with_values({_AMPLITUDE: factor * own}), harmonics=harmonics, should_stop=should_stop,
-            on_progress=part_of(on_progress, i / len(factors), (i + 1) / len(factors)),
+            found.scene.with_values({_AMPLITUDE: factor * own}), harmonics=found.n_harmonics,
+            **watch.part(i / len(factors), (i + 1) / len(factors))._asdict(),
         )  # fmt: skip
         peak = branch.peak if branch.completed else None
-        found.append({
+        told.append({
             "excitation": factor,
             "peak": None if peak is None else peak.value,
             "frequency": None if peak is None else peak.at,
             "status": branch.status.value,
         })  # fmt: skip
-    return found
+    return told

@@ -3,33 +3,31 @@
 from __future__ import annotations
 
 from functools import partial
+from typing import TYPE_CHECKING, Annotated
 
 from pydantic import ConfigDict, Field
 
 from service.jobs.common.scenes import HarmonicRequest, Number, ParameterPath, check, refusal
+from service.jobs.registry import Flag
 from solver.errors import Issue
 from solver.scene.examples import DISK_LOAD
-from solver.scene.scene import Scene
+
+if TYPE_CHECKING:
+    from solver.scene.scene import Scene
 
 FREQUENCY = "frequency"
 
 
 class RangeRequest(HarmonicRequest):
-    """A range of a parameter; the frequency is looked at over the scene's band.
-
-    Attributes
-    ----------
-    parameter : str
-        Path of what changes.
-    from_, to : float
-        Its range (`from` in the body).
-    """
+    """A range of a parameter; the frequency is looked at over the scene's band."""
 
     model_config = ConfigDict(validate_by_alias=True)
 
-    parameter: ParameterPath = Field(description=f"Path of what changes, for example {DISK_LOAD}.")
-    from_: Number = Field(alias="from", description="Start of the range.")
-    to: Number = Field(description="End of the range.")
+    parameter: Annotated[ParameterPath, Flag(metavar="PATH")] = Field(
+        description=f"Path of what changes, for example {DISK_LOAD}."
+    )
+    start: Annotated[Number, Flag(metavar="A")] = Field(alias="from", description="Start of the range.")
+    stop: Annotated[Number, Flag(metavar="B")] = Field(alias="to", description="End of the range.")
 
 
 def range_issues(request: RangeRequest, scene: Scene) -> list[Issue]:
@@ -44,11 +42,11 @@ def range_issues(request: RangeRequest, scene: Scene) -> list[Issue]:
     if path == FREQUENCY:
         return [refusal("/parameter", "`parameter` cannot be the frequency: all of the band is looked at")]
     issues: list[Issue] = []
-    for where, value in (("/from", request.from_), ("/to", request.to)):
+    for where, value in (("/from", request.start), ("/to", request.stop)):
         issues += check(where, partial(scene.with_values, {path: value}))
-    if request.from_ == request.to:
-        issues.append(refusal("/to", f"`to` must differ from `from`, got {request.to!r} for both"))
-    return issues or check("/parameter", partial(scale_of, scene, path, request.from_, request.to))
+    if request.start == request.stop:
+        issues.append(refusal("/to", f"`to` must differ from `from`, got {request.stop!r} for both"))
+    return issues or check("/parameter", partial(scale_of, scene, path, request.start, request.stop))
 
 
 def law_issues(where: str, scene: Scene) -> list[Issue]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Mapping
 from functools import lru_cache
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import BeforeValidator, Field, WithJsonSchema
 
@@ -17,11 +17,13 @@ from optim.criteria.json_types import Number as Number
 from optim.criteria.json_types import ParameterPath as ParameterPath
 from optim.criteria.json_types import PositiveNumber as PositiveNumber
 from service.errors import InvalidRequestError
-from service.jobs.registry import JobRequest, Resolved, SceneSource
+from service.jobs.registry import Flag, JobRequest, Resolved, SceneSource
 from service.jobs.strict_json import digest
 from solver.errors import Issue, SceneError, SettingError, pointer
 from solver.scene.examples import DAMPER_LOAD
-from solver.scene.scene import Scene, load_scene, shipped_scenes
+
+if TYPE_CHECKING:
+    from solver.scene.scene import Scene
 
 MOST_SET = 1000
 UPLOAD = "upload:"
@@ -82,7 +84,9 @@ class HarmonicRequest(SceneRequest):
         Highest harmonic of the balance.
     """
 
-    harmonics: Harmonics = Field(default=11, description="Highest harmonic of the balance.")
+    harmonics: Annotated[Harmonics, Flag(metavar="H")] = Field(
+        default=11, description="Highest harmonic of the balance."
+    )
 
 
 def resolve_scene(request: SceneRequest, source: SceneSource) -> Scene:
@@ -108,6 +112,8 @@ def resolve_scene(request: SceneRequest, source: SceneSource) -> Scene:
 @lru_cache(maxsize=64)
 def shipped_scene(name: str) -> Scene | None:
     """The scene of this name that comes with the package, read once; None for another one."""
+    from solver.scene.scene import load_scene, shipped_scenes
+
     return load_scene(name) if name in shipped_scenes() else None
 
 
@@ -171,6 +177,9 @@ def read_scene(body: Mapping[str, object], prefix: str = "") -> Scene:
     InvalidRequestError
         Lists everything that is wrong, with pointers below `prefix`.
     """
+    # Loaded here: the help of a command needs the keys alone.
+    from solver.scene.scene import Scene
+
     try:
         return Scene.from_dict(body)
     except SceneError as error:
@@ -184,6 +193,15 @@ def check(where: str, attempt: Callable[[], object]) -> list[Issue]:
         attempt()
     except SettingError as error:
         return [Issue(pointer=where, message=str(error))]
+    return []
+
+
+def check_named(attempt: Callable[[], object]) -> list[Issue]:
+    """As `check`, at the key that the error names."""
+    try:
+        attempt()
+    except SettingError as error:
+        return [Issue(pointer=pointer(error.name), message=str(error))]
     return []
 
 

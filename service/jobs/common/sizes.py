@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from typing import TYPE_CHECKING
 
 from service.jobs.common.scenes import refusal
 from solver.errors import Issue
-from solver.scene.scene import Scene
+
+if TYPE_CHECKING:
+    from solver.scene.scene import Scene
 
 MOST_POINTS = 500_000
 """Of a map: its result is text, some 40 bytes a point."""
@@ -20,6 +23,8 @@ MOST_STEPS = 100_000_000_000
 """Time steps × DOFs of a march: hours of one processor."""
 FEWEST_STEPS = 256
 """Of a period, where the solver chooses them."""
+MOST_MOTIONS = 40
+"""Points of the curve of a mode with loops and shapes."""
 POINTS_OF_A_SWEEP = 20
 """Fewer a frequency response seldom has."""
 

@@ -4,21 +4,22 @@ from __future__ import annotations
 
 import optim
 import solver
-from service.jobs.kinds.accuracy import ACCURACY
-from service.jobs.kinds.campbell import CAMPBELL
-from service.jobs.kinds.controlled import CONTROLLED
 from service.jobs.kinds.design import DESIGN
 from service.jobs.kinds.identify import IDENTIFY
-from service.jobs.kinds.interference import INTERFERENCE
-from service.jobs.kinds.map import MAP
-from service.jobs.kinds.march import MARCH
 from service.jobs.kinds.mistuning import MISTUNING
-from service.jobs.kinds.modes import MODES
 from service.jobs.kinds.pareto import PARETO
-from service.jobs.kinds.peaks import PEAKS
 from service.jobs.kinds.solve import SOLVE
 from service.jobs.kinds.sweep import SWEEP
 from service.jobs.registry import Registry
+from service.jobs.studies.accuracy import Accuracy
+from service.jobs.studies.campbell import Campbell
+from service.jobs.studies.controlled import Controlled
+from service.jobs.studies.interference import Interference
+from service.jobs.studies.map import Map
+from service.jobs.studies.march import March
+from service.jobs.studies.modes import Modes
+from service.jobs.studies.peaks import Peaks
+from service.jobs.studies.sensitivities import Sensitivities
 
 
 def warm_up() -> None:
@@ -32,19 +33,20 @@ def warm_up() -> None:
 SHIPPED = Registry(
     [
         SWEEP,
-        MAP,
-        PEAKS,
+        Map.as_kind(),
+        Peaks.as_kind(),
         DESIGN,
         PARETO,
         SOLVE,
-        MARCH,
-        ACCURACY,
-        CAMPBELL,
-        INTERFERENCE,
+        March.as_kind(),
+        Accuracy.as_kind(),
+        Campbell.as_kind(),
+        Interference.as_kind(),
         MISTUNING,
         IDENTIFY,
-        MODES,
-        CONTROLLED,
+        Modes.as_kind(),
+        Controlled.as_kind(),
+        Sensitivities.as_kind(),
     ],
     warm_up,
 )

@@ -11,10 +11,10 @@ import optim
 from optim.problem.keys import ROBUST, NominalAndRobustKeys, of_design
 from service.jobs.common.problem import ProblemRequest, arguments, default_variables, problem_of
 from service.jobs.common.records import design_record, robust_record, sweep_record
+from service.jobs.common.results import Amplitude, KnownResult, PeakAt, ReachedResult, Table
 from service.jobs.common.scenes import refusal, require, resolve_scene, resolved
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
 from service.jobs.kind_view import Json, KindView, NothingToDrawError, ReadSweep, StoredSweep
-from service.jobs.kinds.registry.results import Amplitude, KnownResult, PeakAt, ReachedResult, Table
 from service.jobs.outputs import JobOutput, Progress, ShouldStop, SweepRecord
 from service.jobs.registry import JobKind, Resolved, SceneSource
 from solver.errors import Issue, pointer

@@ -12,11 +12,11 @@ from optim.criteria.json_types import Pair
 from optim.errors import DesignError
 from optim.problem.keys import MAX_VARIABLES, VariableName
 from optim.problem.words import ScalingWord
+from service.jobs.common.results import ReachedResult, Table
 from service.jobs.common.scenes import HarmonicRequest, Number, ParameterPath, refusal, require, resolve_scene
 from service.jobs.common.scenes import resolved as spec_of
 from service.jobs.common.sizes import balance_issues
 from service.jobs.kind_view import Json, KindView, NothingToDrawError, ReadSweep, StoredSweep
-from service.jobs.kinds.registry.results import ReachedResult, Table
 from service.jobs.outputs import JobOutput, Progress, ShouldStop
 from service.jobs.registry import JobKind, Resolved, SceneSource
 from solver.errors import Issue, SceneError, SettingError, pointer

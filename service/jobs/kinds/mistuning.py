@@ -15,10 +15,10 @@ import solver
 from service.jobs.arrays import decode, encode
 from service.jobs.common.problem import Name
 from service.jobs.common.records import packed, sweep_records, unpacked
+from service.jobs.common.results import EndedResult, KnownResult, Table
 from service.jobs.common.scenes import FrequencyHz, HarmonicRequest, refusal, require, resolve_scene, resolved
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, annulus_issues, size_issues, whole_disk_dofs
 from service.jobs.kind_view import Json, KindView, NothingToDrawError, ReadSweep, StoredSweep
-from service.jobs.kinds.registry.results import EndedResult, KnownResult, Table
 from service.jobs.outputs import JobOutput, OnProgress, ShouldStop
 from service.jobs.parts import Part, PartOutput, Parts, PartStoppedError
 from service.jobs.registry import JobKind, Resolved, SceneSource

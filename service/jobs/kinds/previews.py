@@ -11,6 +11,7 @@ from typing import Annotated, Any
 from pydantic import ConfigDict, Field
 
 import solver
+from service.jobs.common.linear_limits import linear_limit
 from service.jobs.common.scenes import (
     FrequencyHz,
     HarmonicRequest,
@@ -27,7 +28,6 @@ from service.jobs.common.sizes import (
     contact_motions,
     dofs_solved,
 )
-from service.jobs.linear_limits import linear_limit
 from service.jobs.outputs import JobOutput, Progress, ShouldStop, Silent
 from service.jobs.registry import JobKind, Registry, Resolved, SceneSource
 from solver.errors import Issue

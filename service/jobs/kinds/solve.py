@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 from pydantic import ConfigDict, Field
 
 import solver
+from service.jobs.common.results import Amplitude, KindResult
 from service.jobs.common.scenes import FrequencyHz, HarmonicRequest, require, resolve_scene, resolved
 from service.jobs.common.sizes import balance_issues
 from service.jobs.kind_view import Json, KindView, ReadSweep, StoredSweep
-from service.jobs.kinds.registry.results import Amplitude, KindResult
 from service.jobs.outputs import JobOutput, Progress, ShouldStop
 from service.jobs.registry import JobKind, Resolved, SceneSource
 from solver.response.stability import MOST_STARTS

@@ -11,6 +11,7 @@ from pydantic import ConfigDict, Field
 import solver
 from service.jobs.checkpoints import Checkpoints
 from service.jobs.common.records import sweep_record
+from service.jobs.common.results import Amplitude, Curve, EndedResult, PeakAt, Table
 from service.jobs.common.scenes import (
     FrequencyHz,
     HarmonicRequest,
@@ -25,7 +26,6 @@ from service.jobs.common.scenes import (
 )
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
 from service.jobs.kind_view import KindView
-from service.jobs.kinds.registry.results import Amplitude, Curve, EndedResult, PeakAt, Table
 from service.jobs.outputs import JobOutput, Progress, ShouldStop
 from service.jobs.registry import JobKind, Resolved, SceneSource
 from solver.errors import Issue, SettingError

@@ -10,8 +10,8 @@ import pytest
 from light_scenes import light_scene
 
 import solver
+from service.jobs.common.linear_limits import linear_limit
 from service.jobs.kinds.previews import run_limits
-from service.jobs.linear_limits import linear_limit
 from service.jobs.outputs import Silent
 from solver.linear.assembly import linear_model
 from solver.linear.condensation import force_amplitudes

@@ -134,7 +134,7 @@ def _show(job: JobAnswer, answer: ResultsAnswer, *, as_json: bool) -> None:
     if as_json:
         print_json(answer.model_dump(mode="json"))
         return
-    _print(job.kind, answer.result)
+    print_result(job.kind, answer.result)
     rows = [
         (
             sweep.id,
@@ -148,7 +148,7 @@ def _show(job: JobAnswer, answer: ResultsAnswer, *, as_json: bool) -> None:
         print_table("Stored sweeps", ("id", "parameter", "points", "peak [m]"), rows, right="23")
 
 
-def _print(kind: str, result: Mapping[str, Any]) -> None:
+def print_result(kind: str, result: Mapping[str, Any]) -> None:
     """Print a result: as the local command does, as its kind says, or by its keys."""
     if reports.knows(kind):
         reports.of_kind(kind)(result)

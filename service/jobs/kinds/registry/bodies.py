@@ -12,6 +12,7 @@ from service.jobs.registry import JobKind, JobRequest, Registry
 
 KIND = "kind"
 DESIGN = "design"
+_WORD = "Request"
 
 
 @cache
@@ -44,7 +45,10 @@ def body_model(name: str, request: type[JobRequest]) -> type[BaseModel]:
         __base__=request,
         __doc__=request.__doc__,
         __module__=request.__module__,
-        __cls_kwargs__={"json_schema_extra": described, "title": request.__name__},
+        __cls_kwargs__={
+            "json_schema_extra": described,
+            "title": f"{request.__name__.removesuffix(_WORD)}{_WORD}",
+        },
         kind=kind,
     )
 

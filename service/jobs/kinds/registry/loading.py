@@ -13,6 +13,7 @@ from collections.abc import Iterable
 from service.errors import ConfigurationError
 from service.jobs.kinds import SHIPPED
 from service.jobs.registry import JobKind, Registry
+from service.jobs.study import Study
 
 _ENTRY = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*:[A-Za-z_]\w*")
 
@@ -23,8 +24,8 @@ def registry_of(entries: Iterable[str], base: Registry = SHIPPED) -> Registry:
     Parameters
     ----------
     entries : iterable of str
-        ``module:NAME`` each: a `JobKind`, or a sequence of them, at the top level of a module that can be
-        imported.
+        ``module:NAME`` each: a `Study`, a `JobKind`, or a sequence of them, at the top level of a module that
+        can be imported.
     base : Registry
         The kinds there are without them.
 
@@ -60,10 +61,11 @@ def _kinds_of(entry: str) -> list[JobKind]:
         raise ConfigurationError(
             f"`kinds` (STICKSLIP_KINDS): {entry!r} cannot be imported: {type(error).__name__}: {error}"
         ) from error
-    listed = [value] if isinstance(value, JobKind) else value
-    if not isinstance(listed, (list, tuple)) or not all(isinstance(one, JobKind) for one in listed):
+    listed = list(value) if isinstance(value, (list, tuple)) else [value]
+    kinds = [one.as_kind() if isinstance(one, type) and issubclass(one, Study) else one for one in listed]
+    if not all(isinstance(one, JobKind) for one in kinds):
         raise ConfigurationError(
-            f"`kinds` (STICKSLIP_KINDS): {entry!r} must be a JobKind or a list of them, got "
+            f"`kinds` (STICKSLIP_KINDS): {entry!r} must be a Study, a JobKind or a list of them, got "
             f"{type(value).__name__}"
         )
-    return list(listed)
+    return kinds

@@ -1,47 +1,16 @@
-"""`stickslip sensitivities`: what one per cent of every parameter does to the highest peaks and the band."""
+"""What people read of sensitivities, given as the JSON object a program reads."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import Any
 
-from service.cli.failures import end
-from service.cli.options import inputs
-from service.cli.options import shared as options
-from service.cli.output_files import Outputs
-from service.cli.progress import patience
-from service.rendering.tables.text import print_table, say, show
+from service.rendering.tables.text import print_table, say
 from solver.results import units
 from solver.results.known import known_pairs
 
 
-def sensitivities(
-    name: options.Scene,
-    values: options.Values = None,
-    limit: options.Limit = None,
-    harmonics: options.Harmonics = 11,
-    plot: options.Plot = None,
-    out: options.Out = None,
-    as_json: options.Json = False,
-) -> None:
-    """Say what matters: per cent of the peaks and the band for one per cent of each parameter.
-
-    Exact derivatives through the whole solve; what matters most for the highest peak comes first.
-    """
-    outputs = Outputs.asked(plot, out)
-    scene = inputs.scene(name, values)
-    with patience():
-        import optim
-
-        found = optim.sensitivities(scene, limit=limit, harmonics=harmonics)
-    answer: Mapping[str, Any] = found.to_json()
-    drawn = any(row["peak_percent"] is not None for row in answer["rows"])
-    outputs.write(found, found.plot if drawn else None)
-    show(answer, _show, as_json=as_json)
-    end(found.reached, found.status.value)
-
-
-def _show(found: Mapping[str, Any]) -> None:
+def shares(found: Mapping[str, Any]) -> None:
     """The peaks, and a row for every parameter."""
     peaks = [f"{units.length(peak['value'])} at {peak['at']:.6g} Hz" for peak in found["peaks"]]
     title = f"{found['scene']}: {'; '.join(peaks) or 'no peak'}"

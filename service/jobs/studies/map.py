@@ -1,67 +1,34 @@
-"""The kind `map`: the response over frequency and a parameter, with the ridge of its peaks."""
+"""The study `map`: the response over frequency and a parameter, with the ridge of its peaks."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import ConfigDict, Field
 
-import solver
-from service.jobs import strict_json
-from service.jobs.arrays import decode, encode
 from service.jobs.common.ranges import RangeRequest, law_issues, range_issues
-from service.jobs.common.records import packed, sweep_records, unpacked
-from service.jobs.common.scenes import refusal, require, resolve_scene, resolved
+from service.jobs.common.results import Curve, EndedResult, KnownResult
+from service.jobs.common.scenes import refusal
 from service.jobs.common.sizes import MOST_POINTS, balance_issues
-from service.jobs.kind_view import Json, KindView, ReadSweep, StoredSweep
-from service.jobs.kinds.peaks import PeaksResult
-from service.jobs.kinds.registry.results import Curve, EndedResult, KnownResult
+from service.jobs.kind_view import Json
 from service.jobs.outputs import JobOutput, OnProgress, ShouldStop
 from service.jobs.parts import Part, PartOutput, Parts, PartStoppedError
-from service.jobs.registry import JobKind, Resolved, SceneSource
+from service.jobs.registry import Flag, JobKind
+from service.jobs.studies.peaks import PeaksResult
+from service.jobs.study import Study
 from solver.errors import Issue
-from solver.results.known import Known, worst_of
 from solver.scene.examples import DISK_LOAD
-from solver.scene.scene import Scene
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
+    from solver.scene.scene import Scene
     from solver.studies.response_map import MapGrid
 
 _EXAMPLE: dict[str, Any] = {
-    "scene": "bladed-disk",
-    "parameter": DISK_LOAD,
-    "from": 20,
-    "to": 3000,
-    "steps": 60,
-    "frequencies": 400,
-}
+    "scene": "bladed-disk", "parameter": DISK_LOAD, "from": 20, "to": 3000, "steps": 60, "frequencies": 400,
+}  # fmt: skip
 _Count = Annotated[int, Field(strict=True, ge=2, le=MOST_POINTS // 2)]
-
-
-class MapRequest(RangeRequest):
-    """A map, in the words of the command.
-
-    Attributes
-    ----------
-    steps : int
-        Values of the parameter.
-    frequencies : int
-        Frequencies over the band.
-    ridge : bool
-        Whether the peaks are tracked too.
-    """
-
-    model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE]})
-
-    steps: _Count = Field(default=60, description="Values of the parameter.")
-    frequencies: _Count = Field(default=400, description="Frequencies over the scene's band.")
-    ridge: bool = Field(
-        default=True, strict=True,
-        description="Track the peaks too; false is faster, and for contacts of every law.",
-    )  # fmt: skip
 
 
 class MapResult(KnownResult, EndedResult):
@@ -81,32 +48,43 @@ class MapResult(KnownResult, EndedResult):
     seconds: float
 
 
-def resolve(request: MapRequest, source: SceneSource) -> Resolved:
-    """Look up the scene, check the range, the size and, with a ridge, the laws of the contacts."""
-    scene = resolve_scene(request, source)
-    require(
-        range_issues(request, scene)
-        + _size_issues(request, scene)
-        + (law_issues("/ridge", scene) if request.ridge else [])
+class Map(Study, RangeRequest):
+    """Map the response over frequency and a parameter, with the ridge of its peaks."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE]})
+    NAME, FUNCTION, RESULT = "map", "solver:response_map", MapResult
+    SHOWS, SWEEPS = "the amplitude on the grid, the ridge of its peaks", "those that look for peaks"
+    FIGURE = "service.jobs.drawing:map_of"
+
+    steps: Annotated[_Count, Flag(metavar="N")] = Field(default=60, description="Values of the parameter.")
+    frequencies: Annotated[_Count, Flag(metavar="N")] = Field(
+        default=400, description="Frequencies over the scene's band."
     )
-    return resolved(
-        scene,
-        parameter=request.parameter,
-        start=request.from_,
-        stop=request.to,
-        steps=request.steps,
-        frequencies=request.frequencies,
-        ridge=request.ridge,
-        harmonics=request.harmonics,
+    ridge: Annotated[bool, Field(strict=True)] = Field(
+        default=True, description="Track the peaks too; false is faster, and for contacts of every law."
     )
 
+    def issues(self, scene: Scene) -> list[Issue]:
+        """Return what is wrong with the range and, with a ridge, with the laws of the contacts."""
+        return range_issues(self, scene) + (law_issues("/ridge", scene) if self.ridge else [])
 
-def _size_issues(request: MapRequest, scene: Scene) -> list[Issue]:
-    points = request.steps * request.frequencies
-    if points > MOST_POINTS:
-        return [refusal("/steps", f"`steps` × `frequencies` must be at most {MOST_POINTS}, got {points}")]
-    words = "`steps` × `frequencies`"
-    return balance_issues("/steps", scene, request.harmonics, points, words)
+    def sizes(self, scene: Scene) -> list[Issue]:
+        """Return what is too large."""
+        points = self.steps * self.frequencies
+        if points > MOST_POINTS:
+            return [refusal("/steps", f"`steps` × `frequencies` must be at most {MOST_POINTS}, got {points}")]
+        return balance_issues("/steps", scene, self.harmonics, points, "`steps` × `frequencies`")
+
+    @classmethod
+    def empty(cls, result: Json) -> str:
+        """Return why there is nothing to draw."""
+        some = any(value is not None for row in result["amplitude"] for value in row)
+        return "" if some else "no point of it was solved"
+
+    @classmethod
+    def as_kind(cls) -> JobKind:
+        """Return the kind of job, which is computed in parts."""
+        return replace(super().as_kind(), run=PARTS.run, parts=PARTS)
 
 
 def split(spec: Mapping[str, Any]) -> list[Part]:
@@ -125,6 +103,8 @@ def run_part(
     spec: Mapping[str, Any], part: Mapping[str, Any], progress: OnProgress, should_stop: ShouldStop
 ) -> PartOutput:
     """Track the peaks, or solve some rows."""
+    from service.jobs.arrays import encode
+
     if part.get("ridge"):
         return _ridge(spec, progress, should_stop)
     strip = _grid(spec).solve(*part["rows"], on_progress=progress, should_stop=should_stop)
@@ -141,6 +121,9 @@ def run_part(
 
 def join(spec: Mapping[str, Any], outputs: Mapping[int, PartOutput]) -> JobOutput:
     """The map from its strips; the stored sweeps are those that look for peaks."""
+    from service.jobs.arrays import decode
+    from service.jobs.common.records import unpacked
+    from solver.results.known import Known, worst_of
     from solver.studies.response_map import Strip
 
     parts = list(outputs.values())
@@ -160,21 +143,19 @@ def join(spec: Mapping[str, Any], outputs: Mapping[int, PartOutput]) -> JobOutpu
 
 def _grid(spec: Mapping[str, Any]) -> MapGrid:
     # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
+    from solver.scene.scene import Scene
     from solver.studies.response_map import map_grid
 
-    return map_grid(
-        Scene.from_dict(spec["scene"]),
-        spec["parameter"],
-        spec["start"],
-        spec["stop"],
-        steps=spec["steps"],
-        frequencies=spec["frequencies"],
-        ridge=spec["ridge"],
-        harmonics=spec["harmonics"],
-    )
+    given = {name: value for name, value in spec.items() if name != "scene"}
+    return map_grid(Scene.from_dict(spec["scene"]), **given)
 
 
 def _ridge(spec: Mapping[str, Any], progress: OnProgress, should_stop: ShouldStop) -> PartOutput:
+    import solver
+    from service.jobs import strict_json
+    from service.jobs.common.records import packed, sweep_records
+    from solver.scene.scene import Scene
+
     track = solver.track_peak(
         Scene.from_dict(spec["scene"]),
         spec["parameter"],
@@ -190,25 +171,5 @@ def _ridge(spec: Mapping[str, Any], progress: OnProgress, should_stop: ShouldSto
     return PartOutput(result={"ridge": strict_json.finite(track.to_json()), "sweeps": sweeps}, arrays=arrays)
 
 
-def draw(result: Json, _sweeps: Sequence[StoredSweep], _read: ReadSweep) -> Figure:
-    """The map with its ridge."""
-    from service.jobs.drawing import map_of
-
-    return map_of(result)
-
-
-_PARTS = Parts(split=split, run_part=run_part, join=join)
-MAP = JobKind(
-    name="map",
-    summary="The response over frequency and a parameter, with the ridge of its peaks.",
-    request=MapRequest,
-    resolve=resolve,
-    run=_PARTS.run,
-    parts=_PARTS,
-    result=MapResult,
-    view=KindView(
-        result="the amplitude on the grid, the ridge of its peaks",
-        sweeps="those that look for peaks",
-        draw=draw,
-    ),
-)
+PARTS = Parts(split=split, run_part=run_part, join=join)
+STUDY = Map

@@ -1,0 +1,127 @@
+"""The study `campbell`: where orders of a running speed meet the resonances of a scene."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Annotated, Any
+
+from pydantic import ConfigDict, Field
+
+from optim.criteria.json_types import Pair, PositiveNumber, Ranges
+from service.jobs.common.results import Amplitude, EndedResult, KnownResult, Table
+from service.jobs.common.scenes import HarmonicRequest, refusal
+from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
+from service.jobs.kind_view import Json, NothingToDrawError, ReadSweep, StoredSweep
+from service.jobs.outputs import SweepRecord
+from service.jobs.registry import Flag
+from service.jobs.study import Study
+from solver.errors import Issue, pointer
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from optim.studies.crossings import CampbellDiagram
+    from solver.scene.scene import Scene
+    from solver.views.plots.curves import Response
+
+_EXAMPLE: dict[str, Any] = {
+    "scene": "bladed-disk",
+    "speeds_rpm": [[40000, 50000]],
+    "orders": [1, 2, 3],
+    "limit": 8e-5,
+}
+_MOST_RPM = 6e10  # a revolution at the highest frequency that is accepted anywhere
+_Order = Annotated[int, Field(strict=True, ge=1, le=10_000)]
+
+
+class CampbellResult(KnownResult, EndedResult):
+    """Crossings of every order with the peaks of its response, and speeds above the limit."""
+
+    scene: str
+    speeds_rpm: list[list[float]]
+    limit: Amplitude
+    clear: bool | None = Field(description="Whether no running speed is above the limit.")
+    orders: list[Table]
+    n_harmonics: int
+    seconds: float
+
+
+class Campbell(Study, HarmonicRequest):
+    """Find the speeds at which orders of the running speed meet resonances.
+
+    The peaks are those of the response with friction; natural frequencies with all contacts stuck and all
+    open are given beside them.
+    """
+
+    model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE]})
+    NAME, FUNCTION, RESULT = "campbell", "optim:campbell_diagram", CampbellResult
+    SHOWS = "crossings and speeds above the limit ([Campbell diagrams](campbell.md))"
+    EMPTY = ("orders", "it stored no sweep to draw")
+    SWEEPS = "one an order; one for all without sectors"
+
+    speeds_rpm: Annotated[Ranges, Flag("--speeds", "LO HI")] = Field(
+        description="Ranges [low, high] of the running speed [1/min]."
+    )
+    orders: Annotated[
+        Annotated[list[_Order], Field(min_length=1, max_length=100)] | None, Flag("--order", "N")
+    ] = Field(
+        default=None,
+        description="Excitations a revolution; in a cyclic scene the engine order. The scene's own, or 1.",
+    )
+    limit: Annotated[PositiveNumber | None, Flag(metavar="A")] = Field(
+        default=None, description="Amplitude [m] that counts as resonance; half power of each order's peak."
+    )
+    band_hz: Annotated[Pair | None, Flag("--band")] = Field(
+        default=None,
+        description="Frequencies looked at [Hz]; the scene's band and those of the running speeds.",
+    )
+
+    def issues(self, _scene: Scene) -> list[Issue]:
+        """Return what is wrong with speeds and band."""
+        found = [
+            refusal(pointer("speeds_rpm", i), f"`speeds_rpm[{i}]` {wanted}, got {pair}")
+            for i, pair in enumerate(self.speeds_rpm)
+            for wanted, good in (
+                ("must have 0 < low < high [1/min]", 0.0 < pair[0] < pair[1]),
+                (f"must be at most {_MOST_RPM:g}", pair[1] <= _MOST_RPM),
+            )
+            if not good
+        ]
+        if self.band_hz is not None and not 0.0 < self.band_hz[0] < self.band_hz[1]:
+            found.append(
+                refusal("/band_hz", f"`band_hz` must have 0 < low < high [Hz], got {self.band_hz!r}")
+            )
+        return found
+
+    def sizes(self, scene: Scene) -> list[Issue]:
+        """Return what is too large."""
+        points = len(self.orders or [1]) * POINTS_OF_A_SWEEP
+        return balance_issues("/orders", scene, self.harmonics, points)
+
+    @classmethod
+    def sweeps(cls, found: CampbellDiagram) -> tuple[SweepRecord, ...]:
+        """Return the response of every order."""
+        from service.jobs.common.records import sweep_records
+
+        return sweep_records(one.branch for one in found.orders)
+
+    @classmethod
+    def figure(cls, result: Json, sweeps: Sequence[StoredSweep], read: ReadSweep) -> Figure:
+        """Return each order with the stored response whose highest peak is its own."""
+        from optim.views.plots.campbell import campbell_figure
+        from service.jobs.stored_curves import response_of
+
+        curves = [response_of(read(sweep.id)) for sweep in sweeps if sweep.points]
+        if not curves:
+            raise NothingToDrawError(cls.EMPTY[1])
+
+        def distance(curve: Response, order: Json) -> float:
+            heights = [float(peak["value"]) for peak in order["peaks"]] or [math.nan]
+            return abs(float(curve.amplitude.max()) - max(heights))
+
+        chosen = [min(curves, key=lambda curve: distance(curve, order)) for order in result["orders"]]
+        return campbell_figure(result, chosen)
+
+
+STUDY = Campbell

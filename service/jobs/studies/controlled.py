@@ -1,0 +1,102 @@
+"""The study `controlled`: responses over the frequency at a held amplitude."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Annotated, Any
+
+from pydantic import ConfigDict, Field
+
+from optim.criteria.json_types import Name
+from service.jobs.common.results import Curve, EndedResult, Table
+from service.jobs.common.scenes import HarmonicRequest, PositiveNumber, refusal
+from service.jobs.common.sizes import balance_issues
+from service.jobs.registry import Flag
+from service.jobs.study import Answer, Study, Watch
+from solver.errors import Issue
+
+if TYPE_CHECKING:
+    from solver.scene.scene import Scene
+
+_POINTS = 200  # a curve seldom has more
+
+
+class ControlledResult(EndedResult):
+    """The force that holds the amplitude, over the frequency."""
+
+    scene: str
+    dof: str
+    amplitude: float
+    frequency: Curve
+    excitation: Curve
+    excitation_error: Curve
+    phase: Curve
+    max_abs: Curve
+    contacts: list[str]
+    states: list[list[str]]
+    changes: list[Table]
+    stable: list[bool | None]
+    stability_unknown: str
+    least: Table | None
+    n_harmonics: int
+    seconds: float
+
+
+class Controlled(Study, HarmonicRequest):
+    """Follow the response over the frequency with one amplitude held, as rigs do.
+
+    It says which force that takes, and what the contacts do.
+    """
+
+    model_config = ConfigDict(json_schema_extra={"examples": [{"scene": "two-dof", "amplitude": 1.0}]})
+    NAME, FUNCTION, RESULT = "controlled", "solver:held_amplitude", ControlledResult
+    SHOWS = "force and phase over the frequency ([a held amplitude](modes.md#a-held-amplitude))"
+    EMPTY = ("frequency", "no response with this amplitude was found")
+    FIGURE = "solver.views.plots.modes:held_figure"
+
+    amplitude: Annotated[PositiveNumber, Flag(metavar="A")] = Field(
+        description="Amplitude of harmonic 1 that is held [m]."
+    )
+    start: Annotated[PositiveNumber | None, Flag(metavar="F")] = Field(
+        default=None, alias="from", description="First frequency [Hz]; the scene's band if left out."
+    )
+    stop: Annotated[PositiveNumber | None, Flag(metavar="F")] = Field(
+        default=None, alias="to", description="Last frequency [Hz]."
+    )
+    dof: Annotated[Name | None, Flag(metavar="NAME")] = Field(
+        default=None, description="Whose amplitude; what the scene observes."
+    )
+    no_stability: Annotated[bool, Field(strict=True)] = Field(
+        default=False, description="Leave out whether responses are stable: faster."
+    )
+
+    def issues(self, scene: Scene) -> list[Issue]:
+        """Return what is wrong with range and DOF for the scene."""
+        issues: list[Issue] = []
+        low = scene.observe.band[0] if self.start is None else self.start
+        high = scene.observe.band[1] if self.stop is None else self.stop
+        if low >= high:
+            issues.append(refusal("/to", f"`to` must be above `from` = {low!r} Hz, got {high!r}"))
+        if self.dof is not None and self.dof not in scene.dofs:
+            words = f"`dof` must be one of {', '.join(scene.dofs)}, got {self.dof!r}"
+            issues.append(refusal("/dof", words))
+        if any(force.harmonic != 1 for force in scene.excitation):
+            issues.append(
+                refusal("/scene", "must have an excitation of harmonic 1 alone: it holds the amplitude")
+            )
+        return issues
+
+    def sizes(self, scene: Scene) -> list[Issue]:
+        """Return what is too large."""
+        return balance_issues("/harmonics", scene, self.harmonics, _POINTS)
+
+    @classmethod
+    def compute(cls, scene: Scene, asked: Mapping[str, Any], watch: Watch) -> Answer:
+        """Follow the responses; of large structures stability is left out unless it is asked for."""
+        given = {name: value for name, value in asked.items() if name != "no_stability"}
+        if asked.get("no_stability"):
+            given["stability"] = False
+        return super().compute(scene, given, watch)
+
+
+STUDY = Controlled

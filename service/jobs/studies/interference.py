@@ -1,0 +1,90 @@
+"""The study `interference`: natural frequencies over the nodal diameter, and the orders that meet them."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING, Annotated
+
+from pydantic import ConfigDict, Field
+
+from service.jobs.common.results import EndedResult, Table
+from service.jobs.common.scenes import PositiveNumber, check_named
+from service.jobs.common.sizes import memory_issues
+from service.jobs.kind_view import Json
+from service.jobs.registry import Flag
+from service.jobs.study import Study
+from solver.errors import Issue
+
+if TYPE_CHECKING:
+    from solver.scene.scene import Scene
+
+_MOST_RPM = 6e10  # a revolution at the highest frequency that is accepted anywhere
+_Speed = Annotated[PositiveNumber, Field(le=_MOST_RPM)]
+_Orders = Annotated[
+    list[Annotated[int, Field(strict=True, ge=1, le=1_000_000)]], Field(min_length=1, max_length=1000)
+]
+
+
+class InterferenceResult(EndedResult):
+    """Natural frequencies at each nodal diameter, what the orders excite, and where they meet."""
+
+    scene: str
+    sectors: int
+    speed_rpm: float | None
+    within: float
+    diameters: list[Table] = Field(description="Frequencies with all contacts open, and all stuck.")
+    orders: list[Table] = Field(description="Nodal diameter and frequency of each order at the speed.")
+    crossings: list[Table] = Field(description="Orders that meet a family or are near one.")
+    missing: list[int] = Field(description="Nodal diameters that a reduced sector was not built for.")
+    seconds: float
+
+
+class Interference(Study):
+    """Draw natural frequencies over the nodal diameter, with the engine orders that meet them.
+
+    Each with all contacts open and all stuck: friction moves a resonance between the two.
+    """
+
+    model_config = ConfigDict(json_schema_extra={"examples": [{"scene": "bladed-disk", "speed_rpm": 11000}]})
+    NAME, FUNCTION, RESULT = "interference", "solver:interference_diagram", InterferenceResult
+    SHOWS = "frequencies at each nodal diameter, orders that meet them ([interference](disks.md))"
+    FIGURE = "solver.views.plots.interference:interference_figure"
+    COUNTED = "nodal diameters"
+
+    speed_rpm: Annotated[_Speed | None, Flag("--speed", "RPM")] = Field(
+        default=None, description="Speed of rotation [1/min]; the scene's own, and without one no orders."
+    )
+    orders: Annotated[_Orders | None, Flag("--order", "N")] = Field(
+        default=None, description="Excitations a revolution; all that reach the frequencies if left out."
+    )
+    families: Annotated[int, Field(strict=True, ge=1, le=100), Flag(metavar="N")] = Field(
+        default=6, description="How many natural frequencies at each nodal diameter."
+    )
+    up_to_hz: Annotated[PositiveNumber | None, Flag("--up-to", "HZ")] = Field(
+        default=None, description="Families that begin above are left out [Hz]."
+    )
+    within: Annotated[float, Field(ge=0.0, le=1.0), Flag(metavar="S")] = Field(
+        default=0.05, description="Relative distance of an order from a family that counts."
+    )
+
+    def issues(self, scene: Scene) -> list[Issue]:
+        """Return why it is no disk, or a speed that cannot be."""
+        # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
+        from solver.studies.interference import checked_speed
+
+        return check_named(partial(checked_speed, scene, self.speed_rpm, self.orders))
+
+    def sizes(self, scene: Scene) -> list[Issue]:
+        """Return what is too large."""
+        from solver.studies.mistuning import without_mistuning
+
+        return memory_issues(without_mistuning(scene), 1)
+
+    @classmethod
+    def empty(cls, result: Json) -> str:
+        """Return why there is nothing to draw."""
+        some = any(point["open_hz"] for point in result["diameters"])
+        return "" if some else "it has no natural frequency to draw"
+
+
+STUDY = Interference

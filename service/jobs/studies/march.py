@@ -1,0 +1,88 @@
+"""The study `march`: time marching, the independent referee."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+from typing import TYPE_CHECKING, Annotated, Any
+
+from pydantic import ConfigDict, Field
+
+from service.jobs.common.results import Amplitude, KindResult, Table
+from service.jobs.common.scenes import FrequencyHz
+from service.jobs.common.sizes import march_issues
+from service.jobs.registry import Flag
+from service.jobs.study import Answer, Study, Watch
+from solver.errors import Issue
+
+if TYPE_CHECKING:
+    from solver.scene.scene import Scene
+
+SAMPLES = 512
+_Steps = Annotated[int, Field(strict=True, ge=16, le=1_000_000)]
+
+
+class MarchResult(KindResult):
+    """The motion a time march settled to."""
+
+    max_abs: Amplitude
+    half_peak_to_peak: Amplitude
+    mean: Amplitude
+    harmonics: list[float | None] | None = Field(description="Amplitudes of the harmonics from 0 on [m].")
+    periods: int
+    steps_per_period: int
+    error_estimate: float | None = Field(description="Relative to the largest displacement.")
+    status: str
+    seconds: float
+    history: Table | None = Field(default=None, description="The last period, where it was asked for.")
+
+
+class March(Study):
+    """March in time until the motion repeats.
+
+    The independent referee of solve; of a cyclic scene the whole annulus is marched.
+    """
+
+    model_config = ConfigDict(json_schema_extra={"examples": [{"scene": "two-dof", "frequency_hz": 1.2}]})
+    NAME, FUNCTION, RESULT = "march", "solver:march", MarchResult
+    SHOWS, COUNTED = "amplitude and periods marched", "periods"
+    EMPTY = ("harmonics", "no response was found")
+    FIGURE = "service.jobs.drawing:harmonics_of"
+
+    frequency_hz: Annotated[FrequencyHz, Flag("--frequency", "HZ")] = Field(
+        description="Excitation frequency [Hz]."
+    )
+    steps_per_period: Annotated[_Steps | None, Flag("--steps", "N")] = Field(
+        default=None, description="Steps of the finer run; chosen by the solver if left out."
+    )
+    tolerance: Annotated[float, Field(strict=True, gt=0.0, lt=1.0), Flag(metavar="E")] = Field(
+        default=1e-10, description="Largest change over a period, relative."
+    )
+    max_periods: Annotated[int, Field(strict=True, ge=1, le=1_000_000), Flag(metavar="N")] = Field(
+        default=20_000, description="Periods marched at most."
+    )
+    history: Annotated[bool, Field(strict=True)] = Field(
+        default=False, description="Give the last period too: motion and loops of the contacts."
+    )
+
+    def sizes(self, scene: Scene) -> list[Issue]:
+        """Return what is too large."""
+        return march_issues(scene, self.steps_per_period, self.max_periods)
+
+    @classmethod
+    def compute(cls, scene: Scene, asked: Mapping[str, Any], watch: Watch) -> Answer:
+        """March; what has not settled is not drawn."""
+        import solver
+
+        given = {name: value for name, value in asked.items() if name != "history"}
+        found = solver.march(scene, **given, **watch._asdict())
+        result = found.to_json()
+        if asked.get("history"):
+            from service.jobs.common.periods import history_of
+
+            result["history"] = history_of(found, SAMPLES)
+        shown = found if found.converged else None
+        return Answer(shown, result, found.converged, found.status.value, partial(found.plot, scene=scene))
+
+
+STUDY = March

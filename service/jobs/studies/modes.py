@@ -1,0 +1,184 @@
+"""The study `modes`: frequency and damping ratio of a mode over its amplitude."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Annotated, Any
+
+from pydantic import ConfigDict, Field, RootModel
+
+from service.jobs.common.results import Curve, EndedResult, Table
+from service.jobs.common.scenes import HarmonicRequest, Number, PositiveNumber, check_named, refusal
+from service.jobs.common.sizes import MOST_MOTIONS, POINTS_OF_A_SWEEP, balance_issues
+from service.jobs.kind_view import Json, ReadSweep, StoredSweep
+from service.jobs.registry import Flag
+from service.jobs.study import Answer, Study, Watch
+from solver.errors import Issue
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from solver.scene.scene import Scene
+
+_MOST_PEAKS = 40
+_POINTS = 200  # a curve seldom has more
+_OF_THE_CURVE = 0.3  # share of the progress, where exact peaks follow
+_Diameter = Annotated[int, Field(strict=True, ge=-10_000, le=10_000)]
+_Ratio = Annotated[Number, Field(ge=-10.0, le=10.0)]
+
+
+class _AmplitudeCurve(EndedResult):
+    """A curve over the modal amplitude, and what the contacts do along it."""
+
+    scene: str
+    mode: int
+    amplitude: Curve
+    frequency: Curve
+    dof: str
+    max_abs: Curve
+    contacts: list[str]
+    states: list[list[str]]
+    seconds: float
+
+
+class PhaseResonanceResult(_AmplitudeCurve):
+    """Frequency and force of phase resonance over the amplitude."""
+
+    excitation: Curve
+
+
+class NonlinearModeResult(_AmplitudeCurve):
+    """Frequency and damping ratio over the amplitude."""
+
+    nodal_diameter: int | None
+    damping_ratio: Curve
+    frequency_error: Curve
+    damping_error: Curve
+    n_harmonics: int
+    newton_iterations: int
+    rejected_steps: int
+    performance: Table | None = None
+    limit_cycles: Table | None = None
+    motions: Table | None = None
+
+
+class ModesResult(RootModel[NonlinearModeResult | PhaseResonanceResult]):
+    """A nonlinear mode; with `phase_resonance` the forced responses."""
+
+
+class Modes(Study, HarmonicRequest):
+    """Follow a mode's frequency and damping over its amplitude.
+
+    The modal amplitude a is mass-normalised: a² = Σ Q_kᴴ M Q_k over the harmonics, of one sector of a disk.
+    """
+
+    model_config = ConfigDict(
+        json_schema_extra={"examples": [{"scene": "two-dof", "mode": 1, "from": 0.01, "to": 100}]}
+    )
+    NAME, FUNCTION, RESULT = "modes", "solver:nonlinear_mode", ModesResult
+    SHOWS = "frequency and damping ratio over the amplitude ([modes](modes.md))"
+    EMPTY = ("amplitude", "no point of the mode was found")
+
+    mode: Annotated[int, Field(strict=True, ge=1, le=100_000), Flag(metavar="N")] = Field(
+        default=1, description="Which mode, 1 the slowest, contacts as they are at rest."
+    )
+    start: Annotated[PositiveNumber, Flag(metavar="A")] = Field(
+        alias="from", description="Smallest modal amplitude [√kg m]."
+    )
+    stop: Annotated[PositiveNumber, Flag(metavar="B")] = Field(
+        alias="to", description="Largest modal amplitude [√kg m]."
+    )
+    nodal_diameter: Annotated[_Diameter | None, Flag(metavar="N")] = Field(
+        default=None, description="Of a disk, negative for a backward wave; that of the engine order."
+    )
+    performance: Annotated[bool, Field(strict=True)] = Field(
+        default=False, description="Resonance peaks over excitation and load too, from the one mode."
+    )
+    aero_damping: Annotated[_Ratio | None, Flag("--aero", "ZETA")] = Field(
+        default=None, description="Aerodynamic damping ratio, below 0 if it feeds: the limit cycles too."
+    )
+    mode_alone: Annotated[bool, Field(strict=True)] = Field(
+        default=False, description="With `aero_damping`: the gas feeds this mode alone, not every one."
+    )
+    motions: Annotated[bool, Field(strict=True)] = Field(
+        default=False, description=f"Loops and shapes of up to {MOST_MOTIONS} points too."
+    )
+    exact_peaks: Annotated[int, Field(strict=True, ge=0, le=_MOST_PEAKS), Flag(metavar="N")] = Field(
+        default=0, description="With `performance`: of so many excitations the whole response as well."
+    )
+    disturbance: Annotated[PositiveNumber | None, Flag(metavar="A")] = Field(
+        default=None, description="Modal amplitude [√kg m] that is to die down: the least loads that do it."
+    )
+    phase_resonance: Annotated[bool, Field(strict=True)] = Field(
+        default=False,
+        description="In place of the mode the forced responses that lag by 90°: which force each takes.",
+    )
+
+    def issues(self, scene: Scene) -> list[Issue]:
+        """Return which questions do not go together, and what is wrong with the mode."""
+        # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
+        from solver.modes.nonlinear_mode import at_nodal_diameter, check_mode
+
+        fed = self.aero_damping is not None
+        apart = self.phase_resonance and (self.performance or fed)
+        words = (
+            ("exact_peaks", bool(self.exact_peaks and not self.performance),
+             f"needs `performance`, which is false here, got {self.exact_peaks!r}"),
+            ("from", self.start <= 0.0, f"must be greater than 0, got {self.start!r}"),
+            ("to", self.start >= self.stop,
+             f"must be above `from` = {self.start!r} √kg m, got {self.stop!r}"),
+            ("disturbance", self.disturbance is not None and not fed,
+             "needs `aero_damping`: without gas that feeds, every disturbance dies down"),
+            ("mode_alone", self.mode_alone and not fed, "needs `aero_damping`: it says what the gas feeds"),
+            ("phase_resonance", apart, "is a curve of its own: leave `performance` and `aero_damping` out"),
+        )  # fmt: skip
+        wrong = [refusal(f"/{key}", f"`{key}` {said}") for key, bad, said in words if bad]
+        return wrong + check_named(
+            lambda: check_mode(at_nodal_diameter(scene, self.nodal_diameter), self.mode)
+        )
+
+    def sizes(self, scene: Scene) -> list[Issue]:
+        """Return what is too large."""
+        points = _POINTS + POINTS_OF_A_SWEEP * self.exact_peaks
+        return balance_issues("/harmonics", scene, self.harmonics, points)
+
+    @classmethod
+    def compute(cls, scene: Scene, asked: Mapping[str, Any], watch: Watch) -> Answer:
+        """Follow the mode, or the phase resonances, and answer what else is asked of it."""
+        import solver
+
+        given = {key: asked[key] for key in ("mode", "nodal_diameter", "harmonics") if key in asked}
+        given["amplitudes"] = (asked["start"], asked["stop"])
+        if asked.get("phase_resonance"):
+            return Answer.of(solver.phase_resonance(scene, **given, **watch._asdict()))
+        of_peaks = asked.get("exact_peaks", 0)
+        found = solver.nonlinear_mode(
+            scene, **given, **watch.part(0.0, _OF_THE_CURVE if of_peaks else 1.0)._asdict()
+        )
+        answer = Answer.of(found)
+        if asked.get("performance"):
+            curve = solver.performance_curve(found)
+            answer = answer.beside(curve, performance=curve.to_json())
+            if of_peaks:
+                from service.jobs.common.modes import exact_peaks
+
+                rest = watch.part(_OF_THE_CURVE, 1.0, len(found.amplitude))
+                answer.json["performance"]["exact"] = exact_peaks(found, curve, of_peaks, rest)
+        if (ratio := asked.get("aero_damping")) is not None:
+            cycles = solver.limit_cycles(found, ratio, mode_alone=asked.get("mode_alone", False))
+            answer.json["limit_cycles"] = cycles.to_json(asked.get("disturbance"))
+        if asked.get("motions"):
+            from service.jobs.common.modes import motions_of
+
+            answer.json["motions"] = motions_of(found)
+        return answer
+
+    @classmethod
+    def figure(cls, result: Json, _sweeps: Sequence[StoredSweep], _read: ReadSweep) -> Figure:
+        """Return frequency and damping ratio over the amplitude, or frequency and force of resonances."""
+        from solver.views.plots.modes import mode_figure, resonance_figure
+
+        return mode_figure(result) if result.get("damping_ratio") is not None else resonance_figure(result)
+
+
+STUDY = Modes

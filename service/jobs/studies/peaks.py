@@ -1,0 +1,90 @@
+"""The study `peaks`: the highest peak of the frequency response over a parameter."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Annotated
+
+from pydantic import ConfigDict, Field
+
+from service.jobs.common.ranges import RangeRequest, law_issues, range_issues
+from service.jobs.common.results import Curve, EndedResult, KnownResult, Table
+from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
+from service.jobs.kind_view import Json, ReadSweep, StoredSweep
+from service.jobs.outputs import SweepRecord
+from service.jobs.registry import Flag
+from service.jobs.study import Study
+from solver.errors import Issue
+from solver.scene.examples import DISK_LOAD
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from solver import PeakTrack
+    from solver.scene.scene import Scene
+
+
+class PeaksResult(KnownResult, EndedResult):
+    """The highest peak over the parameter, what competes with it, and where it is least."""
+
+    scene: str
+    parameter: Curve
+    parameter_path: str
+    unit: str
+    peak: Curve
+    frequency: Curve
+    slope: Curve
+    optimum: Table
+    exchanges: list[Table]
+    competing: list[Table]
+    n_harmonics: int
+    sweeps: int
+    seconds: float
+
+
+class Peaks(Study, RangeRequest):
+    """Track the highest peak over a parameter.
+
+    With exact derivatives; sweeps check that no peak was missed, and the least highest peak is found.
+    """
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [{"scene": "bladed-disk", "parameter": DISK_LOAD, "from": 20, "to": 3000}]
+        }
+    )
+    NAME, FUNCTION, RESULT = "peaks", "solver:track_peak", PeaksResult
+    SHOWS = "the highest peak over the parameter, where it is least ([peaks](peaks.md))"
+    EMPTY = ("parameter", "no peak was tracked")
+    SWEEPS, COUNTED = "those that look for peaks", "sweeps"
+
+    checks: Annotated[int, Field(strict=True, ge=0, le=200), Flag(metavar="N")] = Field(
+        default=3, description="Sweeps between the ends that look for peaks nothing has followed."
+    )
+
+    def issues(self, scene: Scene) -> list[Issue]:
+        """Return what is wrong with the range and the laws of the contacts."""
+        return range_issues(self, scene) + law_issues("/scene", scene)
+
+    def sizes(self, scene: Scene) -> list[Issue]:
+        """Return what is too large."""
+        points = POINTS_OF_A_SWEEP * (self.checks + 2)
+        return balance_issues("/checks", scene, self.harmonics, points)
+
+    @classmethod
+    def sweeps(cls, found: PeakTrack) -> tuple[SweepRecord, ...]:
+        """Return the responses that look for peaks."""
+        from service.jobs.common.records import sweep_records
+
+        return sweep_records(found.branches, intermediate=True)
+
+    @classmethod
+    def figure(cls, result: Json, _sweeps: Sequence[StoredSweep], _read: ReadSweep) -> Figure:
+        """Return the highest peak over the parameter."""
+        from service.jobs.drawing import track_of
+        from solver.views.plots.tracks import track_figure
+
+        return track_figure(track_of(result), dof="x")
+
+
+STUDY = Peaks

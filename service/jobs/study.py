@@ -1,0 +1,183 @@
+"""A study: its keys, each said once, what it computes and what people see of it.
+
+From one class follow the body of a request with its schema and its refusals, the kind of job, the spec that a
+worker is given, the command of its name and ``submit``, and the row in the documentation. The keys have the
+names of the arguments of the function that computes.
+"""
+
+from __future__ import annotations
+
+import enum
+import inspect
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol
+
+from pydantic import BaseModel, ConfigDict
+
+from service.jobs.common.scenes import HarmonicRequest, SceneRequest, require, resolve_scene, resolved
+from service.jobs.kind_view import Json, KindView, NothingToDrawError, ReadSweep, StoredSweep
+from service.jobs.outputs import JobOutput, OnProgress, Progress, ShouldStop, SweepRecord
+from service.jobs.registry import JobKind, Resolved, SceneSource
+from solver.errors import Issue
+from solver.results.views import on_demand
+from solver.results.watch import part_of
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from solver.results.dataset import Dataset
+    from solver.scene.scene import Scene
+
+
+class Watch(NamedTuple):
+    """Who watches a computation: how far it is, and whether it is to end."""
+
+    on_progress: OnProgress | None = None
+    should_stop: ShouldStop | None = None
+
+    def part(self, begin: float, end: float, before: int = 0) -> Watch:
+        """Return who watches a part, from `begin` to `end` of the whole, behind so many points."""
+        return Watch(part_of(self.on_progress, begin, end, before), self.should_stop)
+
+
+class Written(Protocol):
+    """What can be drawn, and written as a table."""
+
+    def to_dataset(self) -> Dataset:
+        """The result as named arrays."""
+
+    def plot(self) -> Figure:
+        """The picture of it."""
+
+
+class Found(Written, Protocol):
+    """A result of a study."""
+
+    @property
+    def completed(self) -> bool:
+        """Whether it came to its end."""
+
+    @property
+    def status(self) -> enum.Enum:
+        """How it ended; the value is a sentence that says what to try."""
+
+    def to_json(self) -> dict[str, Any]:
+        """The result as JSON."""
+
+
+class Answer(NamedTuple):
+    """What a study found: the result that is written, its JSON, how it ended, and what draws it."""
+
+    result: Written | None
+    json: dict[str, Any]
+    reached: bool
+    status: str
+    plot: Callable[[], Figure] | None = None
+
+    @classmethod
+    def of(cls, found: Found) -> Answer:
+        """Return what a result says of itself."""
+        return cls(found, found.to_json(), found.completed, str(found.status.value), found.plot)
+
+    @classmethod
+    def told(cls, json: dict[str, Any]) -> Answer:
+        """Return an answer of which there is nothing but its JSON."""
+        return cls(None, json, True, "")
+
+    def beside(self, result: Written, **further: Any) -> Answer:
+        """Return the answer with further keys, drawn and written as another result."""
+        return self._replace(result=result, json={**self.json, **further}, plot=result.plot)
+
+
+class Study(SceneRequest):
+    """Root of the studies: the keys are fields, an alias is how bodies and options call one.
+
+    A subclass says its NAME, the FUNCTION that computes (``"solver:track_peak"``), the model of its RESULT;
+    for people what it SHOWS, which SWEEPS it stores, what its progress has COUNTED; of its picture what
+    makes the FIGURE, and the key that is EMPTY where there is none, with what is said then. Its docstring
+    is the help of the command, the first line of which is its summary.
+    """
+
+    model_config = ConfigDict(validate_by_alias=True)
+
+    NAME: ClassVar[str]
+    FUNCTION: ClassVar[str]
+    RESULT: ClassVar[type[BaseModel]]
+    SHOWS: ClassVar[str]
+    SWEEPS: ClassVar[str] = ""
+    COUNTED: ClassVar[str] = "points"
+    EMPTY: ClassVar[tuple[str, str]]
+    FIGURE: ClassVar[str]
+
+    def issues(self, _scene: Scene) -> list[Issue]:
+        """Return what is wrong for the scene, beyond the types of the keys."""
+        return []
+
+    def sizes(self, scene: Scene) -> list[Issue]:
+        """Return what is too large for one job."""
+        raise NotImplementedError
+
+    @classmethod
+    def compute(cls, scene: Scene, asked: Mapping[str, Any], watch: Watch) -> Answer:
+        """Compute what was asked, by keys that are the function's; left out, its own defaults count."""
+        return Answer.of(on_demand(cls.FUNCTION)(scene, **asked, **watch._asdict()))
+
+    @classmethod
+    def sweeps(cls, _found: Any) -> tuple[SweepRecord, ...]:
+        """Return the responses to be stored."""
+        return ()
+
+    @classmethod
+    def empty(cls, result: Json) -> str:
+        """Return why there is nothing to draw; empty if there is."""
+        key, why = cls.EMPTY
+        return "" if result[key] else why
+
+    @classmethod
+    def figure(cls, result: Json, _sweeps: Sequence[StoredSweep], _read: ReadSweep) -> Figure:
+        """Return the picture of a stored result that is not empty."""
+        made: Figure = on_demand(cls.FIGURE)(result)
+        return made
+
+    @classmethod
+    def own_keys(cls) -> list[str]:
+        """Return the names of what is asked beside the scene, in order."""
+        of_harmonics = [name for name in HarmonicRequest.model_fields if name in cls.model_fields]
+        apart = {*SceneRequest.model_fields, *of_harmonics}
+        own = [name for name in cls.model_fields if name not in apart]
+        return own + [name for name in of_harmonics if name not in SceneRequest.model_fields]
+
+    @classmethod
+    def run(cls, spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop) -> JobOutput:
+        """Compute a spec, in a worker."""
+        from solver.scene.scene import Scene
+
+        asked = {name: value for name, value in spec.items() if name != "scene" and value is not None}
+        answer = cls.compute(Scene.from_dict(spec["scene"]), asked, Watch(progress, should_stop))
+        return JobOutput(
+            result=answer.json, sweeps=cls.sweeps(answer.result),
+            shortfall=None if answer.reached else answer.status,
+        )  # fmt: skip
+
+    @classmethod
+    def draw(cls, result: Json, sweeps: Sequence[StoredSweep], read: ReadSweep) -> Figure:
+        """Return the picture of a stored result."""
+        if why := cls.empty(result):
+            raise NothingToDrawError(why)
+        return cls.figure(result, sweeps, read)
+
+    @classmethod
+    def as_kind(cls) -> JobKind:
+        """Return the kind of job."""
+        summary = (inspect.getdoc(cls) or "").partition("\n")[0]
+        return JobKind(
+            name=cls.NAME, summary=summary, request=cls, resolve=resolve, run=cls.run, result=cls.RESULT,
+            view=KindView(result=cls.SHOWS, sweeps=cls.SWEEPS, draw=cls.draw),
+        )  # fmt: skip
+
+
+def resolve(request: Study, source: SceneSource) -> Resolved:
+    """Look up the scene of a study and check what is asked of it; the spec has its keys."""
+    scene = resolve_scene(request, source)
+    require(request.issues(scene) or request.sizes(scene))
+    return resolved(scene, **request.model_dump(mode="json", include=set(request.own_keys())))

@@ -1,0 +1,141 @@
+"""Bodies and what the service answers, in this process: no server, no workers."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import httpx
+from fastapi import FastAPI
+from service_helpers import settings_of
+
+from service.errors import InvalidRequestError
+from service.http.app import create_app
+from service.jobs import answering
+from service.jobs.kinds import SHIPPED
+from service.jobs.outputs import Silent
+from solver.errors import Issue
+
+LOAD = {"parameter": "damper.N0", "from": 50, "to": 200}
+_DISK = {"scene": "bladed-disk"}
+_OF_ALL = ("scene", "set", "fresh", "priority", "max_seconds", "project", "name", "notes", "tags")
+_WRONG: tuple[Any, ...] = ("x", -1, [], None)
+_MEANT: dict[str, tuple[dict[str, Any], ...]] = {
+    "sweep": (
+        {"from": 2, "to": 2}, {"from": -1}, {"parameter": "damper.N2"}, {"parameter": "damper.N0"},
+        {"frequency_hz": 1}, {**LOAD, "to": 50, "frequency_hz": 1}, {**LOAD, "frequency_hz": 0},
+        {"harmonics": 201},
+        {"set": {"damper.mu": -1}}, {"set": {"nothing.mu": 1}}, {"scene": "nothing"}, {"scene": 7},
+        {"scene": {"name": "x"}}, {"set": {"damper.N0": "1"}}, {"stability": "yes"}, {"priority": 101},
+        {"fresh": 1}, {"max_seconds": 0}, {"tags": "x"}, {"project": 1}, {"name": 1},
+    ),
+    "map": (
+        {**LOAD, "to": 50}, {**LOAD, "parameter": "frequency"}, {**LOAD, "steps": 1},
+        {**LOAD, "steps": 10**6},
+        {**LOAD, "frequencies": 1}, {**LOAD, "from": -50}, {**LOAD, "steps": 3000, "frequencies": 3000},
+    ),
+    "peaks": (
+        {**LOAD, "to": 50}, {**LOAD, "parameter": "frequency"}, {**LOAD, "parameter": "damper.N2"},
+        {**LOAD, "from": -50}, {**LOAD, "checks": 201}, {"parameter": "damper.N0"}, {**LOAD, "harmonics": 0},
+    ),
+    "campbell": (
+        {}, {"speeds_rpm": [50, 80]}, {"speeds_rpm": [[80, 50]]}, {"speeds_rpm": [[60, 80], [0, 1]]},
+        {"speeds_rpm": [[50, 1e12]]}, {"speeds_rpm": [[50, 80]], "orders": [0]},
+        {"speeds_rpm": [[50, 80]], "orders": [1.5]}, {"speeds_rpm": [[50, 80]], "band_hz": [2, 1]},
+        {"speeds_rpm": [[50, 80]], "band_hz": [0, 1]}, {"speeds_rpm": [[50, 80]], "limit": 0},
+    ),
+    "modes": (
+        {"from": 2, "to": 1}, {"from": 0, "to": 1}, {"from": 1, "to": 2, "mode": 9},
+        {"from": 1, "to": 2, "exact_peaks": 3}, {"from": 1, "to": 2, "disturbance": 1},
+        {"from": 1, "to": 2, "mode_alone": True}, {"from": 1, "to": 2, "nodal_diameter": 3},
+        {"from": 1, "to": 2, "phase_resonance": True, "performance": True}, {"to": 2},
+        {**_DISK, "from": 1e-5, "to": 1e-4, "nodal_diameter": 5},
+    ),
+    "controlled": ({"amplitude": 0}, {"amplitude": 1, "from": 3}, {"amplitude": 1, "dof": "x"}, {}),
+    "interference": ({}, {**_DISK, "orders": [0]}, {**_DISK, "within": 2}, {**_DISK, "orders": [1]}),
+    "solve": ({"frequency_hz": 0}, {}, {"frequency_hz": 1, "starts": -1}, {"frequency_hz": 1, "seed": -1}),
+    "march": ({"frequency_hz": 1, "steps_per_period": 10**9}, {"frequency_hz": 1, "max_periods": 0}),
+    "accuracy": ({"samples": [5]}, {"harmonics": []}, {"repeats": 1000, "samples": [65536] * 9}),
+    "mistuning": (
+        {"of": "m1"}, {**_DISK, "of": ["nothing"]}, {**_DISK, "of": "tip", "from": 3, "to": 2},
+        {**_DISK, "of": "tip", "dof": "nothing"}, {**_DISK, "of": "tip", "samples": 10001},
+    ),
+    "design": (
+        {"variables": {"damper.N0": [2, 1]}}, {"variables": {"nothing.N0": [1, 2]}}, {"max_band_hz": -1},
+        {"weights": {"peak": 1, "x": 2}}, {"uncertain": {"damper.mu": [0.4, 0.2]}}, {"aim": "x"},
+        {"samples": 4},
+        {"start": {"damper.N0": 1e9}}, {"cases": [{"observe": "x"}]}, {"method": "x"}, {"limit": 0},
+    ),
+    "pareto": ({"points": 2}, {"weights": {"peak": 1}}, {"variables": {"damper.N0": [1, 1]}}),
+    "identify": (
+        {"data": [{"frequency": [1], "amplitude": [1, 2]}], "unknowns": {"damper.mu": [0.1, 0.6]}},
+        {"data": [], "unknowns": {}}, {"data": ["a.csv"], "unknowns": {"damper.mu": [0.1, 0.6]}},
+    ),
+    "nothing": ({},),
+}  # fmt: skip
+
+
+class Body(NamedTuple):
+    """What is sent: the example of a kind, or a scene alone, with something changed."""
+
+    kind: str
+    change: dict[str, Any]
+    beside: dict[str, Any]
+
+    @property
+    def whole(self) -> dict[str, Any]:
+        return {"kind": self.kind, **self.beside, **self.change}
+
+
+def bodies() -> Iterator[Body]:
+    """What is meant to be refused, and every key of every kind with what it hardly takes."""
+    for kind, changes in _MEANT.items():
+        yield from (Body(kind, change, {"scene": "two-dof"}) for change in changes)
+    for one in SHIPPED:
+        schema = one.request.model_json_schema()
+        example = schema["examples"][0]
+        yield Body(one.name, {"colour": 1}, example)
+        for key in schema["properties"]:
+            if key not in _OF_ALL:
+                yield from (Body(one.name, {key: wrong}, example) for wrong in _WRONG)
+
+
+def application(folder: Path) -> FastAPI:
+    """The service, not started: what is asked of its processes is done at once, here."""
+    app = create_app(settings_of(f"sqlite:///{folder}/jobs.db")(), SHIPPED)
+    service = app.state.service
+    tasks = answering.runs(service.registry, service.previews.registry)
+
+    async def ask(task: str, spec: dict[str, Any], _owner: str = "", _about: str = "") -> Any:
+        told = tasks[task](spec, Silent(), lambda: False, None).result  # type: ignore[arg-type]
+        if "issues" in told:
+            raise InvalidRequestError([Issue(pointer=where, message=said) for where, said in told["issues"]])
+        return told
+
+    service.answers.ask = ask
+    service.open()
+    return app
+
+
+def refusals(folder: Path, asked: Sequence[Body]) -> dict[str, str]:
+    """Status, pointers and words for every body, by the kind."""
+    app = application(folder)
+
+    async def answers() -> list[httpx.Response]:
+        transport = httpx.ASGITransport(app=app)
+        async with httpx.AsyncClient(transport=transport, base_url="http://localhost") as client:
+            return [await client.post("/v1/jobs", json=body.whole) for body in asked]
+
+    found: dict[str, list[str]] = {}
+    try:
+        for body, answer in zip(asked, asyncio.run(answers()), strict=True):
+            errors = answer.json()["errors"] if answer.status_code == 422 else []
+            told = "; ".join(f"{one.get('pointer', one.get('parameter'))} {one['detail']}" for one in errors)
+            line = f"{json.dumps(body.change, ensure_ascii=False)}: {answer.status_code} {told}".rstrip()
+            found.setdefault(body.kind, []).append(line)
+    finally:
+        app.state.service.database.close()
+    return {kind: "\n".join(lines) for kind, lines in found.items()}
