@@ -107,14 +107,17 @@ def _evaluate(
     for i in range(system.ks.size):
         if not math.isfinite(linear.x_linear[0, i].real):
             return np.nan
-    if not contact_forces(system, u, p, added, alone, out):
+    if not evaluate_contacts(system, u, p, added, alone, out):
         return np.nan
     return _residual(system, linear, u, p, least_size(system, p), alone, out)
 
 
 @apart
-def contact_forces(system: System, u: Real, p: float, added: float, alone: bool, out: Evaluation) -> bool:
-    """Evaluate the contacts at (u, λ = p), without the balance; False if a law failed."""
+def evaluate_contacts(system: System, u: Real, p: float, added: float, alone: bool, out: Evaluation) -> bool:
+    """Evaluate the forces of the contacts and their derivatives at (u, λ = p); False if a contact failed.
+
+    The residual is left as it was. With `alone` the derivatives are left out of the laws that can do without.
+    """
     table, load, slope, dload = contact_values(system, p, added)
     for e in range(system.laws.size):
         if not _element(system, e, u, table[e], load[e], slope[e], dload[e], alone, out):
