@@ -182,7 +182,7 @@ def _tmdsimpy(task: dict[str, Any]) -> PeerCurve | str:
     if folder is None and TMDSIMPY_PYTHON not in os.environ and importlib.util.find_spec("tmdsimpy") is None:
         return f"not installed: {TMDSIMPY} names its folder"
     environment = {**os.environ, **ONE_THREAD, "PYTHONPATH": folder or ""}
-    done = _run([python, str(HERE / "tmdsimpy_runner.py")], environment, json.dumps(task))
+    done = run_other([python, str(HERE / "tmdsimpy_runner.py")], environment, json.dumps(task))
     return done if isinstance(done, str) else PeerCurve(**json.loads(done.stdout))
 
 
@@ -194,11 +194,13 @@ def _nlvib(task: dict[str, Any]) -> PeerCurve | str:
         asked, answer = Path(name) / "task.json", Path(name) / "answer.json"
         asked.write_text(json.dumps(task), encoding="utf-8")
         words = [octave, "--norc", "--quiet", str(HERE / "nlvib_runner.m"), folder, str(asked), str(answer)]
-        done = _run(words, {**os.environ, **ONE_THREAD}, "")
+        done = run_other(words, {**os.environ, **ONE_THREAD}, "")
         return done if isinstance(done, str) else PeerCurve(**json.loads(answer.read_text("utf-8")))
 
 
-def _run(words: list[str], environment: dict[str, str], text: str) -> subprocess.CompletedProcess[str] | str:
+def run_other(
+    words: list[str], environment: dict[str, str], text: str
+) -> subprocess.CompletedProcess[str] | str:
     """Run another code; a sentence where it takes too long."""
     try:
         done = subprocess.run(

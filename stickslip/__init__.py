@@ -9,47 +9,19 @@ Every public name of `solver` and of `optim` stands here too, the very same obje
 `Client` talks to a running service. A name is loaded on first use, so that importing costs nothing.
 """
 
-from __future__ import annotations
-
-from importlib import import_module
-from typing import TYPE_CHECKING
-
 import optim
 import solver
+from solver.first_use import on_first_use
 
-if TYPE_CHECKING:
-    from optim import *  # noqa: F403
-    from service.client.client import Client
-    from service.errors import ServiceProblem
-    from solver import *  # noqa: F403
-
-    __version__: str
-
-_OF_THE_SERVICE = {"Client": "service.client.client", "ServiceProblem": "service.errors"}
-
-__all__ = ["Client", "ServiceProblem"]
-__all__ += solver.__all__
-__all__ += optim.__all__
+_homes = {"Client": "service.client.client", "ServiceProblem": "service.errors"}
+_homes |= dict.fromkeys(solver.__all__, "solver") | dict.fromkeys(optim.__all__, "optim")
+_load, __dir__, __all__ = on_first_use(__name__, _homes)
 
 
-if not TYPE_CHECKING:  # a checker shall notice a name that is none
+def __getattr__(name: str) -> object:
+    """Load a public name on first use."""
+    if name != "__version__":
+        return _load(name)
+    from importlib.metadata import version
 
-    def __getattr__(name: str) -> object:
-        """Load a public name on first use."""
-        if name == "__version__":
-            from importlib.metadata import version
-
-            value: object = version("stickslip")
-        elif name in _OF_THE_SERVICE:
-            value = getattr(import_module(_OF_THE_SERVICE[name]), name)
-        elif name in __all__:
-            value = getattr(solver if name in solver.__all__ else optim, name)
-        else:
-            raise AttributeError(f"module 'stickslip' has no attribute {name!r}")
-        globals()[name] = value
-        return value
-
-
-def __dir__() -> list[str]:
-    """Return the public names, for completion."""
-    return sorted(__all__)
+    return version("stickslip")

@@ -61,7 +61,7 @@ def _case(
     rows: list[Row] = []
     for i, over in enumerate(ranges_of(problem, case)):
         if known:
-            branch = observing(known[i], here.observe.dof, limit=problem.limit, effects=effects)
+            branch = observing(known[i], here.observe.dof, limit=problem.limit)
         else:
             branch = sweep(
                 here, start=over.low, stop=over.high, harmonics=problem.harmonics, limit=problem.limit,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
@@ -12,6 +11,7 @@ from optim.identification.identifiability import Untold
 from optim.identification.next_measurement import Candidate
 from optim.problem.variables import Real
 from solver.results.base import Drawn
+from solver.results.told import json_number
 from solver.results.views import Views
 
 
@@ -143,7 +143,9 @@ class Identification(Drawn):
     harmonics: int
     seconds: float
 
-    VIEWS: ClassVar = Views("optim.views", "of_identification", "identification_dataset", "of_identification")
+    VIEWS: ClassVar = Views(
+        "optim.views", "of_identification", "identification_dataset", "identification:identification_figure"
+    )
 
     @property
     def reached(self) -> bool:
@@ -162,7 +164,8 @@ class Identification(Drawn):
             "estimates": [_estimate(one) for one in self.estimates],
             "values": dict(self.values),
             "covariance": self.covariance.tolist(), "correlation": self.correlation.tolist(),
-            "noise": _number(self.noise), "reduced_chi2": _number(self.reduced_chi2), "misfit": self.misfit,
+            "noise": json_number(self.noise), "reduced_chi2": json_number(self.reduced_chi2),
+            "misfit": self.misfit,
             "untold": [
                 {"names": list(one.names), "direction": list(one.direction), "words": one.words}
                 for one in self.untold
@@ -170,8 +173,8 @@ class Identification(Drawn):
             "correlated": [{"names": [a, b], "correlation": share} for a, b, share in self.correlated],
             "candidates": [
                 {
-                    "conditions": dict(one.conditions), "like": one.like, "gain": _number(one.gain),
-                    "tells": one.tells, "factor": _number(one.factor),
+                    "conditions": dict(one.conditions), "like": one.like, "gain": json_number(one.gain),
+                    "tells": one.tells, "factor": json_number(one.factor),
                 }
                 for one in self.candidates
             ],
@@ -186,12 +189,8 @@ class Identification(Drawn):
 
 def _estimate(one: Estimate) -> dict[str, Any]:
     return {
-        "name": one.name, "unit": one.unit, "value": one.value, "standard_error": _number(one.standard_error),
+        "name": one.name, "unit": one.unit, "value": one.value,
+        "standard_error": json_number(one.standard_error),
         "interval": list(one.interval), "told": one.told, "at_bound": one.at_bound,
         "bounds": [one.low, one.high],
     }  # fmt: skip
-
-
-def _number(value: float) -> float | None:
-    """Return a float that JSON can carry."""
-    return float(value) if math.isfinite(value) else None

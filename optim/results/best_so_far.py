@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
+
+from solver.results.told import json_number
 
 VERIFIED = "Its whole response was computed with all harmonics."
 FEWER_HARMONICS = "Ranked with fewer harmonics; those that count are computed with all of them."
@@ -47,8 +48,8 @@ class BestSoFar:
         """The design as JSON."""
         return {
             "values": dict(self.values),
-            "peak": self.peak if math.isfinite(self.peak) else None,
-            "objective": self.objective if math.isfinite(self.objective) else None,
+            "peak": json_number(self.peak),
+            "objective": json_number(self.objective),
             "feasible": self.feasible,
             "verified": self.verified,
             "words": self.words,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from optim.results.json import number
+from solver.results.told import json_number
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,10 +76,11 @@ class CurveCheck:
         """Return it as a JSON object."""
         return {
             "mode": self.mode, "shared": self.shared, "curves": self.curves,
-            "synthesised": number(self.synthesised), "corrected": number(self.corrected),
-            "exact": number(self.exact), "estimate": number(self.estimate), "error": number(self.error),
+            "synthesised": json_number(self.synthesised), "corrected": json_number(self.corrected),
+            "exact": json_number(self.exact), "estimate": json_number(self.estimate),
+            "error": json_number(self.error),
             "tolerance": self.tolerance, "suffices": self.suffices,
             "holds": math.isfinite(self.error) and self.holds,
             "curve_seconds": self.curve_seconds, "correction_seconds": self.correction_seconds,
-            "response_seconds": self.response_seconds, "seconds_saved": number(self.seconds_saved),
+            "response_seconds": self.response_seconds, "seconds_saved": json_number(self.seconds_saved),
         }  # fmt: skip

@@ -24,13 +24,12 @@ from optim.results.json import (
     conditions_json,
     known_parts,
     looked_json,
-    number,
     row_json,
 )
 from solver.continuation.branch import Branch
 from solver.results.base import Drawn, MadeOfResponses
 from solver.results.known import Known
-from solver.results.told import Piece
+from solver.results.told import Piece, json_number
 from solver.results.verdict import Stable, Verdict, worst
 from solver.results.views import Views
 
@@ -349,10 +348,10 @@ class DesignResult(MadeOfResponses, Drawn):
             "objective": None if evaluation is None or not evaluation.rows else evaluation.objective,
             "rows": [] if evaluation is None else [row_json(row) for row in evaluation.rows],
             "held_by": None if self.held_by is None else row_json(self.held_by),
-            "error_estimate": number(self.error_estimate),
+            "error_estimate": json_number(self.error_estimate),
             **self.stability.to_json(),
             "errors": [
-                {"case": case, "peak": number(known.value), **known.to_json()}
+                {"case": case, "peak": json_number(known.value), **known.to_json()}
                 for case, known in (() if evaluation is None else known_parts(evaluation))
             ],
             "warnings": list(self.warnings),
@@ -371,9 +370,9 @@ class DesignResult(MadeOfResponses, Drawn):
             ],
             "basins": [basin_json(basin) for basin in self.basins],
             "seconds": self.seconds,
-            "work": number(self.work),
+            "work": json_number(self.work),
             "active": list(self.active),
-            "optimality": number(self.optimality),
+            "optimality": json_number(self.optimality),
             "multipliers": list(self.multipliers),
             "conditions": None if self.conditions is None else conditions_json(self.conditions),
             "broken": [{**row_json(row), "by": row.value - (row.bound or 0.0)} for row in self.broken],

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
-
 from optim.criteria.criterion import Row
 from optim.criteria.linearised import Conditions
 from optim.criteria.rows import Evaluation
 from optim.results.basins import Basin, Checked
 from solver.continuation.branch import Branch
 from solver.results.known import Known
+from solver.results.told import json_number
 
 
 def over_bands(evaluation: Evaluation) -> dict[str, Branch]:
@@ -36,7 +35,7 @@ def row_json(row: Row) -> dict[str, object]:
     """Return a row."""
     return {
         "quantity": row.quantity.name, "case": row.case, "what": row.what, "value": row.value,
-        "unit": row.quantity.unit, "at": number(row.at_hz), "bound": row.bound, "weight": row.weight,
+        "unit": row.quantity.unit, "at": json_number(row.at_hz), "bound": row.bound, "weight": row.weight,
         "smaller_is_better": row.quantity.smaller_is_better,
     }  # fmt: skip
 
@@ -58,8 +57,8 @@ def looked_json(one: Evaluation) -> dict[str, object]:
 def checked_json(one: Checked) -> dict[str, object]:
     """Return a local optimum computed again."""
     return {
-        "values": dict(one.values), "n_harmonics": one.harmonics, "peak": number(one.peak),
-        "objective": number(one.objective), "feasible": one.feasible,
+        "values": dict(one.values), "n_harmonics": one.harmonics, "peak": json_number(one.peak),
+        "objective": json_number(one.objective), "feasible": one.feasible,
     }  # fmt: skip
 
 
@@ -74,7 +73,7 @@ def basin_json(basin: Basin) -> dict[str, object]:
 def conditions_json(found: Conditions) -> dict[str, object]:
     """Return the first-order conditions of a design."""
     return {
-        "residual": number(found.residual),
+        "residual": json_number(found.residual),
         "violation": found.violation,
         "rows": [
             {"what": row.what, "case": row.case, "quantity": row.quantity.name, "multiplier": x}
@@ -82,8 +81,3 @@ def conditions_json(found: Conditions) -> dict[str, object]:
         ],
         "bounds": [{"variable": name, "side": side, "multiplier": x} for name, side, x in found.bounds],
     }
-
-
-def number(value: float) -> float | None:
-    """Return a float that JSON can carry (null for NaN)."""
-    return value if math.isfinite(value) else None

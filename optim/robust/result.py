@@ -21,6 +21,7 @@ from optim.robust.scenarios import Outcome
 from solver.results.base import Drawn, MadeOfResponses
 from solver.results.known import NOTHING_KNOWN, Known
 from solver.results.order_statistics import quantile_json
+from solver.results.told import json_number
 from solver.results.views import Views
 
 QUANTILES = (0.05, 0.5, 0.95)
@@ -100,10 +101,10 @@ class Spread:
         shares = sorted({*QUANTILES, quantile})
         return {
             "count": len(self.peaks),
-            "mean": _number(self.mean),
-            "deviation": _number(self.deviation),
+            "mean": json_number(self.mean),
+            "deviation": json_number(self.deviation),
             "quantiles": [quantile_json("peak", self.quantile(share), self.peaks, share) for share in shares],
-            "peaks": [_number(peak) for peak in self.peaks],
+            "peaks": [json_number(peak) for peak in self.peaks],
         }
 
 
@@ -159,8 +160,8 @@ class Side:
             worst = {"peak": row.value, "at": row.at_hz, "scenario": self.worst.scenario.to_json()}
         return {
             "values": dict(self.values),
-            "peak": {"value": _number(self.peak), "at": _number(self.at_hz)},
-            "band_hz": _number(self.band_hz),
+            "peak": {"value": json_number(self.peak), "at": json_number(self.at_hz)},
+            "band_hz": json_number(self.band_hz),
             "worst": worst,
             "samples": self.spread.to_json(quantile),
             "feasible": self.feasible,
@@ -264,7 +265,7 @@ class RobustResult(MadeOfResponses, Drawn):
             return math.nan
         return 1.0 - self.robust.worst_peak / self.nominal.worst_peak
 
-    VIEWS: ClassVar = Views("optim.views", "of_robust", "robust_dataset", "of_robust")
+    VIEWS: ClassVar = Views("optim.views", "of_robust", "robust_dataset", "designs:robust_figure")
 
     def known_parts(self) -> Iterable[Known]:
         """The robust optimum, nominal and in its worst scenario; the nominal one where there is no other."""
@@ -281,18 +282,18 @@ class RobustResult(MadeOfResponses, Drawn):
             "optimum": dict(self.optimum),
             "nominal": None if self.nominal is None else self.nominal.to_json(self.quantile),
             "robust": None if self.robust is None else self.robust.to_json(self.quantile),
-            "objective": _number(self.objective),
-            "gain": _number(self.gain),
+            "objective": json_number(self.objective),
+            "gain": json_number(self.gain),
             "cuts": [
                 {
-                    "scenario": cut.scenario.to_json(), "peak": _number(cut.peak),
-                    "exceeds": _number(cut.exceeds), "multiplier": cut.multiplier,
+                    "scenario": cut.scenario.to_json(), "peak": json_number(cut.peak),
+                    "exceeds": json_number(cut.exceeds), "multiplier": cut.multiplier,
                 }
                 for cut in self.cuts
             ],
-            "gap": _number(self.gap),
+            "gap": json_number(self.gap),
             "inner_look": self.inner_look,
-            "optimality": None if found is None else _number(found.residual),
+            "optimality": None if found is None else json_number(found.residual),
             "violation": None if found is None else found.violation,
             "unknown": None if self.unknown is None else self.unknown.to_json(),
             "designs": self.designs,
@@ -303,8 +304,3 @@ class RobustResult(MadeOfResponses, Drawn):
             "reached": self.reached,
             "status": self.status.value,
         }  # fmt: skip
-
-
-def _number(value: float) -> float | None:
-    """Return a float that JSON can carry (null for NaN)."""
-    return value if math.isfinite(value) else None

@@ -223,7 +223,7 @@ def _of_all_blades(
             return [], len(ranges)
         for j in range(sectors):
             name = f"{case.name}, {dof}@{j}"
-            seen = branch if j == 0 else observing(branch, f"{dof}@{j}", limit=problem.limit, effects=effects)
+            seen = branch if j == 0 else observing(branch, f"{dof}@{j}", limit=problem.limit)
             judge = Judge(problem=problem, case=replace(case, name=name), gradients=gradients)
             rows += [row for row in judge.rows(seen, over) if j == 0 or row.quantity.each_blade]
     return rows, len(ranges)

@@ -11,6 +11,7 @@ from typing import ClassVar
 from solver.continuation.branch import Branch
 from solver.results.base import Drawn, MadeOfResponses
 from solver.results.known import Known
+from solver.results.told import json_number
 from solver.results.views import Views
 from solver.scene.scene import Scene
 
@@ -103,7 +104,7 @@ class OrderResponse:
             "order": self.order,
             "range_hz": [branch.start, branch.stop],
             "running_hz": [list(one) for one in self.running_hz],
-            "limit": _number(self.limit),
+            "limit": json_number(self.limit),
             "peaks": [{"value": peak.value, "at": peak.at} for peak in branch.peaks if peak.interior],
             "bands_hz": [list(one) for one in self.bands_hz],
             "exceeded_rpm": [list(one) for one in self.exceeded_rpm],
@@ -208,9 +209,5 @@ def _crossing_json(crossing: Crossing) -> dict[str, object]:
         "amplitude": crossing.amplitude,
         "inside": crossing.inside,
         "margin": crossing.margin,
-        "error_estimate": _number(crossing.error_estimate),
+        "error_estimate": json_number(crossing.error_estimate),
     }
-
-
-def _number(value: float) -> float | None:
-    return value if math.isfinite(value) else None

@@ -30,6 +30,7 @@ from solver.continuation.peaks import Peak
 from solver.errors import SettingError
 from solver.results.base import Drawn, MadeOfResponses
 from solver.results.known import Known
+from solver.results.told import json_number
 from solver.results.views import Views
 from solver.scene.cyclic.annulus import check_in_annulus
 from solver.scene.parameter_paths import PHASE
@@ -135,7 +136,9 @@ class SensitivityResult(MadeOfResponses, Drawn):
         """Return the per cent of the band for one per cent of a parameter; NaN where none."""
         return row.band * row.value / self.band_hz if row.relative and self.band_hz > 0.0 else math.nan
 
-    VIEWS: ClassVar = Views("optim.views", "of_sensitivities", "sensitivities_dataset", "of_sensitivities")
+    VIEWS: ClassVar = Views(
+        "optim.views", "of_sensitivities", "sensitivities_dataset", "shares:sensitivities_figure"
+    )
 
     def known_parts(self) -> Iterable[Known]:
         """The response."""
@@ -147,20 +150,20 @@ class SensitivityResult(MadeOfResponses, Drawn):
         return {
             "scene": self.scene.name,
             "peaks": [{"value": peak.value, "at": peak.at} for peak in self.peaks],
-            "band_hz": _number(self.band_hz),
+            "band_hz": json_number(self.band_hz),
             "limit": None if band is None else band.limit,
-            "band_by_limit": _number(self.band_by_limit),
+            "band_by_limit": json_number(self.band_by_limit),
             "rows": [
                 {
                     "path": row.path,
                     "unit": row.unit,
                     "value": row.value,
-                    "peak_percent": _number(self.peak_elasticities(row)[0]),
-                    "peaks_percent": [_number(share) for share in self.peak_elasticities(row)],
-                    "band_percent": _number(self.band_elasticity(row)),
-                    "peak_slope": _number(row.peaks[0]),
-                    "peak_slopes": [_number(slope) for slope in row.peaks],
-                    "band_slope": _number(row.band),
+                    "peak_percent": json_number(self.peak_elasticities(row)[0]),
+                    "peaks_percent": [json_number(share) for share in self.peak_elasticities(row)],
+                    "band_percent": json_number(self.band_elasticity(row)),
+                    "peak_slope": json_number(row.peaks[0]),
+                    "peak_slopes": [json_number(slope) for slope in row.peaks],
+                    "band_slope": json_number(row.band),
                 }
                 for row in self.rows
             ],
@@ -268,8 +271,3 @@ def _sorted(found: SensitivityResult, begun: float) -> SensitivityResult:
         rows=tuple(sorted(found.rows, key=rank)), band_by_limit=found.band_by_limit, left_out=found.left_out,
         seconds=time.perf_counter() - begun,
     )  # fmt: skip
-
-
-def _number(value: float) -> float | None:
-    """Return a float that JSON can carry (null for NaN)."""
-    return value if math.isfinite(value) else None

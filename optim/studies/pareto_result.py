@@ -12,6 +12,7 @@ from optim.problem.problem import Problem
 from optim.results.design import DesignResult
 from solver.results.base import Drawn, MadeOfResponses
 from solver.results.known import Known
+from solver.results.told import json_number
 from solver.results.views import Views
 
 SAME = 1e-7  # relative distance within which two points are one
@@ -92,10 +93,10 @@ class ParetoPoint:
             "at": self.at_hz,
             "band_hz": self.band_hz,
             "intervals": [list(pair) for pair in self.intervals],
-            "slope": _number(self.slope),
-            "hz_per_metre": _number(self.hz_per_metre),
+            "slope": json_number(self.slope),
+            "hz_per_metre": json_number(self.hz_per_metre),
             "active": list(self.design.active),
-            "optimality": _number(self.design.optimality),
+            "optimality": json_number(self.design.optimality),
             "status": self.design.status.value,
             **self.design.known.to_json(),
         }
@@ -148,7 +149,7 @@ class ParetoResult(MadeOfResponses, Drawn):
         place = max(range(len(below)), key=below.__getitem__)
         return place if below[place] > 0.0 else None
 
-    VIEWS: ClassVar = Views("optim.views", "of_front", "front_dataset", "of_front")
+    VIEWS: ClassVar = Views("optim.views", "of_front", "front_dataset", "pareto:pareto_figure")
 
     def known_parts(self) -> Iterable[Known]:
         """Both ends and every point of the front."""
@@ -183,8 +184,3 @@ def front_of(found: Sequence[ParetoPoint]) -> tuple[tuple[ParetoPoint, ...], tup
         else:
             kept.append(point)
     return tuple(kept), tuple(dominated)
-
-
-def _number(value: float) -> float | None:
-    """Return a float that JSON can carry (null for NaN)."""
-    return value if math.isfinite(value) else None

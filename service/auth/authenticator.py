@@ -14,10 +14,12 @@ from datetime import timedelta
 from sqlalchemy.exc import SQLAlchemyError
 
 from service.auth.callers import KEYLESS, Caller, Scope
-from service.auth.keys import caller_of_row, id_of, matches
+from service.auth.keys import caller_of_row, id_of
 from service.auth.rate_limit import Buckets
 from service.db.clock import Clock
-from service.db.repositories.keys import KeyRepository, KeyRow
+from service.db.models import ApiKey
+from service.db.repositories.keys import KeyRepository
+from service.db.tokens import matches
 from service.errors import ForbiddenError, TooManyRequestsError, UnauthorizedError
 from service.settings.settings import Settings
 
@@ -59,7 +61,7 @@ class Doorkeeper:
         self._settings = settings
         self._now = now
         self._steady = steady
-        self._remembered: OrderedDict[str, tuple[KeyRow | None, float]] = OrderedDict()
+        self._remembered: OrderedDict[str, tuple[ApiKey | None, float]] = OrderedDict()
         self._lock = threading.Lock()
         self._requests = Buckets(steady=steady)
         self._failures = Buckets(steady=steady)
@@ -149,13 +151,13 @@ class Doorkeeper:
             return UnauthorizedError(reason, presented=True)
         return TooManyRequestsError("too many keys that do not work came from this address", math.ceil(wait))
 
-    def _recall(self, key_id: str) -> tuple[KeyRow | None, float] | None:
+    def _recall(self, key_id: str) -> tuple[ApiKey | None, float] | None:
         with self._lock:
             found = self._remembered.get(key_id)
         fresh = found is not None and self._steady() - found[1] < REMEMBERED_SECONDS
         return found if fresh else None
 
-    def _look_up(self, key_id: str) -> KeyRow | None:
+    def _look_up(self, key_id: str) -> ApiKey | None:
         """The row of a key, at most a second old; that there is none is remembered as well."""
         found = self._recall(key_id)
         if found is not None:

@@ -5,12 +5,10 @@ from __future__ import annotations
 import enum
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import Protocol, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from service.db.models import NOBODY
-from service.errors import NotFoundError
 
 
 class Scope(enum.StrEnum):
@@ -109,30 +107,6 @@ LINK_READERS = Caller(owner="links to runs", scopes=frozenset())
 """Whoever reads a run by its link: all of them together, under a name that no owner can have."""
 
 
-class Owned(Protocol):
-    """A row that belongs to somebody."""
-
-    @property
-    def owner(self) -> str:
-        """Whom it belongs to."""
-
-
-OwnedT = TypeVar("OwnedT", bound=Owned)
-
-
 def included(scopes: Iterable[Scope]) -> frozenset[Scope]:
     """Scopes with those that they include."""
     return frozenset().union(*(_INCLUDED[scope] for scope in scopes))
-
-
-def visible(row: OwnedT | None, caller: Caller, missing: str) -> OwnedT:
-    """The row, if there is one and the caller may see it.
-
-    Raises
-    ------
-    NotFoundError
-        With the words `missing`: the same for what is not there and for what is another's.
-    """
-    if row is None or caller.sees not in (None, row.owner):
-        raise NotFoundError(missing, withheld=row is not None)
-    return row

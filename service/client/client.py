@@ -198,7 +198,7 @@ class Client(Workbench):
 
     def dismiss(self, job_id: str) -> JobAnswer:
         """Cancel a job."""
-        return JobAnswer.model_validate(self._transport.json("DELETE", f"/v1/jobs/{segment(job_id)}"))
+        return self._sent(JobAnswer, "DELETE", f"/v1/jobs/{segment(job_id)}")
 
     def sweeps(self, **filters: Any) -> Iterator[SweepAnswer]:
         """Every stored sweep that meets the filters of ``GET /v1/sweeps``, page after page."""
@@ -243,33 +243,27 @@ class Client(Workbench):
 
     def store_scene(self, scene: Mapping[str, Any]) -> SceneDetail:
         """Store a scene under its name."""
-        return SceneDetail.model_validate(self._transport.json("POST", "/v1/scenes", json=dict(scene)))
+        return self._sent(SceneDetail, "POST", "/v1/scenes", json=dict(scene))
 
     def plan(self, body: Mapping[str, Any]) -> dict[str, Any]:
         """Which effects a scene calls for: the body of ``POST /v1/plan``."""
-        answer: dict[str, Any] = self._transport.json("POST", "/v1/plan", json=dict(body))
-        return answer
+        return self._posted("/v1/plan", body)
 
     def preview(self, body: Mapping[str, Any]) -> dict[str, Any]:
         """A small response at once, nothing stored: the body of ``POST /v1/previews``."""
-        answer: dict[str, Any] = self._transport.json("POST", "/v1/previews", json=dict(body))
-        return answer
+        return self._posted("/v1/previews", body)
 
     def read_scene(self, text: str, form: Literal["toml", "json"] = "toml") -> dict[str, Any]:
         """The tables in the text of a scene file (`scene`), and everything wrong with them (`issues`)."""
-        body = {"text": text, "form": form}
-        answer: dict[str, Any] = self._transport.json("POST", "/v1/scenes/read", json=body)
-        return answer
+        return self._posted("/v1/scenes/read", {"text": text, "form": form})
 
     def read_measurements(self, body: Mapping[str, Any]) -> dict[str, Any]:
         """Measured data in CSV as tables of a job: the body of ``POST /v1/measurements/read``."""
-        answer: dict[str, Any] = self._transport.json("POST", "/v1/measurements/read", json=dict(body))
-        return answer
+        return self._posted("/v1/measurements/read", body)
 
     def edit_scene(self, body: Mapping[str, Any]) -> dict[str, Any]:
         """The text of a scene with its tables changed, comments kept: ``POST /v1/scenes/edit``."""
-        answer: dict[str, Any] = self._transport.json("POST", "/v1/scenes/edit", json=dict(body))
-        return answer
+        return self._posted("/v1/scenes/edit", body)
 
     def scenes_schema(self) -> dict[str, Any]:
         """The JSON Schema of scenes, ``GET /v1/scenes-schema``."""
@@ -283,8 +277,8 @@ class Client(Workbench):
 
     def scene_from(self, template: str, answers: Mapping[str, Any]) -> dict[str, Any]:
         """The scene of a common case: ``POST /v1/templates``, nothing is stored."""
-        body = {"template": template, "answers": dict(answers)}
-        scene: dict[str, Any] = self._transport.json("POST", "/v1/templates", json=body)["scene"]
+        asked = {"template": template, "answers": dict(answers)}
+        scene: dict[str, Any] = self._posted("/v1/templates", asked)["scene"]
         return scene
 
     def scene_text(self, body: Mapping[str, Any]) -> str:
@@ -304,8 +298,7 @@ class Client(Workbench):
         content = file if isinstance(file, bytes) else file.read_bytes()
         # Sending and looking at a large file takes its time.
         timeout = max(self._timeout, 120.0)
-        answer = self._transport.json("POST", "/v1/uploads", params=query, content=content, timeout=timeout)
-        return NewUpload.model_validate(answer)
+        return self._sent(NewUpload, "POST", "/v1/uploads", params=query, content=content, timeout=timeout)
 
     def uploads(self, **filters: Any) -> Iterator[UploadAnswer]:
         """Every upload, newest first, page after page."""
@@ -325,8 +318,7 @@ class Client(Workbench):
 
     def matrices(self, body: Mapping[str, Any]) -> MatricesAnswer:
         """What uploaded matrices are; with DOFs named, the scene that begins with them."""
-        answer = self._transport.json("POST", "/v1/matrices", json=dict(body))
-        return MatricesAnswer.model_validate(answer)
+        return self._sent(MatricesAnswer, "POST", "/v1/matrices", json=dict(body))
 
     def health(self) -> Health | Readiness:
         """Whether the service can work, also if it cannot; the details if the key may see them."""

@@ -35,6 +35,16 @@ class Asking:
     def _sent(self, model: type[ModelT], method: str, path: str, **arguments: Any) -> ModelT:
         return model.model_validate(self._transport.json(method, path, **arguments))
 
+    def _posted(self, path: str, body: Mapping[str, Any]) -> dict[str, Any]:
+        answer: dict[str, Any] = self._transport.json("POST", path, json=dict(body))
+        return answer
+
+    def _changed(
+        self, model: type[ModelT], path: str, revision: int | None, changes: Mapping[str, Any]
+    ) -> ModelT:
+        headers = {} if revision is None else {"If-Match": f'"{revision}"'}
+        return self._sent(model, "PATCH", path, json=changes, headers=headers)
+
     def _pages(self, model: type[Any], path: str, filters: Mapping[str, Any]) -> Iterator[Any]:
         """The items of a list, page after page."""
         page = model.model_validate(self._transport.json("GET", path, params=words(filters)))
@@ -67,8 +77,7 @@ class Workbench(Asking):
         self, project_id: str, *, revision: int | None = None, **changes: str
     ) -> ProjectAnswer:
         """Change `name` or `notes` of a project."""
-        headers = _if_match(revision)
-        return self._sent(ProjectAnswer, "PATCH", _project(project_id), json=changes, headers=headers)
+        return self._changed(ProjectAnswer, _project(project_id), revision, changes)
 
     def delete_project(self, project_id: str) -> ProjectAnswer:
         """Put a project in the bin; its runs stay."""
@@ -91,8 +100,7 @@ class Workbench(Asking):
 
     def change_run(self, run_id: str, *, revision: int | None = None, **changes: Any) -> RunAnswer:
         """Change `project`, `name`, `notes` or `tags` of a run."""
-        headers = _if_match(revision)
-        return self._sent(RunAnswer, "PATCH", _run(run_id), json=changes, headers=headers)
+        return self._changed(RunAnswer, _run(run_id), revision, changes)
 
     def delete_run(self, run_id: str) -> RunAnswer:
         """Put a run that has ended in the bin."""
@@ -142,7 +150,3 @@ def _project(project_id: str) -> str:
 
 def _run(run_id: str) -> str:
     return f"/v1/runs/{segment(run_id)}"
-
-
-def _if_match(revision: int | None) -> dict[str, str]:
-    return {} if revision is None else {"If-Match": f'"{revision}"'}

@@ -203,7 +203,7 @@ class Upload(Base):
     size: Mapped[int]
     sha256: Mapped[str] = mapped_column(String(64))
     created: Mapped[datetime]
-    data: Mapped[bytes] = mapped_column(LargeBinary())
+    data: Mapped[bytes] = mapped_column(LargeBinary(), deferred=True)
 
     __table_args__ = (Index(None, "owner", "id"),)
 
@@ -221,6 +221,11 @@ class Scene(Base):
     created: Mapped[datetime]
     size: Mapped[int] = mapped_column(BigInteger(), default=0, server_default="0")
     body: Mapped[dict[str, Any]]
+
+    @property
+    def shipped(self) -> bool:
+        """Whether it comes with the package: such a one is in no database, and was never stored."""
+        return self.created is None
 
 
 class Sweep(Base):

@@ -4,33 +4,13 @@ from __future__ import annotations
 
 from datetime import datetime
 
-from sqlalchemy import ForeignKey, Index, String, Text
-from sqlalchemy.orm import Mapped, mapped_column
+from sqlalchemy import ForeignKey, Index, String, Text, func, select
+from sqlalchemy.orm import Mapped, column_property, mapped_column
 
 from service.db.models import ID_LENGTH, OWNER_LENGTH, Base
 
 NAME_LENGTH = 200
 TAG_LENGTH = 50
-
-
-class Project(Base):
-    """A name under which an owner gathers runs.
-
-    `revision` counts its changes. `deleted` is when it was put in the bin, NULL outside of it.
-    """
-
-    __tablename__ = "project"
-
-    id: Mapped[str] = mapped_column(String(ID_LENGTH), primary_key=True)
-    owner: Mapped[str] = mapped_column(String(OWNER_LENGTH))
-    name: Mapped[str] = mapped_column(String(NAME_LENGTH))
-    notes: Mapped[str] = mapped_column(Text())
-    created: Mapped[datetime]
-    changed: Mapped[datetime]
-    revision: Mapped[int]
-    deleted: Mapped[datetime | None]
-
-    __table_args__ = (Index(None, "owner", "id"), Index(None, "deleted", "id"))
 
 
 class Run(Base):
@@ -54,6 +34,33 @@ class Run(Base):
     deleted: Mapped[datetime | None]
 
     __table_args__ = (Index(None, "project_id", "job_id"), Index(None, "deleted", "job_id"))
+
+
+class Project(Base):
+    """A name under which an owner gathers runs.
+
+    `revision` counts its changes. `deleted` is when it was put in the bin, NULL outside of it. `runs` counts
+    those in it that are not in the bin.
+    """
+
+    __tablename__ = "project"
+
+    id: Mapped[str] = mapped_column(String(ID_LENGTH), primary_key=True)
+    owner: Mapped[str] = mapped_column(String(OWNER_LENGTH))
+    name: Mapped[str] = mapped_column(String(NAME_LENGTH))
+    notes: Mapped[str] = mapped_column(Text())
+    created: Mapped[datetime]
+    changed: Mapped[datetime]
+    revision: Mapped[int]
+    deleted: Mapped[datetime | None]
+    runs: Mapped[int] = column_property(
+        select(func.count())
+        .where(Run.project_id == id, Run.deleted.is_(None))
+        .correlate_except(Run)
+        .scalar_subquery()
+    )
+
+    __table_args__ = (Index(None, "owner", "id"), Index(None, "deleted", "id"))
 
 
 class RunTag(Base):

@@ -5,20 +5,18 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from service.auth.callers import Caller
 from service.errors import InvalidRequestError
+from service.http.dependencies import Context
 from service.jobs.answering import KIND, PREVIEW, RESOLVE, Prepared
 from service.jobs.registry import JobKind, SceneSource
 from service.jobs.strict_json import JsonText
-from service.queue.core import SOLVER_VERSION, Service
+from service.queue.core import SOLVER_VERSION
 
 _MOST_LOOKED_UP = 8
 """Scenes and uploads of one request; shipped scenes need no looking up."""
 
 
-async def computed(
-    service: Service, caller: Caller, task: str, words: Mapping[str, Any], about: str = "/scene"
-) -> Any:
+async def computed(context: Context, task: str, words: Mapping[str, Any], about: str = "/scene") -> Any:
     """What a task of `service.jobs.answering` finds.
 
     Parameters
@@ -32,6 +30,7 @@ async def computed(
     TooManyRequestsError, QueueFullError
         If the budget of the caller is used up, or too many wait.
     """
+    service, caller = context.service, context.caller
     source = service.scenes.of(caller)
     spec: dict[str, Any] = {"words": words, "scenes": {}, "uploads": {}}
     for _ in range(_MOST_LOOKED_UP + 1):
@@ -42,17 +41,15 @@ async def computed(
     raise RuntimeError(f"the task {task!r} looks up more than {_MOST_LOOKED_UP} scenes")
 
 
-async def prepared(
-    service: Service, caller: Caller, kind: JobKind, body: Mapping[str, Any], task: str = RESOLVE
-) -> Prepared:
+async def prepared(context: Context, kind: JobKind, body: Mapping[str, Any], task: str = RESOLVE) -> Prepared:
     """A request for a job or a preview, resolved; `computed` lists the errors."""
-    settings = service.settings
+    settings = context.service.settings
     memory = settings.answer_memory_bytes if task == PREVIEW else settings.worker_memory_bytes or None
     words = {
-        KIND: kind.name, "body": dict(body), "work": caller.limits.work, "memory": memory,
+        KIND: kind.name, "body": dict(body), "work": context.caller.limits.work, "memory": memory,
         "version": SOLVER_VERSION,
     }  # fmt: skip
-    found = await computed(service, caller, task, words)
+    found = await computed(context, task, words)
     return Prepared(**{**found, "spec": JsonText(found["spec"])})
 
 

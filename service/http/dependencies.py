@@ -11,6 +11,7 @@ import hashlib
 import re
 from collections.abc import AsyncIterator, Callable, Coroutine, Mapping, Sequence
 from contextlib import asynccontextmanager
+from dataclasses import dataclass
 from typing import Annotated, Any, TypeVar
 
 from fastapi import Body, Depends, Request, Response
@@ -34,10 +35,8 @@ from service.jobs.validation import issues_of
 from service.queue.core import Service
 from service.queue.subscriptions import Event
 from service.rendering.representations import JSON, LIST_MEDIA, chosen, csv_of_items
-from service.schemas.answers import DesignPage, JobPage, SweepPage
+from service.schemas.answers import Page
 from service.schemas.problems import service_problem
-from service.schemas.upload_answers import UploadPage
-from service.schemas.workbench_answers import ProjectPage, RunPage
 from solver.errors import Issue
 
 _PREFER_WAIT = re.compile(r"(?:^|[,;\s])wait\s*=\s*\"?(\d{1,6})\"?(?:$|[,;\s])", re.IGNORECASE)
@@ -45,7 +44,6 @@ _KEY = re.compile(r"[\x21-\x7e]{1,200}")
 _LOOK_AGAIN_SECONDS = 2.0
 
 AnswerT = TypeVar("AnswerT")
-Page = SweepPage | DesignPage | JobPage | UploadPage | RunPage | ProjectPage
 
 
 def service_behind(request: Request) -> Service:
@@ -54,25 +52,32 @@ def service_behind(request: Request) -> Service:
     return service
 
 
+@dataclass(frozen=True, slots=True)
+class Context:
+    """What every look-up has: the request, the service behind the app, and who asks."""
+
+    request: Request
+    service: Service
+    caller: Caller
+    token: str = ""
+    """Of the link that it is asked by, if it is."""
+
+    @property
+    def sees(self) -> str | None:
+        """The owner whose things are seen; None for everybody's."""
+        return self.caller.sees
+
+
 # Dependencies are asynchronous: others would be run in a thread each, which costs more than they do.
-async def service_of(request: Request) -> Service:
-    """The service behind the app."""
-    return service_behind(request)
+async def context_of(request: Request) -> Context:
+    """The context of a request; the gate has put there who asks."""
+    return Context(request, service_behind(request), getattr(request.state, "caller", KEYLESS))
 
 
-ServiceDependency = Annotated[Service, Depends(service_of)]
+InContext = Annotated[Context, Depends(context_of)]
 
 
-async def caller_of(request: Request) -> Caller:
-    """Who asks: the gate has put them there."""
-    caller: Caller = getattr(request.state, "caller", KEYLESS)
-    return caller
-
-
-CallerDependency = Annotated[Caller, Depends(caller_of)]
-
-
-async def json_body(request: Request) -> AsyncIterator[dict[str, Any]]:
+async def json_body(context: InContext) -> AsyncIterator[dict[str, Any]]:
     """The body of a request as a JSON object, no larger than the settings allow, until it is answered.
 
     Raises
@@ -80,13 +85,13 @@ async def json_body(request: Request) -> AsyncIterator[dict[str, Any]]:
     UnsupportedMediaError, BodyTooLargeError, SlowBodyError, MalformedBodyError, InvalidRequestError
         For a body that is not that.
     """
+    request, settings = context.request, context.service.settings
     kind = request.headers.get("content-type", "").split(";")[0].strip().lower()
     if kind != "application/json" and not kind.endswith("+json"):
         raise UnsupportedMediaError(f"`Content-Type` must be application/json, got {kind or 'none'}")
-    settings = service_behind(request).settings
     data = await whole(request, settings.max_body_bytes, settings.body_seconds)
     turns: Turns = request.app.state.turns
-    async with turns.of((await caller_of(request)).owner, len(data)):
+    async with turns.of(context.caller.owner, len(data)):
         value = await turns.parsed(data)
         del data
         if not isinstance(value, dict):
@@ -135,7 +140,7 @@ class TypedRoute(APIRoute):
         of_kinds = getattr(field.field_info, "discriminator", None) is not None
 
         async def read_and_handle(request: Request) -> Response:
-            async with reading(request) as value:
+            async with reading(await context_of(request)) as value:
                 try:
                     return await handle(_ReadRequest(request, value))
                 except RequestValidationError as error:
@@ -219,9 +224,9 @@ def raw_list(answers: Sequence[BaseModel]) -> bytes:
     return b"[" + b",".join(one.__pydantic_serializer__.to_json(one) for one in answers) + b"]"
 
 
-def listing(request: Request, page: Page) -> Response:
+def listing(context: Context, page: Page[Any]) -> Response:
     """A page of a list as JSON or CSV, with a link to the next one in its header too (RFC 8288)."""
-    kind = chosen(request.headers.get("accept"), LIST_MEDIA)
+    kind = chosen(context.request.headers.get("accept"), LIST_MEDIA)
     headers = {"Vary": "Accept"}
     if page.next is not None:
         headers["Link"] = f'<{page.next}>; rel="next"'
@@ -231,10 +236,9 @@ def listing(request: Request, page: Page) -> Response:
 
 
 async def wait_for_end(
-    service: Service,
+    context: Context,
     job_id: str,
     seconds: float,
-    caller: Caller,
     answer: Callable[[JobRow], AnswerT],
     known: JobRow | None = None,
 ) -> AnswerT:
@@ -242,10 +246,11 @@ async def wait_for_end(
 
     Parameters
     ----------
-    service, job_id, seconds, caller : where to look, for which job, how long [s], as whom.
+    context, job_id, seconds : where to look and as whom, for which job, how long [s].
     answer : makes of the row what is wanted, in the same transaction.
     known : the row as it was a moment ago: it is not looked at before something happens.
     """
+    service, caller = context.service, context.caller
     loop = asyncio.get_running_loop()
     changed = asyncio.Event()
 

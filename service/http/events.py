@@ -13,9 +13,10 @@ from collections.abc import AsyncIterator, Iterator
 
 from fastapi.sse import ServerSentEvent
 
-from service.auth.callers import Caller, visible
+from service.auth.callers import Caller
 from service.db.models import NOBODY, JobState
 from service.db.repositories import JobRow
+from service.db.repositories.owned import visible
 from service.queue.core import Service
 from service.queue.running import Live
 from service.queue.subscriptions import Event
@@ -127,7 +128,7 @@ class Looks:
             if self._task is None:
                 self._task = asyncio.create_task(self._look())
         # Several streams wait for the same: one that ends must not end that of the others.
-        return visible(await asyncio.shield(found), caller, f"there is no job {job_id!r}")
+        return visible(await asyncio.shield(found), caller.sees, f"there is no job {job_id!r}")
 
     async def _look(self) -> None:
         await asyncio.sleep(_GATHER_SECONDS)

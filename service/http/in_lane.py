@@ -6,8 +6,7 @@ from collections.abc import Awaitable, Callable
 from functools import wraps
 from typing import Any, TypeVar
 
-from service.auth.callers import Caller
-from service.queue.core import Service
+from service.http.dependencies import Context
 from service.queue.lanes import Lane, Lanes
 
 _T = TypeVar("_T")
@@ -15,14 +14,13 @@ _Decorator = Callable[[Callable[..., _T]], Callable[..., Awaitable[_T]]]
 
 
 def _in(lane_of: Callable[[Lanes], Lane]) -> _Decorator[Any]:
-    """Have a function with parameters `service` and `caller` run in a lane when it is its owner's turn."""
+    """Have a function with a parameter `context` run in a lane when it is its owner's turn."""
 
     def decorate(endpoint: Callable[..., _T]) -> Callable[..., Awaitable[_T]]:
         @wraps(endpoint)
         async def run(**values: Any) -> _T:
-            service: Service = values["service"]
-            caller: Caller = values["caller"]
-            return await lane_of(service.lanes).run(caller.owner, endpoint, **values)
+            context: Context = values["context"]
+            return await lane_of(context.service.lanes).run(context.caller.owner, endpoint, **values)
 
         return run
 

@@ -13,7 +13,7 @@ from importlib.metadata import version
 from queue import Empty, SimpleQueue
 from typing import Any
 
-from service.auth.callers import KEYLESS, Caller, visible
+from service.auth.callers import KEYLESS, Caller
 from service.auth.shares import highest_priority, share
 from service.auth.storage import Storage
 from service.db import revisions
@@ -31,7 +31,11 @@ from service.db.repositories import (
     UploadRepository,
 )
 from service.db.repositories.keys import KeyRepository
+from service.db.repositories.owned import visible
+from service.db.repositories.projects import Projects
 from service.db.repositories.rows import RunWords
+from service.db.repositories.runs import Runs
+from service.db.repositories.shares import Shares
 from service.db.repositories.storage import StorageRepository
 from service.errors import ConflictError, InvalidRequestError, JobFailedError, NotFoundError
 from service.jobs import answering
@@ -46,7 +50,6 @@ from service.queue.queue import JobQueue
 from service.queue.retention import Retention
 from service.queue.scene_store import SceneStore
 from service.queue.subscriptions import Event, Waiters
-from service.queue.workbench import Projects, Runs, Shares
 from service.settings.settings import Settings
 from service.uploads.uploads import Uploads
 from service.workers.answers import AnswerLimits, Answers
@@ -120,8 +123,8 @@ class Service:
         self.storage = Storage(StorageRepository(self.database), settings)
         self.uploads = Uploads(UploadRepository(self.database), settings, self.storage)
         self.scenes = SceneStore(SceneRepository(self.database), self.uploads)
-        self.runs = Runs(self.database, settings, self.jobs.now)
-        self.projects = Projects(self.database, settings, self.jobs.now)
+        self.runs = Runs(self.database, self.jobs.now, settings.bin_days)
+        self.projects = Projects(self.database, self.jobs.now, settings.bin_days)
         self.shares = Shares(self.database, self.runs, self.jobs.now)
         self.waiters = Waiters()
         self.lanes = Lanes(settings.database_seconds)
@@ -287,7 +290,7 @@ class Service:
         NotFoundError
             If there is none of this id that the caller may see.
         """
-        return visible(self.jobs.get(job_id), caller, f"there is no job {job_id!r}")
+        return visible(self.jobs.get(job_id), caller.sees, f"there is no job {job_id!r}")
 
     def sweep(self, sweep_id: str, caller: Caller = KEYLESS) -> Sweep:
         """A stored sweep.
@@ -297,7 +300,7 @@ class Service:
         NotFoundError
             If there is none of this id that the caller may see.
         """
-        return visible(self.sweeps.get(sweep_id), caller, f"there is no sweep {sweep_id!r}")
+        return visible(self.sweeps.get(sweep_id), caller.sees, f"there is no sweep {sweep_id!r}")
 
     def dismiss(self, job_id: str, caller: Caller = KEYLESS) -> JobRow:
         """Cancel a job. A running one ends within the grace; the row given back may say `running` still.
@@ -310,7 +313,7 @@ class Service:
             If it ended before.
         """
         self.job(job_id, caller)
-        row = visible(self.jobs.cancel(job_id), caller, f"there is no job {job_id!r}")
+        row = visible(self.jobs.cancel(job_id), caller.sees, f"there is no job {job_id!r}")
         if row.state in (JobState.SUCCESSFUL, JobState.FAILED):
             raise ConflictError(f"job {job_id} ended before ({row.state.value}), there is nothing to dismiss")
         if row.state is JobState.RUNNING:
@@ -367,7 +370,7 @@ class Service:
             If there is none of this id that the caller may see.
         """
         missing = f"there is no design {design_id!r}"
-        asked = visible(self.jobs.get(design_id), caller, missing)
+        asked = visible(self.jobs.get(design_id), caller.sees, missing)
         job = asked if asked.result_of is None else self.jobs.get(asked.result_of)
         row = None if job is None else self.designs.get(job.id)
         result = None if row is None else self.jobs.result(row.job_id)

@@ -4,48 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from datetime import datetime
 from functools import cache
 
 from service.auth.callers import KEYLESS, Caller
-from service.db.models import NOBODY
+from service.db.models import NOBODY, Scene
 from service.db.repositories import SceneRepository
-from service.db.repositories.rows import WholeSceneRow
 from service.errors import ConflictError, NotFoundError
 from service.jobs.common.scenes import read_scene
 from service.jobs.strict_json import digest, encoded
+from service.queue.cursors import Position
 from service.uploads.uploads import Uploads
 from solver.scene.scene import load_scene, shipped_scenes
 
 _BETWEEN = "\n"  # of name and owner where a page ends; neither has one
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class KnownScene:
-    """A scene by name.
-
-    Attributes
-    ----------
-    shipped : bool
-        Whether it comes with the package.
-    created : datetime or None
-        When it was stored; None for a shipped one.
-    owner : str
-        Whose it is; a shipped one is nobody's.
-    """
-
-    name: str
-    shipped: bool
-    scene_hash: str
-    created: datetime | None = None
-    owner: str = NOBODY
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class WholeScene(KnownScene):
-    """A scene with its tables, which may be large."""
-
-    body: Mapping[str, object]
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +42,7 @@ class SceneStore:
         except NotFoundError:
             return None
 
-    def get(self, name: str) -> WholeScene:
+    def get(self, name: str) -> Scene:
         """The shipped scene of this name, or the caller's own; only names are looked up, never paths.
 
         Raises
@@ -85,34 +56,19 @@ class SceneStore:
         if row is None:
             known = ", ".join(shipped_scenes())
             raise NotFoundError(f"there is no scene {name!r}: shipped are {known}, GET /v1/scenes lists all")
-        return _stored(row)
+        return row
 
-    def page(self, size: int, after: str | None = None) -> tuple[list[KnownScene], str | None]:
-        """Shipped scenes, then `size` of the stored ones that the caller may see, by name, without tables.
+    def page(self, limit: int, after: Position | None = None) -> list[Scene]:
+        """Stored scenes that the caller may see, by name, without tables, those behind a position."""
+        name, _, owner = ("", "", "") if after is None else after[1].partition(_BETWEEN)
+        return self.repository.page(self.caller.sees, None if after is None else (name, owner), limit)
 
-        Parameters
-        ----------
-        after : where the page before ended; shipped scenes are on the first one.
+    @staticmethod
+    def position(scene: Scene) -> Position:
+        """Where a page that ends with this scene goes on."""
+        return None, f"{scene.name}{_BETWEEN}{scene.owner}"
 
-        Returns
-        -------
-        The scenes, and where the page ended if more follow.
-        """
-        position = None
-        if after is not None:
-            name, _, owner = after.partition(_BETWEEN)
-            position = (name, owner)
-        rows = self.repository.page(self.caller.sees, position, size + 1)
-        stored = [
-            KnownScene(
-                name=row.name, shipped=False, scene_hash=row.scene_hash, created=row.created, owner=row.owner
-            )
-            for row in rows[:size]
-        ]
-        end = None if len(rows) <= size else f"{stored[-1].name}{_BETWEEN}{stored[-1].owner}"
-        return [*map(_shipped, shipped_scenes() if after is None else ()), *stored], end
-
-    def add(self, body: Mapping[str, object]) -> tuple[WholeScene, bool]:
+    def add(self, body: Mapping[str, object]) -> tuple[Scene, bool]:
         """Store a scene under its own name; whether it is new.
 
         Raises
@@ -126,14 +82,13 @@ class SceneStore:
         tables = scene.to_dict()
         return self.keep(scene.name, digest(tables), tables)
 
-    def keep(self, name: str, scene_hash: str, tables: dict[str, object]) -> tuple[WholeScene, bool]:
+    def keep(self, name: str, scene_hash: str, tables: dict[str, object]) -> tuple[Scene, bool]:
         """Store a scene that was read and checked; `add` lists the errors."""
         if name in shipped_scenes():
             known, added = _shipped(name), False
         else:
             self.uploads.storage.require(self.caller, len(encoded(tables)))
-            row, added = self.repository.add(self.caller.owner, name, scene_hash, tables)
-            known = _stored(row)
+            known, added = self.repository.add(self.caller.owner, name, scene_hash, tables)
         if known.scene_hash != scene_hash:
             kind = "shipped" if known.shipped else "stored"
             raise ConflictError(
@@ -143,18 +98,12 @@ class SceneStore:
         return known, added
 
 
+def shipped() -> list[Scene]:
+    """The scenes that come with the package."""
+    return [_shipped(name) for name in shipped_scenes()]
+
+
 @cache
-def _shipped(name: str) -> WholeScene:
+def _shipped(name: str) -> Scene:
     body = load_scene(name).to_dict()
-    return WholeScene(name=name, shipped=True, scene_hash=digest(body), body=body)
-
-
-def _stored(row: WholeSceneRow) -> WholeScene:
-    return WholeScene(
-        name=row.name,
-        shipped=False,
-        scene_hash=row.scene_hash,
-        body=row.body,
-        created=row.created,
-        owner=row.owner,
-    )
+    return Scene(owner=NOBODY, name=name, scene_hash=digest(body), created=None, body=body)

@@ -6,17 +6,133 @@ is written as a whole.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
-from optim.criteria.table import criteria_table
-from optim.identification.data.columns_table import data_columns_table, data_formats_table
+from pydantic.fields import FieldInfo
+
+from optim.criteria.key import Key, Option
+from optim.criteria.registry import criteria, limit_keys
+from optim.identification.data.measured_units import known_units
+from optim.identification.data.registry import data_kinds
+from optim.identification.readers.registry import data_formats
+from optim.problem.keys import CaseRequest, options
 from optim.problem.keyword_source import keyword_source
+from service.jobs.common.problem import ABOUT_THE_JOB
+from service.jobs.kinds.design import DesignRequest
+from service.jobs.kinds.pareto import ParetoRequest
 from service.jobs.kinds.registry.table import placed
-from service.rendering.problem_table import problem_table
-from service.settings.table import settings_table
-from solver.contacts.laws.table import laws_table
-from solver.matrices.readers.table import formats_table
+from service.settings.limits import Limits
+from service.settings.settings import Settings
+from solver.contacts.laws.registry import DEFAULT, laws
+from solver.matrices.readers.registry import readers
+
+_WRITTEN = {"scene": "`SCENE`", "set": "`--set PATH=VALUE`"}
+_ON_THE_MACHINE = {"workers": "processors"}
+_GIVES = {
+    "matrix": "one matrix", "matrices": "one matrix or several", "modes": "modes", "labels": "names of rows",
+    "nodes": "nodes",
+}  # fmt: skip
+
+
+def _table(heads: str, rows: Iterable[Iterable[str]]) -> str:
+    """A table of Markdown; the heads stand between bars."""
+    lines = [f"| {heads} |", f"|{'---|' * (heads.count('|') + 1)}"]
+    return "\n".join([*lines, *(f"| {' | '.join(row)} |" for row in rows)]) + "\n"
+
+
+def _quoted(words: Iterable[str]) -> str:
+    return ", ".join(f"`{word}`" for word in words)
+
+
+def criteria_table() -> str:
+    """Every criterion with its weight and the keys of its limit."""
+    rows = []
+    for one in criteria():
+        better = "" if one.smaller_is_better else ", larger is better"
+        limits = "<br>".join(f"`{key.name}`: {key.help} {_option(key)}" for key in one.keys)
+        weight = f"`{one.weight}` [1/{one.unit}]" if one.weight else ""
+        rows.append((f"**{one.name}** [{one.unit}]{better}: {one.help}", weight, limits))
+    return _table("criterion | minimised by `weights` | limited by", rows)
+
+
+def problem_table() -> str:
+    """Every key of a design problem but those that limit a criterion."""
+    fields = {**DesignRequest.model_fields, **ParetoRequest.model_fields}
+    keys = options(DesignRequest) | options(ParetoRequest)
+    apart = {*ABOUT_THE_JOB, *(key.name for key in limit_keys())}
+    rows = (
+        (f"`{name}`", _meaning(name, field), _WRITTEN.get(name) or _option(keys.get(name)))
+        for name, field in fields.items()
+        if name not in apart
+    )
+    return _table("key | meaning | option of the command", rows)
+
+
+def _meaning(name: str, field: FieldInfo) -> str:
+    if name != "cases":
+        return str(field.description)
+    cases = (f"`{key}`: {one.description}" for key, one in CaseRequest.model_fields.items())
+    return f"{field.description} A list of tables with any of<br>{'<br>'.join(cases)}"
+
+
+def _option(option: Key | Option | None) -> str:
+    return "" if option is None else f"`{option.flag} {option.metavar}`".replace("|", "\\|")
+
+
+def data_columns_table() -> str:
+    """Every kind of measured data with its columns, their units and the words of its head."""
+    rows: list[tuple[str, ...]] = []
+    for kind in data_kinds():
+        rows += (
+            (f"`{kind.name}`", f"`{column.name}`", ", ".join(known_units(column.dimension)), column.help)
+            for column in kind.columns
+        )
+        rows += ((f"`{kind.name}`", f"head: `{word}`", "", text) for word, text in kind.words.items())
+    return _table("kind | column | units, the first if none is named | what it is", rows)
+
+
+def data_formats_table() -> str:
+    """Every format of measured data with its endings."""
+    rows = ((one.name, _quoted(one.suffixes), one.help) for one in data_formats())
+    return _table("format | files end in | how", rows)
+
+
+def laws_table() -> str:
+    """Every contact law with its force and parameters."""
+    rows = (
+        (f"`{word}`{' (default)' * (word == DEFAULT)}", law.FORCE, _quoted(law.PARAMETERS))
+        for word, law in laws().items()
+    )
+    return _table("`law` | Force | Parameters that can be continued in", rows)
+
+
+def formats_table() -> str:
+    """Every format of matrices with its endings, what it gives, and the word of an upload."""
+    rows = (
+        (
+            _quoted(one.suffixes), one.help, ", ".join(_GIVES[kind] for kind in one.gives),
+            _quoted((one.word, *one.media)),
+        )
+        for one in readers()
+    )  # fmt: skip
+    return _table("files end in | format | holds | `?format=`", rows)
+
+
+def settings_table() -> str:
+    """The settings with their defaults and what they mean."""
+    fields = Settings.model_fields
+    # What is inherited comes first there, and last here.
+    ordered = sorted(fields, key=lambda name: name in Limits.model_fields)
+    return _table("variable | default | ", (_setting(name, fields[name]) for name in ordered))
+
+
+def _setting(name: str, field: FieldInfo) -> tuple[str, str, str]:
+    default = field.get_default(call_default_factory=True)
+    shown = str(default).lower() if isinstance(default, bool) else str(default)
+    said = _ON_THE_MACHINE.get(name) or ("unset" if default is None else f"`{shown}`")
+    return f"`STICKSLIP_{name.upper()}`", said, (field.description or "").replace("|", "\\|")
+
 
 TABLES: Mapping[str, Mapping[str, Callable[[], str]]] = {
     "design.md": {"keys": problem_table, "criteria": criteria_table},

@@ -3,18 +3,83 @@
 from __future__ import annotations
 
 import importlib.util
+import re
 import threading
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from service.db.models import Sweep
 from service.db.repositories import SweepRepository
 from service.errors import NotAcceptableError
-from service.rendering.negotiation import preferred
-from service.rendering.sweep_datasets import sweep_dataset
+from service.jobs.arrays import decode
+from service.jobs.strict_json import digest
 from service.schemas.answers import SweepDetail
 from solver.results.csv import csv_text
+from solver.results.dataset import Dataset
+from solver.scene.parameter_paths import structure_unit
+from solver.scene.scene import Scene
+from solver.views.columns import attributes
 from solver.views.io import written
+from solver.views.parameter_units import parameter_unit
+from solver.views.to_dataset import point_variables
+
+_RANGE = re.compile(r"([!#$%&'*+.^_`|~0-9a-z-]+)/([!#$%&'*+.^_`|~0-9a-z-]+)")
+_QUALITY = re.compile(r"(?:0(?:\.[0-9]{0,3})?|1(?:\.0{0,3})?)")
+
+
+@dataclass(frozen=True, slots=True)
+class _Range:
+    kind: str
+    subkind: str
+    quality: float
+
+    def specificity(self, offered: str) -> int:
+        """How exactly it means a media type; 0 if it does not."""
+        if f"{self.kind}/{self.subkind}" == offered:
+            return 3
+        if self.subkind == "*" and self.kind == offered.partition("/")[0]:
+            return 2
+        return int(self.kind == self.subkind == "*")
+
+
+def preferred(accept: str | None, offered: Sequence[str]) -> str | None:
+    """The media type of `offered` that an `Accept` header prefers (RFC 9110, 12.5.1), the first among equals.
+
+    None if none will do; without the header every one will. What cannot be read in it is passed over.
+    """
+    if accept is None or not accept.strip():
+        return offered[0] if offered else None
+    ranges = [found for part in accept.lower().split(",") if (found := _range(part)) is not None]
+    rated = [(_quality(ranges, media), media) for media in offered]
+    best = max(rated, key=lambda pair: pair[0], default=(0.0, ""))
+    return best[1] if best[0] > 0.0 else None
+
+
+def _quality(ranges: Sequence[_Range], offered: str) -> float:
+    """The quality that the most specific range gives a media type; 0 if none means it."""
+    specificity, quality = 0, 0.0
+    for one in ranges:
+        exact = one.specificity(offered)
+        if exact > specificity or (exact == specificity > 0 and one.quality > quality):
+            specificity, quality = exact, one.quality
+    return quality
+
+
+def _range(text: str) -> _Range | None:
+    media, *parameters = (part.strip() for part in text.split(";"))
+    found = _RANGE.fullmatch(media)
+    if found is None:
+        return None
+    quality = 1.0
+    for parameter in parameters:
+        name, _, value = parameter.partition("=")
+        if name.strip() == "q":
+            if not _QUALITY.fullmatch(value.strip()):
+                return None
+            quality = float(value)
+    return _Range(found[1], found[2], quality)
+
 
 JSON, CSV = "application/json", "text/csv"
 NPZ, ZIP, PARQUET = "application/x-npz", "application/zip", "application/vnd.apache.parquet"
@@ -99,3 +164,42 @@ def _texts(value: Any) -> bool:
 
 def _csv(columns: Sequence[str], rows: Iterable[Iterable[Any]]) -> bytes:
     return csv_text(columns, rows).encode()
+
+
+_COLUMNS = ("parameter", "amplitude", "half_peak_to_peak", "mean", "residual")
+
+
+def _unit(path: str, scene: Scene | None) -> str:
+    """The unit of the parameter swept; a part of the structure has one only where the scene is known."""
+    owner, _, name = path.partition(".")
+    if owner != "structure":
+        return parameter_unit(path)
+    return "" if scene is None else structure_unit(scene.structure, name)
+
+
+def sweep_dataset(row: Sweep, repository: SweepRepository, scene: Mapping[str, Any] | None = None) -> Dataset:
+    """A stored sweep, a point a row.
+
+    Sweeps that an earlier version stored have no column `residual` and none of the states.
+
+    Parameters
+    ----------
+    scene : that of its job; it is told only if it is the one that was swept.
+    """
+    arrays = {name: decode(stored) for name, stored in repository.arrays(row.id).items()}
+    names = [contact.name for contact in repository.parts([row.id])[row.id]]
+    states = arrays.get("states")
+    swept = None
+    if scene is not None and digest(dict(scene)) == row.scene_hash:
+        swept = Scene.from_dict(scene)
+    variables = point_variables(
+        row.parameter, _unit(row.parameter, swept),
+        {name: arrays[name] for name in _COLUMNS if name in arrays},
+        arrays.get("observed"), None if states is None else (names, states),
+    )  # fmt: skip
+    notes = attributes(
+        row.status, swept, parameter=row.parameter, harmonics=row.harmonics,
+        observed=None if swept is None else swept.observe.dof, peak=row.peak, peak_at=row.peak_at,
+        band=row.band_hz, band_limit=row.limit, sweep=row.id, job=row.job_id,
+    )  # fmt: skip
+    return Dataset(kind="branch", rows=("point",), variables=variables, attributes=notes)

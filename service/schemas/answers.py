@@ -4,29 +4,21 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import asdict
 from datetime import datetime
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, Generic, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
-from service.db.models import Design, JobState, Sweep
+from service.db.models import Design, JobState, Scene, Sweep
 from service.db.repositories import JobRow, SweepRepository
 from service.db.repositories.stored import StoredRepository
 from service.jobs.arrays import decode
 from service.jobs.outputs import ContactValues, Told, VariableValues
-from service.queue.scene_store import KnownScene, WholeScene
 
 if TYPE_CHECKING:
     from service.queue.core import Results
-
-
-# What an answer has under the name of its column; a peak stands there with its place.
-_COLUMNS: dict[type[Any], frozenset[str]] = {
-    table: frozenset(table.__mapper__.columns.keys()) - {"peak"} for table in (Sweep, Design)
-}
 
 
 BEST = (
@@ -35,10 +27,29 @@ BEST = (
 )
 
 
+_NONE = object()
+
+
 class Answer(BaseModel):
     """Root of the answers."""
 
     model_config = ConfigDict(frozen=True)
+
+    @classmethod
+    def _from(cls, row: object, **more: Any) -> Self:
+        """The answer with `more`, and with every other field that the row has under the same name."""
+        same = ((name, getattr(row, name, _NONE)) for name in cls.model_fields if name not in more)
+        return cls(**{name: value for name, value in same if value is not _NONE}, **more)
+
+
+AnswerT = TypeVar("AnswerT", bound=Answer)
+
+
+class Page(Answer, Generic[AnswerT]):
+    """A page of a list."""
+
+    items: list[AnswerT]
+    next: str | None = Field(description="Link to the next page; null on the last one.")
 
 
 class JobAnswer(Answer):
@@ -65,8 +76,8 @@ class JobAnswer(Answer):
     links: dict[str, str]
 
     @classmethod
-    def of(cls, row: JobRow, live: Told | None = None) -> Self:
-        """The answer for a row, with progress that is newer than the row if there is any."""
+    def of(cls, row: JobRow, live: Told | None = None, **more: Any) -> Self:
+        """The answer for a row, with progress that is newer than the row if there is any, and with `more`."""
         progress, points, best = live or (row.progress, row.points, row.best)
         source = row.result_of or row.id
         links = {
@@ -77,27 +88,10 @@ class JobAnswer(Answer):
         }
         if row.kind == "design":
             links["design"] = f"/v1/designs/{source}"
-        return cls(
-            id=row.id,
-            owner=row.owner,
-            kind=row.kind,
-            status=row.state,
-            progress=progress,
-            points=points,
-            best=None if best is None else dict(best),
-            scene=row.scene_name,
-            priority=row.priority,
-            attempt=row.attempt,
-            max_attempts=row.max_attempts,
-            cancel_requested=row.cancel_requested,
-            created=row.created,
-            started=row.started,
-            finished=row.finished,
-            result_of=row.result_of,
-            error=row.error,
-            request=row.request,
-            links=links,
-        )
+        return cls._from(
+            row, status=row.state, progress=progress, points=points, scene=row.scene_name,
+            best=None if best is None else dict(best), links=links | more.pop("links", {}), **more,
+        )  # fmt: skip
 
 
 class KindAnswer(Answer):
@@ -115,11 +109,8 @@ class KindList(Answer):
     items: list[KindAnswer]
 
 
-class JobPage(Answer):
+class JobPage(Page[JobAnswer]):
     """A page of jobs, newest first."""
-
-    items: list[JobAnswer]
-    next: str | None = Field(description="Link to the next page; null on the last one.")
 
 
 class Peak(Answer):
@@ -133,25 +124,23 @@ class StoredAnswer(Answer, ABC):
     """What the answers for a stored sweep and a stored design share."""
 
     @classmethod
-    def shared(cls, row: Sweep | Design) -> dict[str, Any]:
-        """The fields that both have: what is named like its column, the scene, and a peak with its place."""
+    @abstractmethod
+    def of(cls, row: Any, parts: Sequence[Any], **more: Any) -> Self:
+        """The answer for a row with its parts."""
+
+    @classmethod
+    def _stored(cls, row: Sweep | Design, **more: Any) -> Self:
+        """The answer with what both have: the scene, and a peak with its place."""
         peak = None
         if row.peak is not None and row.peak_at is not None:
             peak = Peak(value=row.peak, at=row.peak_at)
-        columns = _COLUMNS[type(row)]
-        same = {name: getattr(row, name) for name in cls.model_fields if name in columns}
-        return {**same, "scene": row.scene_name, "peak": peak}
-
-    @classmethod
-    @abstractmethod
-    def values(cls, row: Any, parts: Sequence[Any]) -> dict[str, Any]:
-        """The fields of the answer for a row with its parts."""
+        return cls._from(row, scene=row.scene_name, peak=peak, **more)
 
     @classmethod
     def of_rows(cls, rows: Sequence[Any], repository: StoredRepository[Any, Any]) -> list[Self]:
         """The answers for several rows."""
         parts = repository.parts([row.key for row in rows])
-        return [cls(**cls.values(row, parts[row.key])) for row in rows]
+        return [cls.of(row, parts[row.key]) for row in rows]
 
 
 class ContactAnswer(Answer):
@@ -202,16 +191,13 @@ class SweepAnswer(StoredAnswer):
     links: dict[str, str]
 
     @classmethod
-    def values(cls, row: Sweep, contacts: Sequence[ContactValues]) -> dict[str, Any]:
-        """The fields of the answer for a row."""
-        return {
-            **cls.shared(row),
-            "job": row.job_id,
-            "from_": row.from_value,
-            "to": row.to_value,
-            "contacts": {contact.name: _contact(contact) for contact in contacts},
-            "links": {"self": f"/v1/sweeps/{row.id}", "job": f"/v1/jobs/{row.job_id}"},
-        }
+    def of(cls, row: Sweep, parts: Sequence[ContactValues], **more: Any) -> Self:
+        """The answer for a row with its contacts."""
+        return cls._stored(
+            row, job=row.job_id, from_=row.from_value, to=row.to_value,
+            contacts={contact.name: ContactAnswer._from(contact) for contact in parts},
+            links={"self": f"/v1/sweeps/{row.id}", "job": f"/v1/jobs/{row.job_id}"}, **more,
+        )  # fmt: skip
 
 
 class SweepDetail(SweepAnswer):
@@ -222,18 +208,12 @@ class SweepDetail(SweepAnswer):
     @classmethod
     def load(cls, row: Sweep, repository: SweepRepository) -> Self:
         """The sweep of a row."""
-        stored = repository.arrays(row.id)
-        return cls(
-            **cls.values(row, repository.parts([row.id])[row.id]),
-            arrays={name: _listed(decode(array)) for name, array in stored.items()},
-        )
+        arrays = {name: _listed(decode(array)) for name, array in repository.arrays(row.id).items()}
+        return cls.of(row, repository.parts([row.id])[row.id], arrays=arrays)
 
 
-class SweepPage(Answer):
+class SweepPage(Page[SweepAnswer]):
     """A page of sweeps."""
-
-    items: list[SweepAnswer]
-    next: str | None = Field(description="Link to the next page; null on the last one.")
 
 
 class JobScene(Answer):
@@ -300,18 +280,15 @@ class DesignAnswer(StoredAnswer):
     links: dict[str, str]
 
     @classmethod
-    def values(cls, row: Design, variables: Sequence[VariableValues]) -> dict[str, Any]:
-        """The fields of the answer for a row."""
-        return {
-            **cls.shared(row),
-            "id": row.job_id,
-            "variables": {v.name: VariableAnswer(value=v.value, low=v.low, high=v.high) for v in variables},
-            "links": {
-                "self": f"/v1/designs/{row.job_id}",
-                "job": f"/v1/jobs/{row.job_id}",
-                "sweeps": f"/v1/sweeps?job={row.job_id}",
-            },
+    def of(cls, row: Design, parts: Sequence[VariableValues], **more: Any) -> Self:
+        """The answer for a row with its variables."""
+        links = {
+            "self": f"/v1/designs/{row.job_id}",
+            "job": f"/v1/jobs/{row.job_id}",
+            "sweeps": f"/v1/sweeps?job={row.job_id}",
         }
+        variables = {one.name: VariableAnswer._from(one) for one in parts}
+        return cls._stored(row, id=row.job_id, variables=variables, links=links, **more)
 
 
 class DesignDetail(DesignAnswer):
@@ -321,11 +298,8 @@ class DesignDetail(DesignAnswer):
     result: dict[str, Any]
 
 
-class DesignPage(Answer):
+class DesignPage(Page[DesignAnswer]):
     """A page of designs."""
-
-    items: list[DesignAnswer]
-    next: str | None = Field(description="Link to the next page; null on the last one.")
 
 
 class FinishedJob(JobAnswer):
@@ -346,21 +320,9 @@ class SceneAnswer(Answer):
     links: dict[str, str]
 
     @classmethod
-    def of(cls, scene: KnownScene) -> Self:
+    def of(cls, row: Scene, **more: Any) -> Self:
         """The answer for a scene."""
-        return cls(**cls.values(scene))
-
-    @classmethod
-    def values(cls, scene: KnownScene) -> dict[str, Any]:
-        """The fields of the answer for a scene."""
-        return {
-            "owner": scene.owner,
-            "name": scene.name,
-            "shipped": scene.shipped,
-            "scene_hash": scene.scene_hash,
-            "created": scene.created,
-            "links": {"self": f"/v1/scenes/{scene.name}"},
-        }
+        return cls._from(row, links={"self": f"/v1/scenes/{row.name}"}, **more)
 
 
 class SceneDetail(SceneAnswer):
@@ -368,17 +330,9 @@ class SceneDetail(SceneAnswer):
 
     scene: dict[str, Any]
 
-    @classmethod
-    def of_whole(cls, scene: WholeScene) -> Self:
-        """The answer for a scene."""
-        return cls(**cls.values(scene), scene=dict(scene.body))
 
-
-class SceneList(Answer):
+class SceneList(Page[SceneAnswer]):
     """A page of the scenes."""
-
-    items: list[SceneAnswer]
-    next: str | None = Field(description="Link to the next page; null on the last one.")
 
 
 def _listed(array: NDArray[Any]) -> list[Any]:
@@ -389,9 +343,3 @@ def _listed(array: NDArray[Any]) -> list[Any]:
         array[~finite] = None
     listed: list[Any] = array.tolist()
     return listed
-
-
-def _contact(contact: ContactValues) -> ContactAnswer:
-    values = asdict(contact)
-    del values["name"]
-    return ContactAnswer(**values)

@@ -6,7 +6,7 @@ from itertools import islice
 from typing import Any
 
 from service.auth.callers import Caller
-from service.db.repositories.workbench.rows import RunRow
+from service.db.repositories.runs import RunRow
 from service.jobs.differences import differences, figures
 from service.queue.core import Service
 from service.schemas.workbench_answers import Comparison, Figure, InputDifference, RunAnswer
@@ -17,7 +17,7 @@ _MOST_COUNTED = 10_000
 
 def comparison(service: Service, a: str, b: str, caller: Caller) -> Comparison:
     """What differs between two runs of which the caller sees both (NotFoundError if not)."""
-    rows = [service.runs.get(one, caller) for one in (a, b)]
+    rows = [service.runs.seen(one, caller.sees) for one in (a, b)]
     specs = [_inputs(service, row) for row in rows]
     found = differences(*specs)
     told = [InputDifference(part=d.part, path=d.path, a=d.a, b=d.b) for d in islice(found, _MOST_INPUTS)]

@@ -10,6 +10,7 @@ from pydantic import Field
 from service.db.models import NOBODY
 from service.db.repositories import DesignRepository
 from service.schemas.answers import DesignAnswer, DesignDetail, DesignPage
+from service.schemas.pages import Cursor, Limit
 from service.schemas.stored_queries import Bound, StoredQuery, rows_of_page
 from service.settings.settings import Settings
 
@@ -63,20 +64,14 @@ class DesignQuery(StoredQuery):
     seconds_min: Bound = None
     seconds_max: Bound = None
     sort: Sort = "-created"
-    limit: int = Field(default=100, ge=1, le=10_000)
-    cursor: str | None = Field(default=None, max_length=500)
+    limit: Limit = 100
+    cursor: Cursor = None
 
 
 def design_page(
     repository: DesignRepository, query: DesignQuery, settings: Settings, sees: str | None = NOBODY
 ) -> DesignPage:
-    """A page of designs and the link to the next one.
-
-    Raises
-    ------
-    InvalidRequestError
-        If the cursor is not one of this service.
-    """
+    """A page and the link to the next one (InvalidRequestError if the cursor is not of this service)."""
     rows, following = rows_of_page(repository, query, settings, sees)
     return DesignPage(items=DesignAnswer.of_rows(rows, repository), next=following)
 
@@ -84,6 +79,4 @@ def design_page(
 def design_detail(found: WholeDesign, repository: DesignRepository) -> DesignDetail:
     """The answer for a whole design."""
     variables = repository.parts([found.row.job_id])[found.row.job_id]
-    return DesignDetail(
-        **DesignDetail.values(found.row, variables), problem=found.job.request or {}, result=found.result
-    )
+    return DesignDetail.of(found.row, variables, problem=found.job.request or {}, result=found.result)

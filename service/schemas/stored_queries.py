@@ -2,27 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from service.db.models import NOBODY
 from service.db.pagination import Range
-from service.db.repositories.stored import Filter, Part, Row, StoredRepository
-from service.queue import cursors
+from service.db.repositories.owned import RowT
+from service.db.repositories.stored import Filter, Part, StoredRepository
+from service.schemas.pages import ListQuery, page_of
 from service.settings.settings import Settings
 
 Bound = Annotated[float | None, Field(ge=-1e30, le=1e30)]
 
 
-class StoredQuery(BaseModel):
+class StoredQuery(ListQuery):
     """Which rows to list; the fields stand in the queries themselves, in the order of the reference."""
 
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True)
-
-    path: ClassVar[str]
-    """Of the list."""
     equal: ClassVar[Mapping[str, str]]
     """Filter to the column that must have its value."""
     ranges: ClassVar[Mapping[str, str]]
@@ -34,8 +32,6 @@ class StoredQuery(BaseModel):
 
     if TYPE_CHECKING:  # fields of every query, each where its list has them
         sort: str
-        limit: int
-        cursor: str | None
 
     def to_filter(self, sees: str | None = NOBODY) -> Filter:
         """The query of the repository; of what belongs to `sees`, or to everybody (None)."""
@@ -57,20 +53,9 @@ class StoredQuery(BaseModel):
 
 
 def rows_of_page(
-    repository: StoredRepository[Row, Part], query: StoredQuery, settings: Settings, sees: str | None
-) -> tuple[list[Row], str | None]:
-    """Return the rows of a page and the link to the next one, None on the last.
-
-    Raises
-    ------
-    InvalidRequestError
-        If the cursor is not one of this service.
-    """
-    limit = min(query.limit, settings.page_limit)
-    after = None if query.cursor is None else cursors.decode(query.cursor)
+    repository: StoredRepository[RowT, Part], query: StoredQuery, settings: Settings, sees: str | None
+) -> tuple[Sequence[RowT], str | None]:
+    """The rows of a page and the link to the next one; `page_of` lists the errors."""
     wanted = query.to_filter(sees)
-    rows = repository.page(wanted, limit + 1, after)
-    if len(rows) <= limit:
-        return rows, None
-    shown = rows[:limit]
-    return shown, cursors.next_link(query.path, query, *repository.position(shown[-1], wanted.sort))
+    position = partial(repository.position, sort=wanted.sort)
+    return page_of(query, settings, partial(repository.page, wanted), position)

@@ -10,6 +10,7 @@ from pydantic import Field
 from service.db.models import NOBODY
 from service.db.repositories import SweepRepository
 from service.schemas.answers import SweepAnswer, SweepPage
+from service.schemas.pages import Cursor, Limit
 from service.schemas.stored_queries import Bound, StoredQuery, rows_of_page
 from service.settings.settings import Settings
 
@@ -74,19 +75,13 @@ class SweepQuery(StoredQuery):
     mu_min: Bound = None
     mu_max: Bound = None
     sort: Sort = "-created"
-    limit: int = Field(default=100, ge=1, le=10_000)
-    cursor: str | None = Field(default=None, max_length=500)
+    limit: Limit = 100
+    cursor: Cursor = None
 
 
 def sweep_page(
     repository: SweepRepository, query: SweepQuery, settings: Settings, sees: str | None = NOBODY
 ) -> SweepPage:
-    """A page of sweeps and the link to the next one.
-
-    Raises
-    ------
-    InvalidRequestError
-        If the cursor is not one of this service.
-    """
+    """A page and the link to the next one (InvalidRequestError if the cursor is not of this service)."""
     rows, following = rows_of_page(repository, query, settings, sees)
     return SweepPage(items=SweepAnswer.of_rows(rows, repository), next=following)

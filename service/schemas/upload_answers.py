@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from datetime import datetime
+from typing import Any, Self
 
 from pydantic import Field
 
-from service.db.repositories.uploads import UploadRow
-from service.schemas.answers import Answer
+from service.db.models import Upload
+from service.schemas.answers import Answer, Page
 
 
 class UploadAnswer(Answer):
@@ -22,10 +23,9 @@ class UploadAnswer(Answer):
     links: dict[str, str]
 
     @classmethod
-    def of(cls, row: UploadRow) -> UploadAnswer:
+    def of(cls, row: Upload, **more: Any) -> Self:
         """The answer for a row."""
-        values = {name: getattr(row, name) for name in ("id", "name", "format", "size", "sha256", "created")}
-        return UploadAnswer(**values, links={"self": f"/v1/uploads/{row.id}"})
+        return cls._from(row, links={"self": f"/v1/uploads/{row.id}"}, **more)
 
 
 class UploadedArray(Answer):
@@ -43,8 +43,5 @@ class NewUpload(UploadAnswer):
     contents: list[UploadedArray]
 
 
-class UploadPage(Answer):
+class UploadPage(Page[UploadAnswer]):
     """A page of uploads, newest first."""
-
-    items: list[UploadAnswer]
-    next: str | None = Field(description="Link to the next page; null on the last one.")

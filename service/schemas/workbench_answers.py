@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from datetime import datetime
 from typing import Any, Self
 
 from pydantic import Field
 
-from service.db.repositories.workbench.rows import ProjectRow, RunRow, ShareRow
+from service.db.repositories.runs import RunRow
+from service.db.run_models import Project, Share
 from service.jobs.outputs import Told
-from service.schemas.answers import Answer, JobAnswer
+from service.schemas.answers import Answer, JobAnswer, Page
 
 _REVISION = "Counts the changes; the `ETag`, for `If-Match` of a change."
 _DELETED = "When it was put in the bin; null outside of it."
@@ -30,27 +32,14 @@ class RunAnswer(JobAnswer):
     @classmethod
     def of_run(cls, row: RunRow, live: Told | None = None) -> Self:
         """The answer for a row, with progress that is newer than the row if there is any."""
-        job = JobAnswer.of(row.job, live)
-        about = f"/v1/runs/{row.job.id}"
-        links = {**job.links, "self": about, "job": job.links["self"], "shares": f"{about}/shares"}
-        return cls(
-            **{**job.model_dump(), "links": links},
-            project=row.words.project,
-            name=row.words.name,
-            notes=row.words.notes,
-            tags=list(row.words.tags),
-            sweeps=row.sweeps,
-            revision=row.revision,
-            changed=row.changed,
-            deleted=row.deleted,
-        )
+        job, about = f"/v1/jobs/{row.job.id}", f"/v1/runs/{row.job.id}"
+        said = {name: getattr(row, name) for name in ("sweeps", "revision", "changed", "deleted")}
+        links = {"self": about, "job": job, "shares": f"{about}/shares"}
+        return cls.of(row.job, live, links=links, **asdict(row.words), **said)
 
 
-class RunPage(Answer):
+class RunPage(Page[RunAnswer]):
     """A page of runs, newest first."""
-
-    items: list[RunAnswer]
-    next: str | None = Field(description="Link to the next page; null on the last one.")
 
 
 class ProjectAnswer(Answer):
@@ -68,18 +57,14 @@ class ProjectAnswer(Answer):
     links: dict[str, str]
 
     @classmethod
-    def of(cls, row: ProjectRow) -> Self:
+    def of(cls, row: Project) -> Self:
         """The answer for a row."""
-        values = {name: getattr(row, name) for name in cls.model_fields if name != "links"}
-        about = f"/v1/projects/{row.id}"
-        return cls(**values, links={"self": about, "runs": f"/v1/runs?project={row.id}"})
+        links = {"self": f"/v1/projects/{row.id}", "runs": f"/v1/runs?project={row.id}"}
+        return cls._from(row, links=links)
 
 
-class ProjectPage(Answer):
+class ProjectPage(Page[ProjectAnswer]):
     """A page of projects, newest first."""
-
-    items: list[ProjectAnswer]
-    next: str | None = Field(description="Link to the next page; null on the last one.")
 
 
 class ShareAnswer(Answer):
@@ -91,9 +76,9 @@ class ShareAnswer(Answer):
     expires: datetime | None
 
     @classmethod
-    def values(cls, row: ShareRow) -> dict[str, Any]:
-        """The fields of the answer for a row."""
-        return {"id": row.id, "run": row.job_id, "created": row.created, "expires": row.expires}
+    def of(cls, row: Share, **more: Any) -> Self:
+        """The answer for a row."""
+        return cls._from(row, run=row.job_id, **more)
 
 
 class NewShareAnswer(ShareAnswer):
@@ -130,12 +115,10 @@ class SharedRun(Answer):
     def of(cls, row: RunRow) -> Self:
         """The answer for a row."""
         job, words = row.job, row.words
-        same = ("id", "kind", "progress", "created", "started", "finished", "error")
         # The project is not shared with the run.
         request = {key: value for key, value in (job.request or {}).items() if key != "project"}
-        return cls(
-            **{name: getattr(job, name) for name in same},
-            status=job.state.value, scene=job.scene_name, name=words.name, notes=words.notes,
+        return cls._from(
+            job, status=job.state.value, scene=job.scene_name, name=words.name, notes=words.notes,
             tags=list(words.tags), request=request,
         )  # fmt: skip
 

@@ -7,16 +7,11 @@ from typing import Annotated, Any, ClassVar
 from pydantic import AwareDatetime, BaseModel, ConfigDict, Field
 
 from service.db.models import JobState
-from service.db.repositories.workbench.rows import RunFilter
+from service.db.repositories.runs import RunFilter
 from service.jobs.run_words import LONGEST_TAG, MOST_TAGS, Notes, ProjectName, RunName, Tags
-from service.queue import cursors
-from service.queue.workbench import Projects, Runs
-from service.schemas.workbench_answers import ProjectAnswer, ProjectPage, RunAnswer, RunPage
-from service.settings.settings import Settings
+from service.schemas.pages import Cursor, Limit, ListQuery
 
 _CHANGES = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-Limit = Annotated[int, Field(ge=1, le=10_000)]
-Cursor = Annotated[str | None, Field(max_length=500)]
 Text = Annotated[
     str | None, Field(min_length=1, max_length=200, description="In the name or the notes, in any case.")
 ]
@@ -26,10 +21,9 @@ ProjectId = Annotated[str, Field(min_length=1, max_length=36)]
 OneTag = Annotated[str, Field(min_length=1, max_length=LONGEST_TAG)]
 
 
-class RunQuery(BaseModel):
+class RunQuery(ListQuery):
     """Which runs to list."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
     path: ClassVar[str] = "/v1/runs"
 
     owner: Whose = None
@@ -51,17 +45,12 @@ class RunQuery(BaseModel):
 
     def to_filter(self, sees: str | None) -> RunFilter:
         """The query of the repository; of what belongs to `sees`, or to everybody (None)."""
-        return RunFilter(
-            owner=sees, of_owner=self.owner, states=self.status, kind=self.kind, scene=self.scene,
-            project=self.project, tags=self.tag, text=self.text, after=self.created_after,
-            before=self.created_before, deleted=self.deleted,
-        )  # fmt: skip
+        return RunFilter(sees=sees, **self.model_dump(exclude={"limit", "cursor"}))
 
 
-class ProjectQuery(BaseModel):
+class ProjectQuery(ListQuery):
     """Which projects to list."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
     path: ClassVar[str] = "/v1/projects"
 
     text: Text = None
@@ -116,40 +105,3 @@ class NewLink(BaseModel):
 def changes_of(asked: BaseModel) -> dict[str, Any]:
     """What a request changes: the keys that were given."""
     return {name: getattr(asked, name) for name in asked.model_fields_set}
-
-
-def run_page(runs: Runs, query: RunQuery, settings: Settings, sees: str | None, live: Any) -> RunPage:
-    """A page of runs and the link to the next one.
-
-    Parameters
-    ----------
-    live : the progress of a job that runs here, by its id; None of others.
-
-    Raises
-    ------
-    InvalidRequestError
-        If the cursor is not one of this service.
-    """
-    size = min(query.limit, settings.page_limit)
-    before = None if query.cursor is None else cursors.decode(query.cursor)[1]
-    rows = runs.repository.page(query.to_filter(sees), size + 1, before)
-    following = None
-    if len(rows) > size:
-        following = cursors.next_link(query.path, query, None, rows[size - 1].job.id)
-    items = [RunAnswer.of_run(row, live(row.job.id)) for row in rows[:size]]
-    return RunPage(items=items, next=following)
-
-
-def project_page(
-    projects: Projects, query: ProjectQuery, settings: Settings, sees: str | None
-) -> ProjectPage:
-    """A page of projects and the link to the next one; errors as of `run_page`."""
-    size = min(query.limit, settings.page_limit)
-    before = None if query.cursor is None else cursors.decode(query.cursor)[1]
-    rows = projects.repository.page(
-        size + 1, before, owner=sees, text=query.text, deleted=query.deleted
-    )  # fmt: skip
-    following = None
-    if len(rows) > size:
-        following = cursors.next_link(query.path, query, None, rows[size - 1].id)
-    return ProjectPage(items=[ProjectAnswer.of(row) for row in rows[:size]], next=following)

@@ -11,9 +11,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from service.auth.callers import KEYLESS, Caller, visible
+from service.auth.callers import KEYLESS, Caller
 from service.auth.storage import Storage
-from service.db.repositories.uploads import UploadRepository, UploadRow
+from service.db.models import Upload
+from service.db.repositories.owned import visible
+from service.db.repositories.uploads import UploadRepository
 from service.errors import InvalidRequestError, NotFoundError, UnreadableUploadError
 from service.jobs.common.scenes import UPLOAD, Place, named_files, with_named
 from service.jobs.strict_json import digest
@@ -70,7 +72,7 @@ class Uploads:
         self._lock = threading.Lock()
         self._resolved: OrderedDict[str, dict[str, Any]] = OrderedDict()
 
-    def add(self, arrived: Arrived, caller: Caller = KEYLESS) -> tuple[UploadRow, list[dict[str, Any]], bool]:
+    def add(self, arrived: Arrived, caller: Caller = KEYLESS) -> tuple[Upload, list[dict[str, Any]], bool]:
         """Look at a file and store it; what it holds, and whether it is new to its owner.
 
         Raises
@@ -88,7 +90,7 @@ class Uploads:
         )  # fmt: skip
         return row, found, added
 
-    def get(self, upload_id: str, caller: Caller = KEYLESS) -> UploadRow:
+    def get(self, upload_id: str, caller: Caller = KEYLESS) -> Upload:
         """An upload.
 
         Raises
@@ -96,7 +98,7 @@ class Uploads:
         NotFoundError
             If there is none of this id that the caller may see.
         """
-        return visible(self.repository.get(upload_id), caller, f"there is no upload {upload_id!r}")
+        return visible(self.repository.get(upload_id), caller.sees, f"there is no upload {upload_id!r}")
 
     def delete(self, upload_id: str, caller: Caller = KEYLESS) -> None:
         """Forget an upload; scenes and jobs that were made with it keep what it held.
@@ -139,7 +141,7 @@ class Uploads:
         """
         structure = asked["structure"]
         if structure is None:
-            rows: dict[Place, UploadRow] = {
+            rows: dict[Place, Upload] = {
                 (f"{at}",): self._row("uploads", at, id, caller) for at, id in enumerate(asked["uploads"])
             }
         else:
@@ -166,13 +168,13 @@ class Uploads:
                 tables["structure"] = with_named(tables["structure"], ids)
         return found
 
-    def _row(self, key: str, at: int, upload_id: str, caller: Caller) -> UploadRow:
+    def _row(self, key: str, at: int, upload_id: str, caller: Caller) -> Upload:
         try:
             return self.get(upload_id, caller)
         except NotFoundError as error:
             raise InvalidRequestError([Issue(pointer=pointer(key, at), message=error.detail)]) from error
 
-    def _rows(self, structure: Mapping[str, Any], caller: Caller) -> dict[Place, UploadRow]:
+    def _rows(self, structure: Mapping[str, Any], caller: Caller) -> dict[Place, Upload]:
         """The uploads a structure names, by their places.
 
         Raises
@@ -196,7 +198,7 @@ class Uploads:
         return rows
 
     def _with(
-        self, structure: Mapping[str, Any], rows: Mapping[Place, UploadRow], orders: list[int]
+        self, structure: Mapping[str, Any], rows: Mapping[Place, Upload], orders: list[int]
     ) -> dict[str, Any]:
         known = _digest(structure, rows, orders)
         with self._lock:
@@ -215,7 +217,7 @@ class Uploads:
         return found
 
     @contextmanager
-    def _placed(self, rows: Mapping[Place, UploadRow], names: Mapping[Place, str]) -> Iterator[Path]:
+    def _placed(self, rows: Mapping[Place, Upload], names: Mapping[Place, str]) -> Iterator[Path]:
         """A folder that holds the files of uploads under their names."""
         with tempfile.TemporaryDirectory(prefix="stickslip-") as folder:
             for place, row in rows.items():
@@ -229,7 +231,7 @@ class Uploads:
                 self._resolved.popitem(last=False)
 
 
-def file_names(rows: Mapping[Place, UploadRow]) -> dict[Place, str]:
+def file_names(rows: Mapping[Place, Upload]) -> dict[Place, str]:
     """Names of files for uploads by their places: those they came with, each upload its own."""
     owners: dict[str, str] = {}
     names = {}
@@ -249,7 +251,7 @@ def file_name(name: str, form: str) -> str:
     return name if registry.word_of(name, "") == form else f"{name}.{form}"
 
 
-def _digest(structure: Mapping[str, Any], rows: Mapping[Place, UploadRow], orders: list[int]) -> str:
+def _digest(structure: Mapping[str, Any], rows: Mapping[Place, Upload], orders: list[int]) -> str:
     """What a structure resolves to depends on: its tables, what the files hold under which names, and the
     engine orders, which say at which nodal diameters a sector is reduced.
     """

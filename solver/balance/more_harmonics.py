@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from functools import lru_cache
 
 import numpy as np
 
@@ -14,7 +13,7 @@ from solver.contacts.kernels.system import DENSE, System
 from solver.jit.fourier import Complex, Integer, Real
 from solver.jit.trig_polynomial import grid_size, grid_tables
 from solver.linear.contact_table import contact_table
-from solver.scene.harmonics import MULTIPLES, kept_harmonics, spread
+from solver.scene.harmonics import MULTIPLES, among, kept_harmonics, spread
 
 
 def more_harmonics(balance: Balance, top: int, *, multiples: int = MULTIPLES) -> Balance:
@@ -27,7 +26,8 @@ def more_harmonics(balance: Balance, top: int, *, multiples: int = MULTIPLES) ->
     system = _extended(balance, ks)
     if system is None:
         return _rebuilt(balance, top)
-    cos_table, sin_table = _tables(max(int(ks[-1]), 1))
+    highest = max(int(ks[-1]), 1)
+    cos_table, sin_table = grid_tables(grid_size(highest), highest)
     contacts = contact_table(balance.scene, int(ks[-1]))
     # Where a law is followed from node to node an estimate has to see what lies between them too.
     contacts[:, NODES] = np.maximum(contacts[:, NODES], 2.0 * balance.system.contacts[:, NODES])
@@ -53,7 +53,7 @@ def further_harmonics(balance: Balance, top: int, multiples: int = MULTIPLES) ->
     odd = bool(np.all(ks % 2 == 1))
     path = balance.parameter.path
     wider = kept_harmonics(balance.scene, (path,), top, odd=odd, multiples=multiples)
-    return np.union1d(ks, wider)
+    return np.array(sorted({*ks.tolist(), *wider.tolist()}), np.int64)
 
 
 def pad(coefficients: Real, balance: Balance, wider: Balance) -> Real:
@@ -80,19 +80,19 @@ def _extended(balance: Balance, ks: Integer) -> System | None:
     That is a nodal diameter not met so far, or a force with one of the further harmonics.
     """
     scene, system = balance.scene, balance.system
-    if any(force.harmonic in ks and force.harmonic not in system.ks for force in scene.forces):
+    known = among(system.ks, ks)
+    if any(force.harmonic in ks[~known] for force in scene.forces):
         return None
     sectors = scene.structure.sector_count
-    known, wanted = ((each * scene.engine_order) % sectors for each in (system.ks, ks))
+    diameters = (ks * scene.engine_order) % sectors
     # Of the matrices themselves the mean has others than what moves.
     moving = (system.ks > 0) | (system.form != DENSE)
-    structures = {int(d): int(s) for d, s in zip(known[moving], system.which[moving], strict=True)}
-    at = np.searchsorted(ks, system.ks).astype(np.int64)
-    further = np.isin(ks, system.ks, invert=True)
-    if any(int(d) not in structures for d in wanted[further]):
+    structures = dict(zip(diameters[known][moving].tolist(), system.which[moving].tolist(), strict=True))
+    wanted = diameters[~known].tolist()
+    if not structures.keys() >= set(wanted):
         return None
-    which = np.zeros(ks.size, np.int64)
-    which[at], which[further] = system.which, [structures[int(d)] for d in wanted[further]]
+    at, which = np.flatnonzero(known), np.zeros(ks.size, np.int64)
+    which[known], which[~known] = system.which, [structures[diameter] for diameter in wanted]
     return system._replace(
         ks=ks, which=which,
         modal_forces=_padded_rows(system.modal_forces, at, ks.size),
@@ -111,8 +111,3 @@ def _padded_rows(rows: Complex, at: Integer, count: int) -> Complex:
     padded = np.zeros((count, rows.shape[1]), np.complex128)
     padded[at] = rows
     return padded
-
-
-@lru_cache(maxsize=16)
-def _tables(highest: int) -> tuple[Real, Real]:
-    return grid_tables(grid_size(highest), highest)

@@ -68,7 +68,7 @@ Angle = Annotated[float, Field(strict=True, ge=-1e4, le=1e4, allow_inf_nan=False
 class Part(BaseModel):
     """Root of everything in a scene: frozen, no unknown keys, no NaN."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
 
 
 class End(NamedTuple):

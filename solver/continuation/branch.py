@@ -20,6 +20,7 @@ from solver.continuation.peaks import Band, Peak
 from solver.jit.fourier import Integer, Real
 from solver.results.base import Drawn
 from solver.results.known import Known
+from solver.results.told import json_number
 from solver.results.views import Views, on_demand
 from solver.scene.scene import Scene
 
@@ -261,7 +262,7 @@ class AnyBranch(Drawn):
         ax : axes to draw into, else a new figure.
         limit : amplitude [m] drawn as a line.
         """
-        figure: Figure = self.VIEWS.call("plots.figures", self, ax, limit=limit)
+        figure: Figure = self.VIEWS.call("plots.figures", self, ax=ax, limit=limit)
         return figure
 
     @property
@@ -293,10 +294,10 @@ class AnyBranch(Drawn):
             "band_intervals_hz": None if band is None else [list(interval) for interval in band.intervals],
             "band_known": None if band is None else band.known and self.peak_certificate.known,
             "peak_certificate": self.peak_certificate.to_json(),
-            **({"drift_per_period": _number(self.drift_per_period)} if self.ratchets else {}),
+            **({"drift_per_period": json_number(self.drift_per_period)} if self.ratchets else {}),
             "points": len(self.values),
             "n_harmonics": self.n_harmonics,
-            "error_estimate": _number(self.error_estimate),
+            "error_estimate": json_number(self.error_estimate),
             "newton_iterations": self.newton_iterations,
             "rejected_steps": self.rejected_steps,
             "folds": self.folds,
@@ -388,8 +389,3 @@ class Branch(AnyBranch):
         """
         found: Bifurcations = on_demand("solver.response.stability.bifurcations:of_branch")(self)
         return found
-
-
-def _number(value: float) -> float | None:
-    """Return a float that JSON can carry."""
-    return float(value) if math.isfinite(value) else None

@@ -16,14 +16,22 @@ from solver.balance.workspace import Workspace
 from solver.contacts.kernels.system import AT_BRANCH_POINT, evaluation_by_value
 from solver.continuation.branch import BranchStatus
 from solver.continuation.kernels.pseudo_arclength import begin_walk
-from solver.continuation.kernels.state import COUNT, ITERATIONS, Control, P, Walk, walk_by_value, weights
+from solver.continuation.kernels.state import (
+    COUNT,
+    ITERATIONS,
+    NUMBERS,
+    Control,
+    P,
+    Walk,
+    walk_by_value,
+    weights,
+)
 from solver.errors import SettingError
 from solver.jit.fourier import Integer, Real
 from solver.linear.kernels.receptance import receptance
 from solver.results.told import Piece
 
 _ENDINGS = tuple(BranchStatus)
-_NUMBERS = 12
 _ROWS = ("solutions", "tangents", "states", "observed", "measures")
 
 
@@ -39,7 +47,7 @@ class Stretch(Piece):
         Since the branch began.
     seconds : float
         Since the branch began [s].
-    walk : (4 n_unknowns + 15,) array
+    walk : (6 n_unknowns + 18,) array
         The state of the continuation behind the last point; empty if the branch could not begin.
     """
 
@@ -134,7 +142,7 @@ def go_on_from(workspace: Workspace, control: Control, stretch: Stretch) -> tupl
         getattr(stretch, name).shape[1:] == row.shape[1:] for name, row in zip(_ROWS, rows, strict=True)
     )
     nt = balance.n_unknowns
-    if not fits or stretch.walk.size != 4 * nt + 3 + _NUMBERS or not len(stretch.solutions):
+    if not fits or stretch.walk.size != 6 * nt + 5 + NUMBERS or not len(stretch.solutions):
         raise _foreign(stretch)
     _, state = begin_walk(system, linear, workspace.point, control, stretch.walk[:nt].copy())
     places = walk_by_value(state)

@@ -21,6 +21,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, ClassVar
 
+import llvmlite.binding
 import numba
 from numba.core import caching
 from numba.core.runtime import rtsys
@@ -111,10 +112,31 @@ class _Serialised(caching.CompileResultCacheImpl):
     _locator_classes: ClassVar = [_Locator]
 
 
-class KernelCache(caching.Cache):
-    """The machine code of one kernel, for each types of its arguments."""
+class _Alone(_Serialised):
+    """Keeps of a kernel that no other is linked with, beside its machine code, its name only.
 
-    _impl_class = _Serialised
+    Numba keeps the whole code for the compiler, to put it into callers, and parses it when it loads: a third
+    of what loading a kernel costs.
+    """
+
+    def reduce(self, cres: Any) -> Any:
+        (library, kind, (machine_code, _)), *rest = super().reduce(cres)
+        called = {cres.fndesc.llvm_func_name, cres.fndesc.llvm_cpython_wrapper_name}
+        named = [
+            function.name for function in cres.library.get_defined_functions() if function.name in called
+        ]
+        code = llvmlite.binding.parse_assembly(
+            "".join(f'define void @"{name}"() {{ ret void }}' for name in named)
+        )
+        return ((library, kind, (machine_code, code.as_bitcode())), *rest)
+
+
+class KernelCache(caching.Cache):
+    """The machine code of one kernel, for each types of its arguments; `linked`: callers may contain it."""
+
+    def __init__(self, function: Any, *, linked: bool = True) -> None:
+        self._impl_class = _Serialised if linked else _Alone
+        super().__init__(function)
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return what was saved for these types, or None.

@@ -19,8 +19,10 @@ from solver.jit.cache import KernelCache
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
 
-def compiled(function: _Function) -> _Function:
+def compiled(function: _Function, *, linked: bool = True) -> _Function:
     """Compile a kernel: cached on disk, without the GIL, IEEE special values kept.
+
+    What is not `linked` never becomes part of a kernel that calls it.
 
     One whose name begins with an underscore is for other kernels alone: without the code by which Python
     would call it, a tenth of the compilation is saved.
@@ -33,7 +35,7 @@ def compiled(function: _Function) -> _Function:
         no_cpython_wrapper=inner,
         no_cfunc_wrapper=True,
     )(function)
-    kernel._cache = KernelCache(function)  # what `cache=True` does, with a cache of our own
+    kernel._cache = KernelCache(function, linked=linked)  # what `cache=True` does, with a cache of our own
     if inner:
         kernel._insert = lambda *_: None  # into what Python may call
         kernel._compile_for_args = _refuse

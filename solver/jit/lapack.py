@@ -153,9 +153,9 @@ def invert(matrix: Complex, inverse: Complex) -> bool:
         for j in range(n):
             inverse[i, j] = 1.0 if i == j else 0.0
     for k in range(n):
-        pivot, size = k, abs(matrix[k, k])
+        pivot, size = k, abs(matrix[k, k].real) + abs(matrix[k, k].imag)
         for i in range(k + 1, n):
-            here = abs(matrix[i, k])
+            here = abs(matrix[i, k].real) + abs(matrix[i, k].imag)
             if here > size:
                 pivot, size = i, here
         if not size > 0.0:

@@ -107,7 +107,7 @@ class _Apart:
 
 def apart(function: _Function) -> _Function:
     """Compile a kernel on its own, see above; for all whose body is long beside a call."""
-    kernel: Any = _Apart(compiled(function))
+    kernel: Any = _Apart(compiled(function, linked=False))
 
     def result(_context: Any) -> Any:
         def of(*arguments: types.Type) -> Any:

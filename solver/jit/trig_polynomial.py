@@ -7,6 +7,7 @@ loops run over k; the layout ``[q0, c1, s1, …]`` of `solver.jit.fourier` is un
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 import numpy as np
 
@@ -24,6 +25,7 @@ def grid_size(highest_harmonic: int) -> int:
     return max(SMALLEST_GRID, POINTS_PER_WAVE * highest_harmonic)
 
 
+@lru_cache(maxsize=16)
 def grid_tables(n_grid: int, highest_harmonic: int) -> tuple[Real, Real]:
     """Return cos kτ_j and sin kτ_j, (H + 1, n_grid/2 + 1) each, on the first half of the grid τ_j = 2πj/n."""
     phase = np.outer(np.arange(highest_harmonic + 1), np.arange(n_grid // 2 + 1)) % n_grid

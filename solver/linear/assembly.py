@@ -31,9 +31,10 @@ from solver.linear.lumped_matrices import (
     numbers_of,
     topology_of,
 )
-from solver.linear.model import ForceTerm, LinearModel, LinearModelDerivative
+from solver.linear.model import ForceTerm, Identity, LinearModel, LinearModelDerivative
 from solver.linear.moving_base import base_motions, derivative_with_base, with_base
 from solver.linear.sector_matrices import ProportionalDamping, sector_matrices
+from solver.matrices.values import frozen
 from solver.scene.bodies.body import MOMENTS, Body
 from solver.scene.bodies.kinematics import Form, force_derivatives
 from solver.scene.bodies.paths import is_body_path
@@ -63,7 +64,12 @@ def linear_model(scene: Scene) -> LinearModel:
     Where one sector does not stand for all they are those of the whole annulus. The matrices are cached:
     changing contacts or excitation costs microseconds.
     """
-    scene = written_out(scene)
+    return _linear_model(Identity(scene))
+
+
+@lru_cache(maxsize=2)
+def _linear_model(of: Identity[Scene]) -> LinearModel:
+    scene = written_out(of.it)
     model, base = _without_base(scene), base_motions(scene)
     return with_base(model, scene, base) if base else model
 
@@ -112,7 +118,7 @@ def _model(scene: Scene, matrices: Matrices, shapes: FloatArray) -> LinearModel:
     coordinates = _coordinates(structure, shapes)
 
     def rows(selected: FloatArray) -> FloatArray:
-        return _frozen(selected @ shapes) if whole else selected
+        return frozen(selected @ shapes) if whole else selected
 
     return LinearModel(
         dofs=dofs,
@@ -156,7 +162,7 @@ def _sum_of(dofs: tuple[str, ...], terms: tuple[tuple[str, float], ...]) -> Floa
     found = np.zeros(len(dofs))
     for dof, factor in terms:
         found[dofs.index(dof)] += factor
-    return _frozen(found)
+    return frozen(found)
 
 
 def _terms(
@@ -166,7 +172,7 @@ def _terms(
 
     def vector(force: Excitation) -> NDArray[Any]:
         found = _pattern(dofs, force.forces or ()) if force.dof is None else _unit(dofs, force.dof)
-        return found if shapes is None else _frozen(found @ shapes)
+        return found if shapes is None else frozen(found @ shapes)
 
     return tuple(
         ForceTerm(vector=vector(e), amplitude=e.amplitude, phase=e.phase, harmonic=e.harmonic)
@@ -183,17 +189,17 @@ def _pattern(dofs: tuple[str, ...], parts: tuple[tuple[str, float, float], ...])
     for dof, factor, phase in parts:
         found[at[dof]] += factor * np.exp(1j * phase)
     seen: NDArray[Any] = found if np.any(found.imag) else found.real.copy()
-    return _frozen(seen)
+    return frozen(seen)
 
 
 @lru_cache(maxsize=16)
 def _nothing(n: int) -> FloatArray:
-    return _frozen(np.zeros((n, n)))
+    return frozen(np.zeros((n, n)))
 
 
 @lru_cache(maxsize=64)
 def _identity(n: int) -> FloatArray:
-    return _frozen(np.eye(n))
+    return frozen(np.eye(n))
 
 
 def _derivative_by(scene: Scene, name: str) -> LinearModelDerivative:
@@ -226,7 +232,7 @@ def _derivative_by(scene: Scene, name: str) -> LinearModelDerivative:
     members = [(derivative_by_number(topology, numbers, i, own, ratios), weight) for i, weight in shares]
 
     def total(key: str) -> FloatArray:
-        return _frozen(
+        return frozen(
             sum((weight * getattr(d, key) for d, weight in members), np.zeros(members[0][0].dM.shape))
         )
 
@@ -262,7 +268,7 @@ def _of_motions(scene: Scene, slopes: Mapping[str, tuple[Form, ...]]) -> LinearM
     forms = [slopes.get(c.name, ((),) * len(c.directions)) for c in scene.contacts]
     here, beyond = _contact_selection(dofs, tuple(form for each in forms for form in each))
     if shapes is not None:
-        here, beyond = _frozen(here @ shapes), _frozen(beyond @ shapes)
+        here, beyond = frozen(here @ shapes), frozen(beyond @ shapes)
     return replace(_of_nothing(here.shape[1]), affine=False, contact_here=here, contact_next=beyond)
 
 
@@ -307,7 +313,7 @@ def _proportional(structure: MatricesStructure, bodies: tuple[Body, ...], name: 
     if bodies:  # which have no such damping
         dC = dC.copy()
         dC[-sum(len(body.dofs) for body in bodies) :] = 0.0
-        dC = _frozen(dC)
+        dC = frozen(dC)
     return replace(_of_nothing(len(dC)), dC0=dC)
 
 
@@ -321,14 +327,9 @@ def _contact_selection(dofs: tuple[str, ...], forms: tuple[Form, ...]) -> tuple[
     for row, form in enumerate(forms):
         for dof, ahead, factor in form:
             (beyond if ahead else here)[row, dofs.index(dof)] += factor
-    return _frozen(here), _frozen(beyond)
+    return frozen(here), frozen(beyond)
 
 
 @lru_cache(maxsize=1024)
 def _unit(dofs: Sequence[str], dof: str) -> FloatArray:
-    return _frozen(np.array([1.0 if name == dof else 0.0 for name in dofs]))
-
-
-def _frozen(array: FloatArray) -> FloatArray:
-    array.setflags(write=False)
-    return array
+    return frozen(np.array([1.0 if name == dof else 0.0 for name in dofs]))

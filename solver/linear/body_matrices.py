@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.linear.matrix_model import MatrixModel, matrix_model
+from solver.matrices.values import frozen
 from solver.scene.bodies.body import Body
 from solver.scene.parts import MatricesStructure
 
@@ -18,7 +19,7 @@ FloatArray = NDArray[np.float64]
 @lru_cache(maxsize=64)
 def bodies_mass(n: int, bodies: tuple[Body, ...]) -> FloatArray:
     """Mass matrix of the bodies behind `n` DOFs of the structure, which have none of it; read-only."""
-    return _frozen(block_diag(np.zeros((n, n)), *(body.mass_matrix() for body in bodies)))
+    return frozen(block_diag(np.zeros((n, n)), *(body.mass_matrix() for body in bodies)))
 
 
 def mass_derivative(n: int, bodies: tuple[Body, ...], owner: str, key: str) -> FloatArray:
@@ -27,7 +28,7 @@ def mass_derivative(n: int, bodies: tuple[Body, ...], owner: str, key: str) -> F
         body.mass_derivative(key) if owner in (body.name, body.group) else np.zeros((len(body.dofs),) * 2)
         for body in bodies
     ]
-    return _frozen(block_diag(np.zeros((n, n)), *blocks))
+    return frozen(block_diag(np.zeros((n, n)), *blocks))
 
 
 def matrices_with_bodies(structure: MatricesStructure, bodies: tuple[Body, ...]) -> MatrixModel:
@@ -42,8 +43,8 @@ def _with_bodies(structure: MatricesStructure, bodies: tuple[Body, ...]) -> Matr
     nothing = np.zeros((n, n))
     mass = bodies_mass(0, bodies)
     return MatrixModel(
-        M=_frozen(block_diag(own.M, mass)), C=_frozen(block_diag(own.C, nothing)),
-        K=_frozen(block_diag(own.K, nothing)), shapes=_frozen(block_diag(own.shapes, np.eye(n))),
+        M=frozen(block_diag(own.M, mass)), C=frozen(block_diag(own.C, nothing)),
+        K=frozen(block_diag(own.K, nothing)), shapes=frozen(block_diag(own.shapes, np.eye(n))),
     )  # fmt: skip
 
 
@@ -55,8 +56,3 @@ def block_diag(*blocks: NDArray[Any]) -> NDArray[Any]:
         out[row : row + block.shape[0], column : column + block.shape[1]] = block
         row, column = row + block.shape[0], column + block.shape[1]
     return out
-
-
-def _frozen(array: FloatArray) -> FloatArray:
-    array.setflags(write=False)
-    return array

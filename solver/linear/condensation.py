@@ -133,6 +133,8 @@ def _structures(model: LinearModel, ks: Integer, *, apart: bool) -> tuple[Intege
     still = (ks == 0) & apart
     if model.line is not None:  # each harmonic has an inertia of its own
         return np.arange(ks.size), diameters, ks > 0
+    if not still.any() and not diameters.any():
+        return np.zeros(ks.size, np.int64), np.zeros(1, np.int64), np.ones(1, np.bool_)
     found, which = np.unique(np.where(still, -1, diameters), return_inverse=True)
     return which, np.maximum(found, 0), found >= 0
 
@@ -151,8 +153,9 @@ def _least_size(found: Decomposition, L: Complex, forces: Complex, which: Intege
     """
     sizes = np.maximum(np.abs(found.eigenvalues), 1e-12 * np.abs(found.eigenvalues).max(initial=0.0))
     largest = 0.0
-    for i, s in enumerate(which):
-        if not np.any(forces[i]) or not np.any(sizes[s]):
+    for i in np.flatnonzero(forces.any(axis=1)):
+        s = which[i]
+        if not np.any(sizes[s]):
             continue
         driven = (np.abs(forces[i]) @ np.abs(found.left[s])) / np.where(sizes[s] > 0.0, sizes[s], np.inf)
         moved = np.abs(L[s]) @ (np.abs(found.right[s]) @ driven)
@@ -213,15 +216,20 @@ def _projected(
     # Exact zeros only: a mode that no contact, and not both force and observer, can see adds nothing.
     touched = np.any(contact_modes != 0.0, axis=(0, 1)) | np.any(contact_duals != 0.0, axis=(0, 1))
     seen = touched | (np.any(observe_modes != 0.0, axis=0) & np.any(modal_forces != 0.0, axis=0))
+    every = bool(seen.all())
+
+    def kept(array: NDArray[Any]) -> Complex:
+        return _contiguous(array if every else array[..., seen])
+
     return {
         "form": found.form,
-        "eigenvalues": np.ascontiguousarray(found.eigenvalues[:, seen]),
+        "eigenvalues": kept(found.eigenvalues),
         "dampings": np.ascontiguousarray(found.dampings[:, seen]),
-        "contact_modes": _contiguous(contact_modes[:, :, seen]),
-        "contact_duals": _contiguous(contact_duals[:, :, seen]),
-        "observe_modes": _contiguous(observe_modes[:, seen]),
-        "modal_forces": _contiguous(modal_forces[:, seen]),
-        "shapes": _contiguous(found.right[:, :, seen]),
+        "contact_modes": kept(contact_modes),
+        "contact_duals": kept(contact_duals),
+        "observe_modes": kept(observe_modes),
+        "modal_forces": kept(modal_forces),
+        "shapes": kept(found.right),
     }
 
 

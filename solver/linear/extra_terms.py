@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.matrices.sectors.blocks import full_elimination
+from solver.matrices.values import frozen
 from solver.scene.bodies.body import REVOLUTIONS
 from solver.scene.scene import MatricesStructure, Scene
 from solver.scene.terms.linear_terms import Entry
@@ -271,9 +272,7 @@ class _Sum:
     def terms(self, loss_factor: float = 0.0) -> ExtraTerms:
         """Return what was added, with structural damping."""
         offsets = tuple(sorted({0, *self._K, *self._C}))
-        K, C = (np.array([self._at(part, m) for m in offsets]) for part in (self._K, self._C))
-        for array in (K, C):
-            array.setflags(write=False)
+        K, C = (frozen(np.array([self._at(part, m) for m in offsets])) for part in (self._K, self._C))
         return ExtraTerms(offsets=offsets, K=K, C=C, loss_factor=loss_factor)
 
     def _at(self, part: dict[int, Complex], offset: int) -> Complex:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from solver.linear.body_matrices import bodies_mass
 from solver.linear.modal_damping import modal_damping, modal_damping_derivative
 from solver.linear.model import LinearModelDerivative
+from solver.matrices.values import frozen
 from solver.scene.bodies.body import Body
 from solver.scene.bodies.kinematics import dof_names
 from solver.scene.matrices_structure import Ratios
@@ -128,7 +129,7 @@ def matrices_of_numbers(
         found.C0[:own, :own] += modal_damping(found.M[:own, :own], found.K0[:own, :own], ratios)
     if bodies:
         found.M[:] += bodies_mass(own, bodies)
-    return Matrices(*map(_frozen, found))
+    return Matrices(*map(frozen, found))
 
 
 @lru_cache(maxsize=256)
@@ -150,7 +151,7 @@ def derivative_by_number(
             at.M[:own, :own], at.K0[:own, :own], ratios, d.M[:own, :own], d.K0[:own, :own]
         )
         affine = affine and not (np.any(d.M) or np.any(d.K0))
-    d = Matrices(*map(_frozen, d))
+    d = Matrices(*map(frozen, d))
     return LinearModelDerivative(dM=d.M, dC0=d.C0, dCp=d.Cp, dK0=d.K0, dKp=d.Kp, affine=affine)
 
 
@@ -163,8 +164,3 @@ def _derivative_function(topology: Topology, i: int) -> tuple[Any, bool]:
     vector = casadi.vec(stacked)
     jacobian = casadi.jacobian(vector, q[i])
     return casadi.Function("derivative", [q], [jacobian]), bool(casadi.is_linear(vector, q[i]))
-
-
-def _frozen(array: FloatArray) -> FloatArray:
-    array.setflags(write=False)
-    return array

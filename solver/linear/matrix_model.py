@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from solver.linear.modal_damping import modal_damping, ratio_of_modes
 from solver.matrices.normal_modes import hermitian
+from solver.matrices.values import frozen
 from solver.scene.parts import MatricesStructure
 
 FloatArray = NDArray[np.float64]
@@ -39,8 +40,9 @@ def matrix_model(structure: MatricesStructure) -> MatrixModel:
     M, K, own, shapes = _base(structure.model_copy(update=NO_PROPORTIONAL))
     C = own
     if structure.stiffness_proportional_damping or structure.mass_proportional_damping:
-        C = own + structure.stiffness_proportional_damping * K + structure.mass_proportional_damping * M
-        C.setflags(write=False)
+        C = frozen(
+            own + structure.stiffness_proportional_damping * K + structure.mass_proportional_damping * M
+        )
     return MatrixModel(M=M, C=C, K=K, shapes=shapes)
 
 
@@ -67,6 +69,4 @@ def _base(structure: MatricesStructure) -> tuple[FloatArray, FloatArray, FloatAr
         shapes[np.arange(len(rows)), rows] = 1.0
     else:
         raise ValueError("a matrices structure needs M and K, or `modes`")
-    for array in (M, K, C, shapes):
-        array.setflags(write=False)
-    return M, K, C, shapes
+    return frozen(M), frozen(K), frozen(C), frozen(shapes)

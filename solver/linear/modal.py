@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from solver.contacts.kernels.system import MODES, POLES
 from solver.jit import eigen
 from solver.jit.fourier import Complex, Flags, Integer, Real
-from solver.linear.model import LinearModel
+from solver.linear.model import Identity, LinearModel
 from solver.matrices.normal_modes import (
     UndampedModes,
     hermitian,
@@ -30,19 +30,6 @@ ROUNDING = 4.0  # the same in units of what the modes lack in orthogonality
 SPAN_ERROR = 1e-11  # largest relative error of the pole form against the direct inverse
 SINGULAR = 1e-9  # smallest squared pivot of the scaled K that counts as held in place, not by a hair
 LEAST_POLE = 1e-25  # smallest |1/s| relative to the largest: below is rounding
-
-
-@dataclass(frozen=True, slots=True)
-class _Identity:
-    """A read-only array as a key: equal to itself alone, and kept alive by the key."""
-
-    array: NDArray[Any]
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Identity) and self.array is other.array
-
-    def __hash__(self) -> int:
-        return id(self.array)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -95,7 +82,7 @@ def matrices_of(model: LinearModel, diameters: Integer, moving: Flags) -> Held:
         A reduced sector was not built for one of them.
     """
     arrays = (model.K0, model.Kp, model.C0, model.Cp, model.M)
-    parts: tuple[object, ...] = (model.sector,) if model.sector else tuple(_Identity(a) for a in arrays)
+    parts: tuple[object, ...] = (model.sector,) if model.sector else tuple(Identity(a) for a in arrays)
     # Without extra terms what is at rest has the matrices of what moves.
     still = () if model.extra is None else tuple(moving.tolist())
     return _matrices(_ByParts(model, (*parts, model.sectors, model.extra)), tuple(diameters.tolist()), still)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,21 @@ FloatArray = NDArray[np.float64]
 Integer = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 Complex = NDArray[np.complex128]
+
+_Kept = TypeVar("_Kept")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Identity(Generic[_Kept]):
+    """Something that does not change as a key: equal to itself alone, and kept alive by the key."""
+
+    it: _Kept
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Identity) and self.it is other.it
+
+    def __hash__(self) -> int:
+        return id(self.it)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

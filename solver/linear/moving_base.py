@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from solver.errors import SettingError
 from solver.linear.extra_terms import ExtraTerms
 from solver.linear.model import ForceTerm, LinearModel, LinearModelDerivative
+from solver.matrices.values import frozen
 from solver.scene.scene import Scene
 from solver.scene.terms.excitation import Motion
 
@@ -102,8 +103,7 @@ def with_base(model: LinearModel, scene: Scene, base: BaseMotions) -> LinearMode
         row[at, at] = 1.0
         if one.motion != "displacement":
             still[at, at] = 1.0
-    for array in (M, K0, C0, K, C, still):
-        array.setflags(write=False)
+    M, K0, C0, K, C, still = map(frozen, (M, K0, C0, K, C, still))
     return replace(
         model, M=M, K0=K0, Kp=_zeros(n + m), C0=C0, Cp=_zeros(n + m), prescribed=m,
         shapes=_seen(model.shapes, scene, base, shares), observe=_seen(model.observe, scene, base, shares),
@@ -170,9 +170,8 @@ def _coordinate(model: LinearModel, dof: str) -> int:
 def _motions(base: BaseMotions, n: int) -> Iterable[ForceTerm]:
     """The amplitudes of the base as right-hand sides of its own rows."""
     for vector, amplitudes in zip(np.eye(len(base), n + len(base), n), base.values(), strict=True):
-        vector.setflags(write=False)
         for amplitude, phase, harmonic in amplitudes:
-            yield ForceTerm(vector=vector, amplitude=amplitude, phase=phase, harmonic=harmonic)
+            yield ForceTerm(vector=frozen(vector), amplitude=amplitude, phase=phase, harmonic=harmonic)
 
 
 def _seen(rows: Real, scene: Scene, base: BaseMotions, shares: Real) -> Real:
@@ -183,21 +182,16 @@ def _seen(rows: Real, scene: Scene, base: BaseMotions, shares: Real) -> Real:
         moved = -rows.sum(axis=-1, keepdims=True) * counted
     else:
         moved = rows @ shares * ground
-    return _frozen(np.concatenate([rows, moved], axis=-1))
+    return frozen(np.concatenate([rows, moved], axis=-1))
 
 
 def _wider(terms: tuple[ForceTerm, ...], m: int) -> tuple[ForceTerm, ...]:
-    return tuple(replace(term, vector=_frozen(np.pad(term.vector, (0, m)))) for term in terms)
+    return tuple(replace(term, vector=frozen(np.concatenate([term.vector, np.zeros(m)]))) for term in terms)
 
 
 def _wide(rows: Real, m: int) -> Real:
-    return _frozen(np.pad(rows, ((0, 0), (0, m))))
+    return frozen(np.pad(rows, ((0, 0), (0, m))))
 
 
 def _zeros(n: int) -> Real:
-    return _frozen(np.zeros((n, n)))
-
-
-def _frozen(array: NDArray[Any]) -> NDArray[Any]:
-    array.setflags(write=False)
-    return array
+    return frozen(np.zeros((n, n)))

@@ -18,6 +18,7 @@ from solver.linear.matrix_model import NO_PROPORTIONAL
 from solver.linear.modal_damping import modal_damping
 from solver.matrices.normal_modes import hermitian
 from solver.matrices.sectors.blocks import at_diameter, full_elimination
+from solver.matrices.values import frozen
 from solver.scene.bodies.body import Body
 from solver.scene.parts import MatricesStructure
 
@@ -90,8 +91,7 @@ def sector_matrices(structure: MatricesStructure, bodies: tuple[Body, ...]) -> S
         rows = [eliminated.row(row) for row in rows]
     own = np.zeros((len(rows), structure.n_coordinates))
     own[np.arange(len(rows)), rows] = 1.0
-    shapes = block_diag(own, np.eye(sum(len(body.dofs) for body in bodies)))
-    shapes.setflags(write=False)
+    shapes = frozen(block_diag(own, np.eye(sum(len(body.dofs) for body in bodies))))
     return SectorMatrices(structure=structure, bodies=bodies, shapes=shapes)
 
 
@@ -105,8 +105,7 @@ def _with_damping(structure: MatricesStructure, bodies: tuple[Body, ...], n: int
         C = C.copy()
         C[inner, inner] += structure.stiffness_proportional_damping * K[inner, inner]
         C[inner, inner] += structure.mass_proportional_damping * M[inner, inner]
-        C.setflags(write=False)
-    return K, C, M
+    return K, frozen(C), M
 
 
 @lru_cache(maxsize=128)
@@ -119,6 +118,4 @@ def _at(structure: MatricesStructure, bodies: tuple[Body, ...], n: int) -> Matri
     if bodies:
         behind = np.zeros((sum(len(body.dofs) for body in bodies),) * 2)
         K, C, M = block_diag(K, behind), block_diag(C, behind), block_diag(M, bodies_mass(0, bodies))
-    for matrix in (K, C, M):
-        matrix.setflags(write=False)
-    return K, C, M
+    return frozen(K), frozen(C), frozen(M)

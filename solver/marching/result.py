@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from solver.marching.kernels.state import Record
 from solver.results.base import Drawn
+from solver.results.told import json_number
 from solver.results.views import Views
 
 if TYPE_CHECKING:
@@ -123,27 +124,23 @@ class MarchResult(Drawn):
         ax : axes to draw into, else a new figure.
         scene : what was marched, for the title.
         """
-        figure: Figure = self.VIEWS.call("plots.figures", self, ax, scene=scene)
+        figure: Figure = self.VIEWS.call("plots.figures", self, ax=ax, scene=scene)
         return figure
 
     def to_json(self) -> dict[str, object]:
         """The result without its histories, for JSON; a number that does not exist is None."""
         drift = {"drift": self.drift} if self.status is MarchStatus.RATCHETS else {}
         return drift | {
-            "max_abs": _finite(self.max_abs),
-            "half_peak_to_peak": _finite(self.half_peak_to_peak),
-            "mean": _finite(self.mean),
-            "harmonics": [_finite(amplitude) for amplitude in self.harmonics],
+            "max_abs": json_number(self.max_abs),
+            "half_peak_to_peak": json_number(self.half_peak_to_peak),
+            "mean": json_number(self.mean),
+            "harmonics": [json_number(amplitude) for amplitude in self.harmonics],
             "periods": self.periods,
             "steps_per_period": self.steps_per_period,
-            "error_estimate": _finite(self.error_estimate),
+            "error_estimate": json_number(self.error_estimate),
             "status": self.status.value,
             "seconds": self.seconds,
         }
-
-
-def _finite(number: float) -> float | None:
-    return number if math.isfinite(number) else None
 
 
 def describe(

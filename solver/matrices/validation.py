@@ -8,41 +8,20 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import GetCoreSchemaHandler
-from pydantic_core import CoreSchema, core_schema
 
-from solver.matrices.values import Matrix, Modes
+from solver.matrices.values import Matrix, Modes, Named
 
 ASYMMETRY = 1e-8  # largest difference from the transpose, relative to the largest entry, taken for rounding
 _NAME = re.compile(r"[A-Za-z0-9_-]{1,80}(@[0-9]{1,9})?")
 
 
-class DofTable(tuple[str, ...]):
-    """Names of DOFs in order, with the row of each in the matrices.
+class DofTable(Named):
+    """Names of DOFs in order, with the row of each in the matrices."""
 
-    Attributes
-    ----------
-    rows : tuple of int
-        Zero-based.
-    """
-
-    rows: tuple[int, ...]
-
-    def __new__(cls, table: Mapping[str, int]) -> DofTable:
-        """Make a table from names and rows."""
-        made = super().__new__(cls, table)
-        made.rows = tuple(table.values())
-        return made
-
-    def __eq__(self, other: object) -> bool:
-        same = isinstance(other, DofTable) and self.rows == other.rows
-        return same and tuple(self) == tuple(other)  # type: ignore[arg-type]
-
-    def __hash__(self) -> int:
-        return hash((tuple(self), self.rows))
-
-    def __reduce__(self) -> tuple[type[DofTable], tuple[dict[str, int]]]:
-        return DofTable, (self.write(),)
+    @property
+    def rows(self) -> tuple[int, ...]:
+        """Zero-based."""
+        return self.values
 
     @classmethod
     def read(cls, data: object) -> DofTable:
@@ -79,12 +58,6 @@ class DofTable(tuple[str, ...]):
     def write(self) -> dict[str, int]:
         """The table that `read` reads."""
         return dict(zip(self, self.rows, strict=True))
-
-    @classmethod
-    def __get_pydantic_core_schema__(cls, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return core_schema.no_info_plain_validator_function(
-            cls.read, serialization=core_schema.plain_serializer_function_ser_schema(cls.write)
-        )
 
 
 def one_triangle(array: Any) -> str | None:

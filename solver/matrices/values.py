@@ -7,9 +7,9 @@ what they hold (`solver.matrices.scene_files`), so that a scene from somewhere e
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,7 @@ from pydantic import GetCoreSchemaHandler
 from pydantic_core import CoreSchema, core_schema
 
 FloatArray = NDArray[np.float64]
+ArrayOf = TypeVar("ArrayOf", bound=NDArray[Any])
 MOST_DOFS = 2000
 MOST_MODES = 2000
 _ENTRY_KEYS = ("size", "rows", "columns", "values")
@@ -25,24 +26,61 @@ _SPARSE_BELOW = 0.3  # share of entries that are not zero below which a matrix i
 _INLINE = "must be given inline here, as rows or as a table of entries: files are read by load_scene only"
 
 
-def _schema(read: Callable[[object], Any], write: Callable[[Any], Any], key: str | None) -> CoreSchema:
-    """Read and write for pydantic; a refusal names the key."""
+class Tabled:
+    """Data that scenes hold as a table: `read` makes them of one, or of themselves, `write` gives it back."""
 
-    def reader(data: object) -> Any:
-        try:
-            return read(data)
-        except ValueError as error:
-            raise ValueError(f"`{key}`: {error}" if key else str(error)) from error
+    __slots__ = ()
 
-    return core_schema.no_info_plain_validator_function(
-        reader, serialization=core_schema.plain_serializer_function_ser_schema(write)
-    )
+    @classmethod
+    def __get_pydantic_core_schema__(cls, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
+        made: Any = cls
+        return core_schema.no_info_plain_validator_function(
+            made.read, serialization=core_schema.plain_serializer_function_ser_schema(made.write)
+        )
+
+
+class ByContent(Tabled):
+    """Arrays that are equal where the hashes of their contents are."""
+
+    __slots__ = ()
+    digest: str
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, type(self)) and self.digest == other.digest
+
+    def __hash__(self) -> int:
+        return hash(self.digest)
+
+
+class Named(Tabled, tuple[str, ...]):
+    """Names in their order with a value of each, equal where both are."""
+
+    values: tuple[Any, ...]
+
+    def __new__(cls, table: Mapping[str, Any]) -> Self:
+        """Make them from a table of names and values."""
+        made = super().__new__(cls, table)
+        made.values = tuple(table.values())
+        return made
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, type(self)) and self.values == other.values and super().__eq__(other)
+
+    def __hash__(self) -> int:
+        return hash((tuple(self), self.values))
+
+    def __reduce__(self) -> tuple[type[Self], tuple[dict[str, Any]]]:
+        return type(self), (dict(zip(self, self.values, strict=True)),)
+
+
+def frozen(array: ArrayOf) -> ArrayOf:
+    """The array, read-only from now on."""
+    array.setflags(write=False)
+    return array
 
 
 def _frozen(array: FloatArray) -> FloatArray:
-    array = np.ascontiguousarray(array, dtype=np.float64)
-    array.setflags(write=False)
-    return array
+    return frozen(np.ascontiguousarray(array, dtype=np.float64))
 
 
 def _digest(*arrays: FloatArray) -> str:
@@ -53,7 +91,7 @@ def _digest(*arrays: FloatArray) -> str:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Matrix:
+class Matrix(ByContent):
     """A square matrix of a scene; equal to another with the same entries.
 
     Attributes
@@ -83,12 +121,6 @@ class Matrix:
             raise ValueError(f"a matrix must be finite, got {array[i, j]} in row {i}, column {j}")
         object.__setattr__(self, "array", _frozen(array))
         object.__setattr__(self, "digest", _digest(self.array))
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, Matrix) and self.digest == other.digest
-
-    def __hash__(self) -> int:
-        return hash(self.digest)
 
     def __repr__(self) -> str:
         return f"Matrix({self.size} x {self.size}, {self.digest[:12]})"
@@ -126,11 +158,21 @@ class Matrix:
 
     @classmethod
     def __get_pydantic_core_schema__(cls, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return _schema(cls.read, cls.write, handler.field_name)
+        def reader(data: object) -> Matrix:
+            try:
+                return cls.read(data)
+            except ValueError as error:
+                raise ValueError(
+                    f"`{handler.field_name}`: {error}" if handler.field_name else str(error)
+                ) from error
+
+        return core_schema.no_info_plain_validator_function(
+            reader, serialization=core_schema.plain_serializer_function_ser_schema(cls.write)
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Modes:
+class Modes(ByContent):
     """Mass-normalised modes of a structure: q'' + 2 ζ ω q' + ω² q = φᵀ f, x = φ q.
 
     Attributes
@@ -177,12 +219,6 @@ class Modes:
         kept = [a for a in (self.omega2, self.modes, self.damping_ratio) if a is not None]
         object.__setattr__(self, "digest", _digest(*kept))
 
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, Modes) and self.digest == other.digest
-
-    def __hash__(self) -> int:
-        return hash(self.digest)
-
     def __repr__(self) -> str:
         return f"Modes({self.modes.shape[0]} DOFs, {self.omega2.size} modes, {self.digest[:12]})"
 
@@ -227,10 +263,6 @@ class Modes:
         if self.damping_ratio is not None:
             table["damping_ratio"] = self.damping_ratio.tolist()
         return table
-
-    @classmethod
-    def __get_pydantic_core_schema__(cls, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return _schema(cls.read, cls.write, None)
 
 
 def as_json(tables: Mapping[str, Any]) -> dict[str, Any]:

@@ -32,7 +32,7 @@ from solver.modes.records import Record
 from solver.modes.results import NonlinearMode
 from solver.modes.start import begin
 from solver.response.stability.floquet import GROWS, growth_of
-from solver.results.told import Piece
+from solver.results.told import Piece, json_number
 from solver.scene.scene import Scene
 
 _MOST_COORDINATES = 200  # of a whole structure whose multipliers are computed unasked
@@ -99,9 +99,10 @@ class LimitCycle(Piece):
         """Return it as one JSON object."""
         return {
             "amplitude": self.amplitude, "frequency": self.frequency_hz, "max_abs": self.max_abs,
-            "amplitude_error": _number(self.amplitude_error),
-            "frequency_error": _number(self.frequency_error),
-            "max_abs_error": _number(self.max_abs_error), "damping_slope": _number(self.damping_slope),
+            "amplitude_error": json_number(self.amplitude_error),
+            "frequency_error": json_number(self.frequency_error),
+            "max_abs_error": json_number(self.max_abs_error),
+            "damping_slope": json_number(self.damping_slope),
             "attracts": self.attracts, "stable": self.stable, "growth": growth_from(self),
             "by_slope": self.multipliers is None,
         }  # fmt: skip
@@ -195,9 +196,9 @@ class LimitCycles(Piece):
             "aero_damping": self.aero_damping,
             "mode_alone": self.mode_alone,
             "completed": self.completed,
-            "most_damping": _number(self.most_damping),
-            "most_at": _number(self.most_at),
-            "most_error": _number(self.most_error),
+            "most_damping": json_number(self.most_damping),
+            "most_at": json_number(self.most_at),
+            "most_error": json_number(self.most_error),
             "most_at_end": self.most_at_end,
             "unsolved": [list(each) for each in self.unsolved],
             "cycles": [cycle.to_json() for cycle in self.cycles],
@@ -327,8 +328,3 @@ def _numbers(cycle: Cycle) -> Real:
 def growth_from(cycle: LimitCycle) -> str:
     """Return in words how a perturbation of a cycle grows."""
     return cycle.unknown if cycle.multipliers is None else growth_of(cycle.multipliers).value
-
-
-def _number(value: float) -> float | None:
-    """Return a float that JSON can carry."""
-    return value if math.isfinite(value) else None

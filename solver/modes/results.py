@@ -15,6 +15,7 @@ from solver.jit.fourier import Complex, Integer, Real
 from solver.modes.corrector import State
 from solver.response.contact_response import ContactState, state_of
 from solver.results.base import Drawn
+from solver.results.told import json_numbers
 from solver.results.views import Views
 from solver.scene.scene import Scene
 from solver.wording import listing
@@ -72,7 +73,7 @@ class NonlinearMode(Drawn):
         The unknowns of every point, for `solver.mode_gradient`; `whole_matrices` says of which equations.
     """
 
-    VIEWS: ClassVar = Views("solver.views", "of_mode", "mode_dataset", "of_mode")
+    VIEWS: ClassVar = Views("solver.views", "of_mode", "mode_dataset", "modes:mode_figure")
 
     scene: Scene
     mode: int
@@ -153,8 +154,8 @@ class NonlinearMode(Drawn):
             "amplitude": self.amplitude.tolist(),
             "frequency": self.frequency_hz.tolist(),
             "damping_ratio": self.damping_ratio.tolist(),
-            "frequency_error": _numbers(self.frequency_error),
-            "damping_error": _numbers(self.damping_error),
+            "frequency_error": json_numbers(self.frequency_error),
+            "damping_error": json_numbers(self.damping_error),
             "dof": self.scene.observe.dof,
             "max_abs": self.max_abs.tolist(),
             "contacts": list(self.contact_names),
@@ -164,8 +165,3 @@ class NonlinearMode(Drawn):
             "rejected_steps": self.rejected_steps,
             "seconds": self.seconds,
         }
-
-
-def _numbers(values: Real) -> list[float | None]:
-    """Return floats that JSON can carry."""
-    return [float(v) if math.isfinite(v) else None for v in values]

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, ClassVar
 from solver.jit.fourier import Real
 from solver.response.contact_response import ContactResponse
 from solver.results.base import Drawn
+from solver.results.told import json_number, json_numbers
 from solver.results.views import Views, on_demand
 from solver.scene.scene import Scene
 
@@ -189,25 +190,20 @@ class Solution(Drawn):
             "frequency_hz": self.frequency_hz,
             "converged": self.converged,
             "status": self.status.value,
-            "max_abs": _number(self.max_abs),
-            "half_peak_to_peak": _number(self.half_peak_to_peak),
-            "mean": _number(self.mean),
+            "max_abs": json_number(self.max_abs),
+            "half_peak_to_peak": json_number(self.half_peak_to_peak),
+            "mean": json_number(self.mean),
             "harmonics": self.harmonics.tolist() if self.converged else None,
             "flags": list(self.flags),
             "contacts": {contact.name: contact.state.value for contact in self.contacts},
             **self.stability.to_json(),
             "unique": only.unique,
             "unique_ground": only.ground,
-            "residual": _number(self.residual),
-            "error_estimate": _number(self.error_estimate),
+            "residual": json_number(self.residual),
+            "error_estimate": json_number(self.error_estimate),
             "n_harmonics": self.n_harmonics,
             "newton_iterations": self.newton_iterations,
             "seconds": self.seconds,
-            **({"drift_per_period": _number(self.drift_per_period)} if self.ratchets else {}),
-            **({"mean_range": [*map(_number, self.mean_range)]} if MEAN_UNDETERMINED in self.flags else {}),
+            **({"drift_per_period": json_number(self.drift_per_period)} if self.ratchets else {}),
+            **({"mean_range": json_numbers(self.mean_range)} if MEAN_UNDETERMINED in self.flags else {}),
         }
-
-
-def _number(value: float) -> float | None:
-    """Return a float that JSON can carry."""
-    return float(value) if math.isfinite(value) else None

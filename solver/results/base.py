@@ -93,7 +93,7 @@ class Drawn(Shown):
 
     def plot(self, ax: Axes | Sequence[Axes] | None = None) -> Figure:
         """Draw the result; `ax`: axes to draw into, else a new figure."""
-        figure: Figure = self.VIEWS.call("plots.figures", self, ax)
+        figure: Figure = self.VIEWS.call("plots.figures", self, ax=ax)
         return figure
 
 

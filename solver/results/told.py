@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
 from enum import Enum
 from html import escape
@@ -14,6 +15,16 @@ import numpy as np
 _MOST = 30
 _FEW = 6
 _DIGITS = 5
+
+
+def json_number(value: float) -> float | None:
+    """A number that JSON can carry: null where it is not finite."""
+    return float(value) if math.isfinite(value) else None
+
+
+def json_numbers(values: Iterable[float]) -> list[float | None]:
+    """Numbers that JSON can carry."""
+    return [json_number(value) for value in values]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

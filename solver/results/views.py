@@ -19,7 +19,9 @@ class Views:
     Parameters
     ----------
     package : where the modules ``summary``, ``to_dataset`` and ``plots.figures`` stand.
-    summary, dataset, figure : names of functions there; `figure` is empty where there is no picture.
+    summary, dataset : names of functions there.
+    figure : that of a function of ``plots.figures``, or ``module:name`` of one in ``plots`` that draws what
+        `to_json` gives; empty where there is no picture.
     """
 
     package: str
@@ -27,9 +29,11 @@ class Views:
     dataset: str
     figure: str = ""
 
-    def call(self, what: str, result: object, *arguments: Any, **options: Any) -> Any:
+    def call(self, what: str, result: Any, *arguments: Any, **options: Any) -> Any:
         """Show a result: `what` is ``summary``, ``to_dataset`` or ``plots.figures``."""
         name = {"summary": self.summary, "to_dataset": self.dataset, "plots.figures": self.figure}[what]
+        if ":" in name:
+            return on_demand(f"{self.package}.plots.{name}")(result.to_json(), *arguments, **options)
         return on_demand(f"{self.package}.{what}:{name}")(result, *arguments, **options)
 
 

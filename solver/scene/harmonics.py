@@ -38,12 +38,21 @@ def kept_harmonics(
     multiples : most multiples of a fast wave.
     odd : the response is half-wave symmetric: its odd harmonics are enough.
     """
-    forced = forced_harmonics(scene, paths)
+    orders, waves = load_orders(scene, paths), frozenset(force.harmonic for force in scene.forces)
+    forced = _forced(scene, paths, orders, waves)
+    return _kept(forced, frozenset(orders), waves, highest, odd, multiples).copy()
+
+
+@lru_cache(maxsize=64)
+def _kept(
+    forced: tuple[int, ...], orders: frozenset[int], waves: frozenset[int], highest: int, odd: bool,
+    multiples: int,
+) -> Integer:  # fmt: skip
     kept = {*range(highest + 1), *forced}
-    for k in load_orders(scene, paths):
+    for k in orders:
         # Friction is the load times the direction of slip: sums and differences with a slow wave.
         kept |= set(range(k - 1, k + 2)) if k > max(highest, 1) else set()
-    for h in {force.harmonic for force in scene.forces}:
+    for h in waves:
         if h < FAST:
             continue
         kept |= {m * h for m in range(1, min(highest, multiples) + 1) if m * h <= MOST_HARMONICS}
@@ -56,11 +65,14 @@ def kept_harmonics(
 
 def forced_harmonics(scene: Scene, paths: Iterable[str] = ()) -> tuple[int, ...]:
     """Return the harmonics of the forces and of the normal loads that vary, ascending."""
-    found = {force.harmonic for force in scene.forces}
-    orders = load_orders(scene, paths)
-    found |= {0, *orders} if orders else set()
-    if any(changes_loads(scene, path) for path in paths):
-        found.add(0)
+    waves = frozenset(force.harmonic for force in scene.forces)
+    return _forced(scene, paths, load_orders(scene, paths), waves)
+
+
+def _forced(scene: Scene, paths: Iterable[str], orders: set[int], waves: frozenset[int]) -> tuple[int, ...]:
+    found = waves | orders
+    if orders or any(changes_loads(scene, path) for path in paths):
+        found |= {0}
     return tuple(sorted(found))
 
 
@@ -91,6 +103,18 @@ def spread(coefficients: Real, ks: Integer, wider: Integer) -> Real:
     here, there = places(ks, wider)
     full[..., there] = coefficients[..., here]
     return full
+
+
+def among(ks: Integer, wider: Integer) -> Flags:
+    """Return which harmonics of `wider` are among `ks`."""
+    return _among(ks.tobytes(), wider.tobytes())
+
+
+@lru_cache(maxsize=64)
+def _among(one: bytes, other: bytes) -> Flags:
+    found: Flags = np.isin(np.frombuffer(other, np.int64), np.frombuffer(one, np.int64))
+    found.flags.writeable = False
+    return found
 
 
 def places(ks: Integer, wider: Integer) -> tuple[Integer, Integer]:

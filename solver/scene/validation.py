@@ -35,8 +35,19 @@ from solver.scene.parts import (
     Reduction,
     Spring,
 )
-from solver.scene.terms.keys import TERM_KEYS
+from solver.scene.terms.linear_terms import Aerodynamics, Coupling, DiameterCoefficient, Influence
+from solver.scene.terms.recovery import Recovered
+from solver.scene.terms.speed import SpeedDependence
 from solver.wording import listing, nearest, quoted
+
+TERM_KEYS: dict[tuple[str, ...], tuple[str, tuple[str, ...]]] = {
+    ("with_speed",): ("a dependence on the speed", tuple(SpeedDependence.model_fields)),
+    ("recovery",): ("a recovered quantity", tuple(Recovered.model_fields)),
+    ("couplings",): ("a coupling", tuple(Coupling.model_fields)),
+    ("aerodynamics",): ("aerodynamics", tuple(Aerodynamics.model_fields)),
+    ("aerodynamics", "influence"): ("an influence", tuple(Influence.model_fields)),
+    ("aerodynamics", "nodal_diameters"): ("a nodal diameter", tuple(DiameterCoefficient.model_fields)),
+}
 
 MOST_ISSUES = 200  # of each kind: a scene with more is not read by a person
 RESERVED_PREFIXES = ("excitation", "structure", "frequency", "observe", "speed")

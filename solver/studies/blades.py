@@ -12,6 +12,7 @@ import numpy as np
 from solver.contacts.kernels.stick_slip_events import largest
 from solver.continuation.branch import Branch, BranchStatus
 from solver.continuation.branches.observation import highest_peaks, observing
+from solver.continuation.branches.samples import sampled
 from solver.continuation.branches.sweep import sweep
 from solver.continuation.settings import ContinuationSettings
 from solver.errors import SettingError
@@ -81,8 +82,8 @@ class BladePeaks(MadeOfResponses, Drawn):
     status : tuple of BranchStatus
         How each sector's branch ended.
     branches : tuple of Branch
-        The response of each blade, the same one where all are alike; without those that were not reached. Of
-        the first blade alone where no more was asked for.
+        The response of each blade, the same one where all are alike; without those that were not reached.
+        Where no more was asked for, of the blade with the highest peak alone, with the peaks that may be it.
     highest : Known
         How well the highest peak of all is known.
     """
@@ -111,7 +112,7 @@ class BladePeaks(MadeOfResponses, Drawn):
             return None
         if len(self.branches) == len(self.value):
             return self.branches[self.worst]
-        return observing(self.branches[0], f"{self.dof}@{self.worst}")
+        return observing(self.branches[0], self.branches[0].balance.scene.observe.dof)
 
     VIEWS: ClassVar = Views("solver.views", "of_blade_peaks", "blade_peaks_dataset", "of_blade_peaks")
 
@@ -156,8 +157,7 @@ def blade_peaks(
     harmonics : highest harmonic kept.
     settings : of the continuation.
     every_branch : whether to make the whole response of every blade, with all of its peaks and its error
-        estimate; else `branches` has that of the first blade alone, without the estimate, in a fraction of
-        the time.
+        estimate; else `branches` has that of one blade alone, in a fraction of the time.
     on_progress : called with (share done, blades so far).
     should_stop : asked between stretches of the sweep and between blades.
 
@@ -178,12 +178,22 @@ def blade_peaks(
         if on_progress is not None:
             on_progress(share if len(names) == 1 else _OF_THE_SWEEP * share, 0)
 
-    branch = sweep(
-        _observing(scene, names[0]), start=start, stop=stop, harmonics=harmonics, settings=settings,
-        errors=every_branch or len(names) == 1, on_progress=progress, should_stop=should_stop,
-    )  # fmt: skip
-    if len(names) > 1 and branch.completed and not every_branch:
-        return _informed(_highest(branch, name, names))
+    whole, seen = every_branch or len(names) == 1, _observing(scene, names[0])
+    branch = None if whole or settings is not None else sampled(seen, start, stop, harmonics, should_stop)
+    if branch is not None and branch.completed:
+        progress(1.0, len(branch.values))
+    if branch is None:
+        branch = sweep(
+            seen, start=start, stop=stop, harmonics=harmonics, settings=settings, errors=whole, peaks=whole,
+            on_progress=progress, should_stop=should_stop,
+        )  # fmt: skip
+    if not whole and branch.completed:
+        peaks, highest = highest_peaks(branch, names)
+        return BladePeaks(
+            dof=name, value=np.array([peak.value for peak in peaks]),
+            at_hz=np.array([peak.at for peak in peaks]), status=(branch.status,) * len(names),
+            branches=(highest,), highest=highest.known,
+        )  # fmt: skip
     branches = [branch] * repeats
     for done, each in enumerate(names[1:], 1):
         if should_stop is not None and should_stop():
@@ -201,25 +211,8 @@ def blade_peaks(
         status=tuple(each.status for each in branches) + (BranchStatus.STOPPED,) * missing,
         branches=tuple(branches),
     )
-    return _informed(found)
-
-
-def _informed(peaks: BladePeaks) -> BladePeaks:
-    """Return the peaks with how well the highest is known."""
-    worst = peaks.worst_branch
-    return peaks if worst is None else replace(peaks, highest=worst.known)
-
-
-def _highest(branch: Branch, name: str, names: Sequence[str]) -> BladePeaks:
-    """Return the highest peaks of all blades of a completed response, with its branch."""
-    first = branch.peak
-    others, branch = highest_peaks(branch, names[1:])
-    peaks = [*([] if first is None else [first]), *others]
-    return BladePeaks(
-        dof=name, value=np.array([peak.value for peak in peaks]),
-        at_hz=np.array([peak.at for peak in peaks]), status=(branch.status,) * len(names),
-        branches=(branch,),
-    )  # fmt: skip
+    worst = found.worst_branch
+    return found if worst is None else replace(found, highest=worst.known)
 
 
 def _observing(scene: Scene, dof: str) -> Scene:

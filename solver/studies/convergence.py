@@ -119,7 +119,7 @@ class AccuracyStudy(Drawn):
         """Whether no way was left out."""
         return self.status is AccuracyStatus.COMPLETED
 
-    VIEWS: ClassVar = Views("solver.views", "of_accuracy", "accuracy_dataset", "of_accuracy")
+    VIEWS: ClassVar = Views("solver.views", "of_accuracy", "accuracy_dataset", "accuracy:accuracy_figure")
 
     def to_json(self) -> dict[str, object]:
         """Return the study as one JSON object."""

@@ -184,7 +184,9 @@ class InterferenceDiagram(Drawn):
         """Whether no nodal diameter is missing that the structure is known at."""
         return self.status is InterferenceStatus.COMPLETED
 
-    VIEWS: ClassVar = Views("solver.views", "of_interference", "interference_dataset", "of_interference")
+    VIEWS: ClassVar = Views(
+        "solver.views", "of_interference", "interference_dataset", "interference:interference_figure"
+    )
 
     def to_json(self) -> dict[str, object]:
         """Return the diagram as one JSON object."""

@@ -23,7 +23,7 @@ from solver.results.base import Drawn, MadeOfResponses
 from solver.results.default_bar import shows_progress
 from solver.results.known import Known
 from solver.results.order_statistics import quantile_json
-from solver.results.told import Piece
+from solver.results.told import Piece, json_number
 from solver.results.views import Views
 from solver.results.watch import OnProgress, ShouldStop, part_of
 from solver.scene.parts import LumpedStructure, Mistuning
@@ -83,13 +83,13 @@ class MistunedDisk(Piece):
         return {
             "seed": self.seed,
             "factors": list(self.factors),
-            "peaks": [_number(value) for value in self.peaks.value.tolist()],
-            "at_hz": [_number(value) for value in self.peaks.at_hz.tolist()],
+            "peaks": [json_number(value) for value in self.peaks.value.tolist()],
+            "at_hz": [json_number(value) for value in self.peaks.at_hz.tolist()],
             "largest": self.peaks.largest if self.known else None,
             "worst_blade": self.peaks.worst if self.known else None,
-            "magnification": _number(self.magnification),
-            "error_estimate": _number(self.peaks.highest.error_estimate),
-            "magnification_error": _number(self.magnification_error),
+            "magnification": json_number(self.magnification),
+            "error_estimate": json_number(self.peaks.highest.error_estimate),
+            "magnification_error": json_number(self.magnification_error),
             "measure": self.peaks.highest.measure,
             "flags": list(self.peaks.highest.flags),
         }
@@ -146,7 +146,7 @@ class MistuningStudy(MadeOfResponses, Drawn):
         """The disk with the highest peak."""
         return max((d for d in self.disks if d.known), key=lambda disk: disk.magnification, default=None)
 
-    VIEWS: ClassVar = Views("solver.views", "of_mistuning", "mistuning_dataset", "of_mistuning")
+    VIEWS: ClassVar = Views("solver.views", "of_mistuning", "mistuning_dataset", "disks:mistuning_figure")
 
     def known_parts(self) -> Iterable[Known]:
         """The highest blades of the tuned disk and of every other."""
@@ -168,7 +168,7 @@ class MistuningStudy(MadeOfResponses, Drawn):
             },
             "samples": [disk.to_json() for disk in self.disks],
             "mean": float(factors.mean()) if factors.size else None,
-            "mean_error": _number(self.mean_error),
+            "mean_error": json_number(self.mean_error),
             "standard_error": float(factors.std(ddof=1) / math.sqrt(factors.size)) if several else None,
             "deviation": float(factors.std(ddof=1)) if several else None,
             "quantiles": [
@@ -343,8 +343,3 @@ def _status(compared: bool, disks: Sequence[MistunedDisk]) -> MistuningStatus:
         return MistuningStatus.NO_RESPONSE
     known = all(disk.known for disk in disks)
     return MistuningStatus.COMPLETED if known else MistuningStatus.INCOMPLETE
-
-
-def _number(value: float) -> float | None:
-    """Return a float that JSON can carry (null for NaN)."""
-    return value if math.isfinite(value) else None

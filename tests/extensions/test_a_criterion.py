@@ -21,11 +21,10 @@ import optim
 import solver
 from optim.criteria.evaluation import evaluate
 from optim.criteria.registry import criteria, register, unregister
-from optim.criteria.table import criteria_table
 from optim.problem.problem import pose
 from service.client.client import Client
 from service.errors import ServiceProblem
-from service.rendering.docs_tables import TABLES
+from service.rendering.docs_tables import TABLES, criteria_table
 from solver import extensions
 
 ROOT = Path(__file__).resolve().parent.parent.parent

@@ -17,10 +17,10 @@ import solver
 from service.cli import main
 from service.client.client import Client
 from service.jobs.kinds import SHIPPED
+from service.rendering.docs_tables import formats_table
 from solver import extensions
 from solver.matrices.files import MatrixFileError, read_matrix
 from solver.matrices.readers import registry
-from solver.matrices.readers.table import formats_table
 from solver.scene.scene import Scene
 
 M = np.diag([0.02, 0.03, 0.04])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 from pathlib import Path
@@ -66,24 +65,3 @@ def test_errors_and_scenes_load_no_kernels() -> None:
     """What a script does before it computes."""
     code = "import stickslip; stickslip.SceneError; stickslip.load_scene('two-dof')"
     assert loaded_by(code) & {"numba", "scipy", "casadi", "matplotlib", "httpx"} == set()
-
-
-def check(script: str, folder: Path) -> str:
-    """What mypy says of a user's script under its strictest rules, as of an installed package."""
-    pytest.importorskip("mypy")
-    (folder / "script.py").write_text(script, "utf-8")
-    words = ["--strict", "--follow-imports", "silent", "--config-file", os.devnull, "--cache-dir", "cache"]
-    done = subprocess.run(
-        [sys.executable, "-m", "mypy", *words, "script.py"], cwd=folder, capture_output=True, text=True,
-        check=False, env={**os.environ, "MYPYPATH": str(ROOT)},
-    )  # fmt: skip
-    return done.stdout
-
-
-@pytest.mark.long
-def test_a_checker_knows_every_name_and_no_other(tmp_path: Path) -> None:
-    names = "\n".join(f"stickslip.{name}" for name in (*stickslip.__all__, "__version__"))
-    assert check(f"import stickslip\nfrom stickslip import Scene, solve\n{names}\n", tmp_path).startswith(
-        "Success"
-    )
-    assert 'has no attribute "solv"' in check("import stickslip\nstickslip.solv\n", tmp_path)

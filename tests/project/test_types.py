@@ -13,6 +13,7 @@ import pytest
 
 import optim
 import solver
+import stickslip
 
 SCRIPT = Path(__file__).resolve().parent.parent / "data" / "user_types.py"
 
@@ -75,3 +76,11 @@ def test_a_checker_finds_wrong_keywords_and_types(tmp_path: Path) -> None:
     assert 'Unexpected keyword argument "max_band_hz"' in found[9]
     for line, argument in ((6, "variables"), (7, "method"), (8, "max_peak")):
         assert f'Argument "{argument}"' in found[line]
+
+
+@pytest.mark.long
+def test_a_checker_knows_every_name_and_no_other(tmp_path: Path) -> None:
+    names = "\n".join(f"stickslip.{name}" for name in (*stickslip.__all__, "__version__"))
+    known = f"import stickslip\nfrom stickslip import Scene, solve\n{names}\n"
+    assert mypy(known, tmp_path).startswith("Success")
+    assert 'has no attribute "solv"' in mypy("import stickslip\nstickslip.solv\n", tmp_path)

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import re
 import threading
 import time
+import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import httpx
 import pytest
@@ -139,3 +142,41 @@ def until(condition: Callable[[], object], seconds: float = PATIENCE) -> None:
 def pids(file: Path) -> list[int]:
     """Process numbers that the private kinds wrote, one for each attempt."""
     return [int(line) for line in file.read_text().split()] if file.exists() else []
+
+
+def pdf_objects(pdf: bytes) -> bytes:
+    """What stands in the compressed streams of a PDF."""
+    streams = re.findall(rb"stream\r?\n(.*?)\r?\nendstream", pdf, re.DOTALL)
+    return b"\n".join(zlib.decompress(one) for one in streams if one.startswith(b"x"))
+
+
+def within(value: float | None, query: dict[str, Any], name: str) -> bool:
+    """Whether a value meets the range that a query has for a name."""
+    low, high = query.get(f"{name}_min"), query.get(f"{name}_max")
+    if low is None and high is None:
+        return True
+    return value is not None and (low is None or value >= low) and (high is None or value <= high)
+
+
+def listed(page_of: Callable[..., Any], repository: object, asked: Any) -> list[Any]:
+    """The items of all pages of a query."""
+    found: list[Any] = []
+    while True:
+        page = page_of(repository, asked, load_settings())
+        found += page.items
+        if page.next is None:
+            return found
+        asked = asked.model_copy(update={"cursor": page.next.rpartition("cursor=")[2]})
+
+
+def in_order(
+    records: dict[Any, Any], sort: str, columns: dict[str, str], meets: Callable[[Any], bool]
+) -> list[Any]:
+    """The keys of the records that meet a query, sorted as it asks; of what was created first, the least."""
+    name = sort.removeprefix("-")
+
+    def value(record: Any) -> Any:
+        return 0.0 if name == "created" else getattr(record, columns.get(name, name))
+
+    wanted = [key for key, record in records.items() if meets(record) and value(record) is not None]
+    return sorted(wanted, key=lambda key: (value(records[key]), key), reverse=sort.startswith("-"))

@@ -22,6 +22,7 @@ from service.auth.callers import KeyLimits, Scope
 from service.auth.rate_limit import Buckets
 from service.cli import main
 from service.client.client import Client
+from service.db import tokens
 from service.db.clock import utc_now
 from service.db.engine import Database
 from service.db.repositories.keys import KeyRepository
@@ -52,15 +53,15 @@ def test_only_a_digest_is_kept(database: Database) -> None:
     with database.reading() as connection:
         [row] = connection.execute(text("SELECT * FROM api_key")).all()
     assert made.token.rpartition("_")[2] not in str(row)
-    assert keys.digest_of(made.token) in row
+    assert tokens.digest_of(made.token) in row
     assert made.token not in repr(made)
-    assert keys.matches(made.token, repository.get(made.row.id))
-    other = keys.rotate(repository, made.row.id)
-    assert not keys.matches(made.token, repository.get(made.row.id)), "the old secret ends"
-    assert keys.matches(other.token, repository.get(made.row.id))
+    assert tokens.matches(made.token, repository.get(made.row.id))
+    other = repository.rotate(made.row.id)
+    assert not tokens.matches(made.token, repository.get(made.row.id)), "the old secret ends"
+    assert tokens.matches(other.token, repository.get(made.row.id))
     assert keys.caller_of_row(other.row).limits.waiting == 3
     assert repository.usable(utc_now())
-    keys.revoke(repository, made.row.id, utc_now())
+    repository.revoke(made.row.id)
     assert not repository.usable(utc_now())
 
 
@@ -73,7 +74,7 @@ def test_an_unknown_key_is_compared_too(monkeypatch: pytest.MonkeyPatch) -> None
         return real(a, b)
 
     monkeypatch.setattr(hmac, "compare_digest", watched)
-    assert not keys.matches("stickslip_000000000000_" + "0" * 64, None)
+    assert not tokens.matches("stickslip_000000000000_" + "0" * 64, None)
     assert compared == [(64, 64)]
 
 
@@ -102,7 +103,7 @@ def test_the_command_works_beside_a_service_and_a_revoked_key_ends(
     assert (shown["scopes"], shown["limits"]) == (["submit"], {"waiting": 2})
     assert shown["last_used"] is not None
     assert token not in printed
-    assert keys.digest_of(token) not in printed
+    assert tokens.digest_of(token) not in printed
     assert main(["keys", "rotate", shown["id"], *at]) == 0
     rotated = capsys.readouterr().out.strip()
     assert REMEMBERED_SECONDS <= 1.0, "what a key may is looked up again after that"
@@ -119,7 +120,7 @@ def test_a_stream_ends_with_its_key(guarded: ServedClient) -> None:
     with guarded.stream("GET", f"{job['links']['self']}/events", headers=bearer(token)) as stream:
         lines = stream.iter_lines()
         next(lines)
-        keys.revoke(guarded.service.keys, str(keys.id_of(token)), utc_now())
+        guarded.service.keys.revoke(str(keys.id_of(token)))
         rest = list(lines)
     assert not any(line.startswith("event: end") for line in rest)
     admin = bearer(token_of(guarded, Scope.ADMIN))

@@ -14,7 +14,7 @@ import httpx
 import pytest
 import sqlalchemy as sa
 from alembic import command
-from service_helpers import analyse, is_problem
+from service_helpers import analyse, in_order, is_problem, listed, within
 from sqlalchemy import Connection, func, insert, inspect, select
 
 import optim
@@ -102,13 +102,6 @@ def meets(record: DesignRecord, query: dict[str, Any]) -> bool:
     )
 
 
-def within(value: float | None, query: dict[str, Any], name: str) -> bool:
-    low, high = query.get(f"{name}_min"), query.get(f"{name}_max")
-    if low is None and high is None:
-        return True
-    return value is not None and (low is None or value >= low) and (high is None or value <= high)
-
-
 @pytest.mark.parametrize(
     "query",
     [
@@ -129,25 +122,10 @@ def within(value: float | None, query: dict[str, Any], name: str) -> bool:
 )
 def test_filters_sorts_and_pages(filled: Filled, query: dict[str, Any]) -> None:
     database, records = filled
-    repository, settings = DesignRepository(database), load_settings()
-    found: list[str] = []
-    asked = DesignQuery(**{"limit": 37, **query})
-    while True:
-        page = design_page(repository, asked, settings)
-        found += [item.id for item in page.items]
-        if page.next is None:
-            break
-        asked = asked.model_copy(update={"cursor": page.next.rpartition("cursor=")[2]})
-    sort = query.get("sort", "-created")
-    name, down = sort.removeprefix("-"), sort.startswith("-")
-    column = {"band": "band_hz"}.get(name, name)
-    wanted = [
-        design
-        for design, record in records.items()
-        if meets(record, query) and (name == "created" or getattr(record, column) is not None)
-    ]
-    key = (lambda i: (getattr(records[i], column), i)) if name != "created" else (lambda i: (0.0, i))
-    assert found == sorted(wanted, key=key, reverse=down)
+    found = listed(design_page, DesignRepository(database), DesignQuery(**{"limit": 37, **query}))
+    sort, columns = query.get("sort", "-created"), {"band": "band_hz"}
+    wanted = in_order(records, sort, columns, lambda record: meets(record, query))
+    assert [item.id for item in found] == wanted
 
 
 def test_a_design_is_answered_as_it_was_stored(filled: Filled) -> None:

@@ -140,10 +140,10 @@ def test_what_is_said_of_runs_goes_with_its_tables_and_the_runs_stay(old: str) -
     service.open()
     try:
         job = service.jobs.page(limit=1)[0].id
-        project = service.projects.add("old things", "").id
+        project = service.projects.add("", "old things", "").id
         words = {"name": "of old", "project": project, "tags": ("a", "b")}
-        assert service.runs.change(job, words).words.tags == ("a", "b")
-        service.shares.add(job, None)
+        assert service.runs.change(job, words, None, None).words.tags == ("a", "b")
+        service.shares.add(job, None, None)
     finally:
         service.database.close()
     assert check(old).trouble == ()

@@ -198,7 +198,7 @@ def together(previews: Previews, *asked: tuple[str, float, str]) -> list[bytes |
 
 @pytest.fixture(scope="module")
 def previews() -> Any:
-    made = Previews(1.0, KINDS)
+    made = Previews(1.0, KINDS, workers=1)
     together(made, ("spend", 0.0, ""))
     yield made
     made.close()
@@ -240,8 +240,19 @@ def test_what_cannot_be_computed_says_why(previews: Previews) -> None:
     assert after == b'{"spent":0.0}'
 
 
+def test_two_are_computed_at_a_time() -> None:
+    both = Previews(5.0, KINDS)
+    together(both, ("spend", 0.0, ""))
+    until(lambda: both._executor is not None and both._executor.status().ready == 2)
+    with ThreadPoolExecutor(1) as pool:
+        answers = pool.submit(together, both, ("spend", 1.0, "a"), ("spend", 1.0, "b"))
+        until(lambda: len(both._running) == 2)
+        assert answers.result() == [b'{"spent":1.0}'] * 2
+    both.close()
+
+
 def test_closing_tells_those_who_wait() -> None:
-    closing = Previews(5.0, KINDS)
+    closing = Previews(5.0, KINDS, workers=1)
     together(closing, ("spend", 0.0, ""))
     with ThreadPoolExecutor(1) as pool:
         answers = pool.submit(together, closing, ("spend", 4.0, "a"), ("spend", 4.0, "b"))

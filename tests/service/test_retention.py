@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
@@ -23,19 +22,17 @@ from service.db.engine import Database
 from service.db.integrity import check
 from service.db.models import Design, Job, JobResult, JobState, Sweep, SweepArray, Upload
 from service.db.repositories import JobRepository, UploadRepository
+from service.db.repositories.projects import Projects
 from service.db.repositories.retention import Pruned, RetentionRepository
 from service.db.repositories.rows import RunWords
-from service.db.repositories.workbench.projects import ProjectRepository
-from service.db.repositories.workbench.rows import ShareRow
-from service.db.repositories.workbench.runs import RunRepository
-from service.db.repositories.workbench.shares import ShareRepository
+from service.db.repositories.runs import Runs
+from service.db.repositories.shares import Shares
 from service.db.run_models import RunTag
 from service.errors import ConflictError, DatabaseError, StorageFullError
 from service.jobs.arrays import encode
 from service.jobs.outputs import DesignRecord, JobOutput, SweepRecord
 from service.queue.pruning import prune_database
 from service.queue.retention import Retention, prune, prune_uploads
-from service.queue.workbench import Runs
 
 DAY = timedelta(days=1)
 
@@ -265,17 +262,13 @@ def binned(database: Database) -> tuple[Database, dict[str, str]]:
         "source": ended(database, 9.0, output, spec_hash="3" * 64),
     }
     found["user"] = ended(database, 9.0, output, spec_hash="3" * 64, fresh=False)
-    shares = ShareRepository(database)
-    for number, days in enumerate((-1.0, 1.0)):
-        row = ShareRow(
-            id=str(number), job_id=found["user"], digest="0" * 64, created=utc_now(),
-            expires=utc_now() + days * DAY,
-        )  # fmt: skip
-        shares.add(row, most=2)
+    shares = Shares(database, Runs(database, utc_now, 7.0), utc_now)
+    for days in (-1.0, 1.0):
+        shares.add(found["user"], days, None, most=2)
     with pytest.raises(StorageFullError):
-        shares.add(replace(row, id="2"), most=2)
+        shares.add(found["user"], None, None, most=2)
     for name, days in (("old", 8.0), ("design", 8.0), ("young", 1.0), ("source", 8.0)):
-        RunRepository(database, lambda days=days: utc_now() - days * DAY).put_in_bin(found[name])
+        Runs(database, lambda days=days: utc_now() - days * DAY, 7.0).put_in_bin(found[name], None)
     return database, found
 
 
@@ -283,16 +276,14 @@ def test_what_was_in_the_bin_for_days_is_deleted_for_good(
     binned: tuple[Database, dict[str, str]], make_settings: MakeSettings
 ) -> None:
     database, made = binned
-    projects = ProjectRepository(database, lambda: utc_now() - 8.0 * DAY)
+    projects = Projects(database, lambda: utc_now() - 8.0 * DAY, 7.0)
     project, kept = (projects.add("", name, "", most=9).id for name in ("thrown away", "kept"))
-    RunRepository(database, utc_now).change(
-        RunRepository(database, utc_now).get(made["user"]), {"project": project}
-    )
-    projects.change(project, {"deleted": utc_now() - 8.0 * DAY})
+    Runs(database, utc_now, 7.0).change(made["user"], {"project": project}, None, None)
+    projects.put_in_bin(project, None)
     assert RetentionRepository(database).count(before(7), keep_designs=True).projects == 1
     retention = Retention(database, make_settings(), utc_now)
     assert retention.once() == Pruned(jobs=2, sweeps=2, projects=1, links=1)
-    runs = RunRepository(database, utc_now)
+    runs = Runs(database, utc_now, 7.0)
     there = {name: runs.get(job) for name, job in made.items()}
     assert {name for name, row in there.items() if row is not None} == {"young", "source", "user"}
     assert there["user"].words.project is None, "its runs stay without it"
@@ -303,10 +294,10 @@ def test_what_was_in_the_bin_for_days_is_deleted_for_good(
 
 
 def test_a_run_whose_time_in_the_bin_is_over_is_not_restored(
-    binned: tuple[Database, dict[str, str]], make_settings: MakeSettings
+    binned: tuple[Database, dict[str, str]],
 ) -> None:
     database, made = binned
-    runs = Runs(database, make_settings(), utc_now)
+    runs = Runs(database, utc_now, 7.0)
     with pytest.raises(ConflictError, match="in the bin for more than 7 days"):
-        runs.restore(made["old"])
-    assert runs.restore(made["young"]).deleted is None
+        runs.restore(made["old"], None)
+    assert runs.restore(made["young"], None).deleted is None

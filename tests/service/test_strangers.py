@@ -228,7 +228,7 @@ def make_tokens(client: ServedClient) -> dict[str, str | None]:
         "admin": token("chief", Scope.ADMIN),
         "monitor": token("watch", Scope.MONITOR),
     }
-    keys.revoke(repository, str(keys.id_of(str(tokens["revoked"]))), now)
+    repository.revoke(str(keys.id_of(str(tokens["revoked"]))))
     return tokens
 
 

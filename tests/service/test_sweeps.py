@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from private_kinds import A_SWEEP
-from service_helpers import analyse
+from service_helpers import analyse, in_order, listed, within
 
 from service.db.clock import utc_now
 from service.db.engine import Database
@@ -62,13 +62,6 @@ def filled(module_database: Database) -> tuple[Database, list[SweepRecord]]:
     return module_database, records
 
 
-def within(value: float | None, query: dict[str, Any], name: str) -> bool:
-    low, high = query.get(f"{name}_min"), query.get(f"{name}_max")
-    if low is None and high is None:
-        return True
-    return value is not None and (low is None or value >= low) and (high is None or value <= high)
-
-
 def meets(record: SweepRecord, query: dict[str, Any]) -> bool:
     """The same conditions in plain Python."""
     same = {
@@ -111,25 +104,12 @@ def meets(record: SweepRecord, query: dict[str, Any]) -> bool:
 )
 def test_filters_sorts_and_pages(filled: tuple[Database, list[SweepRecord]], query: dict[str, Any]) -> None:
     database, records = filled
-    repository, settings = SweepRepository(database), load_settings()
+    repository = SweepRepository(database)
     positions = {row.id: row.position for row in repository.of_job(JobRepository(database).page()[0].id)}
-    found: list[int] = []
-    asked = SweepQuery(**{"limit": 97, **query})
-    while True:
-        page = sweep_page(repository, asked, settings)
-        found += [positions[item.id] for item in page.items]
-        if page.next is None:
-            break
-        asked = asked.model_copy(update={"cursor": page.next.rpartition("cursor=")[2]})
+    found = listed(sweep_page, repository, SweepQuery(**{"limit": 97, **query}))
     sort = query.get("sort", "-created")
-    name, down = sort.removeprefix("-"), sort.startswith("-")
-    wanted = [
-        index
-        for index, record in enumerate(records)
-        if meets(record, query) and (name == "created" or getattr(record, name) is not None)
-    ]
-    key = (lambda i: (getattr(records[i], name), i)) if name != "created" else (lambda i: (0.0, i))
-    assert found == sorted(wanted, key=key, reverse=down)
+    wanted = in_order(dict(enumerate(records)), sort, {}, lambda record: meets(record, query))
+    assert [positions[item.id] for item in found] == wanted
 
 
 def test_a_range_is_met_by_one_contact_alone(database: Database) -> None:

@@ -15,11 +15,16 @@ from service.db.clock import utc_now
 from service.db.engine import Database
 from service.db.models import JobState
 from service.db.repositories import JobRepository
+from service.db.repositories.projects import Projects
 from service.db.repositories.rows import RunWords
-from service.db.repositories.workbench.projects import ProjectRepository
-from service.db.repositories.workbench.rows import RunFilter
-from service.db.repositories.workbench.runs import RunRepository
-from service.errors import ChangedMeanwhileError, InvalidRequestError, ServiceProblem, StorageFullError
+from service.db.repositories.runs import RunFilter, Runs
+from service.errors import (
+    ChangedMeanwhileError,
+    ConflictError,
+    InvalidRequestError,
+    ServiceProblem,
+    StorageFullError,
+)
 from service.jobs.differences import differences, figures
 from solver.scene.scene import load_scene
 
@@ -282,8 +287,8 @@ def test_the_client_has_a_method_for_each(http: ServedClient) -> None:
 
 
 def test_every_filter_holds_on_both_databases(database: Database) -> None:
-    jobs, runs = JobRepository(database), RunRepository(database, utc_now)
-    projects = ProjectRepository(database, utc_now)
+    jobs, runs = JobRepository(database), Runs(database, utc_now, bin_days=7.0)
+    projects = Projects(database, utc_now, bin_days=7.0)
     project = projects.add("ann", "shroud", "", most=1).id
     with pytest.raises(StorageFullError):
         projects.add("ann", "one too many", "", most=1)
@@ -299,29 +304,30 @@ def test_every_filter_holds_on_both_databases(database: Database) -> None:
     assert len(jobs.page(owner=None)) == 3, "what was refused is not there"
 
     def found(**wanted: Any) -> list[str]:
-        return [row.job.id for row in runs.page(RunFilter(**{"owner": "ann", **wanted}), 10)]
+        return [row.job.id for row in runs.page(RunFilter(**{"sees": "ann", **wanted}), 10)]
 
     assert found() == [hard, soft]
-    assert found(owner=None) == [other, hard, soft]
-    assert found(owner=None, of_owner="ben") == [other]
-    assert found(project=project) == found(tags=("x", "y")) == found(text="SOFTER") == [soft]
+    assert found(sees=None) == [other, hard, soft]
+    assert found(sees=None, owner="ben") == [other]
+    assert found(project=project) == found(tag=("x", "y")) == found(text="SOFTER") == [soft]
     assert found(text="a_b") == [soft]
     assert found(text="aXb") == found(text="%") == []
-    assert found(states=[JobState.RUNNING]) == []
-    assert found(states=[JobState.RUNNING, JobState.ACCEPTED], kind="iteration") == [hard, soft]
+    assert found(status=[JobState.RUNNING]) == []
+    assert found(status=[JobState.RUNNING, JobState.ACCEPTED], kind="iteration") == [hard, soft]
     created = {row.id: row.created for row in jobs.page(owner="ann")}
-    assert found(after=created[soft], before=created[hard]) == [soft]
-    assert [row.job.id for row in runs.page(RunFilter(owner="ann"), 10, before=hard)] == [soft]
-    row = runs.get(soft)
-    assert row is not None
-    runs.change(row, {"tags": ("z",), "project": None}, expected={1})
+    assert found(created_after=created[soft], created_before=created[hard]) == [soft]
+    assert [row.job.id for row in runs.page(RunFilter(sees="ann"), 10, before=hard)] == [soft]
+    runs.change(soft, {"tags": ("z",), "project": None}, {1}, None)
     with pytest.raises(ChangedMeanwhileError):
-        runs.change(row, {"name": "late"}, expected={1})
+        runs.change(soft, {"name": "late"}, {1}, None)
     changed = runs.get(soft)
     assert changed is not None
     assert (changed.words, changed.revision) == (RunWords(name="Softer", notes="a_b", tags=("z",)), 2)
-    runs.put_in_bin(hard)
+    with pytest.raises(ConflictError, match="dismiss it first"):
+        runs.put_in_bin(hard, None)
+    jobs.cancel(hard)
+    runs.put_in_bin(hard, None)
     assert found() == [row.id for row in jobs.page(owner="ann")] == [soft]
     assert found(deleted=True) == [hard]
-    runs.restore(hard)
+    runs.restore(hard, None)
     assert found() == [hard, soft]

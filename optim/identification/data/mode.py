@@ -7,7 +7,6 @@ amplitude.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -22,6 +21,7 @@ from solver.errors import SettingError
 from solver.modes.at_amplitudes import ModePoints, mode_at_amplitudes
 from solver.modes.corrector import State
 from solver.modes.nonlinear_mode import at_nodal_diameter, check_mode
+from solver.results.told import json_numbers
 from solver.scene.scene import Scene
 
 SHARPER = 0.02  # noise of a frequency relative to it, where that of a damping ratio is 1
@@ -123,8 +123,8 @@ class ModeRun(Measured):
         return {
             "kind": KIND.name, "source": self.source, "conditions": dict(self.conditions), "mode": self.mode,
             "quantity": of, "x": self.amplitude.tolist(), "data": self.observations[last].tolist(),
-            "fit": _listed(fitted[last]), "fit_sd": _listed(sd[last]),
-            **({"frequency": self.frequency_hz.tolist(), "fit_frequency": _listed(fitted[:m])}
+            "fit": json_numbers(fitted[last]), "fit_sd": json_numbers(sd[last]),
+            **({"frequency": self.frequency_hz.tolist(), "fit_frequency": json_numbers(fitted[:m])}
                if self.frequency_hz is not None else {}),
         }  # fmt: skip
 
@@ -229,10 +229,6 @@ def _whole(table: Table, word: str, default: int | None) -> int | None:
         raise DataError(
             table.source, text, f"`{word}` must be a whole number", place=table.place
         ) from None  # fmt: skip
-
-
-def _listed(values: Real) -> list[float | None]:
-    return [float(value) if math.isfinite(value) else None for value in values]
 
 
 KIND = DataKind(

@@ -15,6 +15,7 @@ from optim.identification.data.response_model import ResponseModel
 from optim.identification.data.table import Table, check_monotone, check_sign
 from optim.problem.variables import Real
 from solver.jit.fourier import Complex
+from solver.results.told import json_numbers
 from solver.scene.scene import Scene
 from solver.sensitivity.observed import Quantity
 
@@ -128,11 +129,11 @@ class ResponseRun(Measured):
         told: dict[str, object] = {
             "kind": KIND.name, "source": self.source, "conditions": dict(self.conditions), "dof": self.dof,
             "quantity": self.quantity.value, "x": self.frequency_hz.tolist(),
-            "data": np.abs(self.data).tolist(), "fit": _listed(size), "fit_sd": _listed(spread),
+            "data": np.abs(self.data).tolist(), "fit": json_numbers(size), "fit_sd": json_numbers(spread),
         }  # fmt: skip
         if self.parts == 2:
             told["phase_deg"] = np.degrees(np.angle(self.data)).tolist()
-            told["fit_phase_deg"] = _listed(np.degrees(np.arctan2(parts[:, 1], parts[:, 0])))
+            told["fit_phase_deg"] = json_numbers(np.degrees(np.arctan2(parts[:, 1], parts[:, 0])))
         return told
 
 
@@ -209,10 +210,6 @@ def _data(table: Table) -> tuple[Quantity, str, Real | Complex]:
     if far.size:
         raise table.error(int(far[0]), "phase", f"must be from -{_MOST_DEGREES:g} to {_MOST_DEGREES:g} deg")
     return Quantity.COMPLEX, name, columns[name] * np.exp(1j * np.radians(columns["phase"]))
-
-
-def _listed(values: Real) -> list[float | None]:
-    return [float(value) if math.isfinite(value) else None for value in values]
 
 
 KIND = DataKind(

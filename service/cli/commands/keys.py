@@ -17,8 +17,9 @@ from service.rendering.tables.text import print_json, print_table, say
 
 if TYPE_CHECKING:
     from service.auth.callers import KeyLimits, Scope
-    from service.auth.keys import NewKey
+    from service.db.models import ApiKey
     from service.db.repositories.keys import KeyRepository
+    from service.db.tokens import Made
 
 _PERIOD = re.compile(r"([1-9][0-9]{0,5})([dh])")
 
@@ -82,18 +83,14 @@ def show(database: options.Database = None, as_json: options.Json = False) -> No
 
 def rotate(key: Id, database: options.Database = None, as_json: options.Json = False) -> None:
     """Give a key another secret and print it, this once; the old one ends within a second."""
-    from service.auth import keys
-
     with _repository(database) as repository:
-        _show(keys.rotate(repository, key), as_json=as_json)
+        _show(repository.rotate(key), as_json=as_json)
 
 
 def revoke(key: Id, database: options.Database = None) -> None:
     """End a key, within a second in every service."""
-    from service.auth import keys
-
     with _repository(database) as repository:
-        keys.revoke(repository, key, datetime.now(UTC))
+        repository.revoke(key)
     say(f"key {key} is revoked")
 
 
@@ -113,7 +110,7 @@ def _repository(database: str | None) -> Iterator[KeyRepository]:
         opened.close()
 
 
-def _show(made: NewKey, *, as_json: bool) -> None:
+def _show(made: Made[ApiKey], *, as_json: bool) -> None:
     from service.auth.keys import described
 
     if as_json:

@@ -2,9 +2,9 @@
 
 from service.db.repositories.designs import DesignRepository
 from service.db.repositories.jobs.repository import Attempt, JobRepository, JobRow, NewJob, Recovered
-from service.db.repositories.scenes import SceneRepository, SceneRow
+from service.db.repositories.scenes import SceneRepository
 from service.db.repositories.sweeps import SweepRepository
-from service.db.repositories.uploads import UploadRepository, UploadRow
+from service.db.repositories.uploads import UploadRepository
 
 __all__ = [
     "Attempt",
@@ -14,8 +14,6 @@ __all__ = [
     "NewJob",
     "Recovered",
     "SceneRepository",
-    "SceneRow",
     "SweepRepository",
     "UploadRepository",
-    "UploadRow",
 ]

@@ -30,9 +30,11 @@ DESIGN_SORTS: dict[str, InstrumentedAttribute[Any]] = {
 class DesignRepository(StoredRepository[Design, VariableValues]):
     """Designs of one database; their parts are the variables."""
 
+    table = Design
+
     def __init__(self, database: Database) -> None:
         parts = Parts(table=DesignVariable, of=DesignVariable.design_id, values=VariableValues)
-        super().__init__(database, Design, Design.job_id, DESIGN_SORTS, parts)
+        super().__init__(database, DESIGN_SORTS, parts)
 
 
 def insert_design(

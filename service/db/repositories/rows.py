@@ -112,20 +112,3 @@ class Recovered:
     def total(self) -> int:
         """All of them."""
         return self.accepted + self.failed + self.dismissed
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SceneRow:
-    """A stored scene."""
-
-    owner: str
-    name: str
-    scene_hash: str
-    created: datetime
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class WholeSceneRow(SceneRow):
-    """A stored scene with its tables, which may be large."""
-
-    body: dict[str, Any]

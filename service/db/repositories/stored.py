@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any, Generic, TypeVar
 
-from sqlalchemy import Connection, Select, bindparam, func, select
-from sqlalchemy.orm import InstrumentedAttribute, Session
+from sqlalchemy import bindparam, func, select
+from sqlalchemy.orm import InstrumentedAttribute
 
 from service.db.engine import Database
 from service.db.models import NOBODY, Job
@@ -22,9 +22,9 @@ from service.db.pagination import (
     plain_conditions,
     within,
 )
-from service.db.repositories.workbench.words import in_the_bin
+from service.db.repositories.owned import Rows, RowT
+from service.db.repositories.run_words import in_the_bin
 
-Row = TypeVar("Row")
 Part = TypeVar("Part")
 Column = InstrumentedAttribute[Any]
 CREATED = "created"
@@ -90,27 +90,20 @@ class Parts(Generic[Part]):
     apart: bool = False
 
 
-class StoredRepository(Generic[Row, Part]):
-    """Rows of one table with their parts, in one database.
+class StoredRepository(Rows[RowT], Generic[RowT, Part]):
+    """Rows of one table, whose ids sort by time, with their parts.
 
     Parameters
     ----------
     database : where they are.
-    table : the mapped class.
-    identity : column of the ids, which sort by time.
     sorts : word to the column it sorts by.
     parts : their table.
     """
 
-    def __init__(
-        self, database: Database, table: type[Row], identity: Column, sorts: Mapping[str, Column],
-        parts: Parts[Part],
-    ) -> None:  # fmt: skip
-        self._db = database
-        self._identity, self._sorts, self._parts = identity, sorts, parts
-        self._table: Any = table
-        # Built once: building a statement costs more than running it.
-        self._select = select(table)
+    def __init__(self, database: Database, sorts: Mapping[str, Column], parts: Parts[Part]) -> None:
+        super().__init__(database)
+        self._sorts, self._parts = sorts, parts
+        self._table: Any = self.table
         self._part_names = [one.name for one in fields(parts.values)]  # type: ignore[arg-type]
         self._select_parts = (
             select(parts.of, *(getattr(parts.table, name) for name in self._part_names))
@@ -118,7 +111,7 @@ class StoredRepository(Generic[Row, Part]):
             .order_by(parts.of, parts.table.position)
         )
 
-    def page(self, wanted: Filter, limit: int, after: Position | None = None) -> list[Row]:
+    def page(self, wanted: Filter, limit: int, after: Position | None = None) -> list[RowT]:
         """A page of rows; `after` is the sort value and id of the last one of the page before.
 
         Those of runs in the bin are left out, unless it is their run that is asked for.
@@ -135,12 +128,7 @@ class StoredRepository(Generic[Row, Part]):
             query = ordered(query, self._identity, column, descending=wanted.descending, after=after)
             return self._read(connection, query.limit(limit))
 
-    def get(self, row_id: str) -> Row | None:
-        """The row, or None."""
-        with self._db.reading() as connection:
-            return next(iter(self._read(connection, self._select.where(self._identity == row_id))), None)
-
-    def position(self, row: Row, sort: str) -> Position:
+    def position(self, row: RowT, sort: str) -> Position:
         """Where a page that ends with this row goes on, sorted by this word."""
         column = self._sorts.get(sort)
         return None if column is None else getattr(row, column.key), getattr(row, self._identity.key)
@@ -154,13 +142,6 @@ class StoredRepository(Generic[Row, Part]):
                     self._parts.values(**dict(zip(self._part_names, values, strict=True)))
                 )  # fmt: skip
         return found
-
-    @staticmethod
-    def _read(
-        connection: Connection, query: Select[Row], given: Mapping[str, Any] | None = None
-    ) -> list[Row]:  # fmt: skip
-        with Session(connection) as session:
-            return list(session.scalars(query, given))
 
     def _conditions(self, wanted: Filter) -> list[Condition]:
         found = [getattr(self._table, name) == value for name, value in wanted.equal.items()]

@@ -40,18 +40,19 @@ SWEEP_SORTS: dict[str, InstrumentedAttribute[Any]] = {
 class SweepRepository(StoredRepository[Sweep, ContactValues]):
     """Sweeps of one database; their parts are the contacts."""
 
+    table = Sweep
+
     def __init__(self, database: Database) -> None:
         parts = Parts(
             table=SweepContact, of=SweepContact.sweep_id, values=ContactValues, few=_FEW_OF_CONTACTS,
             apart=True,
         )  # fmt: skip
-        super().__init__(database, Sweep, Sweep.id, SWEEP_SORTS, parts)
+        super().__init__(database, SWEEP_SORTS, parts)
         self._of_job = self._select.where(Sweep.job_id == bindparam("job")).order_by(Sweep.position)
 
     def of_job(self, job_id: str) -> list[Sweep]:
         """The sweeps of a job in the order they were computed."""
-        with self._db.reading() as connection:
-            return self._read(connection, self._of_job, {"job": job_id})
+        return self._all(self._of_job, {"job": job_id})
 
     def arrays(self, sweep_id: str) -> dict[str, StoredArray]:
         """The arrays of a sweep, by name."""

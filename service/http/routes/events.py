@@ -10,7 +10,7 @@ from fastapi import APIRouter, Depends, FastAPI, Header, Request, Response
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 
 from service.auth.callers import Caller
-from service.http.dependencies import CallerDependency, ServiceDependency
+from service.http.dependencies import InContext
 from service.http.events import Looks, job_events
 from service.http.middleware.head import HEADERS_ONLY
 from service.queue.core import Service
@@ -40,12 +40,11 @@ class _Watched:
 
 async def _watched(
     job_id: str,
-    request: Request,
-    service: ServiceDependency,
-    caller: CallerDependency,
+    context: InContext,
     last_event_id: LastEventId = None,
 ) -> _Watched:
     """The job to follow; refused here, before the answer begins, if there is none."""
+    request, service, caller = context.request, context.service, context.caller
     row = await service.lanes.reads.run(caller.owner, service.job, job_id, caller)
     if last_event_id == END and row.state.finished:
         raise _ToldEverything

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Literal
 
-from fastapi import APIRouter, Request, Response
+from fastapi import APIRouter, Response
 
 from service.auth.callers import Scope
-from service.http.dependencies import CallerDependency
+from service.http.dependencies import InContext
 from service.queue.health import Health, Probe, Readiness
 from service.schemas.answers import Answer
 
@@ -27,11 +27,11 @@ async def live() -> Alive:
 
 
 @router.get("/ready", responses={503: {"model": Health, "description": "It cannot work now."}})
-async def ready(request: Request, caller: CallerDependency, response: Response) -> Health | Readiness:
+async def ready(context: InContext, response: Response) -> Health | Readiness:
     """Database, queue and workers are up; the details are for who may see them: where no key is needed, and
     with the scope `monitor`.
     """
-    probe: Probe = request.app.state.probe
-    health = await (probe.detailed() if caller.may(Scope.MONITOR) else probe.brief())
+    probe: Probe = context.request.app.state.probe
+    health = await (probe.detailed() if context.caller.may(Scope.MONITOR) else probe.brief())
     response.status_code = 200 if health.ready else 503
     return health

@@ -5,19 +5,18 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
-from typing import Annotated, Any
-from urllib.parse import urlencode
+from typing import Annotated, Any, ClassVar
 
-from fastapi import APIRouter, Depends, Query, Request, Response
-from pydantic import BaseModel, ConfigDict, Field
+from fastapi import APIRouter, Depends, Query, Response
+from pydantic import Field
 
 from service.auth.callers import Caller
 from service.db.models import JobState
 from service.db.repositories import JobRow
 from service.http.computed import prepared
 from service.http.dependencies import (
-    CallerDependency,
-    ServiceDependency,
+    Context,
+    InContext,
     TypedRoute,
     as_json,
     idempotency_key,
@@ -40,7 +39,6 @@ from service.jobs.kinds.registry.bodies import (
     request_of,
 )
 from service.jobs.registry import JobRequest, Registry
-from service.queue import cursors
 from service.queue.core import Service
 from service.schemas.answers import (
     FinishedJob,
@@ -51,6 +49,7 @@ from service.schemas.answers import (
     ResultsHead,
     SweepAnswer,
 )
+from service.schemas.pages import Cursor, Limit, ListQuery, newest
 
 router = APIRouter(prefix="/v1", tags=["jobs"])
 
@@ -69,76 +68,66 @@ _SUBMITTED: dict[str, Any] = {
 }
 
 
-class JobQuery(BaseModel):
+class JobQuery(ListQuery):
     """Which jobs to list."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    path: ClassVar[str] = "/v1/jobs"
 
     status: JobState | None = None
     kind: str | None = Field(default=None, max_length=32)
     scene: str | None = Field(default=None, max_length=200)
-    limit: int = Field(default=100, ge=1, le=10_000)
-    cursor: str | None = Field(default=None, max_length=500)
+    limit: Limit = 100
+    cursor: Cursor = None
 
 
 @router.get("/jobs", response_model=JobPage, responses=LISTED)
 @reading
-def list_jobs(
-    request: Request,
-    service: ServiceDependency,
-    caller: CallerDependency,
-    query: Annotated[JobQuery, Query()],
-) -> Response:
+def list_jobs(context: InContext, query: Annotated[JobQuery, Query()]) -> Response:
     """Jobs, newest first."""
-    size = min(query.limit, service.settings.page_limit)
-    before = None if query.cursor is None else cursors.decode(query.cursor)[1]
-    rows = service.jobs.page(
-        owner=caller.sees,
-        state=query.status,
-        kind=query.kind,
-        scene=query.scene,
-        before=before,
-        limit=size + 1,
+    found = partial(
+        context.service.jobs.page, owner=context.sees, state=query.status, kind=query.kind, scene=query.scene
     )
-    following = None
-    if len(rows) > size:
-        words = query.model_dump(exclude_none=True, exclude={"cursor"}, mode="json")
-        following = "/v1/jobs?" + urlencode({**words, "cursor": cursors.encode(None, rows[size - 1].id)})
-    items = [_answer(service, row) for row in rows[:size]]
-    return listing(request, JobPage(items=items, next=following))
+    rows, following = newest(query, context.service.settings, found)
+    return listing(context, JobPage(items=[_answer(context.service, row) for row in rows], next=following))
 
 
 @router.get("/jobs/{job_id}", response_model=JobAnswer)
 @reading
-def get_job(job_id: str, service: ServiceDependency, caller: CallerDependency) -> Response:
+def get_job(job_id: str, context: InContext) -> Response:
     """A job."""
-    return as_json(_answer(service, service.job(job_id, caller)))
+    return as_json(_answer(context.service, context.service.job(job_id, context.caller)))
 
 
 @router.delete("/jobs/{job_id}")
-async def dismiss(job_id: str, service: ServiceDependency, caller: CallerDependency) -> JobAnswer:
+async def dismiss(job_id: str, context: InContext) -> JobAnswer:
     """Dismiss a job. A running one is stopped within the grace; the answer waits for that."""
+    service, caller = context.service, context.caller
     row = await service.lanes.writes.run(caller.owner, service.dismiss, job_id, caller)
     if not row.state.finished:
         patience = service.settings.grace_seconds + _STOP_MARGIN_SECONDS
-        row = await wait_for_end(service, job_id, patience, caller, lambda found: found)
+        row = await wait_for_end(context, job_id, patience, lambda found: found)
     return _answer(service, row)
 
 
 @router.get("/jobs/{job_id}/scene", response_model=JobScene)
 @reading
-def scene_of(job_id: str, service: ServiceDependency, caller: CallerDependency) -> Response:
+def scene_of(job_id: str, context: InContext) -> Response:
     """The scene of a job as it is computed: with its values set, and what its uploads held.
 
     It stays what it was when the stored scene or the upload it was made of is replaced or deleted.
     """
-    return as_json(JobScene(job=job_id, scene=service.scene_of(job_id, caller)))
+    return as_json(JobScene(job=job_id, scene=context.service.scene_of(job_id, context.caller)))
 
 
 @router.get("/jobs/{job_id}/results", response_model=ResultsAnswer)
 @reading
-def results(job_id: str, service: ServiceDependency, caller: CallerDependency) -> Response:
+def results(job_id: str, context: InContext) -> Response:
     """What a job computed."""
+    return results_answer(context.service, job_id, context.caller)
+
+
+def results_answer(service: Service, job_id: str, caller: Caller) -> Response:
+    """What a job computed, to a caller."""
     with service.database.reading():
         found = service.results(job_id, caller)
         sweeps = SweepAnswer.of_rows(found.sweeps, service.sweeps)
@@ -155,11 +144,12 @@ class Asked:
     seconds: float | None
 
 
-async def asked(request: Request, service: ServiceDependency) -> Asked:
+async def asked(context: InContext) -> Asked:
     """Read the headers of a submission; `idempotency_key` lists the errors."""
+    headers = context.request.headers
     return Asked(
-        key=idempotency_key(request.headers),
-        seconds=preferred_wait(request.headers, service.settings.max_wait_seconds),
+        key=idempotency_key(headers),
+        seconds=preferred_wait(headers, context.service.settings.max_wait_seconds),
     )
 
 
@@ -169,27 +159,14 @@ AskedDependency = Annotated[Asked, Depends(asked)]
 def submissions(registry: Registry) -> APIRouter:
     """The routes that take jobs; their bodies are those of the kinds there are."""
 
-    async def submit(
-        request: Request,
-        body: JobRequest,
-        service: ServiceDependency,
-        caller: CallerDependency,
-        asked: AskedDependency,
-    ) -> Response:
+    async def submit(body: JobRequest, context: InContext, asked: AskedDependency) -> Response:
         """Accept a job. With `Prefer: wait=N` the answer waits up to N seconds for its end."""
-        raw = await request.json()
-        return await _submit(service, caller, asked, raw, body)
+        return await _submit(context, asked, await context.request.json(), body)
 
-    async def submit_design(
-        request: Request,
-        body: JobRequest,
-        service: ServiceDependency,
-        caller: CallerDependency,
-        asked: AskedDependency,
-    ) -> Response:
+    async def submit_design(body: JobRequest, context: InContext, asked: AskedDependency) -> Response:
         """Accept a design: a job of the kind `design`."""
-        raw = await request.json()
-        return await _submit(service, caller, asked, {**raw, KIND: DESIGN}, body)
+        raw = await context.request.json()
+        return await _submit(context, asked, {**raw, KIND: DESIGN}, body)
 
     taking = APIRouter(prefix="/v1", tags=["jobs"], route_class=TypedRoute)
     takes_body(submit, any_body(registry), examples(registry), by=KIND if len(registry) > 1 else None)
@@ -199,11 +176,10 @@ def submissions(registry: Registry) -> APIRouter:
     return taking
 
 
-async def _submit(
-    service: Service, caller: Caller, asked: Asked, raw: dict[str, Any], body: JobRequest
-) -> Response:
+async def _submit(context: Context, asked: Asked, raw: dict[str, Any], body: JobRequest) -> Response:
+    service, caller = context.service, context.caller
     kind = service.registry.get(raw[KIND])
-    found = await prepared(service, caller, kind, raw)
+    found = await prepared(context, kind, raw)
     row, _ = await service.lanes.writes.run(
         caller.owner, service.accept, kind, request_of(kind, body), raw, asked.key, caller, found
     )
@@ -211,7 +187,7 @@ async def _submit(
     answer = partial(_job_or_result, service, headers)
     if asked.seconds is not None:
         headers["Preference-Applied"] = f"wait={asked.seconds:g}"
-        return await wait_for_end(service, row.id, asked.seconds, caller, answer, row)
+        return await wait_for_end(context, row.id, asked.seconds, answer, row)
     if row.state.finished:
         return await service.lanes.reads.run(caller.owner, answer, row)
     return answer(row)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fastapi import APIRouter
 
-from service.http.dependencies import ServiceDependency
+from service.http.dependencies import InContext
 from service.jobs.kinds.registry.bodies import body_model
 from service.jobs.registry import JobKind
 from service.schemas.answers import KindAnswer, KindList
@@ -14,9 +14,9 @@ router = APIRouter(prefix="/v1/kinds", tags=["jobs"])
 
 
 @router.get("")
-def list_kinds(service: ServiceDependency) -> KindList:
+def list_kinds(context: InContext) -> KindList:
     """The kinds of job of this service, each with the schema of its body and of its result."""
-    return KindList(items=[_answer(kind) for kind in service.registry])
+    return KindList(items=[_answer(kind) for kind in context.service.registry])
 
 
 def _answer(kind: JobKind) -> KindAnswer:

@@ -8,7 +8,7 @@ from fastapi import APIRouter
 from pydantic import BaseModel, ConfigDict, Field
 
 from service.errors import InvalidRequestError
-from service.http.dependencies import CallerDependency, JsonBody, ServiceDependency
+from service.http.dependencies import InContext, JsonBody
 from service.jobs.validation import validated
 from service.schemas.matrix_answers import FormatAnswer, FormatsAnswer, MatricesAnswer
 from solver.errors import Issue
@@ -93,7 +93,7 @@ def formats() -> FormatsAnswer:
 
 
 @router.post("")
-async def look(body: JsonBody, service: ServiceDependency, caller: CallerDependency) -> MatricesAnswer:
+async def look(body: JsonBody, context: InContext) -> MatricesAnswer:
     """Look at uploaded matrices: sizes, labels, mass, frequencies, what is wrong and what to do.
 
     With `dofs` in the structure the answer has a scene that refers to the uploads, with a band around the
@@ -115,5 +115,6 @@ async def look(body: JsonBody, service: ServiceDependency, caller: CallerDepende
         asked["observe"] = asked["observe"] or {"dof": request.excitation.dof}
         if (request.structure or {}).get("sectors") is not None and request.excitation.engine_order is None:
             asked["excitation"]["engine_order"] = _USUAL_ORDER
+    service, caller = context.service, context.caller
     found = await service.lanes.uploads.run(caller.owner, service.uploads.looked_at, asked, caller)
     return MatricesAnswer.model_validate(found)

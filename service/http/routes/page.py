@@ -10,7 +10,7 @@ from importlib.resources.abc import Traversable
 from fastapi import APIRouter, BackgroundTasks, Request, Response
 
 from service.errors import NotFoundError
-from service.http.dependencies import ServiceDependency, tagged
+from service.http.dependencies import InContext, tagged
 
 router = APIRouter(include_in_schema=False)
 
@@ -67,12 +67,12 @@ def index() -> bytes:
 
 
 @router.get("/")
-async def page(request: Request, service: ServiceDependency, tasks: BackgroundTasks) -> Response:
+async def page(context: InContext, tasks: BackgroundTasks) -> Response:
     """The page, whose live response is wanted in a moment."""
-    tasks.add_task(service.previews.begin)
-    tasks.add_task(service.answers.begin)
+    tasks.add_task(context.service.previews.begin)
+    tasks.add_task(context.service.answers.begin)
     headers = {**_HEADERS, "Cache-Control": "no-cache"}
-    return tagged(request, index(), _TYPES[".html"], headers)
+    return tagged(context.request, index(), _TYPES[".html"], headers)
 
 
 @router.get("/page/{hashed}/{path:path}")

@@ -8,7 +8,7 @@ from fastapi import APIRouter, Body
 from pydantic import ConfigDict
 
 from service.http.computed import computed
-from service.http.dependencies import CallerDependency, ServiceDependency, TypedRoute
+from service.http.dependencies import InContext, TypedRoute
 from service.jobs.answering import PLAN
 from service.jobs.common.scenes import HarmonicRequest
 from service.schemas.answers import Answer
@@ -52,6 +52,6 @@ class PlanAnswer(Answer):
 
 
 @router.post("")
-async def plan(body: PlanBody, service: ServiceDependency, caller: CallerDependency) -> PlanAnswer:
+async def plan(body: PlanBody, context: InContext) -> PlanAnswer:
     """The effects this scene calls for and those left out, each with the reason; sizes and cost."""
-    return PlanAnswer.model_validate(await computed(service, caller, PLAN, body.model_dump()))
+    return PlanAnswer.model_validate(await computed(context, PLAN, body.model_dump()))

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import json
 
-from fastapi import APIRouter, Request, Response
+from fastapi import APIRouter, Response
 
 from service.auth.shares import share
 from service.http.computed import prepared
-from service.http.dependencies import CallerDependency, ServiceDependency, TypedRoute, takes_body
+from service.http.dependencies import InContext, TypedRoute, takes_body
 from service.jobs.answering import PREVIEW
 from service.jobs.kinds.previews import PREVIEWS, PreviewRequest
 from service.jobs.kinds.registry.bodies import KIND, any_body, examples
@@ -17,9 +17,7 @@ from service.schemas.preview_answers import LimitsPreview, PointPreview, Sensiti
 router = APIRouter(prefix="/v1/previews", tags=["previews"], route_class=TypedRoute)
 
 
-async def preview(
-    body: PreviewRequest, service: ServiceDependency, caller: CallerDependency, request: Request
-) -> Response:
+async def preview(body: PreviewRequest, context: InContext) -> Response:
     """Compute `sweep`, `sensitivities`, `limits` or `point` within seconds.
 
     Nothing is stored, and sizes are limited.
@@ -29,8 +27,10 @@ async def preview(
 
     Of several previews with the same `client` only the newest is computed: the others are answered 409.
     """
-    kind = service.previews.registry[(await request.json())[KIND]]
-    found = await prepared(service, caller, kind, await request.json(), PREVIEW)
+    service, caller = context.service, context.caller
+    raw = await context.request.json()
+    kind = service.previews.registry[raw[KIND]]
+    found = await prepared(context, kind, raw, PREVIEW)
     asking = f"{caller.owner} {body.client}" if body.client else ""
     most = share(caller, service.settings, "previews")
     spec = json.loads(found.spec)

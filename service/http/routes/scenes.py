@@ -3,51 +3,47 @@
 from __future__ import annotations
 
 import json
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 from fastapi import APIRouter, Query, Response
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
-from service.auth.callers import Caller
+from service.db.models import Scene
 from service.http.computed import computed
-from service.http.dependencies import CallerDependency, JsonBody, ServiceDependency
+from service.http.dependencies import Context, InContext, JsonBody
 from service.http.in_lane import reading
 from service.jobs.answering import STORE
-from service.queue import cursors
-from service.queue.core import Service
-from service.queue.scene_store import WholeScene
+from service.queue.scene_store import shipped
 from service.schemas.answers import SceneAnswer, SceneDetail, SceneList
+from service.schemas.pages import Cursor, Limit, ListQuery, page_of
 
 router = APIRouter(prefix="/v1/scenes", tags=["scenes"])
 
 
-class SceneQuery(BaseModel):
+class SceneQuery(ListQuery):
     """Which scenes to list."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    path: ClassVar[str] = "/v1/scenes"
 
-    limit: int = Field(default=1000, ge=1, le=10_000, description="Of the stored scenes.")
-    cursor: str | None = Field(default=None, max_length=500)
+    limit: Limit = Field(default=1000, description="Of the stored scenes.")
+    cursor: Cursor = None
 
 
 @router.get("")
 @reading
-def list_scenes(
-    service: ServiceDependency, caller: CallerDependency, query: Annotated[SceneQuery, Query()]
-) -> SceneList:
+def list_scenes(context: InContext, query: Annotated[SceneQuery, Query()]) -> SceneList:
     """Shipped scenes, on the first page, and stored ones by name."""
-    size = min(query.limit, service.settings.page_limit)
-    after = None if query.cursor is None else cursors.decode(query.cursor)[1]
-    scenes, end = service.scenes.of(caller).page(size, after)
-    following = None if end is None else cursors.next_link("/v1/scenes", query, None, end)
+    known = context.service.scenes.of(context.caller)
+    stored, following = page_of(query, context.service.settings, known.page, known.position)
+    scenes = [*(shipped() if query.cursor is None else ()), *stored]
     return SceneList(items=[SceneAnswer.of(scene) for scene in scenes], next=following)
 
 
 @router.get("/{name}")
 @reading
-def get_scene(name: str, service: ServiceDependency, caller: CallerDependency) -> SceneDetail:
+def get_scene(name: str, context: InContext) -> SceneDetail:
     """A scene with its tables: a shipped one, or one of one's own."""
-    return SceneDetail.of_whole(service.scenes.of(caller).get(name))
+    return _whole(context.service.scenes.of(context.caller).get(name))
 
 
 @router.post(
@@ -55,17 +51,20 @@ def get_scene(name: str, service: ServiceDependency, caller: CallerDependency) -
     status_code=201,
     responses={200: {"model": SceneDetail, "description": "The same scene was stored before."}},
 )
-async def store_scene(
-    body: JsonBody, service: ServiceDependency, caller: CallerDependency, response: Response
-) -> SceneDetail:
+async def store_scene(body: JsonBody, context: InContext, response: Response) -> SceneDetail:
     """Store a scene under its `name`; a name keeps its meaning for ever."""
-    found = await computed(service, caller, STORE, body, about="")
-    scene, added = await service.lanes.writes.run(caller.owner, _keep, service, caller, found)
+    found = await computed(context, STORE, body, about="")
+    writes = context.service.lanes.writes
+    scene, added = await writes.run(context.caller.owner, _keep, context, found)
     response.status_code = 201 if added else 200
     response.headers["Location"] = f"/v1/scenes/{scene.name}"
-    return SceneDetail.of_whole(scene)
+    return _whole(scene)
 
 
-def _keep(service: Service, caller: Caller, found: dict[str, Any]) -> tuple[WholeScene, bool]:
+def _whole(scene: Scene) -> SceneDetail:
+    return SceneDetail.of(scene, scene=dict(scene.body))
+
+
+def _keep(context: Context, found: dict[str, Any]) -> tuple[Scene, bool]:
     tables = json.loads(found["tables"])
-    return service.scenes.of(caller).keep(found["name"], found["scene_hash"], tables)
+    return context.service.scenes.of(context.caller).keep(found["name"], found["scene_hash"], tables)

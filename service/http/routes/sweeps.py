@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from fastapi import APIRouter, Query, Request, Response
+from fastapi import APIRouter, Query, Response
 
 from service.db.models import Sweep
-from service.http.dependencies import CallerDependency, ServiceDependency, listing, tagged
+from service.http.dependencies import Context, InContext, listing, tagged
 from service.http.in_lane import drawing, reading, writing_files
 from service.http.routes.described import BINARY, LISTED, TEXT, UNCHANGED, media
-from service.queue.core import Service
 from service.rendering.representations import (
     BY_FORMAT,
     JSON,
@@ -40,36 +39,26 @@ SweepForm = Annotated[
 
 @router.get("", response_model=SweepPage, responses=LISTED)
 @reading
-def list_sweeps(
-    request: Request,
-    service: ServiceDependency,
-    caller: CallerDependency,
-    query: Annotated[SweepQuery, Query()],
-) -> Response:
+def list_sweeps(context: InContext, query: Annotated[SweepQuery, Query()]) -> Response:
     """Stored sweeps that meet every filter, newest first unless `sort` says otherwise."""
-    return listing(request, sweep_page(service.sweeps, query, service.settings, caller.sees))
+    return listing(context, sweep_page(context.service.sweeps, query, context.service.settings, context.sees))
 
 
 @router.get("/{sweep_id}", response_model=SweepDetail, responses=SWEEP_FORMS)
 @writing_files
-def get_sweep(
-    sweep_id: str,
-    request: Request,
-    service: ServiceDependency,
-    caller: CallerDependency,
-    form: SweepForm = None,
-) -> Response:
+def get_sweep(sweep_id: str, context: InContext, form: SweepForm = None) -> Response:
     """A stored sweep with its arrays, in the form that `Accept` prefers.
 
     `text/csv` has a row for each point and a column for each array of one number a point. All arrays are in
     `application/x-npz` (also as `application/zip`), which `numpy.load` reads, and in
     `application/vnd.apache.parquet`.
     """
-    return sweep_answer(service.sweep(sweep_id, caller), form, request, service)
+    return sweep_answer(context.service.sweep(sweep_id, context.caller), form, context)
 
 
-def sweep_answer(sweep: Sweep, form: str | None, request: Request, service: Service) -> Response:
+def sweep_answer(sweep: Sweep, form: str | None, context: Context) -> Response:
     """A stored sweep in the form of `form`, or the one that `Accept` prefers."""
+    service, request = context.service, context.request
     accept = request.headers.get("accept") if form is None else BY_FORMAT[form]
     kind = chosen(accept, SWEEP_MEDIA)
     headers = {"Vary": "Accept"}
@@ -85,11 +74,9 @@ def sweep_answer(sweep: Sweep, form: str | None, request: Request, service: Serv
     responses={200: media({"image/svg+xml": TEXT}), **UNCHANGED},
 )
 @drawing
-def plot_svg(
-    sweep_id: str, request: Request, service: ServiceDependency, caller: CallerDependency
-) -> Response:
+def plot_svg(sweep_id: str, context: InContext) -> Response:
     """The curve of a stored sweep, its peak marked, its band shaded."""
-    return _picture(service.sweep(sweep_id, caller), "svg", request, service)
+    return _picture(context.service.sweep(sweep_id, context.caller), "svg", context)
 
 
 @router.get(
@@ -98,12 +85,11 @@ def plot_svg(
     responses={200: media({"image/png": BINARY}), **UNCHANGED},
 )
 @drawing
-def plot_png(
-    sweep_id: str, request: Request, service: ServiceDependency, caller: CallerDependency
-) -> Response:
+def plot_png(sweep_id: str, context: InContext) -> Response:
     """The curve of a stored sweep, its peak marked, its band shaded."""
-    return _picture(service.sweep(sweep_id, caller), "png", request, service)
+    return _picture(context.service.sweep(sweep_id, context.caller), "png", context)
 
 
-def _picture(sweep: Sweep, suffix: str, request: Request, service: ServiceDependency) -> Response:
-    return tagged(request, sweep_picture(sweep, suffix, service.sweeps), _PICTURE_TYPES[suffix])
+def _picture(sweep: Sweep, suffix: str, context: Context) -> Response:
+    picture = sweep_picture(sweep, suffix, context.service.sweeps)
+    return tagged(context.request, picture, _PICTURE_TYPES[suffix])

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import tempfile
+from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
-from fastapi import APIRouter, Query, Request, Response
+from fastapi import APIRouter, Query, Response
 from fastapi.responses import JSONResponse
-from pydantic import BaseModel, ConfigDict, Field, GetJsonSchemaHandler
+from pydantic import Field, GetJsonSchemaHandler
 from pydantic_core import CoreSchema
 
 from service.http.bodies import saved
-from service.http.dependencies import CallerDependency, ServiceDependency, listing
+from service.http.dependencies import InContext, listing
 from service.http.in_lane import reading, writing
 from service.http.routes.described import LISTED
-from service.queue import cursors
+from service.schemas.pages import Cursor, Limit, ListQuery, newest
 from service.schemas.upload_answers import NewUpload, UploadAnswer, UploadedArray, UploadPage
 from service.uploads.uploads import Arrived, file_name, format_of
 
@@ -48,13 +49,13 @@ Format = Annotated[
 ]
 
 
-class UploadQuery(BaseModel):
+class UploadQuery(ListQuery):
     """Which uploads to list."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    path: ClassVar[str] = "/v1/uploads"
 
-    limit: int = Field(default=100, ge=1, le=10_000)
-    cursor: str | None = Field(default=None, max_length=500)
+    limit: Limit = 100
+    cursor: Cursor = None
 
 
 @router.post(
@@ -63,18 +64,13 @@ class UploadQuery(BaseModel):
     response_model=NewUpload,
     responses={200: {"model": NewUpload, "description": "The same file was uploaded before."}},
 )
-async def upload(
-    request: Request,
-    service: ServiceDependency,
-    caller: CallerDependency,
-    name: FileName = "matrices",
-    form: Format = None,
-) -> Response:
+async def upload(context: InContext, name: FileName = "matrices", form: Format = None) -> Response:
     """Store a file of a matrix, several matrices or modes: the body is the file.
 
     It is read at once, within limits, and refused if it holds nothing usable. In a scene, `upload:ID` stands
     where `M`, `K`, `C` or `modes` of a structure of kind `matrices` would name a file.
     """
+    request, service, caller = context.request, context.service, context.caller
     media = request.headers.get("content-type", "").split(";")[0].strip().lower()
     known = format_of(form, name, media)
     settings = service.settings
@@ -86,41 +82,32 @@ async def upload(
         row, found, added = await service.lanes.uploads.run(
             caller.owner, service.uploads.add, arrived, caller
         )
-    answer = NewUpload(**UploadAnswer.of(row).model_dump(), contents=[UploadedArray(**one) for one in found])
+    answer = NewUpload.of(row, contents=[UploadedArray(**one) for one in found])
     headers = {"Location": f"/v1/uploads/{row.id}"}
     return JSONResponse(answer.model_dump(mode="json"), 201 if added else 200, headers)
 
 
 @router.get("", response_model=UploadPage, responses=LISTED)
 @reading
-def list_uploads(
-    request: Request,
-    service: ServiceDependency,
-    caller: CallerDependency,
-    query: Annotated[UploadQuery, Query()],
-) -> Response:
+def list_uploads(context: InContext, query: Annotated[UploadQuery, Query()]) -> Response:
     """Uploads, newest first."""
-    size = min(query.limit, service.settings.page_limit)
-    before = None if query.cursor is None else cursors.decode(query.cursor)[1]
-    rows = service.uploads.repository.page(size + 1, before, caller.sees)
-    following = None
-    if len(rows) > size:
-        following = cursors.next_link("/v1/uploads", query, None, rows[size - 1].id)
-    return listing(request, UploadPage(items=[UploadAnswer.of(row) for row in rows[:size]], next=following))
+    found = partial(context.service.uploads.repository.page, owner=context.sees)
+    rows, following = newest(query, context.service.settings, found)
+    return listing(context, UploadPage(items=[UploadAnswer.of(row) for row in rows], next=following))
 
 
 @router.get("/{upload_id}")
 @reading
-def get_upload(upload_id: str, service: ServiceDependency, caller: CallerDependency) -> UploadAnswer:
+def get_upload(upload_id: str, context: InContext) -> UploadAnswer:
     """An upload, without its bytes."""
-    return UploadAnswer.of(service.uploads.get(upload_id, caller))
+    return UploadAnswer.of(context.service.uploads.get(upload_id, context.caller))
 
 
 @router.delete("/{upload_id}", status_code=204)
 @writing
-def delete_upload(upload_id: str, service: ServiceDependency, caller: CallerDependency) -> None:
+def delete_upload(upload_id: str, context: InContext) -> None:
     """Forget an upload. Scenes and jobs that were made with it keep what it held."""
-    service.uploads.delete(upload_id, caller)
+    context.service.uploads.delete(upload_id, context.caller)
 
 
 def upload_media() -> tuple[str, ...]:

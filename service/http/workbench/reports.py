@@ -7,12 +7,10 @@ from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Header, Query, Response
 
-from service.auth.callers import Caller
 from service.errors import ConflictError
-from service.http.dependencies import CallerDependency, ServiceDependency
+from service.http.dependencies import Context, InContext
 from service.http.in_lane import drawing
 from service.http.routes.described import TEXT, media
-from service.queue.core import Service
 from service.rendering.representations import chosen
 from service.schemas.workbench_answers import ProjectAnswer, RunAnswer
 
@@ -30,8 +28,7 @@ _BINARY = {"type": "string", "format": "binary"}
 @drawing
 def report(
     job_id: str,
-    service: ServiceDependency,
-    caller: CallerDependency,
+    context: InContext,
     form: Annotated[Literal["html", "pdf"] | None, Query(alias="format")] = None,
     accept: Annotated[str | None, Header(max_length=500)] = None,
 ) -> Response:
@@ -44,18 +41,19 @@ def report(
 
     wanted = FORMS[form] if form is not None else chosen(accept, tuple(FORMS.values()))
     suffix = next(name for name, kind in FORMS.items() if kind == wanted)
-    made = report_apart(*_designed(service, caller, job_id), suffix, service.settings.report_seconds)
+    made = report_apart(*_designed(context, job_id), suffix, context.service.settings.report_seconds)
     name = f"report-{job_id}.{suffix}"
     return Response(
         made, media_type=wanted, headers={"Content-Disposition": f'attachment; filename="{name}"'}
     )
 
 
-def _designed(service: Service, caller: Caller, job_id: str) -> tuple[Json, Json, Json, Json]:
+def _designed(context: Context, job_id: str) -> tuple[Json, Json, Json, Json]:
     """Scene, problem and result of a job that found an optimum, and what is known of its run."""
     from service.rendering.report.about import about_run
     from service.rendering.report.sections import KINDS, problem_of_request
 
+    service, caller = context.service, context.caller
     with service.database.reading():
         row = service.job(job_id, caller)
         if row.kind not in KINDS:
@@ -64,7 +62,7 @@ def _designed(service: Service, caller: Caller, job_id: str) -> tuple[Json, Json
             )
         found = service.results(job_id, caller)
         scene = service.scene_of(job_id, caller)
-        run = service.runs.get(job_id, caller)
-        project = None if run.words.project is None else service.projects.get(run.words.project, caller)
+        run = service.runs.seen(job_id, caller.sees)
+        project = None if run.words.project is None else service.projects.seen(run.words.project, caller.sees)
     about = about_run(RunAnswer.of_run(run), None if project is None else ProjectAnswer.of(project))
     return scene, problem_of_request(row.request or {}), found.result, about

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, fields
 from typing import TYPE_CHECKING, Any
@@ -12,6 +11,7 @@ import numpy as np
 from service.jobs.arrays import encode
 from service.jobs.outputs import ContactValues, DesignRecord, StoredArray, SweepRecord, VariableValues
 from service.jobs.strict_json import digest
+from solver.results.told import json_number
 from solver.scene.scene import AnyContact, Scene
 
 if TYPE_CHECKING:
@@ -61,7 +61,7 @@ def sweep_record(
         seconds=branch.seconds,
         completed=branch.completed,
         status=branch.status.value,
-        error_estimate=_finite(branch.error_estimate),
+        error_estimate=json_number(branch.error_estimate),
         peaks_known=branch.peak_certificate.known,
         intermediate=intermediate,
         contacts=contact_values(scene, parameter),
@@ -134,14 +134,14 @@ def design_record(result: DesignResult) -> DesignRecord:
         reached=result.reached,
         feasible=feasible,
         status=result.status.value,
-        objective=None if evaluation is None else _finite(evaluation.objective),
+        objective=None if evaluation is None else json_number(evaluation.objective),
         peak=None if peak is None else peak.value,
         peak_at=None if peak is None else peak.at,
         limit=result.limit,
         band_hz=result.band_hz,
         harmonics=problem.harmonics,
         evaluations=result.evaluations,
-        work=_finite(result.work),
+        work=json_number(result.work),
         seconds=result.seconds,
         variables=_variables(result),
     )
@@ -162,9 +162,9 @@ def robust_record(result: RobustResult) -> DesignRecord:
         reached=result.reached,
         feasible=side is not None and side.feasible,
         status=result.status.value,
-        objective=_finite(result.objective),
+        objective=json_number(result.objective),
         peak=None if peak is None else peak.value,
-        peak_at=None if peak is None else _finite(peak.at_hz),
+        peak_at=None if peak is None else json_number(peak.at_hz),
         limit=problem.limit,
         band_hz=max(bands, default=None),
         harmonics=problem.harmonics,
@@ -173,10 +173,6 @@ def robust_record(result: RobustResult) -> DesignRecord:
         seconds=result.seconds,
         variables=_variables(result),
     )
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None
 
 
 def contact_values(scene: Scene, parameter: str) -> tuple[ContactValues, ...]:

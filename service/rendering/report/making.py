@@ -1,12 +1,34 @@
-"""A report in the form that is asked for."""
+"""A report in the form that is asked for: its page, or that page printed on sheets of A4.
+
+WeasyPrint prints it, which needs Pango with a font of the system, and no browser.
+"""
 
 from __future__ import annotations
 
+import re
+from datetime import date
+from importlib.metadata import version
+from typing import Any
+
+from service.errors import InputError
 from service.rendering.report.sections import Designed
 
 PAGE, PDF = "html", "pdf"
 FORMS = {PAGE: "text/html", PDF: "application/pdf"}
 """Forms of a report with their media types."""
+MISSING = (
+    "a PDF needs the extra `pdf`, which is not installed (pip install 'stickslip[pdf]', and Pango of the "
+    "system: apt install libpangoft2-1.0-0): install it, or write a file that ends in .html"
+)
+MOST_LINES = 90
+"""Of a text such as a scene file on sheets; the page has all of them."""
+_SHEET = """
+@page { font: 6pt "DejaVu Sans", sans-serif; color: #555;
+  @bottom-left { content: string(title) " · %s"; }
+  @bottom-right { content: counter(page) " / " counter(pages); } }
+h1 { string-set: title content(); }
+body { font-family: "DejaVu Sans", sans-serif !important; }
+"""
 
 
 def report_of(given: Designed, form: str) -> bytes:
@@ -26,17 +48,49 @@ def report_of(given: Designed, form: str) -> bytes:
     """
     from service.rendering.report.design import design_report
     from service.rendering.report.identification import identification_report
-    from service.rendering.report.pdf import pdf_of, require_pdf
     from service.rendering.report.robust import robust_report
-    from solver.views.plots.html import pictures_as_png
 
+    if form == PDF:
+        require_pdf()
     if "estimates" in given.result:
         made = identification_report
     else:
         made = robust_report if "nominal" in given.result else design_report
-    if form != PDF:
-        return made(given).encode()
-    require_pdf()
-    with pictures_as_png():
-        page = made(given)
-    return pdf_of(page)
+    page = made(given)
+    return pdf_of(page) if form == PDF else page.encode()
+
+
+def require_pdf() -> None:
+    """Have what writes a PDF.
+
+    Raises
+    ------
+    InputError
+        It is not installed.
+    """
+    try:
+        import weasyprint  # noqa: F401 - whether it is there, with the library of the system that it loads
+    except (ImportError, OSError) as error:
+        raise InputError(MISSING) from error
+
+
+def pdf_of(page: str) -> bytes:
+    """A page of HTML as a PDF; of its files the first lines."""
+    from weasyprint import CSS, HTML
+    from weasyprint.urls import URLFetcher
+
+    foot = f"stickslip {version('stickslip')} · {date.today().isoformat()}"
+    style = CSS(string=_SHEET % foot)
+    inside = URLFetcher(allowed_protocols={"data"})  # a page holds all that it shows
+    text = re.sub(r"(?<=<pre>).*?(?=</pre>)", lambda found: _beginning(found[0]), page, flags=re.DOTALL)
+    made: Any = HTML(string=text, url_fetcher=inside).write_pdf(stylesheets=[style])
+    return bytes(made)
+
+
+def _beginning(text: str) -> str:
+    """The first lines of a long file."""
+    lines = text.splitlines()
+    left_out = len(lines) - MOST_LINES
+    if left_out <= 0:
+        return text
+    return "\n".join([*lines[:MOST_LINES], f"# … and {left_out} further lines: the report in HTML has them"])

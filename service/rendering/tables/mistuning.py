@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from service.rendering.tables.quantiles import quantile_words
+from service.rendering.tables.robust import quantile_words
 from service.rendering.tables.text import print_pairs
 from solver.results import units
 from solver.results.known import known_pairs

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from service.rendering.tables.quantiles import quantile_words
 from service.rendering.tables.text import print_pairs, print_table, say
 from solver.results import units
 from solver.results.known import known_pairs
+from solver.results.order_statistics import needed
 from solver.views.parameter_units import parameter
 
 Json = Mapping[str, Any]
@@ -100,3 +100,28 @@ _LINES: tuple[tuple[str, Callable[[Json], str]], ...] = (
     ("95 % of the samples below", lambda side: _quantile(side, 0.95)),
     ("keeps the limits", lambda side: "yes" if side["feasible"] else "no"),
 )
+
+
+def quantile_words(
+    found: Mapping[str, Any], key: str, samples: str, show: Callable[[float], str] = "{:.4g}".format
+) -> str:
+    """A quantile with the ends between which it lies; that so few samples do not tell it.
+
+    Parameters
+    ----------
+    found : of `solver.results.order_statistics.quantile_json`; one of an earlier version has no interval.
+    key, samples : name of the value, and what the samples are called.
+    show : puts a number in words.
+    """
+    value = found[key]
+    if "interval" not in found:
+        return "not known" if value is None else show(value)
+    low, high = (None if end is None else show(end) for end in found["interval"])
+    sure = f"{100.0 * found['confidence']:g} % sure"
+    ends = {
+        (True, True): f"{sure}: {low} to {high}", (True, False): f"{sure}: {low} or more, no upper end known",
+        (False, True): f"{sure}: {high} or less, no lower end known", (False, False): "no end known",
+    }[low is not None, high is not None]  # fmt: skip
+    if value is None:
+        return f"not told, at least {needed(found['share'])} {samples} are needed ({ends})"
+    return f"{show(value)} ({ends})"

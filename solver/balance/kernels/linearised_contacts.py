@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from solver.balance.kernels.output import force_slope
-from solver.balance.kernels.residual import evaluate
+from solver.balance.kernels.residual import evaluate, evaluate_contacts
 from solver.contacts.kernels.system import Evaluation, Receptance, System
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Complex, Real, coefficient_count, cosine_position
@@ -77,13 +77,8 @@ def linearise(
 
 @apart
 def forces_at(
-    system: System,
-    linear: Receptance,
-    point: Evaluation,
-    solutions: Real,
-    forces: Complex,
-    stiffness: Complex,
-) -> None:
+    system: System, point: Evaluation, solutions: Real, forces: Complex, stiffness: Complex
+) -> None:  # fmt: skip
     """Evaluate the contacts at points.
 
     Parameters
@@ -95,7 +90,8 @@ def forces_at(
     nt, n = solutions.shape[1] - 1, coefficient_count(system.ks)
     for row in range(solutions.shape[0]):
         u = solutions[row, :nt]
-        evaluate(system, linear, u, solutions[row, nt], 0.0, point)
+        if not evaluate_contacts(system, u, solutions[row, nt], 0.0, False, point):
+            point.F[:] = np.nan
         for i in range(system.ks.size):
             for c in range(system.owner.size):
                 carried = system.shift[c] * _amplitude(system, i, u, c * n)

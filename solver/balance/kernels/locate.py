@@ -34,7 +34,8 @@ HIGH_PEAK, LOW_PEAK, EDGE = 0, 1, 2
 _BY_CUBIC, _BY_SECANT = 2, 7  # trials up to which a cubic tells where to look, then a secant or a slope
 _BY_SLOPES = 5  # of a peak, from which the tangents of both sides do: it is a corner, where slopes jump
 # Up to this share of a peak that is polished to the last digits, and of another, one trial may be too low.
-_TOO_LOW, _LOW = 1e-13, 1e-9
+_TOO_LOW, _LOW = 1e-16, 1e-9
+_ASTRAY = 0.4  # share of the chord: a cubic that strays further from it is no guess
 _ROUNDED = 1e-14  # relative residual that no further step makes smaller
 
 
@@ -85,10 +86,19 @@ def between(
 
     Returns
     -------
-    (converged, Newton iterations). The guess is the cubic through both points and tangents.
+    (converged, Newton iterations). The guess is the cubic through both points and tangents, or where that
+    strays far from the chord, as beside a corner, the place on the chord.
     """
     cubic_between(left, left_slope, right, right_slope, 1.0, share, found)
     folds = left_slope[left.size - 1] * right_slope[left.size - 1] < 0.0
+    strayed, length = 0.0, 0.0
+    for i in range(left.size - 1):
+        step = right[i] - left[i]
+        strayed += (found[i] - left[i] - share * step) ** 2
+        length += step * step
+    if not folds and strayed > _ASTRAY * _ASTRAY * length:
+        for i in range(left.size):
+            found[i] = left[i] + share * (right[i] - left[i])
     return _on_plane(system, linear, point, left, right, folds, share, most, False, found, tangent, x, out)
 
 

@@ -28,7 +28,7 @@ import numpy as np
 from solver.balance.kernels.newton import on_springs
 from solver.contacts.kernels.system import Evaluation, Receptance, System
 from solver.jit.decorators import compiled
-from solver.jit.fourier import Real, coefficient_count, cosine_position
+from solver.jit.fourier import Real, coefficient_count, cosine_position, magnitude
 from solver.jit.separate import apart
 
 # Largest share of powers and of mean forces that an answer may lose. Newton's method leaves 1e-11 of motions,
@@ -70,10 +70,10 @@ def _power_share(
         for i in range(first, system.ks.size):
             here = cosine_position(system.ks, i)
             at = c * n + here
-            force = math.hypot(point.F[c, here], point.F[c, here + 1])
-            moved = math.hypot(u[at], u[at + 1])
-            off = math.hypot(residual[at], residual[at + 1])
-            acts = max(force, system.shift[c] * abs(linear.u_linear[0, i, c]))
+            force = magnitude(complex(point.F[c, here], point.F[c, here + 1]))
+            moved = magnitude(complex(u[at], u[at + 1]))
+            off = magnitude(complex(residual[at], residual[at + 1]))
+            acts = max(force, system.shift[c] * magnitude(linear.u_linear[0, i, c]))
             carried += system.ks[i] * acts * max(moved, system.least_size)
             off_force = springs[c] * off + system.shift[c] * _ROUNDING * moved
             lost += system.ks[i] * (force * off + off_force * moved)

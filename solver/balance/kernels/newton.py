@@ -29,6 +29,8 @@ TARGET = 1e-11  # relative residual aimed at
 ACCEPTED = 1e-9  # relative residual still a solution when rounding allows no better
 # Factors serve another step where they are at least this large and the last one left this share at most.
 _KEPT_FROM, _KEPT = 100, 0.02
+# A step along an arc is given up if so many iterations leave more than this share of the first residual.
+_TRIED, _NO_NEARER = 3, 0.7
 _HALVINGS = 5
 _UPHILL_STEPS = 8
 _MOST = 25
@@ -92,6 +94,15 @@ def newton(
     return norm <= ACCEPTED, iteration, norm
 
 
+@compiled
+def _is_close(norm: float, before: float) -> bool:
+    """Return whether another step with the factors of the last one will do.
+
+    A step of Newton's method from a distance e leaves C e², one more with its factors C e times that.
+    """
+    return norm * norm <= 1e-3 * TARGET * before
+
+
 @apart
 def arc_newton(
     system: System, linear: Receptance, u: Real, p: float, guess_u: Real, guess_p: float, tangent: Real,
@@ -109,7 +120,7 @@ def arc_newton(
     """
     n = u.size
     rhs, best = np.empty(n + 1), np.empty(n)
-    before, norm, stalls, kept = np.inf, np.inf, 0, False
+    before, norm, first, stalls, kept = np.inf, np.inf, np.inf, 0, False
     best_p, best_norm = p, np.inf
     iteration = 0
     for iteration in range(most + 1):
@@ -125,12 +136,16 @@ def arc_newton(
         settled = norm <= 0.1 * ACCEPTED or stalls > 1
         if norm <= TARGET or (norm <= ACCEPTED and stalls > 0 and settled):
             return True, iteration, p, norm
-        if iteration == most or norm > 1e3 * max(before, 1e-3):
+        if iteration == 0:
+            first = norm
+        hopeless = iteration >= _TRIED and norm > _NO_NEARER * first and norm > ACCEPTED
+        if iteration == most or hopeless or norm > 1e3 * max(before, 1e-3):
             break
-        if not (kept and norm <= _KEPT * before):
+        serves = _is_close(norm, before) or (norm <= _KEPT * before and point.counts[SIZE] >= _KEPT_FROM)
+        if not (kept and serves):
             if factorise(system, linear, point, tangent, weight_u, weight_p) == 0.0:
                 break
-            kept = point.counts[SIZE] >= _KEPT_FROM
+            kept = True
         before = norm
         plane = weight_p * tangent[n] * (p - guess_p)
         for i in range(n):

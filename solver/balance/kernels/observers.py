@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from solver.balance.kernels.output import force_slope, measure_motion
+from solver.balance.kernels.residual import evaluate_contacts
 from solver.contacts.kernels.system import FREQUENCY, Evaluation, System
 from solver.jit.fourier import Complex, Real, coefficient_count, cosine_position
 from solver.jit.separate import apart
@@ -51,16 +52,31 @@ def modal_motion(
 
 
 @apart
-def measure_through_modes(system: System, point: Evaluation, amplitudes: Complex, x: Real, out: Real) -> None:
-    """Fill `x` and `out` as `solver.balance.kernels.output.measure` does, from the modal coordinates."""
-    dx = np.empty(x.size)
-    for i in range(system.ks.size):
-        here, seen = cosine_position(system.ks, i), system.observe_modes[system.which[i]]
-        value, change = complex(0.0), complex(0.0)
-        for m in range(seen.size):
-            value += seen[m] * amplitudes[0, i, m]
-            change += seen[m] * amplitudes[1, i, m]
-        x[here], dx[here] = value.real, change.real
-        if system.ks[i] > 0:
-            x[here + 1], dx[here + 1] = -value.imag, -change.imag
-    measure_motion(system, point, x, dx, out)
+def measure_through_modes(
+    system: System, point: Evaluation, seen: Complex, solutions: Real, tangents: Real, x: Real, out: Real
+) -> None:
+    """Fill what `solver.balance.kernels.output.measure` does of several DOFs at points of a branch.
+
+    Parameters
+    ----------
+    seen : (d, ns, nm) of each DOF, as `System.observe_modes`.
+    solutions, tangents : (P, nt + 1) the points, λ last.
+    x, out : (d, P, n) and (d, P, MEASURES), of which residual and what is lost are left as they are.
+    """
+    last, amplitudes = solutions.shape[1] - 1, np.empty((2, *system.modal_forces.shape), np.complex128)
+    dx = np.empty(x.shape[2])
+    for row in range(solutions.shape[0]):
+        u, p = solutions[row, :last], solutions[row, last]
+        evaluate_contacts(system, u, p, 0.0, False, point)  # at a solution no contact fails
+        modal_motion(system, u, p, point, tangents[row, :last], tangents[row, last], amplitudes)
+        for j in range(seen.shape[0]):
+            for i in range(system.ks.size):
+                here, s = cosine_position(system.ks, i), system.which[i]
+                value, change = complex(0.0), complex(0.0)
+                for m in range(seen.shape[2]):
+                    value += seen[j, s, m] * amplitudes[0, i, m]
+                    change += seen[j, s, m] * amplitudes[1, i, m]
+                x[j, row, here], dx[here] = value.real, change.real
+                if system.ks[i] > 0:
+                    x[j, row, here + 1], dx[here + 1] = -value.imag, -change.imag
+            measure_motion(system, point, x[j, row], dx, out[j, row])

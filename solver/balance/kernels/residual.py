@@ -17,7 +17,7 @@ from solver.contacts.kernels.normal_load import fill_load, tie
 from solver.contacts.kernels.stick_slip_events import BEGAN, FAILED, SEPARATED, STUCK, UNLOADED
 from solver.contacts.kernels.system import FREQUENCY, LEVEL, Evaluation, Receptance, System
 from solver.jit.decorators import compiled
-from solver.jit.fourier import Complex, Real, coefficient_count, cosine_position
+from solver.jit.fourier import Complex, Real, coefficient_count, cosine_position, magnitude
 from solver.jit.lapack import copy_block, fill
 from solver.jit.separate import apart
 from solver.linear.kernels.modal_responses import driven_motions, goes_through_modes, modal_responses
@@ -107,12 +107,22 @@ def _evaluate(
     for i in range(system.ks.size):
         if not math.isfinite(linear.x_linear[0, i].real):
             return np.nan
+    if not evaluate_contacts(system, u, p, added, alone, out):
+        return np.nan
+    return _residual(system, linear, u, p, least_size(system, p), alone, out)
+
+
+@apart
+def evaluate_contacts(system: System, u: Real, p: float, added: float, alone: bool, out: Evaluation) -> bool:
+    """Evaluate the forces of the contacts and their derivatives at (u, λ = p); False if a contact failed.
+
+    The residual is left as it was. With `alone` the derivatives are left out of the laws that can do without.
+    """
     table, load, slope, dload = contact_values(system, p, added)
     for e in range(system.laws.size):
-        good = _element(system, e, u, table[e], load[e], slope[e], dload[e], alone, out)
-        if not good:
-            return np.nan
-    return _residual(system, linear, u, p, least_size(system, p), alone, out)
+        if not _element(system, e, u, table[e], load[e], slope[e], dload[e], alone, out):
+            return False
+    return True
 
 
 @compiled
@@ -275,10 +285,10 @@ def _residual(
             else:
                 response, dresponse, reach = _response(system, linear, u, i, c, out)
             free, dfree = linear.u_linear[0, i, c], linear.u_linear[1, i, c]
-            scale = max(scale, abs(free), reach * force_scale)
+            scale = max(scale, magnitude(free), reach * force_scale)
             if has_sine:
                 # The mean of a part that nothing holds may drift without bound: it must not hide a residual.
-                scale = max(scale, abs(response))
+                scale = max(scale, magnitude(response))
             r[row] = u[row] - free.real + response.real
             dr[row] = -dfree.real + dresponse.real
             residual = max(residual, abs(r[row]))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Sequence
 from dataclasses import replace
@@ -9,27 +10,21 @@ from dataclasses import replace
 import numpy as np
 
 from solver.balance.balance import build
-from solver.balance.kernels.observers import measure_through_modes, modal_motion
+from solver.balance.kernels.observers import measure_through_modes
 from solver.balance.kernels.output import measure
-from solver.balance.kernels.residual import evaluate, evaluate_forces, prepare_forces
-from solver.balance.simplifications import Effects
+from solver.balance.kernels.residual import evaluate
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.system import DENSE
 from solver.continuation.branch import Branch
-from solver.continuation.branches.sweep import highest_between
-from solver.continuation.extrema.branch_error import branch_error
-from solver.continuation.extrema.extrema import Survey, band_limit
-from solver.continuation.extrema.nodes import Place, Points
+from solver.continuation.branches.sweep import surveyed, with_error, with_points
+from solver.continuation.extrema.extrema import Survey
+from solver.continuation.extrema.nodes import Node, NodeSolver, Points, numbers_of
 from solver.continuation.peaks import Peak
-from solver.jit.fourier import Flags, Real, to_full
+from solver.jit.fourier import Real
 from solver.linear.kernels.receptance import observer_receptance, receptance
 
-COMPETES_FOR_HIGHEST = 0.8  # share of the highest point from which a maximum may turn out to be the highest
 
-
-def observing(
-    branch: Branch, dof: str, *, limit: float | None = None, effects: Effects | None = None
-) -> Branch:
+def observing(branch: Branch, dof: str, *, limit: float | None = None) -> Branch:
     """Return a frequency response with another DOF observed: the same solutions, its own peaks and band.
 
     It costs one evaluation a point, no continuation. Between points it is as good as the branch is dense;
@@ -40,7 +35,6 @@ def observing(
     branch : a completed response over the frequency.
     dof : name of the DOF.
     limit : amplitude [m] above which the band is measured; peak/√2 if left out.
-    effects : those the branch was computed with.
 
     Raises
     ------
@@ -48,131 +42,124 @@ def observing(
         No such DOF.
     """
     begun = time.perf_counter()
-    scene = branch.balance.scene
-    other = scene.model_copy(update={"observe": scene.observe.model_copy(update={"dof": dof})})
-    balance = build(other, "frequency", harmonics=branch.balance.n_harmonics, effects=effects)
-    workspace = Workspace.of(balance)
-    rows, measures = (
-        found[0] for found in _measured([workspace], branch.solutions, branch.tangents, branch.measures)
-    )
-    survey = Survey(
-        workspace,
-        Points(
-            solutions=branch.solutions, tangents=branch.tangents, measures=measures, observed=rows,
-            states=branch.states,
-        ),
-    )  # fmt: skip
-    points = survey.points
-    at = band_limit(limit, survey.peaks, balance.parameter.kind)
-    error = branch_error(workspace, points, survey.peaks, highest_between)
-    return replace(
-        branch, balance=balance,
-        values=balance.parameter.all_outside(points.solutions[:, -1].copy()), solutions=points.solutions,
-        tangents=points.tangents, states=points.states,
-        observed=to_full(points.observed, balance.system.ks, balance.highest_harmonic),
-        measures=points.measures,
-        peaks=survey.peaks, peak_certificate=survey.certificate(completed=branch.completed),
-        band=None if at is None else survey.band(at), error_estimate=error,
-        newton_iterations=survey.spent, seconds=time.perf_counter() - begun,
-    )  # fmt: skip
+    workspace = _workspaces(branch, [dof])[0]
+    x, measures = _measured([workspace], branch.solutions, branch.tangents, branch.measures)
+    seen = replace(branch, balance=workspace.balance, error_estimate=math.nan, newton_iterations=0)
+    survey = Survey.of(workspace, _points(branch, x[0], measures[0]))
+    found = with_error(surveyed(seen, survey, limit), workspace)
+    return replace(found, seconds=time.perf_counter() - begun)
 
 
 def highest_peaks(branch: Branch, dofs: Sequence[str]) -> tuple[list[Peak], Branch]:
     """Return the highest peak of each of several DOFs on one frequency response.
 
-    The contacts are evaluated once a point for all of them, and lower maxima are not polished: a fraction of
-    what `observing` costs for each. The peaks themselves are found and polished in the same way. Points that
-    one DOF calls for, at changes of state and narrow resonances, are known to those behind it.
+    A fraction of what `observing` costs for each: the contacts are evaluated once a point for all DOFs, what
+    was solved for one is known to those behind it, and lower maxima are not polished.
 
     Parameters
     ----------
-    branch : a completed response over the frequency.
+    branch : a completed response over the frequency; its own peaks are not looked at.
     dofs : names of the DOFs.
 
     Returns
     -------
-    The peaks, and the branch with every point that was solved for.
+    The peaks, and the branch with the DOF observed that has the highest: with every point that was solved
+    for, its peaks polished where they compete for the highest, and the error of that, but no band.
 
     Raises
     ------
     SceneError
         No such DOF.
     """
-    scene, balance = branch.balance.scene, branch.balance
-    workspaces = [Workspace.of(balance)]
-    for dof in dofs:
-        other = scene.model_copy(update={"observe": scene.observe.model_copy(update={"dof": dof})})
-        seen = build(other, "frequency", harmonics=balance.n_harmonics)
-        workspaces.append(Workspace.of(seen, observing_another=workspaces[0]))
-    solutions, tangents, states = branch.solutions, branch.tangents, branch.states
-    rows, measures = _measured(workspaces, solutions, tangents, branch.measures)
-    found, lost = [], set[Place]()
-    for j, workspace in enumerate(workspaces[1:], 1):
-        points = Points(
-            solutions=solutions, tangents=tangents, measures=measures[j], observed=rows[j], states=states
-        )
-        survey = Survey(workspace, points, worth=COMPETES_FOR_HIGHEST, lost=lost)
+    begun = time.perf_counter()
+    workspaces = _workspaces(branch, dofs)
+    solver = NodeSolver(workspaces[0])
+    nothing = np.zeros((len(branch.values), branch.balance.n_coefficients))
+    observers, nodes = (
+        _Observers(solver, workspaces),
+        solver.nodes_of(_points(branch, nothing, branch.measures)),
+    )
+    found: list[Peak] = []
+    worst, peaks, certificate = 0, branch.peaks, branch.peak_certificate
+    for j in range(len(dofs)):
+        survey = Survey(solver, observers.seen_by(j, nodes), highest_alone=True)
+        nodes = survey.nodes
         found.append(survey.peaks[0])
-        points = survey.points
-        fresh = _fresh(points.solutions, solutions)
-        more = _measured(workspaces, points.solutions[fresh], points.tangents[fresh], points.measures[fresh])
-        rows, measures = (_joined(*both, fresh) for both in zip((rows, measures), more, strict=True))
-        solutions, tangents, states = points.solutions, points.tangents, points.states
-    return found, replace(
-        branch, values=balance.parameter.all_outside(solutions[:, -1].copy()), solutions=solutions,
-        tangents=tangents, states=states, measures=measures[0],
-        observed=to_full(rows[0], balance.system.ks, balance.highest_harmonic),
+        if j == 0 or found[j].value > found[worst].value:
+            worst, peaks, certificate = j, survey.peaks, survey.certificate(completed=True)
+    points = solver.points_of(observers.seen_by(worst, nodes))
+    seen = replace(
+        branch, balance=workspaces[worst].balance, peaks=peaks, band=None, peak_certificate=certificate,
+        error_estimate=math.nan, newton_iterations=branch.newton_iterations + solver.spent,
+        seconds=branch.seconds + time.perf_counter() - begun,
+    )  # fmt: skip
+    return found, with_error(with_points(seen, points), workspaces[worst])
+
+
+def _points(branch: Branch, x: Real, measures: Real) -> Points:
+    """Return the points of a branch with the motion and the measures of another DOF."""
+    return Points(
+        solutions=branch.solutions, tangents=branch.tangents, measures=measures, observed=x,
+        states=branch.states,
     )  # fmt: skip
 
 
-def _fresh(solutions: Real, known: Real) -> Flags:
-    """Return which rows are not among the known ones, all of which are there in the same order."""
-    fresh, j = np.ones(len(solutions), bool), 0
-    for i, solution in enumerate(solutions):
-        if j < len(known) and np.array_equal(solution, known[j]):
-            fresh[i], j = False, j + 1
-    return fresh
+def _workspaces(branch: Branch, dofs: Sequence[str]) -> list[Workspace]:
+    """Return a workspace with each DOF observed; all share what is known of the resonances."""
+    posed, workspaces = branch.balance, list[Workspace]()
+    for dof in dofs:
+        seen = posed.scene.observe.model_copy(update={"dof": dof})
+        other = posed.scene.model_copy(update={"observe": seen})
+        balance = build(other, harmonics=posed.n_harmonics, effects=posed.effects)
+        workspaces.append(Workspace.of(balance, observing_another=workspaces[0] if workspaces else None))
+    return workspaces
 
 
-def _joined(known: Real, more: Real, fresh: Flags) -> Real:
-    """Return the rows of several DOFs, (DOFs, points, …), with those of fresh points in their places."""
-    both = np.empty((len(known), fresh.size, known.shape[2]))
-    both[:, ~fresh], both[:, fresh] = known, more
-    return both
+class _Observers:
+    """Several observed DOFs at the nodes of one solver, each node measured once for all of them."""
+
+    def __init__(self, solver: NodeSolver, workspaces: Sequence[Workspace]) -> None:
+        self._solver, self._workspaces = solver, workspaces
+        self._known = np.zeros(0, bool)
+        table = solver.table
+        self._x = np.empty((len(workspaces), 0, table.observed.shape[1]))
+        self._measures = np.empty((len(workspaces), 0, table.measures.shape[1]))
+
+    def seen_by(self, j: int, nodes: Sequence[Node]) -> list[Node]:
+        """Return the nodes as DOF number j sees them."""
+        rows, table = numbers_of(nodes), self._solver.table
+        more = len(table.measures) - self._known.size
+        if more:
+            self._known = np.pad(self._known, (0, more))
+            self._x, self._measures = (
+                np.pad(one, ((0, 0), (0, more), (0, 0))) for one in (self._x, self._measures)
+            )
+        new = rows[~self._known[rows]]
+        self._known[new] = True
+        self._x[:, new], self._measures[:, new] = _measured(
+            self._workspaces, table.solutions[new], table.tangents[new], table.measures[new]
+        )
+        return self._solver.observe(self._workspaces[j], nodes, self._x[j, rows], self._measures[j, rows])
 
 
 def _measured(
     workspaces: Sequence[Workspace], solutions: Real, tangents: Real, like: Real
 ) -> tuple[Real, Real]:
     """Return the motions and measures of several DOFs, (DOFs, points, …); residuals are those of `like`."""
-    rows = np.zeros((len(workspaces), len(solutions), workspaces[0].balance.n_coefficients))
-    measures = np.repeat(like[None], len(workspaces), axis=0)
-    for i, (solution, tangent) in enumerate(zip(solutions, tangents, strict=True)):
-        _measure_all(workspaces, solution, tangent, rows[:, i], measures[:, i])
-    return rows, measures
-
-
-def _measure_all(
-    workspaces: Sequence[Workspace], solution: Real, tangent: Real, rows: Real, out: Real
-) -> None:
-    """Fill a row for each of several DOFs of one motion; `out` keeps its residual and what it loses."""
     first = workspaces[0]
-    u, p = np.ascontiguousarray(solution[:-1]), float(solution[-1])
-    du, dp = np.ascontiguousarray(tangent[:-1]), float(tangent[-1])
-    system = first.balance.system
-    if system.alone.any() or system.hold == 1:
+    x = np.zeros((len(workspaces), len(solutions), first.balance.n_coefficients))
+    measures = np.repeat(like[None], len(workspaces), axis=0)
+    if first.balance.system.form != DENSE:
+        seen = np.array([each.balance.system.observe_modes for each in workspaces])
+        measure_through_modes(first.system, first.point, seen, solutions, tangents, x, measures)
+        return x, measures
+    for i, (solution, tangent) in enumerate(zip(solutions, tangents, strict=True)):
+        u, p = solution[:-1].copy(), float(solution[-1])
         receptance(first.system, p, first.linear)
         evaluate(first.system, first.linear, u, p, 0.0, first.point)
-    else:
-        prepare_forces(first.system, first.linear, p)
-        evaluate_forces(first.system, first.linear, u, p, first.point)
-    if system.form == DENSE:
         for j, each in enumerate(workspaces):
             if j > 0:
                 observer_receptance(each.system, p, each.linear)
-            measure(each.system, each.linear, u, first.point, du, dp, rows[j], out[j])
-        return
-    amplitudes = np.empty((2, *system.modal_forces.shape), np.complex128)
-    modal_motion(first.system, u, p, first.point, du, dp, amplitudes)
-    for j, each in enumerate(workspaces):
-        measure_through_modes(each.system, first.point, amplitudes, rows[j], out[j])
+            along = tangent[:-1].copy(), float(tangent[-1])
+            measure(each.system, each.linear, u, first.point, *along, x[j, i], measures[j, i])
+    return x, measures

@@ -22,6 +22,7 @@ from solver.continuation.branch import ENDINGS, Branch, BranchStatus
 from solver.continuation.branches.adaptive_harmonics import sweep_to
 from solver.continuation.branches.point_by_point import is_unique, rows_before_a_turn, walk_by_points
 from solver.continuation.branches.symmetry_breaking import branch_flags
+from solver.continuation.certificate import uncertain
 from solver.continuation.endings import AHEAD, MANY, ratchets_ahead, stands_still, taken_up, too_stiff
 from solver.continuation.extrema.branch_error import branch_error
 from solver.continuation.extrema.extrema import Survey, band_limit
@@ -67,6 +68,7 @@ def sweep(
     settings: ContinuationSettings | None = None,
     effects: Effects | None = None,
     errors: bool = True,
+    peaks: bool = True,
     guess: Real | None = None,
     resume: Stretch | None = None,
     on_stretch: Callable[[Stretch], None] | None = None,
@@ -92,6 +94,7 @@ def sweep(
     effects : what is paid for though the scene does not call for it; see
     `solver.balance.simplifications.Effects`.
     errors : whether the error of the highest peak is estimated; `with_error` does it later if not.
+    peaks : whether peaks and the band are looked for between the points; without them the branch has none.
     guess : (n_unknowns,) slip motions [m] to start from, instead of the start-up ladder.
     resume : the beginning of the same branch, to go on behind its last point.
     on_stretch : called with all consecutive points as they are found; joined (`solver.joined`) they are what
@@ -161,7 +164,7 @@ def sweep(
     if status in _LOST and too_stiff(workspace, stretches):
         status = BranchStatus.TOO_STIFF
     earlier = 0.0 if resume is None else resume.seconds
-    branch = _finish(workspace, stretches, status, first, last, limit, begun - earlier)
+    branch = _finish(workspace, stretches, status, first, last, limit, begun - earlier, peaks=peaks)
     if errors:
         branch = with_error(branch, workspace)
     if on_progress is not None and branch.completed:
@@ -320,33 +323,51 @@ def _stretch(
 
 def _finish(
     workspace: Workspace, stretches: list[Stretch], status: BranchStatus, start: float, stop: float,
-    limit: float | None, begun: float,
+    limit: float | None, begun: float, *, peaks: bool,
 ) -> Branch:  # fmt: skip
-    """Put the stretches together, polish the peaks and measure the band."""
+    """Put the stretches together; with `peaks` polish these and measure the band."""
     balance = workspace.balance
     whole = joined(stretches)
     if status in (BranchStatus.STALLED, BranchStatus.NO_START) and balance.parameter.kind is Kind.FREQUENCY:
         at_end = balance.parameter.outside(float(whole.solutions[-1, -1])) if len(whole.solutions) else start
         if undamped_resonance(balance.scene, at_end, balance.system.ks):
             status = BranchStatus.UNDAMPED
-    survey = _survey(workspace, whole)
-    at = band_limit(limit, survey.peaks, balance.parameter.kind)
+    walked = Branch(
+        balance=balance, status=status, start=start, stop=stop, values=whole.solutions[:, -1],
+        solutions=whole.solutions, tangents=whole.tangents, observed=whole.observed, measures=whole.measures,
+        states=whole.states, peaks=(), band=None, error_estimate=math.nan,
+        newton_iterations=whole.newton_iterations, rejected_steps=whole.rejected_steps,
+        stepped_over=whole.stepped_over, seconds=math.nan, flags=(),
+        peak_certificate=uncertain("peaks between its points were not looked for"),
+    )  # fmt: skip
+    points = points_of(whole)
+    branch = surveyed(walked, Survey.of(workspace, points), limit) if peaks else with_points(walked, points)
+    flags = branch_flags(workspace, branch.solutions), _drive_flags(workspace, whole, status, start, stop)
+    return replace(branch, flags=flags[0] + flags[1], seconds=time.perf_counter() - begun)
+
+
+def surveyed(branch: Branch, survey: Survey, limit: float | None) -> Branch:
+    """Return a branch with the points, the peaks and the band of a survey of it.
+
+    `limit` [m] is the amplitude above which the band is measured; peak/√2 if it is None.
+    """
+    at = band_limit(limit, survey.peaks, branch.balance.parameter.kind)
     band = None if at is None else survey.band(at)
-    points = survey.points
-    return Branch(
-        balance=balance, status=status, start=start, stop=stop,
-        values=balance.parameter.all_outside(points.solutions[:, -1].copy()), solutions=points.solutions,
-        tangents=points.tangents,
+    return replace(
+        with_points(branch, survey.points), peaks=survey.peaks, band=band,
+        newton_iterations=branch.newton_iterations + survey.spent,
+        peak_certificate=survey.certificate(completed=branch.completed),
+    )  # fmt: skip
+
+
+def with_points(branch: Branch, points: Points) -> Branch:
+    """Return a branch with other points of its balance."""
+    balance = branch.balance
+    return replace(
+        branch, values=balance.parameter.all_outside(points.solutions[:, -1].copy()),
+        solutions=points.solutions, tangents=points.tangents, states=points.states,
         observed=to_full(points.observed, balance.system.ks, balance.highest_harmonic),
-        measures=points.measures, states=points.states, peaks=survey.peaks,
-        band=band, error_estimate=math.nan,
-        newton_iterations=whole.newton_iterations + survey.spent,
-        rejected_steps=whole.rejected_steps, stepped_over=whole.stepped_over,
-        seconds=time.perf_counter() - begun,
-        flags=(
-            *branch_flags(workspace, points.solutions), *_drive_flags(workspace, whole, status, start, stop)
-        ),
-        peak_certificate=survey.certificate(completed=status is BranchStatus.COMPLETED),
+        measures=points.measures,
     )  # fmt: skip
 
 
@@ -375,13 +396,12 @@ def _drive_flags(
     return () if all(map(workspace.friction_can_hold, beyond)) else (ABOVE_FRICTION,)
 
 
-def _survey(workspace: Workspace, whole: Stretch) -> Survey:
-    """Return the survey of peaks between the points of a branch."""
-    points = Points(
+def points_of(whole: Stretch) -> Points:
+    """Return the rows of a stretch."""
+    return Points(
         solutions=whole.solutions, tangents=whole.tangents, measures=whole.measures, observed=whole.observed,
         states=whole.states,
     )  # fmt: skip
-    return Survey(workspace, points)
 
 
 def highest_between(balance: Balance, low: float, high: float, guess: Real) -> Peak | None:
@@ -393,5 +413,5 @@ def highest_between(balance: Balance, low: float, high: float, guess: Real) -> P
         stretches.append(stretch)
         if sum(len(each.solutions) for each in stretches) >= _MOST_FOLLOWED:
             break
-    survey = _survey(workspace, joined(stretches))
+    survey = Survey.of(workspace, points_of(joined(stretches)))
     return survey.peaks[0] if survey.peaks else None

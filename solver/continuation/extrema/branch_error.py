@@ -30,7 +30,7 @@ from solver.continuation.extrema.kernels.suspects import find_reaching
 from solver.continuation.extrema.nodes import Points
 from solver.continuation.peaks import Peak
 from solver.jit.fourier import Complex, Flags, Real
-from solver.scene.harmonics import spread
+from solver.scene.harmonics import among, spread
 
 # Follows a balance between two λ from a first guess; returns the highest peak there, None without a solution.
 Follow = Callable[[Balance, float, float, Real], Peak | None]
@@ -118,7 +118,7 @@ class _Look:
         self._loop = larger.loop
         self._samples: list[_Sample] = []
         ks = larger.balance.system.ks
-        self._beyond = np.flatnonzero(~np.isin(ks, balance.system.ks))
+        self._beyond = np.flatnonzero(~among(balance.system.ks, ks))
 
     def _sampled(self) -> list[_Sample]:
         """Return points all along the branch, without those where the contacts have no force."""
@@ -128,7 +128,7 @@ class _Look:
         ks, nc = larger.balance.system.ks, larger.balance.n_ports
         forces = np.empty((len(chosen), ks.size, nc), np.complex128)
         stiffness = np.empty((len(chosen), ks.size, nc, nc), np.complex128)
-        forces_at(larger.system, larger.linear, larger.point, rows, forces, stiffness)
+        forces_at(larger.system, larger.point, rows, forces, stiffness)
         return [
             _Sample(
                 at=float(rows[j, -1]), amplitude=float(self._points.measures[i, MAX_ABS]), u=rows[j, :-1],
@@ -207,7 +207,7 @@ class _Look:
         rows = self._wide_rows(_chosen(points, _FEW_SAMPLES))
         forces = np.empty((len(rows), system.ks.size, nc), np.complex128)
         nothing = np.empty((0, system.ks.size, nc, nc), np.complex128)
-        forces_at(larger.system, larger.linear, larger.point, rows, forces, nothing)
+        forces_at(larger.system, larger.point, rows, forces, nothing)
         may = np.empty(self._beyond.size, bool)
         find_reaching(
             larger.system, *self._loop.range, points.solutions, points.measures[:, MAX_ABS], forces,
@@ -279,5 +279,5 @@ def _chosen(points: Points, count: int) -> list[int]:
     span = max(float(np.ptp(at)), 1e-300)
     steps = np.abs(np.diff(at)) / span + np.abs(np.diff(amplitude)) / max(float(np.ptp(amplitude)), 1e-300)
     along = np.append(0.0, np.cumsum(steps))
-    wanted = np.searchsorted(along, np.linspace(0.0, along[-1], count))
-    return [int(i) for i in np.unique(np.minimum(wanted, at.size - 1))]
+    wanted = np.searchsorted(along, along[-1] / (count - 1) * np.arange(count))
+    return sorted(set(np.minimum(wanted, at.size - 1).tolist()))

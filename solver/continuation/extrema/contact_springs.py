@@ -59,7 +59,7 @@ class LocalModel:
         self._system = balance.system
         nk, nc = balance.system.ks.size, balance.n_ports
         self._rows = np.zeros(0, np.int64)
-        self._springs: dict[int, tuple[Node, Springs]] = {}
+        self._springs: dict[int, Springs] = {}  # by the number of the node
         self.stiffness = np.zeros((0, nk, nc, nc), np.complex128)
 
     def rows(self, numbers: Integer) -> Integer:
@@ -79,14 +79,7 @@ class LocalModel:
             self._rows[chosen] = first + np.arange(chosen.size)
             stiffness = np.empty((chosen.size, *self.stiffness.shape[1:]), np.complex128)
             forces = np.empty(stiffness.shape[:3], np.complex128)
-            forces_at(
-                workspace.system,
-                workspace.linear,
-                workspace.point,
-                table.solutions[chosen],
-                forces,
-                stiffness,
-            )
+            forces_at(workspace.system, workspace.point, table.solutions[chosen], forces, stiffness)
             self.stiffness = np.concatenate([self.stiffness, stiffness]) if first else stiffness
         return self._rows[numbers]
 
@@ -94,7 +87,7 @@ class LocalModel:
         """Return the contacts at a node; None at a fold."""
         if node.tangent[-1] == 0.0:
             return None
-        if id(node) not in self._springs:
+        if node.number not in self._springs:
             workspace, balance = self._solver.workspace, self._solver.workspace.balance
             nk, nc = balance.system.ks.size, balance.n_ports
             motions, stiffness = np.empty((4, nk, nc), np.complex128), np.empty((nk, nc, nc), np.complex128)
@@ -103,8 +96,8 @@ class LocalModel:
                 workspace.system, workspace.linear, workspace.point, node.solution[:-1], node.at, du, motions,
                 stiffness,
             )  # fmt: skip
-            self._springs[id(node)] = node, Springs(motions[0], motions[1], motions[2], motions[3], stiffness)
-        return self._springs[id(node)][1]
+            self._springs[node.number] = Springs(motions[0], motions[1], motions[2], motions[3], stiffness)
+        return self._springs[node.number]
 
     def adds(self, left: Node, right: Node, one: Resonance) -> tuple[float, float]:
         """Return what a resonance adds to what its neighbours suggest.

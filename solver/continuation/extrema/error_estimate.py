@@ -24,7 +24,7 @@ from solver.continuation.branch import Branch
 from solver.jit.fourier import Real
 from solver.linear.kernels.receptance import receptance
 from solver.results.told import Piece
-from solver.scene.harmonics import MULTIPLES, is_fast
+from solver.scene.harmonics import MULTIPLES, among, is_fast
 
 # Harmonics looked at beyond those kept, for a solution with H of them: H + max(H, 8).
 _LEAST_BEYOND = 8
@@ -82,7 +82,7 @@ class ErrorEstimator:
         self._top = highest + max(highest, _LEAST_BEYOND)
         self._larger = Workspace.of(more_harmonics(balance, self._top, multiples=2 * MULTIPLES), workspace)
         beyond = linear_part(self._larger.balance, _TAIL * self._top)
-        self._is_beyond = ~np.isin(beyond.ks, self._larger.balance.system.ks)
+        self._is_beyond = ~among(self._larger.balance.system.ks, beyond.ks)
         self._all_ks, self._beyond_ks = beyond.ks, beyond.ks[self._is_beyond]
         self._is_fast = is_fast(balance.scene, self._larger.balance.system.ks)
         self._later_is_fast = is_fast(balance.scene, self._beyond_ks)
@@ -221,7 +221,7 @@ class ErrorEstimator:
         moving = ks > 0
         pairs = F[:, int(ks[0] == 0) :].reshape(F.shape[0], int(moving.sum()), 2)
         sizes[:, moving] = np.hypot(pairs[..., 0], pairs[..., 1])
-        added = ~np.isin(ks, kept)
+        added = ~among(kept, ks)
         # Of each port at harmonics beyond: of waves of their own, each with its own rate.
         weighted, later = sizes * ks**2, np.zeros((self._beyond_ks.size, F.shape[0]))
         for fast in (False, True):
@@ -232,7 +232,7 @@ class ErrorEstimator:
         if not sizes[:, added].any() and not later.any():
             return 0.0, 1.0
         forces = np.zeros((self._all_ks.size, F.shape[0]))
-        forces[self._is_beyond], forces[np.isin(self._all_ks, ks[added])] = later, sizes[:, added].T
+        forces[self._is_beyond], forces[among(ks[added], self._all_ks)] = later, sizes[:, added].T
         try:
             seen, moved, last = self._beyond_motions(forces, p)
         except np.linalg.LinAlgError:
@@ -269,7 +269,7 @@ class ErrorEstimator:
         seen, moved = np.zeros(forces.shape[0]), np.zeros((2, *forces.shape))
         wanted = np.flatnonzero(forces.any(axis=1))
         count = math.ceil(wanted.size * forces.shape[1] * pushed.size / _AT_ONCE)
-        for part in np.array_split(wanted, max(1, count)):
+        for part in np.array_split(wanted, count) if count > 1 else (wanted,):
             A, B, sizes = linear.A[0, part], linear.B[0, part, None], forces[part][:, pushed, None]
             bare = A[:, :, pushed] if span is None else A @ span[pushed].T
             held = np.linalg.solve(np.eye(A.shape[1]) + A @ springs, bare)

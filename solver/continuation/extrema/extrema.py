@@ -26,7 +26,7 @@ from solver.balance.workspace import Workspace
 from solver.continuation.certificate import PeakCertificate, certified, uncertain
 from solver.continuation.extrema.intervals import CURVES, highest_share, lowest_share, may_cross
 from solver.continuation.extrema.kernels.intervals import IS_BENT, WAVES, WORTH_POLISHING
-from solver.continuation.extrema.nodes import Node, NodeSolver, Place, Points
+from solver.continuation.extrema.nodes import Node, NodeSolver, Points, numbers_of
 from solver.continuation.extrema.resonance_search import ResonanceSearch, Search
 from solver.continuation.extrema.state_changes import ChangeSearch
 from solver.continuation.folds import fold_between, motion_scales
@@ -38,6 +38,11 @@ NEAR_BY = 1e-2
 HALF_POWER = 1.0 / math.sqrt(2.0)
 # A curve this far below the other one all over an interval is no max|x| there.
 HIDDEN = 0.8
+COMPETES_FOR_HIGHEST = 0.8  # share of the highest point from which a maximum may turn out to be the highest
+# Where the highest is looked for alone: share of it, and of the range, from which an interval is parted in
+# which contacts change, how often at most, and how much more than estimated a cubic may be wrong.
+NOT_FAR, CHANGE_LENGTH, CHANGE_HALVINGS = 0.3, 0.01, 3
+OF_THE_ERROR = 4.0
 COMPETES = 0.5  # share of the highest from which a maximum is polished to the last digits
 SHARP, ENOUGH = 1e-10, 1e-5  # slope relative to that of the interval at which a maximum is found
 NEAR_THE_TOP = 0.97  # share of the highest point from which the branch has to be dense
@@ -55,30 +60,36 @@ class Survey:
 
     Parameters
     ----------
-    workspace, points : the branch.
-    worth : share of the highest point below which no maximum is polished. By default all but the smallest
-        are; who looks for the highest alone needs no more than those that compete with it.
-    lost : as of `NodeSolver`.
+    solver, nodes : of the branch.
+    highest_alone : whether the highest peak is all that is wanted. Then the branch is made dense where that
+        may stand alone, and the nodes may be as far apart as those of `solver.continuation.branches.samples`.
     """
 
-    def __init__(
-        self, workspace: Workspace, points: Points, worth: float = WORTH_POLISHING,
-        lost: set[Place] | None = None,
-    ) -> None:  # fmt: skip
-        self._workspace, self._points, self._worth = workspace, points, worth
-        self._solver = NodeSolver(workspace, lost)
-        self._nodes = self._solver.nodes_of(points)
+    def __init__(self, solver: NodeSolver, nodes: list[Node], *, highest_alone: bool = False) -> None:
+        self._workspace, self._highest_alone = solver.workspace, highest_alone
+        # Share of the highest point below which nothing stands that is looked for.
+        self._worth = COMPETES_FOR_HIGHEST if highest_alone else WORTH_POLISHING
+        self._least = 0.0  # amplitude below which no maximum is polished [m]
+        self._solver, self._nodes = solver, nodes
         self._peaks: list[Peak] = []
         self._undone: list[tuple[float, str]] = []  # λ and why
         self._search = Search(nodes=self._nodes)
         if self._nodes:
             if len(self._nodes) > 1:
-                changes = ChangeSearch(self._solver, worth)
+                if highest_alone:
+                    self._part_changes()
+                changes = ChangeSearch(self._solver, self._worth)
                 self._nodes = changes.run(self._nodes)
                 self._undone += changes.left
             self._look_for_resonances()
             self._densify()
             self._find_peaks()
+
+    @classmethod
+    def of(cls, workspace: Workspace, points: Points) -> Survey:
+        """Return the survey of a branch."""
+        solver = NodeSolver(workspace)
+        return cls(solver, solver.nodes_of(points))
 
     @property
     def spent(self) -> int:
@@ -91,9 +102,14 @@ class Survey:
         return tuple(sorted(self._peaks, key=lambda peak: -peak.value))
 
     @property
-    def points(self) -> Points:
+    def nodes(self) -> list[Node]:
         """The branch with everything that was solved for between its points, peaks included."""
-        return self._solver.points_of(self._nodes, self._points)
+        return self._nodes
+
+    @property
+    def points(self) -> Points:
+        """The same as rows."""
+        return self._solver.points_of(self._nodes)
 
     def certificate(self, *, completed: bool) -> PeakCertificate:
         """Say why no higher peak hides between two points, or why that is not known."""
@@ -118,8 +134,31 @@ class Survey:
     def _look_for_resonances(self) -> None:
         balance = self._workspace.balance
         if ClosedLoop.serves(balance) and len(self._nodes) > 1:
-            self._search = ResonanceSearch(self._solver).run(self._nodes)
+            competes = self._worth if self._highest_alone else 0.0
+            self._search = ResonanceSearch(self._solver, competes).run(self._nodes)
             self._nodes = self._search.nodes
+
+    def _part_changes(self) -> None:
+        """Halve long intervals in which contacts change and the amplitude is not far from the top.
+
+        A resonance moves with what the contacts do, and may pass between ends where it is seen from neither.
+        """
+        span = abs(self._nodes[-1].at - self._nodes[0].at)
+        for _ in range(CHANGE_HALVINGS):
+            top = max(node.measures[MAX_ABS] for node in self._nodes)
+            seen = self._solver.look(self._nodes, top)
+            wanted = (np.diff(seen.measures[:, PIECE]) != 0.0) & (seen.reach >= NOT_FAR * top)
+            wanted &= np.abs(np.diff(seen.at)) > CHANGE_LENGTH * span
+            if not wanted.any():
+                break
+            grown = list(self._nodes)
+            for j in reversed(np.flatnonzero(wanted).tolist()):
+                middle = self._solver.middle(*self._nodes[j : j + 2])
+                if middle is None:
+                    self._undone.append((self._nodes[j].at, "no solution was found between two points"))
+                else:
+                    grown.insert(j + 1, middle)
+            self._nodes = grown
 
     def _densify(self) -> None:
         """Halve intervals until cubics predict what lies between: finely near the top, coarsely elsewhere."""
@@ -127,7 +166,8 @@ class Survey:
             return
         for _ in range(COARSE_HALVINGS):
             top = max(node.measures[MAX_ABS] for node in self._nodes)
-            bent = self._solver.look(self._nodes, top).flags & IS_BENT > 0
+            seen = self._solver.look(self._nodes, top)
+            bent = (seen.flags & IS_BENT > 0) & (seen.reach + OF_THE_ERROR * seen.error >= self._worth * top)
             if not bent.any():
                 break
             self._nodes, _, _ = self._solver.halved(self._nodes, bent)
@@ -152,20 +192,25 @@ class Survey:
             if not waving.any():
                 break
             dense, _, _ = self._solver.halved(dense, waving)
-        refined: list[Node] = []
-        slopes = self._solver.look(dense, top).slopes if len(dense) > 1 else np.zeros((0, 2, 2))
-        begun = 0
-        for j in np.flatnonzero(np.any((slopes[:, 0] > 0.0) & (slopes[:, 1] <= 0.0), axis=1)).tolist():
-            refined += dense[begun : j + 1]
+        self._least, refined, begun = self._worth * top, list[Node](), 0
+        for j, inside in sorted(self._maxima(dense, top).items()):
+            refined += [*dense[begun : j + 1], *inside]
             begun = j + 1
-            refined += self._peaks_between(dense[j], dense[j + 1], slopes[j].tolist(), top)
-        refined += dense[begun:]
-        self._nodes = refined
+        self._nodes = [*refined, *dense[begun:]]
         first, last = self._nodes[0], self._nodes[-1]
         if len(self._nodes) == 1 or _slope(first) <= 0.0:
             self._peaks.append(self._peak(first, interior=False))
         if len(self._nodes) > 1 and _slope(last) >= 0.0:
             self._peaks.append(self._peak(last, interior=False))
+
+    def _maxima(self, nodes: list[Node], top: float) -> dict[int, list[Node]]:
+        """Collect the maxima between nodes, where the highest may stand first; return them by interval."""
+        if len(nodes) < 2:
+            return {}
+        seen = self._solver.look(nodes, top)
+        falls = np.any((seen.slopes[:, 0] > 0.0) & (seen.slopes[:, 1] <= 0.0), axis=1)
+        places = sorted(np.flatnonzero(falls).tolist(), key=lambda j: -float(seen.reach[j]))
+        return {j: self._peaks_between(nodes[j], nodes[j + 1], seen.slopes[j].tolist(), top) for j in places}
 
     def _peaks_between(self, left: Node, right: Node, slopes: list[list[float]], top: float) -> list[Node]:
         """Collect the maxima of max|x| between two nodes; return the nodes that come between for them.
@@ -193,7 +238,7 @@ class Survey:
         higher = left if left.measures[value] > right.measures[value] else right
         height = higher.measures[value] + 0.25 * (ends[0] - ends[1])
         hidden = height < HIDDEN * min(left.measures[MAX_ABS], right.measures[MAX_ABS])
-        if hidden or height < self._worth * top:
+        if hidden or height < self._least:
             return higher
         close = SHARP if height >= COMPETES * top else ENOUGH
         node = self._solver.refine(left, right, what, 0.0, ends, close)
@@ -201,6 +246,8 @@ class Survey:
             if node is None:
                 self._undone.append((higher.at, "a peak could not be polished"))
             return higher
+        if self._highest_alone:
+            self._least = max(self._least, node.measures[value] - PREDICTED * top)
         return node
 
     def _sharpened(self, node: Node) -> Node:
@@ -237,10 +284,10 @@ class Survey:
             found, sure = self._dipped(nodes[-1], right, limit, MOST_DIPS) if wanted else ([], True)
             known &= sure
             nodes += [*found, right]
-        for left, right in pairwise(nodes):
+        above = np.array([node.measures[MAX_ABS] for node in nodes]) > limit
+        for j in np.flatnonzero(above[1:] | above[:-1]).tolist():
+            left, right = nodes[j], nodes[j + 1]
             gaps = left.measures[MAX_ABS] - limit, right.measures[MAX_ABS] - limit
-            if gaps[0] <= 0.0 and gaps[1] <= 0.0:
-                continue
             begin, end = left.solution, right.solution
             if (gaps[0] > 0.0) != (gaps[1] > 0.0):
                 edge = self._edge(left, right, limit, gaps)
@@ -268,11 +315,14 @@ class Survey:
 
     def _with_folds(self, limit: float) -> tuple[list[Node], list[tuple[Node, bool]]]:
         """Return the nodes with the folds above the limit among them, and these (and whether smooth)."""
+        onward = self._solver.table.tangents[numbers_of(self._nodes), -1]
+        turns = onward[1:] * onward[:-1] < 0.0
+        if not turns.any():
+            return self._nodes, []
         nodes: list[Node] = [self._nodes[0]]
         folds = []
-        for left, right in pairwise(self._nodes):
-            turns = left.tangent[-1] * right.tangent[-1] < 0.0
-            if turns and max(left.measures[MAX_ABS], right.measures[MAX_ABS]) > limit:
+        for (left, right), turned in zip(pairwise(self._nodes), turns.tolist(), strict=True):
+            if turned and max(left.measures[MAX_ABS], right.measures[MAX_ABS]) > limit:
                 by_share = motion_scales(left, right)
                 ends = float(left.tangent[-1] * by_share[0]), float(right.tangent[-1] * by_share[1])
                 found = fold_between(partial(self._solver.between, left, right), *ends)

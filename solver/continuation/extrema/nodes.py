@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -25,6 +26,7 @@ from solver.balance.kernels.output import (
     measure,
 )
 from solver.contacts.kernels.system import evaluation_by_value
+from solver.continuation.extrema.contact_springs import LocalModel
 from solver.continuation.extrema.kernels import intervals
 from solver.continuation.extrema.kernels.intervals import look_between, middles_between
 from solver.continuation.extrema.kernels.state_changes import locate_change
@@ -40,10 +42,6 @@ MOST_TRIALS = 120
 MOST_SOLVES = 12  # of a change of state
 SLOPES = [SLOPE, RANGE_SLOPE, HIGH_SLOPE, LOW_SLOPE]  # measures along the tangent
 NARROW = 1e-13  # relative width at which a place is found
-
-
-Place = tuple[float, float, float]
-"""λ of two nodes, and λ between them."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -91,16 +89,19 @@ class Between:
 class NodeSolver:
     """Solves for nodes between others; counts the Newton iterations it spends.
 
-    Parameters
+    Attributes
     ----------
-    workspace : of the branch.
-    lost : where no solution was found from anywhere, by surveys of the same branch with other DOFs observed;
-        what is lost here is added. To look there again would cost as much as hundreds of points.
+    workspace : Workspace
+        Of the branch; of another DOF observed after `observe`.
+    table : NodeTable
+        The rows of all nodes.
     """
 
-    def __init__(self, workspace: Workspace, lost: set[Place] | None = None) -> None:
+    def __init__(self, workspace: Workspace) -> None:
         self.workspace = workspace
-        self._lost = set() if lost is None else lost
+        # λ of two nodes, and λ between them, where no solution was found from anywhere: to look there again
+        # would cost as much as hundreds of points.
+        self._lost = set[tuple[float, float, float]]()
         self.spent = 0
         self.least = workspace.balance.system.least_size
         balance = workspace.balance
@@ -108,14 +109,33 @@ class NodeSolver:
         self.table = NodeTable(balance.n_unknowns, balance.n_coefficients, MEASURES, balance.system.laws.size)
         self._last: tuple[Sequence[Node], float, Between] | tuple[None, float, None] = None, 0.0, None
 
+    @cached_property
+    def model(self) -> LocalModel:
+        """The contacts at its nodes as springs."""
+        return LocalModel(self)
+
+    def observe(
+        self, workspace: Workspace, nodes: Sequence[Node], observed: Real, measures: Real
+    ) -> list[Node]:
+        """Return the nodes as another DOF sees them.
+
+        Parameters
+        ----------
+        workspace : of the same scene with that DOF observed.
+        observed, measures : rows of the nodes with it.
+        """
+        self.workspace, rows = workspace, numbers_of(nodes)
+        self.table.observed[rows], self.table.measures[rows] = observed, measures
+        self._last = None, 0.0, None
+        seen = zip(nodes, measures.tolist(), observed, strict=True)
+        return [node._replace(measures=values, observed=x) for node, values, x in seen]
+
     def nodes_of(self, points: Points) -> list[Node]:
         """Return the rows of a branch as nodes."""
         return self._added(points.solutions, points.tangents, points.measures, points.observed, points.states)
 
-    def points_of(self, nodes: Sequence[Node], like: Points) -> Points:
-        """Return nodes as the rows of a branch; `like` gives the shapes where there is none."""
-        if not nodes:
-            return like
+    def points_of(self, nodes: Sequence[Node]) -> Points:
+        """Return nodes as the rows of a branch."""
         rows, table = numbers_of(nodes), self.table
         return Points(
             solutions=table.solutions[rows], tangents=table.tangents[rows], measures=table.measures[rows],
@@ -261,6 +281,15 @@ class NodeSolver:
         near = sides > 0
         return self._added(found[near], ways[near], measures[near], x[near], states[near])
 
+    def middle(self, left: Node, right: Node) -> Node | None:
+        """Return the node at the λ between two far apart, from the cubic through them or from each."""
+        if left.tangent[-1] * right.tangent[-1] <= 0.0:
+            return None
+        p, length, (a, b) = 0.5 * (left.at + right.at), right.at - left.at, (left.solution, right.solution)
+        bend = left.tangent / left.tangent[-1] - right.tangent / right.tangent[-1]
+        cubic = 0.5 * (a + b) + 0.125 * length * bend
+        return self.at(p, [cubic[:-1], a[:-1], b[:-1]], math.copysign(1.0, length))
+
     def _aside(self, left: Node, right: Node, p: float) -> Node | None:
         """Return the node at λ = `p` between two, or None if the branch turns there or has no solution.
 
@@ -308,14 +337,17 @@ class NodeSolver:
                 high, g_high, g_low, side = node, g, g_low * (0.5 if side > 0 else 1.0), 1
         return None
 
-    def at(self, p: float, guesses: Sequence[Real], onward: float) -> Node | None:
+    def at(
+        self, p: float, guesses: Sequence[Real], onward: float, *, from_nothing: bool = True
+    ) -> Node | None:
         """Return the node at λ = `p`, or None if no solution is found there.
 
         Parameters
         ----------
-        guesses : slip motions to start from, one after the other; at last from nothing, where there is one
-            solution only: elsewhere that may be of another branch.
+        guesses : slip motions to start from, one after the other.
         onward : the sign of dλ along the branch.
+        from_nothing : whether to start from nothing at last, where there is one solution only: elsewhere
+            that may be of another branch.
         """
         workspace = self.workspace
         found = None
@@ -324,7 +356,7 @@ class NodeSolver:
             self.spent += found.iterations
             if found.converged:
                 break
-        if found is None or (not found.converged and self._one_solution):
+        if found is None or (not found.converged and self._one_solution and from_nothing):
             found = workspace.solve(p)
             self.spent += found.iterations
         if not found.converged:

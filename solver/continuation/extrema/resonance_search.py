@@ -19,7 +19,7 @@ from itertools import pairwise
 import numpy as np
 
 from solver.balance.kernels.output import HIGH, HIGH_SLOPE, LOW, LOW_SLOPE, MAX_ABS
-from solver.continuation.extrema.contact_springs import LocalModel, Resonance, unknowns
+from solver.continuation.extrema.contact_springs import Resonance, unknowns
 from solver.continuation.extrema.kernels.suspects import find_suspects
 from solver.continuation.extrema.node_table import NodeTable
 from solver.continuation.extrema.nodes import Node, NodeSolver, numbers_of
@@ -31,6 +31,8 @@ MATTERS, OF_THE_TOP = 5e-4, 0.01
 # What it adds to the motion of a contact, relative to that motion, from which it is solved for: the contact
 # may slip there, and then nothing is linear any more.
 MOVES = 0.3
+FEEDBACK = 4.0  # times what is predicted, that it may become as the contacts change with it
+HUGE = 1e30
 RESOLVED = 2.0  # half widths of a resonance that an interval may be long
 FLANKS = 10.0  # how much lower than its flanks suggest a narrow resonance may look at the ends of an interval
 RUNG = 4.0  # factor between the distances of neighbouring rungs from a resonance
@@ -107,11 +109,17 @@ class _Intervals:
 
 
 class ResonanceSearch:
-    """Adds nodes to a branch over the frequency until no narrow resonance can stand between two of them."""
+    """Adds nodes to a branch over the frequency until no narrow resonance can stand between two of them.
 
-    def __init__(self, solver: NodeSolver) -> None:
+    Parameters
+    ----------
+    competes : share of the highest point that a resonance has to reach to be solved for.
+    """
+
+    def __init__(self, solver: NodeSolver, competes: float = 0.0) -> None:
+        self._competes = competes
         self._solver, self._loop = solver, solver.workspace.loop
-        self._model = LocalModel(solver)
+        self._model = solver.model
         self._added = 0
 
     def run(self, nodes: list[Node]) -> Search:
@@ -150,7 +158,8 @@ class ResonanceSearch:
             left, right = found.nodes[begin[j]], found.nodes[begin[j] + 1]
             height, share = self._model.adds(left, right, one)
             stands = max(left.measures[MAX_ABS], right.measures[MAX_ABS])
-            if share > MOVES or height > MATTERS * max(stands, OF_THE_TOP * top):
+            matters = share > MOVES or height > MATTERS * max(stands, OF_THE_TOP * top)
+            if matters and stands + FEEDBACK * height >= self._competes * top:
                 wanted.setdefault(id(left), []).append(one)
             else:
                 found.unseen = max(found.unseen, stands + height)
@@ -247,10 +256,13 @@ class ResonanceSearch:
         workspace = self._solver.workspace
         flags = np.empty((self._loop.system.ks.size, rows.begin.size), bool)
         stands = np.maximum(rows.amplitude[rows.begin], rows.amplitude[rows.begin + 1])
+        counts, moves = MATTERS * np.maximum(stands, OF_THE_TOP * top), MOVES
+        if self._competes > 0.0:
+            # Whatever it makes the contacts do, it matters where it may be the highest.
+            counts, moves = np.maximum(counts, (self._competes * top - stands) / FEEDBACK), HUGE
         find_suspects(
-            workspace.system, *self._loop.range, rows.solutions, rows.observed, rows.begin,
-            np.maximum(stands, OF_THE_TOP * top),
-            self._solver.least, MATTERS, MOVES, FLANKS, RESOLVED, flags,
+            workspace.system, *self._loop.range, rows.solutions, rows.observed, rows.begin, counts,
+            self._solver.least, moves, FLANKS, RESOLVED, flags,
         )  # fmt: skip
         return flags
 

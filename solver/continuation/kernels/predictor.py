@@ -1,14 +1,16 @@
-"""Where the next point of a branch is expected: on the tangent, the secant, or the cubic of the last two."""
+"""Where the next point of a branch is expected: on the tangent, the secant, or a polynomial of the last."""
 
 from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from solver.contacts.kernels.system import System
-from solver.continuation.kernels.state import COUNT, CUBIC, ROUGH, SECANT, Control, P, Walk, weights
+from solver.continuation.kernels.state import COUNT, CUBIC, ROUGH, SECANT, SMOOTH, Control, P, Walk, weights
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Real
-from solver.jit.lapack import set_to
+from solver.jit.lapack import copy_to, set_to
 
 
 @compiled
@@ -26,7 +28,7 @@ def predict(system: System, walk: Walk, control: Control, step: float, guess: Re
             for i in range(n):
                 guess[i] = walk.u[i] + scale * (walk.u[i] - walk.before[i])
             return p + scale * (p - walk.before[n])
-    if control.predictor == CUBIC and walk.numbers[COUNT] > 0 and walk.numbers[ROUGH] == 0.0:
+    if control.predictor == CUBIC and walk.numbers[SMOOTH] > 0.0 and walk.numbers[ROUGH] == 0.0:
         return extrapolate(system, walk, control, step, guess)
     set_to(guess, walk.u, step, walk.tangent)
     return p + step * walk.tangent[n]
@@ -34,27 +36,76 @@ def predict(system: System, walk: Walk, control: Control, step: float, guess: Re
 
 @compiled
 def extrapolate(system: System, walk: Walk, control: Control, step: float, guess: Real) -> float:
-    """Predict by the cubic through the last two points and their tangents; return the predicted λ."""
+    """Predict by the polynomial through the last points and their tangents; return the predicted λ.
+
+    It is a cubic through two points, a quintic through three that are on one smooth piece. They stand at
+    their arc lengths: with chords in their place the quintic would be no better than the cubic.
+    """
     n = walk.u.size
-    p = walk.numbers[P]
     weight_u, weight_p = weights(system, walk, control)
-    chord = weight_p * (p - walk.before[n]) ** 2
-    here, there = weight_p * walk.tangent[n] ** 2, weight_p * walk.before_tangent[n] ** 2
-    for i in range(n):
-        chord += weight_u * (walk.u[i] - walk.before[i]) ** 2
-        here += weight_u * walk.tangent[i] ** 2
-        there += weight_u * walk.before_tangent[i] ** 2
-    length = math.sqrt(chord)
-    if not step < 3.0 * length:
+    here = np.empty(n + 1)
+    copy_to(here[:n], walk.u)
+    here[n] = walk.numbers[P]
+    at, sizes = np.zeros(3), np.ones(3)
+    sizes[0], sizes[1] = (
+        _size(walk.tangent, weight_u, weight_p),
+        _size(walk.before_tangent, weight_u, weight_p),
+    )
+    at[1] = -_arc(here, walk.tangent, walk.before, walk.before_tangent, sizes, weight_u, weight_p)
+    if not step < -3.0 * at[1]:
         set_to(guess, walk.u, step, walk.tangent)
-        return p + step * walk.tangent[n]
-    t = 1.0 + step / length
-    value0, value1 = (1.0 + 2.0 * t) * (1.0 - t) ** 2, t * t * (3.0 - 2.0 * t)
-    slope0 = t * (1.0 - t) ** 2 * length / math.sqrt(there)
-    slope1 = t * t * (t - 1.0) * length / math.sqrt(here)
+        return walk.numbers[P] + step * walk.tangent[n]
+    count = 2
+    if walk.numbers[SMOOTH] >= 2.0:
+        count, sizes[2] = 3, _size(walk.earlier_tangent, weight_u, weight_p)
+        at[2] = at[1] - _arc(
+            walk.before,
+            walk.before_tangent,
+            walk.earlier,
+            walk.earlier_tangent,
+            sizes[1:],
+            weight_u,
+            weight_p,
+        )
+    ahead = np.zeros(n + 1)
+    for k in range(count):
+        point, way = here, walk.tangent
+        if k > 0:
+            point, way = (
+                (walk.before, walk.before_tangent) if k == 1 else (walk.earlier, walk.earlier_tangent)
+            )
+        rest, slope = 1.0, 0.0
+        for j in range(count):
+            if j != k:
+                rest *= (step - at[j]) / (at[k] - at[j])
+                slope += 1.0 / (at[k] - at[j])
+        value = (1.0 - 2.0 * (step - at[k]) * slope) * rest * rest
+        rise = (step - at[k]) * rest * rest / sizes[k]
+        for i in range(n + 1):
+            ahead[i] += value * point[i] + rise * way[i]
+    copy_to(guess, ahead[:n])
+    return ahead[n]
+
+
+@compiled
+def _size(way: Real, weight_u: float, weight_p: float) -> float:
+    """Return the weighted length of a tangent."""
+    n = way.size - 1
+    total = weight_p * way[n] ** 2
     for i in range(n):
-        guess[i] = (
-            value0 * walk.before[i] + value1 * walk.u[i]
-            + slope0 * walk.before_tangent[i] + slope1 * walk.tangent[i]
-        )  # fmt: skip
-    return value0 * walk.before[n] + value1 * p + slope0 * walk.before_tangent[n] + slope1 * walk.tangent[n]
+        total += weight_u * way[i] ** 2
+    return math.sqrt(total)
+
+
+@compiled
+def _arc(
+    here: Real, way: Real, there: Real, other: Real, sizes: Real, weight_u: float, weight_p: float
+) -> float:
+    """Return the arc length between two points: c (1 + κ²/24) where the tangents at a chord c differ by κ."""
+    n = here.size - 1
+    chord = weight_p * (here[n] - there[n]) ** 2
+    turn = weight_p * (way[n] / sizes[0] - other[n] / sizes[1]) ** 2
+    for i in range(n):
+        chord += weight_u * (here[i] - there[i]) ** 2
+        turn += weight_u * (way[i] / sizes[0] - other[i] / sizes[1]) ** 2
+    return math.sqrt(chord) * (1.0 + turn / 24.0)

@@ -21,6 +21,7 @@ from solver.balance.kernels.residual import evaluate
 from solver.contacts.kernels.system import AT_BRANCH_POINT, SIZE, Evaluation, Receptance, System
 from solver.continuation.kernels.predictor import predict
 from solver.continuation.kernels.state import (
+    COUNT,
     CUBIC,
     FINISHED,
     FRESH,
@@ -29,11 +30,13 @@ from solver.continuation.kernels.state import (
     LEFT_RANGE,
     NO_START,
     NORM,
+    NUMBERS,
     ORIENTATION,
     PIECE,
     REJECTED,
     ROUGH,
     RUNNING,
+    SMOOTH,
     STALLED,
     STEP,
     STEPPED_OVER,
@@ -68,7 +71,8 @@ def begin_walk(
 ) -> tuple[int, Walk]:
     """Begin a branch at a solution `u` for the start of the range: its first point and tangent."""
     nt, p = u.size, control.start
-    walk = new_walk(np.zeros(nt), np.zeros(nt + 1), np.zeros(nt + 1), np.zeros(nt + 1), np.zeros(12))
+    rows = np.zeros((5, nt + 1))
+    walk = new_walk(np.zeros(nt), rows[0], rows[1], rows[2], rows[3], rows[4], np.zeros(NUMBERS))
     copy_to(walk.u, u)
     walk.numbers[P] = p
     walk.numbers[STEP] = control.first_step
@@ -109,6 +113,8 @@ def _turn(system: System, linear: Receptance, point: Evaluation, control: Contro
             walk.numbers[ORIENTATION] = sign
         else:
             length = -length
+    smooth = piece(point) == walk.numbers[PIECE]
+    walk.numbers[SMOOTH] = min(walk.numbers[SMOOTH] + 1.0, walk.numbers[COUNT]) if smooth else 0.0
     walk.numbers[PIECE] = piece(point)
     for i in range(n + 1):
         walk.tangent[i] = rhs[i] / length

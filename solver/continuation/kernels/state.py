@@ -45,7 +45,9 @@ class Walk(NamedTuple):
     before: Real  # (nt + 1,) the point before, λ last
     tangent: Real  # (nt + 1,)
     before_tangent: Real  # (nt + 1,) at the point before
-    numbers: Real  # (12,)
+    earlier: Real  # (nt + 1,) the point before that one
+    earlier_tangent: Real  # (nt + 1,)
+    numbers: Real  # (NUMBERS,)
 
 
 @structref.register
@@ -65,10 +67,15 @@ new_walk: Callable[..., Walk] = _WalkReference
 @compiled
 def walk_by_value(walk: Walk) -> Walk:
     """Return the arrays of a walk as a tuple that Python can read (views, not copies)."""
-    return Walk(walk.u, walk.before, walk.tangent, walk.before_tangent, walk.numbers)
+    return Walk(
+        walk.u, walk.before, walk.tangent, walk.before_tangent, walk.earlier, walk.earlier_tangent,
+        walk.numbers,
+    )  # fmt: skip
 
 
+# SMOOTH: how many of the points before the last one follow each other on the same piece as it.
 P, STEP, ORIENTATION, ITERATIONS, REJECTED, STEPPED_OVER, COUNT, NORM, FRESH, ROUGH, PIECE, FROZEN = range(12)
+SMOOTH, NUMBERS = 12, 13
 
 
 @compiled
@@ -93,6 +100,8 @@ def distance(u: Real, p: float, v: Real, q: float, weight_u: float, weight_p: fl
 def accept(walk: Walk, trial: Real, p: float, norm: float) -> None:
     """Move the walk to a converged point."""
     n = trial.size
+    copy_to(walk.earlier, walk.before)
+    copy_to(walk.earlier_tangent, walk.before_tangent)
     copy_to(walk.before[:n], walk.u)
     walk.before[n] = walk.numbers[P]
     copy_to(walk.before_tangent, walk.tangent)
@@ -122,6 +131,6 @@ def undo(walk: Walk, orientation: float, piece: float) -> None:
     copy_to(walk.tangent, walk.before_tangent)
     walk.numbers[P] = walk.before[n]
     walk.numbers[ORIENTATION], walk.numbers[PIECE] = orientation, piece
-    walk.numbers[ROUGH], walk.numbers[FRESH] = 1.0, 0.0
+    walk.numbers[ROUGH], walk.numbers[FRESH], walk.numbers[SMOOTH] = 1.0, 0.0, 0.0
     walk.numbers[COUNT] -= 1
     walk.numbers[REJECTED] += 1

@@ -14,8 +14,7 @@ from scipy.sparse import csc_array
 from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh, splu
 
 from solver.matrices.reduction.block_lanczos import lowest_modes
-from solver.matrices.reduction.multifrontal import Cholesky
-from solver.matrices.reduction.ordering import nested_dissection
+from solver.matrices.reduction.multifrontal import Cholesky, nested_dissection
 from solver.matrices.values import MOST_MODES
 
 FloatArray = NDArray[np.float64]

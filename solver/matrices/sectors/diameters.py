@@ -8,12 +8,10 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import GetCoreSchemaHandler
-from pydantic_core import CoreSchema, core_schema
 
 from solver.errors import SettingError
 from solver.matrices.sectors.parts import PartsAcross
-from solver.matrices.values import MOST_DOFS, Matrix
+from solver.matrices.values import MOST_DOFS, ByContent, Matrix, frozen
 
 ComplexArray = NDArray[np.complex128]
 _KEYS = ("diameters", "M", "K", "C", "parts")
@@ -22,7 +20,7 @@ _MOST = 5001  # nodal diameters of the largest disk
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class DiameterMatrices:
+class DiameterMatrices(ByContent):
     """M, K and maybe C of one sector at some nodal diameters; equal to another with the same content.
 
     The first coordinates are DOFs, the same at each nodal diameter; the others may be modes of their own.
@@ -69,8 +67,7 @@ class DiameterMatrices:
             turned = np.swapaxes(array.conj(), 1, 2)
             if np.abs(array - turned).max() > _ASYMMETRY * np.abs(array).max():
                 raise ValueError(f"`{key}` must be Hermitian at each nodal diameter")
-            array = 0.5 * (array + turned)
-            array.setflags(write=False)
+            array = frozen(0.5 * (array + turned))
             object.__setattr__(self, key, array)
             found.update(key.encode() + array.tobytes())
         for n, mass in zip(self.diameters, self.M, strict=True):
@@ -82,12 +79,6 @@ class DiameterMatrices:
             self.parts.check(len(self.diameters), self.size)
             found.update(b"parts" + self.parts.digest.encode())
         object.__setattr__(self, "digest", found.hexdigest())
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, DiameterMatrices) and self.digest == other.digest
-
-    def __hash__(self) -> int:
-        return hash(self.digest)
 
     def __repr__(self) -> str:
         listed = ", ".join(map(str, self.diameters))
@@ -150,12 +141,6 @@ class DiameterMatrices:
         if self.parts is not None:
             table["parts"] = self.parts.write()
         return table
-
-    @classmethod
-    def __get_pydantic_core_schema__(cls, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return core_schema.no_info_plain_validator_function(
-            cls.read, serialization=core_schema.plain_serializer_function_ser_schema(cls.write)
-        )
 
 
 def _stack(key: str, data: object, count: int) -> ComplexArray:

@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import GetCoreSchemaHandler
-from pydantic_core import CoreSchema, core_schema
 
 from solver.matrices.sectors.elements import drawn_edges
+from solver.matrices.values import ByContent, frozen
 
 if TYPE_CHECKING:
     from solver.matrices.decks.deck import Deck
@@ -30,7 +29,7 @@ Real = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SectorOutline:
+class SectorOutline(ByContent):
     """What is drawn of a sector; nothing is computed with it. Equal to another with the same content.
 
     Attributes
@@ -68,20 +67,13 @@ class SectorOutline:
             array = np.array(given, dtype=kind)
             if kind is np.float64 and not np.isfinite(array).all():
                 raise ValueError(f"`{key}` of the outline must hold finite numbers")
-            array.setflags(write=False)
-            object.__setattr__(self, key, array)
+            object.__setattr__(self, key, frozen(array))
             found.update(key.encode() + repr(array.shape).encode() + array.tobytes())
         for key in KEYS[1:]:
             rows = getattr(self, key)
             if rows.size and not 0 <= rows.min() <= rows.max() < len(self.points):
                 raise ValueError(f"`{key}` of the outline must name points from 0 to {len(self.points) - 1}")
         object.__setattr__(self, "digest", found.hexdigest())
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, SectorOutline) and self.digest == other.digest
-
-    def __hash__(self) -> int:
-        return hash(self.digest)
 
     def __repr__(self) -> str:
         return f"SectorOutline({len(self.points)} points, {len(self.edges)} edges, {self.digest[:12]})"
@@ -120,12 +112,6 @@ class SectorOutline:
     def write(self) -> dict[str, object]:
         """The table that `read` reads."""
         return {key: getattr(self, key).tolist() for key in KEYS}
-
-    @classmethod
-    def __get_pydantic_core_schema__(cls, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return core_schema.no_info_plain_validator_function(
-            cls.read, serialization=core_schema.plain_serializer_function_ser_schema(cls.write)
-        )
 
 
 def _numbers(key: str, data: object) -> NDArray[Any]:

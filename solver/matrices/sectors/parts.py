@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import GetCoreSchemaHandler
-from pydantic_core import CoreSchema, core_schema
 
-from solver.matrices.values import Matrix
+from solver.matrices.values import Matrix, Named, frozen
 
 ComplexArray = NDArray[np.complex128]
 WHOLE = ("K", "M")  # names for the stiffness and the mass of a whole sector
@@ -32,32 +30,13 @@ def check_part_names(names: Sequence[object]) -> None:
             raise ValueError(f"`parts`: {name!r} stands for that of the whole sector: choose another name")
 
 
-class PartMatrices(tuple[str, ...]):
-    """Names of parts of a full sector, with the stiffness of each over all rows of the sector.
+class PartMatrices(Named):
+    """Names of parts of a full sector, with the stiffness of each over all rows of the sector."""
 
-    Attributes
-    ----------
-    matrices : tuple of Matrix
-        [N/m], symmetric; part of K, which they are contained in.
-    """
-
-    matrices: tuple[Matrix, ...]
-
-    def __new__(cls, table: Mapping[str, Matrix]) -> PartMatrices:
-        """Make them from names and matrices."""
-        made = super().__new__(cls, table)
-        made.matrices = tuple(table.values())
-        return made
-
-    def __eq__(self, other: object) -> bool:
-        same = isinstance(other, PartMatrices) and self.matrices == other.matrices
-        return same and tuple(self) == tuple(other)  # type: ignore[arg-type]
-
-    def __hash__(self) -> int:
-        return hash((tuple(self), self.matrices))
-
-    def __reduce__(self) -> tuple[type[PartMatrices], tuple[dict[str, Matrix]]]:
-        return PartMatrices, (dict(zip(self, self.matrices, strict=True)),)
+    @property
+    def matrices(self) -> tuple[Matrix, ...]:
+        """[N/m], symmetric; part of K, which they are contained in."""
+        return self.values
 
     @classmethod
     def read(cls, data: object) -> PartMatrices:
@@ -81,12 +60,6 @@ class PartMatrices(tuple[str, ...]):
     def write(self) -> dict[str, object]:
         """The table that `read` reads."""
         return {name: matrix.write() for name, matrix in zip(self, self.matrices, strict=True)}
-
-    @classmethod
-    def __get_pydantic_core_schema__(cls, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return core_schema.no_info_plain_validator_function(
-            cls.read, serialization=core_schema.plain_serializer_function_ser_schema(cls.write)
-        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -130,8 +103,7 @@ class PartsAcross:
             turned = turned.conj() if key == "ahead" else turned
             if np.abs(array - turned).max() > _ASYMMETRY * np.abs(array).max():
                 raise ValueError(f"`parts`: `{key}` must be that of a symmetric matrix")
-            array.setflags(write=False)
-            object.__setattr__(self, key, array)
+            object.__setattr__(self, key, frozen(array))
             found.update(key.encode() + array.tobytes())
         if self.ahead.shape != self.back.shape:
             raise ValueError("`parts`: `ahead` and `back` must be of one size")

@@ -24,6 +24,7 @@ from solver.modes.records import Record, Recorder
 from solver.response.contact_response import ContactState, state_of
 from solver.response.stability.floquet import motions_stability
 from solver.results.base import Drawn
+from solver.results.told import json_numbers
 from solver.results.views import Views
 
 if TYPE_CHECKING:
@@ -94,7 +95,7 @@ class HeldAmplitude(Drawn):
         What it took.
     """
 
-    VIEWS: ClassVar = Views("solver.views", "of_held", "held_dataset", "of_held")
+    VIEWS: ClassVar = Views("solver.views", "of_held", "held_dataset", "modes:held_figure")
 
     scene: Scene
     held: float
@@ -144,7 +145,7 @@ class HeldAmplitude(Drawn):
             "status": self.status.value,
             "frequency": self.frequency_hz.tolist(),
             "excitation": self.excitation.tolist(),
-            "excitation_error": [float(e) if math.isfinite(e) else None for e in self.excitation_error],
+            "excitation_error": json_numbers(self.excitation_error),
             "phase": self.phase_deg.tolist(),
             "max_abs": self.max_abs.tolist(),
             "contacts": [contact.name for contact in self.scene.contacts],

@@ -101,7 +101,7 @@ class PhaseResonance(Drawn):
         What it took.
     """
 
-    VIEWS: ClassVar = Views("solver.views", "of_resonance", "resonance_dataset", "of_resonance")
+    VIEWS: ClassVar = Views("solver.views", "of_resonance", "resonance_dataset", "modes:resonance_figure")
 
     scene: Scene
     mode: int

@@ -24,6 +24,7 @@ from solver.jit.fourier import Real
 from solver.modes.nonlinear_mode import pose
 from solver.modes.results import NonlinearMode
 from solver.results.base import Drawn
+from solver.results.told import json_numbers
 from solver.results.views import Views
 from solver.scene.bodies.kinematics import static_forces
 from solver.scene.scene import Scene
@@ -94,15 +95,10 @@ class PerformanceCurve(Drawn):
             "peak": self.peak.tolist(),
             "frequency": self.frequency_hz.tolist(),
             "scales": self.scales,
-            "load": _numbers(self.load) if self.scales else None,
-            "peak_at_load": _numbers(self.peak_at_load) if self.scales else None,
+            "load": json_numbers(self.load) if self.scales else None,
+            "peak_at_load": json_numbers(self.peak_at_load) if self.scales else None,
             "least": {"load": load, "peak": peak} if known else None,
         }
-
-
-def _numbers(values: Real) -> list[float | None]:
-    """Return floats that JSON can carry: without damping no load is large enough."""
-    return [float(value) if math.isfinite(value) else None for value in values]
 
 
 def performance_curve(found: NonlinearMode) -> PerformanceCurve:

@@ -28,7 +28,7 @@ from solver.linear.contact_table import port_counts
 from solver.response.contact_response import ContactState, contact_responses
 from solver.response.history_dependence import held_sliders
 from solver.response.solution import Solution
-from solver.results.told import Piece
+from solver.results.told import Piece, json_numbers
 from solver.scene.bodies.body import Load
 from solver.scene.bodies.kinematics import Form
 from solver.scene.scene import Scene
@@ -67,14 +67,13 @@ class AmplitudeRange(Piece):
 
     def to_json(self) -> dict[str, object]:
         """Return the range as one JSON object."""
-
-        def ends(pair: tuple[float, float]) -> list[float | None]:
-            return [float(end) if math.isfinite(end) else None for end in pair]
-
         return {
-            "max_abs": ends(self.max_abs), "half_peak_to_peak": ends(self.half_peak_to_peak),
-            "mean": ends(self.mean), "contacts": list(self.contacts), "exact": self.exact,
-        }  # fmt: skip
+            "max_abs": json_numbers(self.max_abs),
+            "half_peak_to_peak": json_numbers(self.half_peak_to_peak),
+            "mean": json_numbers(self.mean),
+            "contacts": list(self.contacts),
+            "exact": self.exact,
+        }
 
 
 def amplitude_range(solution: Solution, effects: Effects | None = None) -> AmplitudeRange | None:

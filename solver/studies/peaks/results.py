@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
@@ -14,7 +13,7 @@ from solver.errors import SettingError
 from solver.jit.fourier import Real
 from solver.results.base import Drawn, MadeOfResponses
 from solver.results.known import Known
-from solver.results.told import Piece
+from solver.results.told import Piece, json_number
 from solver.results.views import Views
 
 if TYPE_CHECKING:
@@ -177,7 +176,7 @@ class LeastPeak(MadeOfResponses):
         """Return the optimum as one JSON object."""
         active = [{"frequency": a.frequency, "value": a.value, "slope": a.slope} for a in self.active]
         return {
-            "at": _number(self.at), "peak": _number(self.peak), "active": active,
+            "at": json_number(self.at), "peak": json_number(self.peak), "active": active,
             "plateau": None if self.plateau is None else list(self.plateau), "chosen_by": self.chosen_by,
         }  # fmt: skip
 
@@ -289,8 +288,3 @@ class PeakTrack(MadeOfResponses, Drawn):
             "completed": self.completed,
             "status": self.status.value,
         }  # fmt: skip
-
-
-def _number(value: float) -> float | None:
-    """Return a float that JSON can carry (null for NaN)."""
-    return value if math.isfinite(value) else None

@@ -8,23 +8,15 @@ from matplotlib.figure import Figure
 
 from solver.continuation.branch import AnyBranch
 from solver.marching.result import MarchResult
-from solver.modes.driven.controlled import HeldAmplitude
-from solver.modes.driven.phase_resonance import PhaseResonance
 from solver.modes.peaks.performance import PerformanceCurve
-from solver.modes.results import NonlinearMode
 from solver.response.solution import Solution
 from solver.response.stability.floquet import Stability
 from solver.scene.scene import Scene
 from solver.studies.blades import BladeAmplitudes, BladePeaks
-from solver.studies.convergence import AccuracyStudy
-from solver.studies.interference_result import InterferenceDiagram
-from solver.studies.mistuning import MistuningStudy
 from solver.studies.peaks.results import PeakTrack
-from solver.views.plots.accuracy import accuracy_figure
 from solver.views.plots.curves import Response
-from solver.views.plots.disks import blades_figure, mistuning_figure
-from solver.views.plots.interference import interference_figure
-from solver.views.plots.modes import held_figure, mode_figure, performance_figure, resonance_figure
+from solver.views.plots.disks import blades_figure
+from solver.views.plots.modes import performance_figure
 from solver.views.plots.motion import Motion, motion_figure
 from solver.views.plots.multipliers import multipliers_figure
 from solver.views.plots.responses import Demands, response_figure
@@ -67,39 +59,9 @@ def of_stability(found: Stability, ax: Into = None) -> Figure:
     return multipliers_figure(found, ax=ax)
 
 
-def of_accuracy(study: AccuracyStudy, ax: Into = None) -> Figure:
-    """Draw error against time."""
-    return accuracy_figure(study.to_json(), ax=ax)
-
-
-def of_mistuning(study: MistuningStudy, ax: Into = None) -> Figure:
-    """Draw the magnifications and the worst disk."""
-    return mistuning_figure(study.to_json(), ax=ax)
-
-
-def of_interference(found: InterferenceDiagram, ax: Into = None) -> Figure:
-    """Draw the natural frequencies over the nodal diameter, and the orders."""
-    return interference_figure(found.to_json(), ax=ax)
-
-
-def of_mode(found: NonlinearMode, ax: Into = None) -> Figure:
-    """Draw frequency and damping ratio over the amplitude."""
-    return mode_figure(found.to_json(), ax=ax)
-
-
 def of_performance(curve: PerformanceCurve, ax: Into = None) -> Figure:
     """Draw the peak over the load, or over the excitation."""
     return performance_figure(curve.to_json(), dof=curve.mode.scene.observe.dof, ax=ax)
-
-
-def of_held(found: HeldAmplitude, ax: Into = None) -> Figure:
-    """Draw force and phase over the frequency."""
-    return held_figure(found.to_json(), ax=ax)
-
-
-def of_resonance(found: PhaseResonance, ax: Into = None) -> Figure:
-    """Draw frequency and force over the amplitude."""
-    return resonance_figure(found.to_json(), ax=ax)
 
 
 def of_amplitudes(blades: BladeAmplitudes, ax: Into = None) -> Figure:

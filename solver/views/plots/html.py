@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import base64
 import math
-from collections.abc import Iterator
-from contextlib import contextmanager
-from contextvars import ContextVar
 from html import escape
 from typing import Any
 
@@ -30,26 +27,19 @@ th, td { padding: .2rem .7rem .2rem 0; text-align: left; vertical-align: top; }
 thead th { border-bottom: 1px solid #999; } td.number { text-align: right; }
 tbody th, td.short, td:nth-child(2):not(:last-child) { white-space: nowrap; }
 tbody tr + tr > * { border-top: 1px solid #eee; }
-pre { background: #f5f5f5; padding: .8rem; overflow-x: auto; font-size: .8rem; white-space: pre-wrap; }
-@page { size: A4; margin: 18mm; }
-@media print { body { margin: 0; max-width: none; font-size: 10.5pt; padding: 0; }
-  img { max-height: 105mm; }
-  figure, tr { break-inside: avoid; } h2, h3 { break-after: avoid; } }
+pre { background: #f5f5f5; padding: .8rem; font-size: .8rem; white-space: pre-wrap; }
+@page { size: A4; margin: 14mm 14mm 16mm; }
+@media print { body { margin: 0; max-width: none; padding: 0; font-size: 7.6pt; line-height: 1.3; }
+  h1 { font-size: 15pt; } h2 { font-size: 10pt; margin: 7pt 0 3pt; }
+  h3 { font-size: 8.4pt; margin: 6pt 0 2pt; }
+  h1, h2, h3, h2 + p, h3 + p { break-after: avoid; } h1, p { margin: 0 0 3pt; }
+  figure { break-inside: avoid; margin: 3pt 0; text-align: center; } img { max-height: 76mm; }
+  figcaption, .quiet { font-size: 7pt; } table { font-size: 7.6pt; margin-bottom: 4pt; }
+  thead { font-size: 7pt; }
+  th, td { padding: 1.6pt 7pt 1.8pt 0; } tr { break-inside: avoid; }
+  tbody th { color: #555; font-weight: normal; }
+  pre { columns: 2; font-size: 6pt; padding: 3pt 5pt; margin: 0 0 4pt; } }
 """
-
-
-_FORM: ContextVar[str] = ContextVar("form", default="svg")
-_MEDIA = {"svg": "svg+xml", "png": "png"}
-
-
-@contextmanager
-def pictures_as_png() -> Iterator[None]:
-    """Have pictures of pages made inside the block be PNG, for what reads no SVG."""
-    token = _FORM.set("png")
-    try:
-        yield
-    finally:
-        _FORM.reset(token)
 
 
 def page(title: str, body: str) -> str:
@@ -63,12 +53,9 @@ def page(title: str, body: str) -> str:
 
 def image(figure: Figure, words: str, caption: str = "") -> str:
     """A picture inside the page; `words` are read to those who do not see it."""
-    form = _FORM.get()
-    data = base64.b64encode(style.written(figure, form)).decode()
+    data = base64.b64encode(style.written(figure, "svg")).decode()
     below = f"<figcaption>{escape(caption)}</figcaption>" if caption else ""
-    return (
-        f'<figure><img src="data:image/{_MEDIA[form]};base64,{data}" alt="{escape(words)}">{below}</figure>'
-    )
+    return f'<figure><img src="data:image/svg+xml;base64,{data}" alt="{escape(words)}">{below}</figure>'
 
 
 def table(heads: list[str], rows: list[list[Any]]) -> str:

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import html
 import re
+import socket
 import sys
 import tomllib
 from datetime import datetime
 from pathlib import Path
 
 import pytest
+from service_helpers import pdf_objects
 
 import optim
 import solver
 from service.cli import main
-from service.rendering.report.page_parts import Heading, Said, Table, Text, parts_of
 
 PROBLEM = """scene = "two-dof"
 limit = 2.5
@@ -222,30 +223,41 @@ def test_a_mistuned_robust_design_shows_its_worst_blade() -> None:
 
 
 def test_a_pdf_has_what_the_page_has(tmp_path: Path) -> None:
+    page = design(tmp_path, "report.html").read_text("utf-8")
     made = design(tmp_path, "report.pdf").read_bytes()
     assert made.startswith(b"%PDF")
-    assert 2 <= len(re.findall(rb"/Type /Page\b", made)) <= 4
-    assert made.count(b"/Subtype /Image") >= 3, "responses, a period, the scene"
+    inside = pdf_objects(made)
+    assert 2 <= len(re.findall(rb"/Type /Page\b", inside)) <= 4
+    headings = [html.unescape(text) for text in re.findall(r"<h\d>(.*?)</h\d>", page)]
+    bookmarks = [text.decode() for text in re.findall(rb"/Title \(([^)]*)\)", inside)]
+    assert bookmarks[: len(headings)] == headings
+    assert re.search(rb"/BaseFont /\w+\+DejaVu-Sans", inside), "letters that come along"
+    assert len(re.findall(rb" l\n", inside)) > 500, "curves of responses, a period, the scene"
 
 
-def test_the_parts_of_a_page_are_read_back() -> None:
-    from solver.views.plots.html import page, pairs, table
+def test_a_pdf_fetches_nothing_and_shows_the_beginning_of_a_long_file(tmp_path: Path) -> None:
+    from service.rendering.report.making import pdf_of
+    from solver.views.plots.html import page
 
-    body = "<h1>A &lt; B</h1><p class=quiet>said</p><pre>a &amp; b</pre>" + pairs([("name", "value")])
-    title, parts = parts_of(page("T & T", body + table(["x", "y"], [[1.5, "one"]])))
-    assert title == "T & T"
-    assert parts[:3] == [Heading(1, "A < B"), Said("said", quiet=True), Text("a & b")]
-    given, numbers = parts[3], parts[4]
-    assert isinstance(given, Table)
-    assert isinstance(numbers, Table)
-    assert (given.pairs, given.rows) == (True, [["name", "value"]])
-    assert (numbers.heads, numbers.rows, numbers.numeric) == (["x", "y"], [["1.5", "one"]], [[True, False]])
+    listener = socket.create_server(("127.0.0.1", 0))
+    listener.settimeout(0.2)
+    picture = tmp_path / "picture.svg"
+    picture.write_text("<svg xmlns='http://www.w3.org/2000/svg'><path d='M0 0 C 1 2 3 4 5 6'/></svg>")
+    with listener:
+        link = f"http://127.0.0.1:{listener.getsockname()[1]}/a.svg"
+        made = pdf_of(page("T", f"<h1>A &lt; B</h1><img src='{link}'><img src='{picture.as_uri()}'>"))
+        with pytest.raises(TimeoutError):
+            listener.accept()
+    assert b" c\n" not in pdf_objects(made)
+    assert b"/Title (A < B)" in pdf_objects(made)
+    long = pdf_of(page("T", "<h1>T</h1><pre>" + "a = 1\n" * 20_000 + "</pre>"))
+    assert len(re.findall(rb"/Type /Page\b", pdf_objects(long))) == 1
 
 
 def test_without_its_extra_a_pdf_is_refused_in_words(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setitem(sys.modules, "reportlab", None)
+    monkeypatch.setitem(sys.modules, "weasyprint", None)
     words = ["design", "two-dof", "--harmonics", "1", "--report", str(tmp_path / "report.pdf")]
     assert main(words) == 2
     assert "pip install 'stickslip[pdf]'" in capsys.readouterr().err

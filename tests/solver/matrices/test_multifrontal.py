@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 from scipy.sparse import block_diag, csc_array, random_array
 
-from solver.matrices.reduction import ordering
+from solver.matrices.reduction import multifrontal
 from solver.matrices.reduction.fixed_interface_modes import factor
-from solver.matrices.reduction.multifrontal import Cholesky
-from solver.matrices.reduction.ordering import nested_dissection
+from solver.matrices.reduction.multifrontal import Cholesky, nested_dissection
 
 
 def positive_definite(n: int, density: float, seed: int, *, complex_: bool) -> csc_array:
@@ -35,7 +34,7 @@ def chain(n: int) -> csc_array:
 @pytest.mark.parametrize("leaf", [1, 3, 20])
 def test_solves_as_the_dense_matrix(monkeypatch: pytest.MonkeyPatch, leaf: int, complex_: bool) -> None:
     """Sparse and nearly full, one row, loose parts, chains."""
-    monkeypatch.setattr(ordering, "LEAF", leaf)
+    monkeypatch.setattr(multifrontal, "LEAF", leaf)
     sizes = ((1, 1.0), (2, 0.5), (40, 0.02), (90, 0.03), (60, 0.5))
     cases: list[Any] = [positive_definite(n, density, n, complex_=complex_) for n, density in sizes]
     cases += [chain(200), csc_array(np.diag(np.arange(1.0, 50.0))), csc_array(block_diag(cases))]
@@ -66,7 +65,7 @@ def test_a_real_factor_takes_complex_forces() -> None:
 def test_shifts_among_the_eigenvalues_are_factorised_too(monkeypatch: pytest.MonkeyPatch) -> None:
     """What is not positive definite has no Cholesky factor, and is still solved; what is singular is said."""
     monkeypatch.setattr("solver.matrices.reduction.fixed_interface_modes.LARGE", 10)
-    monkeypatch.setattr(ordering, "LEAF", 10)
+    monkeypatch.setattr(multifrontal, "LEAF", 10)
     shifted = csc_array(chain(300) - 0.5 * np.eye(300))
     with pytest.raises(np.linalg.LinAlgError, match="not positive definite"):
         Cholesky(shifted, nested_dissection(shifted))

@@ -219,7 +219,7 @@ def test_the_reduction_reports_its_error(monkeypatch: pytest.MonkeyPatch) -> Non
     plain = reduce_sector(matrices, gone, rows_in_use(found, deck), 8, every, SECTORS)
     monkeypatch.setattr(fixed_interface_modes, "LARGE", 10)
     monkeypatch.setattr(fixed_interface_modes, "DENSE", 10)
-    monkeypatch.setattr("solver.matrices.reduction.ordering.LEAF", 8)
+    monkeypatch.setattr("solver.matrices.reduction.multifrontal.LEAF", 8)
     large = reduce_sector(matrices, gone, rows_in_use(found, deck), 8, every, SECTORS)
     np.testing.assert_allclose(large.quality[1].held_hz, plain.quality[1].held_hz, rtol=1e-10)
     for n, quality in zip(every, plain.quality, strict=True):

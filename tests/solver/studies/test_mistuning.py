@@ -285,6 +285,33 @@ def test_one_sweep_gives_the_same_peaks_as_one_for_each_blade(written: bool, eve
         assert found.at_hz[sector] == pytest.approx(alone.at, rel=1e-9)
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_no_blade_moves_more_anywhere_than_at_its_highest_peak(seed: int):
+    """Random disks with contacts that slip little or much, against single solutions all over the band."""
+    rng = np.random.default_rng(seed)
+    raw: dict[str, Any] = load_scene("bladed-disk").to_dict()
+    raw["structure"] |= {
+        "sectors": 4,
+        "stiffness_proportional_damping": float(10.0 ** rng.uniform(-6.5, -5.5)),
+    }
+    raw["contacts"][0] |= {
+        "N0": float(10.0 ** rng.uniform(0.0, 3.0)),
+        "N1_ratio": float(rng.uniform(0.0, 0.8)),
+    }
+    raw["contacts"][1]["N0"] = float(10.0 ** rng.uniform(1.0, 4.0))
+    raw["excitation"]["engine_order"] = int(rng.integers(0, 4))
+    scene = mistuned(Scene.from_dict(raw), of=("tip_middle", "tip"), spread=0.03, seed=seed)
+    peaks = blade_peaks(scene, harmonics=3, every_branch=False)
+    beside = (peaks.at_hz[:, None] + np.linspace(-0.5, 0.5, 5)).ravel()
+    places = np.concatenate([np.linspace(500.0, 900.0, 81), beside[(beside > 500.0) & (beside < 900.0)]])
+    found = [solve(scene, frequency_hz=float(at), harmonics=3) for at in places]
+    assert all(one.converged for one in found)
+    highest = np.max([blade_amplitudes(one).max_abs for one in found], axis=0)
+    np.testing.assert_allclose(highest, peaks.value, rtol=1e-9)
+    assert np.all(highest <= peaks.value * (1.0 + 1e-9))
+    assert peaks.highest.peaks_open == ()
+
+
 def test_stopped_between_two_blades():
     scene = with_mistuning(disk(2).with_values(LIGHT), of=["root"], values=VALUES)
     done: list[int] = []

@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-from itertools import islice
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
 from service.cli.commands.client.jobs import client_of
+from service.cli.commands.client.told import MOST, listed, tell, tell_list
 from service.cli.options import shared as options
 from service.cli.options.numeric import amount, count
 from service.errors import InputError
 from service.rendering.tables.text import print_json, print_table, say
-
-if TYPE_CHECKING:
-    from service.schemas.workbench_answers import RunAnswer
-
-_MOST = 50
 
 OfProject = Annotated[
     str | None, typer.Option("--project", metavar="ID", help="Id of a project, as `projects list` shows it.")
@@ -32,18 +27,10 @@ States = Annotated[
 Name = Annotated[str | None, typer.Option("--name", metavar="TEXT", help="Its name.")]
 Notes = Annotated[str | None, typer.Option("--notes", metavar="TEXT", help="Its notes.")]
 Binned = Annotated[bool, typer.Option("--deleted", help="Those in the bin.")]
-Count = Annotated[int | None, count("--count", "N", f"At most so many; {_MOST}.")]
+Count = Annotated[int | None, count("--count", "N", f"At most so many; {MOST}.")]
 First = Annotated[str, typer.Argument(metavar="A", help="Id of a run.")]
 Second = Annotated[str, typer.Argument(metavar="B", help="Id of another one.")]
 Days = Annotated[float | None, amount("--days", "N", "After which the link ends; never.")]
-
-
-def most_of(given: int | None) -> int:
-    """How many to list."""
-    most = _MOST if given is None else given
-    if most < 1:
-        raise InputError(f"`--count` must be >= 1, got {most!r}")
-    return most
 
 
 def given_of(**changes: Any) -> dict[str, Any]:
@@ -71,21 +58,15 @@ def show(
     url: options.Url = options.DEFAULT_URL,
 ) -> None:
     """List the runs, newest first."""
-    most = most_of(limit)
-    filters = {
-        "project": project, "tag": tag or None, "text": text, "status": status or None,
-        "deleted": deleted or None, "limit": min(most, 1000),
-    }  # fmt: skip
+    filters = {"project": project, "tag": tag, "text": text, "status": status, "deleted": deleted}
     with client_of(url) as client:
-        found = list(islice(client.runs(**filters), most))
-    if as_json:
-        print_json({"items": [one.model_dump(mode="json") for one in found]})
-        return
+        found = listed(client.runs, limit, **filters)
     rows = [
         (one.id, one.kind, one.status.value, one.scene or "", one.name, ", ".join(one.tags), str(one.sweeps))
         for one in found
     ]
-    print_table("Runs", ("id", "kind", "status", "scene", "name", "tags", "sweeps"), rows, right="6")
+    columns = ("id", "kind", "status", "scene", "name", "tags", "sweeps")
+    tell_list(found, "Runs", columns, rows, right="6", as_json=as_json)
 
 
 def change(
@@ -105,7 +86,7 @@ def change(
     if "tag" in changes:
         changes["tags"] = [word for word in changes.pop("tag") if word]
     with client_of(url) as client:
-        _told(client.change_run(run, **changes), "is changed", as_json=as_json)
+        tell(client.change_run(run, **changes), f"run {run} is changed", as_json=as_json)
 
 
 def delete(run: options.Job, as_json: options.Json = False, url: options.Url = options.DEFAULT_URL) -> None:
@@ -114,13 +95,13 @@ def delete(run: options.Job, as_json: options.Json = False, url: options.Url = o
     It has ended. `stickslip runs restore` takes it out until the service deletes it for good.
     """
     with client_of(url) as client:
-        _told(client.delete_run(run), "is in the bin", as_json=as_json)
+        tell(client.delete_run(run), f"run {run} is in the bin", as_json=as_json)
 
 
 def restore(run: options.Job, as_json: options.Json = False, url: options.Url = options.DEFAULT_URL) -> None:
     """Take a run out of the bin."""
     with client_of(url) as client:
-        _told(client.restore_run(run), "is out of the bin", as_json=as_json)
+        tell(client.restore_run(run), f"run {run} is out of the bin", as_json=as_json)
 
 
 def compare(
@@ -156,17 +137,7 @@ def share(
     """
     with client_of(url) as client:
         made = client.share_run(run, days)
-    if as_json:
-        print_json(made.model_dump(mode="json"))
-    else:
-        say(f"{url.rstrip('/')}{made.link}")
-
-
-def _told(run: RunAnswer, what: str, *, as_json: bool) -> None:
-    if as_json:
-        print_json(run.model_dump(mode="json"))
-    else:
-        say(f"run {run.id} {what}")
+    tell(made, f"{url.rstrip('/')}{made.link}", as_json=as_json)
 
 
 def _word(value: Any) -> str:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from itertools import islice
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from service.cli.commands.client import told
 from service.cli.options.numeric import amount, count
 from service.errors import InputError
 from service.rendering.tables.text import print_json, print_table
@@ -17,7 +17,6 @@ from solver.views.parameter_units import parameter
 if TYPE_CHECKING:
     from service.client.client import Client
 
-_MOST = 50
 _OPTIONS = {"peak_max": "--peak-max", "band_max": "--band-max", "limit": "--count"}
 
 OfScene = Annotated[
@@ -50,7 +49,7 @@ Sort = Annotated[
 ]  # fmt: skip
 Count = Annotated[
     int | None,
-    count("--count", "N", f"At most so many; {_MOST}."),
+    count("--count", "N", f"At most so many; {told.MOST}."),
 ]
 
 
@@ -64,11 +63,9 @@ def refuse_filters(filters: Mapping[str, Any]) -> None:
 
 def listed(client: Client, filters: Mapping[str, Any]) -> dict[str, Any]:
     """The stored designs that meet the filters of ``GET /v1/designs``."""
-    most = _MOST if filters["limit"] is None else filters["limit"]
-    if most < 1:
-        raise InputError(f"`--count` must be >= 1, got {most!r}")
-    asked = {**filters, "limit": min(most, 1000)}
-    return {"items": [one.model_dump(mode="json") for one in islice(client.designs(**asked), most)]}
+    others = {name: value for name, value in filters.items() if name != "limit"}
+    found = told.listed(client.designs, filters["limit"], **others)
+    return {"items": [one.model_dump(mode="json") for one in found]}
 
 
 def show(found: Mapping[str, Any], *, as_json: bool) -> None:

@@ -28,8 +28,8 @@ from service.db.repositories.jobs.leases import renew
 from service.db.repositories.jobs.queue_limits import Room, require_share
 from service.db.repositories.jobs.recovery import FREE, change, recover
 from service.db.repositories.rows import Attempt, JobRow, NewJob, Recovered
+from service.db.repositories.run_words import in_the_bin, insert_words, require_project
 from service.db.repositories.sweeps import insert_sweeps
-from service.db.repositories.workbench.words import in_the_bin, insert_words, require_project
 from service.errors import IdempotencyError
 from service.jobs.ids import new_id
 from service.jobs.outputs import Best, JobFailure, JobOutput, Piece
@@ -141,13 +141,13 @@ class JobRepository:
 
     def page(
         self,
+        limit: int = 100,
+        before: str | None = None,
         *,
         owner: str | None = NOBODY,
         state: JobState | None = None,
         kind: str | None = None,
         scene: str | None = None,
-        before: str | None = None,
-        limit: int = 100,
     ) -> list[JobRow]:
         """Jobs outside of the bin, of an owner or of everybody (None), newest first, older than `before`."""
         query = select(*_LISTED).where(~in_the_bin(Job.id)).order_by(Job.id.desc()).limit(limit)

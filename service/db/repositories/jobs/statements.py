@@ -11,7 +11,7 @@ from sqlalchemy.sql.elements import ColumnElement
 from service.db.models import Job, JobResult, JobState
 from service.db.repositories.jobs.guards import OWNED
 from service.db.repositories.rows import Attempt, JobRow, NewJob
-from service.db.repositories.workbench.words import in_the_bin
+from service.db.repositories.run_words import in_the_bin
 
 _JOB: Table = Job.metadata.tables["job"]
 _RESULT: Table = JobResult.metadata.tables["job_result"]

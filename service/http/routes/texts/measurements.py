@@ -8,7 +8,7 @@ from fastapi import APIRouter, Body, Response
 from pydantic import BaseModel, ConfigDict, Field
 
 from service.http.computed import computed
-from service.http.dependencies import CallerDependency, ServiceDependency, TypedRoute
+from service.http.dependencies import InContext, TypedRoute
 from service.jobs import answering
 from service.jobs.common.scenes import SceneRequest
 
@@ -75,7 +75,7 @@ ReadBody = Annotated[MeasurementsRequest, Body(openapi_examples={"read": {"value
 
 
 @router.post("/read", response_model=MeasurementsRead)
-async def read_measurements(body: ReadBody, service: ServiceDependency, caller: CallerDependency) -> Response:
+async def read_measurements(body: ReadBody, context: InContext) -> Response:
     """Read measured data in CSV against a scene; nothing is stored.
 
     The first thing that is wrong with each file is told with its line and column.
@@ -84,5 +84,5 @@ async def read_measurements(body: ReadBody, service: ServiceDependency, caller: 
         "scene": body.model_dump(exclude={"files"}),
         "files": [file.model_dump() for file in body.files],
     }
-    found = await computed(service, caller, answering.MEASURED, words, about="/files")
+    found = await computed(context, answering.MEASURED, words, about="/files")
     return Response(found, media_type="application/json")

@@ -8,7 +8,7 @@ from fastapi import APIRouter, Body, Response
 from pydantic import BaseModel, ConfigDict, Field
 
 from service.http.computed import computed
-from service.http.dependencies import CallerDependency, ServiceDependency, TypedRoute
+from service.http.dependencies import InContext, TypedRoute
 from service.http.routes.described import TEXT, media
 from service.jobs import answering
 from service.jobs.common.scenes import SceneRequest
@@ -85,24 +85,24 @@ class SceneEdited(BaseModel):
 
 
 @router.post("/read", response_model=SceneRead)
-async def read(body: ReadBody, service: ServiceDependency, caller: CallerDependency) -> Response:
+async def read(body: ReadBody, context: InContext) -> Response:
     """Read the text of a scene file and list everything that is wrong with it; nothing is stored."""
-    found = await computed(service, caller, answering.READ, body.model_dump(), about="/text")
+    found = await computed(context, answering.READ, body.model_dump(), about="/text")
     return Response(found, media_type="application/json")
 
 
 @router.post("/text", response_class=Response, responses={200: media({"application/toml": TEXT})})
-async def text(body: TextBody, service: ServiceDependency, caller: CallerDependency) -> Response:
+async def text(body: TextBody, context: InContext) -> Response:
     """The TOML of a scene with its values set: the file that reproduces what was computed."""
     words = {"scene": body.model_dump(exclude={"comments"}), "comments": body.comments}
-    return Response(await computed(service, caller, answering.TEXT, words), media_type="application/toml")
+    return Response(await computed(context, answering.TEXT, words), media_type="application/toml")
 
 
 @router.post("/edit", response_model=SceneEdited)
-async def edit(body: EditBody, service: ServiceDependency, caller: CallerDependency) -> Response:
+async def edit(body: EditBody, context: InContext) -> Response:
     """Text and tables side by side: `text` read, or changed so that it holds `scene`; nothing is stored.
 
     Comments, order and spelling of what stays the same are kept.
     """
-    found = await computed(service, caller, answering.EDIT, body.model_dump(), about="/text")
+    found = await computed(context, answering.EDIT, body.model_dump(), about="/text")
     return Response(found, media_type="application/json")

@@ -9,7 +9,7 @@ from fastapi import APIRouter, Body, Request, Response
 from pydantic import BaseModel, ConfigDict, Field
 
 from service.errors import InvalidRequestError
-from service.http.dependencies import CallerDependency, TypedRoute, tagged
+from service.http.dependencies import TypedRoute, tagged
 from service.jobs.strict_json import encoded
 from service.schemas.answers import Answer
 from solver.errors import Issue, SceneError
@@ -70,7 +70,7 @@ def list_templates() -> TemplateList:
 
 
 @router.post("/templates")
-async def fill_template(body: FillBody, _caller: CallerDependency) -> TemplateScene:
+async def fill_template(body: FillBody) -> TemplateScene:
     """The scene of a case, made of the answers to its questions; nothing is stored."""
     if body.template not in TEMPLATES:
         message = f"`template` must be one of {', '.join(TEMPLATES)}, got {body.template!r}"

@@ -21,8 +21,8 @@ def _size(row: Real, c: int, ks: Integer, i: int) -> float:
 
 @apart
 def _fill_shares(
-    ks: Integer, solutions: Real, observed: Real, begin: Integer, stands: Real, least: float, matters: float,
-    moves: float, shares: Real,
+    ks: Integer, solutions: Real, observed: Real, begin: Integer, counts: Real, least: float, moves: float,
+    shares: Real,
 ) -> None:  # fmt: skip
     """Fill how large each harmonic is at the ends of intervals, relative to what matters there, (P, nk)."""
     nk, nc = ks.size, (solutions.shape[1] - 1) // coefficient_count(ks)
@@ -34,9 +34,9 @@ def _fill_shares(
                 largest[row, c] = max(largest[row, c], moved[row, i, c])
     for p in range(begin.size):
         a, b = begin[p], begin[p] + 1
-        counts = max(matters * stands[p], 1e-300)
         for i in range(nk):
-            shares[p, i] = max(_size(observed[a], 0, ks, i), _size(observed[b], 0, ks, i)) / counts
+            size = max(_size(observed[a], 0, ks, i), _size(observed[b], 0, ks, i))
+            shares[p, i] = size / max(counts[p], 1e-300)
         for c in range(nc):
             whole = max(moves * max(least, largest[a, c], largest[b, c]), 1e-300)
             for i in range(nk):
@@ -46,7 +46,7 @@ def _fill_shares(
 @apart
 def find_suspects(
     system: System, low: Real, high: Real, half_width: Real, solutions: Real, observed: Real, begin: Integer,
-    stands: Real, least: float, matters: float, moves: float, flanks: float, resolved: float, flags: Flags,
+    counts: Real, least: float, moves: float, flanks: float, resolved: float, flags: Flags,
 ) -> None:  # fmt: skip
     """Find the intervals of a branch in which a harmonic may meet a resonance narrower than they are.
 
@@ -56,16 +56,16 @@ def find_suspects(
         of the least width they may have there.
     solutions, observed : (N, nt + 1) and (N, n) points of the branch, λ last [rad/s].
     begin : (P,) the point each interval begins at; it ends at the next.
-    stands : (P,) amplitude that counts in each interval [m].
+    counts : (P,) change of the observed motion that matters in each interval [m].
     least : motions of contacts below are rounding [m].
-    matters, moves : shares of the observed motion, and of that of a contact, that matter.
+    moves : share of the motion of a contact by which it has to change to matter.
     flanks : how much lower than its flanks suggest a resonance may look at the ends of an interval.
     resolved : half widths that an interval may be long.
     flags : (nk, P) filled.
     """
     ks, last = system.ks, solutions.shape[1] - 1
     shares = np.empty((begin.size, ks.size))
-    _fill_shares(ks, solutions, observed, begin, stands, least, matters, moves, shares)
+    _fill_shares(ks, solutions, observed, begin, counts, least, moves, shares)
     for p in range(begin.size):
         one, other = solutions[begin[p], last], solutions[begin[p] + 1, last]
         for i in range(ks.size):

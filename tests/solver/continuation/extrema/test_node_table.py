@@ -43,7 +43,7 @@ def test_a_look_after_nodes_came_between_is_that_of_a_solver_that_never_looked(n
     assert not lost
     assert len(grown) == len(nodes) + wanted.sum()
     fresh = NodeSolver(Workspace.of(branch.balance))
-    again = fresh.look(fresh.nodes_of(looked.points_of(grown, points)), top)
+    again = fresh.look(fresh.nodes_of(looked.points_of(grown)), top)
     seen = looked.look(grown, top)
     for column in ("measures", "at", "slopes", "reach", "error", "flags"):
         np.testing.assert_array_equal(getattr(seen, column), getattr(again, column))

@@ -32,7 +32,7 @@ def in_the_bin(job_id: InstrumentedAttribute[str]) -> ColumnElement[bool]:
     return select(Run.job_id).where(Run.job_id == job_id, Run.deleted.is_not(None)).correlate(table).exists()
 
 
-def require_project(connection: Connection, project: str | None, owner: str) -> None:
+def require_project(connection: Connection, project: str | None, owner: str | None) -> None:
     """Refuse a project that is not there.
 
     Raises

@@ -4,21 +4,20 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import fields
+from dataclasses import dataclass, fields
+from datetime import datetime
 from typing import Any
 
-from sqlalchemy import ColumnElement, Connection, Select, func, literal, null, or_, select, update
+from sqlalchemy import ColumnElement, Connection, Select, func, literal, null, or_, select
 from sqlalchemy.dialects import postgresql, sqlite
 
-from service.db.clock import Clock
-from service.db.engine import Database
-from service.db.models import Job, Sweep
+from service.db.models import NOBODY, Job, JobState, Sweep
 from service.db.pagination import Condition, met, owner_condition, plain_conditions
+from service.db.repositories.owned import Binned
 from service.db.repositories.rows import JobRow, RunWords
-from service.db.repositories.workbench.rows import RunFilter, RunRow
-from service.db.repositories.workbench.words import in_the_bin, put_tags, require_project
+from service.db.repositories.run_words import in_the_bin, put_tags, require_project
 from service.db.run_models import Run, RunTag
-from service.errors import ChangedMeanwhileError
+from service.errors import ConflictError
 
 _NEVER_LEADS = -1
 _OF_JOBS = [getattr(Job, field.name) for field in fields(JobRow) if field.name != "request"]
@@ -28,21 +27,78 @@ _WHOLE = select(*_OF_JOBS, Job.request, *_OF_RUNS).outerjoin(Run, Run.job_id == 
 _OF_ROW = [field.name for field in fields(JobRow)]
 
 
-class RunRepository:
-    """Runs of one database.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunRow:
+    """A run: a job with what is said of it.
 
-    Parameters
+    Attributes
     ----------
-    database : where they are.
-    now : the clock of the database.
+    revision : int
+        Counts the changes of its words; 0 if there was none.
+    changed, deleted : datetime or None
+        When its words were changed last, when it was put in the bin.
+    sweeps : int
+        How many sweeps are stored with it.
     """
 
-    def __init__(self, database: Database, now: Clock) -> None:
-        self._db = database
-        self._now = now
+    job: JobRow
+    words: RunWords
+    revision: int = 0
+    changed: datetime | None = None
+    deleted: datetime | None = None
+    sweeps: int = 0
+
+    @property
+    def id(self) -> str:
+        """Its id, that of the job."""
+        return self.job.id
+
+    @property
+    def owner(self) -> str:
+        """Whom it belongs to."""
+        return self.job.owner
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunFilter:
+    """Which runs to list; every condition must hold.
+
+    Attributes
+    ----------
+    sees : str or None
+        Whose runs are there; None for everybody's.
+    status : sequence of JobState
+        In one of them; any if empty.
+    tag : sequence of str
+        Marked with all of them.
+    text : str or None
+        In the name or the notes, whatever its case.
+    created_after, created_before : datetime or None
+        Handed in at the earliest, and earlier than.
+    deleted : bool
+        Those in the bin in place of those outside.
+    """
+
+    sees: str | None = NOBODY
+    owner: str | None = None
+    status: Sequence[JobState] = ()
+    kind: str | None = None
+    scene: str | None = None
+    project: str | None = None
+    tag: Sequence[str] = ()
+    text: str | None = None
+    created_after: datetime | None = None
+    created_before: datetime | None = None
+    deleted: bool = False
+
+
+class Runs(Binned[RunRow]):
+    """Runs of one database."""
+
+    what, said = "run", Run
 
     def get(self, job_id: str) -> RunRow | None:
-        """The run, in the bin or not, or None."""
+        """The run, in the bin or not, whoever owns it, or None."""
         with self._db.reading() as connection:
             return next(iter(_rows(connection, _WHOLE.where(Job.id == job_id))), None)
 
@@ -56,82 +112,52 @@ class RunRepository:
         if not wanted.deleted:
             query = query.where(~in_the_bin(Job.id))
         with self._db.reading() as connection:
-            conditions += owner_condition(connection, Job.id, Job.owner, wanted.owner, leads=leads)
+            conditions += owner_condition(connection, Job.id, Job.owner, wanted.sees, leads=leads)
             return _rows(connection, met(connection, query, Job.id, conditions))
 
-    def change(
-        self, row: RunRow, changes: Mapping[str, Any], expected: Collection[int] | None = None
-    ) -> None:
-        """Change words of a run: `project`, `name`, `notes`, `tags`.
+    def put_in_bin(self, row_id: str, sees: str | None) -> RunRow:
+        """Put a run in the bin (ConflictError if it has not ended); one that is there stays since then."""
+        state = self.seen(row_id, sees).job.state
+        if not state.finished:
+            raise ConflictError(f"run {row_id} is {state.value}: dismiss it first, DELETE /v1/jobs/{row_id}")
+        return super().put_in_bin(row_id, sees)
 
-        Parameters
-        ----------
-        expected : the revisions of which it must have one; any if None.
-
-        Raises
-        ------
-        ChangedMeanwhileError
-            It has another one.
-        InvalidRequestError
-            There is no such project of the run's owner.
-        """
-        with self._db.writing() as connection:
-            self._locked(connection, row.job.id, expected)
-            values = {key: value for key, value in changes.items() if key in ("name", "notes")}
-            if "project" in changes:
-                require_project(connection, changes["project"], row.owner)
-                values["project_id"] = changes["project"]
-            if "tags" in changes:
-                put_tags(connection, row.job.id, changes["tags"])
-            self._write(connection, row.job.id, values)
-
-    def put_in_bin(self, job_id: str) -> None:
-        """Put a run in the bin; one that is there stays since then."""
-        with self._db.writing() as connection:
-            self._locked(connection, job_id, None)
-            self._write(
-                connection,
-                job_id,
-                {"deleted": func.coalesce(Run.deleted, literal(self._now(), Run.deleted.type))},
-            )
-
-    def restore(self, job_id: str) -> None:
-        """Take a run out of the bin."""
-        with self._db.writing() as connection:
-            self._locked(connection, job_id, None)
-            self._write(connection, job_id, {"deleted": None})
-
-    def _locked(self, connection: Connection, job_id: str, expected: Collection[int] | None) -> None:
+    def _lock(self, connection: Connection, row_id: str, expected: Collection[int] | None) -> None:
         """Make a row if there is none, lock it and compare its revision."""
         insert = sqlite.insert if connection.dialect.name == "sqlite" else postgresql.insert
         names = ["job_id", "project_id", "name", "notes", "changed", "revision", "deleted"]
         now = literal(self._now(), Run.changed.type)
         made = select(Job.id, null(), literal(""), literal(""), now, literal(0), null()).where(
-            Job.id == job_id
+            Job.id == row_id
         )
         connection.execute(insert(Run).from_select(names, made).on_conflict_do_nothing())
-        query = select(Run.revision).where(Run.job_id == job_id).with_for_update()
-        revision = connection.execute(query).scalar_one_or_none()
-        if expected is not None and revision not in expected:
-            raise ChangedMeanwhileError(f"run {job_id} was changed meanwhile: get it again, and change that")
+        super()._lock(connection, row_id, expected)
 
-    def _write(self, connection: Connection, job_id: str, values: Mapping[str, Any]) -> None:
-        counted = {"revision": Run.revision + 1, "changed": self._now()}
-        connection.execute(update(Run).where(Run.job_id == job_id).values(**values, **counted))
+    def _write(self, connection: Connection, row_id: str, values: Mapping[str, Any]) -> None:
+        """Write `name`, `notes`, `tags` and `project` (InvalidRequestError if its owner has none such)."""
+        own = {key: value for key, value in values.items() if key not in ("project", "tags")}
+        if "project" in values:
+            owner = connection.execute(select(Job.owner).where(Job.id == row_id)).scalar_one_or_none()
+            require_project(connection, values["project"], owner)
+            own["project_id"] = values["project"]
+        if "tags" in values:
+            put_tags(connection, row_id, values["tags"])
+        super()._write(connection, row_id, own)
 
 
 def _conditions(wanted: RunFilter) -> list[Condition]:
     equal = (
         (Job.kind, wanted.kind),
         (Job.scene_name, wanted.scene),
-        (Job.owner, wanted.of_owner),
+        (Job.owner, wanted.owner),
     )
     found = [column == value for column, value in equal if value is not None]
-    if wanted.states:
-        found.append(Job.state.in_(list(wanted.states)))
+    if wanted.status:
+        found.append(Job.state.in_(list(wanted.status)))
     conditions = plain_conditions(Job.id, found)
-    times = [Job.created >= wanted.after] if wanted.after is not None else []
-    times += [Job.created < wanted.before] if wanted.before is not None else []
+    after, before = wanted.created_after, wanted.created_before
+    times = [Job.created >= after] if after is not None else []
+    times += [Job.created < before] if before is not None else []
     conditions += [Condition(ids=select(Job.id), holds=holds, few=_NEVER_LEADS) for holds in times]
     if wanted.project is not None:
         conditions.append(_said(Run.project_id == wanted.project))
@@ -140,7 +166,7 @@ def _conditions(wanted: RunFilter) -> list[Condition]:
     if wanted.text is not None:
         text = or_(*(one.icontains(wanted.text, autoescape=True) for one in (Run.name, Run.notes)))
         conditions.append(_said(text, few=_NEVER_LEADS))
-    for tag in wanted.tags:
+    for tag in wanted.tag:
         ids = select(RunTag.job_id).where(RunTag.tag == tag)
         holds = ids.where(RunTag.job_id == Job.id).correlate(Job).exists()
         conditions.append(Condition(ids=ids, holds=holds, apart=True))

@@ -1,0 +1,17 @@
+from .errors import DataError as DataError, DesignError as DesignError
+from .identification.identify import identify as identify
+from .identification.result import Identification as Identification, IdentifyStatus as IdentifyStatus
+from .problem.typed import Case as Case, Limit as Limit
+from .results.design import DesignResult as DesignResult, DesignStatus as DesignStatus
+from .robust.result import RobustResult as RobustResult, RobustStatus as RobustStatus
+from .robust.robust import robust_design as robust_design
+from .search import design as design
+from .studies.campbell import campbell_diagram as campbell_diagram, forbidden_hz as forbidden_hz
+from .studies.crossings import CampbellDiagram as CampbellDiagram, CampbellStatus as CampbellStatus
+from .studies.elasticities import (
+    SensitivityResult as SensitivityResult,
+    SensitivityStatus as SensitivityStatus,
+    sensitivities as sensitivities,
+)
+from .studies.pareto import pareto_front as pareto_front
+from .studies.pareto_result import ParetoResult as ParetoResult, ParetoStatus as ParetoStatus

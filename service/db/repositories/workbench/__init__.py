@@ -1,1 +1,0 @@
-"""Projects, what is said of runs, and links that share them."""

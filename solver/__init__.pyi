@@ -1,0 +1,144 @@
+from .balance.simplifications import Effects as Effects
+from .contacts.laws.history.definition import LawParameter as LawParameter
+from .contacts.laws.history.register import register_law as register_law
+from .contacts.segments import Shares as Shares
+from .continuation.branch import AnyBranch as AnyBranch, Branch as Branch, BranchStatus as BranchStatus
+from .continuation.extrema.error_estimate import (
+    ErrorEstimate as ErrorEstimate,
+    branch_errors as branch_errors,
+)
+from .continuation.marks import Bifurcations as Bifurcations, Mark as Mark, MarkKind as MarkKind
+from .continuation.peaks import Band as Band, Peak as Peak
+from .continuation.segment import Stretch as Stretch, joined as joined
+from .continuation.settings import ContinuationSettings as ContinuationSettings, Predictor as Predictor
+from .errors import (
+    Issue as Issue,
+    MissingExtraError as MissingExtraError,
+    ResultFileError as ResultFileError,
+    SceneError as SceneError,
+    SettingError as SettingError,
+    SolverError as SolverError,
+    StoppedError as StoppedError,
+)
+from .marching.march import march as march
+from .marching.start import MarchStart as MarchStart
+from .modes.driven.controlled import (
+    HeldAmplitude as HeldAmplitude,
+    HeldStatus as HeldStatus,
+    held_amplitude as held_amplitude,
+)
+from .modes.driven.phase_resonance import PhaseResonance as PhaseResonance, phase_resonance as phase_resonance
+from .modes.gradient import ModeGradient as ModeGradient, mode_gradient as mode_gradient
+from .modes.limit_cycles import (
+    LimitCycle as LimitCycle,
+    LimitCycles as LimitCycles,
+    limit_cycles as limit_cycles,
+)
+from .modes.nonlinear_mode import nonlinear_mode as nonlinear_mode
+from .modes.peaks.peak_correction import PeakCorrection as PeakCorrection, corrected_peak as corrected_peak
+from .modes.peaks.performance import (
+    PerformanceCurve as PerformanceCurve,
+    performance_curve as performance_curve,
+)
+from .modes.results import NonlinearMode as NonlinearMode, NonlinearModeStatus as NonlinearModeStatus
+from .response.power_balance import PowerBalance as PowerBalance, power_balance as power_balance
+from .response.solution import Solution as Solution, SolutionStatus as SolutionStatus
+from .response.solve import solve as solve
+from .response.stability.all_solutions import (
+    AllSolutions as AllSolutions,
+    FoundSolution as FoundSolution,
+    solve_all as solve_all,
+)
+from .response.stability.bifurcations import bifurcations as bifurcations
+from .response.stability.floquet import (
+    Growth as Growth,
+    Stability as Stability,
+    branch_stability as branch_stability,
+    stability as stability,
+)
+from .response.stability.residual_forces import (
+    AmplitudeRange as AmplitudeRange,
+    amplitude_range as amplitude_range,
+)
+from .response.stability.switching import Switched as Switched, switch_branches as switch_branches
+from .response.stability.uniqueness import Uniqueness as Uniqueness, uniqueness as uniqueness
+from .response.sweep import sweep as sweep
+from .response.time_history import (
+    hysteresis_loop as hysteresis_loop,
+    motion as motion,
+    time_history as time_history,
+)
+from .response.wear import (
+    ContactWear as ContactWear,
+    Measured as Measured,
+    WearSensitivity as WearSensitivity,
+    contact_wear as contact_wear,
+)
+from .response.wear_nonsmooth import worst_slopes as worst_slopes
+from .response.worst_wear import (
+    Measure as Measure,
+    WorstWear as WorstWear,
+    worst_friction_work as worst_friction_work,
+    worst_wear as worst_wear,
+)
+from .results.base import Shown as Shown, progress_bar as progress_bar
+from .results.dataset import Dataset as Dataset, Variable as Variable
+from .results.told import Summary as Summary
+from .scene.builder import SceneBuilder as SceneBuilder
+from .scene.cyclic.annulus import Extent as Extent, annulus as annulus, sectors_needed as sectors_needed
+from .scene.scene import Scene as Scene, load_scene as load_scene, shipped_scenes as shipped_scenes
+from .scene.templates.registry import new_scene as new_scene
+from .sensitivity.gradient import Gradient as Gradient, Sensitivities as Sensitivities
+from .sensitivity.hessian import (
+    AmplitudeHessian as AmplitudeHessian,
+    EdgeHessian as EdgeHessian,
+    PeakHessian as PeakHessian,
+)
+from .sensitivity.nonsmooth import (
+    PeakGradient as PeakGradient,
+    PeakKind as PeakKind,
+    peak_gradient as peak_gradient,
+)
+from .studies.blades import (
+    BladeAmplitudes as BladeAmplitudes,
+    BladePeaks as BladePeaks,
+    blade_amplitudes as blade_amplitudes,
+    blade_peaks as blade_peaks,
+    mistuned as mistuned,
+)
+from .studies.convergence import (
+    AccuracyRow as AccuracyRow,
+    AccuracyStudy as AccuracyStudy,
+    accuracy_study as accuracy_study,
+)
+from .studies.instant import start_of as start_of
+from .studies.interference import interference_diagram as interference_diagram
+from .studies.interference_result import (
+    DiameterFrequencies as DiameterFrequencies,
+    FoldedOrder as FoldedOrder,
+    Interference as Interference,
+    InterferenceDiagram as InterferenceDiagram,
+    InterferenceStatus as InterferenceStatus,
+    Wave as Wave,
+)
+from .studies.mistuning import (
+    MistunedDisk as MistunedDisk,
+    MistuningStatus as MistuningStatus,
+    MistuningStudy as MistuningStudy,
+    mistuning_study as mistuning_study,
+)
+from .studies.peaks.minimise_peak import least_peak as least_peak
+from .studies.peaks.results import (
+    Basin as Basin,
+    LeastPeak as LeastPeak,
+    PeakTrack as PeakTrack,
+    TrackStatus as TrackStatus,
+)
+from .studies.peaks.track_peak import track_peak as track_peak
+from .studies.plan import Plan as Plan, plan as plan
+from .studies.response_map import (
+    MapStatus as MapStatus,
+    ResponseMap as ResponseMap,
+    response_map as response_map,
+)
+from .views.io import load as load, save as save
