@@ -29,7 +29,7 @@ MOST_HARMONICS = 60  # beyond that a design is not looked at with more
 HOPELESS = 2.0  # times what is well known: doubts foretold above it are not looked at
 _RUNGS = 4  # times the harmonics asked for, at most: more of them cost more than a search was asked to
 NO_MEAN = 1e-6  # share by which max|x| is above half peak to peak where there is no mean
-_FEW = 12  # harmonics that a search may have though it was asked for fewer
+_FEW = 24  # harmonics that a search may have though it was asked for fewer
 
 
 def well_known(problem: Problem, evaluation: Evaluation) -> bool:

@@ -196,8 +196,20 @@ class Workspace:
         if self.balance.system.constant_mean:
             return self._from_fewer, soft, stuck, at_rest, rungs, self._by_level
         if np.any(self.balance.system.shift):  # contacts hold it: the less they stick the farther it may seem
-            return stuck, rungs, self._from_fewer, soft, self._by_level
+            # What sticks with all it can carry is at its limit, where Newton's method is slow.
+            onward = (self._onward,) if self.balance.system.hold else ()
+            return stuck, *onward, rungs, self._from_fewer, soft, self._by_level
         return stuck, self._from_fewer, soft, rungs, self._by_level
+
+    def _onward(self, u: Real, p: float) -> tuple[bool, int, float]:
+        """Go on from `u` while that brings it ten times nearer, the result in `u`; as `newton`."""
+        spent, before = 0, np.inf
+        while True:
+            good, more, norm = self._newton(u.copy(), u, p)
+            spent += more
+            if good or not norm < 0.1 * before:
+                return good, spent, norm
+            before = norm
 
     def _from_fewer(self, u: Real, p: float) -> tuple[bool, int, float]:
         """Add the harmonics little by little, the result in `u`; as `newton`."""

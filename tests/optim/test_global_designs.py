@@ -235,7 +235,10 @@ def test_a_worst_case_inside_the_intervals() -> None:
     found = check_robust(asked)
     assert found.status is RobustStatus.OPTIMAL
     assert found.robust is not None
-    assert found.robust.worst_peak == pytest.approx(3.04394, rel=1e-4)
+    # Harmonics up to 16 meet a resonance in its band: with three the worst peak is off by 1 %.
+    assert found.problem.harmonics == 24
+    assert found.robust.known.relative <= 1e-3
+    assert found.robust.worst_peak == pytest.approx(3.07039, rel=1e-4)
 
 
 @pytest.mark.long

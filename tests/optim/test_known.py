@@ -207,7 +207,7 @@ def test_harmonics_rise_until_the_peak_of_a_design_is_known(harmonics: int) -> N
 
 @pytest.mark.long
 def test_a_wedge_whose_peak_is_not_known_is_not_called_the_best() -> None:
-    """Its mean is free, and up to 12 harmonics the resonance of the light wedge on its faces is open."""
+    """Its mean is free, and with three harmonics the resonance of the light wedge on its faces is open."""
     wedge = solver.load_scene("platform-wedge")
     found = optim.design(wedge, variables={"wedge.mass": (0.004, 0.007)}, harmonics=3)
     assert found.known.relative <= 0.05 or not found.reached

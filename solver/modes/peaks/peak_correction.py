@@ -217,12 +217,13 @@ class _Neighbourhood:
         if not 0 < i < len(known) - 1:
             return None  # the least force is not between places that were looked at
         ends = known[i - 1].state.log_amplitude, known[i + 1].state.log_amplitude
+        beyond = 2.0 * max(one.state.y[-1] for one in known)  # finite: parabolas are laid through it
 
         def force(log_omega: float) -> float:
             near = min(known, key=lambda one: abs(one.state.log_amplitude - log_omega))
             found = self._at(near.state, log_omega)
             if found is None:
-                return math.inf
+                return beyond
             known.append(found)
             return float(found.state.y[-1])
 
