@@ -217,7 +217,7 @@ class _Neighbourhood:
         if not 0 < i < len(known) - 1:
             return None  # the least force is not between places that were looked at
         ends = known[i - 1].state.log_amplitude, known[i + 1].state.log_amplitude
-        beyond = 2.0 * max(one.state.y[-1] for one in known)  # finite: parabolas are laid through it
+        beyond = 2.0 * max(float(one.state.y[-1]) for one in known)  # finite: parabolas are laid through it
 
         def force(log_omega: float) -> float:
             near = min(known, key=lambda one: abs(one.state.log_amplitude - log_omega))
