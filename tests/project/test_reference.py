@@ -24,7 +24,8 @@ def public_names(module: str) -> list[str]:
     return [
         name
         for name, value in vars(loaded).items()
-        if not name.startswith("_")
+        if name.isidentifier()  # not what a generic class leaves there of each of its kinds
+        and not name.startswith("_")
         and (inspect.isclass(value) or inspect.isfunction(value))
         and value.__module__ == module
     ]
