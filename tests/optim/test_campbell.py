@@ -239,7 +239,7 @@ def test_pictures_are_written(
     ("arguments", "word"),
     [
         ("two-dof --speeds 10 5", "`--speeds` must have 0 < low < high"),
-        ("two-dof --speeds nan 5", "`--speeds` must be two finite numbers"),
+        ("two-dof --speeds nan 5", "`--speeds` must be a finite number, got nan"),
         ("two-dof --speeds 5 10 --order 0", "`--order` must be a whole number >= 1"),
         ("two-dof --speeds 5 10 --order x", "must be a whole number, got 'x'"),
         ("two-dof --speeds 5 10 --limit -1", "`--limit`"),
