@@ -30,7 +30,7 @@ from solver.contacts.kernels.system import (
     of_all_ports,
     receptance_by_value,
 )
-from solver.jit.fourier import Integer, Real
+from solver.jit.fourier import Integer, Real, coefficient_count
 from solver.linear.kernels.receptance import receptance
 from solver.scene.harmonics import spread
 
@@ -379,7 +379,7 @@ class Workspace:
 
     def _padded(self, u: Real, ks: Integer) -> Real:
         """Return a solution with the fewer harmonics `ks`, filled up with zeros."""
-        kept = u.reshape(self.balance.n_ports, -1)
+        kept = u.reshape(self.balance.n_ports, coefficient_count(ks))
         return spread(kept, ks, self.balance.system.ks).reshape(-1)
 
     def evaluate(self, u: Real, p: float) -> tuple[float, Evaluation]:

@@ -11,8 +11,8 @@ from service.jobs.kinds import SHIPPED
 from service.jobs.kinds.registry.table import interrupted_table, kinds_table
 from service.jobs.strict_json import digest
 from service.rendering.docs_tables import SOURCES, TABLES
-from tests.golden.cases import cases
 from tests.golden.faces import Studies, helped, paths
+from tests.golden.golden_cases import cases
 from tests.golden.refused import application, bodies, refusals
 
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.golden.cases import SHIPPED, Case, cases
 from tests.golden.faces import DATA, Studies, differences, joined, sections
+from tests.golden.golden_cases import SHIPPED, Case, cases
 from tests.golden.made import FILES
 
 CASES = [pytest.param(case, marks=pytest.mark.long if case.long else (), id=case.name) for case in cases()]

@@ -242,9 +242,12 @@ class Survey:
             return higher
         close = SHARP if height >= COMPETES * top else ENOUGH
         node = self._solver.refine(left, right, what, 0.0, ends, close)
-        if node is None or node.measures[value] < higher.measures[value]:
-            if node is None:
-                self._undone.append((higher.at, "a peak could not be polished"))
+        if node is None:
+            self._undone.append((higher.at, "a peak could not be polished"))
+            return higher
+        if node.measures[value] < higher.measures[value]:
+            higher = self._sharpened(higher)  # the residual left may have lifted it
+        if node.measures[value] < higher.measures[value]:
             return higher
         if self._highest_alone:
             self._least = max(self._least, node.measures[value] - PREDICTED * top)

@@ -7,7 +7,7 @@ import pytest
 
 import solver
 from solver.balance.balance import build
-from solver.balance.kernels.observers import measure_through_modes, modal_motion
+from solver.balance.kernels.observers import measure_through_modes
 from solver.balance.kernels.output import LOST, MEASURES, measure
 from solver.balance.kernels.residual import evaluate, evaluate_forces, prepare_forces
 from solver.balance.workspace import Workspace
@@ -73,14 +73,15 @@ def test_observers_measure_what_each_would_alone(coupled_damping: bool, form: in
     assert first.balance.system.form == form
     draw, n = np.random.default_rng(5), first.balance.n_unknowns
     u, du, dp, p = 1e-4 * draw.normal(size=n), 1e-4 * draw.normal(size=n), 0.3, 4100.0
-    amplitudes = np.empty((2, *first.balance.system.modal_forces.shape), np.complex128)
     receptance(first.system, p, first.linear)
     evaluate(first.system, first.linear, u, p, 0.0, first.point)
-    modal_motion(first.system, u, p, first.point, du, dp, amplitudes)
-    for each in others:
-        size = each.balance.n_coefficients
-        x, out, y, alone = np.empty(size), np.zeros(MEASURES), np.empty(size), np.zeros(MEASURES)
-        measure_through_modes(each.system, first.point, amplitudes, x, out)
+    seen = np.array([each.balance.system.observe_modes for each in others])
+    size = first.balance.n_coefficients
+    xs, outs = np.empty((len(others), 1, size)), np.zeros((len(others), 1, MEASURES))
+    at, along = np.append(u, p)[None], np.append(du, dp)[None]
+    measure_through_modes(first.system, first.point, seen, at, along, xs, outs)
+    for each, (x,), (out,) in zip(others, xs, outs, strict=True):
+        y, alone = np.empty(size), np.zeros(MEASURES)
         receptance(each.system, p, each.linear)
         measure(each.system, each.linear, u, first.point, du, dp, y, alone)
         np.testing.assert_allclose(x, y, rtol=0, atol=1e-12 * np.abs(y).max())

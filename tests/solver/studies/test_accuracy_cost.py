@@ -118,8 +118,8 @@ def test_on_the_command_line(
 ):
     asked = []
 
-    def instead(*arguments: Any, **_: Any) -> AccuracyStudy:
-        asked.append(arguments[1])
+    def instead(*_: Any, frequency_hz: float | None = None, **__: Any) -> AccuracyStudy:
+        asked.append(frequency_hz)
         return study
 
     monkeypatch.setattr("solver.accuracy_study", instead, raising=False)

@@ -11,12 +11,12 @@ import solver
 from optim.methods.afterwards import looked_after
 from optim.results.design import DesignStatus
 from service.cli import main
-from service.cli.commands import sensitivities as sensitivity_command
 from service.rendering.report.responses import Line
 from service.rendering.report.sections import branch_table
 from service.rendering.tables import campbell as campbell_reports
 from service.rendering.tables import design as design_reports
 from service.rendering.tables import results as reports
+from service.rendering.tables import sensitivities as sensitivity_table
 from service.rendering.tables import track as track_reports
 from solver.continuation.certificate import uncertain
 from solver.results.notes import FLAGS, NONE_HIGHER, flag_words
@@ -109,7 +109,7 @@ def test_tracks_and_sensitivities_warn(capsys):
     track_reports.track(track.to_json())
     assert WHY in " ".join(capsys.readouterr().out.split())
     shares = optim.sensitivities(solver.load_scene("two-dof"), harmonics=1)
-    sensitivity_command._show(replace(shares, branch=doubtful(shares.branch)).to_json())
+    sensitivity_table.shares(replace(shares, branch=doubtful(shares.branch)).to_json())
     assert WHY in " ".join(capsys.readouterr().out.split())
 
 
