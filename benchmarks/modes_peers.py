@@ -178,12 +178,21 @@ def _peers(task: dict[str, Any]) -> list[tuple[str, PeerCurve | str]]:
 
 
 def _tmdsimpy(task: dict[str, Any]) -> PeerCurve | str:
+    told = by_tmdsimpy({**task, "what": "mode"})
+    return told if isinstance(told, str) else PeerCurve(**told)
+
+
+def by_tmdsimpy(task: dict[str, Any]) -> dict[str, Any] | str:
+    """Return what the runner of tmdsimpy finds, or a sentence why there is nothing."""
     folder, python = os.environ.get(TMDSIMPY) or None, os.environ.get(TMDSIMPY_PYTHON, sys.executable)
     if folder is None and TMDSIMPY_PYTHON not in os.environ and importlib.util.find_spec("tmdsimpy") is None:
         return f"not installed: {TMDSIMPY} names its folder"
     environment = {**os.environ, **ONE_THREAD, "PYTHONPATH": folder or ""}
-    done = run_other([python, str(HERE / "tmdsimpy_runner.py")], environment, json.dumps(task))
-    return done if isinstance(done, str) else PeerCurve(**json.loads(done.stdout))
+    done = _run([python, str(HERE / "tmdsimpy_runner.py")], environment, json.dumps(task))
+    if isinstance(done, str):
+        return done
+    told: dict[str, Any] = json.loads(done.stdout)
+    return told
 
 
 def _nlvib(task: dict[str, Any]) -> PeerCurve | str:
@@ -194,13 +203,11 @@ def _nlvib(task: dict[str, Any]) -> PeerCurve | str:
         asked, answer = Path(name) / "task.json", Path(name) / "answer.json"
         asked.write_text(json.dumps(task), encoding="utf-8")
         words = [octave, "--norc", "--quiet", str(HERE / "nlvib_runner.m"), folder, str(asked), str(answer)]
-        done = run_other(words, {**os.environ, **ONE_THREAD}, "")
+        done = _run(words, {**os.environ, **ONE_THREAD}, "")
         return done if isinstance(done, str) else PeerCurve(**json.loads(answer.read_text("utf-8")))
 
 
-def run_other(
-    words: list[str], environment: dict[str, str], text: str
-) -> subprocess.CompletedProcess[str] | str:
+def _run(words: list[str], environment: dict[str, str], text: str) -> subprocess.CompletedProcess[str] | str:
     """Run another code; a sentence where it takes too long."""
     try:
         done = subprocess.run(

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import json
 import math
-import os
-import sys
 from functools import partial
 from typing import Any
 
@@ -13,8 +10,7 @@ import numpy as np
 
 import solver
 from benchmarks.harness import expect, table, timed
-from benchmarks.modes_peers import HERE, SAMPLES, TMDSIMPY, TMDSIMPY_PYTHON, run_other
-from benchmarks.peers import ONE_THREAD
+from benchmarks.modes_peers import SAMPLES, by_tmdsimpy
 from benchmarks.space import masses
 from solver import Scene
 from solver.linear.assembly import linear_model
@@ -40,14 +36,9 @@ def space_peers() -> None:
 
 
 def _beside(scene: Scene, peak: float, ours: float) -> tuple[str, ...]:
-    folder, python = os.environ.get(TMDSIMPY) or None, os.environ.get(TMDSIMPY_PYTHON, sys.executable)
-    if folder is None:
-        return f"not installed: {TMDSIMPY} names its folder", "", "", ""
-    environment = {**os.environ, **ONE_THREAD, "PYTHONPATH": folder}
-    done = run_other([python, str(HERE / "tmdsimpy_responses.py")], environment, json.dumps(_task(scene)))
-    if isinstance(done, str):
-        return done, "", "", ""
-    told = json.loads(done.stdout)
+    told = by_tmdsimpy(_task(scene))
+    if isinstance(told, str):
+        return told, "", "", ""
     expect(f"{scene.name}: its peak is ours", abs(told["peak"] / peak - 1.0) < PEAK_OFF)
     seconds = told["cpu_seconds"]
     return str(told["points"]), f"{1e3 * seconds:.0f}", f"{seconds / ours:.0f}", f"{told['peak']:.6g}"
@@ -72,5 +63,5 @@ def _task(scene: Scene) -> dict[str, Any]:
         "M": model.M.tolist(), "C": model.C0.tolist(), "K": model.K0.tolist(), "contacts": contacts,
         "cosine": cosine.tolist(), "sine": sine.tolist(), "observed": at[scene.observe.dof],
         "omega": [2.0 * math.pi * f for f in scene.observe.band], "harmonics": HARMONICS, "samples": SAMPLES,
-        "step": STEP, "runs": 1,
+        "step": STEP, "runs": 1, "what": "response",
     }  # fmt: skip
