@@ -10,7 +10,6 @@ from optim.errors import DesignError
 from service import errors
 from solver.errors import Issue, SceneError, SettingError, SolverError
 
-DONE = 0
 FELL_SHORT = 1
 BAD_INPUT = 2
 

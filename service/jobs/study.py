@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import enum
 import inspect
+from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol
 
@@ -113,9 +114,9 @@ class Study(SceneRequest):
         """Return what is wrong for the scene, beyond the types of the keys."""
         return []
 
+    @abstractmethod
     def sizes(self, scene: Scene) -> list[Issue]:
         """Return what is too large for one job."""
-        raise NotImplementedError
 
     @classmethod
     def compute(cls, scene: Scene, asked: Mapping[str, Any], watch: Watch) -> Answer:

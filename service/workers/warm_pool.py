@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from abc import abstractmethod
+from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Iterator, Mapping
 from concurrent.futures import Future
@@ -60,7 +60,7 @@ class Asked:
             self.outcome.set_result(outcome)
 
 
-class WarmPool(Unwatched):
+class WarmPool(Unwatched, ABC):
     """Computes what somebody waits for; a `Sink` of its executor.
 
     Parameters

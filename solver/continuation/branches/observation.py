@@ -76,10 +76,8 @@ def highest_peaks(branch: Branch, dofs: Sequence[str]) -> tuple[list[Peak], Bran
     workspaces = _workspaces(branch, dofs)
     solver = NodeSolver(workspaces[0])
     nothing = np.zeros((len(branch.values), branch.balance.n_coefficients))
-    observers, nodes = (
-        _Observers(solver, workspaces),
-        solver.nodes_of(_points(branch, nothing, branch.measures)),
-    )
+    observers = _Observers(solver, workspaces)
+    nodes = solver.nodes_of(_points(branch, nothing, branch.measures))
     found: list[Peak] = []
     worst, peaks, certificate = 0, branch.peaks, branch.peak_certificate
     for j in range(len(dofs)):
