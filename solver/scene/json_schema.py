@@ -17,7 +17,7 @@ from pydantic_core import core_schema
 from solver.contacts.laws import harmonics as load_harmonics
 from solver.contacts.laws.base import AnyContact
 from solver.contacts.laws.registry import laws
-from solver.matrices.file_units import UNITS
+from solver.matrices.values import UNITS
 from solver.scene import matrices_structure as matrices_part
 from solver.scene import parts as scene_parts
 from solver.scene.bodies import body as scene_bodies

@@ -5,8 +5,7 @@ from __future__ import annotations
 from functools import lru_cache
 
 from solver.errors import SettingError
-from solver.matrices.sectors.blocks import annulus_matrices, annulus_of, full_elimination
-from solver.matrices.sectors.mistuned import added_by_mistuning
+from solver.matrices.sectors.blocks import added_by_mistuning, annulus_matrices, annulus_of, full_elimination
 from solver.matrices.validation import DofTable
 from solver.matrices.values import MOST_DOFS, Matrix
 from solver.scene.matrices_structure import MatricesStructure

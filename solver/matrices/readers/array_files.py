@@ -1,4 +1,4 @@
-"""Matrices and modes in files of NumPy and SciPy: ``.npz`` and ``.npy``."""
+"""Matrices and modes in files of arrays: NumPy and SciPy (``.npz``, ``.npy``), MATLAB (``.mat``)."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.io import loadmat
 from scipy.sparse import bsr_array, coo_array, csc_array, csr_array, dia_array
 
-from solver.matrices.readers.choosing import wanted
-from solver.matrices.readers.reader import MatrixFileError, Reader
+from solver.matrices.readers.arrays import chosen, wanted
+from solver.matrices.readers.registry import MatrixFileError, Reader
 from solver.matrices.values import MODES_KEYS
 
 
@@ -33,19 +34,19 @@ def _is_archive(start: bytes) -> bool:
     return start.startswith(b"PK")
 
 
-def _of_archive(path: Path, key: str) -> Any:
+def _archive_names(path: Path) -> list[str]:
+    with _archive(path) as arrays:
+        return list(arrays.files)
+
+
+def _archive_matrix(path: Path, key: str) -> Any:
     with _archive(path) as arrays:
         if {"format", "shape", "data"} <= set(arrays.files):
             return _sparse(arrays)
         return arrays[wanted(arrays.files, key, path)]
 
 
-def _names(path: Path) -> list[str]:
-    with _archive(path) as arrays:
-        return list(arrays.files)
-
-
-def _modes(path: Path) -> dict[str, Any]:
+def _archive_modes(path: Path) -> dict[str, Any]:
     with _archive(path) as archive:
         return {name: archive[name] for name in MODES_KEYS if name in archive.files}
 
@@ -67,8 +68,18 @@ def _sparse(arrays: Any) -> coo_array:
     return matrix.tocoo()
 
 
-def _of_array(path: Path, _key: str) -> Any:
-    return np.load(path, allow_pickle=False)
+def _matlab(path: Path) -> dict[str, Any]:
+    with path.open("rb") as file:
+        start = file.read(128)
+    if b"MATLAB 7.3" in start:
+        raise MatrixFileError(f"{str(path)!r} is a MATLAB 7.3 file: save it with -v7")
+    return {name: value for name, value in loadmat(path, spmatrix=False).items() if not name.startswith("__")}
+
+
+def _matlab_modes(path: Path) -> dict[str, Any]:
+    found = _matlab(path)
+    arrays = {name: np.asarray(found[name]) for name in MODES_KEYS if name in found}
+    return {name: array if name == "modes" else array.reshape(-1) for name, array in arrays.items()}
 
 
 READERS = (
@@ -80,9 +91,9 @@ READERS = (
         recognises=_is_archive,
         help="NumPy and SciPy: a sparse matrix (`scipy.sparse.save_npz`), one array, or arrays named `M`, "
         "`K`, `C` (the same file may stand at each key); modes too.",
-        matrix=_of_archive,
-        names=_names,
-        modes=_modes,
+        matrix=_archive_matrix,
+        names=_archive_names,
+        modes=_archive_modes,
     ),
     Reader(
         name="NumPy array",
@@ -91,6 +102,17 @@ READERS = (
         media=("application/x-npy",),
         recognises=lambda start: start.startswith(b"\x93NUMPY"),
         help="NumPy: one array.",
-        matrix=_of_array,
+        matrix=lambda path, _key: np.load(path, allow_pickle=False),
+    ),
+    Reader(
+        name="MATLAB",
+        suffixes=(".mat",),
+        word="mat",
+        media=("application/x-matlab-data",),
+        recognises=lambda start: start.startswith(b"MATLAB "),
+        help="MATLAB up to version 7 (`save -v7`): one matrix, or `M`, `K`, `C`; modes too.",
+        matrix=lambda path, key: chosen(_matlab(path), key, path),
+        names=lambda path: list(_matlab(path)),
+        modes=_matlab_modes,
     ),
 )

@@ -16,13 +16,11 @@ from pathlib import Path
 import numpy as np
 from scipy.sparse import coo_array
 
-from solver.matrices.labels import component
-from solver.matrices.readers.choosing import chosen_by_initials, named_by_role
-from solver.matrices.readers.label import Label
-from solver.matrices.readers.nastran.output4_records import SQUARE, SYMMETRIC
+from solver.matrices.labels import Label, component
+from solver.matrices.readers.arrays import Labelled, chosen_by_initials, mirrored, named_by_role
 from solver.matrices.readers.numbers_in_text import LARGEST, FormatError, ascii_lines, fortran_real
-from solver.matrices.readers.reader import Reader
-from solver.matrices.readers.triplets import Labelled, mirrored
+from solver.matrices.readers.output4 import SQUARE, SYMMETRIC
+from solver.matrices.readers.registry import Reader
 
 
 @dataclass(slots=True)
