@@ -1,5 +1,11 @@
 """Matrices of Nastran's OUTPUT4, files ``.op4``, as text and binary.
 
+The records, from the DMAP Programmer's Guide (module OUTPUT4, remarks): for each matrix a heading with
+columns, rows (negative if BIGMAT), form, type, name and the format of the numbers; for each column that is
+not zero its number, the first row (0: strings follow) and the number of words, then the words; at the end a
+column past the last. A string begins with its length in words plus one and its row, or (not BIGMAT) with both
+in one number, 65536 (words + 1) + row. A number of double precision is two words.
+
 Each record of a binary file stands between two equal marks with its length in bytes. The first has 24 bytes
 (integers of 4 bytes) or 48 (of 8), which also tells the byte order.
 """

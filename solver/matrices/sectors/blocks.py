@@ -1,4 +1,4 @@
-"""The matrices of a sector without its high boundary, and of the annulus of all sectors."""
+"""The matrices of a sector without its high boundary, and of all sectors, also where these are mistuned."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from solver.matrices.sectors.elimination import Circulant, Elimination, eliminat
 from solver.matrices.sectors.parts import WHOLE, PartsAcross
 from solver.matrices.sectors.validation import Sector
 
+FloatArray = NDArray[np.float64]
 Matrices = tuple[NDArray[Any], NDArray[Any], NDArray[Any]]
 
 
@@ -89,9 +90,6 @@ def _written_out(folded: NDArray[Any], count: int) -> NDArray[np.float64]:
     j, n = np.arange(count), folded.shape[1]
     blocks = offsets[(j[:, None] - j[None, :]) % count]
     return np.ascontiguousarray(blocks.transpose(0, 2, 1, 3).reshape(count * n, count * n))
-
-
-FloatArray = NDArray[np.float64]
 
 
 def scalable(sector: Sector) -> tuple[str, ...]:
