@@ -33,7 +33,7 @@ def scene_to_submit(path: str) -> dict[str, Any] | SceneWithFiles:
         If it cannot be read, or is wrong and names no files.
     """
     import solver
-    from solver.scene.io import load_raw
+    from solver.scene.toml import load_raw
 
     raw = load_raw(path)
     structure = raw.get("structure")

@@ -24,8 +24,8 @@ from service.rendering.report.sections import (
 from service.rendering.tables.design import design_tables
 from solver.errors import SolverError
 from solver.results import units
+from solver.scene.parameter_paths import parameter
 from solver.scene.scene import Scene
-from solver.views.parameter_units import parameter
 from solver.views.plots import style
 from solver.views.plots.html import image, page, pairs, table
 

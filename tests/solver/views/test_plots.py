@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 import solver
 from solver.results import units
 from solver.results.files import whole
-from solver.views.parameter_units import parameter
+from solver.scene.parameter_paths import parameter
 from solver.views.plots import SUFFIXES, saving, style
 from solver.views.plots.curves import Response, above, with_peak
 from solver.views.plots.motion import Motion, motion_figure

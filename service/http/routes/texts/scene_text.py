@@ -12,7 +12,7 @@ from service.http.dependencies import InContext, TypedRoute
 from service.http.routes.described import TEXT, media
 from service.jobs import answering
 from service.jobs.common.scenes import SceneRequest
-from solver.scene.examples import DAMPER_LOAD
+from solver.scene.descriptions import DAMPER_LOAD
 
 router = APIRouter(prefix="/v1/scenes", tags=["scenes"], route_class=TypedRoute)
 

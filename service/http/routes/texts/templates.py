@@ -14,7 +14,7 @@ from service.jobs.strict_json import encoded
 from service.schemas.answers import Answer
 from solver.errors import Issue, SceneError
 from solver.scene.json_schema import scene_schema
-from solver.scene.templates.registry import TEMPLATES, template_schema, template_tables
+from solver.scene.templates import TEMPLATES, template_schema, template_tables
 
 router = APIRouter(prefix="/v1", tags=["scenes"], route_class=TypedRoute)
 
