@@ -87,7 +87,7 @@ from .results.told import Summary as Summary
 from .scene.builder import SceneBuilder as SceneBuilder
 from .scene.cyclic.annulus import Extent as Extent, annulus as annulus, sectors_needed as sectors_needed
 from .scene.scene import Scene as Scene, load_scene as load_scene, shipped_scenes as shipped_scenes
-from .scene.templates.registry import new_scene as new_scene
+from .scene.templates import new_scene as new_scene
 from .sensitivity.gradient import Gradient as Gradient, Sensitivities as Sensitivities
 from .sensitivity.hessian import (
     AmplitudeHessian as AmplitudeHessian,

@@ -10,7 +10,7 @@ import numpy as np
 
 from solver.results.dataset import Dataset, Variable
 from solver.scene.parameter_paths import parameter_unit
-from solver.views.columns import attributes, column
+from solver.views.to_dataset import attributes, column
 
 if TYPE_CHECKING:
     from optim.criteria.rows import Evaluation
