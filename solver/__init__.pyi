@@ -74,7 +74,7 @@ from .response.wear import (
     WearSensitivity as WearSensitivity,
     contact_wear as contact_wear,
 )
-from .response.wear_nonsmooth import worst_slopes as worst_slopes
+from .response.worst_wear import worst_slopes as worst_slopes
 from .response.worst_wear import (
     Measure as Measure,
     WorstWear as WorstWear,
