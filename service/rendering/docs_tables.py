@@ -13,8 +13,8 @@ from pydantic.fields import FieldInfo
 
 from optim.criteria.key import Key, Option
 from optim.criteria.registry import criteria, limit_keys
-from optim.identification.data.measured_units import known_units
-from optim.identification.data.registry import data_kinds
+from optim.identification.data.measured import data_kinds
+from optim.identification.data.table import known_units
 from optim.identification.readers.registry import data_formats
 from optim.problem.keys import CaseRequest, options
 from optim.problem.keyword_source import keyword_source

@@ -198,7 +198,7 @@ def _describe(name: str) -> list[dict[str, Any]]:
 def _nodes_of(file: Path) -> int:
     """How many nodes a deck has."""
     from solver.matrices.readers.numbers_in_text import FormatError
-    from solver.matrices.readers.registry import MatrixFileError
+    from solver.matrices.readers.reader import MatrixFileError
     from solver.matrices.sectors.decks import check_alone, read_deck
 
     try:

@@ -13,8 +13,8 @@ from scipy.sparse import coo_array, issparse
 from solver.matrices.labels import Label
 from solver.matrices.readers import registry
 from solver.matrices.readers.arrays import MOST_ROWS, Labelled
-from solver.matrices.readers.registry import ROLES, Reader
-from solver.matrices.readers.registry import MatrixFileError as MatrixFileError
+from solver.matrices.readers.reader import ROLES, Reader
+from solver.matrices.readers.reader import MatrixFileError as MatrixFileError
 from solver.matrices.values import Modes
 
 _LABELS_OF_ONES_OWN = ".dof"

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from solver.matrices.readers.registry import Reader
+from solver.matrices.readers.reader import Reader
 
 
 def banded(path: Path, _key: str) -> np.ndarray:

@@ -88,7 +88,7 @@ def run(spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop) ->
 
 def draw(result: Json, _sweeps: Sequence[StoredSweep], _read: ReadSweep) -> Figure:
     """The front."""
-    from optim.views.plots.pareto import pareto_figure
+    from optim.views.plots.designs import pareto_figure
 
     if not result["points"]:
         raise NothingToDrawError("its front has no point")

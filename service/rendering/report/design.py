@@ -146,7 +146,7 @@ def _trade_off(result: Json) -> list[str]:
     """The front, of a job that computed one."""
     if not _is_front(result) or not result["points"]:
         return []
-    from optim.views.plots.pareto import pareto_figure
+    from optim.views.plots.designs import pareto_figure
 
     heads = [*result["points"][0]["values"], "peak", "band"]
     rows = [

@@ -12,7 +12,7 @@ from scipy.io import loadmat
 from scipy.sparse import bsr_array, coo_array, csc_array, csr_array, dia_array
 
 from solver.matrices.readers.arrays import chosen, wanted
-from solver.matrices.readers.registry import MatrixFileError, Reader
+from solver.matrices.readers.reader import MatrixFileError, Reader
 from solver.matrices.values import MODES_KEYS
 
 

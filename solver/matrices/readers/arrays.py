@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 
 from solver.matrices.labels import Label
-from solver.matrices.readers.registry import MatrixFileError
+from solver.matrices.readers.reader import MatrixFileError
 
 MOST_ROWS = 10_000_000
 

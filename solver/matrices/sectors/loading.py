@@ -13,7 +13,7 @@ from scipy.sparse import csr_array
 from solver.errors import Issue, SceneError
 from solver.matrices.load_set import MatrixSet
 from solver.matrices.readers.numbers_in_text import FormatError
-from solver.matrices.readers.registry import MatrixFileError
+from solver.matrices.readers.reader import MatrixFileError
 from solver.matrices.sectors.decks import Deck, read_deck
 from solver.matrices.sectors.elimination import Elimination, Group, elimination, rotation
 from solver.matrices.sectors.outline import SectorOutline, outline_of

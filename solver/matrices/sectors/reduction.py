@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from solver.matrices.readers.registry import MatrixFileError
+from solver.matrices.readers.reader import MatrixFileError
 from solver.matrices.reduction.craig_bampton import Reduced, craig_bampton
 from solver.matrices.reduction.reduction_error import Quality
 from solver.matrices.sectors.diameters import DiameterMatrices

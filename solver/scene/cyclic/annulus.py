@@ -19,6 +19,7 @@ from solver.matrices.values import MOST_DOFS, Matrix
 from solver.results.told import Piece
 from solver.scene.bodies.kinematics import forms_of, written_form
 from solver.scene.parameter_paths import changed_quantities
+from solver.scene.parts import Recovered
 from solver.scene.scene import (
     AnyContact,
     Body,
@@ -32,7 +33,6 @@ from solver.scene.scene import (
     MatricesStructure,
     Node,
     Observe,
-    Recovered,
     Scene,
     Spring,
     Structure,
