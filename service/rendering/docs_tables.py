@@ -22,8 +22,7 @@ from service.jobs.common.problem import ABOUT_THE_JOB
 from service.jobs.kinds.design import DesignRequest
 from service.jobs.kinds.pareto import ParetoRequest
 from service.jobs.kinds.registry.table import placed
-from service.settings.limits import Limits
-from service.settings.settings import Settings
+from service.settings.settings import Limits, Settings
 from solver.contacts.laws.registry import DEFAULT, laws
 from solver.matrices.readers.registry import readers
 

@@ -7,8 +7,8 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Body
 from pydantic import ConfigDict
 
-from service.http.computed import computed
 from service.http.dependencies import InContext, TypedRoute
+from service.http.in_lane import computed
 from service.jobs.answering import PLAN
 from service.jobs.common.scenes import HarmonicRequest
 from service.schemas.answers import Answer

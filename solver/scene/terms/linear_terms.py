@@ -3,6 +3,10 @@
 Couplings that are not symmetric, gyroscopic, of the gas: all of them are entries of K and C. The equation of
 the DOF `on` gains (k + i k_imaginary) x + c x' of the DOF `of`, here or some sectors further on. A nodal
 diameter sees Σ X_m e^{jmθ} of entries at the offsets m.
+
+Normal loads and forces may follow the speed. Along an engine-order line the speed follows the frequency,
+speed [1/min] = 60 f / order, so that a sweep over the frequency is one over the speed; `Scene.at_frequency`
+is the scene at one point of it.
 """
 
 from __future__ import annotations
@@ -215,10 +219,7 @@ Table = Annotated[tuple[tuple[NonNegative, Signed], ...], Field(min_length=2, ma
 
 
 class SpeedDependence(Part):
-    """A parameter that follows the speed of rotation: a normal load, or the excitation.
-
-    Along an engine-order line the speed follows the frequency, speed [1/min] = 60 f / order, so that a sweep
-    over the frequency is one over the speed. `Scene.at_frequency` is the scene at one point of it.
+    """A parameter that follows the speed of rotation.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""``/v1/sweeps``: what was computed, to be queried."""
+"""``/v1/sweeps`` and ``/v1/designs``: what was computed and designed, to be queried."""
 
 from __future__ import annotations
 
@@ -7,9 +7,18 @@ from typing import Annotated, Any, Literal
 from fastapi import APIRouter, Query, Response
 
 from service.db.models import Sweep
-from service.http.dependencies import Context, InContext, listing, tagged
+from service.http.dependencies import (
+    BINARY,
+    LISTED,
+    TEXT,
+    UNCHANGED,
+    Context,
+    InContext,
+    listing,
+    media,
+    tagged,
+)
 from service.http.in_lane import drawing, reading, writing_files
-from service.http.routes.described import BINARY, LISTED, TEXT, UNCHANGED, media
 from service.rendering.representations import (
     BY_FORMAT,
     JSON,
@@ -19,10 +28,11 @@ from service.rendering.representations import (
     sweep_body,
     sweep_picture,
 )
-from service.schemas.answers import SweepDetail, SweepPage
+from service.schemas.answers import DesignDetail, DesignPage, SweepDetail, SweepPage
+from service.schemas.design_queries import DesignQuery, design_detail, design_page
 from service.schemas.sweep_queries import SweepQuery, sweep_page
 
-router = APIRouter(prefix="/v1/sweeps", tags=["sweeps"])
+sweeps = APIRouter(prefix="/v1/sweeps", tags=["sweeps"])
 
 _PICTURE_TYPES = {"svg": "image/svg+xml", "png": "image/png"}
 SWEEP_FORMS: dict[int | str, dict[str, Any]] = {
@@ -37,14 +47,14 @@ SweepForm = Annotated[
 ]
 
 
-@router.get("", response_model=SweepPage, responses=LISTED)
+@sweeps.get("", response_model=SweepPage, responses=LISTED)
 @reading
 def list_sweeps(context: InContext, query: Annotated[SweepQuery, Query()]) -> Response:
     """Stored sweeps that meet every filter, newest first unless `sort` says otherwise."""
     return listing(context, sweep_page(context.service.sweeps, query, context.service.settings, context.sees))
 
 
-@router.get("/{sweep_id}", response_model=SweepDetail, responses=SWEEP_FORMS)
+@sweeps.get("/{sweep_id}", response_model=SweepDetail, responses=SWEEP_FORMS)
 @writing_files
 def get_sweep(sweep_id: str, context: InContext, form: SweepForm = None) -> Response:
     """A stored sweep with its arrays, in the form that `Accept` prefers.
@@ -68,7 +78,7 @@ def sweep_answer(sweep: Sweep, form: str | None, context: Context) -> Response:
     return tagged(request, sweep_body(sweep, kind, service.sweeps, scene), kind, headers)
 
 
-@router.get(
+@sweeps.get(
     "/{sweep_id}/plot.svg",
     response_class=Response,
     responses={200: media({"image/svg+xml": TEXT}), **UNCHANGED},
@@ -79,7 +89,7 @@ def plot_svg(sweep_id: str, context: InContext) -> Response:
     return _picture(context.service.sweep(sweep_id, context.caller), "svg", context)
 
 
-@router.get(
+@sweeps.get(
     "/{sweep_id}/plot.png",
     response_class=Response,
     responses={200: media({"image/png": BINARY}), **UNCHANGED},
@@ -93,3 +103,22 @@ def plot_png(sweep_id: str, context: InContext) -> Response:
 def _picture(sweep: Sweep, suffix: str, context: Context) -> Response:
     picture = sweep_picture(sweep, suffix, context.service.sweeps)
     return tagged(context.request, picture, _PICTURE_TYPES[suffix])
+
+
+designs = APIRouter(prefix="/v1/designs", tags=["designs"])
+
+
+@designs.get("", response_model=DesignPage, responses=LISTED)
+@reading
+def list_designs(context: InContext, query: Annotated[DesignQuery, Query()]) -> Response:
+    """Stored designs that meet every filter, newest first unless `sort` says otherwise."""
+    service = context.service
+    return listing(context, design_page(service.designs, query, service.settings, context.sees))
+
+
+@designs.get("/{design_id}", response_model=DesignDetail, responses=UNCHANGED)
+@reading
+def get_design(design_id: str, context: InContext) -> Response:
+    """A stored design with the whole result of its job; its id is that of the job. Has a strong ETag."""
+    answer = design_detail(context.service.design(design_id, context.caller), context.service.designs)
+    return tagged(context.request, answer.model_dump_json().encode())

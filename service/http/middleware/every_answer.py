@@ -1,19 +1,90 @@
-"""What every answer carries, and the audit line of every refusal."""
+"""What every answer carries or leaves out: headers, its number, a line in the log; HEAD and refusals."""
 
 from __future__ import annotations
 
 import json
 import logging
+import re
+import time
+import uuid
 from datetime import UTC, datetime
 from typing import Any
 
-from starlette.datastructures import MutableHeaders
+from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.http.middleware.admission import address_of
+from service.settings import logs
 from service.settings.settings import Settings
 
-log = logging.getLogger("stickslip.audit")
+log = logging.getLogger("stickslip.http")
+_audit_log = logging.getLogger("stickslip.audit")
+
+HEADERS_ONLY = "stickslip.headers_only"
+"""Key of a request's scope: True if nobody reads the body."""
+
+
+class Head:
+    """Answers HEAD as if it were GET and keeps the body back (RFC 9110, section 9.3.2)."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass the request on."""
+        if scope["type"] != "http" or scope["method"] != "HEAD":
+            await self._app(scope, receive, send)
+            return
+
+        async def without_body(message: Message) -> None:
+            if message["type"] == "http.response.body":
+                message = {**message, "body": b""}
+            await send(message)
+
+        # In place: what watches from outside finds the route in the same scope.
+        scope[HEADERS_ONLY], scope["method"] = True, "GET"
+        try:
+            await self._app(scope, receive, without_body)
+        finally:
+            scope["method"] = "HEAD"
+
+
+HEADER = "X-Request-ID"
+_GOOD = re.compile(r"[A-Za-z0-9._-]{1,100}")
+
+
+class RequestLog:
+    """Gives a request its id, that of the client if it is a good one, and logs how it was answered."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass a request on, its id on every line logged meanwhile and on the answer."""
+        if scope["type"] != "http":
+            await self._app(scope, receive, send)
+            return
+        asked = Headers(scope=scope).get(HEADER, "")
+        number = asked if _GOOD.fullmatch(asked) else uuid.uuid4().hex
+        begun, status = time.perf_counter(), 0
+
+        async def numbered(message: Message) -> None:
+            nonlocal status
+            if message["type"] == "http.response.start":
+                status = message["status"]
+                MutableHeaders(scope=message)[HEADER] = number
+            await send(message)
+
+        with logs.about(request=number):
+            try:
+                await self._app(scope, receive, numbered)
+            finally:
+                # As it came, percent-encoded: a decoded path could end the line. Without what was asked for.
+                path = scope.get("raw_path", b"").decode("ascii", "replace")
+                seconds = round(time.perf_counter() - begun, 6)
+                with logs.about(method=scope["method"], path=path, status=status, seconds=seconds):
+                    log.info("%s %s %d in %.1f ms", scope["method"], path, status, 1e3 * seconds)
+
 
 _POLICY = "default-src 'none'; frame-ancestors 'none'"
 # A picture opened by itself styles itself and does nothing else.
@@ -80,4 +151,4 @@ def _audit(scope: Scope, state: dict[str, Any], status: int) -> None:
         "reason": "of-another" if status == _NOT_FOUND else slug,
         "detail": detail[:_LONGEST],
     }
-    log.warning("%s", json.dumps(line))
+    _audit_log.warning("%s", json.dumps(line))

@@ -7,8 +7,8 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Body, Response
 from pydantic import BaseModel, ConfigDict, Field
 
-from service.http.computed import computed
 from service.http.dependencies import InContext, TypedRoute
+from service.http.in_lane import computed
 from service.jobs import answering
 from service.jobs.common.scenes import SceneRequest
 

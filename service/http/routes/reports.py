@@ -8,9 +8,8 @@ from typing import Annotated, Any, Literal
 from fastapi import APIRouter, Header, Query, Response
 
 from service.errors import ConflictError
-from service.http.dependencies import Context, InContext
+from service.http.dependencies import TEXT, Context, InContext, media
 from service.http.in_lane import drawing
-from service.http.routes.described import TEXT, media
 from service.rendering.representations import chosen
 from service.schemas.workbench_answers import ProjectAnswer, RunAnswer
 

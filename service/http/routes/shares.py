@@ -15,7 +15,7 @@ from service.http.dependencies import Context, InContext, TypedRoute, as_json, s
 from service.http.in_lane import reading, writing, writing_files
 from service.http.middleware.admission import address_of
 from service.http.routes.jobs import results_answer
-from service.http.routes.sweeps import SWEEP_FORMS, SweepForm, sweep_answer
+from service.http.routes.stored import SWEEP_FORMS, SweepForm, sweep_answer
 from service.schemas.answers import JobScene, ResultsAnswer, SweepDetail
 from service.schemas.workbench_answers import NewShareAnswer, ShareAnswer, SharedRun, ShareList
 from service.schemas.workbench_queries import NewLink
