@@ -11,7 +11,7 @@ from sqlalchemy.dialects import sqlite
 from service.db import revisions
 from service.db.engine import Database
 from service.db.repositories import owned
-from service.db.repositories.jobs import claims, statements
+from service.db.repositories.jobs import statements, waiting
 
 BY_KEY = "sqlite_autoindex_job_1"
 
@@ -20,9 +20,9 @@ BY_KEY = "sqlite_autoindex_job_1"
     ("statement", "index"),
     [
         (statements.COMPUTED_BEFORE, "ix_job_spec_hash_state"),
-        (claims.WAITING_OWNERS, "ix_job_state_owner_priority_id"),
-        (claims.NEXT_PRIORITY, "ix_job_state_owner_priority_id"),
-        (claims.NEXT_JOBS, "ix_job_state_owner_priority_id"),
+        (waiting.WAITING_OWNERS, "ix_job_state_owner_priority_id"),
+        (waiting.NEXT_PRIORITY, "ix_job_state_owner_priority_id"),
+        (waiting.NEXT_JOBS, "ix_job_state_owner_priority_id"),
         (owned.OF_JOBS, "ix_job_owner_stored_bytes"),
         (statements.TAKE, BY_KEY),
         (statements.REPORT, BY_KEY),

@@ -15,17 +15,22 @@ from service.db.engine import Database
 from service.db.models import NOBODY, Job, JobState
 from service.db.pagination import met, owner_condition, plain_conditions
 from service.db.repositories.jobs import statements
-from service.db.repositories.jobs.checkpoints import (
+from service.db.repositories.jobs.attempts import (
+    FREE,
+    OWNED,
     as_far_as_kept,
+    change,
+    change_owned,
     drop_checkpoint,
+    of_attempt,
+    recover,
+    renew,
     store_pieces,
     with_what_was_kept,
 )
-from service.db.repositories.jobs.claims import Turns
-from service.db.repositories.jobs.leases import FREE, OWNED, change, change_owned, of_attempt, recover, renew
-from service.db.repositories.jobs.queue_limits import Room, require_share
+from service.db.repositories.jobs.waiting import Room, Turns, require_share
 from service.db.repositories.rows import Attempt, JobRow, NewJob, Recovered
-from service.db.repositories.run_words import in_the_bin, insert_words, require_project
+from service.db.repositories.runs import in_the_bin, insert_words, require_project
 from service.db.repositories.stored import insert_design, insert_sweeps
 from service.errors import IdempotencyError
 from service.jobs.ids import new_id
