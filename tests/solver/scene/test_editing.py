@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 
+from solver.scene import editing
 from solver.scene.editing import edited, place_at, places
 
 SHIPPED = {
