@@ -40,7 +40,7 @@ COMMANDS = (
     Entry(
         "controlled", STUDY, "Follow the response over the frequency with one amplitude held, as rigs do.",
     ),
-    Entry("mistuning", "commands.mistuning.mistuning", "Study disks whose blades are not quite equal."),
+    Entry("mistuning", STUDY, "Study disks whose blades are not quite equal."),
     Entry(
         "schema", "commands.schema.schema",
         "Print the JSON Schema of scene files, design problems or jobs, for editors.",

@@ -6,7 +6,6 @@ import optim
 import solver
 from service.jobs.kinds.design import DESIGN
 from service.jobs.kinds.identify import IDENTIFY
-from service.jobs.kinds.mistuning import MISTUNING
 from service.jobs.kinds.pareto import PARETO
 from service.jobs.kinds.solve import SOLVE
 from service.jobs.kinds.sweep import SWEEP
@@ -17,6 +16,7 @@ from service.jobs.studies.controlled import Controlled
 from service.jobs.studies.interference import Interference
 from service.jobs.studies.map import Map
 from service.jobs.studies.march import March
+from service.jobs.studies.mistuning import Mistuning
 from service.jobs.studies.modes import Modes
 from service.jobs.studies.peaks import Peaks
 from service.jobs.studies.sensitivities import Sensitivities
@@ -42,7 +42,7 @@ SHIPPED = Registry(
         Accuracy.as_kind(),
         Campbell.as_kind(),
         Interference.as_kind(),
-        MISTUNING,
+        Mistuning.as_kind(),
         IDENTIFY,
         Modes.as_kind(),
         Controlled.as_kind(),
