@@ -12,7 +12,6 @@ import typer
 from typer.core import TyperGroup
 
 from optim.errors import DesignError
-from service.cli.commands.client.jobs import print_result
 from service.cli.failures import end
 from service.cli.options import inputs
 from service.cli.options import shared as options
@@ -21,6 +20,7 @@ from service.cli.output_files import Outputs
 from service.cli.progress import bar
 from service.errors import InputError, InvalidRequestError
 from service.jobs.study import Study, Watch
+from service.rendering.plain import print_result
 from service.rendering.tables.text import show
 from solver.errors import Issue, SettingError
 

@@ -153,7 +153,10 @@ class Study(SceneRequest):
         """Compute a spec, in a worker."""
         from solver.scene.scene import Scene
 
-        asked = {name: value for name, value in spec.items() if name != "scene" and value is not None}
+        # A job that an earlier version took may have the keys of its body.
+        by_key = {field.alias or name: name for name, field in cls.model_fields.items()}
+        given = {by_key.get(key, key): value for key, value in spec.items() if value is not None}
+        asked = {name: given[name] for name in cls.own_keys() if name in given}
         answer = cls.compute(Scene.from_dict(spec["scene"]), asked, Watch(progress, should_stop))
         return JobOutput(
             result=answer.json, sweeps=cls.sweeps(answer.result),

@@ -15,9 +15,9 @@ from solver.results.views import on_demand
 
 STUDIES = {kind.name: kind.request for kind in SHIPPED if issubclass(kind.request, Study)}
 OF_THE_COMMAND = {"--set", "--plot", "--out", "--json"}
-# Taken otherwise by the function: as one of three words, as a pair, or by another function.
+# Taken otherwise by the function: as one of three words, as a pair, as an object, or by another function.
 OTHERWISE = {
-    "controlled": {"no_stability"}, "march": {"history"},
+    "controlled": {"no_stability"}, "march": {"history"}, "solve": {"effects", "every", "starts", "seed"},
     "modes": {
         "start", "stop", "performance", "aero_damping", "mode_alone", "motions", "exact_peaks", "disturbance",
         "phase_resonance",

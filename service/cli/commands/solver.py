@@ -12,7 +12,7 @@ from service.cli.failures import end
 from service.cli.options import inputs
 from service.cli.options import shared as options
 from service.cli.output_files import Outputs
-from service.cli.progress import bar, patience
+from service.cli.progress import bar
 from service.errors import InputError
 from service.rendering.tables import results as reports
 from service.rendering.tables.text import print_json, show
@@ -42,48 +42,6 @@ def plan(
     asked = solver.Effects.read(effects)
     found = solver.plan(inputs.scene(name, values), harmonics=harmonics, effects=asked)
     show(found.to_json(), reports.plan, as_json=as_json)
-
-
-def solve(
-    name: options.Scene,
-    frequency: options.Frequency,
-    values: options.Values = None,
-    harmonics: options.Harmonics = 11,
-    accuracy: options.Accuracy = None,
-    effects: options.Effects = "auto",
-    every: options.EverySolution = False,
-    starts: options.Starts = 40,
-    seed: options.Seed = 0,
-    plot: options.Plot = None,
-    out: options.Out = None,
-    as_json: options.Json = False,
-) -> None:
-    """Compute one periodic response, or look for all of them."""
-    import solver
-
-    outputs = Outputs.asked(plot, out)
-    scene, asked = inputs.scene(name, values), solver.Effects.read(effects)
-    if every:
-        refused = [("--accuracy", accuracy), ("--plot", plot), ("--out", out)]
-        for option, given in refused:
-            if given is not None:
-                raise InputError(f"`{option}` does not go with `--all`, got {given!r}: leave one of them out")
-        with bar("solve --all", "solutions") as on_progress:
-            found = solver.solve_all(
-                scene, frequency_hz=frequency, harmonics=harmonics, starts=starts, seed=seed, effects=asked,
-                on_progress=on_progress,
-            )  # fmt: skip
-        show(found.to_json(), reports.all_solutions, as_json=as_json)
-        end(bool(found.solutions), "No solution was found: try more starts or more harmonics.")
-        return
-    with patience():
-        solution = solver.solve(
-            scene, frequency_hz=frequency, harmonics=harmonics, accuracy=accuracy, effects=asked
-        )
-    if solution.converged:
-        outputs.write(solution, solution.plot)
-    show(solution.to_json(), reports.solution, as_json=as_json)
-    end(solution.reached, solution.status.value)
 
 
 def sweep(

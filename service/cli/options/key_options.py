@@ -117,7 +117,7 @@ def key_options(kind: JobKind, local: Command | None) -> list[KeyOption]:
     for key, flag in flags.items():
         whole, schema = described["properties"][key], schemas[key]
         words = as_options(whole.get("description", ""), flags)
-        mine = known.get(flag) or _made(flag, said[key].metavar, schema, whole, words, needed=key in needed)
+        mine = known.get(flag) or _made(flag, said[key], schema, whole, words, needed=key in needed)
         parameter = mine.replace(name=f"key_{key}", kind=inspect.Parameter.KEYWORD_ONLY)
         found.append(KeyOption(key, asked[key][0], flag, parameter, schema))
     order = [*known, *(one.flag for one in found)]
@@ -158,7 +158,7 @@ def as_options(words: str, flags: Mapping[str, str]) -> str:
 
 
 def _made(
-    flag: str, metavar: str, schema: Schema, whole: Schema, words: str, *, needed: bool
+    flag: str, said: Flag, schema: Schema, whole: Schema, words: str, *, needed: bool
 ) -> inspect.Parameter:
     """An option of the schema of its key."""
     if flag == "--set":
@@ -171,12 +171,14 @@ def _made(
         words = f"Switch off: {words}" if default is True else words
         return _parameter(Annotated[bool, typer.Option(flag, help=words)], False)
     type_, parser, shown = _read_as(schema)
-    if metavar == _PAIR:  # one of the ranges that a list may hold
+    if said.metavar == _PAIR:  # one of the ranges that a list may hold
         type_, parser = tuple[float, float], None
     if get_origin(type_) is list and kind == "array":
         words = f"{words} Repeatable."
-    offered = completion.paths if metavar == _PATH else None
-    told = typer.Option(flag, metavar=metavar or shown, parser=parser, help=words, autocompletion=offered)
+    offered = completion.offered(said.words, paths=said.metavar == _PATH)
+    told = typer.Option(
+        flag, metavar=said.metavar or shown, parser=parser, help=words, autocompletion=offered
+    )
     if needed:
         return _parameter(Annotated[type_, told], inspect.Parameter.empty)
     return _parameter(

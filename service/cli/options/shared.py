@@ -33,7 +33,6 @@ Values = Annotated[
         autocompletion=completion.settings,
     ),
 ]  # fmt: skip
-Frequency = Annotated[float, amount("--frequency", "HZ", "Excitation frequency [Hz].")]
 FixedFrequency = Annotated[
     float | None,
     amount("--frequency", "HZ", "Excitation frequency [Hz], needed when another parameter is swept."),
@@ -47,15 +46,6 @@ Accuracy = Annotated[
         "Estimated error relative to the amplitude; chooses the harmonics, in place of --harmonics.",
     ),
 ]
-EverySolution = Annotated[
-    bool,
-    typer.Option(
-        "--all",
-        help="Look for all solutions, with their stability: random starts, deflation, branches followed.",
-    ),
-]
-Starts = Annotated[int, count("--starts", "N", "Random starts of --all.")]
-Seed = Annotated[int, count("--seed", "N", "Of the random starts of --all.")]
 Multipliers = Annotated[
     bool,
     typer.Option(
@@ -82,7 +72,7 @@ Parameter = Annotated[
     str,
     typer.Option(
         "--parameter", metavar="PATH", help=f"What is swept: frequency, {DISK_LOAD}, …",
-        autocompletion=completion.parameters,
+        autocompletion=completion.offered(("frequency",), paths=True),
     ),
 ]  # fmt: skip
 From = Annotated[

@@ -7,7 +7,6 @@ import solver
 from service.jobs.kinds.design import DESIGN
 from service.jobs.kinds.identify import IDENTIFY
 from service.jobs.kinds.pareto import PARETO
-from service.jobs.kinds.solve import SOLVE
 from service.jobs.kinds.sweep import SWEEP
 from service.jobs.registry import Registry
 from service.jobs.studies.accuracy import Accuracy
@@ -20,6 +19,7 @@ from service.jobs.studies.mistuning import Mistuning
 from service.jobs.studies.modes import Modes
 from service.jobs.studies.peaks import Peaks
 from service.jobs.studies.sensitivities import Sensitivities
+from service.jobs.studies.solve import Solve
 
 
 def warm_up() -> None:
@@ -37,7 +37,7 @@ SHIPPED = Registry(
         Peaks.as_kind(),
         DESIGN,
         PARETO,
-        SOLVE,
+        Solve.as_kind(),
         March.as_kind(),
         Accuracy.as_kind(),
         Campbell.as_kind(),

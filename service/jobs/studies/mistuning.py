@@ -16,7 +16,7 @@ from service.jobs.arrays import decode, encode
 from service.jobs.common.ranges import band_issues
 from service.jobs.common.results import EndedResult, KnownResult, Table
 from service.jobs.common.scenes import FrequencyHz, HarmonicRequest, refusal
-from service.jobs.common.sizes import POINTS_OF_A_SWEEP, annulus_issues, size_issues, whole_disk_dofs
+from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
 from service.jobs.outputs import JobOutput, OnProgress, ShouldStop
 from service.jobs.parts import Part, PartOutput, Parts, PartStoppedError
 from service.jobs.registry import Flag, JobKind
@@ -131,10 +131,11 @@ class Mistuning(Study, HarmonicRequest):
 
     def sizes(self, scene: Scene) -> list[Issue]:
         """Return what is too large; the factors are drawn if they are not too many, to see that they can."""
-        points = POINTS_OF_A_SWEEP * self.samples * scene.structure.sector_count
-        words, dofs = "points of all sweeps", whole_disk_dofs(scene)
-        large = annulus_issues(scene, self.harmonics)
-        large += size_issues("/samples", words, points, self.harmonics, dofs)
+        points, words = (
+            POINTS_OF_A_SWEEP * self.samples * scene.structure.sector_count,
+            "points of all sweeps",
+        )
+        large = balance_issues("/samples", scene, self.harmonics, points, words, every_sector=True)
         return large or self._drawn(scene)
 
     def _drawn(self, scene: Scene) -> list[Issue]:
