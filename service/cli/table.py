@@ -8,7 +8,7 @@ COMMANDS = (
     Entry("scenes", "commands.solver.scenes", "List the shipped scenes."),
     Entry("plan", "commands.solver.plan", "Say which effects a scene calls for, and why."),
     Entry("solve", STUDY, "Compute one periodic response, or look for all of them."),
-    Entry("sweep", "commands.solver.sweep", "Follow the response over a parameter."),
+    Entry("sweep", STUDY, "Follow the response over a parameter."),
     Entry("accuracy", STUDY, "Measure what accuracy costs."),
     Entry("design", "commands.design.design", "Find the best damper."),
     Entry("pareto", "commands.design.pareto", "Find the front of peak against resonance band."),

@@ -132,7 +132,7 @@ class Study(SceneRequest):
     def empty(cls, result: Json) -> str:
         """Return why there is nothing to draw; empty if there is."""
         key, why = cls.EMPTY
-        return "" if result[key] else why
+        return "" if result.get(key) else why
 
     @classmethod
     def figure(cls, result: Json, _sweeps: Sequence[StoredSweep], _read: ReadSweep) -> Figure:
@@ -149,19 +149,26 @@ class Study(SceneRequest):
         return own + [name for name in of_harmonics if name not in SceneRequest.model_fields]
 
     @classmethod
-    def run(cls, spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop) -> JobOutput:
-        """Compute a spec, in a worker."""
+    def asked(cls, spec: Mapping[str, Any]) -> tuple[Scene, dict[str, Any]]:
+        """Return the scene of a spec, and the keys that were given."""
         from solver.scene.scene import Scene
 
         # A job that an earlier version took may have the keys of its body.
         by_key = {field.alias or name: name for name, field in cls.model_fields.items()}
         given = {by_key.get(key, key): value for key, value in spec.items() if value is not None}
-        asked = {name: given[name] for name in cls.own_keys() if name in given}
-        answer = cls.compute(Scene.from_dict(spec["scene"]), asked, Watch(progress, should_stop))
-        return JobOutput(
-            result=answer.json, sweeps=cls.sweeps(answer.result),
-            shortfall=None if answer.reached else answer.status,
-        )  # fmt: skip
+        return Scene.from_dict(spec["scene"]), {name: given[name] for name in cls.own_keys() if name in given}
+
+    @classmethod
+    def run(cls, spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop) -> JobOutput:
+        """Compute a spec, in a worker."""
+        answer = cls.compute(*cls.asked(spec), Watch(progress, should_stop))
+        return cls.output(answer, cls.sweeps(answer.result))
+
+    @classmethod
+    def output(cls, answer: Answer, sweeps: Sequence[SweepRecord]) -> JobOutput:
+        """Return what a worker gives back."""
+        shortfall = None if answer.reached else answer.status
+        return JobOutput(result=answer.json, sweeps=tuple(sweeps), shortfall=shortfall)
 
     @classmethod
     def draw(cls, result: Json, sweeps: Sequence[StoredSweep], read: ReadSweep) -> Figure:

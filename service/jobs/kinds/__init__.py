@@ -7,7 +7,6 @@ import solver
 from service.jobs.kinds.design import DESIGN
 from service.jobs.kinds.identify import IDENTIFY
 from service.jobs.kinds.pareto import PARETO
-from service.jobs.kinds.sweep import SWEEP
 from service.jobs.registry import Registry
 from service.jobs.studies.accuracy import Accuracy
 from service.jobs.studies.campbell import Campbell
@@ -20,6 +19,7 @@ from service.jobs.studies.modes import Modes
 from service.jobs.studies.peaks import Peaks
 from service.jobs.studies.sensitivities import Sensitivities
 from service.jobs.studies.solve import Solve
+from service.jobs.studies.sweep import Sweep
 
 
 def warm_up() -> None:
@@ -32,7 +32,7 @@ def warm_up() -> None:
 
 SHIPPED = Registry(
     [
-        SWEEP,
+        Sweep.as_kind(),
         Map.as_kind(),
         Peaks.as_kind(),
         DESIGN,
