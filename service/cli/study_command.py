@@ -50,8 +50,9 @@ def command_of(study: type[Study]) -> Callable[..., None]:
     flags["path"] = flags.get("parameter", "--set")
 
     def command(
-        name: str, values: list[str] | None, plot: str | None, out: str | None, as_json: bool, **given: Any
-    ) -> None:
+        name: str, values: list[str] | None, out: str | None, as_json: bool, plot: str | None = None,
+        **given: Any,
+    ) -> None:  # fmt: skip
         outputs = Outputs.asked(plot, out)
         scene = inputs.scene(name, values)
         read = {key: made[key].in_body(given[made[key].parameter.name]) for key in own}
@@ -65,14 +66,17 @@ def command_of(study: type[Study]) -> Callable[..., None]:
         except (SettingError, DesignError) as error:
             raise InputError(as_options(str(error), flags)) from error
         if answer.result is not None:
-            draw = None if study.empty(answer.json) else answer.plot
+            draw = answer.plot if study.drawn() and not study.empty(answer.json) else None
             outputs.write(answer.result, draw, scene=scene)
+        elif answer.reached and out is not None:
+            raise InputError(f"`--out`: what `{study.NAME}` finds is no table, take --json")
         show(answer.json, partial(print_result, study.NAME), as_json=as_json)
         end(answer.reached, answer.status)
 
     listed = [
         _keyword("name", options.Scene), *(made[key].parameter for key in own),
-        _keyword("values", options.Values, None), _keyword("plot", options.Plot, None),
+        _keyword("values", options.Values, None),
+        *([_keyword("plot", options.Plot, None)] if study.drawn() else []),
         _keyword("out", options.Out, None), _keyword("as_json", options.Json, False),
     ]  # fmt: skip
     command.__doc__ = study.__doc__

@@ -5,8 +5,8 @@ from __future__ import annotations
 from service.cli.lazy import STUDY, Entry
 
 COMMANDS = (
-    Entry("scenes", "commands.solver.scenes", "List the shipped scenes."),
-    Entry("plan", "commands.solver.plan", "Say which effects a scene calls for, and why."),
+    Entry("scenes", "commands.scenes.scenes", "List the shipped scenes."),
+    Entry("plan", STUDY, "Say which effects a scene calls for, and why."),
     Entry("solve", STUDY, "Compute one periodic response, or look for all of them."),
     Entry("sweep", STUDY, "Follow the response over a parameter."),
     Entry("accuracy", STUDY, "Measure what accuracy costs."),

@@ -42,16 +42,20 @@ class Watch(NamedTuple):
 
 
 class Written(Protocol):
-    """What can be drawn, and written as a table."""
+    """What can be written as a table."""
 
     def to_dataset(self) -> Dataset:
         """The result as named arrays."""
+
+
+class Drawn(Written, Protocol):
+    """What can be drawn too."""
 
     def plot(self) -> Figure:
         """The picture of it."""
 
 
-class Found(Written, Protocol):
+class Found(Drawn, Protocol):
     """A result of a study."""
 
     @property
@@ -85,7 +89,7 @@ class Answer(NamedTuple):
         """Return an answer of which there is nothing but its JSON."""
         return cls(None, json, True, "")
 
-    def beside(self, result: Written, **further: Any) -> Answer:
+    def beside(self, result: Drawn, **further: Any) -> Answer:
         """Return the answer with further keys, drawn and written as another result."""
         return self._replace(result=result, json={**self.json, **further}, plot=result.plot)
 
@@ -129,6 +133,11 @@ class Study(SceneRequest):
         return ()
 
     @classmethod
+    def drawn(cls) -> bool:
+        """Return whether there are pictures of it."""
+        return hasattr(cls, "FIGURE") or "figure" in vars(cls)
+
+    @classmethod
     def empty(cls, result: Json) -> str:
         """Return why there is nothing to draw; empty if there is."""
         key, why = cls.EMPTY
@@ -147,6 +156,10 @@ class Study(SceneRequest):
         apart = {*SceneRequest.model_fields, *of_harmonics}
         own = [name for name in cls.model_fields if name not in apart]
         return own + [name for name in of_harmonics if name not in SceneRequest.model_fields]
+
+    def spec(self, _scene: Scene) -> dict[str, Any]:
+        """Return what a worker is given beside the scene, as JSON."""
+        return self.model_dump(mode="json", include=set(self.own_keys()))
 
     @classmethod
     def asked(cls, spec: Mapping[str, Any]) -> tuple[Scene, dict[str, Any]]:
@@ -183,7 +196,7 @@ class Study(SceneRequest):
         summary = (inspect.getdoc(cls) or "").partition("\n")[0]
         return JobKind(
             name=cls.NAME, summary=summary, request=cls, resolve=resolve, run=cls.run, result=cls.RESULT,
-            view=KindView(result=cls.SHOWS, sweeps=cls.SWEEPS, draw=cls.draw),
+            view=KindView(result=cls.SHOWS, sweeps=cls.SWEEPS, draw=cls.draw if cls.drawn() else None),
         )  # fmt: skip
 
 
@@ -191,4 +204,4 @@ def resolve(request: Study, source: SceneSource) -> Resolved:
     """Look up the scene of a study and check what is asked of it; the spec has its keys."""
     scene = resolve_scene(request, source)
     require(request.issues(scene) or request.sizes(scene))
-    return resolved(scene, **request.model_dump(mode="json", include=set(request.own_keys())))
+    return resolved(scene, **request.spec(scene))

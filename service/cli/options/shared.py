@@ -10,8 +10,6 @@ from service.cli import completion
 from service.cli.options.numeric import count
 from solver.scene.examples import DISK_LOAD
 
-EFFECTS = ("even-harmonics", "every-contact", "every-port", "every-sector", "whole-matrices")
-
 Scene = Annotated[
     str,
     typer.Argument(
@@ -34,15 +32,6 @@ Values = Annotated[
     ),
 ]  # fmt: skip
 Harmonics = Annotated[int, count("--harmonics", "H", "Highest harmonic kept.")]
-Effects = Annotated[
-    str,
-    typer.Option(
-        "--effects", metavar="auto|all|NAME,…",
-        help="What to pay for though the scene does not call for it: even-harmonics, every-contact, "
-        "every-port, every-sector, whole-matrices.",
-        autocompletion=completion.words("auto", "all", *EFFECTS),
-    ),
-]  # fmt: skip
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 Plot = Annotated[
     str | None,

@@ -17,6 +17,7 @@ from service.jobs.studies.march import March
 from service.jobs.studies.mistuning import Mistuning
 from service.jobs.studies.modes import Modes
 from service.jobs.studies.peaks import Peaks
+from service.jobs.studies.plan import Plan
 from service.jobs.studies.sensitivities import Sensitivities
 from service.jobs.studies.solve import Solve
 from service.jobs.studies.sweep import Sweep
@@ -47,6 +48,7 @@ SHIPPED = Registry(
         Modes.as_kind(),
         Controlled.as_kind(),
         Sensitivities.as_kind(),
+        Plan.as_kind(),
     ],
     warm_up,
 )

@@ -229,7 +229,7 @@ _HOMES = {
     "peaks": "track.track", "accuracy": "results.accuracy", "campbell": "campbell.diagram",
     "interference": "interference.diagram",
     "mistuning": "mistuning.report", "identify": "identify.report", "modes": "modes.report",
-    "controlled": "modes.held", "sensitivities": "sensitivities.shares",
+    "controlled": "modes.held", "sensitivities": "sensitivities.shares", "plan": "results.plan",
 }  # fmt: skip
 
 
