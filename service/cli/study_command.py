@@ -6,7 +6,7 @@ import inspect
 from collections.abc import Callable
 from functools import partial
 from importlib import import_module
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 from typer.core import TyperGroup
@@ -19,10 +19,13 @@ from service.cli.options.key_options import as_options, key_options
 from service.cli.output_files import Outputs
 from service.cli.progress import bar
 from service.errors import InputError, InvalidRequestError
-from service.jobs.study import Study, Watch
+from service.jobs.study import Answer, Study, Watch
 from service.rendering.plain import print_result
 from service.rendering.tables.text import show
 from solver.errors import Issue, SettingError
+
+if TYPE_CHECKING:
+    from solver.scene.scene import Scene
 
 
 def command_named(name: str) -> Callable[..., None]:
@@ -65,13 +68,7 @@ def command_of(study: type[Study]) -> Callable[..., None]:
                 answer = study.compute(scene, asked, Watch(on_progress))
         except (SettingError, DesignError) as error:
             raise InputError(as_options(str(error), flags)) from error
-        if answer.result is not None:
-            draw = answer.plot if study.drawn() and not study.empty(answer.json) else None
-            outputs.write(answer.result, draw, scene=scene)
-        elif answer.reached and out is not None:
-            raise InputError(f"`--out`: what `{study.NAME}` finds is no table, take --json")
-        show(answer.json, partial(print_result, study.NAME), as_json=as_json)
-        end(answer.reached, answer.status)
+        give(study, answer, outputs, scene, as_json=as_json)
 
     listed = [
         _keyword("name", options.Scene), *(made[key].parameter for key in own),
@@ -83,6 +80,17 @@ def command_of(study: type[Study]) -> Callable[..., None]:
     command.__signature__ = inspect.Signature(listed)  # type: ignore[attr-defined]
     command.__annotations__ = {one.name: one.annotation for one in listed}
     return command
+
+
+def give(study: type[Study], answer: Answer, outputs: Outputs, scene: Scene, *, as_json: bool) -> None:
+    """Write and print what was found; status 1 if the goal was not reached."""
+    if answer.result is not None:
+        draw = answer.plot if study.drawn() and not study.empty(answer.json) else None
+        outputs.write(answer.result, draw, scene=scene)
+    elif answer.reached and outputs.file is not None:
+        raise InputError(f"`--out`: what `{study.NAME}` finds is no table, take --json")
+    show(answer.json, partial(print_result, study.NAME), as_json=as_json)
+    end(answer.reached, answer.status)
 
 
 def _keyword(name: str, annotation: Any, default: Any = inspect.Parameter.empty) -> inspect.Parameter:

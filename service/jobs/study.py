@@ -80,9 +80,10 @@ class Answer(NamedTuple):
     plot: Callable[[], Figure] | None = None
 
     @classmethod
-    def of(cls, found: Found) -> Answer:
-        """Return what a result says of itself."""
-        return cls(found, found.to_json(), found.completed, str(found.status.value), found.plot)
+    def of(cls, found: Found, *, reached: bool | None = None) -> Answer:
+        """Return what a result says of itself; by `reached` whether that is what was asked for."""
+        good = found.completed if reached is None else reached
+        return cls(found, found.to_json(), good, str(found.status.value), found.plot)
 
     @classmethod
     def told(cls, json: dict[str, Any]) -> Answer:
@@ -135,7 +136,7 @@ class Study(SceneRequest):
     @classmethod
     def drawn(cls) -> bool:
         """Return whether there are pictures of it."""
-        return hasattr(cls, "FIGURE") or "figure" in vars(cls)
+        return hasattr(cls, "FIGURE") or any("figure" in vars(one) for one in cls.__mro__ if one is not Study)
 
     @classmethod
     def empty(cls, result: Json) -> str:

@@ -17,7 +17,7 @@ STUDIES = {kind.name: kind.request for kind in SHIPPED if issubclass(kind.reques
 OF_THE_COMMAND = {"--set", "--plot", "--out", "--json"}
 # Taken otherwise by the function: as one of three words, as a pair, as an object, or by another function.
 OTHERWISE = {
-    "controlled": {"no_stability"}, "march": {"history"}, "plan": {"effects"},
+    "design": {"uncertain", "aim", "quantile", "samples", "seed"}, "controlled": {"no_stability"}, "march": {"history"}, "plan": {"effects"},
     "solve": {"effects", "every", "starts", "seed"},
     "sweep": {"effects", "multipliers", "switched"},
     "modes": {

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import optim
 import solver
-from service.jobs.kinds.design import DESIGN
 from service.jobs.kinds.identify import IDENTIFY
-from service.jobs.kinds.pareto import PARETO
 from service.jobs.registry import Registry
 from service.jobs.studies.accuracy import Accuracy
 from service.jobs.studies.campbell import Campbell
 from service.jobs.studies.controlled import Controlled
+from service.jobs.studies.design import Design
 from service.jobs.studies.interference import Interference
 from service.jobs.studies.map import Map
 from service.jobs.studies.march import March
 from service.jobs.studies.mistuning import Mistuning
 from service.jobs.studies.modes import Modes
+from service.jobs.studies.pareto import Pareto
 from service.jobs.studies.peaks import Peaks
 from service.jobs.studies.plan import Plan
 from service.jobs.studies.sensitivities import Sensitivities
@@ -36,8 +36,8 @@ SHIPPED = Registry(
         Sweep.as_kind(),
         Map.as_kind(),
         Peaks.as_kind(),
-        DESIGN,
-        PARETO,
+        Design.as_kind(),
+        Pareto.as_kind(),
         Solve.as_kind(),
         March.as_kind(),
         Accuracy.as_kind(),
