@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import optim
 import solver
-from service.jobs.kinds.identify import IDENTIFY
 from service.jobs.registry import Registry
 from service.jobs.studies.accuracy import Accuracy
 from service.jobs.studies.campbell import Campbell
 from service.jobs.studies.controlled import Controlled
 from service.jobs.studies.design import Design
+from service.jobs.studies.identify import Identify
 from service.jobs.studies.interference import Interference
 from service.jobs.studies.map import Map
 from service.jobs.studies.march import March
@@ -21,6 +23,7 @@ from service.jobs.studies.plan import Plan
 from service.jobs.studies.sensitivities import Sensitivities
 from service.jobs.studies.solve import Solve
 from service.jobs.studies.sweep import Sweep
+from service.jobs.study import Study
 
 
 def warm_up() -> None:
@@ -44,7 +47,7 @@ SHIPPED = Registry(
         Campbell.as_kind(),
         Interference.as_kind(),
         Mistuning.as_kind(),
-        IDENTIFY,
+        Identify.as_kind(),
         Modes.as_kind(),
         Controlled.as_kind(),
         Sensitivities.as_kind(),
@@ -52,3 +55,8 @@ SHIPPED = Registry(
     ],
     warm_up,
 )
+
+
+def studies(registry: Registry = SHIPPED) -> Mapping[str, type[Study]]:
+    """Return the studies among some kinds by their names."""
+    return {kind.name: kind.request for kind in registry if issubclass(kind.request, Study)}
