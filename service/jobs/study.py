@@ -59,10 +59,6 @@ class Found(Drawn, Protocol):
     """A result of a study."""
 
     @property
-    def completed(self) -> bool:
-        """Whether it came to its end."""
-
-    @property
     def status(self) -> enum.Enum:
         """How it ended; the value is a sentence that says what to try."""
 
@@ -80,10 +76,9 @@ class Answer(NamedTuple):
     plot: Callable[[], Figure] | None = None
 
     @classmethod
-    def of(cls, found: Found, *, reached: bool | None = None) -> Answer:
-        """Return what a result says of itself; by `reached` whether that is what was asked for."""
-        good = found.completed if reached is None else reached
-        return cls(found, found.to_json(), good, str(found.status.value), found.plot)
+    def of(cls, found: Found, reached: bool) -> Answer:
+        """Return what a result says of itself, and whether that is what was asked for."""
+        return cls(found, found.to_json(), reached, str(found.status.value), found.plot)
 
     @classmethod
     def told(cls, json: dict[str, Any]) -> Answer:
@@ -126,7 +121,8 @@ class Study(SceneRequest):
     @classmethod
     def compute(cls, scene: Scene, asked: Mapping[str, Any], watch: Watch) -> Answer:
         """Compute what was asked, by keys that are the function's; left out, its own defaults count."""
-        return Answer.of(on_demand(cls.FUNCTION)(scene, **asked, **watch._asdict()))
+        found = on_demand(cls.FUNCTION)(scene, **asked, **watch._asdict())
+        return Answer.of(found, found.completed)
 
     @classmethod
     def sweeps(cls, _found: Any) -> tuple[SweepRecord, ...]:

@@ -155,14 +155,15 @@ class _Design(NominalAndRobustKeys, ProblemRequest):
         on_best = None if best is None else lambda found: best(found.to_json())
         search = optim.robust_design if UNCERTAIN in asked else optim.design
         found = search(scene, **asked, **watch._asdict(), on_best=on_best)
-        return Answer.of(found, reached=found.reached)
+        return Answer.of(found, found.reached)
 
     @classmethod
     def sweeps(cls, found: Optimum | Robust) -> tuple[SweepRecord, ...]:
         """Return the responses computed; of a robust design those of the search without uncertainty."""
         from service.jobs.common.records import sweep_records
 
-        return sweep_records(getattr(found, "design", found).sweeps, intermediate=True)
+        nominal: Any = getattr(found, "design", found)
+        return sweep_records(nominal.sweeps, intermediate=True)
 
     @classmethod
     def output(cls, answer: Answer, sweeps: Sequence[SweepRecord]) -> JobOutput:

@@ -171,7 +171,7 @@ class Identify(Study, HarmonicRequest):
         import optim
 
         found = optim.identify(scene, **asked, **watch._asdict())
-        return Answer.of(found, reached=found.reached)
+        return Answer.of(found, found.reached)
 
 
 STUDY = Identify

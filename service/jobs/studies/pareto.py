@@ -63,7 +63,7 @@ class _Pareto(PointsOfFront, ProblemRequest):
         import optim
 
         found = optim.pareto_front(scene, **asked, **watch._asdict())
-        return Answer.of(found, reached=found.reached)
+        return Answer.of(found, found.reached)
 
     @classmethod
     def sweeps(cls, found: Front) -> tuple[SweepRecord, ...]:

@@ -61,7 +61,7 @@ class Sensitivities(Study, HarmonicRequest):
         import optim
 
         found = optim.sensitivities(scene, **asked)
-        return Answer.of(found, reached=found.reached)
+        return Answer.of(found, found.reached)
 
     @classmethod
     def sweeps(cls, found: SensitivityResult) -> tuple[SweepRecord, ...]:

@@ -143,14 +143,13 @@ class Sweep(Study, HarmonicRequest):
 
     def issues(self, scene: Scene) -> list[Issue]:
         """Return what is wrong with parameter and range."""
-        path, ends = self.parameter, (self.start, self.stop)
-        if path == SPEED and scene.speed_order is not None:  # the frequency in other units
-            path, ends = FREQUENCY, tuple(end and end * scene.speed_order / 60.0 for end in ends)
+        path, order, ends = self.parameter, scene.speed_order, [self.start, self.stop]
+        if path == SPEED and order is not None:  # the frequency in other units
+            path, ends = FREQUENCY, [None if end is None else end * order / 60.0 for end in ends]
         over_frequency = path == FREQUENCY
         if over_frequency:
-            ends = tuple(
-                end if given is None else given for given, end in zip(ends, scene.observe.band, strict=True)
-            )
+            band = zip(ends, scene.observe.band, strict=True)
+            ends = [end if given is None else given for given, end in band]
         if unknown := check("/parameter", partial(scene.check_path, path)):
             return unknown
         issues = effects_issues(self.effects)
