@@ -98,6 +98,7 @@ def test_a_worker_is_sent_it_by_name(name: str) -> None:
     kind = SHIPPED[name]
     assert pickle.loads(pickle.dumps((kind.request, kind.resolve))) == (kind.request, kind.resolve)
     assert callable(pickle.loads(pickle.dumps(kind.run)))
+    assert not hasattr(STUDIES[name], "FIGURE") or callable(on_demand(STUDIES[name].FIGURE))
 
 
 def test_every_kind_is_a_study_with_a_command() -> None:

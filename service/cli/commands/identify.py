@@ -15,7 +15,7 @@ from service.cli.progress import bar
 from service.cli.study_command import Keys, give
 from service.jobs.studies.identify import Identify
 from service.jobs.study import Watch
-from solver.scene.examples import DISK_LOAD
+from solver.scene.descriptions import DISK_LOAD
 
 if TYPE_CHECKING:
     from optim import Identification

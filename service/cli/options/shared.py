@@ -8,7 +8,7 @@ import typer
 
 from service.cli import completion
 from service.cli.options.numeric import count
-from solver.scene.examples import DISK_LOAD
+from solver.scene.descriptions import DISK_LOAD
 
 Scene = Annotated[
     str,

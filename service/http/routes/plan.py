@@ -6,8 +6,8 @@ from typing import Annotated
 
 from fastapi import APIRouter, Body
 
-from service.http.computed import computed
 from service.http.dependencies import InContext, TypedRoute
+from service.http.in_lane import computed
 from service.jobs.answering import PLAN
 from service.jobs.studies.plan import EXAMPLE, Plan, PlanResult
 

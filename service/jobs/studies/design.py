@@ -17,7 +17,7 @@ from service.jobs.kind_view import Json, ReadSweep, StoredSweep
 from service.jobs.outputs import JobOutput, SweepRecord
 from service.jobs.study import Answer, Watch
 from solver.errors import Issue, pointer
-from solver.scene.examples import DISK_LOAD
+from solver.scene.descriptions import DISK_LOAD
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

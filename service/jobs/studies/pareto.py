@@ -14,7 +14,7 @@ from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
 from service.jobs.outputs import SweepRecord
 from service.jobs.study import Answer, Watch
 from solver.errors import Issue
-from solver.scene.examples import DISK_LOAD
+from solver.scene.descriptions import DISK_LOAD
 
 if TYPE_CHECKING:
     from optim import ParetoResult as Front
@@ -49,7 +49,7 @@ class _Pareto(PointsOfFront, ProblemRequest):
     NAME, FUNCTION, RESULT = "pareto", "optim:pareto_front", ParetoResult
     KEYS = "those of a design problem, `points`"
     SHOWS, SWEEPS = "the front of peak against band ([trade-offs](trade-offs.md))", "those of its points"
-    EMPTY, FIGURE = ("points", "its front has no point"), "optim.views.plots.pareto:pareto_figure"
+    EMPTY, FIGURE = ("points", "its front has no point"), "optim.views.plots.designs:pareto_figure"
 
     def sizes(self, scene: Scene) -> list[Issue]:
         """Return what is too large."""

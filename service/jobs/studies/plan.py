@@ -12,7 +12,7 @@ from service.jobs.common.results import KindResult
 from service.jobs.common.scenes import HarmonicRequest
 from service.jobs.study import Answer, Study, Watch
 from solver.errors import Issue
-from solver.scene.examples import DISK_LOAD
+from solver.scene.descriptions import DISK_LOAD
 
 if TYPE_CHECKING:
     from solver.scene.scene import Scene

@@ -21,7 +21,7 @@ from service.jobs.registry import Flag
 from service.jobs.study import Answer, Study, Watch
 from solver.errors import Issue
 from solver.response.stability import MOST_STARTS
-from solver.scene.examples import DAMPER_LOAD
+from solver.scene.descriptions import DAMPER_LOAD
 
 if TYPE_CHECKING:
     from solver.scene.scene import Scene

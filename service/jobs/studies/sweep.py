@@ -34,7 +34,7 @@ from service.jobs.outputs import JobOutput, Progress, ShouldStop
 from service.jobs.registry import Flag, JobKind
 from service.jobs.study import Answer, Study, Watch
 from solver.errors import Issue, SettingError
-from solver.scene.examples import DISK_LOAD
+from solver.scene.descriptions import DISK_LOAD
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
