@@ -32,6 +32,7 @@ BODIES: dict[str, tuple[str, Mapping[str, Any]]] = {
     ),
     "controlled": ("controlled", {**TWO, "amplitude": 1.0}),
     "sensitivities": ("sensitivities", TWO),
+    "plan": ("plan", TWO),
     "phase-resonance": ("modes", {**TWO, "from": 0.3, "to": 1.0, "phase_resonance": True}),
     "modes": ("modes", {**TWO, "from": 0.1, "to": 3.0}),
     "modes with motions": ("modes", {**TWO, "from": 0.1, "to": 3.0, "motions": True}),

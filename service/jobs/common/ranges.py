@@ -49,6 +49,14 @@ def range_issues(request: RangeRequest, scene: Scene) -> list[Issue]:
     return issues or check("/parameter", partial(scale_of, scene, path, request.start, request.stop))
 
 
+def band_issues(scene: Scene, start: float | None, stop: float | None) -> list[Issue]:
+    """Refuse frequencies [Hz], the scene's band where left out, of which the last is not above the first."""
+    low, high = (
+        end if given is None else given for end, given in zip(scene.observe.band, (start, stop), strict=True)
+    )
+    return [] if low < high else [refusal("/to", f"`to` must be above `from` = {low!r} Hz, got {high!r}")]
+
+
 def law_issues(where: str, scene: Scene) -> list[Issue]:
     """Refuse contacts whose peaks cannot be tracked, at the pointer `where`."""
     from solver.studies.peaks.tracker import check_laws

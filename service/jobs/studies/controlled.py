@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from pydantic import ConfigDict, Field
 
 from optim.criteria.json_types import Name
+from service.jobs.common.ranges import band_issues
 from service.jobs.common.results import Curve, EndedResult, Table
 from service.jobs.common.scenes import HarmonicRequest, PositiveNumber, refusal
 from service.jobs.common.sizes import balance_issues
@@ -72,11 +73,7 @@ class Controlled(Study, HarmonicRequest):
 
     def issues(self, scene: Scene) -> list[Issue]:
         """Return what is wrong with range and DOF for the scene."""
-        issues: list[Issue] = []
-        low = scene.observe.band[0] if self.start is None else self.start
-        high = scene.observe.band[1] if self.stop is None else self.stop
-        if low >= high:
-            issues.append(refusal("/to", f"`to` must be above `from` = {low!r} Hz, got {high!r}"))
+        issues = band_issues(scene, self.start, self.stop)
         if self.dof is not None and self.dof not in scene.dofs:
             words = f"`dof` must be one of {', '.join(scene.dofs)}, got {self.dof!r}"
             issues.append(refusal("/dof", words))

@@ -150,12 +150,13 @@ class Modes(Study, HarmonicRequest):
         given = {key: asked[key] for key in ("mode", "nodal_diameter", "harmonics") if key in asked}
         given["amplitudes"] = (asked["start"], asked["stop"])
         if asked.get("phase_resonance"):
-            return Answer.of(solver.phase_resonance(scene, **given, **watch._asdict()))
+            resonances = solver.phase_resonance(scene, **given, **watch._asdict())
+            return Answer.of(resonances, resonances.completed)
         of_peaks = asked.get("exact_peaks", 0)
         found = solver.nonlinear_mode(
             scene, **given, **watch.part(0.0, _OF_THE_CURVE if of_peaks else 1.0)._asdict()
         )
-        answer = Answer.of(found)
+        answer = Answer.of(found, found.completed)
         if asked.get("performance"):
             curve = solver.performance_curve(found)
             answer = answer.beside(curve, performance=curve.to_json())

@@ -61,7 +61,7 @@ class Sensitivities(Study, HarmonicRequest):
         import optim
 
         found = optim.sensitivities(scene, **asked)
-        return Answer(found, found.to_json(), found.reached, found.status.value, found.plot)
+        return Answer.of(found, found.reached)
 
     @classmethod
     def sweeps(cls, found: SensitivityResult) -> tuple[SweepRecord, ...]:

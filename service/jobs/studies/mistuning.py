@@ -1,35 +1,32 @@
-"""The kind `mistuning`: the blades of many disks that are not quite equal, against the tuned disk."""
+"""The study `mistuning`: the blades of many disks that are not quite equal, against the tuned disk."""
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 from pydantic import BeforeValidator, ConfigDict, Field, WithJsonSchema
 
-import solver
+from optim.criteria.json_types import Name
 from service.jobs.arrays import decode, encode
-from service.jobs.common.problem import Name
-from service.jobs.common.records import packed, sweep_records, unpacked
+from service.jobs.common.ranges import band_issues
 from service.jobs.common.results import EndedResult, KnownResult, Table
-from service.jobs.common.scenes import FrequencyHz, HarmonicRequest, refusal, require, resolve_scene, resolved
-from service.jobs.common.sizes import POINTS_OF_A_SWEEP, annulus_issues, size_issues, whole_disk_dofs
-from service.jobs.kind_view import Json, KindView, NothingToDrawError, ReadSweep, StoredSweep
+from service.jobs.common.scenes import FrequencyHz, HarmonicRequest, refusal
+from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
 from service.jobs.outputs import JobOutput, OnProgress, ShouldStop
 from service.jobs.parts import Part, PartOutput, Parts, PartStoppedError
-from service.jobs.registry import JobKind, Resolved, SceneSource
+from service.jobs.registry import Flag, JobKind
+from service.jobs.study import Study
 from solver.errors import Issue, SceneError, SettingError, pointer
 from solver.results.known import Known
-from solver.scene.scene import Scene
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from solver import BladePeaks
+    from solver.scene.scene import Scene
 
 _EXAMPLE: dict[str, Any] = {
     "scene": "bladed-disk",
@@ -67,46 +64,6 @@ PartNames = Annotated[
 ]
 
 
-class MistuningRequest(HarmonicRequest):
-    """A study of mistuned disks, in the words of the command.
-
-    Attributes
-    ----------
-    of : str or list
-        The parts that have factors: springs, dashpots and masses by name, or DOFs.
-    spread : float
-        Standard deviation of the factors.
-    samples : int
-        How many disks.
-    seed : int
-        Of the first disk; those of the others follow.
-    dof : str or None
-        DOF of one sector whose amplitude counts.
-    from_, to : float or None
-        Frequencies [Hz] (`from` in the body).
-    """
-
-    model_config = ConfigDict(validate_by_alias=True, json_schema_extra={"examples": [_EXAMPLE]})
-
-    of: PartNames = Field(description="Springs (k), dashpots (c) and masses by name, or DOFs (their mass).")
-    spread: Annotated[float, Field(strict=True, ge=0.0, le=1.0)] = Field(
-        default=0.02, description="Standard deviation of the factors 1 + spread z, z normal."
-    )
-    samples: Annotated[int, Field(strict=True, ge=1, le=_MOST_SAMPLES)] = Field(
-        default=100, description="How many disks."
-    )
-    seed: Annotated[int, Field(strict=True, ge=0, lt=2**53)] = Field(
-        default=1, description="Of the first disk; disk k has the seed of the first plus k."
-    )
-    dof: Name | None = Field(
-        default=None, description="DOF of one sector whose amplitude counts; the observed one."
-    )
-    from_: FrequencyHz | None = Field(
-        default=None, alias="from", description="Lowest frequency [Hz]; the scene's band."
-    )
-    to: FrequencyHz | None = Field(default=None, description="Highest frequency [Hz]; the scene's band.")
-
-
 class MistuningResult(KnownResult, EndedResult):
     """The peaks of every blade of every disk, and how much higher they are than the tuned disk's."""
 
@@ -126,66 +83,87 @@ class MistuningResult(KnownResult, EndedResult):
     seconds: float
 
 
-def resolve(request: MistuningRequest, source: SceneSource) -> Resolved:
-    """Look up the scene, fill in the range, draw all factors to see that they can be had."""
-    scene = resolve_scene(request, source)
-    start = scene.observe.band[0] if request.from_ is None else request.from_
-    stop = scene.observe.band[1] if request.to is None else request.to
-    require(_issues(request, scene, start, stop))
-    return resolved(
-        scene,
-        of=request.of,
-        spread=request.spread,
-        samples=request.samples,
-        seed=request.seed,
-        dof=request.dof,
-        start=start,
-        stop=stop,
-        harmonics=request.harmonics,
+class Mistuning(Study, HarmonicRequest):
+    """Study disks whose blades are not quite equal.
+
+    Of each disk the highest peak of every blade, and how much higher it is than that of the tuned disk.
+    """
+
+    model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE]})
+    NAME, FUNCTION, RESULT = "mistuning", "solver:mistuning_study", MistuningResult
+    SHOWS = "the magnification over many disks and the worst of them ([disks](disks.md))"
+    SWEEPS, COUNTED = "the tuned disk's, and that of the worst blade", "disks"
+    EMPTY = ("worst", "the peaks of no disk are known")
+    FIGURE = "solver.views.plots.disks:mistuning_figure"
+
+    of: Annotated[PartNames, Flag(metavar="NAME")] = Field(
+        description="Springs (k), dashpots (c) and masses by name, or DOFs (their mass)."
+    )
+    spread: Annotated[float, Field(strict=True, ge=0.0, le=1.0), Flag(metavar="S")] = Field(
+        default=0.02, description="Standard deviation of the factors 1 + spread z, z normal."
+    )
+    samples: Annotated[int, Field(strict=True, ge=1, le=_MOST_SAMPLES), Flag(metavar="N")] = Field(
+        default=100, description="How many disks."
+    )
+    seed: Annotated[int, Field(strict=True, ge=0, lt=2**53), Flag(metavar="N")] = Field(
+        default=1, description="Of the first disk; disk k has the seed of the first plus k."
+    )
+    dof: Annotated[Name | None, Flag(metavar="DOF")] = Field(
+        default=None, description="DOF of one sector whose amplitude counts; the observed one."
+    )
+    start: Annotated[FrequencyHz | None, Flag(metavar="F")] = Field(
+        default=None, alias="from", description="Lowest frequency [Hz]; the scene's band."
+    )
+    stop: Annotated[FrequencyHz | None, Flag(metavar="F")] = Field(
+        default=None, alias="to", description="Highest frequency [Hz]; the scene's band."
     )
 
+    def issues(self, scene: Scene) -> list[Issue]:
+        """Return why it is no disk, and what is wrong with DOF and range."""
+        if not scene.structure.has_sectors:
+            words = f"`scene` {scene.name!r} must have a cyclic structure to be mistuned"
+            return [refusal("/scene", words)]
+        found = band_issues(scene, self.start, self.stop)
+        if self.dof is not None and self.dof not in scene.dofs:
+            words = f"must be a DOF of every sector, one of {', '.join(scene.dofs)}, got {self.dof!r}"
+            found.append(refusal("/dof", f"`dof` {words}"))
+        return found
 
-def _issues(request: MistuningRequest, scene: Scene, start: float, stop: float) -> list[Issue]:
-    """Everything wrong with the study for the scene."""
-    structure = scene.structure
-    if not structure.has_sectors:
-        message = f"`scene` {scene.name!r} must have a cyclic structure to be mistuned"
-        return [refusal("/scene", message)]
-    sweeps = POINTS_OF_A_SWEEP * request.samples * structure.sector_count
-    words = "points of all sweeps"
-    issues = annulus_issues(scene, request.harmonics)
-    issues += size_issues("/samples", words, sweeps, request.harmonics, whole_disk_dofs(scene))
-    # Drawn only if there are not too many.
-    issues = issues or _factor_issues(request, scene)
-    if request.dof is not None and request.dof not in scene.dofs:
-        known = ", ".join(scene.dofs)
-        issues.append(
-            refusal("/dof", f"`dof` must be a DOF of every sector, one of {known}, got {request.dof!r}")
+    def sizes(self, scene: Scene) -> list[Issue]:
+        """Return what is too large; the factors are drawn if they are not too many, to see that they can."""
+        points, words = (
+            POINTS_OF_A_SWEEP * self.samples * scene.structure.sector_count,
+            "points of all sweeps",
         )
-    if start >= stop:
-        issues.append(refusal("/to", f"`to` must be above `from` = {start!r} Hz, got {stop!r}"))
-    return issues
+        large = balance_issues("/samples", scene, self.harmonics, points, words, every_sector=True)
+        return large or self._drawn(scene)
 
+    def _drawn(self, scene: Scene) -> list[Issue]:
+        """Refuse parts that are not there, and factors that are not above 0."""
+        # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
+        from solver.studies.mistuning import disk_factors
 
-def _factor_issues(request: MistuningRequest, scene: Scene) -> list[Issue]:
-    """Refuse parts that are not there, and factors that are not above 0."""
-    # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
-    from solver.studies.mistuning import disk_factors
+        try:
+            disk_factors(scene, self.of, self.spread, self.samples, self.seed)
+        except SceneError as error:
+            prefix = "/structure/mistuning/of"
+            within = [issue for issue in error.issues if issue.pointer.startswith(prefix)]
+            known = [refusal("/of" + issue.pointer.removeprefix(prefix), issue.message) for issue in within]
+            return known or [refusal("/of", issue.message) for issue in error.issues]
+        except SettingError as error:
+            return [refusal(pointer(error.name), str(error))]
+        return []
 
-    try:
-        disk_factors(scene, request.of, request.spread, request.samples, request.seed)
-    except SceneError as error:
-        prefix = "/structure/mistuning/of"
-        within = [issue for issue in error.issues if issue.pointer.startswith(prefix)]
-        known = [refusal("/of" + issue.pointer.removeprefix(prefix), issue.message) for issue in within]
-        return known or [refusal("/of", issue.message) for issue in error.issues]
-    except SettingError as error:
-        return [refusal(pointer(error.name), str(error))]
-    return []
+    @classmethod
+    def as_kind(cls) -> JobKind:
+        """Return the kind of job, which is computed in parts."""
+        return replace(super().as_kind(), run=PARTS.run, parts=PARTS)
 
 
 def split(spec: Mapping[str, Any]) -> list[Part]:
     """The tuned disk, and then some of the others at a time."""
+    from solver.scene.scene import Scene
+
     sectors = Scene.from_dict(spec["scene"]).structure.sector_count
     a_disk, samples = sectors * max(spec["harmonics"], 1), spec["samples"]
     size = max(math.ceil(_WORK_OF_A_PART / a_disk), math.ceil(samples / _MOST_DIVIDED))
@@ -199,6 +177,9 @@ def run_part(
     spec: Mapping[str, Any], part: Mapping[str, Any], progress: OnProgress, should_stop: ShouldStop
 ) -> PartOutput:
     """Find the peaks of all blades of the tuned disk, or of some others."""
+    import solver
+    from service.jobs.common.records import packed, sweep_records
+    from solver.scene.scene import Scene
     from solver.studies.mistuning import without_mistuning, worst_branch
 
     scene, begun = Scene.from_dict(spec["scene"]), time.perf_counter()
@@ -243,6 +224,8 @@ def run_part(
 
 def join(spec: Mapping[str, Any], outputs: Mapping[int, PartOutput]) -> JobOutput:
     """The study of all disks; the stored sweeps are those of the tuned disk and of the worst blade of all."""
+    from service.jobs.common.records import unpacked
+    from solver.scene.scene import Scene
     from solver.studies.mistuning import joined_study
 
     parts = list(outputs.values())
@@ -269,6 +252,8 @@ def join(spec: Mapping[str, Any], outputs: Mapping[int, PartOutput]) -> JobOutpu
 
 def _peaks(part: PartOutput) -> list[BladePeaks]:
     """The peaks that a part found, a disk each."""
+    import solver
+
     value, at_hz = (decode(part.arrays[key]) for key in _OF_THE_PEAKS)
     return [
         solver.BladePeaks(
@@ -279,27 +264,5 @@ def _peaks(part: PartOutput) -> list[BladePeaks]:
     ]  # fmt: skip
 
 
-def draw(result: Json, _sweeps: Sequence[StoredSweep], _read: ReadSweep) -> Figure:
-    """The magnification over the disks, and the worst of them."""
-    from solver.views.plots.disks import mistuning_figure
-
-    if result["worst"] is None:
-        raise NothingToDrawError("the peaks of no disk are known")
-    return mistuning_figure(result)
-
-
-_PARTS = Parts(split=split, run_part=run_part, join=join)
-MISTUNING = JobKind(
-    name="mistuning",
-    summary="The blades of many mistuned disks against the tuned one.",
-    request=MistuningRequest,
-    resolve=resolve,
-    run=_PARTS.run,
-    parts=_PARTS,
-    result=MistuningResult,
-    view=KindView(
-        result="the magnification over many disks and the worst of them ([disks](disks.md))",
-        sweeps="the tuned disk's, and that of the worst blade",
-        draw=draw,
-    ),
-)
+PARTS = Parts(split=split, run_part=run_part, join=join)
+STUDY = Mistuning
