@@ -230,11 +230,11 @@ def _run(
     search.problem = replace(search.problem, harmonics=posed.harmonics, cases=posed.cases)
     status = _ended(search, drawn, state)
     while status is RobustStatus.NOT_KNOWN and 2 * search.problem.harmonics <= most:
-        before, again = search.problem, _State(nominal=state.nominal)
-        search.problem = replace(before, harmonics=2 * before.harmonics)
+        earlier, again = search.problem, _State(nominal=state.nominal)
+        search.problem = replace(earlier, harmonics=2 * earlier.harmonics)
         status = _ended(search, drawn, again)
         if "robust" not in again.sides:
-            search.problem, state.unknown = before, again.unknown
+            search.problem, state.unknown = earlier, again.unknown
             break
         state = again
     return _result(search, state, status)

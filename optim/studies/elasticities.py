@@ -137,7 +137,7 @@ class SensitivityResult(MadeOfResponses, Drawn):
         return row.band * row.value / self.band_hz if row.relative and self.band_hz > 0.0 else math.nan
 
     VIEWS: ClassVar = Views(
-        "optim.views", "of_sensitivities", "sensitivities_dataset", "shares:sensitivities_figure"
+        "optim.views", "of_sensitivities", "sensitivities_dataset", "designs:sensitivities_figure"
     )
 
     def known_parts(self) -> Iterable[Known]:

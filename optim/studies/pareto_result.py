@@ -149,7 +149,7 @@ class ParetoResult(MadeOfResponses, Drawn):
         place = max(range(len(below)), key=below.__getitem__)
         return place if below[place] > 0.0 else None
 
-    VIEWS: ClassVar = Views("optim.views", "of_front", "front_dataset", "pareto:pareto_figure")
+    VIEWS: ClassVar = Views("optim.views", "of_front", "front_dataset", "designs:pareto_figure")
 
     def known_parts(self) -> Iterable[Known]:
         """Both ends and every point of the front."""

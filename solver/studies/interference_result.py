@@ -185,7 +185,7 @@ class InterferenceDiagram(Drawn):
         return self.status is InterferenceStatus.COMPLETED
 
     VIEWS: ClassVar = Views(
-        "solver.views", "of_interference", "interference_dataset", "interference:interference_figure"
+        "solver.views", "of_interference", "interference_dataset", "disks:interference_figure"
     )
 
     def to_json(self) -> dict[str, object]:

@@ -13,9 +13,6 @@ from matplotlib.figure import Figure
 
 from optim.criteria.forbidden import FORBIDDEN
 from optim.criteria.peak import PEAK
-from optim.results.design import DesignResult
-from optim.studies.crossings import CampbellDiagram
-from optim.views.plots.campbell import campbell_figure
 from solver.jit.fourier import Real
 from solver.results import units
 from solver.results.units import LengthUnit
@@ -99,18 +96,6 @@ class _Peaks:
         known = np.sort([peak for peak in side["samples"]["peaks"] if peak is not None])
         worst = math.nan if side["worst"] is None else float(side["worst"]["peak"])
         return cls(known=known.astype(np.float64), worst=worst)
-
-
-def of_design(result: DesignResult, ax: Into = None) -> Figure:
-    """Draw the response of the optimum."""
-    return design_figure(result, ax=ax)
-
-
-def of_campbell(diagram: CampbellDiagram, ax: Into = None) -> Figure:
-    """Draw the diagram, and the responses beside it."""
-    # One object for each branch: orders that share theirs are told by it.
-    curves = {id(one.branch): Response.of_branch(one.branch) for one in diagram.orders}
-    return campbell_figure(diagram.to_json(), [curves[id(one.branch)] for one in diagram.orders], ax=ax)
 
 
 MOST = 12  # parameters shown, those that matter most
