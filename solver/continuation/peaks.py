@@ -27,6 +27,7 @@ class Peak(Piece):
     """
 
     UNITS: ClassVar[Mapping[str, str]] = {"value": "m"}
+    JSON: ClassVar = "value at"
 
     value: float
     at: float

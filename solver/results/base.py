@@ -57,10 +57,6 @@ class MadeOfResponses(Shown):
     def known_parts(self) -> Iterable[Known]:
         """How well each of the responses is known that the numbers stand on."""
 
-    @abstractmethod
-    def own_json(self) -> dict[str, object]:
-        """Return the JSON object, without how well it is known."""
-
     @property
     def known(self) -> Known:
         """How well the numbers are known: the largest error of a response relative to its peak, all flags."""
@@ -81,7 +77,11 @@ class MadeOfResponses(Shown):
         }
         return replace(found, attributes={**found.attributes, **notes})
 
-    def to_json(self) -> dict[str, object]:
+    def own_json(self) -> dict[str, Any]:
+        """Return the JSON object, without how well it is known."""
+        return super().to_json()
+
+    def to_json(self) -> dict[str, Any]:
         """Return the result as one JSON object."""
         return {**self.own_json(), **self.known.to_json()}
 

@@ -1,20 +1,26 @@
-"""What is told of a result or a part of it: a short text, and a table in a notebook."""
+"""What is told of a result or a part of it: its numbers, each said once, a text, a table."""
 
 from __future__ import annotations
 
 import math
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
 from enum import Enum
+from functools import cache
 from html import escape
-from typing import ClassVar
+from inspect import cleandoc
+from operator import attrgetter
+from typing import Any, ClassVar, overload
 
 import numpy as np
 
 _MOST = 30
 _FEW = 6
 _DIGITS = 5
+_DESCRIBED = re.compile(r"Annotated\[(?P<kind>.+?), (?P<quote>['\"])(?P<words>.+)(?P=quote)\]")
+_UNIT = re.compile(r"\[([^]]+)\]")
 
 
 def json_number(value: float) -> float | None:
@@ -27,6 +33,36 @@ def json_numbers(values: Iterable[float]) -> list[float | None]:
     return [json_number(value) for value in values]
 
 
+@overload
+def plain(value: Mapping[str, Any]) -> dict[str, Any]: ...
+@overload
+def plain(value: object) -> Any: ...
+def plain(value: Any) -> Any:
+    """A value as JSON has it: null where a number is not finite, an enum by its value, a scene by name."""
+    if isinstance(value, Enum):
+        return value.value
+    if value is None or isinstance(value, str | bool | int):
+        return value
+    if isinstance(value, float):
+        return json_number(value)
+    if isinstance(value, np.ndarray):
+        known = value.dtype.kind != "f" or bool(np.isfinite(value).all())
+        return value.tolist() if known else [plain(one) for one in value]
+    if isinstance(value, Mapping):
+        return {key: plain(one) for key, one in value.items()}
+    if isinstance(value, tuple | list):
+        pairs = getattr(value, "_asdict", None)
+        return [plain(one) for one in value] if pairs is None else plain(pairs())
+    return value.to_json() if isinstance(value, Told) else value.name
+
+
+@cache
+def json_keys(kind: type[Told]) -> dict[str, str]:
+    """The keys of the JSON of a class in their order, and the attributes that they have the values of."""
+    named = kind.JSON.split() or [one.name for one in fields(kind)]  # type: ignore[arg-type]
+    return {key: path or key for key, _, path in (name.partition("=") for name in named)}
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Summary:
     """What is most worth knowing of a result: a title, and names with their values."""
@@ -36,9 +72,38 @@ class Summary:
 
 
 class Told(ABC):
-    """Root of everything that is looked at: a short text, and a table in a notebook."""
+    """Root of everything that is looked at: its JSON, a short text, and a table in a notebook.
+
+    A field says its type, and in words what it is with its unit in brackets:
+    ``speed_rpm: Annotated[float, "Running speed [1/min]."]``. The attributes in the docstring of the class,
+    the units in texts and the schema of the JSON follow from that.
+
+    Attributes
+    ----------
+    JSON : str
+        The keys of the JSON in their order, ``key=path.of.attribute`` where they differ; if empty all fields.
+    WORDS : mapping
+        What each field is in words.
+    """
 
     __slots__ = ()
+    JSON: ClassVar[str] = ""
+    WORDS: ClassVar[Mapping[str, str]] = {}
+
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        found = {name: _DESCRIBED.fullmatch(str(text)) for name, text in cls.__annotations__.items()}
+        told = {name: match for name, match in found.items() if match is not None}
+        if not told:  # nothing said, or a class that dataclass made anew for its slots
+            return
+        cls.WORDS = {**cls.WORDS, **{name: match["words"] for name, match in told.items()}}
+        cls.__annotations__.update({name: match["kind"] for name, match in told.items()})
+        rows = [f"{name} : {match['kind']}\n    {match['words']}" for name, match in told.items()]
+        cls.__doc__ = "\n".join([cleandoc(cls.__doc__ or ""), "\nAttributes\n----------", *rows])
+
+    def to_json(self) -> dict[str, Any]:
+        """Return it as one JSON object."""
+        return {key: plain(attrgetter(path)(self)) for key, path in json_keys(type(self)).items()}
 
     @abstractmethod
     def summary(self) -> Summary:
@@ -70,7 +135,8 @@ class Piece(Told):
 
     def summary(self) -> Summary:
         """Every field with its unit."""
-        units = self.UNITS
+        said = {name: _UNIT.search(words) for name, words in self.WORDS.items()}
+        units = {**self.UNITS, **{name: unit[1] for name, unit in said.items() if unit is not None}}
         given = [(one.name, getattr(self, one.name)) for one in fields(self)]  # type: ignore[arg-type]
         pairs = tuple((name, _words(value, units.get(name, ""))) for name, value in given)
         return Summary(title="", pairs=pairs)

@@ -2,9 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+import inspect
+import sys
+from enum import Enum
+from types import NoneType, UnionType
+from typing import Annotated, Any, Union, get_args, get_origin
 
-from pydantic import BaseModel, ConfigDict, Field
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, create_model
+
+from solver.results.base import MadeOfResponses
+from solver.results.told import Told, json_keys
+from solver.scene.scene import Scene
 
 Table = dict[str, Any]
 Amplitude = Annotated[float | None, Field(description="Displacement [m].")]
@@ -70,3 +79,49 @@ class ReachedResult(KindResult):
 
     reached: bool
     status: str = Field(description="How it ended, and what to try if it fell short.")
+
+
+def result_model(kind: type[Told], name: str, **further: Any) -> type[KindResult]:
+    """Return the schema of the JSON of a class of results, by the types and words of its fields.
+
+    Parameters
+    ----------
+    kind : the class; how well responses are known, and how a result ended, is said in all alike.
+    name : of the schema.
+    further : keys that the service adds, as of `pydantic.create_model`.
+    """
+    keys = json_keys(kind)
+    bases = (KnownResult,) * issubclass(kind, MadeOfResponses) + (EndedResult,) * ("completed" in keys)
+    shared = {key for base in bases for key in base.model_fields}
+    own: dict[str, Any] = {key: _described(kind, path) for key, path in keys.items() if key not in shared}
+    return create_model(
+        name, __base__=bases or (KindResult,), __doc__=(kind.__doc__ or "").partition("\n")[0],
+        **own, **further,
+    )  # fmt: skip
+
+
+def _described(kind: Any, path: str) -> tuple[Any, Any]:
+    """Return the type that the JSON of an attribute has, and its description."""
+    name, _, rest = path.partition(".")
+    owner = next(one for one in kind.__mro__ if name in {*inspect.get_annotations(one), *vars(one)})
+    made = getattr(vars(owner).get(name), "fget", None)
+    text = owner.__annotations__[name] if made is None else made.__annotations__["return"]
+    # Not all annotations of the class: what others name may be there for type checkers alone.
+    found = eval(text, vars(sys.modules[owner.__module__]))
+    if rest:
+        return _described(found, rest)
+    words = kind.WORDS.get(name) if made is None else (made.__doc__ or "").partition("\n")[0]
+    return _json_type(found), Field(description=words)
+
+
+def _json_type(given: Any) -> Any:
+    of, parts = get_origin(given), get_args(given)
+    if of in (Union, UnionType):
+        return Union[tuple(_json_type(one) for one in parts)]  # noqa: UP007 - made of what is found
+    if of is np.ndarray:
+        return Curve
+    if of is tuple:
+        return list[_json_type(parts[0])]  # type: ignore[misc]
+    if given in (str, int, float, bool, NoneType):
+        return given
+    return str if issubclass(given, Enum | Scene) else Table
