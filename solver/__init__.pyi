@@ -127,6 +127,7 @@ from .studies.mistuning import (
     MistuningStudy as MistuningStudy,
     mistuning_study as mistuning_study,
 )
+from .studies.map_result import MapStatus as MapStatus, ResponseMap as ResponseMap
 from .studies.peaks.minimise_peak import least_peak as least_peak
 from .studies.peaks.results import (
     Basin as Basin,
@@ -136,9 +137,5 @@ from .studies.peaks.results import (
 )
 from .studies.peaks.track_peak import track_peak as track_peak
 from .studies.plan import Plan as Plan, plan as plan
-from .studies.response_map import (
-    MapStatus as MapStatus,
-    ResponseMap as ResponseMap,
-    response_map as response_map,
-)
+from .studies.response_map import response_map as response_map
 from .views.io import load as load, save as save

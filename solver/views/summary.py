@@ -25,10 +25,10 @@ if TYPE_CHECKING:
     from solver.studies.blades import BladeAmplitudes, BladePeaks
     from solver.studies.convergence import AccuracyStudy
     from solver.studies.interference_result import InterferenceDiagram
+    from solver.studies.map_result import ResponseMap
     from solver.studies.mistuning import MistuningStudy
     from solver.studies.peaks.results import LeastPeak, PeakTrack
     from solver.studies.plan import Plan
-    from solver.studies.response_map import ResponseMap
 
 Pairs = list[tuple[str, str]]
 

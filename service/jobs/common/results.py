@@ -81,26 +81,29 @@ class ReachedResult(KindResult):
     status: str = Field(description="How it ended, and what to try if it fell short.")
 
 
-def result_model(kind: type[Told], name: str, **further: Any) -> type[KindResult]:
+def result_model(kind: type[Told], name: str, **types: Any) -> type[KindResult]:
     """Return the schema of the JSON of a class of results, by the types and words of its fields.
 
     Parameters
     ----------
     kind : the class; how well responses are known, and how a result ended, is said in all alike.
     name : of the schema.
-    further : keys that the service adds, as of `pydantic.create_model`.
+    types : of keys whose JSON has another one than the attribute; of further keys their fields, as of
+        `pydantic.create_model`.
     """
     keys = json_keys(kind)
     bases = (KnownResult,) * issubclass(kind, MadeOfResponses) + (EndedResult,) * ("completed" in keys)
     shared = {key for base in bases for key in base.model_fields}
-    own: dict[str, Any] = {key: _described(kind, path) for key, path in keys.items() if key not in shared}
-    return create_model(
-        name, __base__=bases or (KindResult,), __doc__=(kind.__doc__ or "").partition("\n")[0],
-        **own, **further,
-    )  # fmt: skip
+    own: dict[str, Any] = {}
+    for key, path in keys.items():
+        if key not in shared:
+            kept, words = _described(kind, path)
+            own[key] = (types.pop(key, kept), Field(description=words))
+    about = (kind.__doc__ or "").partition("\n")[0]
+    return create_model(name, __base__=bases or (KindResult,), __doc__=about, **own, **types)
 
 
-def _described(kind: Any, path: str) -> tuple[Any, Any]:
+def _described(kind: Any, path: str) -> tuple[Any, str | None]:
     """Return the type that the JSON of an attribute has, and its description."""
     name, _, rest = path.partition(".")
     owner = next(one for one in kind.__mro__ if name in {*inspect.get_annotations(one), *vars(one)})
@@ -111,7 +114,7 @@ def _described(kind: Any, path: str) -> tuple[Any, Any]:
     if rest:
         return _described(found, rest)
     words = kind.WORDS.get(name) if made is None else (made.__doc__ or "").partition("\n")[0]
-    return _json_type(found), Field(description=words)
+    return _json_type(found), words
 
 
 def _json_type(given: Any) -> Any:
