@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from solver.marching.result import MarchResult
     from solver.response.solution import Solution
     from solver.response.stability.floquet import Stability
+    from solver.studies.accuracy_result import AccuracyStudy
     from solver.studies.blades import BladeAmplitudes, BladePeaks
-    from solver.studies.convergence import AccuracyStudy
     from solver.studies.interference_result import InterferenceDiagram
     from solver.studies.map_result import ResponseMap
     from solver.studies.mistuning import MistuningStudy

@@ -11,6 +11,7 @@ from typing import Annotated, Any, Union, get_args, get_origin
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, create_model
 
+from solver.arrays import FloatOrNaN
 from solver.results.base import MadeOfResponses
 from solver.results.told import Told, json_keys
 from solver.scene.scene import Scene
@@ -92,7 +93,11 @@ def result_model(kind: type[Told], name: str, **types: Any) -> type[KindResult]:
         `pydantic.create_model`.
     """
     keys = json_keys(kind)
-    bases = (KnownResult,) * issubclass(kind, MadeOfResponses) + (EndedResult,) * ("completed" in keys)
+    parts: dict[type[KindResult], bool] = {
+        KnownResult: issubclass(kind, MadeOfResponses),
+        EndedResult: "completed" in keys, ReachedResult: "reached" in keys,
+    }  # fmt: skip
+    bases = tuple(part for part, has in parts.items() if has)
     shared = {key for base in bases for key in base.model_fields}
     own: dict[str, Any] = {}
     for key, path in keys.items():
@@ -113,7 +118,7 @@ def _described(kind: Any, path: str) -> tuple[Any, str | None]:
     found = eval(text, vars(sys.modules[owner.__module__]))
     if rest:
         return _described(found, rest)
-    words = kind.WORDS.get(name) if made is None else (made.__doc__ or "").partition("\n")[0]
+    words = getattr(kind, "WORDS", {}).get(name) if made is None else (made.__doc__ or "").partition("\n")[0]
     return _json_type(found), words
 
 
@@ -121,6 +126,10 @@ def _json_type(given: Any) -> Any:
     of, parts = get_origin(given), get_args(given)
     if of in (Union, UnionType):
         return Union[tuple(_json_type(one) for one in parts)]  # noqa: UP007 - made of what is found
+    if given is FloatOrNaN:
+        return float | None
+    if of is Annotated:
+        return _json_type(parts[0])
     if of is np.ndarray:
         return Curve
     if of is tuple:
