@@ -48,7 +48,7 @@ class Shown(Told):
 class MadeOfResponses(Shown):
     """Root of the results made of responses: their errors and flags are in every form it is given in.
 
-    A class says of which responses it is made, and gives the rest of its JSON; it cannot leave them out.
+    A class says of which responses it is made; it cannot leave them out.
     """
 
     __slots__ = ()
@@ -77,13 +77,9 @@ class MadeOfResponses(Shown):
         }
         return replace(found, attributes={**found.attributes, **notes})
 
-    def own_json(self) -> dict[str, Any]:
-        """Return the JSON object, without how well it is known."""
-        return super().to_json()
-
     def to_json(self) -> dict[str, Any]:
         """Return the result as one JSON object."""
-        return {**self.own_json(), **self.known.to_json()}
+        return {**super().to_json(), **self.known.to_json()}
 
 
 class Drawn(Shown):

@@ -53,14 +53,16 @@ def plain(value: Any) -> Any:
     if isinstance(value, tuple | list):
         pairs = getattr(value, "_asdict", None)
         return [plain(one) for one in value] if pairs is None else plain(pairs())
-    return value.to_json() if isinstance(value, Told) else value.name
+    to_json = getattr(value, "to_json", None)
+    return value.name if to_json is None else to_json()
 
 
 @cache
 def json_keys(kind: type[Told]) -> dict[str, str]:
     """The keys of the JSON of a class in their order, and the attributes that they have the values of."""
     named = kind.JSON.split() or [one.name for one in fields(kind)]  # type: ignore[arg-type]
-    return {key: path or key for key, _, path in (name.partition("=") for name in named)}
+    parts = (name.partition("=") for name in named)
+    return {key: path if equal else key for key, equal, path in parts}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -81,7 +83,8 @@ class Told(ABC):
     Attributes
     ----------
     JSON : str
-        The keys of the JSON in their order, ``key=path.of.attribute`` where they differ; if empty all fields.
+        The keys of the JSON in their order, ``key=path.of.attribute`` where they differ, ``key=`` of what
+        `to_json` adds; if empty all fields.
     WORDS : mapping
         What each field is in words.
     """
@@ -103,7 +106,8 @@ class Told(ABC):
 
     def to_json(self) -> dict[str, Any]:
         """Return it as one JSON object."""
-        return {key: plain(attrgetter(path)(self)) for key, path in json_keys(type(self)).items()}
+        keys = json_keys(type(self)).items()
+        return {key: plain(attrgetter(path)(self)) if path else None for key, path in keys}
 
     @abstractmethod
     def summary(self) -> Summary:

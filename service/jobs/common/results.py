@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import builtins
 import inspect
 import sys
+from collections.abc import Mapping
 from enum import Enum
 from types import NoneType, UnionType
 from typing import Annotated, Any, Union, get_args, get_origin
@@ -89,8 +91,8 @@ def result_model(kind: type[Told], name: str, **types: Any) -> type[KindResult]:
     ----------
     kind : the class; how well responses are known, and how a result ended, is said in all alike.
     name : of the schema.
-    types : of keys whose JSON has another one than the attribute; of further keys their fields, as of
-        `pydantic.create_model`.
+    types : of keys whose JSON has another one than the attribute, or none that is known here; of further keys
+        their fields, as of `pydantic.create_model`.
     """
     keys = json_keys(kind)
     parts: dict[type[KindResult], bool] = {
@@ -102,8 +104,9 @@ def result_model(kind: type[Told], name: str, **types: Any) -> type[KindResult]:
     own: dict[str, Any] = {}
     for key, path in keys.items():
         if key not in shared:
-            kept, words = _described(kind, path)
-            own[key] = (types.pop(key, kept), Field(description=words))
+            kept, words = _described(kind, path or key)
+            given = types.pop(key, kept)
+            own[key] = given if isinstance(given, tuple) else (given, Field(description=words))
     about = (kind.__doc__ or "").partition("\n")[0]
     return create_model(name, __base__=bases or (KindResult,), __doc__=about, **own, **types)
 
@@ -111,15 +114,24 @@ def result_model(kind: type[Told], name: str, **types: Any) -> type[KindResult]:
 def _described(kind: Any, path: str) -> tuple[Any, str | None]:
     """Return the type that the JSON of an attribute has, and its description."""
     name, _, rest = path.partition(".")
-    owner = next(one for one in kind.__mro__ if name in {*inspect.get_annotations(one), *vars(one)})
+    found_in = (one for one in kind.__mro__ if name in {*inspect.get_annotations(one), *vars(one)})
+    owner = next(found_in, None)
+    if owner is None:  # of what is there for type checkers alone
+        return Table, None
     made = getattr(vars(owner).get(name), "fget", None)
     text = owner.__annotations__[name] if made is None else made.__annotations__["return"]
-    # Not all annotations of the class: what others name may be there for type checkers alone.
-    found = eval(text, vars(sys.modules[owner.__module__]))
+    found = eval(text, {}, _Names({**vars(builtins), **vars(sys.modules[owner.__module__])}))
     if rest:
         return _described(found, rest)
     words = getattr(kind, "WORDS", {}).get(name) if made is None else (made.__doc__ or "").partition("\n")[0]
     return _json_type(found), words
+
+
+class _Names(dict[str, Any]):
+    """What annotations name; what is there for type checkers alone is a part of a result."""
+
+    def __missing__(self, _name: str) -> type[Told]:
+        return Told
 
 
 def _json_type(given: Any) -> Any:
@@ -132,8 +144,10 @@ def _json_type(given: Any) -> Any:
         return _json_type(parts[0])
     if of is np.ndarray:
         return Curve
+    if of is Mapping:
+        return dict[str, _json_type(parts[1])]  # type: ignore[misc]
     if of is tuple:
         return list[_json_type(parts[0])]  # type: ignore[misc]
-    if given in (str, int, float, bool, NoneType):
+    if given in (str, int, float, bool, NoneType, Any):
         return given
     return str if issubclass(given, Enum | Scene) else Table

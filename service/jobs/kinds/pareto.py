@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from pydantic import ConfigDict, Field
+from pydantic import ConfigDict
 
 import optim
 from optim.problem.keys import PointsOfFront, of_front
 from service.jobs.common.problem import ProblemRequest, arguments, default_variables, problem_of
 from service.jobs.common.records import sweep_record
-from service.jobs.common.results import Amplitude, KnownResult, ReachedResult, Table
+from service.jobs.common.results import result_model
 from service.jobs.common.scenes import require, resolve_scene, resolved
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
 from service.jobs.kind_view import Json, KindView, NothingToDrawError, ReadSweep, StoredSweep
@@ -45,19 +45,7 @@ def pareto_issues(scene: Scene, given: Mapping[str, Any]) -> list[Issue]:
     return problem_issues(scene, {key: value for key, value in given.items() if key != "points"})
 
 
-class ParetoResult(KnownResult, ReachedResult):
-    """The front: designs of which none has both a lower peak and a narrower band than another."""
-
-    scene: str
-    dof: str
-    limit: Amplitude
-    points: list[Table]
-    knee: int | None = Field(description="Number of the point where the front bends most.")
-    dominated: list[Table]
-    missed: list[Table]
-    ends: list[Table]
-    evaluations: int
-    seconds: float
+ParetoResult = result_model(optim.ParetoResult, "ParetoResult", scene=str, dof=str, limit=float | None)
 
 
 def resolve(request: _ParetoRequest, source: SceneSource) -> Resolved:

@@ -43,7 +43,7 @@ class HeldAmplitude(ModalCurve):
     VIEWS: ClassVar = Views("solver.views", "of_held", "held_dataset", "modes:held_figure")
     JSON: ClassVar = (
         "scene dof=scene.observe.dof amplitude=held completed status frequency=frequency_hz excitation"
-        " excitation_error phase=phase_deg max_abs contacts=contact_names states=state_words changes stable"
+        " excitation_error phase=phase_deg max_abs contacts=contact_names states=state_words changes= stable"
         " stability_unknown=unknown least n_harmonics seconds"
     )
 
