@@ -86,7 +86,7 @@ class Identification(Drawn):
     )
     JSON: ClassVar = (
         "scene reached status estimates values covariance correlation noise reduced_chi2 misfit untold"
-        " correlated= candidates runs not_reached uncertain other_optima starts agreeing evaluations"
+        " correlated candidates runs not_reached uncertain other_optima starts agreeing evaluations"
         " n_harmonics=harmonics seconds"
     )
 
@@ -143,4 +143,4 @@ class Identification(Drawn):
     def to_json(self) -> dict[str, Any]:
         """Return everything as one JSON object."""
         pairs = [{"names": [a, b], "correlation": share} for a, b, share in self.correlated]
-        return Drawn.to_json(self) | {"correlated": pairs}
+        return self._json(correlated=pairs)

@@ -61,4 +61,4 @@ class CurveCheck(Piece):
 
     def to_json(self) -> dict[str, Any]:
         """Return it as a JSON object."""
-        return Piece.to_json(self) | {"holds": math.isfinite(self.error) and self.holds}
+        return self._json(holds=math.isfinite(self.error) and self.holds)

@@ -19,7 +19,7 @@ from optim.results.json import conditions_json, evaluation_json, known_parts, lo
 from solver.arrays import FloatOrNaN
 from solver.results.base import Drawn, MadeOfResponses
 from solver.results.known import Known
-from solver.results.told import Piece, plain
+from solver.results.told import Piece
 from solver.results.verdict import Stable, Verdict, worst
 from solver.results.views import Views
 
@@ -115,10 +115,10 @@ class DesignResult(MadeOfResponses, Drawn):
 
     VIEWS: ClassVar = Views("optim.views", "of_design", "design_dataset", "of_design")
     JSON: ClassVar = (
-        "scene method optimum peak n_harmonics=problem.harmonics peaks= band_hz limit bands= objective= rows="
-        " held_by error_estimate stable= stable_ground= errors= warnings plateau chosen_by certainty checked"
-        " curve looked_at= evaluations newton_iterations= tried= basins seconds work active optimality"
-        " multipliers conditions= broken= reached status"
+        "scene method optimum peak n_harmonics=problem.harmonics peaks band_hz limit bands objective rows"
+        " held_by error_estimate stable stable_ground errors warnings plateau chosen_by certainty checked"
+        " curve looked_at evaluations newton_iterations tried basins seconds work active optimality"
+        " multipliers conditions broken reached status"
     )
 
     problem: Annotated[Problem, "What was asked."]
@@ -313,20 +313,15 @@ class DesignResult(MadeOfResponses, Drawn):
 
     def to_json(self) -> dict[str, Any]:
         """Return the result as one JSON object."""
-        evaluation = self.evaluation
-        return MadeOfResponses.to_json(self) | self.stability.to_json() | plain({
-            "conditions": None if self.conditions is None else conditions_json(self.conditions),
-            "looked_at": [looked_json(one) for one in self.looked_at if one.good],
-            "newton_iterations": sum(branch.newton_iterations for branch in self.sweeps),
-            "tried": [
-                {"values": e.values, "peak": e.peaks[0].value, "at": e.peaks[0].at_hz}
-                for e in self.history
-                if e.good and e.peaks
-            ],
-            "broken": [{**row.to_json(), "by": row.value - (row.bound or 0.0)} for row in self.broken],
-            "peaks": [], "bands": [], "rows": [], "errors": [],
-            **({} if evaluation is None else evaluation_json(evaluation)),
-        })  # fmt: skip
+        tried = [one for one in self.history if one.good and one.peaks]
+        return self._json(
+            conditions=None if self.conditions is None else conditions_json(self.conditions),
+            looked_at=[looked_json(one) for one in self.looked_at if one.good],
+            newton_iterations=sum(branch.newton_iterations for branch in self.sweeps),
+            tried=[{"values": e.values, "peak": e.peaks[0].value, "at": e.peaks[0].at_hz} for e in tried],
+            broken=[{**row.to_json(), "by": row.value - (row.bound or 0.0)} for row in self.broken],
+            **self.stability.to_json(), **evaluation_json(self.evaluation),
+        )  # fmt: skip
 
 
 def at_limit(row: Row) -> bool:

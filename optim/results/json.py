@@ -31,8 +31,10 @@ def bands_json(evaluation: Evaluation) -> list[dict[str, object]]:
     ]  # fmt: skip
 
 
-def evaluation_json(evaluation: Evaluation) -> dict[str, object]:
+def evaluation_json(evaluation: Evaluation | None) -> dict[str, object]:
     """Return the rows of a design, its peaks, its bands, and how well each is known."""
+    if evaluation is None:
+        return {"peaks": [], "bands": [], "objective": None, "rows": [], "errors": []}
     rows = evaluation.rows
     return {
         "peaks": [{"value": peak.value, "at": peak.at_hz, "case": peak.case} for peak in evaluation.peaks],

@@ -16,7 +16,7 @@ from solver.arrays import FloatOrNaN
 from solver.results.base import Drawn, MadeOfResponses
 from solver.results.known import NOTHING_KNOWN, Known
 from solver.results.order_statistics import quantile_json
-from solver.results.told import Piece, json_number, plain
+from solver.results.told import Piece, json_number
 from solver.results.views import Views
 
 if TYPE_CHECKING:
@@ -182,8 +182,8 @@ class RobustResult(MadeOfResponses, Drawn):
 
     VIEWS: ClassVar = Views("optim.views", "of_robust", "robust_dataset", "designs:robust_figure")
     JSON: ClassVar = (
-        "scene=problem.scene.name aim quantile= uncertain optimum nominal= robust= objective gain cuts gap"
-        " inner_look optimality= violation= unknown designs responses seconds nominal_status=design.status"
+        "scene=problem.scene.name aim quantile uncertain optimum nominal robust objective gain cuts gap"
+        " inner_look optimality violation unknown designs responses seconds nominal_status=design.status"
         " warnings=design.warnings reached status"
     )
 
@@ -238,10 +238,10 @@ class RobustResult(MadeOfResponses, Drawn):
     def to_json(self) -> dict[str, Any]:
         """Return the result as one JSON object."""
         found = self.conditions
-        return MadeOfResponses.to_json(self) | plain({
-            "quantile": self.quantile if self.aim is Aim.QUANTILE else None,
-            "nominal": None if self.nominal is None else self.nominal.to_json(self.quantile),
-            "robust": None if self.robust is None else self.robust.to_json(self.quantile),
-            "optimality": None if found is None else found.residual,
-            "violation": None if found is None else found.violation,
-        })  # fmt: skip
+        return self._json(
+            quantile=self.quantile if self.aim is Aim.QUANTILE else None,
+            nominal=None if self.nominal is None else self.nominal.to_json(self.quantile),
+            robust=None if self.robust is None else self.robust.to_json(self.quantile),
+            optimality=None if found is None else found.residual,
+            violation=None if found is None else found.violation,
+        )

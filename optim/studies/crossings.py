@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from solver.results.base import Drawn, MadeOfResponses
 from solver.results.known import Known
-from solver.results.told import Piece, plain
+from solver.results.told import Piece
 from solver.results.views import Views
 from solver.scene.scene import Scene
 
@@ -47,6 +47,13 @@ class Crossing(Piece):
 class OrderResponse(Piece):
     """What one order excites; natural frequencies are of its nodal diameter if the structure is cyclic."""
 
+    JSON: ClassVar = (
+        "order range_hz running_hz limit peaks bands_hz exceeded_rpm exceeded_running_rpm crossings_rpm"
+        " crossings highest_running stuck_hz open_hz peak_certificate=branch.peak_certificate band_known"
+        " measure peak_max_abs error_estimate peak_half_peak_to_peak half_peak_to_peak_error relative_error"
+        " flags completed=branch.completed status=branch.status"
+    )
+
     order: Annotated[int, "Excitations a revolution."]
     branch: Annotated[Branch, "The frequency response; without sectors it is the same for all orders."]
     running_hz: Annotated[Ranges, "Excitation frequencies of the running speeds [Hz]."]
@@ -66,18 +73,13 @@ class OrderResponse(Piece):
     def to_json(self) -> dict[str, Any]:
         """Return the response of the order as one JSON object."""
         branch, band, certificate = self.branch, self.branch.band, self.branch.peak_certificate
-        return plain({
-            "order": self.order, "range_hz": (branch.start, branch.stop), "running_hz": self.running_hz,
-            "limit": self.limit, "peaks": [peak for peak in branch.peaks if peak.interior],
-            "bands_hz": self.bands_hz, "exceeded_rpm": self.exceeded_rpm,
-            "exceeded_running_rpm": self.exceeded_running_rpm,
-            "crossings_rpm": [crossing.speed_rpm for crossing in self.crossings], "crossings": self.crossings,
-            "highest_running": self.highest_running, "stuck_hz": self.stuck_hz, "open_hz": self.open_hz,
-            "peak_certificate": certificate,
-            "band_known": None if band is None else band.known and certificate.known,
-            **{key: value for key, value in branch.known.to_json().items() if key != "peaks_open"},
-            "completed": branch.completed, "status": branch.status,
-        })  # fmt: skip
+        known = branch.known.to_json()
+        del known["peaks_open"]
+        return self._json(
+            range_hz=(branch.start, branch.stop), peaks=[peak for peak in branch.peaks if peak.interior],
+            crossings_rpm=[crossing.speed_rpm for crossing in self.crossings],
+            band_known=None if band is None else band.known and certificate.known, **known,
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)

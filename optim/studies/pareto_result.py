@@ -82,7 +82,7 @@ class ParetoPoint(Piece):
 
     def to_json(self) -> dict[str, Any]:
         """Return it as one JSON object."""
-        return Piece.to_json(self) | self.design.known.to_json()
+        return self._json() | self.design.known.to_json()
 
 
 class Ended(NamedTuple):

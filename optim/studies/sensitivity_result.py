@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple
 from solver.arrays import FloatOrNaN
 from solver.results.base import Drawn, MadeOfResponses
 from solver.results.known import Known
-from solver.results.told import Piece, plain
+from solver.results.told import Piece
 from solver.results.views import Views
 from solver.scene.scene import Scene
 
@@ -67,7 +67,7 @@ class SensitivityResult(MadeOfResponses, Drawn):
         "optim.views", "of_sensitivities", "sensitivities_dataset", "shares:sensitivities_figure"
     )
     JSON: ClassVar = (
-        "scene peaks band_hz limit band_by_limit rows= left_out peak_certificate=branch.peak_certificate"
+        "scene peaks band_hz limit band_by_limit rows left_out peak_certificate=branch.peak_certificate"
         " seconds reached status"
     )
 
@@ -117,14 +117,13 @@ class SensitivityResult(MadeOfResponses, Drawn):
     def to_json(self) -> dict[str, Any]:
         """Return the result as one JSON object."""
         shares = {row.path: self.peak_elasticities(row) for row in self.rows}
-        return MadeOfResponses.to_json(self) | plain({
-            "rows": [
-                {
-                    "path": row.path, "unit": row.unit, "value": row.value,
-                    "peak_percent": shares[row.path][0], "peaks_percent": shares[row.path],
-                    "band_percent": self.band_elasticity(row), "peak_slope": row.peaks[0],
-                    "peak_slopes": row.peaks, "band_slope": row.band,
-                }
-                for row in self.rows
-            ],
-        })  # fmt: skip
+        rows = [
+            {
+                "path": row.path, "unit": row.unit, "value": row.value,
+                "peak_percent": shares[row.path][0], "peaks_percent": shares[row.path],
+                "band_percent": self.band_elasticity(row), "peak_slope": row.peaks[0],
+                "peak_slopes": row.peaks, "band_slope": row.band,
+            }
+            for row in self.rows
+        ]  # fmt: skip
+        return self._json(rows=rows)

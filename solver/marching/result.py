@@ -99,7 +99,7 @@ class MarchResult(Drawn):
     def to_json(self) -> dict[str, Any]:
         """The result without its histories, for JSON; a number that does not exist is None."""
         drift = {"drift": self.drift} if self.status is MarchStatus.RATCHETS else {}
-        return drift | Drawn.to_json(self)
+        return drift | self._json()
 
 
 def describe(

@@ -77,9 +77,8 @@ class MadeOfResponses(Shown):
         }
         return replace(found, attributes={**found.attributes, **notes})
 
-    def to_json(self) -> dict[str, Any]:
-        """Return the result as one JSON object."""
-        return {**super().to_json(), **self.known.to_json()}
+    def _json(self, **others: object) -> dict[str, Any]:
+        return super()._json(**others) | self.known.to_json()
 
 
 class Drawn(Shown):

@@ -12,7 +12,7 @@ from functools import cache
 from html import escape
 from inspect import cleandoc
 from operator import attrgetter
-from typing import Any, ClassVar, overload
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -33,11 +33,7 @@ def json_numbers(values: Iterable[float]) -> list[float | None]:
     return [json_number(value) for value in values]
 
 
-@overload
-def plain(value: Mapping[str, Any]) -> dict[str, Any]: ...
-@overload
-def plain(value: object) -> Any: ...
-def plain(value: Any) -> Any:
+def json_value(value: Any) -> Any:
     """A value as JSON has it: null where a number is not finite, an enum by its value, a scene by name."""
     if isinstance(value, Enum):
         return value.value
@@ -47,12 +43,12 @@ def plain(value: Any) -> Any:
         return json_number(value)
     if isinstance(value, np.ndarray):
         known = value.dtype.kind != "f" or bool(np.isfinite(value).all())
-        return value.tolist() if known else [plain(one) for one in value]
+        return value.tolist() if known else [json_value(one) for one in value]
     if isinstance(value, Mapping):
-        return {key: plain(one) for key, one in value.items()}
+        return {key: json_value(one) for key, one in value.items()}
     if isinstance(value, tuple | list):
         pairs = getattr(value, "_asdict", None)
-        return [plain(one) for one in value] if pairs is None else plain(pairs())
+        return [json_value(one) for one in value] if pairs is None else json_value(pairs())
     to_json = getattr(value, "to_json", None)
     return value.name if to_json is None else to_json()
 
@@ -61,8 +57,7 @@ def plain(value: Any) -> Any:
 def json_keys(kind: type[Told]) -> dict[str, str]:
     """The keys of the JSON of a class in their order, and the attributes that they have the values of."""
     named = kind.JSON.split() or [one.name for one in fields(kind)]  # type: ignore[arg-type]
-    parts = (name.partition("=") for name in named)
-    return {key: path if equal else key for key, equal, path in parts}
+    return {key: path or key for key, _, path in (name.partition("=") for name in named)}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -83,8 +78,7 @@ class Told(ABC):
     Attributes
     ----------
     JSON : str
-        The keys of the JSON in their order, ``key=path.of.attribute`` where they differ, ``key=`` of what
-        `to_json` adds; if empty all fields.
+        The keys of the JSON in their order, ``key=path.of.attribute`` where they differ; if empty all fields.
     WORDS : mapping
         What each field is in words.
     """
@@ -106,8 +100,13 @@ class Told(ABC):
 
     def to_json(self) -> dict[str, Any]:
         """Return it as one JSON object."""
-        keys = json_keys(type(self)).items()
-        return {key: plain(attrgetter(path)(self)) if path else None for key, path in keys}
+        return self._json()
+
+    def _json(self, **others: object) -> dict[str, Any]:
+        """The JSON object; `others` are the values of keys that are not those of attributes."""
+        paths = json_keys(type(self)).items()
+        found = {key: others.pop(key) if key in others else attrgetter(path)(self) for key, path in paths}
+        return {key: json_value(value) for key, value in (found | others).items()}
 
     @abstractmethod
     def summary(self) -> Summary:
@@ -135,12 +134,11 @@ class Piece(Told):
     """A part of a result, a dataclass of a few numbers: its fields, arrays cut short."""
 
     __slots__ = ()
-    UNITS: ClassVar[Mapping[str, str]] = {}
 
     def summary(self) -> Summary:
         """Every field with its unit."""
         said = {name: _UNIT.search(words) for name, words in self.WORDS.items()}
-        units = {**self.UNITS, **{name: unit[1] for name, unit in said.items() if unit is not None}}
+        units = {name: unit[1] for name, unit in said.items() if unit is not None}
         given = [(one.name, getattr(self, one.name)) for one in fields(self)]  # type: ignore[arg-type]
         pairs = tuple((name, _words(value, units.get(name, ""))) for name, value in given)
         return Summary(title="", pairs=pairs)

@@ -76,8 +76,7 @@ class MistunedDisk(Piece):
 
     def to_json(self) -> dict[str, Any]:
         """Return the disk as one JSON object."""
-        found = Piece.to_json(self)
-        return found if self.known else found | {"largest": None, "worst_blade": None}
+        return self._json() if self.known else self._json(largest=None, worst_blade=None)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
@@ -86,8 +85,8 @@ class MistuningStudy(MadeOfResponses, Drawn):
 
     VIEWS: ClassVar = Views("solver.views", "of_mistuning", "mistuning_dataset", "disks:mistuning_figure")
     JSON: ClassVar = (
-        "scene dof=tuned.dof of spread tuned= samples=disks mean= mean_error standard_error= deviation="
-        " quantiles= worst n_harmonics seconds completed status"
+        "scene dof=tuned.dof of spread tuned samples=disks mean mean_error standard_error deviation"
+        " quantiles worst n_harmonics seconds completed status"
     )
 
     scene: Annotated[str, "Its name."]
@@ -132,19 +131,19 @@ class MistuningStudy(MadeOfResponses, Drawn):
         factors, tuned = self.magnifications, self.tuned
         known = math.isfinite(tuned.largest)
         deviation = float(factors.std(ddof=1)) if factors.size > 1 else None
-        return MadeOfResponses.to_json(self) | {
-            "tuned": {
+        return self._json(
+            tuned={
                 "peak": tuned.largest if known else None,
-                "at_hz": float(tuned.at_hz[tuned.worst]) if known else None,
+                "at_hz": tuned.at_hz[tuned.worst] if known else None,
             },
-            "mean": float(factors.mean()) if factors.size else None,
-            "standard_error": None if deviation is None else deviation / math.sqrt(factors.size),
-            "deviation": deviation,
-            "quantiles": [
+            mean=factors.mean() if factors.size else None,
+            standard_error=None if deviation is None else deviation / math.sqrt(factors.size),
+            deviation=deviation,
+            quantiles=[
                 quantile_json("magnification", float(np.quantile(factors, share)), factors.tolist(), share)
                 for share in (QUANTILES if factors.size else ())
             ],
-        }
+        )
 
 
 def _until_stopped(

@@ -104,7 +104,7 @@ def result_model(kind: type[Told], name: str, **types: Any) -> type[KindResult]:
     own: dict[str, Any] = {}
     for key, path in keys.items():
         if key not in shared:
-            kept, words = _described(kind, path or key)
+            kept, words = _described(kind, path)
             given = types.pop(key, kept)
             own[key] = given if isinstance(given, tuple) else (given, Field(description=words))
     about = (kind.__doc__ or "").partition("\n")[0]

@@ -43,7 +43,7 @@ class HeldAmplitude(ModalCurve):
     VIEWS: ClassVar = Views("solver.views", "of_held", "held_dataset", "modes:held_figure")
     JSON: ClassVar = (
         "scene dof=scene.observe.dof amplitude=held completed status frequency=frequency_hz excitation"
-        " excitation_error phase=phase_deg max_abs contacts=contact_names states=state_words changes= stable"
+        " excitation_error phase=phase_deg max_abs contacts=contact_names states=state_words changes stable"
         " stability_unknown=unknown least n_harmonics seconds"
     )
 
@@ -83,9 +83,8 @@ class HeldAmplitude(ModalCurve):
 
     def to_json(self) -> dict[str, Any]:
         """Return the curve as one JSON object."""
-        found = ModalCurve.to_json(self)
-        found["changes"] = [{"from": low, "to": high, "contact": name} for low, high, name in self.changes]
-        return found if self.excitation.size else found | {"least": None}
+        changes = [{"from": low, "to": high, "contact": name} for low, high, name in self.changes]
+        return self._json(changes=changes, least=self.least if self.excitation.size else None)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
