@@ -92,7 +92,7 @@ class Spread:
     def quantile(self, share: float) -> float:
         """Return the least peak that at least this share of the samples does not exceed [m]."""
         # Loaded here: it brings the compiled loops along, which who knows what results are does not need.
-        from optim.robust.risk_measure import rank_of
+        from optim.robust.scenarios import rank_of
 
         if not self.peaks or not all(math.isfinite(peak) for peak in self.peaks):
             return math.nan

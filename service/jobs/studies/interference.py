@@ -36,7 +36,7 @@ class Interference(Study):
     NAME, FUNCTION = "interference", "solver:interference_diagram"
     RESULT = result_model(InterferenceDiagram, "InterferenceResult")
     SHOWS = "frequencies at each nodal diameter, orders that meet them ([interference](disks.md))"
-    FIGURE = "solver.views.plots.interference:interference_figure"
+    FIGURE = "solver.views.plots.disks:interference_figure"
     COUNTED = "nodal diameters"
 
     speed_rpm: Annotated[_Speed | None, Flag("--speed", "RPM")] = Field(

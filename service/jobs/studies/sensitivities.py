@@ -31,7 +31,7 @@ class Sensitivities(Study, HarmonicRequest):
     NAME, FUNCTION = "sensitivities", "optim:sensitivities"
     RESULT = result_model(SensitivityResult, "SensitivitiesResult", peaks=list[PeakAt])
     SHOWS = "the change of peaks and band by one per cent of each parameter ([sensitivities](trade-offs.md))"
-    SWEEPS, FIGURE = "the response", "optim.views.plots.shares:sensitivities_figure"
+    SWEEPS, FIGURE = "the response", "optim.views.plots.designs:sensitivities_figure"
 
     limit: Annotated[PositiveNumber | None, Flag(metavar="A")] = Field(
         default=None,
