@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from abc import ABC, abstractmethod
+from ast import literal_eval
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
 from enum import Enum
@@ -14,12 +15,10 @@ from inspect import cleandoc
 from operator import attrgetter
 from typing import Any, ClassVar
 
-import numpy as np
-
 _MOST = 30
 _FEW = 6
 _DIGITS = 5
-_DESCRIBED = re.compile(r"Annotated\[(?P<kind>.+?), (?P<quote>['\"])(?P<words>.+)(?P=quote)\]")
+_DESCRIBED = re.compile(r"Annotated\[(.+?), (['\"].+['\"])\]")
 _UNIT = re.compile(r"\[([^]]+)\]")
 
 
@@ -41,9 +40,12 @@ def json_value(value: Any) -> Any:
         return value
     if isinstance(value, float):
         return json_number(value)
-    if isinstance(value, np.ndarray):
+    if hasattr(value, "tolist"):  # an array, or a number of one
+        # Loaded here, where it is already: the command knows criteria without it.
+        import numpy as np
+
         known = value.dtype.kind != "f" or bool(np.isfinite(value).all())
-        return value.tolist() if known else [json_value(one) for one in value]
+        return value.tolist() if known else json_value(value.tolist())
     if isinstance(value, Mapping):
         return {key: json_value(one) for key, one in value.items()}
     if isinstance(value, tuple | list):
@@ -89,14 +91,14 @@ class Told(ABC):
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
-        found = {name: _DESCRIBED.fullmatch(str(text)) for name, text in cls.__annotations__.items()}
-        told = {name: match for name, match in found.items() if match is not None}
-        if not told:  # nothing said, or a class that dataclass made anew for its slots
-            return
-        cls.WORDS = {**cls.WORDS, **{name: match["words"] for name, match in told.items()}}
-        cls.__annotations__.update({name: match["kind"] for name, match in told.items()})
-        rows = [f"{name} : {match['kind']}\n    {match['words']}" for name, match in told.items()]
-        cls.__doc__ = "\n".join([cleandoc(cls.__doc__ or ""), "\nAttributes\n----------", *rows])
+        rows = []
+        for name, text in cls.__annotations__.items():
+            if (said := _DESCRIBED.fullmatch(str(text))) is not None:
+                kind, words = said[1], literal_eval(said[2])
+                cls.__annotations__[name], cls.WORDS = kind, {**cls.WORDS, name: words}
+                rows.append(f"{name} : {kind}\n    {words}")
+        if rows:  # else nothing is said, or dataclass made the class anew for its slots
+            cls.__doc__ = "\n".join([cleandoc(cls.__doc__ or ""), "\nAttributes\n----------", *rows])
 
     def to_json(self) -> dict[str, Any]:
         """Return it as one JSON object."""
@@ -150,9 +152,11 @@ def _words(value: object, unit: str) -> str:
         return str(value.value)
     if isinstance(value, Told):
         return repr(value)
-    if isinstance(value, float | np.floating):
+    if isinstance(value, float):
         return f"{value:.6g} {unit}".rstrip()
-    if isinstance(value, np.ndarray):
+    if hasattr(value, "shape"):
+        import numpy as np
+
         if value.size > _FEW:
             return f"{' x '.join(map(str, value.shape))} numbers"
         return f"{np.array2string(value, precision=_DIGITS, separator=', ')} {unit}".rstrip()
