@@ -146,7 +146,7 @@ class Piece(Told):
         return Summary(title="", pairs=pairs)
 
 
-def _words(value: object, unit: str) -> str:
+def _words(value: Any, unit: str) -> str:
     """A field in a few words."""
     if isinstance(value, Enum):
         return str(value.value)
