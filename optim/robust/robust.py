@@ -22,6 +22,7 @@ from optim.criteria.band import BAND
 from optim.criteria.criterion import Row
 from optim.criteria.peak import PEAK
 from optim.errors import DesignError
+from optim.methods.enough_harmonics import most_harmonics
 from optim.methods.evaluator import StoppedError
 from optim.methods.kkt import KEPT
 from optim.problem.keys import FEWEST_SAMPLES, QUANTILE, SEED, DesignKeys
@@ -223,17 +224,32 @@ def _run(
             search.problem, on_progress=count, should_stop=should_stop, on_best=search.nominal
         )
     )
-    # What is minimised over the uncertainty has the measure and the harmonics that the nominal optimum needs.
-    posed = state.nominal.problem
+    # What is minimised over the uncertainty has the measure and the harmonics that the nominal optimum needs,
+    # and more of these where the worst scenario needs them.
+    most, posed = most_harmonics(search.problem.harmonics), state.nominal.problem
     search.problem = replace(search.problem, harmonics=posed.harmonics, cases=posed.cases)
+    status = _ended(search, drawn, state)
+    while status is RobustStatus.NOT_KNOWN and 2 * search.problem.harmonics <= most:
+        before, again = search.problem, _State(nominal=state.nominal)
+        search.problem = replace(before, harmonics=2 * before.harmonics)
+        status = _ended(search, drawn, again)
+        if "robust" not in again.sides:
+            search.problem, state.unknown = before, again.unknown
+            break
+        state = again
+    return _result(search, state, status)
+
+
+def _ended(search: RobustSearch, drawn: tuple[Scenario, ...], state: _State) -> RobustStatus:
+    """Search until it ends or is made to."""
     try:
-        status = _search(search, drawn, state)
+        return _search(search, drawn, state)
     except StoppedError as stop:
         stopped = stop.status is DesignStatus.STOPPED
-        status = RobustStatus.STOPPED if stopped else RobustStatus.TOO_MANY
+        return RobustStatus.STOPPED if stopped else RobustStatus.TOO_MANY
     except UnknownScenarioError as unknown:
-        status, state.unknown = RobustStatus.UNKNOWN_SCENARIO, unknown.scenario
-    return _result(search, state, status)
+        state.unknown = unknown.scenario
+        return RobustStatus.UNKNOWN_SCENARIO
 
 
 def _search(search: RobustSearch, drawn: tuple[Scenario, ...], state: _State) -> RobustStatus:

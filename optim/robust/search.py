@@ -98,7 +98,7 @@ OVER = {
     Aim.QUANTILE: "Best by the quantile of {count} samples; its peak is the highest of them.",
 }
 
-Key = tuple[tuple[float, ...], Scenario, bool]
+Key = tuple[tuple[float, ...], Scenario, bool, int]  # the last one: harmonics
 
 
 class RobustSearch:
@@ -115,7 +115,9 @@ class RobustSearch:
         self._on_progress, self._should_stop = on_progress, should_stop
         self._outcomes: dict[Key, Outcome] = {}
         self._on_best = on_best
-        self._known: tuple[int, tuple[float, float]] | None = None  # scenarios and standing of the best
+        self._known: tuple[tuple[int, int], tuple[float, float]] | None = (
+            None  # over what, standing of the best
+        )
         self._scale: float | None = None
 
     @property
@@ -142,9 +144,10 @@ class RobustSearch:
             The caller asked to stop, or the responses are used up.
         """
         place = tuple(values[variable.name] for variable in self.variables)
-        for known in ((place, scenario, True), (place, scenario, gradients)):
-            if known in self._outcomes:
-                return self._outcomes[known]
+        harmonics = self.problem.harmonics
+        for slopes in (True, gradients):
+            if (place, scenario, slopes, harmonics) in self._outcomes:
+                return self._outcomes[place, scenario, slopes, harmonics]
         if self._should_stop is not None and self._should_stop():
             raise StoppedError(DesignStatus.STOPPED)
         if self.responses >= MOST_RESPONSES:
@@ -152,7 +155,7 @@ class RobustSearch:
         found = outcome(self.problem, values, scenario, gradients=gradients, should_stop=self._should_stop)
         if not found.good and self._should_stop is not None and self._should_stop():
             raise StoppedError(DesignStatus.STOPPED)
-        self._outcomes[place, scenario, gradients] = found
+        self._outcomes[place, scenario, gradients, harmonics] = found
         self.count(found.responses)
         return found
 
@@ -207,9 +210,10 @@ class RobustSearch:
         """Tell of a design that is better over the same scenarios, or is the first over more of them."""
         if self._on_best is None or not local.evaluation.good:
             return
-        if self._known is not None and self._known[0] == scenarios and self._known[1] <= local.standing:
+        over = scenarios, self.problem.harmonics
+        if self._known is not None and self._known[0] == over and self._known[1] <= local.standing:
             return
-        self._known = scenarios, local.standing
+        self._known = over, local.standing
         peaks = local.evaluation.peaks
         self._on_best(
             BestSoFar(
