@@ -74,7 +74,7 @@ class InterferenceDiagram(Drawn):
     """Natural frequencies of a disk over its nodal diameters, and the engine orders that meet them."""
 
     VIEWS: ClassVar = Views(
-        "solver.views", "of_interference", "interference_dataset", "interference:interference_figure"
+        "solver.views", "of_interference", "interference_dataset", "disks:interference_figure"
     )
     JSON: ClassVar = (
         "scene sectors speed_rpm within diameters=points orders crossings missing seconds completed status"
