@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from optim.identification.unknowns import Unknowns
 from optim.problem.variables import Real
 from solver.contacts.kernels.stick_slip_events import SEPARATED, STUCK
 from solver.jit.fourier import Integer
+from solver.results.told import Piece
 from solver.scene.scene import Scene
 
 UNIFORM = 1.0 / math.sqrt(12.0)
@@ -104,23 +106,13 @@ _ALIKE = 0.1  # relative difference of two logarithmic changes that cancel each 
 _CORRELATED = 0.95
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Untold:
-    """A direction of the unknowns along which the data tell less than the bounds.
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Untold(Piece):
+    """A direction of the unknowns along which the data tell less than the bounds."""
 
-    Attributes
-    ----------
-    names : tuple of str
-        The unknowns it is of.
-    direction : tuple of float
-        Their share, of unknowns scaled to their bounds.
-    words : str
-        What that means, and why, as far as it shows.
-    """
-
-    names: tuple[str, ...]
-    direction: tuple[float, ...]
-    words: str
+    names: Annotated[tuple[str, ...], "The unknowns it is of."]
+    direction: Annotated[tuple[float, ...], "Their share, of unknowns scaled to their bounds."]
+    words: Annotated[str, "What that means, and why, as far as it shows."]
 
 
 def untold(

@@ -18,6 +18,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
+from typing import Annotated
 
 import numpy as np
 
@@ -72,24 +73,12 @@ _MEASURES: dict[Measure, Callable[[Cycle, int, Sequence[Change]], tuple[float, R
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class WorstWear(Piece):
-    """A local worst value of a measure over a branch.
+    """A local worst value of a measure over a branch."""
 
-    Attributes
-    ----------
-    value : float
-        Friction work [J], least normal load [N] or slip travel [m].
-    at : float
-        Value of the branch's parameter there, in user units (Hz for a frequency).
-    solution : (n_unknowns,) array
-        Slip motions of all contacts there [m].
-    interior : bool
-        Not at an end of the branch.
-    """
-
-    value: float
-    at: float
-    solution: Real
-    interior: bool
+    value: Annotated[float, "Friction work [J], least normal load [N] or slip travel [m]."]
+    at: Annotated[float, "Value of the branch's parameter there, in user units (Hz for a frequency)."]
+    solution: Annotated[Real, "Slip motions of all contacts there [m], (n_unknowns,)."]
+    interior: Annotated[bool, "Not at an end of the branch."]
 
 
 def worst_friction_work(branch: Branch, contact: str) -> WorstWear:

@@ -16,19 +16,18 @@ from solver.scene.parameter_paths import parameter
 if TYPE_CHECKING:
     from solver.continuation.branch import AnyBranch
     from solver.marching.result import MarchResult
-    from solver.modes.driven.controlled import HeldAmplitude
-    from solver.modes.driven.phase_resonance import PhaseResonance
+    from solver.modes.driven.results import HeldAmplitude, PhaseResonance
     from solver.modes.peaks.performance import PerformanceCurve
     from solver.modes.results import NonlinearMode
     from solver.response.solution import Solution
     from solver.response.stability.floquet import Stability
+    from solver.studies.accuracy_result import AccuracyStudy
     from solver.studies.blades import BladeAmplitudes, BladePeaks
-    from solver.studies.convergence import AccuracyStudy
     from solver.studies.interference_result import InterferenceDiagram
+    from solver.studies.map_result import ResponseMap
     from solver.studies.mistuning import MistuningStudy
     from solver.studies.peaks.results import LeastPeak, PeakTrack
     from solver.studies.plan import Plan
-    from solver.studies.response_map import ResponseMap
 
 Pairs = list[tuple[str, str]]
 

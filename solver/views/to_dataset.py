@@ -16,20 +16,19 @@ if TYPE_CHECKING:
     from solver.continuation.branch import AnyBranch
     from solver.jit.fourier import Real
     from solver.marching.result import MarchResult
-    from solver.modes.driven.controlled import HeldAmplitude
-    from solver.modes.driven.phase_resonance import PhaseResonance
+    from solver.modes.driven.results import HeldAmplitude, PhaseResonance
     from solver.modes.peaks.performance import PerformanceCurve
-    from solver.modes.results import NonlinearMode
+    from solver.modes.results import ModalCurve, NonlinearMode
     from solver.response.solution import Solution
     from solver.response.stability.floquet import Stability
     from solver.scene.scene import Scene
+    from solver.studies.accuracy_result import AccuracyStudy
     from solver.studies.blades import BladeAmplitudes, BladePeaks
-    from solver.studies.convergence import AccuracyStudy
     from solver.studies.interference_result import InterferenceDiagram
+    from solver.studies.map_result import ResponseMap
     from solver.studies.mistuning import MistuningStudy
     from solver.studies.peaks.results import LeastPeak, PeakTrack
     from solver.studies.plan import Plan
-    from solver.studies.response_map import ResponseMap
 
 AMPLITUDE = "max|x| of the observed DOF"
 
@@ -353,9 +352,6 @@ def stability_dataset(found: Stability) -> Dataset:
 
 def mode_dataset(found: NonlinearMode) -> Dataset:
     """A point a row: amplitude, frequency, damping ratio, the states of the contacts and the mode shape."""
-    names = np.array(found.contact_names, dtype=np.str_)
-    states = [[state.value for state in found.contact_states(i).values()] for i in range(len(found.states))]
-    shape = (len(states), names.size)
     variables = {
         "amplitude": column("point", found.amplitude, "√kg m", "a² = Σ Q_kᴴ M Q_k"),
         "frequency": column("point", found.frequency_hz, "Hz"),
@@ -364,8 +360,7 @@ def mode_dataset(found: NonlinearMode) -> Dataset:
         "damping_error": column("point", found.damping_error, "", "estimate by more harmonics"),
         "max_abs": column("point", found.max_abs, "m", AMPLITUDE),
         "forcing": column("point", found.forcing, "N/√kg", "|Qᴴ f| of the excitation, mode normalised"),
-        "contact": column("contact", names),
-        "state": Variable(dims=("point", "contact"), values=np.array(states, np.str_).reshape(shape)),
+        **_states(found),
         "dof": column("dof", np.array(found.scene.dofs, dtype=np.str_)),
         **harmonics(found.dof_motions, ("point", "dof", "harmonic"), "motion", "m"),
     }
@@ -374,6 +369,12 @@ def mode_dataset(found: NonlinearMode) -> Dataset:
         nodal_diameter=found.nodal_diameter,
     )  # fmt: skip
     return Dataset(kind="modes", rows=("point",), variables=variables, attributes=notes)
+
+
+def _states(found: ModalCurve) -> dict[str, Variable]:
+    words = np.array(found.state_words, np.str_).reshape(found.states.shape)
+    names = column("contact", np.array(found.contact_names, dtype=np.str_))
+    return {"contact": names, "state": Variable(dims=("point", "contact"), values=words)}
 
 
 def performance_dataset(curve: PerformanceCurve) -> Dataset:
@@ -391,8 +392,6 @@ def performance_dataset(curve: PerformanceCurve) -> Dataset:
 
 def held_dataset(found: HeldAmplitude) -> Dataset:
     """A frequency a row: the force that holds the amplitude, and the response to it."""
-    names = np.array([contact.name for contact in found.scene.contacts], dtype=np.str_)
-    states = [[state.value for state in found.contact_states(i).values()] for i in range(len(found.states))]
     stable = ["" if one is None else "yes" if one else "no" for one in found.stable]
     variables = {
         "frequency": column("point", found.frequency_hz, "Hz"),
@@ -401,10 +400,7 @@ def held_dataset(found: HeldAmplitude) -> Dataset:
         "phase": column("point", found.phase_deg, "deg", "of harmonic 1, ahead of the excitation"),
         "max_abs": column("point", found.max_abs, "m", AMPLITUDE),
         "stable": column("point", np.array(stable, dtype=np.str_), "", "while the force is held"),
-        "contact": column("contact", names),
-        "state": Variable(
-            dims=("point", "contact"), values=np.array(states, np.str_).reshape(len(states), names.size)
-        ),
+        **_states(found),
         **harmonics(found.observed, ("point", "harmonic"), "observed", "m"),
     }
     notes = attributes(found.status.value, found.scene, amplitude=found.held, harmonics=found.n_harmonics)

@@ -11,7 +11,7 @@ import pytest
 
 import optim
 import solver
-from optim.studies.elasticities import ParameterSensitivity, SensitivityStatus
+from optim.studies.sensitivity_result import ParameterSensitivity, SensitivityStatus
 from optim.views.plots.designs import sensitivities_figure
 
 DESIGNS = {"two-dof": {"damper.N0": 140.0}, "bladed-disk": {"shroud.N0": 150.0}}

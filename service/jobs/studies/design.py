@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import ConfigDict, Field, RootModel
 
+import optim
 from optim.problem.keys import ROBUST, NominalAndRobustKeys, of_design
 from service.jobs.common.problem import ProblemRequest, arguments
-from service.jobs.common.results import Amplitude, KnownResult, PeakAt, ReachedResult, Table
+from service.jobs.common.results import PeakAt, Table, result_model
 from service.jobs.common.scenes import refusal
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
 from service.jobs.kind_view import Json, ReadSweep, StoredSweep
@@ -41,72 +42,22 @@ _EXAMPLE: dict[str, Any] = {
 }
 
 
-class OptimumResult(KnownResult, ReachedResult):
-    """The best design of what is known: its values, its responses, and what holds it."""
-
-    scene: str
-    method: str
-    optimum: dict[str, float]
-    peak: PeakAt | None
-    n_harmonics: int = Field(
-        description="Highest harmonic kept; more than asked for where the peak needs them."
-    )
-    peaks: list[Table]
-    band_hz: float | None
-    limit: Amplitude
-    bands: list[Table]
-    objective: float | None
-    rows: list[Table]
-    held_by: Table | None
-    stable: str
-    stable_ground: str
-    errors: list[Table]
-    warnings: list[Any]
-    plateau: Table
-    chosen_by: str | None
-    certainty: str = Field(description="Whether the range is closed by peaks followed over it, or sampled.")
-    checked: list[Any]
-    curve: Table | None
-    looked_at: list[Any]
-    evaluations: int
-    newton_iterations: int
-    tried: list[Table]
-    basins: list[Table]
-    seconds: float
-    work: float | None
-    active: list[str]
-    optimality: float | None
-    multipliers: list[float | None]
-    conditions: Table | None
-    broken: list[Table]
+_Rows = list[Table]
+_HARMONICS = "Highest harmonic kept; more than asked for where the peak needs them."
+OptimumResult = result_model(
+    optim.DesignResult, "OptimumResult", peak=PeakAt | None, peaks=_Rows, bands=_Rows, rows=_Rows,
+    errors=_Rows, looked_at=_Rows, tried=_Rows, broken=_Rows, plateau=Table, conditions=Table | None,
+    objective=float | None, limit=float | None, stable=str, stable_ground=str, newton_iterations=int,
+    multipliers=list[float | None], n_harmonics=(int, Field(description=_HARMONICS)),
+)  # fmt: skip
+RobustResult = result_model(
+    optim.RobustResult, "RobustResult", scene=str, quantile=float | None, nominal=Table | None,
+    robust=Table | None, optimality=float | None, violation=float | None, inner_look=bool | None,
+    nominal_status=str, warnings=list[str],
+)  # fmt: skip
 
 
-class RobustResult(KnownResult, ReachedResult):
-    """The best design in spite of what is not known, beside the best of what is."""
-
-    scene: str
-    aim: str
-    quantile: float | None
-    uncertain: Table
-    optimum: dict[str, float]
-    nominal: Table | None
-    robust: Table | None
-    objective: float | None
-    gain: float | None
-    cuts: list[Table]
-    gap: float | None
-    inner_look: bool | None
-    optimality: float | None
-    violation: float | None
-    unknown: Any
-    designs: int
-    responses: int
-    seconds: float
-    nominal_status: str
-    warnings: list[Any]
-
-
-class DesignResult(RootModel[OptimumResult | RobustResult]):
+class DesignResult(RootModel[OptimumResult | RobustResult]):  # type: ignore[valid-type]
     """A design; with `uncertain` a robust one."""
 
     model_config = ConfigDict(defer_build=True)

@@ -9,9 +9,10 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from optim.criteria.json_types import Pair
 from optim.errors import DesignError
+from optim.identification.result import Identification
 from optim.problem.keys import MAX_VARIABLES, VariableName
 from optim.problem.words import ScalingWord
-from service.jobs.common.results import ReachedResult, Table
+from service.jobs.common.results import Table, result_model
 from service.jobs.common.scenes import HarmonicRequest, Number, ParameterPath, refusal
 from service.jobs.common.sizes import balance_issues
 from service.jobs.registry import Flag
@@ -66,29 +67,10 @@ class EstimateResult(BaseModel):
     at_bound: bool
 
 
-class IdentifyResult(ReachedResult):
-    """Estimates with covariance, what the data do not tell, the fit, and what to measure next."""
-
-    scene: str
-    estimates: list[EstimateResult]
-    values: dict[str, float]
-    covariance: list[list[float]]
-    correlation: list[list[float]]
-    noise: float | None
-    reduced_chi2: float | None
-    misfit: str = Field(description="What residuals larger than the noise given say; else empty.")
-    untold: list[Table]
-    correlated: list[Table]
-    candidates: list[Table]
-    runs: list[Table]
-    not_reached: list[Table]
-    uncertain: Table = Field(description="For the key `uncertain` of a robust design.")
-    other_optima: list[Table]
-    starts: int
-    agreeing: int
-    evaluations: int
-    n_harmonics: int
-    seconds: float
+IdentifyResult = result_model(
+    Identification, "IdentifyResult", estimates=list[EstimateResult], correlated=list[Table],
+    covariance=list[list[float]], correlation=list[list[float]],
+)  # fmt: skip
 
 
 class Identify(Study, HarmonicRequest):

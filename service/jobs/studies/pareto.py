@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from pydantic import ConfigDict, Field
+from pydantic import ConfigDict
 
+import optim
 from optim.problem.keys import PointsOfFront, of_front
 from service.jobs.common.problem import ProblemRequest
-from service.jobs.common.results import Amplitude, KnownResult, ReachedResult, Table
+from service.jobs.common.results import result_model
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
 from service.jobs.outputs import SweepRecord
 from service.jobs.study import Answer, Watch
@@ -23,19 +24,7 @@ if TYPE_CHECKING:
 _EXAMPLE: dict[str, Any] = {"scene": "bladed-disk", "variables": {DISK_LOAD: [20, 3000]}, "limit": 8e-5}
 
 
-class ParetoResult(KnownResult, ReachedResult):
-    """The front: designs of which none has both a lower peak and a narrower band than another."""
-
-    scene: str
-    dof: str
-    limit: Amplitude
-    points: list[Table]
-    knee: int | None = Field(description="Number of the point where the front bends most.")
-    dominated: list[Table]
-    missed: list[Table]
-    ends: list[Table]
-    evaluations: int
-    seconds: float
+ParetoResult = result_model(optim.ParetoResult, "ParetoResult", scene=str, dof=str, limit=float | None)
 
 
 class _Pareto(PointsOfFront, ProblemRequest):

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TypeVar
+from typing import Annotated, TypeVar
 
 from solver.contacts.laws.harmonics import is_phase
 from solver.errors import SettingError
@@ -101,22 +101,15 @@ _NamedT = TypeVar("_NamedT", Spring, Damper, Mass)
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Extent(Piece):
-    """How many sectors a scene has to be solved with, and why.
+    """How many sectors a scene has to be solved with, and why."""
 
-    Attributes
-    ----------
-    sectors : int
-        1 where one sector (or the lumped structure itself) is enough, else all.
-    reason : str
-        In words and numbers.
-    assumed : bool
-        One sector stands for all only if the response is the travelling wave, which the laws of the contacts
-        do not make the only one.
-    """
-
-    sectors: int
-    reason: str
-    assumed: bool = False
+    sectors: Annotated[int, "1 where one sector (or the lumped structure itself) is enough, else all."]
+    reason: Annotated[str, "In words and numbers."]
+    assumed: Annotated[
+        bool,
+        "One sector stands for all only if the response is the travelling wave, which the laws of the "
+        "contacts do not make the only one.",
+    ] = False
 
 
 def sectors_needed(scene: Scene) -> Extent:
