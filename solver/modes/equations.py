@@ -83,8 +83,10 @@ class Evaluated:
             return self.slopes.step(rhs, pulls, border)
         J = self.slopes + motions.T @ pulls if len(motions) else self.slopes
         if border is not None:
-            J = np.vstack([np.column_stack([J, self.by_log_amplitude]), border])
-            columns = np.append(columns, 1.0)
+            m = columns.size
+            bordered = np.empty((m + 1, m + 1))
+            bordered[:m, :m], bordered[:m, m], bordered[m] = J, self.by_log_amplitude, border
+            J, columns = bordered, np.append(columns, 1.0)
         return step(J, rhs, columns)
 
 
@@ -130,6 +132,7 @@ class Equations:
         # Changes of x by Re q, ω and the last unknown; c of q, of the equation before the last, of a.
         self._pushed, self._rows = np.zeros((2, 3, nk, coordinates), np.complex128)
         self._turned = np.zeros((nk, coordinates), np.complex128)
+        self._held = np.zeros((2, 0, self.size + BESIDES))
         self._by_log_amplitude = np.zeros(self.size + BESIDES)
         self._by_log_amplitude[-1] = -1.0
 
@@ -176,6 +179,8 @@ class Equations:
     def loose(self) -> Real:
         """Return `Evaluated.loose` where last evaluated."""
         system, count = self.balance.system, int(self.point.counts[UNHELD])
+        if not count:
+            return self._held
         found = np.zeros((2, count, self.size + BESIDES))
         for k, along in enumerate(self.point.gauge[:count]):
             found[0, k, : self.size : self.n] = along[system.leading]

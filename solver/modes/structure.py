@@ -88,7 +88,7 @@ class Structure:
     def momentum(self, x: Complex) -> Complex:
         """Return M x (N,) of harmonic 1."""
         here = slice(self.first, self.first + 1)
-        return self.times(self.mass[here], x[None])[0]
+        return np.asarray(self.times(self.mass[here], x[None])[0])
 
     def at(self, omega: float, zeta: float, mode: int) -> Dynamics:
         """Return Z of all harmonics with mode number `mode` stiffened; raises LinAlgError if singular."""
