@@ -112,6 +112,7 @@ def reduce_model(
     *,
     whole_matrices: bool = False,
     each_port: bool = False,
+    poles: bool = True,
 ) -> Reduced:
     """Bring a linear model into the form of the compiled loops.
 
@@ -124,6 +125,7 @@ def reduce_model(
     derivative : by the structural parameter that is continued in; then the dense form is kept.
     whole_matrices : keep the dense form whatever the damping is.
     each_port : keep every port, even where all follow from fewer.
+    poles : carry damping that couples the modes by poles where they serve.
 
     Raises
     ------
@@ -143,7 +145,7 @@ def reduce_model(
     if len(loose) or not (model.prescribed or held_alone(held)):
         # Also without a mean: of a light part A is 1/(m ω²) else, 1e9 times what its contacts let it move.
         shift, held = kt.copy(), held_by(held, L, kt)
-    found = None if dense_asked else decompose(held)
+    found = None if dense_asked else decompose(held, poles=poles)
     if found is None and not apart:
         which, diameters, moving = _structures(model, ks, apart=True)
         L = model.ports_at(diameters)

@@ -128,8 +128,8 @@ def held_by(held: Held, L: Complex, kt: Real) -> Held:
 
 
 @lru_cache(maxsize=32)
-def decompose(held: Held) -> Decomposition | None:
-    """Return modes if the damping is classical, else poles; None if neither gives Z⁻¹ to rounding."""
+def decompose(held: Held, *, poles: bool = True) -> Decomposition | None:
+    """Return modes if the damping is classical, else `poles`; None if neither gives Z⁻¹ to rounding."""
     stiffness = list(held.K)
     even = [hermitian(K) for K in stiffness]
     undamped = [undamped_modes(K, M) for K, M in zip(even, held.M, strict=True)]
@@ -150,12 +150,14 @@ def decompose(held: Held) -> Decomposition | None:
             right=phi,
             left=phi.conj(),
         )
-    poles = [
+    if not poles:
+        return None
+    tried = [
         _poles(u, D, E) if u.sigma == 0.0 else _plain_poles(K, C, M)
         for u, D, E, K, C, M in zip(undamped, damping, skew, held.K, held.C, held.M, strict=True)
     ]
-    found = [each for each in poles if each is not None]
-    if len(found) < len(poles):
+    found = [each for each in tried if each is not None]
+    if len(found) < len(tried):
         return None
     values = np.array([each[0] for each in found], dtype=np.complex128)
     return Decomposition(

@@ -41,6 +41,8 @@ _FAINT = 1e-9  # share of the excitation along a mode below which it does not dr
 class Driven(Equations):
     """The responses to the excitation at a given amplitude; the last unknown is z, see the module."""
 
+    KEEPS_J = False
+
     def __init__(self, balance: Balance) -> None:
         super().__init__(balance)
         self.unit = 1.0  # c, set when the linear mode is known

@@ -21,7 +21,7 @@ import numpy as np
 from solver.balance.kernels.output import extremes
 from solver.contacts.kernels.system import System, by_reference
 from solver.jit.fourier import Complex, Real
-from solver.modes.corrector import Corrected, State, correct, scales, step
+from solver.modes.corrector import Corrected, State, correct, scales
 from solver.modes.equations import Evaluated
 from solver.modes.gradient import ModeSensitivities
 from solver.modes.nonlinear_mode import pose
@@ -184,7 +184,7 @@ class _Solver:
         columns, reading = scales(state.y, size), self.read(point)
         tops, forces = [], []
         for j, change in enumerate((at.by_log_amplitude, *rows)):
-            dy = step(at.jacobian, -change, columns, least_squares=at.unheld)
+            dy = at.step(-change, columns)
             if dy is None:
                 return None
             dx = self._moved(state, at, dy, None if j == 0 else pushes[j - 1])
