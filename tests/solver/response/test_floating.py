@@ -7,7 +7,6 @@ import pytest
 from floating_cases import DAMPER, pulled, two_blades, underplatform
 from floating_scenes import floating_scene
 from light_points import PointSolver
-from sampling import sampled
 from scene_cases import two_dof
 
 from solver import (
@@ -230,7 +229,8 @@ def checked(seed: int) -> str:
     return ""
 
 
-@pytest.mark.parametrize("seed", sampled([*range(5), 197], 2, keep=(197,)))
+@pytest.mark.few(2, keep=(197,))
+@pytest.mark.parametrize("seed", [*range(5), 197])
 def test_random_floating_scenes(seed: int):
     assert checked(seed) == ""
 

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from peak_cases import case_a, highest, scene_of
 from random_scenes import random_scene
-from sampling import others_long
 from scene_cases import oscillator
 
 import solver
@@ -170,8 +169,8 @@ def check_random(seed: int, points: int) -> None:
             assert branch.peak.value >= best.peak * (1.0 - 1e-8)
 
 
-@pytest.mark.few(2)
-@pytest.mark.parametrize("seed", others_long([2, 8, 14, 30, 34, 37, 48, 72], keep=(2, 30, 48, 72)))
+@pytest.mark.few(keep=(2, 14, 34, 48))
+@pytest.mark.parametrize("seed", [2, 8, 14, 30, 34, 37, 48, 72])
 def test_random_scenes_against_brute_force(seed: int) -> None:
     check_random(seed, 13)
 
