@@ -197,7 +197,7 @@ def test_a_length_has_a_unit_of_its_size(profile: Profile, site: Site) -> None:
     assert said == ["4.8e-14 m", "3 nm", "25 µm", "509000 N/m", "92.7 N"]
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(4)
 @pytest.mark.parametrize("harmonics", ["2.5", "0", "201", ""])
 def test_harmonics_that_cannot_be_are_refused_where_they_stand(
     profile: Profile, site: Site, harmonics: str

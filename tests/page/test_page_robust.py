@@ -105,6 +105,7 @@ def test_a_study_that_falls_short_says_so(profile: Profile, site: Site) -> None:
     expect(page.locator("#study-status")).to_contain_text("did not come to their end", timeout=60_000)
 
 
+@pytest.mark.long
 def test_the_service_stopped_and_started_under_the_page(profile: Profile, site: Site) -> None:
     context, watch = profile
     watch.allowed = AWAY

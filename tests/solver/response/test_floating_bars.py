@@ -13,7 +13,7 @@ from solver.response.solution import SolutionStatus
 BARS = 100
 
 
-@pytest.mark.few(7)
+@pytest.mark.few(20)
 @pytest.mark.parametrize("seed", range(BARS))
 def test_a_floating_bar_moves_as_its_loading_history_says(seed: int) -> None:
     bar = Bar.of(seed)

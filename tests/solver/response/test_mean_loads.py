@@ -23,7 +23,7 @@ CREEPS = {
 }  # fmt: skip
 
 
-@pytest.mark.few(6)
+@pytest.mark.few(10)
 @pytest.mark.parametrize("seed", range(40))
 @pytest.mark.parametrize("kind", DRAWN)
 def test_the_limit_of_friction(kind: str, seed: int) -> None:
