@@ -74,7 +74,7 @@ from .response.wear import (
     WearSensitivity as WearSensitivity,
     contact_wear as contact_wear,
 )
-from .response.wear_nonsmooth import worst_slopes as worst_slopes
+from .response.worst_wear import worst_slopes as worst_slopes
 from .response.worst_wear import (
     Measure as Measure,
     WorstWear as WorstWear,
@@ -87,7 +87,7 @@ from .results.told import Summary as Summary
 from .scene.builder import SceneBuilder as SceneBuilder
 from .scene.cyclic.annulus import Extent as Extent, annulus as annulus, sectors_needed as sectors_needed
 from .scene.scene import Scene as Scene, load_scene as load_scene, shipped_scenes as shipped_scenes
-from .scene.templates.registry import new_scene as new_scene
+from .scene.templates import new_scene as new_scene
 from .sensitivity.gradient import Gradient as Gradient, Sensitivities as Sensitivities
 from .sensitivity.hessian import (
     AmplitudeHessian as AmplitudeHessian,

@@ -17,8 +17,7 @@ import numpy as np
 
 from optim.errors import DesignError
 from optim.identification.data.measured import Measured
-from optim.identification.fit.evaluation import Runs
-from optim.identification.fit.least_squares import LocalFit
+from optim.identification.fit import LocalFit, Runs
 from optim.identification.information import UNIFORM, Information
 from optim.identification.unknowns import Unknowns
 from optim.problem.numbers import is_number

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any, ClassVar
 
-from optim.identification.identifiability import Untold
+from optim.identification.information import Untold
 from optim.identification.next_measurement import Candidate
 from optim.problem.variables import Real
 from solver.results.base import Drawn

@@ -16,8 +16,7 @@ from optim.problem.problem import Problem
 from optim.problem.uncertainty_set import Scenario, UncertainSet
 from optim.problem.words import Aim
 from optim.results.design import DesignResult
-from optim.robust.risk_measure import rank_of
-from optim.robust.scenarios import Outcome
+from optim.robust.scenarios import Outcome, rank_of
 from solver.results.base import Drawn, MadeOfResponses
 from solver.results.known import NOTHING_KNOWN, Known
 from solver.results.order_statistics import quantile_json

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from solver.results import units
 from solver.results.told import Summary
-from solver.views.parameter_units import parameter
+from solver.scene.parameter_paths import parameter
 from solver.views.summary import Pairs, made
 
 if TYPE_CHECKING:

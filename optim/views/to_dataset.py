@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solver.results.dataset import Dataset, Variable
-from solver.views.columns import attributes, column
-from solver.views.parameter_units import parameter_unit
+from solver.scene.parameter_paths import parameter_unit
+from solver.views.to_dataset import attributes, column
 
 if TYPE_CHECKING:
     from optim.criteria.rows import Evaluation

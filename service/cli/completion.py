@@ -19,7 +19,7 @@ _SCENE_FILES = (".toml", ".json")
 
 def scenes(incomplete: str) -> list[str]:
     """Shipped scenes, scene files, and the folders on the way to them."""
-    from solver.scene.io import shipped_scenes
+    from solver.scene.toml import shipped_scenes
 
     beside = Path(incomplete + "x").parent
     found = sorted(beside.iterdir()) if beside.is_dir() else []

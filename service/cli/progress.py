@@ -38,7 +38,7 @@ class Reporter:
 def told_best(found: Mapping[str, Any]) -> str:
     """The best design so far in a few words."""
     from solver.results import units
-    from solver.views.parameter_units import parameter
+    from solver.scene.parameter_paths import parameter
 
     values = [parameter(name.split(",")[0].strip(), value) for name, value in found["values"].items()]
     peak = "" if found["peak"] is None else f": {units.length(found['peak'])}"

@@ -301,3 +301,18 @@ class HostCheck:
                 await service_problem(request, error)(scope, receive, send)
                 return
         await self._app(scope, receive, send)
+
+
+Responses = dict[int | str, dict[str, Any]]
+
+TEXT: dict[str, Any] = {"type": "string"}
+BINARY: dict[str, Any] = {"type": "string", "contentMediaType": "application/octet-stream"}
+UNCHANGED: Responses = {304: {"description": "`If-None-Match` has its ETag."}}
+
+
+def media(schemas: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+    """An answer in further media types."""
+    return {"content": {name: {"schema": dict(schema)} for name, schema in schemas.items()}}
+
+
+LISTED: Responses = {200: media({"text/csv": TEXT})}

@@ -13,8 +13,8 @@ from pydantic.fields import FieldInfo
 
 from optim.criteria.key import Key, Option
 from optim.criteria.registry import criteria, limit_keys
-from optim.identification.data.measured_units import known_units
-from optim.identification.data.registry import data_kinds
+from optim.identification.data.measured import data_kinds
+from optim.identification.data.table import known_units
 from optim.identification.readers.registry import data_formats
 from optim.problem.keys import CaseRequest, options
 from optim.problem.keyword_source import keyword_source
@@ -22,8 +22,7 @@ from service.jobs.common.problem import ABOUT_THE_JOB
 from service.jobs.kinds.design import DesignRequest
 from service.jobs.kinds.pareto import ParetoRequest
 from service.jobs.kinds.registry.table import placed
-from service.settings.limits import Limits
-from service.settings.settings import Settings
+from service.settings.settings import Limits, Settings
 from solver.contacts.laws.registry import DEFAULT, laws
 from solver.matrices.readers.registry import readers
 

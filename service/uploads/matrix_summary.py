@@ -71,7 +71,7 @@ def look(asked: Mapping[str, Any]) -> dict[str, Any]:
 
 def _sorted(files: list[str]) -> dict[str, Any]:
     from service.uploads.sector_summary import told_apart
-    from solver.matrices.file_roles import sorted_files
+    from solver.matrices.files import sorted_files
 
     rest, found = told_apart(files)
     if "diameters" in found:

@@ -31,11 +31,10 @@ from solver.scene.bodies.kinematics import Form
 from solver.scene.bodies.shape_parts import own_parts, with_shapes
 from solver.scene.bodies.shapes import AnyShape
 from solver.scene.bodies.validation import body_issues
-from solver.scene.contacts import ContactOfAnyLaw
 from solver.scene.cyclic.validation import cyclic_issues
-from solver.scene.io import load_raw, scene_folder, shipped_scenes
 from solver.scene.parts import (
     KINDS,
+    ContactOfAnyLaw,
     CyclicStructure,
     Damper,
     Excitation,
@@ -44,14 +43,14 @@ from solver.scene.parts import (
     MatricesStructure,
     Mistuning,
     Observe,
+    Recovered,
     Spring,
     Structure,
 )
-from solver.scene.terms.force_files import with_force_files
-from solver.scene.terms.linear_terms import Aerodynamics, Coupling
-from solver.scene.terms.recovery import Recovered
-from solver.scene.terms.speed import SpeedDependence, at_speed
+from solver.scene.terms.excitation import with_force_files
+from solver.scene.terms.linear_terms import Aerodynamics, Coupling, SpeedDependence, at_speed
 from solver.scene.terms.validation import term_issues
+from solver.scene.toml import load_raw, scene_folder, shipped_scenes
 from solver.scene.validation import cross_issues, field_issues, plain
 
 __all__ = [

@@ -20,10 +20,10 @@ from solver.errors import Issue
 from solver.errors import pointer as json_pointer
 from solver.scene.bodies.body import Body, Load, Node, body_dofs
 from solver.scene.bodies.shapes import SHAPES, WITH_BODY
-from solver.scene.contacts import LAW_TAG
-from solver.scene.cyclic.boundary import is_cyclic
+from solver.scene.cyclic.sector_tables import is_cyclic
 from solver.scene.parts import (
     KINDS,
+    LAW_TAG,
     CyclicBoundary,
     CyclicStructure,
     Damper,
@@ -32,12 +32,17 @@ from solver.scene.parts import (
     MatricesStructure,
     Mistuning,
     Observe,
+    Recovered,
     Reduction,
     Spring,
 )
-from solver.scene.terms.linear_terms import Aerodynamics, Coupling, DiameterCoefficient, Influence
-from solver.scene.terms.recovery import Recovered
-from solver.scene.terms.speed import SpeedDependence
+from solver.scene.terms.linear_terms import (
+    Aerodynamics,
+    Coupling,
+    DiameterCoefficient,
+    Influence,
+    SpeedDependence,
+)
 from solver.wording import listing, nearest, quoted
 
 TERM_KEYS: dict[tuple[str, ...], tuple[str, tuple[str, ...]]] = {

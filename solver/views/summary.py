@@ -11,7 +11,7 @@ from solver.continuation.branch import BranchStatus
 from solver.results import units
 from solver.results.notes import BAND_OPEN, between_points, drift_words, flag_words
 from solver.results.told import Summary
-from solver.views.parameter_units import parameter
+from solver.scene.parameter_paths import parameter
 
 if TYPE_CHECKING:
     from solver.continuation.branch import AnyBranch

@@ -35,8 +35,8 @@ from postgresql_cluster import Cluster
 from sqlalchemy import func, select
 
 from service.db.engine import Database
-from service.db.integrity import check
 from service.db.models import Job, JobResult, JobState, Sweep
+from service.db.repositories.integrity import check
 
 COMMON: dict[str, Fault] = {
     "worker killed": child_killed,

@@ -10,7 +10,7 @@ from sqlalchemy.dialects import sqlite
 
 from service.db import revisions
 from service.db.engine import Database
-from service.db.repositories import storage
+from service.db.repositories import owned
 from service.db.repositories.jobs import claims, statements
 
 BY_KEY = "sqlite_autoindex_job_1"
@@ -23,7 +23,7 @@ BY_KEY = "sqlite_autoindex_job_1"
         (claims.WAITING_OWNERS, "ix_job_state_owner_priority_id"),
         (claims.NEXT_PRIORITY, "ix_job_state_owner_priority_id"),
         (claims.NEXT_JOBS, "ix_job_state_owner_priority_id"),
-        (storage.OF_JOBS, "ix_job_owner_stored_bytes"),
+        (owned.OF_JOBS, "ix_job_owner_stored_bytes"),
         (statements.TAKE, BY_KEY),
         (statements.REPORT, BY_KEY),
         (statements.SUCCEED, BY_KEY),

@@ -296,7 +296,7 @@ def unguarded() -> Iterator[None]:
     forgotten = (bindparam("number", type_=Integer) >= 0) & (bindparam("holder", type_=String) != "")
     with pytest.MonkeyPatch.context() as patch:
         weak = (Job.id == bindparam("job")) & (Job.state == JobState.RUNNING) & forgotten
-        for module in ("guards", "repository"):
+        for module in ("leases", "repository"):
             patch.setattr(f"service.db.repositories.jobs.{module}.OWNED", weak)
         importlib.reload(job_statements)
         yield

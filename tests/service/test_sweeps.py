@@ -16,7 +16,7 @@ from service.db.clock import utc_now
 from service.db.engine import Database
 from service.db.models import NOBODY
 from service.db.repositories import JobRepository, NewJob, SweepRepository
-from service.db.repositories.sweeps import insert_sweeps
+from service.db.repositories.stored import insert_sweeps
 from service.errors import InvalidRequestError
 from service.jobs.arrays import encode
 from service.jobs.outputs import ContactValues, JobOutput, SweepRecord

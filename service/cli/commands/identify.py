@@ -17,7 +17,7 @@ from service.cli.output_files import Outputs
 from service.cli.progress import bar
 from service.rendering.tables import identify as tables
 from service.rendering.tables.text import show
-from solver.scene.examples import DISK_LOAD
+from solver.scene.descriptions import DISK_LOAD
 
 if TYPE_CHECKING:
     from optim import Identification

@@ -8,7 +8,7 @@ import typer
 
 from service.cli import completion
 from service.cli.options.numeric import amount, count
-from solver.scene.examples import DISK_LOAD
+from solver.scene.descriptions import DISK_LOAD
 
 EFFECTS = ("even-harmonics", "every-contact", "every-port", "every-sector", "whole-matrices")
 

@@ -8,9 +8,8 @@ from typing import Any
 from sqlalchemy import ColumnElement, Connection, bindparam, delete, insert, select
 from sqlalchemy.orm import InstrumentedAttribute
 
-from service.db.models import ID_LENGTH
+from service.db.models import ID_LENGTH, Project, Run
 from service.db.repositories.rows import NO_WORDS, RunWords
-from service.db.run_models import Project, Run
 from service.errors import InvalidRequestError
 from solver.errors import Issue
 

@@ -11,12 +11,11 @@ from typing import Any
 from sqlalchemy import ColumnElement, Connection, Select, func, literal, null, or_, select
 from sqlalchemy.dialects import postgresql, sqlite
 
-from service.db.models import NOBODY, Job, JobState, Sweep
+from service.db.models import NOBODY, Job, JobState, Run, RunTag, Sweep
 from service.db.pagination import Condition, met, owner_condition, plain_conditions
 from service.db.repositories.owned import Binned
 from service.db.repositories.rows import JobRow, RunWords
 from service.db.repositories.run_words import in_the_bin, put_tags, require_project
-from service.db.run_models import Run, RunTag
 from service.errors import ConflictError
 
 _NEVER_LEADS = -1

@@ -8,9 +8,9 @@ from sqlalchemy import delete
 
 from service.db.clock import Clock
 from service.db.engine import Database
+from service.db.models import Share
 from service.db.repositories.owned import Rows
 from service.db.repositories.runs import RunRow, Runs
-from service.db.run_models import Share
 from service.db.tokens import Made, Tokens, digest_of, matches
 from service.errors import NotFoundError
 

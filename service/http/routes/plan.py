@@ -7,12 +7,12 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Body
 from pydantic import ConfigDict
 
-from service.http.computed import computed
 from service.http.dependencies import InContext, TypedRoute
+from service.http.in_lane import computed
 from service.jobs.answering import PLAN
 from service.jobs.common.scenes import HarmonicRequest
 from service.schemas.answers import Answer
-from solver.scene.examples import DISK_LOAD
+from solver.scene.descriptions import DISK_LOAD
 
 _EXAMPLE: dict[str, Any] = {"scene": "bladed-disk", "set": {DISK_LOAD: 150}}
 

@@ -6,9 +6,9 @@ import json
 
 from fastapi import APIRouter, Response
 
-from service.auth.shares import share
-from service.http.computed import prepared
+from service.auth.allowances import share
 from service.http.dependencies import InContext, TypedRoute, takes_body
+from service.http.in_lane import prepared
 from service.jobs.answering import PREVIEW
 from service.jobs.kinds.previews import PREVIEWS, PreviewRequest
 from service.jobs.kinds.registry.bodies import KIND, any_body, examples

@@ -9,7 +9,7 @@ from typing import Any
 
 from fastapi import APIRouter, Request, Response
 
-from service.http.routes.described import TEXT, media
+from service.http.dependencies import TEXT, media
 
 router = APIRouter(prefix="/docs", tags=["health"])
 

@@ -13,9 +13,8 @@ from pydantic import Field, GetJsonSchemaHandler
 from pydantic_core import CoreSchema
 
 from service.http.bodies import saved
-from service.http.dependencies import InContext, listing
+from service.http.dependencies import LISTED, InContext, listing
 from service.http.in_lane import reading, writing
-from service.http.routes.described import LISTED
 from service.schemas.pages import Cursor, Limit, ListQuery, newest
 from service.schemas.upload_answers import NewUpload, UploadAnswer, UploadedArray, UploadPage
 from service.uploads.uploads import Arrived, file_name, format_of

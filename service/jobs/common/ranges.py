@@ -10,7 +10,7 @@ from pydantic import ConfigDict, Field
 from service.jobs.common.scenes import HarmonicRequest, Number, ParameterPath, check, refusal
 from service.jobs.registry import Flag
 from solver.errors import Issue
-from solver.scene.examples import DISK_LOAD
+from solver.scene.descriptions import DISK_LOAD
 
 if TYPE_CHECKING:
     from solver.scene.scene import Scene

@@ -18,7 +18,7 @@ from service.jobs.kind_view import Json, KindView, NothingToDrawError, ReadSweep
 from service.jobs.outputs import JobOutput, Progress, ShouldStop, SweepRecord
 from service.jobs.registry import JobKind, Resolved, SceneSource
 from solver.errors import Issue, pointer
-from solver.scene.examples import DISK_LOAD
+from solver.scene.descriptions import DISK_LOAD
 from solver.scene.scene import Scene
 
 if TYPE_CHECKING:

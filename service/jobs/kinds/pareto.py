@@ -18,7 +18,7 @@ from service.jobs.kind_view import Json, KindView, NothingToDrawError, ReadSweep
 from service.jobs.outputs import JobOutput, Progress, ShouldStop
 from service.jobs.registry import JobKind, Resolved, SceneSource
 from solver.errors import Issue
-from solver.scene.examples import DISK_LOAD
+from solver.scene.descriptions import DISK_LOAD
 from solver.scene.scene import Scene
 
 if TYPE_CHECKING:
@@ -88,7 +88,7 @@ def run(spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop) ->
 
 def draw(result: Json, _sweeps: Sequence[StoredSweep], _read: ReadSweep) -> Figure:
     """The front."""
-    from optim.views.plots.pareto import pareto_figure
+    from optim.views.plots.designs import pareto_figure
 
     if not result["points"]:
         raise NothingToDrawError("its front has no point")

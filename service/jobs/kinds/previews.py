@@ -31,7 +31,7 @@ from service.jobs.common.sizes import (
 from service.jobs.outputs import JobOutput, Progress, ShouldStop, Silent
 from service.jobs.registry import JobKind, Registry, Resolved, SceneSource
 from solver.errors import Issue
-from solver.scene.examples import DAMPER_LOAD
+from solver.scene.descriptions import DAMPER_LOAD
 from solver.scene.scene import Scene
 
 MOST_POINTS = 2000

@@ -15,7 +15,7 @@ from service.jobs.kind_view import Json, KindView, ReadSweep, StoredSweep
 from service.jobs.outputs import JobOutput, Progress, ShouldStop
 from service.jobs.registry import JobKind, Resolved, SceneSource
 from solver.response.stability import MOST_STARTS
-from solver.scene.examples import DAMPER_LOAD
+from solver.scene.descriptions import DAMPER_LOAD
 from solver.scene.scene import Scene
 
 if TYPE_CHECKING:

@@ -29,7 +29,7 @@ from service.jobs.kind_view import KindView
 from service.jobs.outputs import JobOutput, Progress, ShouldStop
 from service.jobs.registry import JobKind, Resolved, SceneSource
 from solver.errors import Issue, SettingError
-from solver.scene.examples import DISK_LOAD
+from solver.scene.descriptions import DISK_LOAD
 from solver.scene.scene import Scene
 
 if TYPE_CHECKING:

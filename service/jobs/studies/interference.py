@@ -48,7 +48,7 @@ class Interference(Study):
     model_config = ConfigDict(json_schema_extra={"examples": [{"scene": "bladed-disk", "speed_rpm": 11000}]})
     NAME, FUNCTION, RESULT = "interference", "solver:interference_diagram", InterferenceResult
     SHOWS = "frequencies at each nodal diameter, orders that meet them ([interference](disks.md))"
-    FIGURE = "solver.views.plots.interference:interference_figure"
+    FIGURE = "solver.views.plots.disks:interference_figure"
     COUNTED = "nodal diameters"
 
     speed_rpm: Annotated[_Speed | None, Flag("--speed", "RPM")] = Field(

@@ -19,7 +19,7 @@ from service.jobs.registry import Flag, JobKind
 from service.jobs.studies.peaks import PeaksResult
 from service.jobs.study import Study
 from solver.errors import Issue
-from solver.scene.examples import DISK_LOAD
+from solver.scene.descriptions import DISK_LOAD
 
 if TYPE_CHECKING:
     from solver.scene.scene import Scene

@@ -44,7 +44,7 @@ class Sensitivities(Study, HarmonicRequest):
     model_config = ConfigDict(json_schema_extra={"examples": [{"scene": "two-dof", "harmonics": 5}]})
     NAME, FUNCTION, RESULT = "sensitivities", "optim:sensitivities", SensitivitiesResult
     SHOWS = "the change of peaks and band by one per cent of each parameter ([sensitivities](trade-offs.md))"
-    SWEEPS, FIGURE = "the response", "optim.views.plots.shares:sensitivities_figure"
+    SWEEPS, FIGURE = "the response", "optim.views.plots.designs:sensitivities_figure"
 
     limit: Annotated[PositiveNumber | None, Flag(metavar="A")] = Field(
         default=None,

@@ -9,7 +9,7 @@ from service.rendering.tables.text import print_pairs, print_table, say
 from solver.results import units
 from solver.results.notes import BAND_OPEN, FLAGS, between_points, drift_words, flag_words
 from solver.results.views import on_demand
-from solver.views.parameter_units import parameter
+from solver.scene.parameter_paths import parameter
 
 if TYPE_CHECKING:
     from solver.scene.scene import Scene

@@ -15,15 +15,12 @@ from solver.extensions import extensions
 from solver.matrices.readers.reader import MatrixFileError, Reader
 
 SHIPPED = (
-    "solver.matrices.readers.numpy_files",
-    "solver.matrices.readers.matlab",
+    "solver.matrices.readers.array_files",
     "solver.matrices.readers.matrix_market",
     "solver.matrices.readers.harwell_boeing",
-    "solver.matrices.readers.ansys",
     "solver.matrices.readers.abaqus",
-    "solver.matrices.readers.calculix",
-    "solver.matrices.readers.nastran.output4",
-    "solver.matrices.readers.nastran.dmig",
+    "solver.matrices.readers.output4",
+    "solver.matrices.readers.dmig",
     "solver.matrices.sectors.decks",
 )
 _START = 200

@@ -1,19 +1,24 @@
-"""Linear terms beside masses, springs and dashpots: couplings that are not symmetric, gyroscopic, of the gas.
+"""What a structure has beside masses, springs and dashpots: linear terms, and what depends on its speed.
 
-All of them are entries of K and C: the equation of the DOF `on` gains (k + i k_imaginary) x + c x' of the
-DOF `of`, here or some sectors further on. A nodal diameter sees Σ X_m e^{jmθ} of entries at the offsets m.
+Couplings that are not symmetric, gyroscopic, of the gas: all of them are entries of K and C. The equation of
+the DOF `on` gains (k + i k_imaginary) x + c x' of the DOF `of`, here or some sectors further on. A nodal
+diameter sees Σ X_m e^{jmθ} of entries at the offsets m.
+
+Normal loads and forces may follow the speed. Along an engine-order line the speed follows the frequency,
+speed [1/min] = 60 f / order, so that a sweep over the frequency is one over the speed; `Scene.at_frequency`
+is the scene at one point of it.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Annotated, NamedTuple, Self
+from typing import Annotated, Any, NamedTuple, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
-from solver.contacts.fields import DofName, Name, Part, Signed
+from solver.contacts.fields import DofName, Name, NonNegative, Part, Signed
 
 Offset = Annotated[int, Field(strict=True, ge=-10_000, le=10_000)]
 _ROUNDING = 1e-14  # of the largest coefficient: less is what a Fourier transform leaves
@@ -207,3 +212,64 @@ def _of_diameters(
 def _shortest(offset: int, sectors: int) -> int:
     """The offset the short way round."""
     return offset - sectors if offset > math.floor(sectors / 2) else offset
+
+
+Coefficients = Annotated[tuple[Signed, ...], Field(min_length=1, max_length=3)]
+Table = Annotated[tuple[tuple[NonNegative, Signed], ...], Field(min_length=2, max_length=3)]
+
+
+class SpeedDependence(Part):
+    """A parameter that follows the speed of rotation.
+
+    Attributes
+    ----------
+    path : str
+        ``<contact>.N0`` (or of a group), or ``excitation.amplitude``.
+    polynomial : tuple of float or None
+        c0, c1, c2 of c0 + c1 speed + c2 speed², the speed in 1/min; or
+    table : tuple of (float, float) or None
+        two or three rows [speed in 1/min, value], through which the polynomial of least degree goes.
+    """
+
+    path: str
+    polynomial: Coefficients | None = None
+    table: Table | None = None
+
+    @model_validator(mode="after")
+    def _one_way(self) -> Self:
+        if (self.polynomial is None) == (self.table is None):
+            given = "neither" if self.table is None else "both"
+            raise ValueError(f"`with_speed` needs `polynomial` or `table`, one of them, got {given}")
+        if self.table is not None and len({speed for speed, _ in self.table}) < len(self.table):
+            raise ValueError(f"`table` must have different speeds, got {[row[0] for row in self.table]}")
+        return self
+
+    @property
+    def coefficients(self) -> tuple[float, float, float]:
+        """c0, c1, c2 by powers of the speed in 1/min."""
+        if self.polynomial is not None:
+            c0, c1, c2 = (*self.polynomial, 0.0, 0.0)[:3]
+            return c0, c1, c2
+        speeds, values = np.array(self.table).T
+        scale = float(speeds.max())
+        found = np.linalg.solve(np.vander(speeds / scale, increasing=True), values)
+        c0, c1, c2 = (*(found / scale ** np.arange(found.size)).tolist(), 0.0)[:3]
+        return c0, c1, c2
+
+    def at(self, speed: float) -> float:
+        """Value at a speed [1/min]."""
+        c0, c1, c2 = self.coefficients
+        return c0 + speed * (c1 + speed * c2)
+
+
+def at_speed(scene: Any, speed: float) -> Any:
+    """Return a scene (with `speed`, `with_speed` and `with_values`) at a speed [1/min], all that follows set.
+
+    Raises
+    ------
+    SettingError
+        A value that a parameter must not have.
+    """
+    there = scene.model_copy(update={"speed": float(speed), "speed_order": None, "with_speed": ()})
+    values = there.with_values({each.path: each.at(speed) for each in scene.with_speed})
+    return values.model_copy(update={"with_speed": scene.with_speed})

@@ -7,7 +7,7 @@ from itertools import islice
 from typing import Any
 
 from solver.errors import Issue
-from solver.scene.cyclic.boundary import is_cyclic
+from solver.scene.cyclic.sector_tables import is_cyclic
 from solver.scene.terms.excitation import PLACES
 from solver.scene.validation import MOST_ISSUES, dofs_of, duplicates, pointer_of, rows_of, unknown_dof
 

@@ -101,7 +101,7 @@ def modules_after(code: str) -> set[str]:
 
 def test_what_serves_loads_no_numbers() -> None:
     """The computing is done in other processes: the one with the routes needs none of what they load."""
-    loaded = modules_after("import service.http.process.server")
+    loaded = modules_after("import service.http.server")
     assert loaded & (PICTURES | DESIGN | {"numba", "llvmlite", "scipy"}) == set()
 
 

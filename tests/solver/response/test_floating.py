@@ -26,7 +26,7 @@ from solver.continuation.branches.point_by_point import walk_by_points
 from solver.continuation.branches.sweep import walk
 from solver.continuation.loose_parts import balanced_part
 from solver.continuation.segment import joined
-from solver.linear.rigid_body_modes import loose_motions
+from solver.linear.condensation import loose_motions
 from solver.marching.result import MarchStatus
 
 ENDED = (BranchStatus.COMPLETED, BranchStatus.RATCHETS)

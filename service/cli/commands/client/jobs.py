@@ -164,7 +164,7 @@ def _draw(client: Client, kind: str, answer: ResultsAnswer, picture: Path) -> No
     from service.jobs.kind_view import NothingToDrawError
     from service.rendering.plots import result_figure
     from service.settings.kinds import registry_here
-    from solver.views.plots.saving import save
+    from solver.views.plots.html import save
 
     try:
         page = result_figure(kind, answer.result, answer.sweeps, client.sweep, registry_here())

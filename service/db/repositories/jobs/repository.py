@@ -14,7 +14,6 @@ from service.db.clock import Clock, SharedClock, utc_now
 from service.db.engine import Database
 from service.db.models import NOBODY, Job, JobState
 from service.db.pagination import met, owner_condition, plain_conditions
-from service.db.repositories.designs import insert_design
 from service.db.repositories.jobs import statements
 from service.db.repositories.jobs.checkpoints import (
     as_far_as_kept,
@@ -23,13 +22,11 @@ from service.db.repositories.jobs.checkpoints import (
     with_what_was_kept,
 )
 from service.db.repositories.jobs.claims import Turns
-from service.db.repositories.jobs.guards import OWNED, change_owned, of_attempt
-from service.db.repositories.jobs.leases import renew
+from service.db.repositories.jobs.leases import FREE, OWNED, change, change_owned, of_attempt, recover, renew
 from service.db.repositories.jobs.queue_limits import Room, require_share
-from service.db.repositories.jobs.recovery import FREE, change, recover
 from service.db.repositories.rows import Attempt, JobRow, NewJob, Recovered
 from service.db.repositories.run_words import in_the_bin, insert_words, require_project
-from service.db.repositories.sweeps import insert_sweeps
+from service.db.repositories.stored import insert_design, insert_sweeps
 from service.errors import IdempotencyError
 from service.jobs.ids import new_id
 from service.jobs.outputs import Best, JobFailure, JobOutput, Piece
