@@ -57,7 +57,7 @@ def _difference(case: str, path: str, limit: float | None, criterion: str) -> tu
 
 
 # Every case by one criterion or two, and every criterion in cases of each scene.
-@pytest.mark.few(2)
+@pytest.mark.few(4)
 @pytest.mark.parametrize("criterion", CRITERIA)
 @pytest.mark.parametrize("case", CASES)
 def test_gradient_equals_differences_of_the_whole_solve(case: str, criterion: str) -> None:

@@ -73,11 +73,11 @@ def test_two_variables(seed: int) -> None:
     check_design(random_design(seed, 2), 7, places=2, levels=2, fine=5)
 
 
-@pytest.mark.few(keep=(4,))
-@pytest.mark.parametrize("seed", range(15))
-def test_two_to_five_variables_with_cases_and_limits(seed: int) -> None:
+@pytest.mark.few(16)
+@pytest.mark.parametrize(("seed", "starts"), [(4, 15), *((seed, 60) for seed in range(15))])
+def test_two_to_five_variables_with_cases_and_limits(seed: int, starts: int) -> None:
     """One to three masses; designs at random and steps from the best of them find nothing better."""
-    check_against(limited_cases(seed), lambda problem: random_multistart(problem, seed, 60))
+    check_against(limited_cases(seed), lambda problem: random_multistart(problem, seed, starts))
 
 
 @pytest.mark.long

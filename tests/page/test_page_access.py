@@ -193,6 +193,7 @@ def test_zoomed_and_narrow_nothing_is_cut_off(
         assert page.evaluate(OVERLAPS) == [], "numbers of an axis stand on one another"
 
 
+@pytest.mark.long
 def test_the_theme_can_be_chosen_and_stays(profile: Profile, site: Site) -> None:
     context, _ = profile
     page = visit(context, site)

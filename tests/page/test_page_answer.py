@@ -129,6 +129,7 @@ def test_the_range_and_the_harmonics_make_a_design_stale_too(
     expect(page.locator("#accuracy-stale")).to_be_hidden()
 
 
+@pytest.mark.long
 def test_a_design_is_used_with_the_values_it_was_computed_for(
     profile: Profile, site: Site, found: str
 ) -> None:

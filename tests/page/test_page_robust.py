@@ -90,6 +90,7 @@ def test_another_scene_in_the_middle_of_a_study_begins_anew(profile: Profile, si
             httpx.delete(f"{site.url}/v1/jobs/{job['id']}")
 
 
+@pytest.mark.long
 def test_a_study_that_falls_short_says_so(profile: Profile, site: Site) -> None:
     context, watch = profile
     watch.allowed = ("status of 422",)

@@ -43,6 +43,7 @@ def confirm(solution: Solution) -> None:
     assert lost_power(solution) <= BALANCED
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("name", [name for name in HARD if name != RATCHETING])
 def test_solve(name: str):
     hard = HARD[name]

@@ -77,6 +77,7 @@ CASES: dict[str, tuple[Scene, float, tuple[str, ...], Effects]] = {
 }  # fmt: skip
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize("case", CASES)
 def test_the_hessian_equals_differences_of_the_gradient(case: str) -> None:
     scene, hz, paths, effects = CASES[case]

@@ -90,6 +90,7 @@ def test_the_disk_s_two_peaks_are_equally_high() -> None:
     assert min(peak.slope for peak in best.active) < 0.0 < max(peak.slope for peak in best.active)
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize("first", [20.0, 60.0, 100.0, 150.0, 400.0, 1000.0, 3000.0])
 def test_it_does_not_depend_on_where_the_first_sweep_is(first: float) -> None:
     best = least_peak(scene_of("bladed-disk"), "shroud.N0", 20.0, 3000.0, first=first)
