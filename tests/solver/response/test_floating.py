@@ -229,8 +229,8 @@ def checked(seed: int) -> str:
     return ""
 
 
-@pytest.mark.few(2, keep=(197,))
-@pytest.mark.parametrize("seed", [*range(5), 197])
+@pytest.mark.few(keep=(0, 2, 4, 197))
+@pytest.mark.parametrize("seed", range(200))
 def test_random_floating_scenes(seed: int):
     assert checked(seed) == ""
 
@@ -271,12 +271,6 @@ def test_a_branch_ends_before_a_mean_force_drives_a_part():
     cut = balanced_part(workspace, found)
     assert len(cut.solutions) == 7
     assert cut.status is BranchStatus.STALLED
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("seed", range(200))
-def test_many_random_floating_scenes(seed: int):
-    assert checked(seed) == ""
 
 
 @pytest.mark.long

@@ -170,16 +170,13 @@ def check_random(seed: int, points: int) -> None:
             assert branch.peak.value >= best.peak * (1.0 - 1e-8)
 
 
-@pytest.mark.few(keep=(2, 14, 34, 48))
-@pytest.mark.parametrize("seed", [2, 8, 14, 30, 34, 37, 48, 72])
-def test_random_scenes_against_brute_force(seed: int) -> None:
-    check_random(seed, 13)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("seed", range(100, 140))
-def test_more_random_scenes_against_brute_force(seed: int) -> None:
-    check_random(seed, 41)
+@pytest.mark.few(keep=(2, 48))
+@pytest.mark.parametrize(
+    ("seed", "points"),
+    [*((seed, 13) for seed in (2, 8, 14, 30, 34, 37, 48, 72)), *((seed, 41) for seed in range(100, 140))],
+)
+def test_random_scenes_against_brute_force(seed: int, points: int) -> None:
+    check_random(seed, points)
 
 
 def test_the_optimum_is_the_first_basin() -> None:
