@@ -11,27 +11,20 @@ from starlette.concurrency import run_in_threadpool
 
 from service.auth.authenticator import Doorkeeper
 from service.http import openapi
-from service.http.bodies import Turns
-from service.http.dependencies import HostCheck
+from service.http.dependencies import HostCheck, Turns
 from service.http.metrics import Measured, Metrics
 from service.http.middleware.admission import Gate, Turnstile
 from service.http.middleware.connections import Connections
 from service.http.middleware.every_answer import Head, RequestLog, Seal
 from service.http.routes import (
+    at_once,
     events,
     forms,
     health,
     jobs,
-    matrices,
-    measurements,
     page,
-    plan,
-    previews,
-    reference,
-    reports,
     runs,
     scenes,
-    shares,
     stored,
     uploads,
 )
@@ -99,9 +92,9 @@ def create_app(settings: Settings | None = None, registry: Registry | None = Non
     app.include_router(jobs.submissions(service.registry))
     for router in (
         jobs.router, forms.kinds, forms.laws, events.router, stored.designs, stored.sweeps, scenes.texts,
-        forms.templates, scenes.router, uploads.router, matrices.router, measurements.router, plan.router,
-        previews.router, runs.projects, reports.router, runs.runs, shares.router, health.router,
-        reference.router, page.router,
+        forms.templates, scenes.router, uploads.router, uploads.matrices, uploads.measurements, at_once.plans,
+        at_once.previews, runs.projects, runs.reports, runs.runs, runs.shares, health.router,
+        page.reference, page.router,
     ):  # fmt: skip
         app.include_router(router)
     openapi.install(app, service.registry)

@@ -31,8 +31,7 @@ from service.db.repositories import (
 )
 from service.db.repositories.owned import KeyRepository, Projects, StorageRepository, visible
 from service.db.repositories.rows import RunWords
-from service.db.repositories.runs import Runs
-from service.db.repositories.shares import Shares
+from service.db.repositories.runs import Runs, Shares
 from service.errors import ConflictError, InvalidRequestError, JobFailedError, NotFoundError
 from service.jobs import answering
 from service.jobs.answering import Prepared, prepared
@@ -44,8 +43,8 @@ from service.jobs.validation import validated
 from service.queue.lanes import Lanes
 from service.queue.queue import JobQueue
 from service.queue.retention import Retention
+from service.queue.running import Event, Waiters
 from service.queue.scene_store import SceneStore
-from service.queue.subscriptions import Event, Waiters
 from service.settings.settings import Settings
 from service.uploads.uploads import Uploads
 from service.workers.answers import AnswerLimits, Answers

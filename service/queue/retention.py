@@ -18,7 +18,7 @@ from functools import partial
 from sqlalchemy.exc import DBAPIError
 
 from service.db.engine import Database, database_name, database_path, is_sqlite, shrink
-from service.db.repositories.jobs.repository import JobRepository
+from service.db.repositories.jobs import JobRepository
 from service.db.repositories.retention import Pruned, RetentionRepository
 from service.db.revisions import off_head
 from service.errors import DatabaseError

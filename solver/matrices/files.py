@@ -133,7 +133,7 @@ def _matrix(reader: Reader, path: Path, key: str) -> Any:
 
 def _modes_arrays(reader: Reader, path: Path) -> dict[str, Any]:
     if reader.modes is None:
-        known, suffix = " and ".join(registry.modes_suffixes()), path.suffix.lower()
+        known, suffix = " and ".join(registry.suffixes("modes")), path.suffix.lower()
         raise MatrixFileError(f"{str(path)!r}: modes are read from {known} files, got {suffix!r}")
     return reader.modes(path)
 
@@ -149,14 +149,14 @@ def read_labels(path: Path) -> tuple[Label, ...]:
         The file cannot be read.
     """
     suffix = path.suffix.lower()
-    suffix = suffix if suffix in registry.label_suffixes() else _LABELS_OF_ONES_OWN
+    suffix = suffix if suffix in registry.suffixes("labels") else _LABELS_OF_ONES_OWN
     read = next(one.labels for one in registry.readers() if one.labels is not None and suffix in one.suffixes)
     return read(path)
 
 
 def labels_beside(path: Path) -> Path | None:
     """The file of labels that stands beside a matrix under the same name, if there is one."""
-    for suffix in registry.label_suffixes():
+    for suffix in registry.suffixes("labels"):
         for name in (path.with_suffix(suffix), path.with_suffix(suffix.upper())):
             if name.is_file():
                 return name
@@ -185,7 +185,7 @@ def sorted_files(files: Sequence[Path], mapping: Path | None = None) -> dict[str
     MatrixFileError
         Too many files, none, or a single one without M and K.
     """
-    naming = registry.label_suffixes()
+    naming = registry.suffixes("labels")
     labels = [path for path in files if path.suffix.lower() in naming]
     matrices = [path for path in files if path not in labels]
     rows = [*labels, *([] if mapping is None else [mapping])]

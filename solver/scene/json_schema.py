@@ -18,6 +18,7 @@ from solver.contacts.laws import harmonics as load_harmonics
 from solver.contacts.laws.base import AnyContact
 from solver.contacts.laws.registry import laws
 from solver.matrices.values import UNITS
+from solver.scene import linear_terms
 from solver.scene import matrices_structure as matrices_part
 from solver.scene import parts as scene_parts
 from solver.scene.bodies import body as scene_bodies
@@ -25,11 +26,10 @@ from solver.scene.bodies import shapes as scene_shapes
 from solver.scene.bodies.validation import further_ends
 from solver.scene.descriptions import EXAMPLES, WORDS
 from solver.scene.scene import Scene
-from solver.scene.terms import linear_terms as scene_terms
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 _ENTRY = re.compile(r"^(\w+(?:, \w+)*) : .*\n((?:    .*\n?)+)", re.MULTILINE)
-_HOMES = (scene_parts, scene_bodies, scene_shapes, scene_terms, matrices_part, load_harmonics)
+_HOMES = (scene_parts, scene_bodies, scene_shapes, linear_terms, matrices_part, load_harmonics)
 
 
 class _Generator(GenerateJsonSchema):

@@ -17,6 +17,7 @@ from solver.scene.bodies.kinematics import HasBodies
 from solver.scene.bodies.paths import SPEED, body_paths, body_value, changed_bodies, is_body_path
 from solver.scene.bodies.shape_parts import own_parts, shape_of, shape_paths, shape_value, with_shape_value
 from solver.scene.bodies.shapes import AnyShape
+from solver.scene.linear_terms import SpeedDependence, at_speed
 from solver.scene.parts import (
     Damper,
     Excitation,
@@ -25,7 +26,6 @@ from solver.scene.parts import (
     Spring,
     Structure,
 )
-from solver.scene.terms.linear_terms import SpeedDependence, at_speed
 from solver.wording import listing, nearest
 
 FREQUENCY = "frequency"

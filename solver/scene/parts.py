@@ -33,11 +33,11 @@ from solver.contacts.laws.registry import DEFAULT, laws
 from solver.scene.cyclic.sector_tables import CyclicBoundary as CyclicBoundary
 from solver.scene.cyclic.sector_tables import Mistuning as Mistuning
 from solver.scene.cyclic.sector_tables import Sectors
+from solver.scene.excitation import Excitation as Excitation
+from solver.scene.excitation import Shares
 from solver.scene.matrices_structure import LossFactor, Ratios
 from solver.scene.matrices_structure import MatricesStructure as MatricesStructure
 from solver.scene.matrices_structure import Reduction as Reduction
-from solver.scene.terms.excitation import Excitation as Excitation
-from solver.scene.terms.excitation import Shares
 
 
 class _Grouped(Part):

@@ -32,6 +32,8 @@ from solver.scene.bodies.shape_parts import own_parts, with_shapes
 from solver.scene.bodies.shapes import AnyShape
 from solver.scene.bodies.validation import body_issues
 from solver.scene.cyclic.validation import cyclic_issues
+from solver.scene.excitation import with_force_files
+from solver.scene.linear_terms import Aerodynamics, Coupling, SpeedDependence, at_speed
 from solver.scene.parts import (
     KINDS,
     ContactOfAnyLaw,
@@ -47,11 +49,8 @@ from solver.scene.parts import (
     Spring,
     Structure,
 )
-from solver.scene.terms.excitation import with_force_files
-from solver.scene.terms.linear_terms import Aerodynamics, Coupling, SpeedDependence, at_speed
-from solver.scene.terms.validation import term_issues
 from solver.scene.toml import load_raw, scene_folder, shipped_scenes
-from solver.scene.validation import cross_issues, field_issues, plain
+from solver.scene.validation import cross_issues, field_issues, plain, term_issues
 
 __all__ = [
     "KINDS",

@@ -63,27 +63,6 @@ def harmonics(coefficients: Real, dims: tuple[str, ...], name: str, unit: str) -
     }
 
 
-__all__ = [
-    "accuracy_dataset",
-    "amplitudes_dataset",
-    "blade_peaks_dataset",
-    "branch_dataset",
-    "held_dataset",
-    "interference_dataset",
-    "least_dataset",
-    "map_dataset",
-    "march_dataset",
-    "mistuning_dataset",
-    "mode_dataset",
-    "performance_dataset",
-    "plan_dataset",
-    "point_variables",
-    "resonance_dataset",
-    "solution_dataset",
-    "stability_dataset",
-    "track_dataset",
-]
-
 _SAMPLES = 500
 ContactStates = tuple[Sequence[str], NDArray[np.integer]]
 

@@ -25,8 +25,7 @@ from service.db.repositories.integrity import check
 from service.db.repositories.owned import Projects
 from service.db.repositories.retention import Pruned, RetentionRepository
 from service.db.repositories.rows import RunWords
-from service.db.repositories.runs import Runs
-from service.db.repositories.shares import Shares
+from service.db.repositories.runs import Runs, Shares
 from service.errors import ConflictError, DatabaseError, StorageFullError
 from service.jobs.arrays import encode
 from service.jobs.outputs import DesignRecord, JobOutput, SweepRecord

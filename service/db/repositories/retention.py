@@ -12,7 +12,7 @@ from sqlalchemy.orm import aliased
 
 from service.db.engine import Database
 from service.db.models import Design, Job, JobState, Project, Run, Share, Sweep, SweepArray, Upload
-from service.db.repositories.jobs.statements import ADD_STORED
+from service.db.repositories.job_statements import ADD_STORED
 from service.jobs.common.scenes import UPLOAD
 
 _ENDED = [state for state in JobState if state.finished]

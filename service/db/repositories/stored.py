@@ -24,7 +24,7 @@ from service.db.pagination import (
     within,
 )
 from service.db.repositories.owned import Rows, RowT
-from service.db.repositories.run_words import in_the_bin
+from service.db.repositories.runs import in_the_bin
 from service.jobs.ids import new_id
 from service.jobs.outputs import ContactValues, DesignRecord, StoredArray, SweepRecord, VariableValues
 

@@ -18,8 +18,7 @@ from service.db.repositories.owned import visible
 from service.http.dependencies import InContext
 from service.http.middleware.every_answer import HEADERS_ONLY
 from service.queue.core import Service
-from service.queue.running import Live
-from service.queue.subscriptions import Event
+from service.queue.running import Event, Live
 from service.schemas.answers import JobAnswer
 from service.schemas.event_answers import END, PARTIAL, PROGRESS, JobPoints, JobProgress
 

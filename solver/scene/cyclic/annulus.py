@@ -18,6 +18,7 @@ from solver.matrices.validation import DofTable
 from solver.matrices.values import MOST_DOFS, Matrix
 from solver.results.told import Piece
 from solver.scene.bodies.kinematics import forms_of, written_form
+from solver.scene.linear_terms import Coupling
 from solver.scene.parameter_paths import changed_quantities
 from solver.scene.parts import Recovered
 from solver.scene.scene import (
@@ -38,7 +39,6 @@ from solver.scene.scene import (
     Structure,
     parse_end,
 )
-from solver.scene.terms.linear_terms import Coupling
 from solver.wording import listing
 
 

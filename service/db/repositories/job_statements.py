@@ -9,9 +9,9 @@ from sqlalchemy import Table, Text, Update, bindparam, cast, insert, select, upd
 from sqlalchemy.sql.elements import ColumnElement
 
 from service.db.models import Job, JobResult, JobState
-from service.db.repositories.jobs.leases import OWNED
+from service.db.repositories.attempts import OWNED
 from service.db.repositories.rows import Attempt, JobRow, NewJob
-from service.db.repositories.run_words import in_the_bin
+from service.db.repositories.runs import in_the_bin
 
 _JOB: Table = Job.metadata.tables["job"]
 _RESULT: Table = JobResult.metadata.tables["job_result"]

@@ -14,19 +14,24 @@ from service.db.clock import Clock, SharedClock, utc_now
 from service.db.engine import Database
 from service.db.models import NOBODY, Job, JobState
 from service.db.pagination import met, owner_condition, plain_conditions
-from service.db.repositories.jobs import statements
-from service.db.repositories.jobs.checkpoints import (
+from service.db.repositories import job_statements
+from service.db.repositories.attempts import (
+    FREE,
+    OWNED,
     as_far_as_kept,
+    change,
+    change_owned,
     drop_checkpoint,
+    of_attempt,
+    recover,
+    renew,
     store_pieces,
     with_what_was_kept,
 )
-from service.db.repositories.jobs.claims import Turns
-from service.db.repositories.jobs.leases import FREE, OWNED, change, change_owned, of_attempt, recover, renew
-from service.db.repositories.jobs.queue_limits import Room, require_share
 from service.db.repositories.rows import Attempt, JobRow, NewJob, Recovered
-from service.db.repositories.run_words import in_the_bin, insert_words, require_project
+from service.db.repositories.runs import in_the_bin, insert_words, require_project
 from service.db.repositories.stored import insert_design, insert_sweeps
+from service.db.repositories.waiting import Room, Turns, require_share
 from service.errors import IdempotencyError
 from service.jobs.ids import new_id
 from service.jobs.outputs import Best, JobFailure, JobOutput, Piece
@@ -127,13 +132,13 @@ class JobRepository:
     def get(self, job_id: str) -> JobRow | None:
         """The job, or None."""
         with self._db.reading() as connection:
-            row = connection.execute(statements.BY_ID, {"job": job_id}).mappings().one_or_none()
+            row = connection.execute(job_statements.BY_ID, {"job": job_id}).mappings().one_or_none()
         return None if row is None else JobRow(**row)
 
     def several(self, job_ids: Sequence[str]) -> dict[str, JobRow]:
         """Those of the jobs that there are, by id."""
         with self._db.reading() as connection:
-            rows = connection.execute(statements.SEVERAL, {"jobs": job_ids}).mappings()
+            rows = connection.execute(job_statements.SEVERAL, {"jobs": job_ids}).mappings()
             return {row["id"]: JobRow(**row) for row in rows}
 
     def page(
@@ -163,12 +168,12 @@ class JobRepository:
     def result(self, job_id: str) -> dict[str, Any] | None:
         """The result of a job, or None if it has none."""
         with self._db.reading() as connection:
-            return connection.execute(statements.RESULT, {"job": job_id}).scalar_one_or_none()
+            return connection.execute(job_statements.RESULT, {"job": job_id}).scalar_one_or_none()
 
     def result_text(self, job_id: str) -> str | None:
         """The result of a job as its JSON, None if it has none."""
         with self._db.reading() as connection:
-            return connection.execute(statements.RESULT_TEXT, {"job": job_id}).scalar_one_or_none()
+            return connection.execute(job_statements.RESULT_TEXT, {"job": job_id}).scalar_one_or_none()
 
     def spec(self, job_id: str) -> dict[str, Any]:
         """What a job computes; empty if there is none of this id."""
@@ -200,7 +205,7 @@ class JobRepository:
             return []
         taken = {"holder": owner, "until": lease_until, "begun": self.now()}
         changes = [{"job": row.id, "number": row.attempt + 1, **taken} for row in found]
-        connection.execute(statements.TAKE, changes)
+        connection.execute(job_statements.TAKE, changes)
         return [_attempt(row, owner) for row in found]
 
     def report(
@@ -213,7 +218,7 @@ class JobRepository:
         """
         values = {"fraction": fraction, "counted": points, "until": lease_until, "told": best}
         with self._db.writing() as connection:
-            return _guarded(connection, statements.REPORT, attempt, values)
+            return _guarded(connection, job_statements.REPORT, attempt, values)
 
     def keep(
         self,
@@ -231,7 +236,7 @@ class JobRepository:
         """
         values = {"fraction": fraction, "counted": max(points, 1), "until": lease_until, "told": None}
         with self._db.writing() as connection:
-            owned = _guarded(connection, statements.REPORT, attempt, values)
+            owned = _guarded(connection, job_statements.REPORT, attempt, values)
             if owned:
                 store_pieces(connection, attempt, pieces, self.now(), anew=anew)
             return owned
@@ -247,7 +252,7 @@ class JobRepository:
         values = {"ended": finished, "more": _bytes_of(output)}
 
         def write(connection: Connection) -> bool:
-            if not _guarded(connection, statements.SUCCEED, attempt, values):
+            if not _guarded(connection, job_statements.SUCCEED, attempt, values):
                 return False
             drop_checkpoint(connection, attempt.job_id)
             self._store(connection, attempt, output, finished)
@@ -271,7 +276,7 @@ class JobRepository:
                 drop_checkpoint(connection, attempt.job_id)
             if changed and output is not None:
                 more = {"job": attempt.job_id, "more": _bytes_of(output)}
-                connection.execute(statements.ADD_STORED, more)
+                connection.execute(job_statements.ADD_STORED, more)
                 self._store(connection, attempt, output, finished)
             return changed
 
@@ -366,21 +371,21 @@ class JobRepository:
     @staticmethod
     def _computed_before(connection: Connection, new: NewJob) -> str | None:
         known = {"hash": new.spec_hash, "owner": new.owner}
-        return connection.execute(statements.COMPUTED_BEFORE, known).scalar_one_or_none()
+        return connection.execute(job_statements.COMPUTED_BEFORE, known).scalar_one_or_none()
 
     def _insert(self, connection: Connection, new: NewJob, source: str | None) -> JobRow:
         """Insert a job; its row is what was written, not read again."""
         now = self.now()
-        values = {name: getattr(new, name) for name in statements.NEW_COLUMNS}
+        values = {name: getattr(new, name) for name in job_statements.NEW_COLUMNS}
         values |= {"id": new_id(), "created": now, "result_of": source, "state": JobState.ACCEPTED}
         if source is not None:
             values |= {"state": JobState.SUCCESSFUL, "started": now, "finished": now, "progress": 1.0}
-        written: dict[str, Any] = statements.INITIAL | values
+        written: dict[str, Any] = job_statements.INITIAL | values
         request, spec = encoded(new.request), encoded(new.spec)
         stored = {"request": request, "spec": spec, "stored_bytes": len(request) + len(spec)}
-        connection.execute(statements.INSERT_JOB, written | stored)
+        connection.execute(job_statements.INSERT_JOB, written | stored)
         insert_words(connection, written["id"], new.words, now)
-        return JobRow(**{name: written[name] for name in statements.ROW})
+        return JobRow(**{name: written[name] for name in job_statements.ROW})
 
     @staticmethod
     def _store(connection: Connection, attempt: Attempt, output: JobOutput, created: datetime) -> None:
@@ -388,7 +393,7 @@ class JobRepository:
         body = _text_of(output)
         text = body.encode()
         written = {"job_id": job_id, "body": body, "sha256": hashlib.sha256(text).hexdigest()}
-        connection.execute(statements.INSERT_RESULT, written)
+        connection.execute(job_statements.INSERT_RESULT, written)
         insert_sweeps(connection, job_id, output.sweeps, created, owner)
         if output.design is not None:
             insert_design(connection, job_id, output.design, created, owner)
