@@ -16,7 +16,8 @@ from pathlib import Path
 
 import httpx
 import pytest
-from fault_site import SCRIPT, free_port
+from fault_site import SCRIPT
+from launch import free_port
 
 from service.auth import authenticator
 from service.auth.callers import KeyLimits, Scope

@@ -102,6 +102,7 @@ def meets(record: DesignRecord, query: dict[str, Any]) -> bool:
     )
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize(
     "query",
     [

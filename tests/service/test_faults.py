@@ -30,7 +30,8 @@ from fault_kinds import (
     server_restarted,
     source_killed,
 )
-from fault_site import Site, clients, free_port
+from fault_site import Site, clients
+from launch import free_port
 from postgresql_cluster import Cluster
 from sqlalchemy import func, select
 

@@ -79,6 +79,7 @@ def meets(record: SweepRecord, query: dict[str, Any]) -> bool:
     )
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize(
     "query",
     [
