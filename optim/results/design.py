@@ -103,10 +103,10 @@ _PROVEN = (DesignStatus.OPTIMAL, DesignStatus.AT_BOUND)
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class DesignPeak(Piece):
-    """A peak of the response of a design: max|x| of the observed DOF [m] and its frequency [Hz]."""
+    """A peak of the response of a design."""
 
-    value: float
-    at: float
+    value: Annotated[float, "max|x| of the observed DOF [m]."]
+    at: Annotated[float, "Its frequency [Hz]."]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)

@@ -7,7 +7,6 @@ from typing import Any
 
 from service.jobs.kind_view import Json, Told
 from service.jobs.registry import Registry
-from service.rendering.tables import results
 from service.rendering.tables.text import print_pairs
 
 _FEW = 6
@@ -15,6 +14,9 @@ _FEW = 6
 
 def print_result(kind: str, result: Json) -> None:
     """Print a result: as the local command does, as its kind says, or by its keys."""
+    # Loaded here, as below: the help of a command prints no result.
+    from service.rendering.tables import results
+
     if results.knows(kind):
         results.of_kind(kind)(result)
         return

@@ -8,15 +8,13 @@ import sys
 from collections.abc import Mapping
 from enum import Enum
 from types import NoneType, UnionType
-from typing import Annotated, Any, Union, get_args, get_origin
+from typing import TYPE_CHECKING, Annotated, Any, Union, get_args, get_origin
 
-import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, create_model
 
-from solver.arrays import FloatOrNaN
-from solver.results.base import MadeOfResponses
-from solver.results.told import Told, json_keys
-from solver.scene.scene import Scene
+if TYPE_CHECKING:
+    from solver.results.told import Told
+
 
 Table = dict[str, Any]
 Amplitude = Annotated[float | None, Field(description="Displacement [m].")]
@@ -94,6 +92,10 @@ def result_model(kind: type[Told], name: str, **types: Any) -> type[KindResult]:
     types : of keys whose JSON has another one than the attribute, or none that is known here; of further keys
         their fields, as of `pydantic.create_model`.
     """
+    # Loaded here: the help of a command whose model is written out needs no numbers.
+    from solver.results.base import MadeOfResponses
+    from solver.results.told import json_keys
+
     keys = json_keys(kind)
     parts: dict[type[KindResult], bool] = {
         KnownResult: issubclass(kind, MadeOfResponses),
@@ -131,10 +133,17 @@ class _Names(dict[str, Any]):
     """What annotations name; what is there for type checkers alone is a part of a result."""
 
     def __missing__(self, _name: str) -> type[Told]:
+        from solver.results.told import Told
+
         return Told
 
 
 def _json_type(given: Any) -> Any:
+    import numpy as np
+
+    from solver.arrays import FloatOrNaN
+    from solver.scene.scene import Scene
+
     of, parts = get_origin(given), get_args(given)
     if of in (Union, UnionType):
         return Union[tuple(_json_type(one) for one in parts)]  # noqa: UP007 - made of what is found
