@@ -57,6 +57,7 @@ BODIES: dict[str, dict[str, Any]] = {
     "modes": {"scene": "two-dof", "from": 0.01, "to": 10.0, "harmonics": 3},
     "controlled": {"scene": "two-dof", "amplitude": 1.0, "harmonics": 3},
     "sensitivities": {"scene": "two-dof", "harmonics": 3},
+    "plan": {"scene": "two-dof"},
     "identify": {
         "scene": "two-dof", "unknowns": {"damper.N0": [20, 500]}, "harmonics": 3, "starts": 1,
         "data": [{"frequency": [0.9, 1.0, 1.1], "amplitude": [0.85, 1.95, 2.1]}],
