@@ -20,8 +20,8 @@ class Views:
     ----------
     package : where the modules ``summary``, ``to_dataset`` and ``plots.figures`` stand.
     summary, dataset : names of functions there.
-    figure : that of a function of ``plots.figures``, ``module.name`` of another one in ``plots``, or
-        ``module:name`` of one there that draws what `to_json` gives; empty where there is no picture.
+    figure : that of a function of ``plots.figures``, or ``module:name`` of one in ``plots`` that draws what
+        `to_json` gives; empty where there is no picture.
     """
 
     package: str
@@ -34,9 +34,7 @@ class Views:
         name = {"summary": self.summary, "to_dataset": self.dataset, "plots.figures": self.figure}[what]
         if ":" in name:
             return on_demand(f"{self.package}.plots.{name}")(result.to_json(), *arguments, **options)
-        home = name.replace(".", ":") if "." in name else f"figures:{name}"
-        place = f"plots.{home}" if what == "plots.figures" else f"{what}:{name}"
-        return on_demand(f"{self.package}.{place}")(result, *arguments, **options)
+        return on_demand(f"{self.package}.{what}:{name}")(result, *arguments, **options)
 
 
 def on_demand(place: str) -> Callable[..., Any]:
