@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from solver.studies.peaks.results import LeastPeak, PeakTrack
     from solver.studies.plan import Plan
 
+LEVEL = 1e-9  # relative difference of damping ratios that is none
 Pairs = list[tuple[str, str]]
 
 
@@ -179,7 +180,9 @@ def of_mode(found: NonlinearMode) -> Summary:
     """Frequency and damping ratio at both ends, and where it damps most."""
     pairs: Pairs = []
     if found.amplitude.size:
-        best = int(np.argmax(found.damping_ratio))
+        # Where damping is level, rounding would choose among its places.
+        most = found.damping_ratio.max()
+        best = int(np.argmax(found.damping_ratio >= most - LEVEL * abs(most)))
         for name, i in (("smallest", 0), ("most damping", best), ("largest", -1)):
             at = f"a = {found.amplitude[i]:.4g} √kg m"
             pairs.append((name, f"{found.frequency_hz[i]:.6g} Hz, ζ = {found.damping_ratio[i]:.5g} at {at}"))
