@@ -80,6 +80,11 @@ class Answer(NamedTuple):
         """Return what a result says of itself, and whether that is what was asked for."""
         return cls(found, found.to_json(), reached, str(found.status.value), found.plot)
 
+    @classmethod
+    def told(cls, json: dict[str, Any]) -> Answer:
+        """Return an answer of which there is nothing but its JSON."""
+        return cls(None, json, True, "")
+
     def beside(self, result: Drawn, **further: Any) -> Answer:
         """Return the answer with further keys, drawn and written as another result."""
         return self._replace(result=result, json={**self.json, **further}, plot=result.plot)
