@@ -69,7 +69,7 @@ def test_over_another_parameter() -> None:
 
 def test_a_resonance_without_damping_ends_the_branch() -> None:
     found = stickslip.sweep(one_mass(0.4), start=0.14, stop=0.18)
-    assert found.status is stickslip.BranchStatus.UNDAMPED
+    assert found.status is stickslip.branches.BranchStatus.UNDAMPED
     assert found.values[-1] < 0.5 / math.pi
     assert found.bifurcations.marks[-1].why == found.status.value
 
@@ -136,13 +136,13 @@ def test_random_scenes_are_what_single_solves_find(seed: int) -> None:
 
 def test_where_a_rigid_normal_contact_opens_the_branch_ends() -> None:
     found = stickslip.sweep(pressed(math.inf, N0=1.2), start=0.12, stop=0.3)
-    assert found.status is stickslip.BranchStatus.RIGID_OPENS
+    assert found.status is stickslip.branches.BranchStatus.RIGID_OPENS
     assert 0.12 < found.values[-1] < 0.3
     opens = pressed(math.inf, N0=1.2)
     assert stickslip.march(opens, frequency_hz=float(found.values[-1]) - 0.01).converged
     assert not stickslip.march(opens, frequency_hz=float(found.values[-1]) + 0.01).converged
     nothing = stickslip.sweep(pressed(math.inf, N0=0.5), start=0.12, stop=0.3)
-    assert nothing.status is stickslip.BranchStatus.RIGID_OPENS
+    assert nothing.status is stickslip.branches.BranchStatus.RIGID_OPENS
     assert len(nothing.values) == 0
     assert nothing.peak is None
     assert nothing.to_json()["points"] == 0
@@ -175,15 +175,15 @@ def test_it_is_watched_and_stopped() -> None:
         on_points=lambda values, amplitudes: (seen.extend(values), heights.extend(amplitudes)),
         on_progress=lambda share, _count: shares.append(share), should_stop=lambda: len(seen) == 7,
     )  # fmt: skip
-    assert found.status is stickslip.BranchStatus.STOPPED
+    assert found.status is stickslip.branches.BranchStatus.STOPPED
     assert len(seen) == 7
     assert seen == sorted(seen)
     assert shares == sorted(shares)
     assert set(seen) <= set(found.values.tolist())
     few = stickslip.sweep(
-        damped(0.4, 0.05), start=0.1, stop=0.2, settings=stickslip.ContinuationSettings(most_points=4)
+        damped(0.4, 0.05), start=0.1, stop=0.2, settings=stickslip.branches.ContinuationSettings(most_points=4)
     )
-    assert few.status is stickslip.BranchStatus.TOO_MANY_POINTS
+    assert few.status is stickslip.branches.BranchStatus.TOO_MANY_POINTS
 
 
 def test_what_needs_a_balance_refuses_by_name() -> None:
@@ -197,7 +197,7 @@ def test_what_needs_a_balance_refuses_by_name() -> None:
             study()
     branch = stickslip.sweep(scene, start=0.1, stop=0.12)
     with pytest.raises(stickslip.SettingError, match="orbits"):
-        stickslip.switch_branches(branch)
+        stickslip.branches.switch_branches(branch)
     assert not isinstance(branch, Branch)
     for name in ("guess", "resume"):
         with pytest.raises(stickslip.SettingError, match=name):
