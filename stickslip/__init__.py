@@ -5,8 +5,8 @@
     scene = stickslip.load_scene("bladed-disk")
     best = stickslip.design(scene, variables={"shroud.N0": (20.0, 3000.0)})
 
-What a script asks stands here; what goes further, by subject: `stickslip.modes`, `.disks`, `.peaks`, `.wear`, ….
-Every name is the very object of `solver` or `optim`. It is loaded on first use, so that importing costs nothing.
+What a script asks stands here; what goes further, by subject: `stickslip.modes`, `stickslip.disks`, ….
+Every name is the very object of `solver` or `optim`, loaded on first use, so that importing costs nothing.
 """
 
 from solver.first_use import names_of, on_first_use
@@ -33,7 +33,7 @@ def __getattr__(name: str) -> object:
         if name in vars(module):
             import warnings
 
-            told = f"stickslip.{name} is stickslip.{subject}.{name} now; the short form goes with the next version"
+            told = f"stickslip.{name} is stickslip.{subject}.{name} now; the short form goes with 0.2"
             warnings.warn(told, DeprecationWarning, stacklevel=2)
             return getattr(module, name)
     return _load(name)

@@ -65,7 +65,8 @@ def test_completion_offers_every_public_name(module: object) -> None:
 def test_what_is_not_there_is_said() -> None:
     with pytest.raises(AttributeError, match=r"module 'stickslip' has no attribute 'solv'") as raised:
         stickslip.solv  # type: ignore[attr-defined]  # noqa: B018
-    assert (raised.value.name, raised.value.obj) == ("solv", stickslip)  # Python asks "Did you mean: 'solve'?"
+    # By these Python asks "Did you mean: 'solve'?"
+    assert (raised.value.name, raised.value.obj) == ("solv", stickslip)
     with pytest.raises(ImportError):
         from stickslip import solv  # type: ignore[attr-defined]  # noqa: F401
 

@@ -56,7 +56,9 @@ def test_solve_loads_what_it_computes_with(scene: str) -> None:
 
 
 ENTRIES = [
-    one for entry in TOP.values() for one in (entry.entries if isinstance(entry, Entries) else [entry])
+    one
+    for entry in TOP.values()
+    for one in (entry.entries if isinstance(entry, Entries) else [entry])
     if not one.group
 ]
 

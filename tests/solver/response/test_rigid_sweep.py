@@ -38,7 +38,7 @@ def test_every_point_is_den_hartogs(F: float, low: float, high: float) -> None:
     for begin, end in ((start, stop), (stop, start)):
         found = stickslip.sweep(one_mass(F), start=begin, stop=end, limit=limit)
         assert isinstance(found, ExactBranch)
-        assert found.completed
+        assert found.reached
         assert found.values[0] == begin
         assert found.values[-1] == end
         assert found.amplitude == pytest.approx([amplitude(hz, F) for hz in found.values], rel=1e-10)
@@ -59,7 +59,7 @@ def test_over_another_parameter() -> None:
     """Over the load at a fixed frequency, with stops and without."""
     b = 1.5
     found = stickslip.sweep(one_mass(0.2), "f.N0", 0.3, 0.75, frequency_hz=b / (2.0 * math.pi))
-    assert found.completed
+    assert found.reached
     assert found.band is None
     assert found.amplitude[0] == pytest.approx(without_stops(b, 0.3), rel=1e-10)
     assert found.amplitude[-1] == pytest.approx(with_stops(b, 0.75), rel=1e-10)
@@ -76,7 +76,7 @@ def test_a_resonance_without_damping_ends_the_branch() -> None:
 
 def test_friction_above_a_quarter_of_pi_of_the_force_bounds_it() -> None:
     bounded = stickslip.sweep(one_mass(0.8), start=0.15, stop=0.2)
-    assert bounded.completed
+    assert bounded.reached
     assert bounded.amplitude[-1] == pytest.approx(with_stops(0.4 * math.pi, 0.8), rel=1e-10)
     i = int(np.argmax(bounded.amplitude))
     marched = stickslip.march(one_mass(0.8), frequency_hz=float(bounded.values[i]))
@@ -124,7 +124,7 @@ def test_random_scenes_are_what_single_solves_find(seed: int) -> None:
     """Elastic contacts, gaps, loads that vary and move beside rigid ones."""
     scene, hz = random_scene(seed)
     found = stickslip.sweep(scene, start=0.95 * hz, stop=1.05 * hz)
-    assert found.completed
+    assert found.reached
     for i in range(0, len(found.values), max(len(found.values) // 5, 1)):
         alone = stickslip.solve(scene, frequency_hz=float(found.values[i]))
         if not alone.converged or "history_dependent" in alone.flags:
@@ -180,9 +180,8 @@ def test_it_is_watched_and_stopped() -> None:
     assert seen == sorted(seen)
     assert shares == sorted(shares)
     assert set(seen) <= set(found.values.tolist())
-    few = stickslip.sweep(
-        damped(0.4, 0.05), start=0.1, stop=0.2, settings=stickslip.branches.ContinuationSettings(most_points=4)
-    )
+    settings = stickslip.branches.ContinuationSettings(most_points=4)
+    few = stickslip.sweep(damped(0.4, 0.05), start=0.1, stop=0.2, settings=settings)
     assert few.status is stickslip.branches.BranchStatus.TOO_MANY_POINTS
 
 
