@@ -12,7 +12,7 @@ import re
 import sys
 import tokenize
 import tomllib
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterator
 from html import escape
 from itertools import pairwise
@@ -20,6 +20,7 @@ from pathlib import Path
 
 PACKAGES = ("solver", "optim", "service")
 RUN = 6  # lines of the same shape that make a pair of duplicates
+PARAMETERS = 14
 COMMON = 8  # a run that stands in more places is an idiom, not a duplicate
 
 
@@ -95,9 +96,37 @@ class House:
                     found[upper].add(lower)
         return {name: len(inside) for name, inside in sorted(found.items())}
 
-    def lines(self) -> int:
-        """Lines of the sources."""
-        return sum(len(path.read_text("utf-8").splitlines()) for path in self.files.values())
+    def lines(self) -> str:
+        """Lines of the sources, in all and of each package."""
+        of = {package: self.lines_below(package) for package in PACKAGES}
+        return f"{sum(of.values())}: {', '.join(f'{package} {count}' for package, count in of.items())}"
+
+    def lines_below(self, *folders: str, end: str = "py") -> int:
+        """Lines of the files below folders."""
+        found = [path for folder in folders for path in (self.root / folder).rglob(f"*.{end}")]
+        return sum(len(path.read_text("utf-8").splitlines()) for path in found)
+
+    def twice(self) -> tuple[int, int]:
+        """How many names of classes, and of modules, stand for more than one."""
+        classes = [
+            node.name
+            for tree in self.trees.values()
+            for node in ast.walk(tree)
+            if isinstance(node, ast.ClassDef)
+        ]
+        modules = [name.rpartition(".")[2] for name, path in self.files.items() if path.stem != "__init__"]
+        return _repeated(classes), _repeated(modules)
+
+    def with_many_parameters(self) -> list[str]:
+        """Functions outside kernels that take `PARAMETERS` or more."""
+        return [
+            f"{name}.{node.name} {count}"
+            for name, tree in self.trees.items()
+            if "kernels" not in name.split(".") and not name.startswith("solver.jit")
+            for node in ast.walk(tree)
+            if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
+            and (count := len(node.args.posonlyargs + node.args.args + node.args.kwonlyargs)) >= PARAMETERS
+        ]
 
     def with_word(self, word: str) -> int:
         """Files of the packages, the page among them, that name something."""
@@ -131,6 +160,10 @@ class House:
                     if one != other or abs(at - elsewhere) >= RUN:
                         shared[one, other].add(at)
         return len(shared)
+
+
+def _repeated(names: list[str]) -> int:
+    return sum(count > 1 for count in Counter(names).values())
 
 
 def _reached(ahead: dict[str, set[str]], name: str) -> set[str]:
@@ -186,7 +219,12 @@ def report(house: House) -> list[tuple[str, str]]:
     every = ("at once", "late", "for types")
     return [
         ("modules", str(len(house.files))),
-        ("source lines", str(house.lines())),
+        ("source lines", house.lines()),
+        ("lines of the page's scripts", str(house.lines_below("service/page/js", end="js"))),
+        ("lines of the tests", str(house.lines_below("tests"))),
+        ("names of classes twice", str(house.twice()[0])),
+        ("names of modules twice", str(house.twice()[1])),
+        (f"functions with {PARAMETERS} parameters", ", ".join(house.with_many_parameters()) or "none"),
         ("most entries in a folder", ", ".join(f"{name} {entries[name]}" for name in largest)),
         ("longest chain of imports", str(house.depth())),
         ("modules in circles, imports at once", str(sum(map(len, house.circles("at once"))))),
