@@ -110,12 +110,9 @@ def _on_plane(
     system: System, linear: Receptance, point: Evaluation, left: Real, right: Real, folds: bool, share: float,
     most: int, sharp: bool, found: Real, tangent: Real, x: Real, out: Real,
 ) -> tuple[bool, int]:  # fmt: skip
-    """Solve as `between` from the guess in `found`; `folds`: whether the branch turns between the points.
-
-    `sharp`: with one step more, by the factors of the tangent.
-    """
+    """Solve as `between` from the guess in `found`; `folds`: whether the branch turns between the points."""
     n = left.size - 1
-    chord, plane, u = np.empty(n + 1), np.empty(n), np.empty(n)
+    chord, plane = np.empty(n + 1), np.empty(n + 1)
     set_to(chord, right, -1.0, left)
     size, span = max(largest_entry(left[:n]), system.least_size), abs(chord[n])
     weight_u = 1.0 / (size * size) if size > 0.0 else 1.0
@@ -124,9 +121,33 @@ def _on_plane(
         # λ goes there and back, and only u tells the places on the arc apart.
         weight_p *= _AT_A_FOLD
     set_to(plane, left, share, chord)
-    copy_to(u, found)
+    return solve_on_plane(
+        system, linear, point, plane, chord, weight_u, weight_p, most, sharp, found, tangent, x, out
+    )
+
+
+@apart
+def solve_on_plane(
+    system: System, linear: Receptance, point: Evaluation, plane: Real, chord: Real, weight_u: float,
+    weight_p: float, most: int, sharp: bool, found: Real, tangent: Real, x: Real, out: Real,
+) -> tuple[bool, int]:  # fmt: skip
+    """Solve from the guess in `found` on the plane through a point across a chord, and measure there.
+
+    Parameters
+    ----------
+    plane, chord : (nt + 1,), λ last, as are the weights of the scalar product; with weight_u = 0 that is at
+        the λ of the plane.
+    sharp : with one step more, by the factors of the tangent.
+    most, found, tangent, x, out : as in `between`; the tangent is by the share of the chord.
+
+    Returns
+    -------
+    (converged, Newton iterations).
+    """
+    n = plane.size - 1
+    u = found[:n].copy()
     good, iterations, p, norm = arc_newton(
-        system, linear, u, found[n], plane, left[n] + share * chord[n], chord, weight_u, weight_p, point, most
+        system, linear, u, found[n], plane, plane[n], chord, weight_u, weight_p, point, most
     )
     if not good:
         return False, iterations
@@ -139,12 +160,12 @@ def _on_plane(
         tangent[n] += weight_u * chord[i] * chord[i]
     step_back(system, point, tangent)
     if sharp and norm > _ROUNDED:
-        copy_to(chord[:n], point.residual)
-        chord[n] = 0.0
-        rebase(system, linear, u, point, chord)
-        step_back(system, point, chord)
-        set_to(found[:n], u, -1.0, chord[:n])
-        found[n] = p - chord[n]
+        step = np.zeros(n + 1)
+        copy_to(step[:n], point.residual)
+        rebase(system, linear, u, point, step)
+        step_back(system, point, step)
+        set_to(found[:n], u, -1.0, step[:n])
+        found[n] = p - step[n]
         receptance(system, found[n], linear)
         again = evaluate(system, linear, found[:n], found[n], 0.0, point)
         if again < norm:
