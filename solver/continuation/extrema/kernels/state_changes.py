@@ -13,6 +13,7 @@ import math
 import numpy as np
 
 from solver.balance.kernels.locate import solve_on_plane
+from solver.balance.kernels.newton import newton
 from solver.balance.kernels.output import HIGH, HIGH_SLOPE, LOW, LOW_SLOPE, PIECE, piece
 from solver.balance.kernels.residual import contact_values, element
 from solver.contacts.kernels.columns import KT, MU
@@ -23,6 +24,7 @@ from solver.jit.decorators import compiled
 from solver.jit.fourier import Integer, Real, coefficient_count
 from solver.jit.lapack import copy_to
 from solver.jit.separate import apart
+from solver.linear.kernels.receptance import receptance
 
 _FORETOLD = 5  # halvings of the interpolated motion: the cubic is no better than their result
 _BEYOND = 0.1  # share of a step between two solutions by which the next one goes beyond the change foretold
@@ -145,12 +147,22 @@ def locate_change(
         margin = _NEAREST * (hi - lo)
         p = lo + margin if (p - lo) * (hi - lo) < margin * (hi - lo) else p
         p = hi - margin if (hi - p) * (hi - lo) < margin * (hi - lo) else p
-        _interpolated(found, ways, (p - lo) / (hi - lo), row[:n])
-        row[n] = p
-        good, iterations = solve_on_plane(
-            system, linear, point, row.copy(), onward, 0.0, 1.0, most, False, row, way, at, out
-        )
-        total += iterations
+        good, share = False, (p - lo) / (hi - lo)
+        for damped in range(2):
+            _interpolated(found, ways, share, row[:n])
+            row[n] = p
+            if damped == 1:
+                receptance(system, p, linear)
+                reached, iterations, _ = newton(system, linear, row[:n], p, 0.0, point)
+                total += iterations
+                if not reached:
+                    break
+            good, iterations = solve_on_plane(
+                system, linear, point, row.copy(), onward, 0.0, 1.0, most, False, row, way, at, out
+            )
+            total += iterations
+            if good:
+                break
         if not (good and math.isfinite(out[HIGH] + out[LOW] + out[HIGH_SLOPE] + out[LOW_SLOPE])):
             break
         behind = piece(point) != measures[0, PIECE]
