@@ -52,6 +52,7 @@ from solver.jit.lapack import (
     fill,
     fill_block,
     invert,
+    largest_entry,
     multiply,
     set_to,
     take_block,
@@ -290,23 +291,28 @@ def factorise(
 
 @apart
 def _border(system: System, point: Evaluation, tangent: Real, weight_u: float, weight_p: float) -> None:
-    """Put G T dr/dλ and the tangent, of forces, around the leading block of the factors."""
+    """Put G T dr/dλ and the tangent, of forces, around the leading block of the factors.
+
+    The tangent is scaled to 1: pivots are chosen among equations.
+    """
     n, nt, lu = coefficient_count(system.ks), point.border.size, point.lu
     kept, gone = point.free[: point.counts[FREE]], point.held[: point.counts[HELD]]
     corner, end, along = weight_p * tangent[nt], kept.size * n, np.zeros(nt)
-    _settled(system, point, point.dr_dp, point.settled)
+    _settled(system, point, point.dr_dp, point.settled[:nt])
     for i in range(nt):
         point.border[i] = weight_u * tangent[i]
         corner -= point.border[i] * point.settled[i]
     forces = point.work[0, :nt]
-    slopes_times(system, point, False, point.settled, forces)
+    slopes_times(system, point, False, point.settled[:nt], forces)
     _gather(n, kept, forces, lu[end])
     _times(system, point, kept, kept, True, point.border, -1.0, along)
     _times(system, point, kept, gone, True, point.border, -1.0, along)
     _gather(n, kept, along, forces)
+    most = max(largest_entry(forces[:end]), abs(corner))
+    scale = 1.0 / most if most > 0.0 else 1.0
     for i in range(end):
-        lu[i, end] = forces[i]
-    lu[end, end] = corner
+        lu[i, end] = scale * forces[i]
+    lu[end, end], point.settled[nt] = scale * corner, scale
 
 
 @apart
@@ -330,6 +336,7 @@ def step_back(system: System, point: Evaluation, x: Real) -> None:
         rhs[end] = x[nt]
         for i in range(nt):
             rhs[end] -= point.border[i] * motions[i]
+        rhs[end] *= point.settled[nt]
     if size > 0:
         back_substitute_transposed(point.lu, size, point.pivots, rhs)
     _spread(n, kept, rhs, forces)

@@ -147,7 +147,7 @@ class Evaluation(NamedTuple):
     responses: Complex  # (nk, nc, nc) R in the columns of ports kept, V and D⁻¹ in those of ports eliminated,
     # likewise below; see `solver.balance.kernels.jacobian`. Of leading ports (nk, r, r), Â
     border: Real  # (nt,) the weighted tangent
-    settled: Real  # (nt,) T dr/dλ
+    settled: Real  # (nt + 1,) T dr/dλ, and what the border is scaled with
     work: Real  # (3, nt + 1) scratch
     gauge: Real  # (nr, nc) motions of the ports that nothing holds, see `solver.balance.kernels.gauge`
     unheld: Real  # (nr, nr) forces along them, over the rigid-body motions
@@ -306,7 +306,7 @@ def _new_evaluation(system: System, spanned: bool) -> Evaluation:
         np.empty((whole, whole)),
         np.empty((size + 1, size + 1)), np.zeros(nt + 1, np.int32), np.zeros(nc, np.int64),
         np.zeros(nc, np.int64), np.zeros(COUNTS, np.int64), np.zeros((blocks, n, n)),
-        np.empty((nk, kept, kept), np.complex128), np.zeros(nt),
-        np.zeros(nt), np.zeros((3, nt + 1)), np.zeros((rigid, nc)), np.zeros((rigid, rigid)), np.zeros(nc),
-        np.zeros((rigid, nc)), np.empty((nc, r * n)), np.empty((n, r, r * n)), np.empty((4 * r, r * n)),
+        np.empty((nk, kept, kept), np.complex128), np.zeros(nt), np.zeros(nt + 1), np.zeros((3, nt + 1)),
+        np.zeros((rigid, nc)), np.zeros((rigid, rigid)), np.zeros(nc), np.zeros((rigid, nc)),
+        np.empty((nc, r * n)), np.empty((n, r, r * n)), np.empty((4 * r, r * n)),
     )  # fmt: skip

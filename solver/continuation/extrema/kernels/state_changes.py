@@ -19,7 +19,7 @@ from solver.balance.kernels.residual import contact_values, element
 from solver.contacts.kernels.columns import KT, MU
 from solver.contacts.kernels.state_durations import find_segments
 from solver.contacts.kernels.stick_slip_events import piece_of
-from solver.contacts.kernels.system import Evaluation, Receptance, System
+from solver.contacts.kernels.system import SIZE, Evaluation, Receptance, System
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Integer, Real, coefficient_count
 from solver.jit.lapack import copy_to
@@ -28,6 +28,7 @@ from solver.linear.kernels.receptance import receptance
 
 _FORETOLD = 5  # halvings of the interpolated motion: the cubic is no better than their result
 _BEYOND = 0.1  # share of a step between two solutions by which the next one goes beyond the change foretold
+_LARGE = 100  # unknowns from which steps are tried first for which old factors may serve
 _NEAREST = 1e-3  # share of the interval left next to an end
 
 
@@ -148,7 +149,7 @@ def locate_change(
         p = lo + margin if (p - lo) * (hi - lo) < margin * (hi - lo) else p
         p = hi - margin if (hi - p) * (hi - lo) < margin * (hi - lo) else p
         good, share = False, (p - lo) / (hi - lo)
-        for damped in range(2):
+        for damped in range(0 if point.counts[SIZE] >= _LARGE else 1, 2):
             _interpolated(found, ways, share, row[:n])
             row[n] = p
             if damped == 1:
