@@ -8,10 +8,14 @@ the others (`free`) are looked at, and
 
   D = I + A_hh g,  V = A_fh g D⁻¹,  T b = (b_f − V b_h, D⁻¹ b_h),  R = (A_ff − V A_hf, D⁻¹ A_hf),
 
-the step δ that solves dr/du δ = b is T b − R φ with the forces φ of the free ports, (I + G R) φ = G T b, and
-det (I + G R) det D = det dr/du. A bordered system [dr/du d; tᵀ w] condenses to
+the step δ that solves dr/du δ = b is T b − R φ with the forces φ of the free ports. Where friction feels
+ports that are eliminated these are the unknowns, (I + G R) φ = G T b, and a bordered system [dr/du d; tᵀ w]
+condenses to
 
   [I + G R, G T d; −tᵀ R, w − tᵀ T d].
+
+Elsewhere the motions are, φ = G δ_f and (I + R_ff G) δ_f = (T b)_f, which loses nothing near resonances that
+nothing damps: there T b and R φ cancel. Both have the sign of det dr/du.
 
 Nothing is approximated: a contact that begins to slip is free at the next evaluation. Where fewer leading
 ports move all others, `solver.balance.kernels.coordinates` takes its place.
@@ -35,7 +39,7 @@ from solver.contacts.kernels.system import (
     AT_BRANCH_POINT,
     FREE,
     HELD,
-    PINNED,
+    MIXED,
     SIZE,
     UNHELD,
     Evaluation,
@@ -49,6 +53,7 @@ from solver.jit.lapack import (
     back_substitute_transposed,
     copy_block,
     copy_to,
+    dot,
     fill,
     fill_block,
     invert,
@@ -110,16 +115,20 @@ def whole_jacobian(system: System, A: Complex, point: Evaluation, J: Real) -> No
 @compiled
 def _part(system: System, point: Evaluation) -> None:
     """Divide the ports into those kept and those eliminated; all are kept where nothing holds a part."""
-    free, held = 0, 0
+    free, held, mixed, before = 0, 0, 0, False
     whole = system.condense == 0 or point.counts[UNHELD] > 0
     for c in range(system.owner.size):
-        if whole or math.isnan(point.slopes[c]) or point.elastic[c] > 0.0:
+        kept = whole or math.isnan(point.slopes[c]) or point.elastic[c] > 0.0
+        if c > 0 and system.owner[c] == system.owner[c - 1] and kept != before:
+            mixed = 1
+        before = kept
+        if kept:
             point.free[free] = c
             free += 1
         else:
             point.held[held] = c
             held += 1
-    point.counts[FREE], point.counts[HELD] = free, held
+    point.counts[FREE], point.counts[HELD], point.counts[MIXED] = free, held, mixed
 
 
 @apart
@@ -165,6 +174,32 @@ def _eliminate(system: System, linear: Receptance, point: Evaluation) -> bool:
 
 @apart
 def _assemble(system: System, point: Evaluation) -> None:
+    """Fill the leading block of the factors with I + R G of the free ports."""
+    n, free, J, kept = coefficient_count(system.ks), point.counts[FREE], point.lu, point.free
+    for i in range(free * n):
+        fill(J[i, : free * n], 0.0)
+    for i in range(system.ks.size):
+        here, has_sine = cosine_position(system.ks, i), system.ks[i] > 0
+        for a in range(free):
+            row, b = a * n + here, 0
+            while b < free:
+                # The ports of an element are free together, and stand side by side.
+                e = system.owner[kept[b]]
+                m = system.first_port[e + 1] - system.first_port[e]
+                for d in range(m):
+                    response = point.responses[i, kept[a], kept[b + d]]
+                    for q in range(m):
+                        G = point.G[system.first_block[e] + d * m + q]
+                        _add_block(J, G, row, (b + q) * n, here, response, has_sine)
+                b += m
+            J[row, row] += 1.0
+            if has_sine:
+                J[row + 1, row + 1] += 1.0
+    keep_means(system, point, J, n)
+
+
+@apart
+def _assemble_mixed(system: System, point: Evaluation) -> None:
     """Fill the leading block of the factors with the transpose of I + G R."""
     n, free, lu = coefficient_count(system.ks), point.counts[FREE], point.lu
     columns = np.empty((n, n))
@@ -185,13 +220,6 @@ def _assemble(system: System, point: Evaluation) -> None:
                     if r != 0.0:
                         here = cosine_position(system.ks, i)
                         _add_rows(lu, columns, b * n + here, a * n, here, r, system.ks[i] > 0)
-    for k in range(point.counts[PINNED]):
-        for b in range(free):
-            along = 0.0
-            for c in range(free):
-                along += point.pinned[k, c] * point.responses[0, c, b].real
-            for a in range(free):
-                lu[b * n, a * n] += point.pinned[k, a] * along
 
 
 @compiled
@@ -253,6 +281,15 @@ def _gather(n: int, ports: Integer, source: Real, target: Real) -> None:
 
 
 @compiled
+def _dot_of(n: int, ports: Integer, one: Real, other: Real) -> float:
+    """Return the scalar product of the coefficients of some ports."""
+    total = 0.0
+    for c in ports:
+        total += dot(one[c * n : (c + 1) * n], other[c * n : (c + 1) * n])
+    return total
+
+
+@compiled
 def _spread(n: int, ports: Integer, source: Real, target: Real) -> None:
     """Copy them back."""
     for a in range(ports.size):
@@ -279,7 +316,10 @@ def factorise(
     take_slopes(system, point)
     if not _eliminate(system, linear, point):
         return 0.0
-    _assemble(system, point)
+    if point.counts[MIXED] == 0:
+        _assemble(system, point)
+    else:
+        _assemble_mixed(system, point)
     size = point.counts[FREE] * coefficient_count(system.ks)
     point.counts[AT_BRANCH_POINT] = 0
     if weight_p > 0.0:
@@ -291,9 +331,9 @@ def factorise(
 
 @apart
 def _border(system: System, point: Evaluation, tangent: Real, weight_u: float, weight_p: float) -> None:
-    """Put G T dr/dλ and the tangent, of forces, around the leading block of the factors.
+    """Put dr/dλ and the tangent, of motions or forces, around the leading block of the factors.
 
-    The tangent is scaled to 1: pivots are chosen among equations.
+    That of forces is scaled to 1: pivots are chosen among equations.
     """
     n, nt, lu = coefficient_count(system.ks), point.border.size, point.lu
     kept, gone = point.free[: point.counts[FREE]], point.held[: point.counts[HELD]]
@@ -301,8 +341,17 @@ def _border(system: System, point: Evaluation, tangent: Real, weight_u: float, w
     _settled(system, point, point.dr_dp, point.settled[:nt])
     for i in range(nt):
         point.border[i] = weight_u * tangent[i]
-        corner -= point.border[i] * point.settled[i]
     forces = point.work[0, :nt]
+    if point.counts[MIXED] == 0:
+        _times(system, point, kept, gone, True, point.border, 1.0, along)
+        slopes_times(system, point, True, along, forces)
+        for a in range(kept.size):
+            for i in range(n):
+                at = kept[a] * n + i
+                lu[a * n + i, end], lu[end, a * n + i] = point.settled[at], point.border[at] - forces[at]
+        lu[end, end] = corner - _dot_of(n, gone, point.border, point.settled)
+        return
+    corner -= dot(point.border, point.settled[:nt])
     slopes_times(system, point, False, point.settled[:nt], forces)
     _gather(n, kept, forces, lu[end])
     _times(system, point, kept, kept, True, point.border, -1.0, along)
@@ -330,29 +379,40 @@ def step_back(system: System, point: Evaluation, x: Real) -> None:
     kept, gone = point.free[: point.counts[FREE]], point.held[: point.counts[HELD]]
     end, motions, forces, rhs = kept.size * n, point.work[0, :nt], point.work[1, :nt], point.work[2]
     _settled(system, point, x[:nt], motions)
-    slopes_times(system, point, False, motions, forces)
-    _gather(n, kept, forces, rhs)
-    if size > end:
-        rhs[end] = x[nt]
-        for i in range(nt):
-            rhs[end] -= point.border[i] * motions[i]
-        rhs[end] *= point.settled[nt]
-    if size > 0:
+    mixed = point.counts[MIXED] == 1
+    if mixed:
+        slopes_times(system, point, False, motions, forces)
+        _gather(n, kept, forces, rhs)
+        if size > end:
+            rhs[end] = (x[nt] - dot(point.border, motions)) * point.settled[nt]
         back_substitute_transposed(point.lu, size, point.pivots, rhs)
-    _spread(n, kept, rhs, forces)
+        _spread(n, kept, rhs, forces)
+    else:
+        _gather(n, kept, motions, rhs)
+        if size > end:
+            rhs[end] = x[nt] - _dot_of(n, gone, point.border, motions)
+        back_substitute(point.lu, size, point.pivots, rhs)
     copy_to(x[:nt], motions)
     if size > end:
         x[nt] = rhs[end]
         set_to(x[:nt], motions, -rhs[end], point.settled)
-    _times(system, point, kept, kept, False, forces, -1.0, x)
-    _times(system, point, gone, kept, False, forces, -1.0, x)
+    if mixed:
+        _times(system, point, kept, kept, False, forces, -1.0, x)
+    else:
+        _spread(n, kept, rhs, x)
+        if gone.size > 0:
+            fill(motions, 0.0)
+            _spread(n, kept, rhs, motions)
+            slopes_times(system, point, False, motions, forces)
+    if gone.size > 0:
+        _times(system, point, gone, kept, False, forces, -1.0, x)
 
 
 @apart
 def step_back_transposed(system: System, point: Evaluation, x: Real) -> None:
     """Solve with the transpose of what `factorise` factorised without a border, in place.
 
-    λ = Tᵀ (b − G_fᵀ (I + G_f R)⁻ᵀ Rᵀ b).
+    λ = Tᵀ (b − G_fᵀ (I + G_f R)⁻ᵀ Rᵀ b), or Tᵀ (λ_f, b_h) with (I + R G)ᵀ λ_f = b_f − Gᵀ R_hfᵀ b_h.
 
     Parameters
     ----------
@@ -365,15 +425,22 @@ def step_back_transposed(system: System, point: Evaluation, x: Real) -> None:
     kept, gone = point.free[: point.counts[FREE]], point.held[: point.counts[HELD]]
     forces, motions, rhs = point.work[0, :nt], point.work[1, :nt], point.work[2]
     fill(forces, 0.0)
-    _times(system, point, kept, kept, True, x, 1.0, forces)
     _times(system, point, kept, gone, True, x, 1.0, forces)
-    _gather(n, kept, forces, rhs)
-    if size > 0:
+    if point.counts[MIXED] == 0:
+        slopes_times(system, point, True, forces, motions)
+        set_to(motions, x, -1.0, motions)
+        _gather(n, kept, motions, rhs)
+        back_substitute_transposed(point.lu, size, point.pivots, rhs)
+        copy_to(motions, x)
+        _spread(n, kept, rhs, motions)
+    else:
+        _times(system, point, kept, kept, True, x, 1.0, forces)
+        _gather(n, kept, forces, rhs)
         back_substitute(point.lu, size, point.pivots, rhs)
-    fill(forces, 0.0)
-    _spread(n, kept, rhs, forces)
-    slopes_times(system, point, True, forces, motions)
-    set_to(motions, x, -1.0, motions)
+        fill(forces, 0.0)
+        _spread(n, kept, rhs, forces)
+        slopes_times(system, point, True, forces, motions)
+        set_to(motions, x, -1.0, motions)
     _settled_transposed(system, point, motions, x)
 
 
