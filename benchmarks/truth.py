@@ -122,10 +122,10 @@ class _Tally:
         """Judge points of a branch, spread over it."""
         branch = solver.sweep(scene, harmonics=harmonics)
         self.endings[f"sweep {branch.status.name}"] += 1
-        for i in np.unique(np.linspace(0, len(branch.values) - 1, POINTS).astype(int)):
-            if i >= 0:
-                self.points += 1
-                self.judge(described_at(branch, int(i)), f"{name}, {branch.values[i]:g} Hz")
+        n = len(branch.values)
+        for i in {i * (n - 1) // (POINTS - 1) for i in range(POINTS)} if n else ():
+            self.points += 1
+            self.judge(described_at(branch, i), f"{name}, {branch.values[i]:g} Hz")
 
 
 def truth() -> None:

@@ -10,7 +10,7 @@ from alembic import context
 from sqlalchemy import Connection
 
 from service.db.engine import migration_engine
-from service.db.run_models import Project
+from service.db.models import Project
 from service.settings.settings import load_settings
 
 

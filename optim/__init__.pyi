@@ -8,10 +8,10 @@ from .robust.robust import robust_design as robust_design
 from .search import design as design
 from .studies.campbell import campbell_diagram as campbell_diagram, forbidden_hz as forbidden_hz
 from .studies.crossings import CampbellDiagram as CampbellDiagram, CampbellStatus as CampbellStatus
-from .studies.elasticities import (
-    SensitivityResult as SensitivityResult,
-    SensitivityStatus as SensitivityStatus,
-    sensitivities as sensitivities,
-)
+from .studies.elasticities import sensitivities as sensitivities
 from .studies.pareto import pareto_front as pareto_front
 from .studies.pareto_result import ParetoResult as ParetoResult, ParetoStatus as ParetoStatus
+from .studies.sensitivity_result import (
+    SensitivityResult as SensitivityResult,
+    SensitivityStatus as SensitivityStatus,
+)

@@ -22,12 +22,13 @@ from .errors import (
 )
 from .marching.march import march as march
 from .marching.start import MarchStart as MarchStart
-from .modes.driven.controlled import (
+from .modes.driven.controlled import held_amplitude as held_amplitude
+from .modes.driven.phase_resonance import phase_resonance as phase_resonance
+from .modes.driven.results import (
     HeldAmplitude as HeldAmplitude,
     HeldStatus as HeldStatus,
-    held_amplitude as held_amplitude,
+    PhaseResonance as PhaseResonance,
 )
-from .modes.driven.phase_resonance import PhaseResonance as PhaseResonance, phase_resonance as phase_resonance
 from .modes.gradient import ModeGradient as ModeGradient, mode_gradient as mode_gradient
 from .modes.limit_cycles import (
     LimitCycle as LimitCycle,
@@ -74,7 +75,7 @@ from .response.wear import (
     WearSensitivity as WearSensitivity,
     contact_wear as contact_wear,
 )
-from .response.wear_nonsmooth import worst_slopes as worst_slopes
+from .response.worst_wear import worst_slopes as worst_slopes
 from .response.worst_wear import (
     Measure as Measure,
     WorstWear as WorstWear,
@@ -87,7 +88,7 @@ from .results.told import Summary as Summary
 from .scene.builder import SceneBuilder as SceneBuilder
 from .scene.cyclic.annulus import Extent as Extent, annulus as annulus, sectors_needed as sectors_needed
 from .scene.scene import Scene as Scene, load_scene as load_scene, shipped_scenes as shipped_scenes
-from .scene.templates.registry import new_scene as new_scene
+from .scene.templates import new_scene as new_scene
 from .sensitivity.gradient import Gradient as Gradient, Sensitivities as Sensitivities
 from .sensitivity.hessian import (
     AmplitudeHessian as AmplitudeHessian,
@@ -99,6 +100,7 @@ from .sensitivity.nonsmooth import (
     PeakKind as PeakKind,
     peak_gradient as peak_gradient,
 )
+from .studies.accuracy_result import AccuracyRow as AccuracyRow, AccuracyStudy as AccuracyStudy
 from .studies.blades import (
     BladeAmplitudes as BladeAmplitudes,
     BladePeaks as BladePeaks,
@@ -106,11 +108,7 @@ from .studies.blades import (
     blade_peaks as blade_peaks,
     mistuned as mistuned,
 )
-from .studies.convergence import (
-    AccuracyRow as AccuracyRow,
-    AccuracyStudy as AccuracyStudy,
-    accuracy_study as accuracy_study,
-)
+from .studies.convergence import accuracy_study as accuracy_study
 from .studies.instant import start_of as start_of
 from .studies.interference import interference_diagram as interference_diagram
 from .studies.interference_result import (
@@ -127,6 +125,7 @@ from .studies.mistuning import (
     MistuningStudy as MistuningStudy,
     mistuning_study as mistuning_study,
 )
+from .studies.map_result import MapStatus as MapStatus, ResponseMap as ResponseMap
 from .studies.peaks.minimise_peak import least_peak as least_peak
 from .studies.peaks.results import (
     Basin as Basin,
@@ -136,9 +135,5 @@ from .studies.peaks.results import (
 )
 from .studies.peaks.track_peak import track_peak as track_peak
 from .studies.plan import Plan as Plan, plan as plan
-from .studies.response_map import (
-    MapStatus as MapStatus,
-    ResponseMap as ResponseMap,
-    response_map as response_map,
-)
+from .studies.response_map import response_map as response_map
 from .views.io import load as load, save as save

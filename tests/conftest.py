@@ -3,7 +3,7 @@ from __future__ import annotations
 import gc
 import os
 from collections import Counter
-from collections.abc import Generator, Iterator
+from collections.abc import Collection, Generator, Iterator
 
 import pytest
 from launch import served
@@ -28,16 +28,23 @@ def pytest_collection() -> Generator[None, object, object]:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Of the cases of a function marked `few(n)` every n-th runs by default, the others are long."""
+    """Of the cases of a function marked `few` every n-th runs and those to keep; the others are long."""
     seen: Counter[str] = Counter()
     for item in items:
         few = item.get_closest_marker("few")
         if few is None:
             continue
         function = item.nodeid.partition("[")[0]
-        if seen[function] % few.args[0]:
-            item.add_marker(pytest.mark.long)
+        kept = bool(few.args) and seen[function] % few.args[0] == 0
         seen[function] += 1
+        if not kept and not _named(item, few.kwargs.get("keep", ())):
+            item.add_marker(pytest.mark.long)
+
+
+def _named(item: pytest.Item, keep: Collection[object]) -> bool:
+    """Whether a value that a case has is one of those to keep."""
+    values = item.callspec.params.values() if isinstance(item, pytest.Function) else ()
+    return any(value in keep for value in values if isinstance(value, str | int | float))
 
 
 @pytest.fixture(scope="session")

@@ -11,11 +11,12 @@ import math
 from collections.abc import Callable, Container, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from optim.criteria.key import WORD
 from optim.criteria.key import Form as Form  # with `Criterion` and `Key` all that a criterion is made of
 from optim.criteria.key import Key as Key
+from solver.results.told import Piece
 
 if TYPE_CHECKING:
     from optim.criteria.response_gradients import Sensitivity
@@ -195,42 +196,30 @@ class Goals:
         return tuple(path for variable in self.variables for path in variable.paths)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Row:
-    """One smooth number of a design.
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Row(Piece):
+    """One smooth number of a design."""
 
-    Attributes
-    ----------
-    quantity : Criterion
-        What it measures.
-    case : str
-        Name of the load case.
-    what : str
-        In words, for example ``peak at 753.28 Hz``.
-    value : float
-        In the unit of its criterion; the negative where larger is better.
-    gradient : (n_variables,) array
-        By each variable, per unit of it; NaN where it does not exist.
-    at_hz : float
-        Its frequency; NaN for what has none.
-    weight : float
-        Multiplies it in what is minimised; 0 if it is only limited.
-    bound : float or None
-        The most it may be.
-    second : callable or None
-        Computes the exact second derivatives by the variables, (n_variables, n_variables), NaN where they do
-        not exist; None where the solver has none.
-    """
+    JSON: ClassVar = (
+        "quantity=quantity.name case what value unit=quantity.unit at=at_hz bound weight"
+        " smaller_is_better=quantity.smaller_is_better"
+    )
 
-    quantity: Criterion
-    case: str
-    what: str
-    value: float
-    gradient: Real
-    at_hz: float
-    weight: float
-    bound: float | None
-    second: Callable[[], Real] | None = field(default=None, compare=False, repr=False)
+    quantity: Annotated[Criterion, "What it measures."]
+    case: Annotated[str, "Name of the load case."]
+    what: Annotated[str, "In words, for example ``peak at 753.28 Hz``."]
+    value: Annotated[float, "In the unit of its criterion; the negative where larger is better."]
+    gradient: Annotated[
+        Real, "By each variable, per unit of it; NaN where it does not exist, (n_variables,)."
+    ]
+    at_hz: Annotated[float, "Its frequency; NaN for what has none."]
+    weight: Annotated[float, "Multiplies it in what is minimised; 0 if it is only limited."]
+    bound: Annotated[float | None, "The most it may be."]
+    second: Annotated[
+        Callable[[], Real] | None,
+        "Computes the exact second derivatives by the variables, (n_variables, n_variables), NaN where "
+        "they do not exist; None where the solver has none.",
+    ] = field(default=None, compare=False, repr=False)
 
     def excess(self, scale: float) -> float:
         """Return how far it is above its bound, relative to the bound (to `scale` if that is 0)."""

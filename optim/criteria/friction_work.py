@@ -18,8 +18,7 @@ _KEY = "max_friction_work"
 
 def _rows(judged: Judged) -> list[Row]:
     """A row for every local maximum that competes, of every contact that is limited."""
-    from solver.response.wear_nonsmooth import worst_slopes
-    from solver.response.worst_wear import Measure, worst_wear
+    from solver.response.worst_wear import Measure, worst_slopes, worst_wear
 
     bounds = judged.limit(FRICTION_WORK) or {}
     return [

@@ -28,8 +28,7 @@ def _rows(judged: Judged) -> list[Row]:
 def _of(judged: Judged, contact: AnyContact) -> list[Row]:
     import numpy as np
 
-    from solver.response.wear_nonsmooth import worst_slopes
-    from solver.response.worst_wear import Measure, worst_wear
+    from solver.response.worst_wear import Measure, worst_slopes, worst_wear
 
     what = f"least load of {contact.name}"
     if contact.load is not None and contact.load_is_given:

@@ -12,11 +12,8 @@ import numpy as np
 
 from optim.errors import DataError, DesignError
 from optim.identification.data.response import ResponseRun
-from optim.identification.fit.evaluation import Runs
-from optim.identification.fit.least_squares import LocalFit, Noise
-from optim.identification.fit.starts import MOST_STARTS, STARTS, Searched, search
-from optim.identification.identifiability import strong_correlations, untold
-from optim.identification.information import UNIFORM, Information, information
+from optim.identification.fit import MOST_STARTS, STARTS, LocalFit, Noise, Runs, Searched, search
+from optim.identification.information import UNIFORM, Information, information, strong_correlations, untold
 from optim.identification.model_check import doubts
 from optim.identification.next_measurement import rank, read_candidates
 from optim.identification.reading import Given, read_data

@@ -1,4 +1,4 @@
-"""What the data tell: information matrix, covariance, standard errors, and directions they do not tell.
+"""What the data tell: information matrix, covariance, standard errors, and in words what they do not tell.
 
 All is in unknowns scaled to their bounds, 0 to 1. What a uniform distribution over the bounds is uncertain
 by, 1/√12, is the measure: a direction along which the data leave more than that open, they do not tell.
@@ -7,13 +7,19 @@ by, 1/√12, is the measure: a direction along which the data leave more than th
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
-from optim.identification.fit.evaluation import Runs
-from optim.identification.fit.least_squares import HUBER, LocalFit
+from optim.identification.fit import HUBER, LocalFit, Runs
+from optim.identification.unknowns import Unknowns
 from optim.problem.variables import Real
+from solver.contacts.kernels.stick_slip_events import SEPARATED, STUCK
+from solver.jit.fourier import Integer
+from solver.results.told import Piece
+from solver.scene.scene import Scene
 
 UNIFORM = 1.0 / math.sqrt(12.0)
 _TINY = 1e-12  # of the largest eigenvalue, below which information is rounding
@@ -93,3 +99,119 @@ def information(runs: Runs, found: LocalFit, *, robust: bool, level_known: bool)
         data=efficiency * rows.T @ rows, prior=prior_rows.T @ prior_rows, degrees=0 if level_known else free,
         reduced_chi2=float(np.sum(rest**2)) / free,
     )  # fmt: skip
+
+
+_SHARE = 0.15  # of a direction, below which an unknown has no part in it
+_ALIKE = 0.1  # relative difference of two logarithmic changes that cancel each other
+_CORRELATED = 0.95
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Untold(Piece):
+    """A direction of the unknowns along which the data tell less than the bounds."""
+
+    names: Annotated[tuple[str, ...], "The unknowns it is of."]
+    direction: Annotated[tuple[float, ...], "Their share, of unknowns scaled to their bounds."]
+    words: Annotated[str, "What that means, and why, as far as it shows."]
+
+
+def untold(
+    scene: Scene, unknowns: Unknowns, z: Real, known: Information, states: Sequence[Mapping[str, Integer]]
+) -> tuple[Untold, ...]:
+    """Return the directions the data do not tell, worst first.
+
+    Parameters
+    ----------
+    states : of each run, contact to the codes it had at its points.
+    """
+    seen = _states_of(states)
+    return tuple(_one(scene, unknowns, z, direction, seen) for _, direction in known.weak())
+
+
+def strong_correlations(unknowns: Unknowns, known: Information) -> tuple[tuple[str, str, float], ...]:
+    """Return pairs of unknowns whose correlation is above 0.95, though each may be told."""
+    covariance, spread = known.covariance(), known.standard_errors()
+    told = [i for i in range(len(unknowns)) if spread[i] < UNIFORM]
+    found = []
+    for a, i in enumerate(told):
+        for j in told[a + 1 :]:
+            share = float(covariance[i, j] / (spread[i] * spread[j]))
+            if abs(share) > _CORRELATED:
+                found.append((unknowns.names[i], unknowns.names[j], share))
+    return tuple(found)
+
+
+def _states_of(states: Sequence[Mapping[str, Integer]]) -> dict[str, set[int]]:
+    """Return the state codes every contact ever had, not reached ones left out."""
+    seen: dict[str, set[int]] = {}
+    for run in states:
+        for name, codes in run.items():
+            seen.setdefault(name, set()).update(int(code) for code in np.unique(codes) if code >= 0)
+    return seen
+
+
+def _one(
+    scene: Scene, unknowns: Unknowns, z: Real, direction: Real, seen: Mapping[str, set[int]]
+) -> Untold:  # fmt: skip
+    at = [i for i in np.argsort(-np.abs(direction)) if abs(direction[i]) > _SHARE]
+    names = tuple(unknowns.names[i] for i in at)
+    if len(at) == 1:
+        words = f"The data do not tell {names[0]}: {_why(scene, unknowns, at[0], seen)}"
+    else:
+        words = _together(unknowns, z, direction, at)
+    return Untold(names=names, direction=tuple(float(direction[i]) for i in at), words=words)
+
+
+def _why(scene: Scene, unknowns: Unknowns, i: int, seen: Mapping[str, set[int]]) -> str:
+    """Return the reason why an unknown does not show, as far as the states of its contacts tell it."""
+    for path in unknowns.variables[i].paths:
+        owner, _, key = path.rpartition(".")
+        contacts = [c.name for c in scene.contacts if owner in (c.name, c.group)]
+        codes = set().union(*(seen.get(name, set()) for name in contacts)) if contacts else set()
+        if codes and codes <= {SEPARATED}:
+            return f"`{owner}` is open at every point measured. Measure with more load on it."
+        if codes == {STUCK} and key != "kt":
+            return (
+                f"`{owner}` never slips at any point measured, and while it sticks {key} does not show. "
+                "Measure with more excitation, or less load on it."
+            )
+        if codes and key == "kt":
+            return (
+                f"`{owner}` never sticks for long at any point measured, and while it slips its stiffness "
+                f"hardly "
+                "shows. Measure with less excitation, or more load on it."
+            )
+    return "the responses measured hardly depend on it within its bounds."
+
+
+def _together(unknowns: Unknowns, z: Real, direction: Real, at: Sequence[int]) -> str:
+    """Return in words that several unknowns show in one combination only."""
+    changes = direction * unknowns.slopes(z) / unknowns.values(z)
+    names = [unknowns.names[i] for i in at]
+    if len(at) == 2:
+        a, b = (float(changes[i]) for i in at)
+        if abs(abs(a) - abs(b)) <= _ALIKE * max(abs(a), abs(b)):
+            what, sign = ("product", " · ") if a * b < 0.0 else ("ratio", " / ")
+            text = (
+                f"The data tell only the {what} {names[0]}{sign}{names[1]}, not each: more of one with "
+                f"{'less' if what == 'product' else 'as much more'} of the other changes no response "
+                f"measured."
+            )
+            return f"{text} {_remedy(names)}"
+    parts = ", ".join(f"{100.0 * changes[i] / abs(changes[at[0]]):+.3g} % of {unknowns.names[i]}" for i in at)
+    return (
+        f"The data cannot tell {', '.join(names[:-1])} and {names[-1]} apart: {parts} together change no "
+        f"response "
+        "measured by more than the noise."
+    )
+
+
+def _remedy(names: Sequence[str]) -> str:
+    keys = {name.rpartition(".")[2] for name in names}
+    if keys == {"mu", "N0"}:
+        return (
+            "Friction limits μN alone show: measure the load itself and give it as a condition of the "
+            "data, or "
+            "give one of both a prior."
+        )
+    return "Give one of both a prior, or measure where they act differently."

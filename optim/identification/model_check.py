@@ -21,8 +21,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from optim.identification.fit.evaluation import Runs
-from optim.identification.fit.least_squares import HUBER, LocalFit
+from optim.identification.fit import HUBER, LocalFit, Runs
 from optim.problem.variables import Real
 from solver.scene.matrices_structure import MatricesStructure
 from solver.scene.parts import Damper, Mass, Spring

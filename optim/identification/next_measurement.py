@@ -12,19 +12,20 @@ from __future__ import annotations
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from optim.errors import DesignError
 from optim.identification.data.measured import Measured
-from optim.identification.fit.evaluation import Runs
-from optim.identification.fit.least_squares import LocalFit
+from optim.identification.fit import LocalFit, Runs
 from optim.identification.information import UNIFORM, Information
 from optim.identification.unknowns import Unknowns
 from optim.problem.numbers import is_number
 from optim.problem.variables import Real
 from solver.balance.parameter import Kind, resolve
 from solver.errors import at
+from solver.results.told import Piece
 from solver.scene.parameter_paths import AMPLITUDE
 from solver.scene.scene import Scene
 
@@ -35,29 +36,17 @@ _FACTORS = (0.3, 1.0, 3.0)
 _MOST_PATHS = 2
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Candidate:
-    """A measurement that could be made.
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Candidate(Piece):
+    """A measurement that could be made."""
 
-    Attributes
-    ----------
-    conditions : mapping
-        Parameter path to value.
-    like : str
-        The run whose points it has.
-    gain : float
-        ½ ln of the ratio of determinants; NaN where its responses could not be computed.
-    tells : str
-        The unknown whose standard error falls most.
-    factor : float
-        What that standard error is multiplied by.
-    """
-
-    conditions: Mapping[str, float]
-    like: str
-    gain: float
-    tells: str
-    factor: float
+    conditions: Annotated[Mapping[str, float], "Parameter path to value."]
+    like: Annotated[str, "The run whose points it has."]
+    gain: Annotated[
+        float, "½ ln of the ratio of determinants; NaN where its responses could not be computed."
+    ]
+    tells: Annotated[str, "The unknown whose standard error falls most."]
+    factor: Annotated[float, "What that standard error is multiplied by."]
 
 
 def read_candidates(

@@ -11,12 +11,10 @@ from typing import Any
 import numpy as np
 
 from optim.errors import DataError
-from optim.identification.data.measured import DataKind, Measured
-from optim.identification.data.registry import data_kinds
+from optim.identification.data.measured import DataKind, Measured, data_kinds
 from optim.identification.data.table import Table, check_numbers, runs_of
-from optim.identification.readers.columns import Head, read_head, table_of
 from optim.identification.readers.csv_text import FromText
-from optim.identification.readers.registry import read_file
+from optim.identification.readers.registry import Head, read_file, read_head, table_of
 from solver.errors import SettingError
 from solver.scene.scene import Scene
 

@@ -5,14 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-from optim.identification.identifiability import Untold
-from optim.identification.next_measurement import Candidate
-from optim.problem.variables import Real
+from solver.arrays import FloatOrNaN, Real
 from solver.results.base import Drawn
-from solver.results.told import json_number
+from solver.results.told import Piece
 from solver.results.views import Views
+
+if TYPE_CHECKING:
+    from optim.identification.information import Untold
+    from optim.identification.next_measurement import Candidate
 
 
 class IdentifyStatus(Enum):
@@ -42,110 +44,91 @@ class IdentifyStatus(Enum):
     STOPPED = "It was stopped."
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Estimate:
-    """An unknown.
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Estimate(Piece):
+    """An unknown."""
 
-    Attributes
-    ----------
-    name : str
-        Parameter path, or several that share the value.
-    unit : str
-    value : float
-    standard_error : float
-        NaN where the data do not tell it.
-    interval : (float, float)
-        Of 95 %; the bounds where the data do not tell it.
-    told : bool
-        Whether data and priors tell more of it than its bounds; of a model that is doubtful they do not.
-    at_bound : bool
-        Whether it lies on one of them.
-    low, high : float
-        Its bounds.
-    """
+    JSON: ClassVar = "name unit value standard_error interval told at_bound bounds"
 
-    name: str
-    unit: str
-    value: float
-    standard_error: float
-    interval: tuple[float, float]
-    told: bool
-    at_bound: bool
-    low: float
-    high: float
+    name: Annotated[str, "Parameter path, or several that share the value."]
+    unit: Annotated[str, "Of the value."]
+    value: Annotated[float, "The estimate."]
+    standard_error: Annotated[float, "Its standard error; NaN where the data do not tell it."]
+    interval: Annotated[tuple[float, float], "Of 95 %; the bounds where the data do not tell it."]
+    told: Annotated[
+        bool,
+        "Whether data and priors tell more of it than its bounds; of a model that is doubtful they do not.",
+    ]
+    at_bound: Annotated[bool, "Whether it lies on one of them."]
+    low: Annotated[float, "Its lower bound."]
+    high: Annotated[float, "Its upper bound."]
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Both of them."""
+        return self.low, self.high
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class NotReached:
-    """Points of a run at which no response was found: (x of each as the run has it)."""
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class NotReached(Piece):
+    """Points of a run at which no response was found."""
 
-    run: str
-    at: tuple[float, ...]
+    run: Annotated[str, "What it is called."]
+    at: Annotated[tuple[float, ...], "x of each, as the run has it."]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Identification(Drawn):
-    """Parameters identified from measurements.
-
-    Attributes
-    ----------
-    scene : str
-        Its name.
-    status : IdentifyStatus
-    estimates : tuple of Estimate
-    covariance, correlation : (n, n) arrays
-        Of the estimates, in their units; along what the data do not tell that of the bounds.
-    noise : float
-        Relative level of the noise found, or given; NaN where every row has its own.
-    reduced_chi2 : float
-        Mean square of the residuals over the noise; about 1 where the model describes the data and the noise
-        was given, 1 by construction where it was not.
-    misfit : str
-        Why the model does not describe the data, see `optim.identification.model_check`: residuals that hang
-        together or that something held fixed would explain, above the noise given, or larger than
-        measurements scatter; else empty. No unknown is then told.
-    untold : tuple of Untold
-    correlated : tuple of (name, name, correlation)
-    candidates : tuple of Candidate
-        Further measurements, the most telling first.
-    runs : tuple of mappings
-        Data, fit and standard deviation of the fit of each run as curves.
-    not_reached : tuple of NotReached
-    uncertain : mapping
-        For the key `uncertain` of a robust design; empty if there is no fit.
-    values : mapping
-        Parameter path to value, for `Scene.with_values`.
-    other_optima : tuple of mappings
-        Values at further local optima of the first look, with `misfit` relative to the best.
-    starts, agreeing, evaluations : int
-        Places tried, searches that ended at the same place, evaluations of all runs.
-    """
-
-    scene: str
-    status: IdentifyStatus
-    estimates: tuple[Estimate, ...]
-    covariance: Real
-    correlation: Real
-    noise: float
-    reduced_chi2: float
-    misfit: str
-    untold: tuple[Untold, ...]
-    correlated: tuple[tuple[str, str, float], ...]
-    candidates: tuple[Candidate, ...]
-    runs: tuple[Mapping[str, Any], ...]
-    not_reached: tuple[NotReached, ...]
-    uncertain: Mapping[str, Any]
-    values: Mapping[str, float]
-    other_optima: tuple[Mapping[str, float], ...]
-    starts: int
-    agreeing: int
-    evaluations: int
-    harmonics: int
-    seconds: float
+    """Parameters identified from measurements."""
 
     VIEWS: ClassVar = Views(
         "optim.views", "of_identification", "identification_dataset", "identification:identification_figure"
     )
+    JSON: ClassVar = (
+        "scene reached status estimates values covariance correlation noise reduced_chi2 misfit untold"
+        " correlated candidates runs not_reached uncertain other_optima starts agreeing evaluations"
+        " n_harmonics=harmonics seconds"
+    )
+
+    scene: Annotated[str, "Its name."]
+    status: Annotated[IdentifyStatus, "How it ended."]
+    estimates: Annotated[tuple[Estimate, ...], "The unknowns."]
+    covariance: Annotated[
+        Real, "Of the estimates, in their units; along what the data do not tell that of the bounds, (n, n)."
+    ]
+    correlation: Annotated[Real, "The same without units, (n, n)."]
+    noise: Annotated[FloatOrNaN, "Relative noise found, or given; NaN where each row has its own."]
+    reduced_chi2: Annotated[
+        FloatOrNaN,
+        "Mean square of the residuals over the noise; about 1 where the model describes the data and the "
+        "noise was given, 1 by construction where it was not.",
+    ]
+    misfit: Annotated[
+        str,
+        "Why the model does not describe the data, see `optim.identification.model_check`: residuals that "
+        "hang together or that something held fixed would explain, above the noise given, or larger than "
+        "measurements scatter; else empty. No unknown is then told.",
+    ]
+    untold: Annotated[tuple[Untold, ...], "Directions that the data do not tell."]
+    correlated: Annotated[tuple[tuple[str, str, float], ...], "Names hardly kept apart, with correlation."]
+    candidates: Annotated[tuple[Candidate, ...], "Further measurements, the most telling first."]
+    runs: Annotated[
+        tuple[Mapping[str, Any], ...], "Data, fit and standard deviation of the fit of each run as curves."
+    ]
+    not_reached: Annotated[tuple[NotReached, ...], "Points at which no response was found."]
+    uncertain: Annotated[
+        Mapping[str, Any], "For the key `uncertain` of a robust design; empty if there is no fit."
+    ]
+    values: Annotated[Mapping[str, float], "Parameter path to value, for `Scene.with_values`."]
+    other_optima: Annotated[
+        tuple[Mapping[str, float], ...],
+        "Values at further local optima of the first look, with `misfit` relative to the best.",
+    ]
+    starts: Annotated[int, "Places tried."]
+    agreeing: Annotated[int, "Searches that ended at the same place."]
+    evaluations: Annotated[int, "Evaluations of all runs."]
+    harmonics: Annotated[int, "Highest harmonic kept."]
+    seconds: Annotated[float, "Time taken [s]."]
 
     @property
     def reached(self) -> bool:
@@ -159,38 +142,5 @@ class Identification(Drawn):
 
     def to_json(self) -> dict[str, Any]:
         """Return everything as one JSON object."""
-        return {
-            "scene": self.scene, "reached": self.reached, "status": self.status.value,
-            "estimates": [_estimate(one) for one in self.estimates],
-            "values": dict(self.values),
-            "covariance": self.covariance.tolist(), "correlation": self.correlation.tolist(),
-            "noise": json_number(self.noise), "reduced_chi2": json_number(self.reduced_chi2),
-            "misfit": self.misfit,
-            "untold": [
-                {"names": list(one.names), "direction": list(one.direction), "words": one.words}
-                for one in self.untold
-            ],
-            "correlated": [{"names": [a, b], "correlation": share} for a, b, share in self.correlated],
-            "candidates": [
-                {
-                    "conditions": dict(one.conditions), "like": one.like, "gain": json_number(one.gain),
-                    "tells": one.tells, "factor": json_number(one.factor),
-                }
-                for one in self.candidates
-            ],
-            "runs": [dict(run) for run in self.runs],
-            "not_reached": [{"run": one.run, "at": list(one.at)} for one in self.not_reached],
-            "uncertain": dict(self.uncertain),
-            "other_optima": [dict(one) for one in self.other_optima],
-            "starts": self.starts, "agreeing": self.agreeing, "evaluations": self.evaluations,
-            "n_harmonics": self.harmonics, "seconds": self.seconds,
-        }  # fmt: skip
-
-
-def _estimate(one: Estimate) -> dict[str, Any]:
-    return {
-        "name": one.name, "unit": one.unit, "value": one.value,
-        "standard_error": json_number(one.standard_error),
-        "interval": list(one.interval), "told": one.told, "at_bound": one.at_bound,
-        "bounds": [one.low, one.high],
-    }  # fmt: skip
+        pairs = [{"names": [a, b], "correlation": share} for a, b, share in self.correlated]
+        return self._json(correlated=pairs)

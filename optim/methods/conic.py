@@ -1,4 +1,4 @@
-"""What the convex subproblems of `optim.methods.subproblem` and `optim.robust.socp` share: numbers of order
+"""What the convex subproblems of `optim.methods.subproblem` and `optim.robust.search` share: numbers of order
 one, one solver.
 
 Steps are in units of the radius and rows in units of what they change by within it, counted from the largest:

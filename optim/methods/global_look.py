@@ -35,7 +35,9 @@ from optim.methods.surrogate import Taylor, between, candidates, places, promisi
 from optim.problem.variables import Real, scaled, unscaled
 
 FEWEST = 3  # harmonics of a look with several variables, at least
-SURE = 3  # designs of a look for each variable, before what was seen says which others are worth one
+# Designs of a look for each variable, and so many more, before what was seen says which others are worth one:
+# the middles and the two corners where all variables have one bound, and some between.
+SURE = 3
 LOOSE = 2.0  # spreads by which a prediction may be too high there
 WORTH = 1.3  # how much higher than the best end the potential of a design to start from may be
 PATIENCE = 20  # designs of a local search, after which it ends if it is far behind the best end
@@ -87,8 +89,8 @@ class WholeRange:
         True if nothing depends on the variables, None if no response could be computed.
         """
         try:
-            for z in () if self._seen else places(self._n):
-                if self._worth(z):
+            for i, z in enumerate(() if self._seen else places(self._n)):
+                if i < SURE * (self._n + 1) or self._worth(z):
                     self._look(z)
             begins = [e for values in given if (e := self.search(values)).good]
             if not self._seen and not begins:
@@ -105,7 +107,7 @@ class WholeRange:
 
     def _worth(self, z: Real) -> bool:
         """Return whether a place of the look may be one to start from, as far as what was seen tells."""
-        if self._n == 1 or len(self._seen) <= SURE * self._n:
+        if self._n == 1 or not self._seen:
             return True
         models = self._models()
         known = np.array([model.place for model in models])

@@ -15,9 +15,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from optim.criteria.bundle import with_cuts
 from optim.criteria.criterion import Row
-from optim.criteria.linearised import PENALTY, Model
+from optim.criteria.linearised import PENALTY, Model, with_cuts
 from optim.criteria.rows import Evaluation, nearest
 from optim.methods.conic import Step
 from optim.methods.kkt import KEPT, Evaluate, Local, ModelOf, ended

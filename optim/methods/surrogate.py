@@ -32,9 +32,9 @@ CANDIDATES = 256  # places a variable that are compared, one variable: all of th
 def places(n: int, known: int = 0) -> Real:
     """Return the places of a look, (k, n), of the unit box: bounds included.
 
-    The middle; the corners, of many variables only those next to the lowest and the highest; the middles of
-    the faces, with two variables those of the edges; a Sobol sequence between them, shorter by so many
-    places as are `known` between the bounds already.
+    The middle; the middles of the faces, with two variables those of the edges; the corners where all
+    variables have one bound; a Sobol sequence between them, shorter by so many places as are `known` between
+    the bounds already; the other corners, of many variables only those next to these two.
     """
     if n == 1:
         return np.linspace(0.0, 1.0, LOOKS_ONE)[:, None]
@@ -44,7 +44,8 @@ def places(n: int, known: int = 0) -> Real:
         faces[2 * i, i], faces[2 * i + 1, i] = 0.0, 1.0
     between = quasi_random(n, 2 ** math.ceil(math.log2(LOOKS_EACH * n)))
     # The first place of the sequence is a corner, the second the middle.
-    return np.vstack([middle, faces, between[2 + known :], corners(n)])
+    ends = corners(n)
+    return np.vstack([middle, faces, ends[:2], between[2 + known :], ends[2:]])
 
 
 def quasi_random(n: int, count: int, seed: int | None = None) -> Real:
@@ -55,11 +56,14 @@ def quasi_random(n: int, count: int, seed: int | None = None) -> Real:
 
 
 def corners(n: int) -> Real:
-    """Return the corners of the unit box, (k, n); of many variables those that differ from an end in one."""
+    """Return corners of the unit box, (k, n), the two where all variables have one bound first.
+
+    Of many variables those that differ from these in one.
+    """
+    others = np.vstack([np.eye(n), 1.0 - np.eye(n)])
     if 2**n <= MOST_CORNERS:
-        return np.array(list(itertools.product((0.0, 1.0), repeat=n)))
-    low = np.vstack([np.zeros(n), np.eye(n)])
-    return np.vstack([low, 1.0 - low])
+        others = np.array(list(itertools.product((0.0, 1.0), repeat=n)))[1:-1]
+    return np.vstack([np.ones(n), np.zeros(n), others])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -16,7 +16,7 @@ from optim.criteria.json_types import LARGEST, Harmonics, Name, Number, Pair, Pa
 from optim.criteria.key import Form, Key, Option
 from optim.criteria.registry import criteria, limit_keys, weight_words
 from optim.problem.words import AimWord, MethodWord, ScalingWord
-from solver.scene.examples import DAMPER_LOAD, DISK_LOAD, DISK_LOADS
+from solver.scene.descriptions import DAMPER_LOAD, DISK_LOAD, DISK_LOADS
 
 MAX_UNCERTAIN = 2000
 

@@ -4,55 +4,37 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Annotated, ClassVar
+
+from solver.results.told import Piece
 
 SAME_PLACE = 1e-3  # scaled distance within which two optima are one
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Basin:
-    """A local optimum.
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Basin(Piece):
+    """A local optimum."""
 
-    Attributes
-    ----------
-    values : mapping
-        Variable name to value.
-    peak : float
-        Highest peak [m].
-    objective : float
-        What is minimised.
-    settled, feasible : bool
-        Whether the first-order conditions hold and the limits are kept there.
-    proven : bool
-        Whether a response there was computed, so that no peak is higher than `peak`. A further basin of the
-        tracked peak is solved for along the peaks that were followed: it is at least that high.
-    """
-
-    values: Mapping[str, float]
-    peak: float
-    objective: float
-    settled: bool
-    feasible: bool
-    proven: bool
+    values: Annotated[Mapping[str, float], "Variable name to value."]
+    peak: Annotated[float, "Highest peak [m]."]
+    objective: Annotated[float, "What is minimised."]
+    settled: Annotated[bool, "Whether the first-order conditions hold there."]
+    feasible: Annotated[bool, "Whether the limits are kept there."]
+    proven: Annotated[
+        bool,
+        "Whether a response there was computed, so that no peak is higher than `peak`. A further basin of "
+        "the tracked peak is solved for along the peaks that were followed: it is at least that high.",
+    ]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Checked:
-    """A local optimum again with more harmonics.
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Checked(Piece):
+    """A local optimum again with more harmonics."""
 
-    Attributes
-    ----------
-    values : mapping
-        Variable name to value.
-    harmonics : int
-        Highest harmonic kept.
-    peak, objective : float
-        Highest peak [m] and what is minimised; NaN where a response could not be computed.
-    feasible : bool
-        Whether the limits are kept.
-    """
+    JSON: ClassVar = "values n_harmonics=harmonics peak objective feasible"
 
-    values: Mapping[str, float]
-    harmonics: int
-    peak: float
-    objective: float
-    feasible: bool
+    values: Annotated[Mapping[str, float], "Variable name to value."]
+    harmonics: Annotated[int, "Highest harmonic kept."]
+    peak: Annotated[float, "Highest peak [m]; NaN where a response could not be computed."]
+    objective: Annotated[float, "What is minimised; NaN likewise."]
+    feasible: Annotated[bool, "Whether the limits are kept."]

@@ -4,47 +4,34 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar
 
-from solver.results.told import json_number
+from solver.results.told import Piece
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CurveCheck:
-    """The peak of the performance curve at its optimum, beside exact ones.
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class CurveCheck(Piece):
+    """The peak of the performance curve at its optimum, beside exact ones."""
 
-    Attributes
-    ----------
-    mode : int
-        Number of the mode that the curve is of.
-    shared : bool
-        One curve served all designs, because forces, loads and motions grow together.
-    curves : int
-        Curves followed.
-    synthesised : float
-        Peak of the curve at its optimum [m].
-    corrected : float
-        What the whole balance next to the synthesised motion makes of it [m]; NaN if that was not found.
-    exact : float
-        Highest peak of the whole response [m]; NaN if it could not be computed.
-    tolerance : float
-        Relative error up to which the curve suffices.
-    curve_seconds, correction_seconds, response_seconds : float
-        What the search on curves, the correction, and the whole response took [s].
-    exact_responses : float
-        The work of an exact search, in whole responses, at least.
-    """
+    JSON: ClassVar = (
+        "mode shared curves synthesised corrected exact estimate error tolerance suffices holds curve_seconds"
+        " correction_seconds response_seconds seconds_saved"
+    )
 
-    mode: int
-    shared: bool
-    curves: int
-    synthesised: float
-    corrected: float
-    exact: float
-    tolerance: float
-    curve_seconds: float
-    correction_seconds: float
-    response_seconds: float
-    exact_responses: float
+    mode: Annotated[int, "Number of the mode that the curve is of."]
+    shared: Annotated[bool, "One curve served all designs, because forces, loads and motions grow together."]
+    curves: Annotated[int, "Curves followed."]
+    synthesised: Annotated[float, "Peak of the curve at its optimum [m]."]
+    corrected: Annotated[
+        float,
+        "What the whole balance next to the synthesised motion makes of it [m]; NaN if that was not found.",
+    ]
+    exact: Annotated[float, "Highest peak of the whole response [m]; NaN if it could not be computed."]
+    tolerance: Annotated[float, "Relative error up to which the curve suffices."]
+    curve_seconds: Annotated[float, "What the search on curves took [s]."]
+    correction_seconds: Annotated[float, "What the correction took [s]."]
+    response_seconds: Annotated[float, "What the whole response took [s]."]
+    exact_responses: Annotated[float, "The work of an exact search, in whole responses, at least."]
 
     @property
     def estimate(self) -> float:
@@ -72,15 +59,6 @@ class CurveCheck:
         spent = self.curve_seconds + self.correction_seconds + self.response_seconds
         return self.exact_responses * self.response_seconds - spent
 
-    def to_json(self) -> dict[str, object]:
+    def to_json(self) -> dict[str, Any]:
         """Return it as a JSON object."""
-        return {
-            "mode": self.mode, "shared": self.shared, "curves": self.curves,
-            "synthesised": json_number(self.synthesised), "corrected": json_number(self.corrected),
-            "exact": json_number(self.exact), "estimate": json_number(self.estimate),
-            "error": json_number(self.error),
-            "tolerance": self.tolerance, "suffices": self.suffices,
-            "holds": math.isfinite(self.error) and self.holds,
-            "curve_seconds": self.curve_seconds, "correction_seconds": self.correction_seconds,
-            "response_seconds": self.response_seconds, "seconds_saved": json_number(self.seconds_saved),
-        }  # fmt: skip
+        return self._json(holds=math.isfinite(self.error) and self.holds)

@@ -6,32 +6,28 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
-from typing import ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from optim.criteria.band import BAND
 from optim.criteria.criterion import Row
-from optim.criteria.linearised import Conditions
 from optim.criteria.peak import PEAK
-from optim.criteria.rows import Evaluation
-from optim.problem.problem import Method, Problem
+from optim.problem.words import Method
 from optim.results.basins import Basin, Checked
 from optim.results.curve_check import CurveCheck
 from optim.results.doubts import doubts_of
-from optim.results.json import (
-    bands_json,
-    basin_json,
-    checked_json,
-    conditions_json,
-    known_parts,
-    looked_json,
-    row_json,
-)
-from solver.continuation.branch import Branch
+from optim.results.json import conditions_json, evaluation_json, known_parts, looked_json
+from solver.arrays import FloatOrNaN
 from solver.results.base import Drawn, MadeOfResponses
 from solver.results.known import Known
-from solver.results.told import Piece, json_number
+from solver.results.told import Piece
 from solver.results.verdict import Stable, Verdict, worst
 from solver.results.views import Views
+
+if TYPE_CHECKING:
+    from optim.criteria.linearised import Conditions
+    from optim.criteria.rows import Evaluation
+    from optim.problem.problem import Problem
+    from solver.continuation.branch import Branch
 
 SAME_HEIGHT = 1e-5  # relative distance within which rows count as equally high
 AT_LIMIT = 1e-4  # relative distance from a bound within which a limited row holds the design
@@ -107,67 +103,53 @@ _PROVEN = (DesignStatus.OPTIMAL, DesignStatus.AT_BOUND)
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class DesignPeak(Piece):
-    """A peak of the response of a design: max|x| of the observed DOF [m] and its frequency [Hz]."""
+    """A peak of the response of a design."""
 
-    UNITS: ClassVar[Mapping[str, str]] = {"value": "m", "at": "Hz"}
-
-    value: float
-    at: float
+    value: Annotated[float, "max|x| of the observed DOF [m]."]
+    at: Annotated[float, "Its frequency [Hz]."]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class DesignResult(MadeOfResponses, Drawn):
-    """The best design found.
+    """The best design found."""
 
-    Attributes
-    ----------
-    problem : Problem
-        What was asked.
-    method : Method
-        How the optimum was found.
-    status : DesignStatus
-        How the search ended.
-    evaluation : Evaluation or None
-        Rows and responses of the optimum.
-    conditions : Conditions or None
-        First-order conditions there.
-    basins : tuple of Basin
-        Every local optimum found, best first.
-    looked_at : tuple of Evaluation
-        The designs of the look over the whole range, in order, some of them with fewer harmonics.
-    history : tuple of Evaluation
-        Every design evaluated, in order; the optimum is among them (of a tracked peak the optimum alone).
-    plateau : mapping of variable name to (low, high)
-        Along each variable, how far every value is as good (to 1e-6); empty for a sharp optimum.
-    chosen_by : str or None
-        What the design was chosen by on a plateau.
-    checked : tuple of Checked
-        The local optima again with twice the harmonics, where the estimated error of a peak is large.
-    curve : CurveCheck or None
-        Of the method performance-curve: the curve beside the whole response.
-    evaluations : int
-        Frequency responses computed.
-    work : float
-        What the search cost in all, in frequency responses.
-    seconds : float
-        Time in all.
-    """
+    VIEWS: ClassVar = Views("optim.views", "of_design", "design_dataset", "of_design")
+    JSON: ClassVar = (
+        "scene method optimum peak n_harmonics=problem.harmonics peaks band_hz limit bands objective rows"
+        " held_by error_estimate stable stable_ground errors warnings plateau chosen_by certainty checked"
+        " curve looked_at evaluations newton_iterations tried basins seconds work active optimality"
+        " multipliers conditions broken reached status"
+    )
 
-    problem: Problem
-    method: Method
-    status: DesignStatus
-    evaluation: Evaluation | None
-    conditions: Conditions | None
-    basins: tuple[Basin, ...]
-    looked_at: tuple[Evaluation, ...] = ()
-    plateau: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    chosen_by: str | None = None
-    checked: tuple[Checked, ...] = ()
-    curve: CurveCheck | None = None
-    history: tuple[Evaluation, ...]
-    evaluations: int
-    work: float
-    seconds: float
+    problem: Annotated[Problem, "What was asked."]
+    method: Annotated[Method, "How the optimum was found."]
+    status: Annotated[DesignStatus, "How the search ended."]
+    evaluation: Annotated[Evaluation | None, "Rows and responses of the optimum."]
+    conditions: Annotated[Conditions | None, "First-order conditions there."]
+    basins: Annotated[tuple[Basin, ...], "Every local optimum found, best first."]
+    looked_at: Annotated[
+        tuple[Evaluation, ...],
+        "The designs of the look over the whole range, in order, some of them with fewer harmonics.",
+    ] = ()
+    plateau: Annotated[
+        Mapping[str, tuple[float, float]],
+        "Along each variable, how far every value is as good (to 1e-6); empty for a sharp optimum.",
+    ] = field(default_factory=dict)
+    chosen_by: Annotated[str | None, "What the design was chosen by on a plateau."] = None
+    checked: Annotated[
+        tuple[Checked, ...],
+        "The local optima again with twice the harmonics, where the estimated error of a peak is large.",
+    ] = ()
+    curve: Annotated[
+        CurveCheck | None, "Of the method performance-curve: the curve beside the whole response."
+    ] = None
+    history: Annotated[
+        tuple[Evaluation, ...],
+        "Every design evaluated, in order; the optimum is among them (of a tracked peak the optimum alone).",
+    ]
+    evaluations: Annotated[int, "Frequency responses computed."]
+    work: Annotated[FloatOrNaN, "What the search cost in all, in frequency responses."]
+    seconds: Annotated[float, "Time in all [s]."]
 
     @property
     def scene(self) -> str:
@@ -203,7 +185,7 @@ class DesignResult(MadeOfResponses, Drawn):
         return None
 
     @property
-    def error_estimate(self) -> float:
+    def error_estimate(self) -> FloatOrNaN:
         """Estimated error [m] of the highest peak of the case that holds the optimum; NaN if not known.
 
         It is of the `measure` of `known`.
@@ -265,7 +247,7 @@ class DesignResult(MadeOfResponses, Drawn):
         return None if branches[0].band is None else branches[0].band.limit
 
     @property
-    def optimality(self) -> float:
+    def optimality(self) -> FloatOrNaN:
         """Largest component of the gradient of the Lagrangian, relative objective per scaled variable."""
         return math.nan if self.conditions is None else self.conditions.residual
 
@@ -325,60 +307,21 @@ class DesignResult(MadeOfResponses, Drawn):
         history = tuple(found if one is self.evaluation else one for one in self.history)
         return replace(self, evaluation=found, history=history)
 
-    VIEWS: ClassVar = Views("optim.views", "of_design", "design_dataset", "of_design")
-
     def known_parts(self) -> Iterable[Known]:
         """The response of each case over its band."""
         return () if self.evaluation is None else [known for _, known in known_parts(self.evaluation)]
 
-    def own_json(self) -> dict[str, object]:
+    def to_json(self) -> dict[str, Any]:
         """Return the result as one JSON object."""
-        peak, evaluation = self.peak, self.evaluation
-        peaks = () if evaluation is None else evaluation.peaks
-        return {
-            "scene": self.scene,
-            "method": self.method.value,
-            "optimum": dict(self.optimum),
-            "peak": None if peak is None else {"value": peak.value, "at": peak.at},
-            "n_harmonics": self.problem.harmonics,
-            "peaks": [{"value": p.value, "at": p.at_hz, "case": p.case} for p in peaks],
-            "band_hz": self.band_hz,
-            "limit": self.limit,
-            "bands": [] if evaluation is None else bands_json(evaluation),
-            "objective": None if evaluation is None or not evaluation.rows else evaluation.objective,
-            "rows": [] if evaluation is None else [row_json(row) for row in evaluation.rows],
-            "held_by": None if self.held_by is None else row_json(self.held_by),
-            "error_estimate": json_number(self.error_estimate),
-            **self.stability.to_json(),
-            "errors": [
-                {"case": case, "peak": json_number(known.value), **known.to_json()}
-                for case, known in (() if evaluation is None else known_parts(evaluation))
-            ],
-            "warnings": list(self.warnings),
-            "plateau": {name: list(ends) for name, ends in self.plateau.items()},
-            "chosen_by": self.chosen_by,
-            "certainty": self.certainty.value,
-            "checked": [checked_json(one) for one in self.checked],
-            "curve": None if self.curve is None else self.curve.to_json(),
-            "looked_at": [looked_json(one) for one in self.looked_at if one.good],
-            "evaluations": self.evaluations,
-            "newton_iterations": sum(branch.newton_iterations for branch in self.sweeps),
-            "tried": [
-                {"values": dict(e.values), "peak": e.peaks[0].value, "at": e.peaks[0].at_hz}
-                for e in self.history
-                if e.good and e.peaks
-            ],
-            "basins": [basin_json(basin) for basin in self.basins],
-            "seconds": self.seconds,
-            "work": json_number(self.work),
-            "active": list(self.active),
-            "optimality": json_number(self.optimality),
-            "multipliers": list(self.multipliers),
-            "conditions": None if self.conditions is None else conditions_json(self.conditions),
-            "broken": [{**row_json(row), "by": row.value - (row.bound or 0.0)} for row in self.broken],
-            "reached": self.reached,
-            "status": self.status.value,
-        }
+        tried = [one for one in self.history if one.good and one.peaks]
+        return self._json(
+            conditions=None if self.conditions is None else conditions_json(self.conditions),
+            looked_at=[looked_json(one) for one in self.looked_at if one.good],
+            newton_iterations=sum(branch.newton_iterations for branch in self.sweeps),
+            tried=[{"values": e.values, "peak": e.peaks[0].value, "at": e.peaks[0].at_hz} for e in tried],
+            broken=[{**row.to_json(), "by": row.value - (row.bound or 0.0)} for row in self.broken],
+            **self.stability.to_json(), **evaluation_json(self.evaluation),
+        )  # fmt: skip
 
 
 def at_limit(row: Row) -> bool:

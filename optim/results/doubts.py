@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING
 
-from optim.criteria.rows import Evaluation
 from optim.results.basins import Checked
 from optim.results.json import known_parts
 from solver.results.known import Known
 from solver.results.notes import flag_words
+
+if TYPE_CHECKING:
+    from optim.criteria.rows import Evaluation
 
 DOUBTFUL = 0.1  # estimated error of a peak, relative, from which its harmonics are too few
 WELL_KNOWN = 0.05  # relative error of the highest peak up to which a design may be called the best

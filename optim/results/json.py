@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from optim.criteria.criterion import Row
-from optim.criteria.linearised import Conditions
-from optim.criteria.rows import Evaluation
-from optim.results.basins import Basin, Checked
-from solver.continuation.branch import Branch
-from solver.results.known import Known
-from solver.results.told import json_number
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from optim.criteria.linearised import Conditions
+    from optim.criteria.rows import Evaluation
+    from solver.continuation.branch import Branch
+    from solver.results.known import Known
 
 
 def over_bands(evaluation: Evaluation) -> dict[str, Branch]:
@@ -31,13 +31,20 @@ def bands_json(evaluation: Evaluation) -> list[dict[str, object]]:
     ]  # fmt: skip
 
 
-def row_json(row: Row) -> dict[str, object]:
-    """Return a row."""
+def evaluation_json(evaluation: Evaluation | None) -> dict[str, object]:
+    """Return the rows of a design, its peaks, its bands, and how well each is known."""
+    if evaluation is None:
+        return {"peaks": [], "bands": [], "objective": None, "rows": [], "errors": []}
+    rows = evaluation.rows
     return {
-        "quantity": row.quantity.name, "case": row.case, "what": row.what, "value": row.value,
-        "unit": row.quantity.unit, "at": json_number(row.at_hz), "bound": row.bound, "weight": row.weight,
-        "smaller_is_better": row.quantity.smaller_is_better,
-    }  # fmt: skip
+        "peaks": [{"value": peak.value, "at": peak.at_hz, "case": peak.case} for peak in evaluation.peaks],
+        "bands": bands_json(evaluation),
+        "objective": evaluation.objective if rows else None,
+        "rows": [row.to_json() for row in rows],
+        "errors": [
+            {"case": case, "peak": known.value, **known.to_json()} for case, known in known_parts(evaluation)
+        ],
+    }
 
 
 def known_parts(evaluation: Evaluation) -> list[tuple[str, Known]]:
@@ -54,26 +61,10 @@ def looked_json(one: Evaluation) -> dict[str, object]:
     }  # fmt: skip
 
 
-def checked_json(one: Checked) -> dict[str, object]:
-    """Return a local optimum computed again."""
-    return {
-        "values": dict(one.values), "n_harmonics": one.harmonics, "peak": json_number(one.peak),
-        "objective": json_number(one.objective), "feasible": one.feasible,
-    }  # fmt: skip
-
-
-def basin_json(basin: Basin) -> dict[str, object]:
-    """Return a local optimum."""
-    return {
-        "values": dict(basin.values), "peak": basin.peak, "objective": basin.objective,
-        "settled": basin.settled, "feasible": basin.feasible, "proven": basin.proven,
-    }  # fmt: skip
-
-
 def conditions_json(found: Conditions) -> dict[str, object]:
     """Return the first-order conditions of a design."""
     return {
-        "residual": json_number(found.residual),
+        "residual": found.residual,
         "violation": found.violation,
         "rows": [
             {"what": row.what, "case": row.case, "quantity": row.quantity.name, "multiplier": x}

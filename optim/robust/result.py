@@ -6,23 +6,25 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from enum import Enum
-from typing import ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
 
-from optim.criteria.linearised import Conditions
 from optim.criteria.peak import PEAK
-from optim.problem.problem import Problem
-from optim.problem.uncertainty_set import Scenario, UncertainSet
 from optim.problem.words import Aim
-from optim.results.design import DesignResult
-from optim.robust.risk_measure import rank_of
-from optim.robust.scenarios import Outcome
+from solver.arrays import FloatOrNaN
 from solver.results.base import Drawn, MadeOfResponses
 from solver.results.known import NOTHING_KNOWN, Known
 from solver.results.order_statistics import quantile_json
-from solver.results.told import json_number
+from solver.results.told import Piece, json_number
 from solver.results.views import Views
+
+if TYPE_CHECKING:
+    from optim.criteria.linearised import Conditions
+    from optim.problem.problem import Problem
+    from optim.problem.uncertainty_set import Scenario, UncertainSet
+    from optim.results.design import DesignResult
+    from optim.robust.scenarios import Outcome
 
 QUANTILES = (0.05, 0.5, 0.95)
 
@@ -70,15 +72,12 @@ class RobustStatus(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Spread:
-    """The highest peak over samples of the uncertainty.
+    """The highest peak over samples of the uncertainty."""
 
-    Attributes
-    ----------
-    peaks : (n,) tuple of float
-        One a sample [m], in the order they were drawn; NaN where a response could not be computed.
-    """
-
-    peaks: tuple[float, ...]
+    peaks: Annotated[
+        tuple[float, ...],
+        "One a sample [m], in the order they were drawn; NaN where a response could not be computed.",
+    ]
 
     @property
     def mean(self) -> float:
@@ -92,6 +91,9 @@ class Spread:
 
     def quantile(self, share: float) -> float:
         """Return the least peak that at least this share of the samples does not exceed [m]."""
+        # Loaded here: it brings the compiled loops along, which who knows what results are does not need.
+        from optim.robust.scenarios import rank_of
+
         if not self.peaks or not all(math.isfinite(peak) for peak in self.peaks):
             return math.nan
         return sorted(self.peaks)[rank_of(share, len(self.peaks)) - 1]
@@ -110,36 +112,25 @@ class Spread:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Side:
-    """One design, nominal and over the uncertainty.
+    """One design, nominal and over the uncertainty."""
 
-    Attributes
-    ----------
-    values : mapping
-        Variable name to value.
-    peak, at_hz, band_hz : float
-        Highest peak [m], its frequency and the widest band [Hz] with every parameter at its nominal value.
-    worst : Outcome or None
-        The design in the scenario with the highest peak; None if that is not known.
-    spread : Spread
-        Over samples.
-    feasible : bool
-        Whether the limits are kept in every scenario that counts.
-    unknown : Scenario or None
-        The scenario that could not be computed, if the worst peak is not known for that.
-    known : Known
-        How well the highest peak is known, with every parameter at its nominal value and in the worst
-        scenario, whichever is less.
-    """
-
-    values: Mapping[str, float]
-    peak: float
-    at_hz: float
-    band_hz: float
-    worst: Outcome | None
-    spread: Spread
-    feasible: bool
-    unknown: Scenario | None
-    known: Known = NOTHING_KNOWN
+    values: Annotated[Mapping[str, float], "Variable name to value."]
+    peak: Annotated[float, "Highest peak with every parameter at its nominal value [m]."]
+    at_hz: Annotated[float, "Its frequency [Hz]."]
+    band_hz: Annotated[float, "Width of the widest band then [Hz]."]
+    worst: Annotated[
+        Outcome | None, "The design in the scenario with the highest peak; None if that is not known."
+    ]
+    spread: Annotated[Spread, "Over samples."]
+    feasible: Annotated[bool, "Whether the limits are kept in every scenario that counts."]
+    unknown: Annotated[
+        Scenario | None, "The scenario that could not be computed, if the worst peak is not known for that."
+    ]
+    known: Annotated[
+        Known,
+        "How well the highest peak is known, with every parameter at its nominal value and in the worst "
+        "scenario, whichever is less.",
+    ] = NOTHING_KNOWN
 
     @property
     def worst_peak(self) -> float:
@@ -169,84 +160,59 @@ class Side:
         }
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Cut:
-    """A scenario the master problem was given, and what brought it in.
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Cut(Piece):
+    """A scenario the master problem was given, and what brought it in."""
 
-    Attributes
-    ----------
-    scenario : Scenario
-        What is the case.
-    peak : float
-        Highest peak [m] of the design it was found at.
-    exceeds : float
-        By how much, relative, it was worse than all scenarios before; NaN for those the search began with.
-    multiplier : float
-        With which force it holds the robust optimum; those of all scenarios sum to 1 for a peak alone.
-    """
-
-    scenario: Scenario
-    peak: float
-    exceeds: float
-    multiplier: float
+    scenario: Annotated[Scenario, "What is the case."]
+    peak: Annotated[float, "Highest peak [m] of the design it was found at."]
+    exceeds: Annotated[
+        float,
+        "By how much, relative, it was worse than all scenarios before; NaN for those the search began with.",
+    ]
+    multiplier: Annotated[
+        float,
+        "With which force it holds the robust optimum; those of all scenarios sum to 1 for a peak alone.",
+    ]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class RobustResult(MadeOfResponses, Drawn):
-    """The nominal and the robust optimum side by side.
+    """The nominal and the robust optimum side by side."""
 
-    Attributes
-    ----------
-    problem : Problem
-        What was asked.
-    uncertain : UncertainSet
-        Over what.
-    aim, quantile : Aim, float
-        What was minimised over it.
-    status : RobustStatus
-        How the search ended.
-    design : DesignResult
-        The search without uncertainty.
-    nominal, robust : Side or None
-        Both optima over the uncertainty; None where no design is known.
-    objective : float
-        What was minimised, at the robust optimum.
-    conditions : Conditions or None
-        First-order conditions there.
-    cuts : tuple of Cut
-        The scenarios the robust optimum was made for.
-    gap : float
-        Worst case: by how much, relative, the worst scenario found exceeds the worst of the cuts. The latter
-        bounds the optimum of its basin from below, the former from above. NaN for other aims.
-    inner_look : bool
-        Worst case: whether the look over the whole uncertainty, at the robust optimum, came to its end: the
-        gap is that of the worst scenario of all, as far as corners, middles, a space-filling sequence and
-        climbs from these tell. False for other aims.
-    unknown : Scenario or None
-        The scenario that could not be computed.
-    designs, responses : int
-        Designs tried over the uncertainty, and frequency responses in all.
-    seconds : float
-        Time in all.
-    """
+    VIEWS: ClassVar = Views("optim.views", "of_robust", "robust_dataset", "designs:robust_figure")
+    JSON: ClassVar = (
+        "scene=problem.scene.name aim quantile uncertain optimum nominal robust objective gain cuts gap"
+        " inner_look optimality violation unknown designs responses seconds nominal_status=design.status"
+        " warnings=design.warnings reached status"
+    )
 
-    problem: Problem
-    uncertain: UncertainSet
-    aim: Aim
-    quantile: float
-    status: RobustStatus
-    design: DesignResult
-    nominal: Side | None
-    robust: Side | None
-    objective: float
-    conditions: Conditions | None
-    cuts: tuple[Cut, ...]
-    gap: float
-    inner_look: bool = False
-    unknown: Scenario | None
-    designs: int
-    responses: int
-    seconds: float
+    problem: Annotated[Problem, "What was asked."]
+    uncertain: Annotated[UncertainSet, "Over what."]
+    aim: Annotated[Aim, "What was minimised over it."]
+    quantile: Annotated[float, "Share of the uncertainty, where a quantile was minimised."]
+    status: Annotated[RobustStatus, "How the search ended."]
+    design: Annotated[DesignResult, "The search without uncertainty."]
+    nominal: Annotated[Side | None, "The optimum without uncertainty; None where no design is known."]
+    robust: Annotated[Side | None, "The optimum over the uncertainty, likewise."]
+    objective: Annotated[FloatOrNaN, "What was minimised, at the robust optimum."]
+    conditions: Annotated[Conditions | None, "First-order conditions there."]
+    cuts: Annotated[tuple[Cut, ...], "The scenarios the robust optimum was made for."]
+    gap: Annotated[
+        FloatOrNaN,
+        "Worst case: by how much, relative, the worst scenario found exceeds the worst of the cuts. The "
+        "latter bounds the optimum of its basin from below, the former from above. NaN for other aims.",
+    ]
+    inner_look: Annotated[
+        bool,
+        "Worst case: whether the look over the whole uncertainty, at the robust optimum, came to its end: "
+        "the gap is that of the worst scenario of all, as far as corners, middles, a space-filling "
+        "sequence and climbs from these tell. False for other aims.",
+    ] = False
+    unknown: Annotated[Scenario | None, "The scenario that could not be computed."]
+    designs: Annotated[int, "Designs tried over the uncertainty."]
+    responses: Annotated[int, "Frequency responses in all."]
+    seconds: Annotated[float, "Time in all [s]."]
 
     @property
     def reached(self) -> bool:
@@ -259,48 +225,23 @@ class RobustResult(MadeOfResponses, Drawn):
         return {} if self.robust is None else dict(self.robust.values)
 
     @property
-    def gain(self) -> float:
+    def gain(self) -> FloatOrNaN:
         """By which share the robust optimum lowers the worst peak of the nominal one."""
         if self.nominal is None or self.robust is None:
             return math.nan
         return 1.0 - self.robust.worst_peak / self.nominal.worst_peak
 
-    VIEWS: ClassVar = Views("optim.views", "of_robust", "robust_dataset", "designs:robust_figure")
-
     def known_parts(self) -> Iterable[Known]:
         """The robust optimum, nominal and in its worst scenario; the nominal one where there is no other."""
         return self.design.known_parts() if self.robust is None else (self.robust.known,)
 
-    def own_json(self) -> dict[str, object]:
+    def to_json(self) -> dict[str, Any]:
         """Return the result as one JSON object."""
         found = self.conditions
-        return {
-            "scene": self.problem.scene.name,
-            "aim": self.aim.value,
-            "quantile": self.quantile if self.aim is Aim.QUANTILE else None,
-            "uncertain": self.uncertain.to_json(),
-            "optimum": dict(self.optimum),
-            "nominal": None if self.nominal is None else self.nominal.to_json(self.quantile),
-            "robust": None if self.robust is None else self.robust.to_json(self.quantile),
-            "objective": json_number(self.objective),
-            "gain": json_number(self.gain),
-            "cuts": [
-                {
-                    "scenario": cut.scenario.to_json(), "peak": json_number(cut.peak),
-                    "exceeds": json_number(cut.exceeds), "multiplier": cut.multiplier,
-                }
-                for cut in self.cuts
-            ],
-            "gap": json_number(self.gap),
-            "inner_look": self.inner_look,
-            "optimality": None if found is None else json_number(found.residual),
-            "violation": None if found is None else found.violation,
-            "unknown": None if self.unknown is None else self.unknown.to_json(),
-            "designs": self.designs,
-            "responses": self.responses,
-            "seconds": self.seconds,
-            "nominal_status": self.design.status.value,
-            "warnings": list(self.design.warnings),
-            "reached": self.reached,
-            "status": self.status.value,
-        }  # fmt: skip
+        return self._json(
+            quantile=self.quantile if self.aim is Aim.QUANTILE else None,
+            nominal=None if self.nominal is None else self.nominal.to_json(self.quantile),
+            robust=None if self.robust is None else self.robust.to_json(self.quantile),
+            optimality=None if found is None else found.residual,
+            violation=None if found is None else found.violation,
+        )

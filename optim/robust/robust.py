@@ -14,13 +14,17 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Unpack
 
+from optim.criteria.band import BAND
+from optim.criteria.criterion import Row
 from optim.criteria.peak import PEAK
 from optim.errors import DesignError
+from optim.methods.enough_harmonics import most_harmonics
 from optim.methods.evaluator import StoppedError
+from optim.methods.kkt import KEPT
 from optim.problem.keys import FEWEST_SAMPLES, QUANTILE, SEED, DesignKeys
 from optim.problem.keywords import keywords
 from optim.problem.numbers import is_number, whole
@@ -32,18 +36,88 @@ from optim.problem.words import Aim, Method
 from optim.results.best_so_far import OnBest
 from optim.results.design import DesignResult, DesignStatus
 from optim.results.doubts import WELL_KNOWN
-from optim.robust.assessment import side_of
 from optim.robust.cutting_sets import CLOSED, Progress, cutting_sets, sampled
-from optim.robust.result import RobustResult, RobustStatus, Side
+from optim.robust.result import RobustResult, RobustStatus, Side, Spread
+from optim.robust.scenarios import Outcome, rank_of
 from optim.robust.search import RobustSearch
-from optim.robust.worst_case import Aspect, UnknownScenarioError
+from optim.robust.worst_case import MOST_BESIDES, Aspect, UnknownScenarioError, pessimise
 from optim.search import solve_problem
 from solver.results.default_bar import shows_progress
+from solver.results.known import worst_of
 from solver.results.watch import OnProgress, ShouldStop
 from solver.scene.scene import Scene
 
 if TYPE_CHECKING:
     from optim.problem.keyword_types import DesignKeywords
+
+
+def side_of(
+    search: RobustSearch,
+    values: Mapping[str, float],
+    drawn: Sequence[Scenario],
+    scenarios: Sequence[Scenario],
+) -> Side:
+    """Return a design over the uncertainty.
+
+    Parameters
+    ----------
+    search : what is judged, and over what.
+    values : the design.
+    drawn : the samples.
+    scenarios : that may be the worst.
+    """
+    nominal = search.outcome(values, Scenario(), gradients=False)
+    slopes = not search.uncertain.finite  # the search for the worst begins from them
+    samples = [search.outcome(values, scenario, gradients=slopes) for scenario in drawn]
+    peaks = [found.highest(PEAK) if found.good else None for found in samples]
+    worst, unknown = _worst(search, values, samples, scenarios)
+    peak, band = nominal.highest(PEAK), nominal.highest(BAND)
+    places = [Scenario()] if worst is None else [Scenario(), worst.scenario]
+    known = worst_of(search.known(values, scenario) for scenario in dict.fromkeys(places))
+    return Side(
+        values=dict(values), peak=math.nan if peak is None else peak.value,
+        at_hz=math.nan if peak is None else peak.at_hz, band_hz=math.nan if band is None else band.value,
+        worst=worst, spread=Spread(peaks=tuple(math.nan if row is None else row.value for row in peaks)),
+        feasible=unknown is None and _feasible(search, values, samples, scenarios), unknown=unknown,
+        known=known,
+    )  # fmt: skip
+
+
+def _worst(
+    search: RobustSearch, values: Mapping[str, float], samples: Sequence[Outcome], known: Sequence[Scenario]
+) -> tuple[Outcome | None, Scenario | None]:
+    """Return the design in the scenario of the highest peak; or None and the scenario that is not known."""
+    aspect = Aspect(quantity=PEAK, limited=False, plain=True)
+    ranked = sorted((o for o in samples if o.good), key=lambda found: -aspect.worst(found.rows))
+    besides = [found.scenario for found in ranked[:MOST_BESIDES]]
+    try:
+        finding = pessimise(
+            lambda scenario: search.outcome(values, scenario),
+            search.uncertain,
+            aspect,
+            known,
+            besides=besides,
+            thorough=True,
+        )
+    except UnknownScenarioError as error:
+        return None, error.scenario
+    return finding.worst, None
+
+
+def _feasible(
+    search: RobustSearch, values: Mapping[str, float], samples: Sequence[Outcome], known: Sequence[Scenario]
+) -> bool:
+    """Return whether the limits are kept in every scenario tried, with a quantile in its share of samples."""
+    excess = [_excess(search, found.rows) for found in samples]
+    if search.aim is Aim.QUANTILE:
+        return sorted(excess)[rank_of(search.quantile, len(excess)) - 1] <= KEPT
+    excess += [_excess(search, search.outcome(values, scenario).rows) for scenario in known]
+    return max(excess, default=-math.inf) <= KEPT
+
+
+def _excess(search: RobustSearch, rows: Sequence[Row]) -> float:
+    return max((row.excess(search.scales[row.quantity]) for row in rows), default=math.inf)
+
 
 SAMPLES = {Aim.WORST_CASE: 32, Aim.MEAN: 64, Aim.QUANTILE: 64}
 
@@ -150,17 +224,32 @@ def _run(
             search.problem, on_progress=count, should_stop=should_stop, on_best=search.nominal
         )
     )
-    # What is minimised over the uncertainty has the measure and the harmonics that the nominal optimum needs.
-    posed = state.nominal.problem
+    # What is minimised over the uncertainty has the measure and the harmonics that the nominal optimum needs,
+    # and more of these where the worst scenario needs them.
+    most, posed = most_harmonics(search.problem.harmonics), state.nominal.problem
     search.problem = replace(search.problem, harmonics=posed.harmonics, cases=posed.cases)
+    status = _ended(search, drawn, state)
+    while status is RobustStatus.NOT_KNOWN and 2 * search.problem.harmonics <= most:
+        earlier, again = search.problem, _State(nominal=state.nominal)
+        search.problem = replace(earlier, harmonics=2 * earlier.harmonics)
+        status = _ended(search, drawn, again)
+        if "robust" not in again.sides:
+            search.problem, state.unknown = earlier, again.unknown
+            break
+        state = again
+    return _result(search, state, status)
+
+
+def _ended(search: RobustSearch, drawn: tuple[Scenario, ...], state: _State) -> RobustStatus:
+    """Search until it ends or is made to."""
     try:
-        status = _search(search, drawn, state)
+        return _search(search, drawn, state)
     except StoppedError as stop:
         stopped = stop.status is DesignStatus.STOPPED
-        status = RobustStatus.STOPPED if stopped else RobustStatus.TOO_MANY
+        return RobustStatus.STOPPED if stopped else RobustStatus.TOO_MANY
     except UnknownScenarioError as unknown:
-        status, state.unknown = RobustStatus.UNKNOWN_SCENARIO, unknown.scenario
-    return _result(search, state, status)
+        state.unknown = unknown.scenario
+        return RobustStatus.UNKNOWN_SCENARIO
 
 
 def _search(search: RobustSearch, drawn: tuple[Scenario, ...], state: _State) -> RobustStatus:

@@ -3,26 +3,91 @@
 from __future__ import annotations
 
 import math
+import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import lru_cache
+
+import cvxpy
+import numpy as np
 
 from optim.criteria.evaluation import natural_scales
 from optim.criteria.linearised import Model
 from optim.criteria.rows import Evaluation
+from optim.methods.conic import Index, Numbers, Programme, Step, duals_of, padded
 from optim.methods.evaluator import StoppedError
 from optim.methods.kkt import Local
 from optim.methods.minimax import REMEMBERED, minimax_search
 from optim.problem.problem import Problem
 from optim.problem.uncertainty_set import Scenario, UncertainSet
-from optim.problem.variables import Variable
+from optim.problem.variables import Real, Variable
 from optim.problem.words import Aim
 from optim.results.best_so_far import NOMINAL, BestSoFar, OnBest
 from optim.results.design import DesignStatus
-from optim.robust.risk_measure import aim_model
-from optim.robust.scenarios import Outcome, known_in, outcome, together
-from optim.robust.socp import solve_cone
+from optim.robust.scenarios import Outcome, aim_model, known_in, outcome, together
 from optim.robust.worst_case import Aspect
 from solver.results.known import Known
+
+_BLOCK = 4  # rows are padded to multiples of it
+_LOCK = threading.Lock()  # a problem keeps its numbers in itself
+
+
+def solve_cone(model: Model, root: Real, radius: float) -> Step | None:
+    """Solve the master problem of a model; None if the conic solver did not reach optimality.
+
+    Parameters
+    ----------
+    model : rows of the present design.
+    root : (n, n) R.
+    radius : of the trust region, in scaled variables.
+    """
+    groups = np.unique(model.groups)
+    most = max(int((model.groups == g).sum()) for g in groups)
+    with _LOCK:
+        cone = _cone(model.z.size, groups.size, padded(most, _BLOCK), padded(model.excess.size, _BLOCK))
+        return cone.solve(model, root, radius)
+
+
+@lru_cache(maxsize=32)
+def _cone(n: int, groups: int, rows: int, limited: int) -> _Cone:
+    return _Cone(n, groups, rows, limited)
+
+
+class _Cone(Programme):
+    """The second-order cone programme for n variables, so many rows in each group, so many limited rows.
+
+        minimise   Σ t_g + w + penalty · s
+        subject to aᵢ + gᵢᵀ d ≤ t_g(i)             every competing row i of every scenario, in groups g
+                   bⱼ + hⱼᵀ d ≤ s, s ≥ least       every limited row j, as relative excess over its bound
+                   ‖(√2 R d, w − 1)‖ ≤ w + 1       that is ½ |R d|² ≤ w
+                   ‖d‖ ≤ 1                         trust region
+                   low ≤ d ≤ high                  bounds
+
+    d is the step in scaled variables, in units of the radius, and rows are in the units of
+    `optim.methods.conic`; RᵀR is the convex part of the Hessian of the Lagrangian. With the many scenarios of
+    a mean every scenario is a group of its own; the number of rows in a group is padded, so that a problem is
+    compiled once for each shape and kept for the whole process.
+    """
+
+    def __init__(self, n: int, groups: int, rows: int, limited: int) -> None:
+        super().__init__(n)
+        t, w = cvxpy.Variable(groups), cvxpy.Variable()
+        self._heights, self._slopes = cvxpy.Parameter(groups * rows), cvxpy.Parameter((groups * rows, n))
+        self._rows_each = rows
+        owner = np.repeat(np.eye(groups), rows, axis=0)
+        self._row = self._heights + self._slopes @ self._d <= owner @ t
+        curved = cvxpy.hstack([math.sqrt(2.0) * (self._root @ self._d), w - 1.0])
+        cones = [cvxpy.SOC(w + 1.0, curved), cvxpy.SOC(cvxpy.Constant(1.0), self._d)]
+        self._pose(self._share * cvxpy.sum(t) + w, [self._row, *cones], limited)
+
+    def _fill(self, numbers: Numbers, places: list[Index]) -> Index:
+        spread = np.concatenate([np.resize(mine, self._rows_each) for mine in places])
+        self._heights.value, self._slopes.value = numbers.heights[spread], numbers.slopes[spread]
+        return spread
+
+    def _duals(self) -> Real:
+        return duals_of(self._row)
+
 
 MOST_RESPONSES = 20_000
 USUAL = 200.0  # responses of a usual search; what is left is not known beforehand
@@ -33,7 +98,7 @@ OVER = {
     Aim.QUANTILE: "Best by the quantile of {count} samples; its peak is the highest of them.",
 }
 
-Key = tuple[tuple[float, ...], Scenario, bool]
+Key = tuple[tuple[float, ...], Scenario, bool, int]  # the last one: harmonics
 
 
 class RobustSearch:
@@ -50,7 +115,9 @@ class RobustSearch:
         self._on_progress, self._should_stop = on_progress, should_stop
         self._outcomes: dict[Key, Outcome] = {}
         self._on_best = on_best
-        self._known: tuple[int, tuple[float, float]] | None = None  # scenarios and standing of the best
+        self._known: tuple[tuple[int, int], tuple[float, float]] | None = (
+            None  # over what, standing of the best
+        )
         self._scale: float | None = None
 
     @property
@@ -77,9 +144,10 @@ class RobustSearch:
             The caller asked to stop, or the responses are used up.
         """
         place = tuple(values[variable.name] for variable in self.variables)
-        for known in ((place, scenario, True), (place, scenario, gradients)):
-            if known in self._outcomes:
-                return self._outcomes[known]
+        harmonics = self.problem.harmonics
+        for slopes in (True, gradients):
+            if (place, scenario, slopes, harmonics) in self._outcomes:
+                return self._outcomes[place, scenario, slopes, harmonics]
         if self._should_stop is not None and self._should_stop():
             raise StoppedError(DesignStatus.STOPPED)
         if self.responses >= MOST_RESPONSES:
@@ -87,7 +155,7 @@ class RobustSearch:
         found = outcome(self.problem, values, scenario, gradients=gradients, should_stop=self._should_stop)
         if not found.good and self._should_stop is not None and self._should_stop():
             raise StoppedError(DesignStatus.STOPPED)
-        self._outcomes[place, scenario, gradients] = found
+        self._outcomes[place, scenario, gradients, harmonics] = found
         self.count(found.responses)
         return found
 
@@ -142,9 +210,10 @@ class RobustSearch:
         """Tell of a design that is better over the same scenarios, or is the first over more of them."""
         if self._on_best is None or not local.evaluation.good:
             return
-        if self._known is not None and self._known[0] == scenarios and self._known[1] <= local.standing:
+        over = scenarios, self.problem.harmonics
+        if self._known is not None and self._known[0] == over and self._known[1] <= local.standing:
             return
-        self._known = scenarios, local.standing
+        self._known = over, local.standing
         peaks = local.evaluation.peaks
         self._on_best(
             BestSoFar(

@@ -9,16 +9,19 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
-from enum import Enum
-from typing import ClassVar
+from collections.abc import Mapping
 
 import numpy as np
 
 from optim.criteria.amplitudes import COMPETES
 from optim.criteria.response_gradients import Sensitivity
 from optim.problem.variables import Real
+from optim.studies.sensitivity_result import (
+    LeftOut,
+    ParameterSensitivity,
+    SensitivityResult,
+    SensitivityStatus,
+)
 from solver.balance.parameter import resolve
 from solver.balance.parameter_derivatives import resolved
 from solver.balance.simplifications import Effects, even_harmonics_reason
@@ -28,151 +31,9 @@ from solver.continuation.branches.sweep import sweep
 from solver.continuation.extrema.extrema import HALF_POWER
 from solver.continuation.peaks import Peak
 from solver.errors import SettingError
-from solver.results.base import Drawn, MadeOfResponses
-from solver.results.known import Known
-from solver.results.told import json_number
-from solver.results.views import Views
 from solver.scene.cyclic.annulus import check_in_annulus
 from solver.scene.parameter_paths import PHASE
 from solver.scene.scene import Scene
-
-
-class SensitivityStatus(Enum):
-    """Whether there are sensitivities; the value is a sentence a user can act on."""
-
-    KNOWN = "Every derivative is exact for the harmonics kept."
-    SINGULAR = (
-        "Some derivatives do not exist at this design (the peak or a band edge sits on a change of contact "
-        "state): those are left out; look at a design beside it."
-    )
-    NO_RESPONSE = (
-        "The frequency response could not be computed over the whole band: use more harmonics or a narrower "
-        "band."
-    )
-    UNDAMPED = (
-        "There is a resonance in the band and no damping, so that nothing bounds the response: give the "
-        "structure some (damping_ratio = 0.001, say), or a band without the resonance."
-    )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ParameterSensitivity:
-    """What one parameter does to the peaks and the band.
-
-    Attributes
-    ----------
-    path, unit : str
-        The parameter.
-    value : float
-        Its value.
-    relative : bool
-        Whether per cent of it mean something: not of angles, and not of what is 0.
-    peaks : tuple of float
-        Derivative of every competing peak [m per unit], in the order of the result.
-    band : float
-        Derivative of the band's width [Hz per unit]; NaN without a band.
-    """
-
-    path: str
-    unit: str
-    value: float
-    relative: bool
-    peaks: tuple[float, ...]
-    band: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class SensitivityResult(MadeOfResponses, Drawn):
-    """Sensitivities of a design.
-
-    Attributes
-    ----------
-    scene : Scene
-        With the values of the design.
-    status : SensitivityStatus
-        Whether there are sensitivities.
-    branch : Branch
-        The response.
-    peaks : tuple of Peak
-        Those that compete, highest first.
-    rows : tuple of ParameterSensitivity
-        What matters most for the highest peak first; those without per cents last.
-    band_by_limit : float
-        Derivative of the band's width by the limit it is measured at [Hz/m], the peaks held; NaN without.
-    left_out : tuple of (str, str)
-        Paths with the reason why they have no derivative.
-    seconds : float
-        Time in all.
-    """
-
-    scene: Scene
-    status: SensitivityStatus
-    branch: Branch
-    peaks: tuple[Peak, ...]
-    rows: tuple[ParameterSensitivity, ...]
-    band_by_limit: float
-    left_out: tuple[tuple[str, str], ...]
-    seconds: float
-
-    @property
-    def reached(self) -> bool:
-        """Whether there are sensitivities."""
-        return self.status not in (SensitivityStatus.NO_RESPONSE, SensitivityStatus.UNDAMPED)
-
-    @property
-    def band_hz(self) -> float:
-        """Width of the resonance band [Hz]; NaN without one."""
-        return math.nan if self.branch.band is None else self.branch.band.width
-
-    def peak_elasticities(self, row: ParameterSensitivity) -> tuple[float, ...]:
-        """Return the per cent of every competing peak for one per cent of a parameter; NaN where none."""
-        factor = row.value if row.relative else math.nan
-        return tuple(
-            slope * factor / peak.value if peak.value > 0.0 else math.nan
-            for slope, peak in zip(row.peaks, self.peaks, strict=True)
-        )
-
-    def band_elasticity(self, row: ParameterSensitivity) -> float:
-        """Return the per cent of the band for one per cent of a parameter; NaN where none."""
-        return row.band * row.value / self.band_hz if row.relative and self.band_hz > 0.0 else math.nan
-
-    VIEWS: ClassVar = Views(
-        "optim.views", "of_sensitivities", "sensitivities_dataset", "shares:sensitivities_figure"
-    )
-
-    def known_parts(self) -> Iterable[Known]:
-        """The response."""
-        return (self.branch.known,)
-
-    def own_json(self) -> dict[str, object]:
-        """Return the result as one JSON object."""
-        band = self.branch.band
-        return {
-            "scene": self.scene.name,
-            "peaks": [{"value": peak.value, "at": peak.at} for peak in self.peaks],
-            "band_hz": json_number(self.band_hz),
-            "limit": None if band is None else band.limit,
-            "band_by_limit": json_number(self.band_by_limit),
-            "rows": [
-                {
-                    "path": row.path,
-                    "unit": row.unit,
-                    "value": row.value,
-                    "peak_percent": json_number(self.peak_elasticities(row)[0]),
-                    "peaks_percent": [json_number(share) for share in self.peak_elasticities(row)],
-                    "band_percent": json_number(self.band_elasticity(row)),
-                    "peak_slope": json_number(row.peaks[0]),
-                    "peak_slopes": [json_number(slope) for slope in row.peaks],
-                    "band_slope": json_number(row.band),
-                }
-                for row in self.rows
-            ],
-            "left_out": [{"path": path, "reason": reason} for path, reason in self.left_out],
-            "peak_certificate": self.branch.peak_certificate.to_json(),
-            "seconds": self.seconds,
-            "reached": self.reached,
-            "status": self.status.value,
-        }
 
 
 def sensitivities(
@@ -218,7 +79,7 @@ def sensitivities(
 
 def _differentiable(
     scene: Scene, branch: Branch, known: tuple[str, ...]
-) -> tuple[list[str], tuple[tuple[str, str], ...]]:
+) -> tuple[list[str], tuple[LeftOut, ...]]:
     """Return the paths with a value and a derivative, and the others with the reason."""
     paths, left_out = [], []
     for path in known:
@@ -228,7 +89,7 @@ def _differentiable(
                 check_in_annulus(scene, path)
             resolved(branch.balance, [path])
         except SettingError as error:
-            left_out.append((path, str(error)))
+            left_out.append(LeftOut(path, str(error)))
         else:
             paths.append(path)
     return paths, tuple(left_out)

@@ -6,14 +6,16 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
-from typing import ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple
 
-from optim.problem.problem import Problem
-from optim.results.design import DesignResult
 from solver.results.base import Drawn, MadeOfResponses
 from solver.results.known import Known
-from solver.results.told import json_number
+from solver.results.told import Piece
 from solver.results.views import Views
+
+if TYPE_CHECKING:
+    from optim.problem.problem import Problem
+    from optim.results.design import DesignResult, DesignStatus
 
 SAME = 1e-7  # relative distance within which two points are one
 
@@ -32,30 +34,23 @@ class ParetoStatus(Enum):
     STOPPED = "The search was stopped by the caller; the points found so far are given."
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ParetoPoint:
-    """A design on the front, with the two indicators of a damper: risk range and largest amplitude.
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class ParetoPoint(Piece):
+    """A design on the front, with the two indicators of a damper: risk range and largest amplitude."""
 
-    Attributes
-    ----------
-    design : DesignResult
-        The design with its responses, active limits and conditions.
-    peak, at_hz : float
-        Largest amplitude [m] and its frequency.
-    band_hz : float
-        Width of the resonance band, the frequencies at risk [Hz].
-    intervals : tuple of (low, high)
-        Where they are [Hz].
-    slope : float
-        d peak / d band along the front [m/Hz], at most 0; NaN where the front ends in a vertical.
-    """
+    JSON: ClassVar = (
+        "values peak at=at_hz band_hz intervals slope hz_per_metre active=design.active"
+        " optimality=design.optimality status=design.status"
+    )
 
-    design: DesignResult
-    peak: float
-    at_hz: float
-    band_hz: float
-    intervals: tuple[tuple[float, float], ...]
-    slope: float
+    design: Annotated[DesignResult, "The design with its responses, active limits and conditions."]
+    peak: Annotated[float, "Largest amplitude [m]."]
+    at_hz: Annotated[float, "Its frequency [Hz]."]
+    band_hz: Annotated[float, "Width of the resonance band, the frequencies at risk [Hz]."]
+    intervals: Annotated[tuple[tuple[float, float], ...], "Where they are [Hz]."]
+    slope: Annotated[
+        float, "d peak / d band along the front [m/Hz], at most 0; NaN where the front ends in a vertical."
+    ]
 
     @classmethod
     def of(cls, design: DesignResult, slope: float) -> ParetoPoint:
@@ -85,58 +80,46 @@ class ParetoPoint:
         peak, band = other.peak * (1.0 + SAME), other.band_hz * (1.0 + SAME)
         return self.peak <= peak and self.band_hz <= band
 
-    def to_json(self) -> dict[str, object]:
+    def to_json(self) -> dict[str, Any]:
         """Return it as one JSON object."""
-        return {
-            "values": dict(self.values),
-            "peak": self.peak,
-            "at": self.at_hz,
-            "band_hz": self.band_hz,
-            "intervals": [list(pair) for pair in self.intervals],
-            "slope": json_number(self.slope),
-            "hz_per_metre": json_number(self.hz_per_metre),
-            "active": list(self.design.active),
-            "optimality": json_number(self.design.optimality),
-            "status": self.design.status.value,
-            **self.design.known.to_json(),
-        }
+        return self._json() | self.design.known.to_json()
+
+
+class Ended(NamedTuple):
+    """How the search of an end of the front ended."""
+
+    status: DesignStatus
+    reached: bool
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class ParetoResult(MadeOfResponses, Drawn):
-    """The front of peak against band.
+    """The front of peak against band: designs of which none is better in both than another."""
 
-    Attributes
-    ----------
-    problem : Problem
-        What was asked.
-    status : ParetoStatus
-        How the search ended.
-    ends : tuple of DesignResult
-        The least peak, and the narrowest band.
-    points, dominated : tuple of ParetoPoint
-        The front from the least peak on, and designs found that another one beats in both.
-    missed : tuple of float
-        Widths [Hz] for which no design was found.
-    evaluations : int
-        Designs evaluated.
-    seconds : float
-        Time in all.
-    """
+    VIEWS: ClassVar = Views("optim.views", "of_front", "front_dataset", "designs:pareto_figure")
+    JSON: ClassVar = (
+        "scene=problem.scene.name dof=problem.scene.observe.dof limit=problem.limit points knee dominated"
+        " missed ends=ended evaluations seconds reached status"
+    )
 
-    problem: Problem
-    status: ParetoStatus
-    ends: tuple[DesignResult, ...]
-    points: tuple[ParetoPoint, ...]
-    dominated: tuple[ParetoPoint, ...]
-    missed: tuple[float, ...]
-    evaluations: int
-    seconds: float
+    problem: Annotated[Problem, "What was asked."]
+    status: Annotated[ParetoStatus, "How the search ended."]
+    ends: Annotated[tuple[DesignResult, ...], "The least peak, and the narrowest band."]
+    points: Annotated[tuple[ParetoPoint, ...], "The front from the least peak on."]
+    dominated: Annotated[tuple[ParetoPoint, ...], "Designs found that another one beats in both."]
+    missed: Annotated[tuple[float, ...], "Widths [Hz] for which no design was found."]
+    evaluations: Annotated[int, "Designs evaluated."]
+    seconds: Annotated[float, "Time in all [s]."]
 
     @property
     def reached(self) -> bool:
         """Whether the whole front was found."""
         return self.status in (ParetoStatus.COMPLETE, ParetoStatus.NO_TRADE_OFF)
+
+    @property
+    def ended(self) -> tuple[Ended, ...]:
+        """How the searches of both ends ended."""
+        return tuple(Ended(end.status, end.reached) for end in self.ends)
 
     @property
     def knee(self) -> int | None:
@@ -149,28 +132,9 @@ class ParetoResult(MadeOfResponses, Drawn):
         place = max(range(len(below)), key=below.__getitem__)
         return place if below[place] > 0.0 else None
 
-    VIEWS: ClassVar = Views("optim.views", "of_front", "front_dataset", "pareto:pareto_figure")
-
     def known_parts(self) -> Iterable[Known]:
         """Both ends and every point of the front."""
         return [one.known for one in (*self.ends, *(point.design for point in self.points))]
-
-    def own_json(self) -> dict[str, object]:
-        """Return the result as one JSON object."""
-        return {
-            "scene": self.problem.scene.name,
-            "dof": self.problem.scene.observe.dof,
-            "limit": self.problem.limit,
-            "points": [point.to_json() for point in self.points],
-            "knee": self.knee,
-            "dominated": [point.to_json() for point in self.dominated],
-            "missed": list(self.missed),
-            "ends": [{"status": end.status.value, "reached": end.reached} for end in self.ends],
-            "evaluations": self.evaluations,
-            "seconds": self.seconds,
-            "reached": self.reached,
-            "status": self.status.value,
-        }
 
 
 def front_of(found: Sequence[ParetoPoint]) -> tuple[tuple[ParetoPoint, ...], tuple[ParetoPoint, ...]]:

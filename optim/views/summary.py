@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from solver.results import units
 from solver.results.told import Summary
-from solver.views.parameter_units import parameter
+from solver.scene.parameter_paths import parameter
 from solver.views.summary import Pairs, made
 
 if TYPE_CHECKING:
@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from optim.results.design import DesignResult
     from optim.robust.result import RobustResult
     from optim.studies.crossings import CampbellDiagram
-    from optim.studies.elasticities import SensitivityResult
     from optim.studies.pareto_result import ParetoResult
+    from optim.studies.sensitivity_result import SensitivityResult
 
 _MOST_ROWS = 12
 

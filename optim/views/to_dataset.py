@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solver.results.dataset import Dataset, Variable
-from solver.views.columns import attributes, column
-from solver.views.parameter_units import parameter_unit
+from solver.scene.parameter_paths import parameter_unit
+from solver.views.to_dataset import attributes, column
 
 if TYPE_CHECKING:
     from optim.criteria.rows import Evaluation
@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from optim.results.design import DesignResult
     from optim.robust.result import RobustResult
     from optim.studies.crossings import CampbellDiagram
-    from optim.studies.elasticities import SensitivityResult
     from optim.studies.pareto_result import ParetoResult
+    from optim.studies.sensitivity_result import SensitivityResult
 
 
 def design_dataset(result: DesignResult) -> Dataset:

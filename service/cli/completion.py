@@ -19,7 +19,7 @@ _SCENE_FILES = (".toml", ".json")
 
 def scenes(incomplete: str) -> list[str]:
     """Shipped scenes, scene files, and the folders on the way to them."""
-    from solver.scene.io import shipped_scenes
+    from solver.scene.toml import shipped_scenes
 
     beside = Path(incomplete + "x").parent
     found = sorted(beside.iterdir()) if beside.is_dir() else []
@@ -32,15 +32,21 @@ def scenes(incomplete: str) -> list[str]:
 def words(*known: str) -> Callable[[str], list[str]]:
     """Offer these words."""
 
-    def offered(incomplete: str) -> list[str]:
+    def found(incomplete: str) -> list[str]:
         return [word for word in known if word.startswith(incomplete)]
 
-    return offered
+    return found
 
 
-def parameters(ctx: typer.Context, incomplete: str) -> list[str]:
-    """The frequency, and the parameter paths of the scene written before."""
-    return [path for path in ("frequency", *_paths(ctx)) if path.startswith(incomplete)]
+def offered(known: tuple[str, ...], *, paths: bool) -> Callable[..., list[str]] | None:
+    """Offer these words, with the parameter paths of the scene written before."""
+    if not paths:
+        return words(*known) if known else None
+
+    def found(ctx: typer.Context, incomplete: str) -> list[str]:
+        return [word for word in (*known, *_paths(ctx)) if word.startswith(incomplete)]
+
+    return found
 
 
 def paths(ctx: typer.Context, incomplete: str) -> list[str]:

@@ -24,8 +24,8 @@ from service.rendering.tables import design as design_reports
 from service.rendering.tables.text import say
 from service.schemas.answers import JobAnswer, SweepDetail
 from service.settings.settings import load_settings
+from solver.views.plots.html import save
 from solver.views.plots.responses import Family, family_figure, peak_figure
-from solver.views.plots.saving import save
 
 REMOVED, STUCK = 0.0, 1e9
 """Normal loads [N] at which a contact does nothing, and never slips."""

@@ -23,7 +23,7 @@ class Entry:
     name : str
         As the user writes it.
     home : str
-        Module of `service.cli` and function, ``"commands.solver.solve"``; `STUDY` for the command of a study.
+        Module of `service.cli` and function, ``"commands.scenes.scenes"``; `STUDY` for that of a study.
     summary : str
         The first line of the function's docstring, which `--help` shows.
     keyed : bool

@@ -67,8 +67,8 @@ class Outputs:
         if scene is not None and "scene" not in data.attributes:
             data = replace(data, attributes={**data.attributes, **scene_attributes(scene)})
         if self.picture is not None and draw is not None:
-            from solver.views.plots import saving
+            from solver.views.plots import html
 
-            saving.save(draw(), self.picture, data)
+            html.save(draw(), self.picture, data)
         if self.file is not None:
             save(data, self.file)

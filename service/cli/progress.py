@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import sys
 import threading
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -38,13 +39,30 @@ class Reporter:
 def told_best(found: Mapping[str, Any]) -> str:
     """The best design so far in a few words."""
     from solver.results import units
-    from solver.views.parameter_units import parameter
+    from solver.scene.parameter_paths import parameter
 
     values = [parameter(name.split(",")[0].strip(), value) for name, value in found["values"].items()]
     peak = "" if found["peak"] is None else f": {units.length(found['peak'])}"
     doubt = "" if found["verified"] else ", to be verified"
     broken = "" if found["feasible"] else ", breaks a limit"
     return f"best {', '.join(values)}{peak}{doubt}{broken}"
+
+
+class _WhenTold(Reporter):
+    """A bar that is there from its first report on; before it, people are told to be patient."""
+
+    def __init__(self, begin: Callable[[], Reporter | None]) -> None:
+        self._begin = cache(begin)
+
+    def __call__(self, fraction: float, count: int) -> None:
+        """Show the bar and move it."""
+        if reporter := self._begin():
+            reporter(fraction, count)
+
+    def best(self, found: Mapping[str, Any]) -> None:
+        """Show the bar and say the best design so far."""
+        if reporter := self._begin():
+            reporter.best(found)
 
 
 @contextmanager
@@ -56,8 +74,18 @@ def bar(label: str, counted: str = "points") -> Iterator[Reporter | None]:
     label : what is going on.
     counted : what the second number of a progress report counts.
     """
-    with bars([label], counted) as reporters:
-        yield reporters[0]
+    if not on_terminal():
+        yield None
+        return
+    with ExitStack() as stack:
+        waiting = stack.enter_context(ExitStack())
+        waiting.enter_context(patience())
+
+        def begin() -> Reporter | None:
+            waiting.close()
+            return stack.enter_context(bars([label], counted))[0]
+
+        yield _WhenTold(begin)
 
 
 @contextmanager

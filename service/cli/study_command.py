@@ -3,26 +3,32 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 from typer.core import TyperGroup
 
 from optim.errors import DesignError
-from service.cli.commands.client.jobs import print_result
 from service.cli.failures import end
 from service.cli.options import inputs
 from service.cli.options import shared as options
-from service.cli.options.key_options import as_options, key_options
+from service.cli.options.key_options import KeyOption, as_options, key_options
 from service.cli.output_files import Outputs
 from service.cli.progress import bar
 from service.errors import InputError, InvalidRequestError
-from service.jobs.study import Study, Watch
+from service.jobs.study import Answer, Study, Watch
+from service.rendering.plain import print_result
 from service.rendering.tables.text import show
 from solver.errors import Issue, SettingError
+from solver.results.views import on_demand
+
+if TYPE_CHECKING:
+    from solver.scene.scene import Scene
 
 
 def command_named(name: str) -> Callable[..., None]:
@@ -33,52 +39,104 @@ def command_named(name: str) -> Callable[..., None]:
 
 def add_others(group: TyperGroup) -> None:
     """Add the commands of the studies that the setting `kinds` names."""
+    from service.jobs.common.problem import ProblemRequest
+    from service.jobs.kinds import studies
     from service.settings.kinds import registry_here
 
-    for kind in registry_here():
-        if issubclass(kind.request, Study) and kind.name not in group.commands:
-            alone = typer.Typer(add_completion=False, rich_markup_mode=None)
-            alone.command(kind.name)(command_of(kind.request))
-            group.add_command(typer.main.get_command(alone))
+    for name, study in studies(registry_here()).items():
+        if name in group.commands:
+            continue
+        made = command_of
+        if issubclass(study, ProblemRequest):
+            made = on_demand("service.cli.commands.design:command_of_problem")
+        alone = typer.Typer(add_completion=False, rich_markup_mode=None)
+        alone.command(name)(made(study))
+        group.add_command(typer.main.get_command(alone))
+
+
+@dataclass(frozen=True, slots=True)
+class Keys:
+    """The keys of a study as options of a command."""
+
+    study: type[Study]
+    made: Mapping[str, KeyOption]
+    flags: Mapping[str, str]
+
+    @classmethod
+    def of(cls, study: type[Study], *but: str) -> Keys:
+        """Return them, without some that the command takes otherwise."""
+        options_ = {one.name: one for one in key_options(study.as_kind(), None)}
+        made = {name: options_[name] for name in study.own_keys() if name not in but}
+        flags = {word: one.flag for name, one in made.items() for word in (name, one.key)}
+        return cls(study, made, {**flags, "path": flags.get("parameter", "--set")})
+
+    def read(self, given: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the keys that were given."""
+        read = {name: one.in_body(given[one.parameter.name]) for name, one in self.made.items()}
+        return {name: value for name, value in read.items() if value is not None}
+
+    @contextmanager
+    def named(self) -> Iterator[None]:
+        """Name options in what is refused inside."""
+        try:
+            yield
+        except (SettingError, DesignError) as error:
+            raise InputError(as_options(str(error), self.flags)) from error
+
+    def command(
+        self, function: Callable[..., None], before: Mapping[str, Any], behind: Mapping[str, Any], *,
+        doc: str | None,
+    ) -> Callable[..., None]:  # fmt: skip
+        """Return a function as a command: scene, what comes `before`, keys, what comes `behind`."""
+        drawn = {"plot": options.Plot} if self.study.drawn() else {}
+        listed = [
+            _keyword("name", options.Scene),
+            *(_keyword(name, annotation) for name, annotation in before.items()),
+            *(one.parameter for one in self.made.values()),
+            _keyword("values", options.Values, None),
+            *(_keyword(name, one, None) for name, one in {**behind, **drawn, "out": options.Out}.items()),
+            _keyword("as_json", options.Json, False),
+        ]
+
+        def command(**given: Any) -> None:
+            function(**given)
+
+        command.__doc__ = doc
+        command.__signature__ = inspect.Signature(listed)  # type: ignore[attr-defined]
+        command.__annotations__ = {one.name: one.annotation for one in listed}
+        return command
 
 
 def command_of(study: type[Study]) -> Callable[..., None]:
     """Return the command of a study, with an option for each key."""
-    own = study.own_keys()
-    made = {one.name: one for one in key_options(study.as_kind(), None)}
-    flags = {word: made[name].flag for name in own for word in (name, made[name].key)}
-    flags["path"] = flags.get("parameter", "--set")
+    keys = Keys.of(study)
 
-    def command(
-        name: str, values: list[str] | None, plot: str | None, out: str | None, as_json: bool, **given: Any
-    ) -> None:
+    def compute(
+        name: str, values: list[str] | None, out: str | None, as_json: bool, plot: str | None = None,
+        **given: Any,
+    ) -> None:  # fmt: skip
         outputs = Outputs.asked(plot, out)
         scene = inputs.scene(name, values)
-        read = {key: made[key].in_body(given[made[key].parameter.name]) for key in own}
-        asked = {key: value for key, value in read.items() if value is not None}
-        wrong = [as_options(one.message, flags) for one in study.model_construct(**asked).issues(scene)]
-        if wrong:
-            raise InvalidRequestError([Issue(pointer="", message=one) for one in wrong])
-        try:
-            with bar(study.NAME, study.COUNTED) as on_progress:
-                answer = study.compute(scene, asked, Watch(on_progress))
-        except (SettingError, DesignError) as error:
-            raise InputError(as_options(str(error), flags)) from error
-        if answer.result is not None:
-            draw = None if study.empty(answer.json) else answer.plot
-            outputs.write(answer.result, draw, scene=scene)
-        show(answer.json, partial(print_result, study.NAME), as_json=as_json)
-        end(answer.reached, answer.status)
+        asked = keys.read(given)
+        if wrong := study.model_construct(**asked).issues(scene):
+            named = [Issue(pointer="", message=as_options(one.message, keys.flags)) for one in wrong]
+            raise InvalidRequestError(named)
+        with keys.named(), bar(study.NAME, study.COUNTED) as on_progress:
+            answer = study.compute(scene, asked, Watch(on_progress))
+        give(study, answer, outputs, scene, as_json=as_json)
 
-    listed = [
-        _keyword("name", options.Scene), *(made[key].parameter for key in own),
-        _keyword("values", options.Values, None), _keyword("plot", options.Plot, None),
-        _keyword("out", options.Out, None), _keyword("as_json", options.Json, False),
-    ]  # fmt: skip
-    command.__doc__ = study.__doc__
-    command.__signature__ = inspect.Signature(listed)  # type: ignore[attr-defined]
-    command.__annotations__ = {one.name: one.annotation for one in listed}
-    return command
+    return keys.command(compute, {}, {}, doc=study.__doc__)
+
+
+def give(study: type[Study], answer: Answer, outputs: Outputs, scene: Scene, *, as_json: bool) -> None:
+    """Write and print what was found; status 1 if the goal was not reached."""
+    if answer.result is not None:
+        draw = answer.plot if study.drawn() and not study.empty(answer.json) else None
+        outputs.write(answer.result, draw, scene=scene)
+    elif answer.reached and outputs.file is not None:
+        raise InputError(f"`--out`: what `{study.NAME}` finds is no table, take --json")
+    show(answer.json, partial(print_result, study.NAME), as_json=as_json)
+    end(answer.reached, answer.status)
 
 
 def _keyword(name: str, annotation: Any, default: Any = inspect.Parameter.empty) -> inspect.Parameter:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from service.cli.lazy import STUDY, Entry
 
 COMMANDS = (
-    Entry("scenes", "commands.solver.scenes", "List the shipped scenes."),
-    Entry("plan", "commands.solver.plan", "Say which effects a scene calls for, and why."),
-    Entry("solve", "commands.solver.solve", "Compute one periodic response, or look for all of them."),
-    Entry("sweep", "commands.solver.sweep", "Follow the response over a parameter."),
+    Entry("scenes", "commands.scenes.scenes", "List the shipped scenes."),
+    Entry("plan", STUDY, "Say which effects a scene calls for, and why."),
+    Entry("solve", STUDY, "Compute one periodic response, or look for all of them."),
+    Entry("sweep", STUDY, "Follow the response over a parameter."),
     Entry("accuracy", STUDY, "Measure what accuracy costs."),
     Entry("design", "commands.design.design", "Find the best damper."),
     Entry("pareto", "commands.design.pareto", "Find the front of peak against resonance band."),
@@ -40,7 +40,7 @@ COMMANDS = (
     Entry(
         "controlled", STUDY, "Follow the response over the frequency with one amplitude held, as rigs do.",
     ),
-    Entry("mistuning", "commands.mistuning.mistuning", "Study disks whose blades are not quite equal."),
+    Entry("mistuning", STUDY, "Study disks whose blades are not quite equal."),
     Entry(
         "schema", "commands.schema.schema",
         "Print the JSON Schema of scene files, design problems or jobs, for editors.",

@@ -27,6 +27,7 @@ OLDEST = 15
 _WAIT_SECONDS = 30.0
 _CONNECT_SECONDS = 10
 _LEAST_CONNECT_SECONDS = 2  # libpq takes no less
+_MARGIN_SECONDS = 1.0  # the server is the first to give up, and says why
 # Two numbers of our own; advisory locks know their holders' agreement by number alone.
 _SERVICES = 0x5354_4943_4B01
 _TABLES = 0x5354_4943_4B02
@@ -95,11 +96,38 @@ def _connect_bounded(seconds: float) -> Callable[[Any, Any, list[Any], dict[str,
 
 
 def bounded_connect(seconds: float) -> Callable[..., Any]:
-    """What opens connections of psycopg whose server has so long for each answer [s]."""
-    # Loaded here: only services on PostgreSQL need the driver.
-    from service.db.bounded import connector
+    """What opens connections of psycopg whose server has so long for each answer [s].
 
-    return connector(seconds)
+    The server ends a statement that takes long by itself, if it runs. One that is frozen, or behind a network
+    that swallows everything, says nothing at all, and TCP notices that late or never: the client must give
+    up.
+    """
+    # Loaded here: only services on PostgreSQL need the driver.
+    import psycopg
+    from psycopg.errors import OperationalError
+
+    class Bounded(psycopg.Connection[Any]):
+        """A connection that closes itself when its server is silent for too long."""
+
+        def wait(self, gen: Any, interval: float = 0.1, timeout: float | None = None) -> Any:
+            """Wait for the server, as every method of a connection does.
+
+            Raises
+            ------
+            OperationalError
+                If it does not answer in time. What became of the statement is not known; the server rolls
+                its transaction back as soon as it sees that the connection is gone.
+            """
+            longest = seconds + _MARGIN_SECONDS
+            try:
+                return super().wait(gen, interval, longest if timeout is None else min(timeout, longest))
+            except OperationalError as error:
+                if error.sqlstate is None and not self.closed:
+                    self.pgconn.finish()
+                    raise OperationalError(f"the server did not answer within {longest:g} s") from error
+                raise
+
+    return Bounded.connect
 
 
 def service_engine(url: str, connections: int, seconds: float) -> Engine:

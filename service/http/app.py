@@ -11,35 +11,24 @@ from starlette.concurrency import run_in_threadpool
 
 from service.auth.authenticator import Doorkeeper
 from service.http import openapi
-from service.http.bodies import Turns
-from service.http.dependencies import HostCheck
-from service.http.events import Looks
+from service.http.dependencies import HostCheck, Turns
 from service.http.metrics import Measured, Metrics
-from service.http.middleware.admission import Gate
+from service.http.middleware.admission import Gate, Turnstile
 from service.http.middleware.connections import Connections
-from service.http.middleware.head import Head
-from service.http.middleware.request_log import RequestLog
-from service.http.middleware.security_headers import Seal
-from service.http.middleware.turnstile import Turnstile
+from service.http.middleware.every_answer import Head, RequestLog, Seal
 from service.http.routes import (
-    designs,
+    at_once,
     events,
+    forms,
     health,
     jobs,
-    kinds,
-    laws,
-    matrices,
-    metrics,
     page,
-    plan,
-    previews,
-    reference,
+    runs,
     scenes,
-    sweeps,
+    stored,
     uploads,
 )
-from service.http.routes.texts import measurements, scene_text, templates
-from service.http.workbench import projects, reports, runs, shares
+from service.http.routes.events import Looks
 from service.jobs.registry import Registry
 from service.queue.core import SOLVER_VERSION, Service
 from service.queue.health import Probe
@@ -101,11 +90,13 @@ def create_app(settings: Settings | None = None, registry: Registry | None = Non
     app.add_middleware(Seal, settings=service.settings)
     events.install(app)
     app.include_router(jobs.submissions(service.registry))
-    for module in (
-        jobs, kinds, laws, events, designs, sweeps, scene_text, templates, scenes, uploads, matrices,
-        measurements, plan, previews, projects, reports, runs, shares, health, metrics, reference, page,
+    for router in (
+        jobs.router, forms.kinds, forms.laws, events.router, stored.designs, stored.sweeps, scenes.texts,
+        forms.templates, scenes.router, uploads.router, uploads.matrices, uploads.measurements, at_once.plans,
+        at_once.previews, runs.projects, runs.reports, runs.runs, runs.shares, health.router,
+        page.reference, page.router,
     ):  # fmt: skip
-        app.include_router(module.router)
+        app.include_router(router)
     openapi.install(app, service.registry)
     return app
 

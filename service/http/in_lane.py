@@ -1,12 +1,17 @@
-"""Endpoints that look something up or compute, run in the lane they belong to."""
+"""What a route looks up or has computed: in the lane it belongs to, or beside the service."""
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Mapping
 from functools import wraps
 from typing import Any, TypeVar
 
+from service.errors import InvalidRequestError
 from service.http.dependencies import Context
+from service.jobs.answering import KIND, PREVIEW, RESOLVE, Prepared
+from service.jobs.registry import JobKind, SceneSource
+from service.jobs.strict_json import JsonText
+from service.queue.core import SOLVER_VERSION
 from service.queue.lanes import Lane, Lanes
 
 _T = TypeVar("_T")
@@ -31,3 +36,56 @@ reading = _in(lambda lanes: lanes.reads)
 writing = _in(lambda lanes: lanes.writes)
 writing_files = _in(lambda lanes: lanes.files)
 drawing = _in(lambda lanes: lanes.pictures)
+
+
+_MOST_LOOKED_UP = 8
+"""Scenes and uploads of one request; shipped scenes need no looking up."""
+
+
+async def computed(context: Context, task: str, words: Mapping[str, Any], about: str = "/scene") -> Any:
+    """What a task of `service.jobs.answering` finds.
+
+    Parameters
+    ----------
+    about : pointer of the field that makes it costly.
+
+    Raises
+    ------
+    InvalidRequestError, MalformedBodyError, BodyTooLargeError
+        What the task refuses; what takes more time or memory than an answer may.
+    TooManyRequestsError, QueueFullError
+        If the budget of the caller is used up, or too many wait.
+    """
+    service, caller = context.service, context.caller
+    source = service.scenes.of(caller)
+    spec: dict[str, Any] = {"words": words, "scenes": {}, "uploads": {}}
+    for _ in range(_MOST_LOOKED_UP + 1):
+        told = await service.answers.ask(task, spec, caller.owner, about)
+        if "needs" not in told:
+            return told["found"]
+        await service.lanes.reads.run(caller.owner, _look_up, told["needs"], source, spec)
+    raise RuntimeError(f"the task {task!r} looks up more than {_MOST_LOOKED_UP} scenes")
+
+
+async def prepared(context: Context, kind: JobKind, body: Mapping[str, Any], task: str = RESOLVE) -> Prepared:
+    """A request for a job or a preview, resolved; `computed` lists the errors."""
+    settings = context.service.settings
+    memory = settings.answer_memory_bytes if task == PREVIEW else settings.worker_memory_bytes or None
+    words = {
+        KIND: kind.name, "body": dict(body), "work": context.caller.limits.work, "memory": memory,
+        "version": SOLVER_VERSION,
+    }  # fmt: skip
+    found = await computed(context, task, words)
+    return Prepared(**{**found, "spec": JsonText(found["spec"])})
+
+
+def _look_up(needs: Mapping[str, Any], source: SceneSource, spec: dict[str, Any]) -> None:
+    """Put what a task needs where it finds it."""
+    if "scene" in needs:
+        spec["scenes"][needs["scene"]] = source.scene_body(needs["scene"])
+        return
+    try:
+        found: dict[str, Any] = {"scene": source.with_uploads(needs["uploads"])}
+    except InvalidRequestError as error:
+        found = {"issues": [[issue.pointer, issue.message] for issue in error.issues]}
+    spec["uploads"][needs["as"]] = found

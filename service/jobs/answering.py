@@ -16,10 +16,10 @@ from service.jobs.common.measurements import read_measurements
 from service.jobs.common.scene_editing import side_by_side
 from service.jobs.common.scene_text import issues_of_scene, read_text
 from service.jobs.common.scenes import (
-    HarmonicRequest,
     SceneRequest,
     read_scene,
     refers_to_uploads,
+    require,
     resolve_scene,
 )
 from service.jobs.common.sizes import memory_limited, work_limited
@@ -27,6 +27,8 @@ from service.jobs.kinds.registry.bodies import KIND as KIND
 from service.jobs.outputs import JobOutput, Progress, ShouldStop
 from service.jobs.registry import JobRequest, Registry, Resolve, RunOn, SceneSource
 from service.jobs.strict_json import JsonText, digest, encoded
+from service.jobs.studies.plan import Plan
+from service.jobs.study import Watch
 from service.jobs.validation import validated
 from solver.errors import Issue
 
@@ -149,12 +151,10 @@ class _Resolving:
 
 
 def _plan(words: Words, source: SceneSource) -> dict[str, Any]:
-    # Loaded here, as below: it brings the compiled loops along, which only the processes need.
-    import solver
-
-    request = HarmonicRequest.model_validate(words)
+    request = Plan.model_validate(words)
     scene = resolve_scene(request, source)
-    return solver.plan(scene, harmonics=request.harmonics).to_json()
+    require(request.issues(scene))
+    return Plan.compute(scene, request.spec(scene), Watch()).json
 
 
 def _read(words: Words, source: SceneSource) -> JsonText:

@@ -42,7 +42,7 @@ def harmonics_of(result: Json) -> Figure:
 
 def map_of(result: Json) -> Figure:
     """A map with its ridge."""
-    from solver.studies.response_map import MapStatus, ResponseMap
+    from solver.studies.map_result import MapStatus, ResponseMap
     from solver.views.plots.tracks import map_figure
 
     found = ResponseMap(
@@ -62,7 +62,14 @@ def map_of(result: Json) -> Figure:
 
 def track_of(result: Json) -> PeakTrack:
     """A track as far as it is drawn; its sweeps are stored apart."""
-    from solver.studies.peaks.results import ActivePeak, CompetingPeak, LeastPeak, PeakTrack, TrackStatus
+    from solver.studies.peaks.results import (
+        ActivePeak,
+        CompetingPeak,
+        Exchange,
+        LeastPeak,
+        PeakTrack,
+        TrackStatus,
+    )
 
     status, best = TrackStatus(result["status"]), result["optimum"]
     optimum = LeastPeak(
@@ -82,7 +89,7 @@ def track_of(result: Json) -> PeakTrack:
         scene=result["scene"], parameter_path=result["parameter_path"], unit=result["unit"],
         parameter=_numbers(result["parameter"]), peak=_numbers(result["peak"]),
         frequency=_numbers(result["frequency"]), slope=_numbers(result["slope"]), optimum=optimum,
-        competing=competing, exchanges=tuple((one["at"], one["peak"]) for one in result["exchanges"]),
+        competing=competing, exchanges=tuple(Exchange(**one) for one in result["exchanges"]),
         branches=(), n_harmonics=result["n_harmonics"], sweeps=result["sweeps"], status=status,
         seconds=result["seconds"],
     )  # fmt: skip

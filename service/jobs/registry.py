@@ -65,10 +65,12 @@ class JobRequest(BaseModel):
 
 
 class Flag(NamedTuple):
-    """How the option of a key is written, and what stands for its value, where key and type do not say it."""
+    """How the option of a key is written, what stands for its value, where key and type do not say it, and
+    words that a shell offers."""
 
     name: str = ""
     metavar: str = ""
+    words: tuple[str, ...] = ()
 
 
 ABOUT_THE_RUN = ("project", "name", "notes", "tags")

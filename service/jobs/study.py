@@ -42,21 +42,21 @@ class Watch(NamedTuple):
 
 
 class Written(Protocol):
-    """What can be drawn, and written as a table."""
+    """What can be written as a table."""
 
     def to_dataset(self) -> Dataset:
         """The result as named arrays."""
+
+
+class Drawn(Written, Protocol):
+    """What can be drawn too."""
 
     def plot(self) -> Figure:
         """The picture of it."""
 
 
-class Found(Written, Protocol):
+class Found(Drawn, Protocol):
     """A result of a study."""
-
-    @property
-    def completed(self) -> bool:
-        """Whether it came to its end."""
 
     @property
     def status(self) -> enum.Enum:
@@ -76,16 +76,16 @@ class Answer(NamedTuple):
     plot: Callable[[], Figure] | None = None
 
     @classmethod
-    def of(cls, found: Found) -> Answer:
-        """Return what a result says of itself."""
-        return cls(found, found.to_json(), found.completed, str(found.status.value), found.plot)
+    def of(cls, found: Found, reached: bool) -> Answer:
+        """Return what a result says of itself, and whether that is what was asked for."""
+        return cls(found, found.to_json(), reached, str(found.status.value), found.plot)
 
     @classmethod
     def told(cls, json: dict[str, Any]) -> Answer:
         """Return an answer of which there is nothing but its JSON."""
         return cls(None, json, True, "")
 
-    def beside(self, result: Written, **further: Any) -> Answer:
+    def beside(self, result: Drawn, **further: Any) -> Answer:
         """Return the answer with further keys, drawn and written as another result."""
         return self._replace(result=result, json={**self.json, **further}, plot=result.plot)
 
@@ -121,7 +121,8 @@ class Study(SceneRequest):
     @classmethod
     def compute(cls, scene: Scene, asked: Mapping[str, Any], watch: Watch) -> Answer:
         """Compute what was asked, by keys that are the function's; left out, its own defaults count."""
-        return Answer.of(on_demand(cls.FUNCTION)(scene, **asked, **watch._asdict()))
+        found = on_demand(cls.FUNCTION)(scene, **asked, **watch._asdict())
+        return Answer.of(found, found.completed)
 
     @classmethod
     def sweeps(cls, _found: Any) -> tuple[SweepRecord, ...]:
@@ -129,10 +130,15 @@ class Study(SceneRequest):
         return ()
 
     @classmethod
+    def drawn(cls) -> bool:
+        """Return whether there are pictures of it."""
+        return hasattr(cls, "FIGURE") or any("figure" in vars(one) for one in cls.__mro__ if one is not Study)
+
+    @classmethod
     def empty(cls, result: Json) -> str:
         """Return why there is nothing to draw; empty if there is."""
         key, why = cls.EMPTY
-        return "" if result[key] else why
+        return "" if result.get(key) else why
 
     @classmethod
     def figure(cls, result: Json, _sweeps: Sequence[StoredSweep], _read: ReadSweep) -> Figure:
@@ -148,17 +154,31 @@ class Study(SceneRequest):
         own = [name for name in cls.model_fields if name not in apart]
         return own + [name for name in of_harmonics if name not in SceneRequest.model_fields]
 
+    def spec(self, _scene: Scene) -> dict[str, Any]:
+        """Return what a worker is given beside the scene, as JSON."""
+        return self.model_dump(mode="json", include=set(self.own_keys()))
+
+    @classmethod
+    def asked(cls, spec: Mapping[str, Any]) -> tuple[Scene, dict[str, Any]]:
+        """Return the scene of a spec, and the keys that were given."""
+        from solver.scene.scene import Scene
+
+        # A job that an earlier version took may have the keys of its body.
+        by_key = {field.alias or name: name for name, field in cls.model_fields.items()}
+        given = {by_key.get(key, key): value for key, value in spec.items() if value is not None}
+        return Scene.from_dict(spec["scene"]), {name: given[name] for name in cls.own_keys() if name in given}
+
     @classmethod
     def run(cls, spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop) -> JobOutput:
         """Compute a spec, in a worker."""
-        from solver.scene.scene import Scene
+        answer = cls.compute(*cls.asked(spec), Watch(progress, should_stop))
+        return cls.output(answer, cls.sweeps(answer.result))
 
-        asked = {name: value for name, value in spec.items() if name != "scene" and value is not None}
-        answer = cls.compute(Scene.from_dict(spec["scene"]), asked, Watch(progress, should_stop))
-        return JobOutput(
-            result=answer.json, sweeps=cls.sweeps(answer.result),
-            shortfall=None if answer.reached else answer.status,
-        )  # fmt: skip
+    @classmethod
+    def output(cls, answer: Answer, sweeps: Sequence[SweepRecord]) -> JobOutput:
+        """Return what a worker gives back."""
+        shortfall = None if answer.reached else answer.status
+        return JobOutput(result=answer.json, sweeps=tuple(sweeps), shortfall=shortfall)
 
     @classmethod
     def draw(cls, result: Json, sweeps: Sequence[StoredSweep], read: ReadSweep) -> Figure:
@@ -173,7 +193,7 @@ class Study(SceneRequest):
         summary = (inspect.getdoc(cls) or "").partition("\n")[0]
         return JobKind(
             name=cls.NAME, summary=summary, request=cls, resolve=resolve, run=cls.run, result=cls.RESULT,
-            view=KindView(result=cls.SHOWS, sweeps=cls.SWEEPS, draw=cls.draw),
+            view=KindView(result=cls.SHOWS, sweeps=cls.SWEEPS, draw=cls.draw if cls.drawn() else None),
         )  # fmt: skip
 
 
@@ -181,4 +201,4 @@ def resolve(request: Study, source: SceneSource) -> Resolved:
     """Look up the scene of a study and check what is asked of it; the spec has its keys."""
     scene = resolve_scene(request, source)
     require(request.issues(scene) or request.sizes(scene))
-    return resolved(scene, **request.model_dump(mode="json", include=set(request.own_keys())))
+    return resolved(scene, **request.spec(scene))

@@ -13,9 +13,8 @@ from importlib.metadata import version
 from queue import Empty, SimpleQueue
 from typing import Any
 
+from service.auth.allowances import Storage, highest_priority, share
 from service.auth.callers import KEYLESS, Caller
-from service.auth.shares import highest_priority, share
-from service.auth.storage import Storage
 from service.db import revisions
 from service.db.clock import Clock
 from service.db.engine import Database
@@ -30,13 +29,9 @@ from service.db.repositories import (
     SweepRepository,
     UploadRepository,
 )
-from service.db.repositories.keys import KeyRepository
-from service.db.repositories.owned import visible
-from service.db.repositories.projects import Projects
+from service.db.repositories.owned import KeyRepository, Projects, StorageRepository, visible
 from service.db.repositories.rows import RunWords
-from service.db.repositories.runs import Runs
-from service.db.repositories.shares import Shares
-from service.db.repositories.storage import StorageRepository
+from service.db.repositories.runs import Runs, Shares
 from service.errors import ConflictError, InvalidRequestError, JobFailedError, NotFoundError
 from service.jobs import answering
 from service.jobs.answering import Prepared, prepared
@@ -48,8 +43,8 @@ from service.jobs.validation import validated
 from service.queue.lanes import Lanes
 from service.queue.queue import JobQueue
 from service.queue.retention import Retention
+from service.queue.running import Event, Waiters
 from service.queue.scene_store import SceneStore
-from service.queue.subscriptions import Event, Waiters
 from service.settings.settings import Settings
 from service.uploads.uploads import Uploads
 from service.workers.answers import AnswerLimits, Answers

@@ -19,8 +19,7 @@ from datetime import datetime, timedelta
 
 from service.db.repositories import Attempt, JobRepository
 from service.jobs.outputs import Best, FailureKind, JobFailure, JobOutput, Piece, Point, Told
-from service.queue.running import Live, Running, StopReason
-from service.queue.subscriptions import Waiters
+from service.queue.running import Live, Running, StopReason, Waiters
 from service.settings import logs
 from service.settings.settings import Settings
 from service.workers.base import Executor, ExecutorStatus, Failed, Finished, Lost, Outcome, Stopped

@@ -8,11 +8,11 @@ from functools import cache
 
 from service.auth.callers import KEYLESS, Caller
 from service.db.models import NOBODY, Scene
+from service.db.pagination import Position
 from service.db.repositories import SceneRepository
 from service.errors import ConflictError, NotFoundError
 from service.jobs.common.scenes import read_scene
 from service.jobs.strict_json import digest, encoded
-from service.queue.cursors import Position
 from service.uploads.uploads import Uploads
 from solver.scene.scene import load_scene, shipped_scenes
 

@@ -13,17 +13,16 @@ from pydantic.fields import FieldInfo
 
 from optim.criteria.key import Key, Option
 from optim.criteria.registry import criteria, limit_keys
-from optim.identification.data.measured_units import known_units
-from optim.identification.data.registry import data_kinds
+from optim.identification.data.measured import data_kinds
+from optim.identification.data.table import known_units
 from optim.identification.readers.registry import data_formats
 from optim.problem.keys import CaseRequest, options
 from optim.problem.keyword_source import keyword_source
 from service.jobs.common.problem import ABOUT_THE_JOB
-from service.jobs.kinds.design import DesignRequest
-from service.jobs.kinds.pareto import ParetoRequest
 from service.jobs.kinds.registry.table import placed
-from service.settings.limits import Limits
-from service.settings.settings import Settings
+from service.jobs.studies.design import Design
+from service.jobs.studies.pareto import Pareto
+from service.settings.settings import Limits, Settings
 from solver.contacts.laws.registry import DEFAULT, laws
 from solver.matrices.readers.registry import readers
 
@@ -58,8 +57,8 @@ def criteria_table() -> str:
 
 def problem_table() -> str:
     """Every key of a design problem but those that limit a criterion."""
-    fields = {**DesignRequest.model_fields, **ParetoRequest.model_fields}
-    keys = options(DesignRequest) | options(ParetoRequest)
+    fields = {**Design.model_fields, **Pareto.model_fields}
+    keys = options(Design) | options(Pareto)
     apart = {*ABOUT_THE_JOB, *(key.name for key in limit_keys())}
     rows = (
         (f"`{name}`", _meaning(name, field), _WRITTEN.get(name) or _option(keys.get(name)))

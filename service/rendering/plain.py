@@ -1,4 +1,4 @@
-"""A result of which nothing else is known, for people: its numbers and words by their keys."""
+"""A result of any kind for people; of which nothing else is known, its numbers and words by their keys."""
 
 from __future__ import annotations
 
@@ -7,8 +7,24 @@ from typing import Any
 
 from service.jobs.kind_view import Json, Told
 from service.jobs.registry import Registry
+from service.rendering.tables.text import print_pairs
 
 _FEW = 6
+
+
+def print_result(kind: str, result: Json) -> None:
+    """Print a result: as the local command does, as its kind says, or by its keys."""
+    # Loaded here, as below: the help of a command prints no result.
+    from service.rendering.tables import results
+
+    if results.knows(kind):
+        results.of_kind(kind)(result)
+        return
+    # Loaded here: it brings every kind along.
+    from service.settings.kinds import registry_here
+
+    view = told(kind, result, registry_here())
+    print_pairs(view.title, view.pairs)
 
 
 def told(kind: str, result: Json, registry: Registry) -> Told:

@@ -17,12 +17,10 @@ from service.jobs.strict_json import digest
 from service.schemas.answers import SweepDetail
 from solver.results.csv import csv_text
 from solver.results.dataset import Dataset
-from solver.scene.parameter_paths import structure_unit
+from solver.scene.parameter_paths import parameter_unit, structure_unit
 from solver.scene.scene import Scene
-from solver.views.columns import attributes
 from solver.views.io import written
-from solver.views.parameter_units import parameter_unit
-from solver.views.to_dataset import point_variables
+from solver.views.to_dataset import attributes, point_variables
 
 _RANGE = re.compile(r"([!#$%&'*+.^_`|~0-9a-z-]+)/([!#$%&'*+.^_`|~0-9a-z-]+)")
 _QUALITY = re.compile(r"(?:0(?:\.[0-9]{0,3})?|1(?:\.0{0,3})?)")

@@ -25,11 +25,11 @@ def schema_of(what: Described) -> dict[str, Any]:
 
 def _problem() -> dict[str, Any]:
     """Of ``--problem FILE``: a design, with the key that only fronts have."""
-    from service.jobs.kinds.design import DesignRequest
-    from service.jobs.kinds.pareto import ParetoRequest
+    from service.jobs.studies.design import Design
+    from service.jobs.studies.pareto import Pareto
 
-    found = plain(DesignRequest.model_json_schema())
-    front = plain(ParetoRequest.model_json_schema())
+    found = plain(Design.model_json_schema())
+    front = plain(Pareto.model_json_schema())
     found["$defs"] = {**front.get("$defs", {}), **found.get("$defs", {})}
     found["properties"] = {**front["properties"], **found["properties"]}
     # The scene may be the command's argument instead.

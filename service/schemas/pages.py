@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Protocol, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from service.queue import cursors
-from service.queue.cursors import Position
+from service.db import pagination
+from service.db.pagination import Position
 from service.settings.settings import Settings
 
 Limit = Annotated[int, Field(ge=1, le=10_000)]
@@ -59,10 +59,10 @@ def page_of(
         If the cursor is not one of this service.
     """
     limit = min(query.limit, settings.page_limit)
-    rows = read(limit + 1, None if query.cursor is None else cursors.decode(query.cursor))
+    rows = read(limit + 1, None if query.cursor is None else pagination.decode(query.cursor))
     if len(rows) <= limit:
         return rows, None
-    return rows[:limit], cursors.next_link(query.path, query, *position(rows[limit - 1]))
+    return rows[:limit], pagination.next_link(query.path, query, *position(rows[limit - 1]))
 
 
 def newest(

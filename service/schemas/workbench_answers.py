@@ -8,8 +8,8 @@ from typing import Any, Self
 
 from pydantic import Field
 
+from service.db.models import Project, Share
 from service.db.repositories.runs import RunRow
-from service.db.run_models import Project, Share
 from service.jobs.outputs import Told
 from service.schemas.answers import Answer, JobAnswer, Page
 

@@ -174,9 +174,9 @@ def _describe(name: str) -> list[dict[str, Any]]:
     from solver.matrices.sectors.reduction import read_sector
 
     file = Path(name)
-    if file.suffix.lower() in registry.label_suffixes():
+    if file.suffix.lower() in registry.suffixes("labels"):
         return [{"name": "mapping", "rows": len(labels_of(file)), "columns": 1, "entries": None}]
-    if file.suffix.lower() in registry.nodes_suffixes():
+    if file.suffix.lower() in registry.suffixes("nodes"):
         return [{"name": "nodes", "rows": _nodes_of(file), "columns": 3, "entries": None}]
     names = array_names(file)
     if "diameters" in names:

@@ -29,7 +29,7 @@ def told_apart(files: Sequence[str]) -> tuple[list[str], dict[str, Any]]:
     from solver.matrices.files import array_names
     from solver.matrices.readers import registry
 
-    decks = [name for name in files if Path(name).suffix.lower() in registry.nodes_suffixes()]
+    decks = [name for name in files if Path(name).suffix.lower() in registry.suffixes("nodes")]
     if len(decks) > 1:
         raise SceneError([_issue("cyclic/nodes", f"one deck tells the nodes, got {', '.join(decks)}")])
     rest = [name for name in files if name not in decks]

@@ -11,11 +11,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from service.auth.allowances import Storage
 from service.auth.callers import KEYLESS, Caller
-from service.auth.storage import Storage
 from service.db.models import Upload
-from service.db.repositories.owned import visible
-from service.db.repositories.uploads import UploadRepository
+from service.db.repositories.owned import UploadRepository, visible
 from service.errors import InvalidRequestError, NotFoundError, UnreadableUploadError
 from service.jobs.common.scenes import UPLOAD, Place, named_files, with_named
 from service.jobs.strict_json import digest

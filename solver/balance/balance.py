@@ -107,7 +107,7 @@ def check_frequency(name: str, frequency_hz: float) -> float:
 
 def build(
     scene: Scene, path: str = "frequency", *, harmonics: int = 11, frequency_hz: float | None = None,
-    effects: Effects | None = None,
+    effects: Effects | None = None, poles: bool = True,
 ) -> Balance:  # fmt: skip
     """Set up the balance of a scene for continuation in `path`.
 
@@ -119,6 +119,7 @@ def build(
         and those that forces and loads call for, see `solver.scene.harmonics.kept_harmonics`.
     frequency_hz : the excitation frequency [Hz], needed unless λ is the frequency.
     effects : what is paid for though the scene does not call for it.
+    poles : damping that couples the modes may be carried by poles; otherwise matrices are kept where it does.
 
     Raises
     ------
@@ -142,7 +143,7 @@ def build(
         check_level(scene)
     if parameter.kind is Kind.LEVEL and scene.value("excitation.amplitude") == 0.0:
         scene = scene.with_values({"excitation.amplitude": 1.0})
-    system = _system(scene, parameter, ks, omega, effects)
+    system = _system(scene, parameter, ks, omega, effects, poles=poles)
     return Balance(scene=scene, parameter=parameter, system=system, n_harmonics=harmonics, effects=effects)
 
 
@@ -226,7 +227,7 @@ def _level(scene: Scene) -> float:
 
 
 def _system(
-    scene: Scene, parameter: Parameter, ks: Integer, omega: float, effects: Effects
+    scene: Scene, parameter: Parameter, ks: Integer, omega: float, effects: Effects, *, poles: bool = True
 ) -> System:  # fmt: skip
     """Put the arrays of the compiled loops together."""
     model = linear_model(scene)
@@ -236,7 +237,7 @@ def _system(
         raise SettingError("parameter", parameter.path, wanted)
     reduced = reduce_model(
         model, ks, port_stiffnesses(scene, model), derivative, whole_matrices=effects.whole_matrices,
-        each_port=effects.every_port,
+        each_port=effects.every_port, poles=poles,
     )  # fmt: skip
     load_order = highest_load(scene)
     highest = max(int(ks[-1]), load_order)

@@ -7,7 +7,7 @@ from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import TYPE_CHECKING, ClassVar, Protocol
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Protocol
 
 import numpy as np
 
@@ -20,7 +20,6 @@ from solver.continuation.peaks import Band, Peak
 from solver.jit.fourier import Integer, Real
 from solver.results.base import Drawn
 from solver.results.known import Known
-from solver.results.told import json_number
 from solver.results.views import Views, on_demand
 from solver.scene.scene import Scene
 
@@ -105,48 +104,47 @@ class AnyBranch(Drawn):
     """Periodic responses over one parameter, P points in their order along it: what `sweep` returns.
 
     A `Branch` has them by continuation of a balance of harmonics, an `ExactBranch` by exact orbits.
-
-    Attributes
-    ----------
-    status : BranchStatus
-        How it ended.
-    start, stop : float
-        The range asked for, in user units.
-    values : (P,) array
-        Parameter values in user units.
-    observed : (P, 2H + 1) array
-        Full coefficients of the observed DOF [m], zero where a harmonic is not kept.
-    measures : (P, MEASURES) array
-        Columns named in `solver.balance.kernels.output`; slopes are along the tangents.
-    states : (P, n_contacts) array
-        State of every contact, as in `solver.response.contact_response.ContactState`.
-    peaks : tuple of Peak
-        All local maxima, highest first; the ends of the branch are in it too.
-    band : Band or None
-        Where the amplitude exceeds the limit asked for (peak/√2 if none was); None without a peak.
-    error_estimate : float
-        Estimated error of the highest peak's value [m]; NaN without a peak.
-    peak_certificate : PeakCertificate
-        Why no higher peak hides between two points, or why that is not known.
-    flags : tuple of str
-        Names of what is to be known of it, see the classes.
     """
 
-    status: BranchStatus
-    start: float
-    stop: float
-    values: Real
-    observed: Real
-    measures: Real
-    states: Integer
-    peaks: tuple[Peak, ...]
-    band: Band | None
-    error_estimate: float
-    newton_iterations: int
-    rejected_steps: int
-    seconds: float
-    peak_certificate: PeakCertificate
-    flags: tuple[str, ...] = ()
+    VIEWS: ClassVar = Views("solver.views", "of_branch", "branch_dataset", "of_branch")
+    JSON: ClassVar = (
+        "scene parameter=values parameter_path=parameter unit speed_rpm=speeds_rpm amplitude"
+        " half_peak_to_peak mean peak peaks stable stable_ground peaks_stable band_hz band_limit"
+        " band_intervals_hz band_known peak_certificate drift_per_period points n_harmonics"
+        " error_estimate newton_iterations rejected_steps folds unstable marks stability_known_by"
+        " mean_undetermined largest_residual seconds flags completed status"
+    )
+
+    status: Annotated[BranchStatus, "How it ended."]
+    start: Annotated[float, "First value of the range asked for, in user units."]
+    stop: Annotated[float, "Last value of it."]
+    values: Annotated[Real, "Parameter values in user units, (P,)."]
+    observed: Annotated[
+        Real, "Full coefficients of the observed DOF [m], zero where a harmonic is not kept, (P, 2H + 1)."
+    ]
+    measures: Annotated[
+        Real,
+        "Columns named in `solver.balance.kernels.output`; slopes are along the tangents. (P, MEASURES).",
+    ]
+    states: Annotated[
+        Integer,
+        "State of every contact, as in `solver.response.contact_response.ContactState`. (P, n_contacts).",
+    ]
+    peaks: Annotated[
+        tuple[Peak, ...], "All local maxima, highest first; the ends of the branch are in it too."
+    ]
+    band: Annotated[
+        Band | None,
+        "Where the amplitude exceeds the limit asked for (peak/√2 if none was); None without a peak.",
+    ]
+    error_estimate: Annotated[float, "Estimated error of the highest peak's value [m]; NaN without a peak."]
+    newton_iterations: Annotated[int, "Of all points."]
+    rejected_steps: Annotated[int, "Steps that were tried again, shorter."]
+    seconds: Annotated[float, "Time taken [s]."]
+    peak_certificate: Annotated[
+        PeakCertificate, "Why no higher peak hides between two points, or why that is not known."
+    ]
+    flags: Annotated[tuple[str, ...], "Names of what is to be known of it, see the classes."] = ()
 
     @property
     @abstractmethod
@@ -252,8 +250,6 @@ class AnyBranch(Drawn):
         ahead = np.sign(np.diff(self.values))
         return int(np.count_nonzero(np.diff(ahead[ahead != 0.0])))
 
-    VIEWS: ClassVar = Views("solver.views", "of_branch", "branch_dataset", "of_branch")
-
     def plot(self, ax: Axes | Sequence[Axes] | None = None, *, limit: float | None = None) -> Figure:
         """Draw the response, its peak and its band.
 
@@ -271,44 +267,21 @@ class AnyBranch(Drawn):
         order = self.scene.speed_order
         return None if order is None else 60.0 / order * self.values
 
-    def to_json(self) -> dict[str, object]:
+    def to_json(self) -> dict[str, Any]:
         """Return the branch as one JSON object."""
-        peak, band = self.peak, self.band
-        judged = [each.stable.value for each in self.peak_stability]
-        return {
-            "scene": self.scene.name,
-            "parameter": self.values.tolist(),
-            "parameter_path": self.parameter,
-            "unit": self.unit,
-            "speed_rpm": None if self.speeds_rpm is None else self.speeds_rpm.tolist(),
-            "amplitude": self.amplitude.tolist(),
-            "half_peak_to_peak": self.half_peak_to_peak.tolist(),
-            "mean": self.mean.tolist(),
-            "peak": None if peak is None else {"value": peak.value, "at": peak.at},
-            "peaks": [{"value": peak.value, "at": peak.at} for peak in self.peaks if peak.interior],
-            "stable": judged[0] if judged else None,
-            "stable_ground": self.peak_stability[0].ground if judged else None,
-            "peaks_stable": [word for word, one in zip(judged, self.peaks, strict=True) if one.interior],
-            "band_hz": None if band is None else band.width,
-            "band_limit": None if band is None else band.limit,
-            "band_intervals_hz": None if band is None else [list(interval) for interval in band.intervals],
-            "band_known": None if band is None else band.known and self.peak_certificate.known,
-            "peak_certificate": self.peak_certificate.to_json(),
-            **({"drift_per_period": json_number(self.drift_per_period)} if self.ratchets else {}),
-            "points": len(self.values),
-            "n_harmonics": self.n_harmonics,
-            "error_estimate": json_number(self.error_estimate),
-            "newton_iterations": self.newton_iterations,
-            "rejected_steps": self.rejected_steps,
-            "folds": self.folds,
+        band, judged = self.band, self.peak_stability
+        found = self._json(
+            peaks=[peak for peak in self.peaks if peak.interior],
+            stable=judged[0].stable if judged else None, stable_ground=judged[0].ground if judged else None,
+            peaks_stable=[one.stable for one, at in zip(judged, self.peaks, strict=True) if at.interior],
+            band_hz=None if band is None else band.width, band_limit=None if band is None else band.limit,
+            band_intervals_hz=None if band is None else band.intervals,
+            band_known=None if band is None else band.known and self.peak_certificate.known,
+            points=len(self.values),
+            largest_residual=self.residuals.max() if len(self.values) else None,
             **self.bifurcations.of_a_branch(),
-            "mean_undetermined": self.mean_undetermined,
-            "largest_residual": float(self.residuals.max()) if len(self.values) else None,
-            "seconds": self.seconds,
-            "flags": list(self.flags),
-            "completed": self.completed,
-            "status": self.status.value,
-        }
+        )  # fmt: skip
+        return found if self.ratchets else {k: v for k, v in found.items() if k != "drift_per_period"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
@@ -316,26 +289,16 @@ class Branch(AnyBranch):
     """A branch of periodic responses over one parameter, P points in their order along it.
 
     They are the steps of the continuation and what was solved for between them: narrow resonances and peaks.
-
-    Attributes
-    ----------
-    balance : Balance
-        What was continued; its scene holds the values that stayed fixed.
-    solutions, tangents : (P, n_unknowns + 1) array
-        Slip motions [m] with λ (inside unit) last, and tangents that point onward along the branch.
-    error_estimate : float
-        Estimated error of the highest peak's value, by the harmonics left out and the residual [m], with
-        peaks that stand elsewhere if more are kept (`solver.continuation.extrema.branch_error`); NaN without
-        a peak. `solver.branch_errors` gives that of every point.
-    flags : tuple of str
-        ``symmetric_unstable`` if a half-wave symmetric point of it is not the motion that is seen,
-        ``travelling_wave_assumed`` where one sector stands for all though the laws allow other motions,
-        ``mean_load_above_friction`` where it ends because contacts cannot hold a part's mean load.
+    The error is by the harmonics left out and the residual, with peaks that stand elsewhere if more are kept
+    (`solver.continuation.extrema.branch_error`); `solver.branch_errors` gives that of every point. Flags are
+    ``symmetric_unstable`` if a half-wave symmetric point of it is not the motion that is seen,
+    ``travelling_wave_assumed`` where one sector stands for all though the laws allow other motions,
+    ``mean_load_above_friction`` where it ends because contacts cannot hold a part's mean load.
     """
 
-    balance: Balance
-    solutions: Real
-    tangents: Real
+    balance: Annotated[Balance, "What was continued; its scene holds the values that stayed fixed."]
+    solutions: Annotated[Real, "Slip motions [m] with λ (inside unit) last, (P, n_unknowns + 1)."]
+    tangents: Annotated[Real, "Tangents that point onward along the branch, (P, n_unknowns + 1)."]
     stepped_over: int
     _judged: list[tuple[Verdict, ...]] = field(default_factory=list, init=False, compare=False)
     _drifts: list[float] = field(default_factory=list, init=False, compare=False)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated
 
 from solver.results.told import Piece
 
@@ -16,41 +16,24 @@ class PeakCertificate(Piece):
 
     It is about the branch as it was computed, with its harmonics: what the harmonics left out may change is
     the error estimate, and another branch of a law that allows several is not on this one.
-
-    Attributes
-    ----------
-    known : bool
-        No peak of the branch is higher than `bound`, and every peak above 1 % of the highest is listed.
-    reason : str
-        Why, or why it is not known.
-    bound : float
-        What the amplitude does not exceed between points [m]: of the cubics through them, which near the top
-        are checked by their neighbours or by solutions between, and of the motion predicted at every
-        resonance of the structure with its contacts that is narrower than the points are apart. NaN if not
-        known.
-    widest_gap : float
-        Largest distance between neighbouring points, in units of the parameter (Hz for a frequency).
-    resonances : int
-        Narrow resonances between points that were solved for.
     """
 
-    UNITS: ClassVar[Mapping[str, str]] = {"bound": "m"}
-
-    known: bool
-    reason: str
-    bound: float
-    widest_gap: float
-    resonances: int
-
-    def to_json(self) -> dict[str, object]:
-        """Return the certificate as one JSON object."""
-        return {
-            "known": self.known,
-            "reason": self.reason,
-            "bound": self.bound if math.isfinite(self.bound) else None,
-            "widest_gap": self.widest_gap if math.isfinite(self.widest_gap) else None,
-            "resonances": self.resonances,
-        }
+    known: Annotated[
+        bool,
+        "No peak of the branch is higher than `bound`, and every peak above 1 % of the highest is listed.",
+    ]
+    reason: Annotated[str, "Why, or why it is not known."]
+    bound: Annotated[
+        float,
+        "What the amplitude does not exceed between points [m]: of the cubics through them, which near the "
+        "top are checked by their neighbours or by solutions between, and of the motion predicted at every "
+        "resonance of the structure with its contacts that is narrower than the points are apart. NaN if "
+        "not known.",
+    ]
+    widest_gap: Annotated[
+        float, "Largest distance between neighbouring points, in units of the parameter (Hz for a frequency)."
+    ]
+    resonances: Annotated[int, "Narrow resonances between points that were solved for."]
 
 
 def certified(*, bound: float, gap: float, resonances: int) -> PeakCertificate:

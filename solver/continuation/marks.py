@@ -5,10 +5,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,35 +28,15 @@ class MarkKind(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Mark(Piece):
-    """A place on a branch.
+    """A place on a branch."""
 
-    Attributes
-    ----------
-    kind : MarkKind
-        What happens there.
-    at : float
-        Parameter value, in user units.
-    amplitude : float
-        max|x| of the observed DOF there [m].
-    solution : (n_unknowns + 1,) array
-        Slip motions [m] with λ (inside unit) last.
-    after : int
-        The point of the branch it comes behind.
-    corner : bool
-        Of a fold: a contact changes its state there.
-    why : str
-        Of an end: how the branch ended.
-    """
-
-    UNITS: ClassVar[Mapping[str, str]] = {"amplitude": "m"}
-
-    kind: MarkKind
-    at: float
-    amplitude: float
-    solution: Real
-    after: int
-    corner: bool = False
-    why: str = ""
+    kind: Annotated[MarkKind, "What happens there."]
+    at: Annotated[float, "Parameter value, in user units."]
+    amplitude: Annotated[float, "max|x| of the observed DOF there [m]."]
+    solution: Annotated[Real, "Slip motions [m] with λ (inside unit) last, (n_unknowns + 1,)."]
+    after: Annotated[int, "The point of the branch it comes behind."]
+    corner: Annotated[bool, "Of a fold: a contact changes its state there."] = False
+    why: Annotated[str, "Of an end: how the branch ended."] = ""
 
     def to_json(self) -> dict[str, object]:
         """Return the mark as one JSON object."""
@@ -71,28 +50,21 @@ class Mark(Piece):
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Bifurcations(Piece):
-    """Stability along a branch, and its marks.
+    """Stability along a branch, and its marks."""
 
-    Attributes
-    ----------
-    unstable : (P,) array of bool
-        Points at which a perturbation grows, as far as `known_by` sees.
-    marks : tuple of Mark
-        In their order along the branch.
-    known_by : str
-        ``uniqueness``: loads are given and everything takes out power, so that all points are stable;
-        ``determinant``: real perturbations of the same period alone are seen; ``multipliers``: all are.
-    parameter : str
-        Path of the parameter.
-    seconds : float
-        What it took.
-    """
+    JSON: ClassVar = "known_by parameter_path=parameter unstable=stretches marks seconds"
 
-    unstable: NDArray[np.bool_]
-    marks: tuple[Mark, ...]
-    known_by: str
-    parameter: str
-    seconds: float
+    unstable: Annotated[
+        NDArray[np.bool_], "Points at which a perturbation grows, as far as `known_by` sees, (P,)."
+    ]
+    marks: Annotated[tuple[Mark, ...], "In their order along the branch."]
+    known_by: Annotated[
+        str,
+        "``uniqueness``: loads are given and everything takes out power, so that all points are stable; "
+        "``determinant``: real perturbations of the same period alone are seen; ``multipliers``: all are.",
+    ]
+    parameter: Annotated[str, "Path of the parameter."]
+    seconds: Annotated[float, "What it took."]
 
     @property
     def stretches(self) -> tuple[tuple[int, int], ...]:
@@ -106,14 +78,4 @@ class Bifurcations(Piece):
             "unstable": [list(stretch) for stretch in self.stretches],
             "marks": [mark.to_json() for mark in self.marks],
             "stability_known_by": self.known_by,
-        }
-
-    def to_json(self) -> dict[str, object]:
-        """Return the answer as one JSON object."""
-        return {
-            "known_by": self.known_by,
-            "parameter_path": self.parameter,
-            "unstable": [list(stretch) for stretch in self.stretches],
-            "marks": [mark.to_json() for mark in self.marks],
-            "seconds": self.seconds,
         }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 
@@ -37,31 +38,23 @@ _ROWS = ("solutions", "tangents", "states", "observed", "measures")
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Stretch(Piece):
-    """Some consecutive points of a branch; the arrays are those of `solver.continuation.branch.Branch`.
-
-    Attributes
-    ----------
-    status : BranchStatus or None
-        How the branch ended with this stretch; None if it goes on.
-    newton_iterations, rejected_steps, stepped_over : int
-        Since the branch began.
-    seconds : float
-        Since the branch began [s].
-    walk : (6 n_unknowns + 18,) array
-        The state of the continuation behind the last point; empty if the branch could not begin.
-    """
+    """Some consecutive points of a branch; the arrays are those of `solver.continuation.branch.Branch`."""
 
     solutions: Real
     tangents: Real
     states: Integer
     observed: Real
     measures: Real
-    status: BranchStatus | None
-    newton_iterations: int
-    rejected_steps: int
-    stepped_over: int
-    seconds: float
-    walk: Real
+    status: Annotated[BranchStatus | None, "How the branch ended with this stretch; None if it goes on."]
+    newton_iterations: Annotated[int, "Since the branch began."]
+    rejected_steps: Annotated[int, "Since the branch began."]
+    stepped_over: Annotated[int, "Since the branch began."]
+    seconds: Annotated[float, "Since the branch began [s]."]
+    walk: Annotated[
+        Real,
+        "The state of the continuation behind the last point; empty if the branch could not begin, (6 "
+        "n_unknowns + 18,).",
+    ]
 
     def first(self, count: int) -> Stretch:
         """Return the first points alone, without the state of a continuation, which is that of the last."""

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.errors import SettingError
-from solver.linear.body_matrices import mass_derivative, matrices_with_bodies
 from solver.linear.extra_terms import (
     Coordinates,
     ExtraTerms,
@@ -31,6 +30,7 @@ from solver.linear.lumped_matrices import (
     numbers_of,
     topology_of,
 )
+from solver.linear.matrix_model import mass_derivative, matrices_with_bodies
 from solver.linear.model import ForceTerm, Identity, LinearModel, LinearModelDerivative
 from solver.linear.moving_base import base_motions, derivative_with_base, with_base
 from solver.linear.sector_matrices import ProportionalDamping, sector_matrices

@@ -15,14 +15,59 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.contacts.kernels.system import DENSE
+from solver.jit import eigen
 from solver.jit.fourier import Complex, Flags, Integer, Real
 from solver.linear.assembly import linear_model
 from solver.linear.contact_table import port_stiffnesses
 from solver.linear.leading_ports import every_port, leading_ports
 from solver.linear.modal import Decomposition, Held, decompose, held_alone, held_by, matrices_of
 from solver.linear.model import ForceTerm, LinearModel, LinearModelDerivative
-from solver.linear.rigid_body_modes import loose_motions
+from solver.matrices.normal_modes import hermitian, least_stiffness
 from solver.scene.scene import Scene
+
+HELD = 1e-7  # smallest squared pivot of the scaled K from which every part is held, without a closer look
+BY_CONTACTS = 1e-6  # largest stiffness of a loose part, relative to the contacts' stiffness against it
+CANCELLED_STIFFNESS = 1e-9  # and relative to the sum of what cancels in it: a file of ten digits leaves less
+ROUNDING = 1e-12  # of the contacts' stiffness: what the modes themselves leave
+_UNTOUCHED = 1e-14  # put on the scaled stiffness: what neither springs nor contacts hold is no contact's part
+
+
+def loose_motions(K: NDArray[Any], L: NDArray[Any], kt: Real) -> Real:
+    """Return the motions of the ports in the rigid-body motions that contacts alone hold.
+
+    They are found by rank before anything is divided. The scales are those of the problem: of the contacts
+    that hold the part, and of the part's own stiffness, of which rounding leaves a share where entries of K
+    cancel. No absolute number decides.
+
+    Parameters
+    ----------
+    K : (n, n) static stiffness without contacts [N/m].
+    L : (nc, n) relative motion of each port.
+    kt : (nc,) stiffness of each port [N/m].
+
+    Returns
+    -------
+    (nr, nc) rows l_i with Σ_c l_i kt l_j = δ_ij; none where the structure holds every part.
+    """
+    nothing = np.zeros((0, kt.size))
+    if K.shape[0] == 0 or kt.size == 0 or least_stiffness(K) > HELD:
+        return nothing
+    K, L = hermitian(K.real), L.real
+    contact = L.T @ (kt[:, None] * L)
+    diagonal = np.diag(K) + np.diag(contact)
+    scale = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
+    across = np.outer(scale, scale)
+    held = across * (K + contact) + _UNTOUCHED * np.eye(scale.size)
+    _, modes = eigen.pencil(across * K, held)
+    modes = modes * scale[:, None]
+    stiffness, against = ((modes * (matrix @ modes)).sum(axis=0) for matrix in (K, contact))
+    cancelling = (np.abs(modes) * (np.abs(K) @ np.abs(modes))).sum(axis=0)
+    size = np.sqrt(np.maximum(against, 0.0))
+    rounding = np.maximum(CANCELLED_STIFFNESS * cancelling, ROUNDING * against)
+    loose = np.abs(stiffness) <= np.minimum(BY_CONTACTS * against, rounding)
+    loose &= against > 0.5 * (modes * ((contact + K) @ modes)).sum(axis=0)
+    return np.ascontiguousarray((L @ modes[:, loose] / size[loose]).T)
+
 
 CANCELLED = 1e-3  # a relative residual of 1e-11 of this share of what cancels in a motion is its rounding
 
@@ -67,6 +112,7 @@ def reduce_model(
     *,
     whole_matrices: bool = False,
     each_port: bool = False,
+    poles: bool = True,
 ) -> Reduced:
     """Bring a linear model into the form of the compiled loops.
 
@@ -79,6 +125,7 @@ def reduce_model(
     derivative : by the structural parameter that is continued in; then the dense form is kept.
     whole_matrices : keep the dense form whatever the damping is.
     each_port : keep every port, even where all follow from fewer.
+    poles : carry damping that couples the modes by poles where they serve.
 
     Raises
     ------
@@ -98,7 +145,7 @@ def reduce_model(
     if len(loose) or not (model.prescribed or held_alone(held)):
         # Also without a mean: of a light part A is 1/(m ω²) else, 1e9 times what its contacts let it move.
         shift, held = kt.copy(), held_by(held, L, kt)
-    found = None if dense_asked else decompose(held)
+    found = None if dense_asked else decompose(held, poles=poles)
     if found is None and not apart:
         which, diameters, moving = _structures(model, ks, apart=True)
         L = model.ports_at(diameters)
@@ -166,7 +213,7 @@ def _least_size(found: Decomposition, L: Complex, forces: Complex, which: Intege
 def loose_ports(scene: Scene) -> tuple[Real, Real]:
     """Return the rigid-body motions at the ports of what contacts alone hold, and the ports' stiffnesses.
 
-    See `solver.linear.rigid_body_modes.loose_motions`; also where the balance has no means.
+    See `solver.linear.condensation.loose_motions`; also where the balance has no means.
     """
     model = linear_model(scene)
     kt = port_stiffnesses(scene, model)

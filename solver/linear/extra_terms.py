@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 from solver.matrices.sectors.blocks import full_elimination
 from solver.matrices.values import frozen
 from solver.scene.bodies.body import REVOLUTIONS
+from solver.scene.linear_terms import Entry
 from solver.scene.scene import MatricesStructure, Scene
-from solver.scene.terms.linear_terms import Entry
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]

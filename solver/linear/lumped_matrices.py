@@ -12,8 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.linear.body_matrices import bodies_mass
-from solver.linear.modal_damping import modal_damping, modal_damping_derivative
+from solver.linear.matrix_model import bodies_mass, modal_damping, modal_damping_derivative
 from solver.linear.model import LinearModelDerivative
 from solver.matrices.values import frozen
 from solver.scene.bodies.body import Body

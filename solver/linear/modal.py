@@ -7,6 +7,7 @@ arrays is the key: changing contacts, forces or the observed DOF costs no decomp
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any
@@ -17,6 +18,8 @@ from numpy.typing import NDArray
 from solver.contacts.kernels.system import MODES, POLES
 from solver.jit import eigen
 from solver.jit.fourier import Complex, Flags, Integer, Real
+from solver.linear.assembly import linear_model
+from solver.linear.contact_table import port_stiffnesses
 from solver.linear.model import Identity, LinearModel
 from solver.matrices.normal_modes import (
     UndampedModes,
@@ -24,6 +27,7 @@ from solver.matrices.normal_modes import (
     least_stiffness,
     undamped_modes,
 )
+from solver.scene.scene import Scene
 
 CLASSICAL = 1e-11  # largest off-diagonal modal damping, relative to the diagonal, that counts as none
 ROUNDING = 4.0  # the same in units of what the modes lack in orthogonality
@@ -124,8 +128,8 @@ def held_by(held: Held, L: Complex, kt: Real) -> Held:
 
 
 @lru_cache(maxsize=32)
-def decompose(held: Held) -> Decomposition | None:
-    """Return modes if the damping is classical, else poles; None if neither gives Z⁻¹ to rounding."""
+def decompose(held: Held, *, poles: bool = True) -> Decomposition | None:
+    """Return modes if the damping is classical, else `poles`; None if neither gives Z⁻¹ to rounding."""
     stiffness = list(held.K)
     even = [hermitian(K) for K in stiffness]
     undamped = [undamped_modes(K, M) for K, M in zip(even, held.M, strict=True)]
@@ -146,12 +150,14 @@ def decompose(held: Held) -> Decomposition | None:
             right=phi,
             left=phi.conj(),
         )
-    poles = [
+    if not poles:
+        return None
+    tried = [
         _poles(u, D, E) if u.sigma == 0.0 else _plain_poles(K, C, M)
         for u, D, E, K, C, M in zip(undamped, damping, skew, held.K, held.C, held.M, strict=True)
     ]
-    found = [each for each in poles if each is not None]
-    if len(found) < len(poles):
+    found = [each for each in tried if each is not None]
+    if len(found) < len(tried):
         return None
     values = np.array([each[0] for each in found], dtype=np.complex128)
     return Decomposition(
@@ -237,3 +243,33 @@ def _plain_poles(
         if np.abs(summed - direct).max() > SPAN_ERROR * np.abs(direct).max():
             return None
     return values, x, yh
+
+
+_NEAR = 0.02  # relative to a natural frequency
+
+
+def undamped_resonance(scene: Scene, frequency_hz: float, harmonics: NDArray[np.int64]) -> bool:
+    """Return whether nothing damps the structure, and a harmonic is near one of its natural frequencies.
+
+    Those with all contacts open count, and those with all of them stuck. Friction takes out power in
+    proportion to the amplitude, a resonance puts it in so too: above some force no amplitude balances them.
+
+    Parameters
+    ----------
+    harmonics : those kept.
+    """
+    model = linear_model(scene)
+    ks = harmonics[harmonics > 0]
+    if model.prescribed:
+        return False
+    diameters, kt = model.diameters(ks), port_stiffnesses(scene, model)
+    matrices = model.at(diameters, np.ones(ks.size, np.bool_))
+    for k, K, C, M, L in zip(ks.tolist(), *matrices, model.ports_at(diameters), strict=True):
+        if np.any(hermitian(C)) or np.any(K - hermitian(K)):
+            return False
+        for stiffness in (K, K + L.conj().T @ (kt[:, None] * L)):
+            omega2 = undamped_modes(hermitian(stiffness), hermitian(M)).omega2
+            natural = np.sqrt(np.maximum(omega2, 0.0)) / (2.0 * math.pi)
+            if np.any(np.abs(k * frequency_hz - natural) <= _NEAR * natural):
+                return True
+    return False

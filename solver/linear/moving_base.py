@@ -22,8 +22,8 @@ from solver.errors import SettingError
 from solver.linear.extra_terms import ExtraTerms
 from solver.linear.model import ForceTerm, LinearModel, LinearModelDerivative
 from solver.matrices.values import frozen
+from solver.scene.excitation import Motion
 from solver.scene.scene import Scene
-from solver.scene.terms.excitation import Motion
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]

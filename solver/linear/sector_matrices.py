@@ -13,9 +13,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.linear.body_matrices import block_diag, bodies_mass
-from solver.linear.matrix_model import NO_PROPORTIONAL
-from solver.linear.modal_damping import modal_damping
+from solver.linear.matrix_model import NO_PROPORTIONAL, block_diag, bodies_mass, modal_damping
 from solver.matrices.normal_modes import hermitian
 from solver.matrices.sectors.blocks import at_diameter, full_elimination
 from solver.matrices.values import frozen

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from solver.errors import SettingError
+from solver.scene.excitation import Excitation
 from solver.scene.scene import Scene
-from solver.scene.terms.excitation import Excitation
 
 FloatArray = NDArray[np.float64]
 Push = tuple[int, float, float, int]  # coordinate, amplitude, phase [rad] and harmonic of a force

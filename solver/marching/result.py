@@ -6,24 +6,21 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from solver.marching.kernels.state import Record
+from solver.arrays import FloatOrNaN, Real
 from solver.results.base import Drawn
-from solver.results.told import json_number
 from solver.results.views import Views
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from solver.marching.kernels.state import Record
     from solver.scene.scene import Scene
 
-
-FloatArray = NDArray[np.float64]
 N_HARMONICS = 10
 
 
@@ -53,68 +50,40 @@ class MarchStatus(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class MarchResult(Drawn):
-    """The last period of a time march, from the run with the smaller step.
+    """The last period of a time march, from the run with the smaller step; n samples."""
 
-    Attributes
-    ----------
-    status : MarchStatus
-        How it ended.
-    max_abs : float
-        Largest abs(x) of the observed DOF [m].
-    half_peak_to_peak : float
-        (max - min) / 2 [m].
-    mean : float
-        Mean [m]. In full stick it depends on the history, here a start from rest.
-    harmonics : (11,) tuple
-        abs(mean) and the amplitudes of harmonics 1 to 10 [m].
-    frequency_hz : float
-        Excitation frequency [Hz].
-    time : (n,) array
-        Instants of the samples of the last period [s], evenly spaced from 0.
-    displacement, velocity : (n,) array
-        Observed DOF [m], [m/s].
-    contacts : tuple of str
-        Names of the contacts; of the whole annulus in a cyclic scene.
-    slip, contact_force, normal_load : (n_contacts, n) array
-        Relative displacement [m], friction force [N], normal load (0 when separated) [N].
-    periods : int
-        Periods marched, of both step sizes.
-    steps_per_period : int
-        Steps of the finer run.
-    drift : float
-        How far the part that RATCHETS moves on in a period [m], else 0.
-    error_estimate : float
-        Estimated error of `max_abs` relative to it: Richardson's from two step sizes, and what the transient
-        has left to decay. It does not see the history a stuck contact remembers (its mean).
-    seconds : float
-        Time taken [s].
-    """
+    VIEWS: ClassVar = Views("solver.views", "of_march", "march_dataset", "of_march")
+    JSON: ClassVar = (
+        "max_abs half_peak_to_peak mean harmonics periods steps_per_period error_estimate status seconds"
+    )
 
-    status: MarchStatus
-    max_abs: float
-    half_peak_to_peak: float
-    mean: float
-    harmonics: tuple[float, ...]
-    frequency_hz: float
-    time: FloatArray
-    displacement: FloatArray
-    velocity: FloatArray
-    contacts: tuple[str, ...]
-    slip: FloatArray
-    contact_force: FloatArray
-    normal_load: FloatArray
-    periods: int
-    steps_per_period: int
-    drift: float
-    error_estimate: float
-    seconds: float
+    status: Annotated[MarchStatus, "How it ended."]
+    max_abs: Annotated[FloatOrNaN, "Largest abs(x) of the observed DOF [m]."]
+    half_peak_to_peak: Annotated[FloatOrNaN, "(max - min) / 2 [m]."]
+    mean: Annotated[FloatOrNaN, "Mean [m]. In full stick it depends on the history, here a start from rest."]
+    harmonics: Annotated[tuple[float, ...], "abs(mean) and the amplitudes of harmonics 1 to 10 [m]."]
+    frequency_hz: Annotated[float, "Excitation frequency [Hz]."]
+    time: Annotated[Real, "Instants of the samples of the last period [s], evenly spaced from 0, (n,)."]
+    displacement: Annotated[Real, "Observed DOF [m], (n,)."]
+    velocity: Annotated[Real, "Its velocity [m/s], (n,)."]
+    contacts: Annotated[tuple[str, ...], "Names of the contacts; of the whole annulus in a cyclic scene."]
+    slip: Annotated[Real, "Relative displacement [m], (n_contacts, n)."]
+    contact_force: Annotated[Real, "Friction force [N], (n_contacts, n)."]
+    normal_load: Annotated[Real, "Normal load (0 when separated) [N], (n_contacts, n)."]
+    periods: Annotated[int, "Periods marched, of both step sizes."]
+    steps_per_period: Annotated[int, "Steps of the finer run."]
+    drift: Annotated[float, "How far the part that RATCHETS moves on in a period [m], else 0."]
+    error_estimate: Annotated[
+        FloatOrNaN,
+        "Estimated error of `max_abs` relative to it: Richardson's from two step sizes, and what the "
+        "transient has left to decay. It does not see the history a stuck contact remembers (its mean).",
+    ]
+    seconds: Annotated[float, "Time taken [s]."]
 
     @property
     def converged(self) -> bool:
         """The motion repeats within the tolerance."""
         return self.status is MarchStatus.CONVERGED
-
-    VIEWS: ClassVar = Views("solver.views", "of_march", "march_dataset", "of_march")
 
     def plot(self, ax: Axes | Sequence[Axes] | None = None, *, scene: Scene | None = None) -> Figure:
         """Draw the last period and its hysteresis loops.
@@ -127,20 +96,10 @@ class MarchResult(Drawn):
         figure: Figure = self.VIEWS.call("plots.figures", self, ax=ax, scene=scene)
         return figure
 
-    def to_json(self) -> dict[str, object]:
+    def to_json(self) -> dict[str, Any]:
         """The result without its histories, for JSON; a number that does not exist is None."""
         drift = {"drift": self.drift} if self.status is MarchStatus.RATCHETS else {}
-        return drift | {
-            "max_abs": json_number(self.max_abs),
-            "half_peak_to_peak": json_number(self.half_peak_to_peak),
-            "mean": json_number(self.mean),
-            "harmonics": [json_number(amplitude) for amplitude in self.harmonics],
-            "periods": self.periods,
-            "steps_per_period": self.steps_per_period,
-            "error_estimate": json_number(self.error_estimate),
-            "status": self.status.value,
-            "seconds": self.seconds,
-        }
+        return drift | self._json()
 
 
 def describe(

@@ -8,13 +8,36 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from pathlib import Path
+from typing import NamedTuple
 
-from solver.matrices.readers import registry
-from solver.matrices.readers.label import COMPONENTS, Label
 from solver.matrices.readers.numbers_in_text import LARGEST, FormatError
 
-_OF_ONES_OWN = ".dof"
+COMPONENTS = ("UX", "UY", "UZ", "ROTX", "ROTY", "ROTZ")
+OWN_COMPONENTS = ("U1", "U2", "U3", "UR1", "UR2", "UR3")
+"""Along and about the axes of a node's own frame, where it could not be turned into the global one."""
+
+
+class Label(NamedTuple):
+    """A node and a component of its motion: ``UX`` to ``ROTZ``, or what the file calls it."""
+
+    node: int
+    component: str
+
+    def __str__(self) -> str:
+        return f"{self.node}.{self.component}"
+
+    @property
+    def rotation(self) -> bool:
+        """Whether it is an angle."""
+        return self.component in COMPONENTS[3:] + OWN_COMPONENTS[3:]
+
+    @property
+    def place(self) -> tuple[int, int, str]:
+        """What labels are sorted by: node, then UX to ROTZ, then the rest."""
+        known = self.component in COMPONENTS
+        return self.node, COMPONENTS.index(self.component) if known else len(COMPONENTS), self.component
+
+
 _ALIASES = {
     **{str(i): name for i, name in enumerate(COMPONENTS, start=1)},
     **{f"T{i}": name for i, name in enumerate(COMPONENTS[:3], start=1)},
@@ -35,22 +58,6 @@ def label(text: str) -> Label | None:
     """The label a text such as ``1203.UX``, ``1203.1`` or ``1203.T1`` is; None if it is none."""
     found = _TEXT.fullmatch(text.strip())
     return Label(int(found[1]), component(found[2])) if found else None
-
-
-def read_labels(path: Path) -> tuple[Label, ...]:
-    """Read the labels of all rows from a file that names them; one of an unknown ending as `.dof`.
-
-    Raises
-    ------
-    FormatError
-        With the line that holds no label, or one of another row again.
-    OSError
-        The file cannot be read.
-    """
-    suffix = path.suffix.lower()
-    suffix = suffix if suffix in registry.label_suffixes() else _OF_ONES_OWN
-    read = next(one.labels for one in registry.readers() if one.labels is not None and suffix in one.suffixes)
-    return read(path)
 
 
 def distinct(labels: Sequence[Label], n_lines: int) -> tuple[Label, ...]:
@@ -81,12 +88,3 @@ def node_number(text: str, line: int) -> int:
     if abs(int(text)) > LARGEST:
         raise FormatError(f"line {line}: a node number may be {LARGEST}, got {text}")
     return int(text)
-
-
-def labels_beside(path: Path) -> Path | None:
-    """The file of labels that stands beside a matrix under the same name, if there is one."""
-    for suffix in registry.label_suffixes():
-        for name in (path.with_suffix(suffix), path.with_suffix(suffix.upper())):
-            if name.is_file():
-                return name
-    return None

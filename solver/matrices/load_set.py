@@ -10,14 +10,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.sparse import coo_array, csr_array, diags_array
 
-from solver.matrices.file_units import UNITS
-from solver.matrices.files import MatrixFileError, read_labelled
+from solver.matrices.files import MatrixFileError, labels_beside, read_labelled, read_labels
+from solver.matrices.labels import Label
 from solver.matrices.labels import label as parsed
-from solver.matrices.labels import labels_beside, read_labels
-from solver.matrices.readers.label import Label
+from solver.matrices.readers.arrays import Labelled
 from solver.matrices.readers.numbers_in_text import FormatError
-from solver.matrices.readers.registry import label_suffixes, reader_of
-from solver.matrices.readers.triplets import Labelled
+from solver.matrices.readers.registry import reader_of, suffixes
+from solver.matrices.values import UNITS
 
 if TYPE_CHECKING:
     from solver.matrices.decks.deck import Deck
@@ -68,7 +67,7 @@ class MatrixSet:
         if self.labels is None:
             return (
                 f"is {given[:40]!r}, but the files do not tell the nodes of their rows: give the row, or a "
-                f"file of labels ({', '.join(f'name{s}' for s in label_suffixes())}) beside the matrices"
+                f"file of labels ({', '.join(f'name{s}' for s in suffixes('labels'))}) beside the matrices"
             )
         wanted = parsed(given)
         if wanted is None:

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
 
 from solver.matrices.decks.deck import Deck, frames
+from solver.matrices.labels import COMPONENTS, OWN_COMPONENTS, Label
 from solver.matrices.load_set import MatrixSet
-from solver.matrices.readers.label import COMPONENTS, OWN_COMPONENTS, Label
 
 _ALIGNED = 1e-9  # component of a unit vector that counts as none
 Rows = dict[int, int]  # component 0, 1, 2 of a vector: its row

@@ -10,7 +10,6 @@ import numpy as np
 from scipy.sparse import coo_array
 
 from solver.errors import Issue, SceneError
-from solver.matrices.file_units import METRES, UNITS
 from solver.matrices.files import MatrixFileError, read_labelled, read_modes
 from solver.matrices.labels import label
 from solver.matrices.load_set import PART, MatrixSet, in_si, put_together
@@ -19,7 +18,7 @@ from solver.matrices.reduction.craig_bampton import Reduced, craig_bampton
 from solver.matrices.sectors.loading import read_nodes, sector_kept
 from solver.matrices.sectors.reduction import ReducedSector
 from solver.matrices.validation import DofTable
-from solver.matrices.values import MOST_DOFS, Matrix, Modes
+from solver.matrices.values import METRES, MOST_DOFS, UNITS, Matrix, Modes
 
 KEEP_MODES = "keep_modes"
 MAPPING, IN_UNITS, NODES = "mapping", "units", "nodes"

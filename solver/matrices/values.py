@@ -16,6 +16,13 @@ from numpy.typing import NDArray
 from pydantic import GetCoreSchemaHandler
 from pydantic_core import CoreSchema, core_schema
 
+# Forces over displacements, and moments over angles, in the units of the files: what they are in N/m and
+# N m. Masses go with them, as seconds stay seconds: t, mm, N and lbf s²/in, in, lbf are consistent units.
+UNITS = {"SI": (1.0, 1.0), "mm": (1e3, 1e-3), "in": (4.4482216152605 / 0.0254, 4.4482216152605 * 0.0254)}
+METRES = {"SI": 1.0, "mm": 1e-3, "in": 0.0254}
+"""The length of each."""
+
+
 FloatArray = NDArray[np.float64]
 ArrayOf = TypeVar("ArrayOf", bound=NDArray[Any])
 MOST_DOFS = 2000

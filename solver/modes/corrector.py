@@ -68,22 +68,6 @@ def relative_residual(at: Evaluated, y: Real, a: float, size: int) -> float:
     return float(kernels.relative_residual(at.residual, at.rough, y, size, a, at.lag, _CANCELLED))
 
 
-def step(J: Real, rhs: Real, columns: Real, *, least_squares: bool) -> Real | None:
-    """Solve J δ = rhs in units `columns` of the unknowns, rows brought to one size; None if singular."""
-    found = np.array(rhs)
-    if not least_squares:
-        good = kernels.scaled_step(J, found, columns, np.empty_like(J), np.empty(rhs.size, np.int32))
-        return found if good else None
-    scaled = J * columns
-    rows = np.abs(scaled).max(axis=1)
-    rows[rows == 0.0] = 1.0
-    scaled /= rows[:, None]
-    if not np.all(np.isfinite(scaled)):
-        return None
-    found = columns * np.linalg.lstsq(scaled, rhs / rows, rcond=1e-12)[0]
-    return found if np.all(np.isfinite(found)) else None
-
-
 def correct(
     equations: Equations, guess: State, border: Real | None = None, *, most: int = MOST_ITERATIONS,
     fine: float = _FINE, good: float = TOLERANCE,
@@ -129,15 +113,13 @@ def _newton_step(
     at: Evaluated, state: State, start: State, border: Real | None, size: int
 ) -> tuple[Real, float] | None:
     """Return the Newton step of the unknowns and of ln a."""
-    columns = scales(state.y, size)
+    columns, rhs = scales(state.y, size), -at.residual
     if border is None:
-        found = step(at.jacobian, -at.residual, columns, least_squares=at.unheld)
+        found = at.step(rhs, columns)
         return None if found is None else (found, 0.0)
     m = state.y.size
-    J = np.empty((m + 1, m + 1))
-    J[:m, :m], J[:m, m], J[m] = at.jacobian, at.by_log_amplitude, border
     behind = border[:m] @ (start.y - state.y) + border[m] * (start.log_amplitude - state.log_amplitude)
-    found = step(J, np.append(-at.residual, behind), np.append(columns, 1.0), least_squares=at.unheld)
+    found = at.step(np.append(rhs, behind), columns, border)
     return None if found is None else (found[:m], float(found[m]))
 
 

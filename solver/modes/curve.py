@@ -18,7 +18,7 @@ from enum import Enum
 import numpy as np
 
 from solver.jit.fourier import Real
-from solver.modes.corrector import Corrected, State, carried_anew, correct, scales, step
+from solver.modes.corrector import Corrected, State, carried_anew, correct, scales
 from solver.modes.equations import Equations
 
 FIRST_STEP, LARGEST_STEP, LEAST_STEP = 0.1, 0.4, 1e-4
@@ -205,17 +205,10 @@ def tangent_of(equations: Equations, found: Corrected, before: Real | None = Non
     """
     if found.at is None:
         return None
-    y, m = found.state.y, found.state.y.size
-    J = np.empty((m + 1, m + 1))
-    J[:m, :m], J[:m, m] = found.at.jacobian, found.at.by_log_amplitude
-    J[m] = 0.0
-    J[m, m] = 1.0
-    if before is not None:
-        J[m] = border_of(found.state, before, equations.size)
-    rhs = np.zeros(m + 1)
-    rhs[m] = 1.0
-    columns = np.append(scales(y, equations.size), 1.0)
-    t = step(J, rhs, columns, least_squares=found.at.unheld)
+    rhs = np.zeros(found.state.y.size + 1)
+    rhs[-1] = 1.0
+    border = rhs if before is None else border_of(found.state, before, equations.size)
+    t = found.at.step(rhs, scales(found.state.y, equations.size), border)
     if t is None:
         return None
     shape = by_shape(found.state, t, equations.size)
@@ -235,6 +228,5 @@ def _with_phase(equations: Equations, found: Corrected) -> Corrected:
     if found.at is None:
         return found
     s = equations.structure
-    x = found.at.x[s.first]
-    phase = 1j * (s.mass[s.first] * x if s.is_diagonal else s.mass[s.first] @ x)
+    phase = 1j * s.momentum(found.at.x[s.first])
     return replace(found, state=replace(found.state, phase=phase / np.linalg.norm(phase)))

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -28,8 +29,10 @@ from solver.contacts.kernels.system import (
     new_receptance,
 )
 from solver.jit.fourier import Complex, Integer, Real
+from solver.modes.kernels import steps
 from solver.modes.kernels.assembly import fill_functionals, fill_motions, fill_slopes
 from solver.modes.kernels.dynamics import fill_pushes
+from solver.modes.sparse import Factors, Layout, SparseJacobian
 from solver.modes.structure import Dynamics, Structure, structure_of
 from solver.sensitivity.gradient import Amplitudes
 
@@ -43,23 +46,55 @@ class Evaluated:
     Attributes
     ----------
     residual : (m,) in the order of the unknowns; [m, √kg m, …, 1].
-    jacobian : (m, m); `by_log_amplitude` (m,) is that by ln a.
+    slopes : (m, m) the Jacobian, or what solves with it; `by_log_amplitude` (m,) is that by ln a.
     x : (nk, N) motion of all coordinates; forces : (r, n) forces at the leading ports less the shift.
     rough : (r n,) size that a residual of each motion is rounding of.
     lag : size that the residual of the phase is relative to.
-    unheld : bool
-        Nothing holds a part where it is: its mean is left alone.
+    loose : (2, g, m) mean motions of parts that nothing holds where they are, and the forces of the contacts'
+        stiffnesses along them: a step takes these for the slope that is missing, and leaves such means
+        alone (`solver.balance.kernels.gauge`).
     """
 
     residual: Real
-    jacobian: Real
+    slopes: Real | SparseJacobian
     by_log_amplitude: Real
     x: Complex
     forces: Real
     rough: Real
     lag: float
-    unheld: bool
+    loose: Real
     dynamics: Dynamics
+
+    @property
+    def jacobian(self) -> Real:
+        """The Jacobian, (m, m)."""
+        return self.slopes.whole() if isinstance(self.slopes, SparseJacobian) else self.slopes
+
+    def step(self, rhs: Real, columns: Real, border: Real | None = None) -> Real | None:
+        """Solve J δ = rhs in units `columns` (m,) of the unknowns; None if J is singular.
+
+        Parameters
+        ----------
+        rhs : (m,), or (m + 1,) with a border: that of a further row.
+        border : (m + 1,) this row, over the unknowns and ln a; δ is (m + 1,) then.
+        """
+        motions, pulls = self.loose
+        if isinstance(self.slopes, SparseJacobian):
+            return self.slopes.step(rhs, pulls, border)
+        J = self.slopes + motions.T @ pulls if len(motions) else self.slopes
+        if border is not None:
+            m = columns.size
+            bordered = np.empty((m + 1, m + 1))
+            bordered[:m, :m], bordered[:m, m], bordered[m] = J, self.by_log_amplitude, border
+            J, columns = bordered, np.append(columns, 1.0)
+        return step(J, rhs, columns)
+
+
+def step(J: Real, rhs: Real, columns: Real) -> Real | None:
+    """Solve J δ = rhs in units `columns` of the unknowns, rows brought to one size; None if singular."""
+    found = np.array(rhs)
+    good = steps.scaled_step(J, found, columns, np.empty_like(J), np.empty(rhs.size, np.int32))
+    return found if good else None
 
 
 class Equations:
@@ -69,6 +104,8 @@ class Equations:
     ----------
     alone : (N,) a mode that −2ζω acts on alone; all masses if left out.
     """
+
+    KEEPS_J: ClassVar[bool] = True  # the rows of J are those of the module, whatever form it has
 
     def __init__(self, balance: Balance, alone: Complex | None = None) -> None:
         self.balance, self.alone = balance, alone
@@ -84,11 +121,18 @@ class Equations:
         self.size = self.r * self.n
         self.span = system.span if system.span.shape[1] else None
         self._blocks = _block_places(balance)
-        nk, coordinates = self.structure.ks.size, self.structure.force.size
-        self._slopes = np.empty((nk, self.r, self.size), np.complex128)
+        s = self.structure
+        nk, coordinates = s.ks.size, s.force.size
+        self._layout = (
+            Layout(s.pattern, self.amplitudes, s.contact, self._blocks, self.span, self.n)
+            if s.pattern is not None and self.KEEPS_J
+            else None
+        )
+        self._slopes = np.empty((nk, self.r, self.size if self._layout is None else 0), np.complex128)
         # Changes of x by Re q, ω and the last unknown; c of q, of the equation before the last, of a.
         self._pushed, self._rows = np.zeros((2, 3, nk, coordinates), np.complex128)
         self._turned = np.zeros((nk, coordinates), np.complex128)
+        self._held = np.zeros((2, 0, self.size + BESIDES))
         self._by_log_amplitude = np.zeros(self.size + BESIDES)
         self._by_log_amplitude[-1] = -1.0
 
@@ -131,6 +175,17 @@ class Equations:
         if self.span is not None:
             G = np.einsum("cr,cdij,ds->rsij", self.span, G, self.span, optimize=True)
         return np.asarray(G.transpose(0, 2, 1, 3))
+
+    def loose(self) -> Real:
+        """Return `Evaluated.loose` where last evaluated."""
+        system, count = self.balance.system, int(self.point.counts[UNHELD])
+        if not count:
+            return self._held
+        found = np.zeros((2, count, self.size + BESIDES))
+        for k, along in enumerate(self.point.gauge[:count]):
+            found[0, k, : self.size : self.n] = along[system.leading]
+            found[1, k, : self.size : self.n] = self.lead((system.shift * along)[:, None])[:, 0]
+        return found
 
     def shifted_forces(self, w: Real) -> Real:
         """Return the forces along the leading motions less the shift, (r, n)."""
@@ -186,31 +241,45 @@ class Equations:
     ) -> Evaluated:  # fmt: skip
         """Put residual and Jacobian together."""
         s, size = self.structure, self.size
-        first, ks = s.first, s.ks
+        first = s.first
         mass, moved = s.times(s.mass, x), x[first]
         squared = max(float(np.vdot(x, mass).real), 1e-300)
-        residual, J = np.empty(size + BESIDES), np.empty((size + BESIDES, size + BESIDES))
+        residual = np.empty(size + BESIDES)
         off = q - np.vdot(dynamics.b, moved)
         residual[size], residual[size + 1] = off.real, off.imag
         residual[size + 2] = np.vdot(phase, moved).real
         residual[size + 3] = 0.5 * math.log(squared) - log_amplitude
 
-        pushes, rows, turned, rough = self._pushed, self._rows, self._turned, np.empty(size)
+        pushes, rows, turned = self._pushed, self._rows, self._turned
         pushes[0, first] = dynamics.rho * dynamics.b
         np.subtract(by_omega, s.times(dynamics.by_omega, x), out=pushes[1])
         pushes[2] = self.by_last(x, dynamics, log_amplitude)
-        changes = dynamics.solve(pushes)
         turned[first] = phase
         rows[0, first], rows[1], rows[2] = dynamics.b, self._second_last(x, turned), mass / squared
-        fill_slopes(ks, self._blocks, self.point.G, self.balance.system.span, self._slopes)
-        A = np.ascontiguousarray(dynamics.receptance())
-        fill_motions(ks, s.contact, A, self._slopes, x, w, changes, forces, residual, J, rough)
-        fill_functionals(s.back, self._slopes, rows, dynamics.solve_adjoint(rows), changes, J)
+        slopes, rough = self._linearised(w, forces, x, dynamics, residual)
         return Evaluated(
-            residual=residual, jacobian=J, by_log_amplitude=self._by_log_amplitude, x=x, forces=forces,
+            residual=residual, slopes=slopes, by_log_amplitude=self._by_log_amplitude, x=x, forces=forces,
             rough=rough, lag=math.sqrt(np.vdot(phase, phase).real * np.vdot(moved, moved).real),
-            unheld=bool(self.point.counts[UNHELD]), dynamics=dynamics,
+            loose=self.loose(), dynamics=dynamics,
         )  # fmt: skip
+
+    def _linearised(
+        self, w: Real, forces: Real, x: Complex, dynamics: Dynamics, residual: Real
+    ) -> tuple[Real | SparseJacobian, Real]:
+        """Return the Jacobian and what residuals of motions are rounding of; fill these in `residual`."""
+        s, layout, factors = self.structure, self._layout, dynamics.inverse
+        pushes, rows, m = self._pushed, self._rows, residual.size
+        if layout is not None and isinstance(factors, Factors):
+            residual[: self.size] = w.reshape(-1) - layout.L @ layout.coefficients(x)
+            rough = layout.reach(factors) * np.abs(forces).max(initial=0.0)
+            return SparseJacobian(layout, factors, self.point.G, pushes, rows), rough
+        J, rough = np.empty((m, m)), np.empty(self.size)
+        changes = dynamics.solve(pushes)
+        fill_slopes(s.ks, self._blocks, self.point.G, self.balance.system.span, self._slopes)
+        A = np.ascontiguousarray(dynamics.receptance())
+        fill_motions(s.ks, s.contact, A, self._slopes, x, w, changes, forces, residual, J, rough)
+        fill_functionals(s.back, self._slopes, rows, dynamics.solve_adjoint(rows), changes, J)
+        return J, rough
 
     def _second_last(self, _x: Complex, turned: Complex) -> Complex:
         """Return c (nk, N) of the equation before the last, Re Σ c_kᴴ x_k: `turned` is that of the phase."""

@@ -11,7 +11,7 @@ from solver.balance.balance import build
 from solver.balance.simplifications import Effects
 from solver.contacts.kernels.system import DENSE
 from solver.jit.fourier import Real
-from solver.modes.corrector import Corrected, State, scales, step
+from solver.modes.corrector import Corrected, State, scales
 from solver.modes.equations import BESIDES, Equations
 from solver.scene.harmonics import MOST_HARMONICS, spread
 
@@ -46,7 +46,7 @@ class Wider:
         at = wide.evaluate(y, state.log_amplitude, state.phase, state.mode)
         if at is None:
             return math.nan, math.nan
-        move: Real | None = step(at.jacobian, -at.residual, scales(y, wide.size), least_squares=at.unheld)
+        move: Real | None = at.step(-at.residual, scales(y, wide.size))
         if move is None:
             return math.nan, math.nan
         return abs(float(move[-2])) / (2.0 * math.pi), abs(float(move[-1]))

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar, cast
+from typing import Annotated, cast
 
 import numpy as np
 
@@ -32,22 +32,15 @@ from solver.results.told import Piece
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class ModeGradient(Piece):
-    """How frequency and damping ratio change with parameters, the amplitude held.
+    """How frequency and damping ratio change with parameters, the amplitude held."""
 
-    Attributes
-    ----------
-    paths : tuple of str
-        Parameter paths.
-    frequency_hz, damping_ratio : (n, n_paths) array
-        Derivatives at n points of a nonlinear mode, [Hz] and [1] per unit of each parameter; NaN where the
-        equations are singular, at a turning point.
-    """
-
-    UNITS: ClassVar = {"frequency_hz": "Hz per unit", "damping_ratio": "1 per unit"}
-
-    paths: tuple[str, ...]
-    frequency_hz: Real
-    damping_ratio: Real
+    paths: Annotated[tuple[str, ...], "Parameter paths."]
+    frequency_hz: Annotated[
+        Real,
+        "Derivatives at n points of a nonlinear mode [Hz per unit] of each parameter; NaN where the "
+        "equations are singular, at a turning point, (n, n_paths).",
+    ]
+    damping_ratio: Annotated[Real, "The same of the damping ratio [1 per unit], (n, n_paths)."]
 
 
 def mode_gradient(

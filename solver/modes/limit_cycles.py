@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
@@ -32,7 +32,7 @@ from solver.modes.records import Record
 from solver.modes.results import NonlinearMode
 from solver.modes.start import begin
 from solver.response.stability.floquet import GROWS, growth_of
-from solver.results.told import Piece, json_number
+from solver.results.told import Piece
 from solver.scene.scene import Scene
 
 _MOST_COORDINATES = 200  # of a whole structure whose multipliers are computed unasked
@@ -40,48 +40,30 @@ _MOST_COORDINATES = 200  # of a whole structure whose multipliers are computed u
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class LimitCycle(Piece):
-    """A periodic motion that nothing drives.
+    """A periodic motion that nothing drives."""
 
-    Attributes
-    ----------
-    amplitude : float
-        Modal amplitude a [√kg m].
-    frequency_hz : float
-        Its own frequency.
-    max_abs : float
-        max|x| of the observed DOF [m].
-    damping_slope : float
-        dζ / d ln a there: above 0 the mode returns to the cycle.
-    multipliers : complex array or None
-        Floquet multipliers of the whole structure, without that of a shift in time; None if `unknown`.
-    unknown : str
-        Why they are not known, empty if they are.
-    amplitude_error, frequency_error, max_abs_error : float
-        Estimates of what more harmonics would change, by the cycle with twice and four times as many;
-        NaN where that was not found, so that nothing is known.
-    record : Record
-        Motions of contacts and DOFs, and forces, as `solver.NonlinearMode` has them.
-    """
+    JSON: ClassVar = (
+        "amplitude frequency=frequency_hz max_abs amplitude_error frequency_error max_abs_error"
+        " damping_slope attracts stable growth by_slope"
+    )
 
-    UNITS: ClassVar = {
-        "amplitude": "√kg m",
-        "frequency_hz": "Hz",
-        "max_abs": "m",
-        "amplitude_error": "√kg m",
-        "frequency_error": "Hz",
-        "max_abs_error": "m",
-    }
-
-    amplitude: float
-    frequency_hz: float
-    max_abs: float
-    damping_slope: float
-    multipliers: Complex | None
-    unknown: str
-    amplitude_error: float
-    frequency_error: float
-    max_abs_error: float
-    record: Record
+    amplitude: Annotated[float, "Modal amplitude a [√kg m]."]
+    frequency_hz: Annotated[float, "Its own frequency [Hz]."]
+    max_abs: Annotated[float, "max|x| of the observed DOF [m]."]
+    damping_slope: Annotated[float, "dζ / d ln a there: above 0 the mode returns to the cycle."]
+    multipliers: Annotated[
+        Complex | None,
+        "Floquet multipliers of the whole structure, without that of a shift in time; None if `unknown`.",
+    ]
+    unknown: Annotated[str, "Why they are not known, empty if they are."]
+    amplitude_error: Annotated[
+        float,
+        "Estimate of what more harmonics would change of `amplitude` [√kg m], by the cycle with twice and "
+        "four times as many; NaN where that was not found, so that nothing is known.",
+    ]
+    frequency_error: Annotated[float, "The same of `frequency_hz` [Hz]."]
+    max_abs_error: Annotated[float, "The same of `max_abs` [m]."]
+    record: Annotated[Record, "Motions of contacts and DOFs, and forces, as `solver.NonlinearMode` has them."]
 
     @property
     def attracts(self) -> bool:
@@ -97,57 +79,36 @@ class LimitCycle(Piece):
 
     def to_json(self) -> dict[str, Any]:
         """Return it as one JSON object."""
-        return {
-            "amplitude": self.amplitude, "frequency": self.frequency_hz, "max_abs": self.max_abs,
-            "amplitude_error": json_number(self.amplitude_error),
-            "frequency_error": json_number(self.frequency_error),
-            "max_abs_error": json_number(self.max_abs_error),
-            "damping_slope": json_number(self.damping_slope),
-            "attracts": self.attracts, "stable": self.stable, "growth": growth_from(self),
-            "by_slope": self.multipliers is None,
-        }  # fmt: skip
+        return self._json(growth=growth_from(self), by_slope=self.multipliers is None)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class LimitCycles(Piece):
-    """The limit cycles of a mode under aerodynamic excitation, in the order of its curve.
+    """The limit cycles of a mode under aerodynamic excitation, in the order of its curve."""
 
-    Attributes
-    ----------
-    aero_damping : float
-        ζ_aero; below 0 it feeds the mode.
-    cycles : tuple of LimitCycle
-        Where ζ(a) + ζ_aero = 0 within the curve.
-    most_damping : float
-        The largest ζ(a): an excitation of −ζ_aero up to that is held.
-    most_at : float
-        Its amplitude [√kg m].
-    most_error : float
-        Estimate of what more harmonics would change of `most_damping`; NaN where it is not known.
-    most_at_end : bool
-        That is an end of the curve: beyond it more may be held.
-    unsolved : tuple of (float, float)
-        Ranges of the amplitude [√kg m] within which ζ(a) + ζ_aero changes its sign and no cycle was found.
-    scales : bool
-        Whether amplitudes of cycles grow in proportion to the loads.
-    mode_alone : bool
-        Whether the gas acts on the one mode alone.
-    completed : bool
-        Whether the curve that they were looked for on reaches its largest amplitude: else there may be more.
-    """
+    JSON: ClassVar = (
+        "aero_damping mode_alone completed most_damping most_at most_error most_at_end unsolved cycles"
+    )
 
-    UNITS: ClassVar = {"most_at": "√kg m"}
-
-    aero_damping: float
-    cycles: tuple[LimitCycle, ...]
-    most_damping: float
-    most_at: float
-    most_error: float
-    most_at_end: bool
-    unsolved: tuple[tuple[float, float], ...]
-    scales: bool
-    mode_alone: bool
-    completed: bool
+    aero_damping: Annotated[float, "ζ_aero; below 0 it feeds the mode."]
+    cycles: Annotated[tuple[LimitCycle, ...], "Where ζ(a) + ζ_aero = 0 within the curve."]
+    most_damping: Annotated[float, "The largest ζ(a): an excitation of −ζ_aero up to that is held."]
+    most_at: Annotated[float, "Its amplitude [√kg m]."]
+    most_error: Annotated[
+        float, "Estimate of what more harmonics would change of `most_damping`; NaN where it is not known."
+    ]
+    most_at_end: Annotated[bool, "That is an end of the curve: beyond it more may be held."]
+    unsolved: Annotated[
+        tuple[tuple[float, float], ...],
+        "Ranges of the amplitude [√kg m] within which ζ(a) + ζ_aero changes its sign and no cycle was found.",
+    ]
+    scales: Annotated[bool, "Whether amplitudes of cycles grow in proportion to the loads."]
+    mode_alone: Annotated[bool, "Whether the gas acts on the one mode alone."]
+    completed: Annotated[
+        bool,
+        "Whether the curve that they were looked for on reaches its largest amplitude: else there may be "
+        "more.",
+    ]
 
     def load_for(self, disturbance: float) -> float:
         """Return the least factor on every load with which a disturbance dies down to the stable cycle.
@@ -192,17 +153,7 @@ class LimitCycles(Piece):
     def to_json(self, disturbance: float | None = None) -> dict[str, Any]:
         """Return them as one JSON object, with what holds a disturbance [√kg m] if that is given."""
         asked = {} if disturbance is None else {"load_for": self.held_by(disturbance)}
-        return asked | {
-            "aero_damping": self.aero_damping,
-            "mode_alone": self.mode_alone,
-            "completed": self.completed,
-            "most_damping": json_number(self.most_damping),
-            "most_at": json_number(self.most_at),
-            "most_error": json_number(self.most_error),
-            "most_at_end": self.most_at_end,
-            "unsolved": [list(each) for each in self.unsolved],
-            "cycles": [cycle.to_json() for cycle in self.cycles],
-        }
+        return asked | self._json()
 
 
 def limit_cycles(

@@ -12,7 +12,6 @@ import numpy as np
 
 from solver.balance.balance import Balance, build, check_harmonics
 from solver.balance.simplifications import Effects
-from solver.contacts.kernels.system import DENSE, MODES
 from solver.errors import SettingError
 from solver.jit.fourier import Real
 from solver.linear.assembly import linear_model
@@ -159,10 +158,7 @@ def pose(
 
 
 def _balance(scene: Scene, harmonics: int, *, whole: bool) -> Balance:
-    balance = build(scene, harmonics=harmonics, effects=Effects(whole_matrices=True) if whole else None)
-    if balance.system.form not in (MODES, DENSE):
-        return build(scene, harmonics=harmonics, effects=Effects(whole_matrices=True))
-    return balance
+    return build(scene, harmonics=harmonics, effects=Effects(whole_matrices=whole), poles=False)
 
 
 def _begin(equations: Equations, mode: int) -> tuple[LinearMode, Real, list[LinearMode]]:

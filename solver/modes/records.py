@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.balance.kernels.output import extremes
-from solver.contacts.kernels.system import System, by_reference
+from solver.contacts.kernels.system import DENSE, System, by_reference
 from solver.jit.fourier import Complex, Integer, Real, to_full
 from solver.linear.assembly import linear_model
 from solver.modes.corrector import Corrected
@@ -114,7 +114,7 @@ def collect(
         dof_motions=np.array([row.dofs for row in rows]).reshape(n, len(scene.dofs), size),
         forcing=np.array([row.forcing for row in rows], dtype=np.float64),
         points=tuple(point.state for point in points),
-        whole_matrices=balance.effects.whole_matrices, rejected_steps=rejected,
+        whole_matrices=balance.system.form == DENSE, rejected_steps=rejected,
         newton_iterations=sum(point.iterations for point in points),
         seconds=time.perf_counter() - begun,
     )  # fmt: skip

@@ -5,20 +5,20 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import numpy as np
 
+from solver.arrays import Complex, Integer, Real
 from solver.errors import SettingError
-from solver.jit import fourier
-from solver.jit.fourier import Complex, Integer, Real
-from solver.modes.corrector import State
-from solver.response.contact_response import ContactState, state_of
 from solver.results.base import Drawn
-from solver.results.told import json_numbers
 from solver.results.views import Views
 from solver.scene.scene import Scene
 from solver.wording import listing
+
+if TYPE_CHECKING:
+    from solver.modes.corrector import State
+    from solver.response.contact_response import ContactState
 
 
 class NonlinearModeStatus(Enum):
@@ -39,80 +39,84 @@ class NonlinearModeStatus(Enum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class NonlinearMode(Drawn):
-    """Frequency and damping ratio of a mode over its amplitude; n points along the curve.
+class ModalCurve(Drawn):
+    """Root of the results that are curves of n points with the states of the contacts along them."""
 
-    Attributes
-    ----------
-    scene : Scene
-        As it was solved: with the engine order of the nodal diameter.
-    mode : int
-        Number of the linear mode it begins with, the contacts as they are at rest, 1 the slowest.
-    nodal_diameter : int or None
-        Of harmonic 1; None of a structure without sectors.
-    amplitude : (n,) array
-        a with a² = Σ Q_kᴴ M Q_k over the harmonics k ≥ 1, of one sector if cyclic [√kg m].
-    frequency_hz, damping_ratio : (n,) array
-        ω / 2π and ζ.
-    frequency_error, damping_error : (n,) array
-        Estimates of what more harmonics would change: a Newton step with twice as many. NaN if not asked for.
-    max_abs : (n,) array
-        max|x| of the observed DOF [m].
-    states : (n, n_contacts) array
-        What each contact does over the period, see `contact_states`.
-    residual : (n,) array
-        Relative residual of the equations.
-    contact_motions, contact_forces : (n, n_ports, 2H + 1) array
-        Coefficients of the relative motions [m] and of the forces along them [N]; port after port of each
-        contact.
-    dof_motions : (n, n_dofs, 2H + 1) array
-        Coefficients of every DOF [m], of one sector if cyclic. Harmonic 1 lags the excitation's by 90°.
-    forcing : (n,) array
-        |Qᴴ f| of the scene's own excitation and the mass-normalised mode Q_1 / a [N/√kg].
-    points : tuple of State
-        The unknowns of every point, for `solver.mode_gradient`; `whole_matrices` says of which equations.
-    """
-
-    VIEWS: ClassVar = Views("solver.views", "of_mode", "mode_dataset", "modes:mode_figure")
-
-    scene: Scene
-    mode: int
-    nodal_diameter: int | None
-    n_harmonics: int
-    status: NonlinearModeStatus
-    amplitude: Real
-    frequency_hz: Real
-    damping_ratio: Real
-    frequency_error: Real
-    damping_error: Real
-    max_abs: Real
-    states: Integer
-    residual: Real
-    contact_motions: Real
-    contact_forces: Real
-    dof_motions: Real
-    forcing: Real
-    points: tuple[State, ...]
-    whole_matrices: bool
-    newton_iterations: int
-    rejected_steps: int
-    seconds: float
-
-    @property
-    def completed(self) -> bool:
-        """Whether the curve reaches the amplitude asked for."""
-        return self.status is NonlinearModeStatus.COMPLETED
+    scene: Annotated[Scene, "As it was solved: with the engine order of the nodal diameter."]
+    max_abs: Annotated[Real, "max|x| of the observed DOF [m], (n,)."]
+    states: Annotated[Integer, "What each contact does, see `contact_states`, (n, n_contacts)."]
+    residual: Annotated[Real, "Relative residual of the equations, (n,)."]
+    seconds: Annotated[float, "Time taken [s]."]
 
     @property
     def contact_names(self) -> tuple[str, ...]:
         """Names of the contacts, as `states` has them."""
         return tuple(contact.name for contact in self.scene.contacts)
 
+    @property
+    def state_words(self) -> tuple[tuple[str, ...], ...]:
+        """What each contact does over the period, at each point, in words."""
+        every = (self.contact_states(i).values() for i in range(len(self.states)))
+        return tuple(tuple(state.value for state in row) for row in every)
+
     def contact_states(self, i: int) -> dict[str, ContactState]:
         """What each contact does at point i."""
-        return {
-            name: state_of(int(code)) for name, code in zip(self.contact_names, self.states[i], strict=True)
-        }
+        # Loaded here: who reads results, or what they are, needs no compiled loops.
+        from solver.response.contact_response import state_of
+
+        return dict(zip(self.contact_names, map(state_of, self.states[i].tolist()), strict=True))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class NonlinearMode(ModalCurve):
+    """Frequency and damping ratio of a mode over its amplitude; n points along the curve."""
+
+    VIEWS: ClassVar = Views("solver.views", "of_mode", "mode_dataset", "modes:mode_figure")
+    JSON: ClassVar = (
+        "scene mode nodal_diameter completed status amplitude frequency=frequency_hz damping_ratio"
+        " frequency_error damping_error dof=scene.observe.dof max_abs contacts=contact_names"
+        " states=state_words n_harmonics newton_iterations rejected_steps seconds"
+    )
+
+    mode: Annotated[int, "Number of the linear mode it begins with, contacts as at rest, 1 the slowest."]
+    nodal_diameter: Annotated[int | None, "Of harmonic 1; None of a structure without sectors."]
+    n_harmonics: Annotated[int, "Highest harmonic kept."]
+    status: Annotated[NonlinearModeStatus, "How the curve ended."]
+    amplitude: Annotated[
+        Real, "a with a² = Σ Q_kᴴ M Q_k over the harmonics k ≥ 1, of one sector if cyclic [√kg m], (n,)."
+    ]
+    frequency_hz: Annotated[Real, "ω / 2π [Hz], (n,)."]
+    damping_ratio: Annotated[Real, "ζ, (n,)."]
+    frequency_error: Annotated[
+        Real,
+        "Estimate of what more harmonics would change [Hz]: a Newton step with twice as many, (n,); NaN if "
+        "not asked for.",
+    ]
+    damping_error: Annotated[Real, "The same of the damping ratio, (n,)."]
+    contact_motions: Annotated[
+        Real, "Coefficients of the relative motions [m], port after port, (n, n_ports, 2H + 1)."
+    ]
+    contact_forces: Annotated[Real, "Coefficients of the forces along them [N], as many."]
+    dof_motions: Annotated[
+        Real,
+        "Coefficients of every DOF [m], of one sector if cyclic, (n, n_dofs, 2H + 1). Harmonic 1 lags the "
+        "excitation's by 90°.",
+    ]
+    forcing: Annotated[
+        Real, "|Qᴴ f| of the scene's own excitation and the mass-normalised mode Q_1 / a [N/√kg], (n,)."
+    ]
+    points: Annotated[
+        tuple[State, ...],
+        "The unknowns of every point, for `solver.mode_gradient`; `whole_matrices` says of which equations.",
+    ]
+    whole_matrices: bool
+    newton_iterations: Annotated[int, "Of all points."]
+    rejected_steps: Annotated[int, "Steps that were tried again."]
+
+    @property
+    def completed(self) -> bool:
+        """Whether the curve reaches the amplitude asked for."""
+        return self.status is NonlinearModeStatus.COMPLETED
 
     def shape(self, i: int) -> Complex:
         """Return harmonic 1 of every DOF over the amplitude, (n_dofs,) [1/√kg], at point i."""
@@ -130,6 +134,9 @@ class NonlinearMode(Drawn):
         SettingError
             An unknown contact, or fewer than 2 samples.
         """
+        # Loaded here: who reads results, or what they are, needs no compiled loops.
+        from solver.jit.fourier import basis
+
         if contact not in self.contact_names:
             raise SettingError("contact", contact, f"must be one of {listing(self.contact_names)}")
         if isinstance(samples, bool) or not isinstance(samples, int) or samples < 2:
@@ -139,29 +146,5 @@ class NonlinearMode(Drawn):
         motions = self.contact_motions[i, ports[at] : ports[at + 1]]
         given = self.scene.contacts[at].at_frequency(2.0 * math.pi * float(self.frequency_hz[i]))
         tau = np.asarray(2.0 * math.pi / samples * np.arange(samples), dtype=np.float64)
-        basis = fourier.basis(tau, (motions.shape[1] - 1) // 2)
-        return basis @ motions[0], given.force_at(motions, given.normal_load(motions), tau)
-
-    def to_json(self) -> dict[str, Any]:
-        """Return the curve as one JSON object."""
-        states = [[state_of(int(code)).value for code in row] for row in self.states]
-        return {
-            "scene": self.scene.name,
-            "mode": self.mode,
-            "nodal_diameter": self.nodal_diameter,
-            "completed": self.completed,
-            "status": self.status.value,
-            "amplitude": self.amplitude.tolist(),
-            "frequency": self.frequency_hz.tolist(),
-            "damping_ratio": self.damping_ratio.tolist(),
-            "frequency_error": json_numbers(self.frequency_error),
-            "damping_error": json_numbers(self.damping_error),
-            "dof": self.scene.observe.dof,
-            "max_abs": self.max_abs.tolist(),
-            "contacts": list(self.contact_names),
-            "states": states,
-            "n_harmonics": self.n_harmonics,
-            "newton_iterations": self.newton_iterations,
-            "rejected_steps": self.rejected_steps,
-            "seconds": self.seconds,
-        }
+        waves = basis(tau, (motions.shape[1] - 1) // 2)
+        return waves @ motions[0], given.force_at(motions, given.normal_load(motions), tau)

@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 
 from solver.balance.balance import Balance
-from solver.contacts.kernels.system import UNHELD
 from solver.jit.fourier import Complex, Real, cosine_position
 from solver.linear.assembly import linear_model
 from solver.matrices.normal_modes import hermitian, undamped_modes
-from solver.modes.corrector import Corrected, State, carried_anew, correct, step
-from solver.modes.equations import Equations
+from solver.modes.corrector import Corrected, State, carried_anew, correct
+from solver.modes.equations import Equations, step
+from solver.modes.structure import plain
 
 _MOST = 60  # Newton steps to the equilibrium
 _LEAST = 1e-10  # relative motion of a contact below which a mode does not move it
@@ -69,16 +69,15 @@ def linear_modes(balance: Balance, slopes: Complex, omega: float = 1.0) -> list[
     free = np.ix_(model.free, model.free)
     held = L.conj().T @ slopes @ L
     dashpots = C + (held - hermitian(held)) / (1j * omega)
-    found = undamped_modes(hermitian((K + held)[free]), hermitian(M[free]))
-    modes = []
-    for square, column in zip(found.omega2, found.phi.T, strict=True):
-        omega = math.sqrt(max(float(square), 0.0))
-        shape = np.zeros(M.shape[0], np.complex128)
-        shape[model.free] = column
-        lost = float(np.vdot(shape, dashpots @ shape).real)
-        zeta = lost / (2.0 * omega) if omega > 0.0 else 0.0
-        modes.append(LinearMode(omega, zeta, shape, L @ shape, dashpots @ shape))
-    return modes
+    found = undamped_modes(plain(hermitian((K + held)[free])), plain(hermitian(M[free])))
+    shapes = np.zeros((M.shape[0], found.mu.size), np.complex128)
+    shapes[model.free] = found.phi
+    drags = dashpots @ shapes
+    lost = np.sum(shapes.conj() * drags, axis=0).real
+    omegas = np.sqrt(np.maximum(found.omega2, 0.0))
+    zetas = np.divide(lost, 2.0 * omegas, out=np.zeros(lost.size), where=omegas > 0.0)
+    rows = zip(omegas.tolist(), zetas.tolist(), shapes.T, (L @ shapes).T, drags.T, strict=True)
+    return [LinearMode(*each) for each in rows]
 
 
 def damped_mode(modes: list[LinearMode], i: int) -> LinearMode:
@@ -121,8 +120,9 @@ def equilibrium(equations: Equations, omega: float) -> Real | None:
         size = max(np.abs(w[:, 0]).max(initial=0.0), np.abs(free).max(initial=0.0), 1e-300)
         if np.abs(residual).max(initial=0.0) <= 1e-12 * size:
             break
-        J = np.eye(equations.r) + A @ equations.slopes()[:, 0, :, 0]
-        move = step(J, -residual, np.ones(equations.r), least_squares=bool(equations.point.counts[UNHELD]))
+        motions, pulls = equations.loose()[:, :, : equations.size : n]
+        J = np.eye(equations.r) + A @ equations.slopes()[:, 0, :, 0] + motions.T @ pulls
+        move = step(J, -residual, np.ones(equations.r))
         if move is None:
             return None
         w = w.copy()
@@ -195,7 +195,7 @@ def first_state(
         x = x * (-1j * abs(seen) / seen)
     phase = force
     if turns:
-        phase = 1j * (s.mass[s.first] * x if s.is_diagonal else s.mass[s.first] @ x)
+        phase = 1j * s.momentum(x)
     number = s.nearest(mode.omega, mode.zeta)
     q = a * complex(np.vdot(s.carried[:, number], x))
     moved = a * (s.contact[s.first] @ x)
@@ -233,8 +233,8 @@ def _is_of(equations: Equations, mode: LinearMode, found: Corrected) -> bool:
     if found.at is None:
         return False
     s, shape = equations.structure, coordinates_of(equations, mode)
-    M, x = s.mass[s.first], found.at.x[s.first]
-    own, moved = (M * shape, M * x) if s.is_diagonal else (M @ shape, M @ x)
+    x = found.at.x[s.first]
+    own, moved = s.momentum(shape), s.momentum(x)
     size = abs(complex(np.vdot(shape, own))) * abs(complex(np.vdot(x, moved)))
     omega, zeta = found.state.y[-2:]
     alike = abs(omega - mode.omega) <= _SAME * mode.omega and abs(zeta - mode.zeta) <= _SAME

@@ -10,8 +10,10 @@ than that of the structure alone.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from solver.balance.balance import Balance
 from solver.contacts.kernels.system import DENSE
@@ -21,11 +23,14 @@ from solver.linear.condensation import reduce_model
 from solver.linear.contact_table import port_stiffnesses
 from solver.matrices.normal_modes import hermitian, undamped_modes
 from solver.modes.kernels.dynamics import fill_stiffness, invert_modes
+from solver.modes.sparse import Factors, Pattern
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Structure:
-    """What Z_k is made of, in modes (diagonals, (nk, N)) or as matrices ((nk, N, N)); N coordinates.
+    """What Z_k is made of; N coordinates.
+
+    It is in modes (diagonals, (nk, N)), as matrices ((nk, N, N)), or as the entries of a pattern ((nk, L)).
 
     Attributes
     ----------
@@ -41,6 +46,8 @@ class Structure:
     shapes : (nk, n, N) the coordinates in those of the matrices.
     modes : (N, m) modes of the structure alone that may be carried, M b of them in `carried`.
     squares : (m,) their ω² [rad²/s²].
+    own : (4, m) ψᴴ K ψ, ψᴴ C ψ, ψᴴ M ψ and that of `fed` of harmonic 1, of these modes ψ.
+    pattern : where matrices have entries that are kept alone; None where whole ones or diagonals are.
     """
 
     ks: Integer
@@ -62,17 +69,26 @@ class Structure:
     modes: Complex
     carried: Complex
     squares: Real
+    own: Complex
+    pattern: Pattern | None
 
     @property
     def is_diagonal(self) -> bool:
         """Whether the coordinates are modes that damping leaves apart."""
-        return self.K.ndim == 2
+        return self.pattern is None and self.K.ndim == 2
 
     def times(self, matrix: Complex, x: Complex) -> Complex:
         """Return matrix @ x of each harmonic, x (…, nk, N)."""
+        if self.pattern is not None:
+            return self.pattern.times(matrix, x)
         if matrix.ndim == 2:
             return matrix * x
         return np.asarray((matrix @ x[..., None])[..., 0])
+
+    def momentum(self, x: Complex) -> Complex:
+        """Return M x (N,) of harmonic 1."""
+        here = slice(self.first, self.first + 1)
+        return np.asarray(self.times(self.mass[here], x[None])[0])
 
     def at(self, omega: float, zeta: float, mode: int) -> Dynamics:
         """Return Z of all harmonics with mode number `mode` stiffened; raises LinAlgError if singular."""
@@ -85,28 +101,28 @@ class Structure:
         )  # fmt: skip
         b = self.carried[:, mode]
         rho = -1j * self.squares[mode]
-        if self.is_diagonal:
-            if not invert_modes(Z, self.first, rho, b):
-                raise np.linalg.LinAlgError("Z is singular")
-        else:
+        inverse: Complex | Factors = Z
+        if self.pattern is not None:
+            inverse = Factors(self.pattern, Z, self.first, rho, b)
+        elif not self.is_diagonal:
             Z[self.first] += rho * np.outer(b, b.conj())
-            Z = np.asarray(np.linalg.inv(Z), np.complex128)
-        return Dynamics(
-            of=self, inverse=Z, by_omega=by_omega, by_zeta=by_zeta, b=b, rho=rho,
-        )  # fmt: skip
+            inverse = np.asarray(np.linalg.inv(Z), np.complex128)
+        elif not invert_modes(Z, self.first, rho, b):
+            raise np.linalg.LinAlgError("Z is singular")
+        return Dynamics(of=self, inverse=inverse, by_omega=by_omega, by_zeta=by_zeta, b=b, rho=rho)
 
     def nearest(self, omega: float, zeta: float) -> int:
         """Return the mode of the structure alone that is nearest to singular at (ω, ζ)."""
-        if self.squares.size == 1:
-            return 0
+        K, C, M, fed = self.own
+        return int(np.argmin(np.abs(K + 1j * omega * C - omega**2 * M - 2j * zeta * omega**2 * fed)))
+
+    def stiffness(self, omega: float) -> Complex:
+        """Return K + iωC − ω²M of harmonic 1, (N, N)."""
         i = self.first
-        K, C, M, fed = self.K[i], self.C[i], self.M[i], self.fed[i]
-        if self.is_diagonal:
-            Z = K + 1j * omega * C - omega**2 * M - 2j * zeta * omega**2 * fed
-            return int(np.argmin(np.abs(Z)))
-        Z = K + 1j * omega * C - omega**2 * M - 2j * zeta * omega**2 * fed
-        own = (self.modes.conj() * (Z @ self.modes)).sum(axis=0)
-        return int(np.argmin(np.abs(own)))
+        Z = self.K[i] + 1j * omega * self.C[i] - omega**2 * self.M[i]
+        if self.pattern is not None:
+            return np.asarray(self.pattern.matrix(Z).toarray())
+        return np.diag(Z) if self.is_diagonal else Z
 
     def squared_amplitude(self, x: Complex) -> float:
         """Return Σ x_kᴴ M x_k over the harmonics that move [kg m²]."""
@@ -118,7 +134,7 @@ class Dynamics:
     """Z of all harmonics at (ω, ζ), with one mode stiffened; see the module."""
 
     of: Structure
-    inverse: Complex
+    inverse: Complex | Factors
     by_omega: Complex
     by_zeta: Complex
     b: Complex
@@ -126,16 +142,22 @@ class Dynamics:
 
     def solve(self, phi: Complex) -> Complex:
         """Return Z⁻¹ φ, (…, nk, N)."""
+        if isinstance(self.inverse, Factors):
+            return self.inverse.solve(phi)
         return self.of.times(self.inverse, phi)
 
     def solve_adjoint(self, eta: Complex) -> Complex:
         """Return Z⁻ᴴ η, (…, nk, N)."""
+        if isinstance(self.inverse, Factors):
+            return self.inverse.solve(eta, "H")
         if self.inverse.ndim == 2:
             return self.inverse.conj() * eta
         return np.asarray((np.swapaxes(self.inverse, 1, 2).conj() @ eta[..., None])[..., 0])
 
     def receptance(self) -> Complex:
         """Return L Z⁻¹ Lᴴ of the leading ports, (nk, r, r)."""
+        if isinstance(self.inverse, Factors):
+            return self.of.contact @ self.inverse.solve(self.of.back.transpose(2, 0, 1)).transpose(1, 2, 0)
         if self.inverse.ndim == 2:
             return np.asarray((self.of.contact * self.inverse[:, None, :]) @ self.of.back)
         return np.asarray(self.of.contact @ (self.inverse @ self.of.back))
@@ -159,18 +181,24 @@ def structure_of(balance: Balance, alone: Complex | None = None) -> Structure:
         model = linear_model(scene)
         K, C, M = system.K[which], system.C[which], system.M[which]
         mass = model.plain(model.diameters(ks))[2] * moving[:, None, None] + 0j
+        fed = mass if alone is None else _on_one_mode(balance, mass, first, alone)
         contact, back = system.L[which][:, led], system.L[which][:, led].conj()
         forces, observe = system.forces, np.broadcast_to(system.observe, (ks.size, system.observe.size))
         n = observe.shape[1]
         shapes = np.broadcast_to(np.eye(n, dtype=np.complex128), (ks.size, n, n))
         squares: Real
         modes, carried, squares = _carried(K[first], mass[first], model.free)
+        own = np.array([(modes.conj() * (each[first] @ modes)).sum(axis=0) for each in (K, C, M, fed)])
+        pattern = Pattern.of(K, C, M, fed)
+        if pattern is not None:
+            K, C, M, mass, fed = (pattern.entries(each) for each in (K, C, M, mass, fed))
     else:
         values = np.asarray(system.eigenvalues[which].real, np.complex128)
         moves = np.asarray(moving[:, None], np.complex128)
         # Of the mean only the stiffness counts: in modes it is written with k = 0.
         K, C = values, np.asarray(system.dampings[which] * moves, np.complex128)
-        M = mass = np.broadcast_to(moves, values.shape)
+        M = mass = fed = np.broadcast_to(moves, values.shape)
+        own, pattern = np.array([K[first], C[first], M[first], fed[first]]), None
         contact, back = system.contact_modes[which][:, led], system.contact_duals[which][:, led]
         forces, observe = system.modal_forces, system.observe_modes[which]
         model = linear_model(scene)
@@ -186,7 +214,7 @@ def structure_of(balance: Balance, alone: Complex | None = None) -> Structure:
         mass=np.array(mass, np.complex128), contact=np.ascontiguousarray(contact),
         back=np.ascontiguousarray(np.swapaxes(back, 1, 2)), constant=constant, level=row,
         force=forces[first], observe=observe, shapes=shapes, modes=modes, carried=carried, squares=squares,
-        fed=mass if alone is None else _on_one_mode(balance, mass, first, alone),
+        fed=fed, own=own, pattern=pattern,
     )  # fmt: skip
 
 
@@ -203,10 +231,15 @@ def _on_one_mode(balance: Balance, mass: Complex, first: int, alone: Complex) ->
     return fed
 
 
+def plain(matrix: Complex) -> NDArray[Any]:
+    """Return a matrix in real numbers where it is one of these: decompositions cost a quarter."""
+    return matrix if np.any(matrix.imag) else np.ascontiguousarray(matrix.real)
+
+
 def _carried(K: Complex, M: Complex, free: Flags) -> tuple[Complex, Complex, Real]:
     """Return modes b of Hermitian parts, M b, and ω²; coordinates without inertia stay at rest."""
     rows = np.ix_(free, free)
-    found = undamped_modes(hermitian(K[rows]), hermitian(M[rows]))
+    found = undamped_modes(plain(hermitian(K[rows])), plain(hermitian(M[rows])))
     modes = np.zeros((K.shape[0], found.mu.size), np.complex128)
     modes[free] = found.phi
     squares = np.maximum(np.abs(found.omega2), 1e-12 * np.abs(found.omega2).max(initial=1.0))

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from enum import Enum
 from itertools import pairwise
+from typing import Annotated
 
 import numpy as np
 
@@ -56,39 +57,29 @@ OPENS = (ContactState.SEPARATED, ContactState.LIFTING, ContactState.TOUCHING)
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class ContactResponse(Piece):
-    """The motion and force of one contact.
+    """The motion and force of one contact."""
 
-    Attributes
-    ----------
-    name : str
-        Name of the contact.
-    state : ContactState
-        What it does over the period.
-    slip : (2H + 1,) array
-        Coefficients of the slip motion u [m].
-    force : (2H + 1,) array
-        Coefficients of the friction force [N].
-    load : (3,) or (2H + 1,) array
-        Coefficients of the normal load N [N] before it is cut at 0; 0 of a contact without friction.
-    second_motion, second_force : (2H + 1,) array or None
-        The other relative motion of the contact [m] and the force along it [N]: the normal one of a rubbing
-        contact, or the second direction it slides in.
-    third_motion, third_force : (2H + 1,) array or None
-        Those of a law with three relative motions.
-    utilisation : float
-        max|f| / (μ N) of a stuck contact, 1 for one that slips, NaN for one that is separated throughout.
-    """
-
-    name: str
-    state: ContactState
-    slip: Real
-    force: Real
-    load: Real
-    utilisation: float
-    second_motion: Real | None = None
-    second_force: Real | None = None
-    third_motion: Real | None = None
-    third_force: Real | None = None
+    name: Annotated[str, "Name of the contact."]
+    state: Annotated[ContactState, "What it does over the period."]
+    slip: Annotated[Real, "Coefficients of the slip motion u [m], (2H + 1,)."]
+    force: Annotated[Real, "Coefficients of the friction force [N], (2H + 1,)."]
+    load: Annotated[
+        Real,
+        "Coefficients of the normal load N [N] before it is cut at 0; 0 of a contact without friction, "
+        "(3,) or (2H + 1,).",
+    ]
+    utilisation: Annotated[
+        float,
+        "max|f| / (μ N) of a stuck contact, 1 for one that slips, NaN for one that is separated throughout.",
+    ]
+    second_motion: Annotated[
+        Real | None,
+        "The other relative motion [m]: the normal one of a rubbing contact, or the second direction it "
+        "slides in, (2H + 1,).",
+    ] = None
+    second_force: Annotated[Real | None, "The force along it [N], (2H + 1,)."] = None
+    third_motion: Annotated[Real | None, "That of a law with three relative motions [m], (2H + 1,)."] = None
+    third_force: Annotated[Real | None, "The force along that [N], (2H + 1,)."] = None
 
     @property
     def motions(self) -> tuple[Real, ...]:

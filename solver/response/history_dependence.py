@@ -39,9 +39,9 @@ from solver.contacts.laws.parts import Slider
 from solver.jit import fourier
 from solver.jit.fourier import Complex, Real
 from solver.linear.assembly import linear_model
+from solver.linear.condensation import CANCELLED_STIFFNESS
 from solver.linear.contact_table import port_counts, port_stiffnesses
 from solver.linear.model import LinearModel
-from solver.linear.rigid_body_modes import CANCELLED
 from solver.matrices.normal_modes import hermitian, least_stiffness
 from solver.response.contact_response import ContactResponse, ContactState
 from solver.response.solution import Solution
@@ -364,7 +364,7 @@ def _mean_gains(model: LinearModel) -> Real | None:
     if not model.every_diameter:
         return None
     for K, _, L in _of_diameters(model):
-        if least_stiffness(K) <= CANCELLED:
+        if least_stiffness(K) <= CANCELLED_STIFFNESS:
             return None
         rows.append(model.observe @ np.linalg.solve(K, L.conj().T))
     return np.asarray(np.fft.fft(np.array(rows), axis=0).real / model.sectors)

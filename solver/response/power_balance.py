@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated
 
 import numpy as np
 
@@ -23,31 +22,18 @@ class PowerBalance(Piece):
 
     A solution of the balance loses none: input = viscous + friction to rounding, whatever the number of
     harmonics.
-
-    Attributes
-    ----------
-    input_w : float
-        Put in by the excitation [W]; of a base that moves what it puts into the coordinates that move freely,
-        in which dashpots to the base then take out.
-    viscous_w : float
-        Taken out by the dampers of the structure, structural damping and gas included [W].
-    friction_w : float
-        Taken out by all contacts [W].
-    contacts_w : dict of str to float
-        Taken out by each contact [W].
     """
 
-    UNITS: ClassVar[Mapping[str, str]] = {
-        "input_w": "W",
-        "viscous_w": "W",
-        "friction_w": "W",
-        "contacts_w": "W",
-    }
-
-    input_w: float
-    viscous_w: float
-    friction_w: float
-    contacts_w: dict[str, float]
+    input_w: Annotated[
+        float,
+        "Put in by the excitation [W]; of a base that moves what it puts into the coordinates that move "
+        "freely, in which dashpots to the base then take out.",
+    ]
+    viscous_w: Annotated[
+        float, "Taken out by the dampers of the structure, structural damping and gas included [W]."
+    ]
+    friction_w: Annotated[float, "Taken out by all contacts [W]."]
+    contacts_w: Annotated[dict[str, float], "Taken out by each contact [W]."]
 
     @property
     def imbalance(self) -> float:

@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from solver.jit.fourier import Real
 from solver.response.contact_response import ContactResponse
 from solver.results.base import Drawn
-from solver.results.told import json_number, json_numbers
 from solver.results.views import Views, on_demand
 from solver.scene.scene import Scene
 
@@ -67,56 +66,56 @@ class SolutionStatus(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Solution(Drawn):
-    """A periodic response at one frequency.
+    """A periodic response at one frequency."""
 
-    Attributes
-    ----------
-    status : SolutionStatus
-        Whether and why; every number below is NaN where it is none.
-    max_abs, half_peak_to_peak, mean : float
-        Of the observed DOF over the period [m]. Not unique when `flags` has ``mean_undetermined``: the first
-        and the last then depend on the history, and with ``history_dependent`` the second does too. Without
-        these flags they are what a start from rest with contacts free of force leads to.
-    n_harmonics : int
-        The number asked for.
-    harmonics : (H + 1,) array
-        |mean| and the amplitude of each harmonic of the observed DOF [m], up to the highest one kept: that is
-        above `n_harmonics` where a force is, see `solver.scene.harmonics.kept_harmonics`. Zero if not kept.
-    observed : (2H + 1,) array
-        Its coefficients [m].
-    contacts : tuple of ContactResponse
-        One for each contact of the scene.
-    flags : tuple of str
-        ``mean_undetermined``, ``history_dependent``, ``all_stuck``, ``separation``, ``not_unique``,
-        ``symmetric_unstable``, ``travelling_wave_assumed`` where they apply; for the last three see
-        `solver.continuation.branches.symmetry_breaking`. ``mean_load_above_friction`` of what ratchets
-        because its contacts cannot hold its mean load (`solver.balance.mean_loads`).
-    residual : float
-        Relative residual of the balance.
-    error_estimate : float
-        Estimated error of `max_abs` by the harmonics left out and the residual [m]; of `half_peak_to_peak`
-        where the mean is not determined. See `solver.continuation.extrema.error_estimate`.
-    mean_range : (float, float)
-        Bounds of the mean over every history [m], forces left in contacts by assembly included; NaN where no
-        bound is known. See `solver.response.history_dependence`.
-    """
+    VIEWS: ClassVar = Views("solver.views", "of_solution", "solution_dataset", "of_solution")
+    JSON: ClassVar = (
+        "scene frequency_hz converged status max_abs half_peak_to_peak mean harmonics flags contacts"
+        " stable stable_ground unique unique_ground residual error_estimate n_harmonics"
+        " newton_iterations seconds"
+    )
 
-    scene: Scene
-    frequency_hz: float
-    n_harmonics: int
-    status: SolutionStatus
-    max_abs: float
-    half_peak_to_peak: float
-    mean: float
-    harmonics: Real
-    observed: Real
-    contacts: tuple[ContactResponse, ...]
-    flags: tuple[str, ...]
-    residual: float
-    error_estimate: float
-    newton_iterations: int
-    seconds: float
-    mean_range: tuple[float, float] = (math.nan, math.nan)
+    scene: Annotated[Scene, "What vibrates."]
+    frequency_hz: Annotated[float, "Of the excitation [Hz]."]
+    n_harmonics: Annotated[int, "The number asked for."]
+    status: Annotated[SolutionStatus, "Whether and why; every number below is NaN where it is none."]
+    max_abs: Annotated[
+        float,
+        "Largest of the observed DOF over the period [m]. Not unique when `flags` has ``mean_undetermined``: "
+        "it and the mean then depend on the history, and with ``history_dependent`` half peak to peak too. "
+        "Without these flags they are what a start from rest with contacts free of force leads to.",
+    ]
+    half_peak_to_peak: Annotated[float, "(max x - min x) / 2 of it [m]."]
+    mean: Annotated[float, "Its mean [m]."]
+    harmonics: Annotated[
+        Real,
+        "|mean| and the amplitude of each harmonic of the observed DOF [m], up to the highest one kept: "
+        "that is above `n_harmonics` where a force is, see `solver.scene.harmonics.kept_harmonics`. Zero "
+        "if not kept. (H + 1,).",
+    ]
+    observed: Annotated[Real, "Its coefficients [m], (2H + 1,)."]
+    contacts: Annotated[tuple[ContactResponse, ...], "One for each contact of the scene."]
+    flags: Annotated[
+        tuple[str, ...],
+        "``mean_undetermined``, ``history_dependent``, ``all_stuck``, ``separation``, ``not_unique``, "
+        "``symmetric_unstable``, ``travelling_wave_assumed`` where they apply; for the last three see "
+        "`solver.continuation.branches.symmetry_breaking`. ``mean_load_above_friction`` of what ratchets "
+        "because its contacts cannot hold its mean load (`solver.balance.mean_loads`).",
+    ]
+    residual: Annotated[float, "Relative residual of the balance."]
+    error_estimate: Annotated[
+        float,
+        "Estimated error of `max_abs` by the harmonics left out and the residual [m]; of "
+        "`half_peak_to_peak` where the mean is not determined. See "
+        "`solver.continuation.extrema.error_estimate`.",
+    ]
+    newton_iterations: Annotated[int, "What it took."]
+    seconds: Annotated[float, "Time taken [s]."]
+    mean_range: Annotated[
+        tuple[float, float],
+        "Bounds of the mean over every history [m], forces left in contacts by assembly included; NaN "
+        "where no bound is known. See `solver.response.history_dependence`.",
+    ] = (math.nan, math.nan)
     _judged: list[Verdict] = field(default_factory=list, init=False, compare=False)  # once, when asked for
     _drifts: list[float] = field(default_factory=list, init=False, compare=False)
 
@@ -173,9 +172,7 @@ class Solution(Drawn):
             self._drifts.append(on_demand("solver.response.drift:of_solution")(self))
         return self._drifts[0]
 
-    VIEWS: ClassVar = Views("solver.views", "of_solution", "solution_dataset", "of_solution")
-
-    def to_json(self, *, with_stability: bool = False) -> dict[str, object]:
+    def to_json(self, *, with_stability: bool = False) -> dict[str, Any]:
         """Return the answer as one JSON object; on request with what `solver.stability` says, which costs."""
         if with_stability:
             found = (
@@ -185,25 +182,10 @@ class Solution(Drawn):
             )
             return {**self.to_json(), "stability": found}
         only = self.uniqueness
-        return {
-            "scene": self.scene.name,
-            "frequency_hz": self.frequency_hz,
-            "converged": self.converged,
-            "status": self.status.value,
-            "max_abs": json_number(self.max_abs),
-            "half_peak_to_peak": json_number(self.half_peak_to_peak),
-            "mean": json_number(self.mean),
-            "harmonics": self.harmonics.tolist() if self.converged else None,
-            "flags": list(self.flags),
-            "contacts": {contact.name: contact.state.value for contact in self.contacts},
-            **self.stability.to_json(),
-            "unique": only.unique,
-            "unique_ground": only.ground,
-            "residual": json_number(self.residual),
-            "error_estimate": json_number(self.error_estimate),
-            "n_harmonics": self.n_harmonics,
-            "newton_iterations": self.newton_iterations,
-            "seconds": self.seconds,
-            **({"drift_per_period": json_number(self.drift_per_period)} if self.ratchets else {}),
-            **({"mean_range": json_numbers(self.mean_range)} if MEAN_UNDETERMINED in self.flags else {}),
-        }
+        return self._json(
+            harmonics=self.harmonics if self.converged else None,
+            contacts={contact.name: contact.state for contact in self.contacts},
+            unique=only.unique, unique_ground=only.ground, **self.stability.to_json(),
+            **({"drift_per_period": self.drift_per_period} if self.ratchets else {}),
+            **({"mean_range": self.mean_range} if MEAN_UNDETERMINED in self.flags else {}),
+        )  # fmt: skip

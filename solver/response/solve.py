@@ -25,7 +25,7 @@ from solver.continuation.from_nothing import solve_from_nothing
 from solver.jit import fourier
 from solver.jit.fourier import Real
 from solver.linear.condensation import loose_ports
-from solver.linear.undamped import undamped_resonance
+from solver.linear.modal import undamped_resonance
 from solver.response.contact_response import OPENS, ContactResponse, ContactState, contact_responses
 from solver.response.history_dependence import has_another_solution, history_of
 from solver.response.solution import HISTORY_DEPENDENT, MEAN_UNDETERMINED, Solution, SolutionStatus

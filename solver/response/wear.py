@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 
@@ -32,47 +33,33 @@ from solver.wording import listing
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Measured(Piece):
-    """A number of a response with its derivatives through the whole solve; NaN where that is singular.
+    """A number of a response with its derivatives through the whole solve; NaN where that is singular."""
 
-    Attributes
-    ----------
-    value : float
-        In its SI unit.
-    by_frequency : float
-        By the excitation frequency [unit/Hz].
-    gradient : (n_paths,) array
-        By each parameter path, at a fixed frequency.
-    """
-
-    value: float
-    by_frequency: float
-    gradient: Real
+    value: Annotated[float, "In its SI unit."]
+    by_frequency: Annotated[float, "By the excitation frequency [unit/Hz]."]
+    gradient: Annotated[Real, "By each parameter path, at a fixed frequency, (n_paths,)."]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class ContactWear(Piece):
-    """What one contact goes through in a period.
+    """What one contact goes through in a period."""
 
-    Attributes
-    ----------
-    name : str
-        Name of the contact.
-    work : Measured
-        Work that friction takes out [J], of one sector's contact if the structure is cyclic.
-    least_load : Measured or None
-        Least normal load [N], below 0 if the contact separates; None of a law without friction.
-    travel : Measured or None
-        Distance rubbed [m]; None of a law whose slider does not move on a line.
-    shares : Shares or None
-        Shares of the period in stick, slip and separation; a spring on one side sticks while it is closed.
-        None of a law that knows no such.
-    """
-
-    name: str
-    work: Measured
-    least_load: Measured | None
-    travel: Measured | None
-    shares: Shares | None
+    name: Annotated[str, "Name of the contact."]
+    work: Annotated[
+        Measured, "Work that friction takes out [J], of one sector's contact if the structure is cyclic."
+    ]
+    least_load: Annotated[
+        Measured | None,
+        "Least normal load [N], below 0 if the contact separates; None of a law without friction.",
+    ]
+    travel: Annotated[
+        Measured | None, "Distance rubbed [m]; None of a law whose slider does not move on a line."
+    ]
+    shares: Annotated[
+        Shares | None,
+        "Shares of the period in stick, slip and separation; a spring on one side sticks while it is "
+        "closed. None of a law that knows no such.",
+    ]
 
 
 class WearPoint:

@@ -2,8 +2,10 @@
 
 At a maximum inside the range the slope along the branch is 0, and at an end the frequency does not move
 either, so the derivative of the worst value by a parameter is the one at that fixed frequency (envelope
-theorem). A maximum may also be a corner of the response, closed in by bracketing; its derivative takes both
-sides of it (`solver.response.wear_nonsmooth`).
+theorem). A maximum may also be a corner of the response, closed in by bracketing, where two smooth pieces m⁻
+and m⁺ meet at ω_k(p); as for peaks of the amplitude (`solver.sensitivity.nonsmooth`) the derivative is
+m⁻_p + m⁻_ω dω_k/dp with dω_k/dp = −(m⁺_p − m⁻_p)/(m⁺_ω − m⁻_ω), from solutions beside the corner at two
+distances, extrapolated to it.
 
 Two maxima may hide between two points of a branch: near the top it is made dense until cubics through its
 points predict the measure between them, as for the peaks of the amplitude
@@ -14,8 +16,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
+from typing import Annotated
 
 import numpy as np
 
@@ -31,7 +34,7 @@ from solver.continuation.extrema.nodes import share_scales
 from solver.errors import SettingError
 from solver.jit.fourier import Real
 from solver.linear.kernels.receptance import receptance
-from solver.response.wear import contact_index
+from solver.response.wear import Measured, WearPoint, WearSensitivity, contact_index
 from solver.response.wear_measures import (
     Change,
     Cycle,
@@ -42,6 +45,7 @@ from solver.response.wear_measures import (
     work_of,
 )
 from solver.results.told import Piece
+from solver.sensitivity.nonsmooth import BESIDE, FAR, SMOOTH
 
 # Maxima below this share of the highest cannot lead within one step of an optimiser.
 COMPETES = 0.6
@@ -69,24 +73,12 @@ _MEASURES: dict[Measure, Callable[[Cycle, int, Sequence[Change]], tuple[float, R
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class WorstWear(Piece):
-    """A local worst value of a measure over a branch.
+    """A local worst value of a measure over a branch."""
 
-    Attributes
-    ----------
-    value : float
-        Friction work [J], least normal load [N] or slip travel [m].
-    at : float
-        Value of the branch's parameter there, in user units (Hz for a frequency).
-    solution : (n_unknowns,) array
-        Slip motions of all contacts there [m].
-    interior : bool
-        Not at an end of the branch.
-    """
-
-    value: float
-    at: float
-    solution: Real
-    interior: bool
+    value: Annotated[float, "Friction work [J], least normal load [N] or slip travel [m]."]
+    at: Annotated[float, "Value of the branch's parameter there, in user units (Hz for a frequency)."]
+    solution: Annotated[Real, "Slip motions of all contacts there [m], (n_unknowns,)."]
+    interior: Annotated[bool, "Not at an end of the branch."]
 
 
 def worst_friction_work(branch: Branch, contact: str) -> WorstWear:
@@ -301,3 +293,57 @@ class _Search:
         if not math.isfinite(value):
             value, slope = -math.inf, 0.0
         return _Node(solution, tangent, value, slope)
+
+
+def worst_slopes(
+    sensitivity: WearSensitivity, worst: WorstWear, contact: str, measure: Measure = Measure.FRICTION_WORK
+) -> Measured:
+    """Return a local worst value of a frequency response with its derivatives by parameters.
+
+    Parameters
+    ----------
+    sensitivity : of the balance of the response, `Branch.balance`, and the paths.
+    worst : one of `solver.worst_wear` for the same contact and measure.
+
+    Raises
+    ------
+    SettingError
+        An unknown contact, or a law the measure has no meaning for.
+    """
+    here = _measured(sensitivity.at(worst.at, worst.solution), contact, measure)
+    if not worst.interior or not abs(here.by_frequency) * worst.at > SMOOTH * abs(here.value):
+        return here
+    near, far = (_across(sensitivity, worst, contact, measure, share * BESIDE) for share in (1.0, 2.0))
+    # Where nothing is found beside it, the derivative at the fixed frequency stands in.
+    return here if near is None or far is None else replace(here, gradient=2.0 * near - far)
+
+
+def _measured(point: WearPoint, contact: str, measure: Measure) -> Measured:
+    found = {
+        Measure.FRICTION_WORK: point.work,
+        Measure.LEAST_LOAD: point.least_load,
+        Measure.SLIP_TRAVEL: point.travel,
+    }[measure](contact)
+    if found is None:
+        raise SettingError("contact", contact, f"must be one whose law has a {measure.value}")
+    return found
+
+
+def _across(
+    sensitivity: WearSensitivity, worst: WorstWear, contact: str, measure: Measure, distance: float
+) -> Real | None:
+    """Return the derivatives of a corner from solutions at a relative distance on both sides."""
+    sides = []
+    for way in (-1.0, 1.0):
+        at_hz = worst.at * (1.0 + way * distance)
+        found = Workspace.of(sensitivity.balance).solve(2.0 * math.pi * at_hz, worst.solution)
+        change = np.abs(found.u - worst.solution).max(initial=0.0)
+        if not found.converged or change > FAR * np.abs(worst.solution).max(initial=0.0):
+            return None
+        sides.append(_measured(sensitivity.at(at_hz, found.u), contact, measure))
+    left, right = sides
+    rises = left.by_frequency, right.by_frequency
+    if not rises[0] * rises[1] < 0.0:
+        return None
+    drift = -(right.gradient - left.gradient) / (rises[1] - rises[0])
+    return np.asarray(left.gradient + rises[0] * drift)

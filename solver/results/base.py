@@ -48,7 +48,7 @@ class Shown(Told):
 class MadeOfResponses(Shown):
     """Root of the results made of responses: their errors and flags are in every form it is given in.
 
-    A class says of which responses it is made, and gives the rest of its JSON; it cannot leave them out.
+    A class says of which responses it is made; it cannot leave them out.
     """
 
     __slots__ = ()
@@ -56,10 +56,6 @@ class MadeOfResponses(Shown):
     @abstractmethod
     def known_parts(self) -> Iterable[Known]:
         """How well each of the responses is known that the numbers stand on."""
-
-    @abstractmethod
-    def own_json(self) -> dict[str, object]:
-        """Return the JSON object, without how well it is known."""
 
     @property
     def known(self) -> Known:
@@ -81,9 +77,8 @@ class MadeOfResponses(Shown):
         }
         return replace(found, attributes={**found.attributes, **notes})
 
-    def to_json(self) -> dict[str, object]:
-        """Return the result as one JSON object."""
-        return {**self.own_json(), **self.known.to_json()}
+    def _json(self, **others: object) -> dict[str, Any]:
+        return super()._json(**others) | self.known.to_json()
 
 
 class Drawn(Shown):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,24 +23,12 @@ Attribute = str | float | int
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Variable(Piece):
-    """An array with its dimensions.
+    """An array with its dimensions."""
 
-    Attributes
-    ----------
-    dims : tuple of str
-        One name for each axis of `values`.
-    values : array
-        Numbers, booleans or texts.
-    unit : str
-        SI; empty for a number without one.
-    about : str
-        What it is, in words.
-    """
-
-    dims: tuple[str, ...]
-    values: NDArray[Any]
-    unit: str = ""
-    about: str = ""
+    dims: Annotated[tuple[str, ...], "One name for each axis of `values`."]
+    values: Annotated[NDArray[Any], "Numbers, booleans or texts."]
+    unit: Annotated[str, "SI; empty for a number without one."] = ""
+    about: Annotated[str, "What it is, in words."] = ""
 
     @property
     def attributes(self) -> dict[str, str]:
@@ -51,24 +39,17 @@ class Variable(Piece):
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Dataset(Piece):
-    """Named arrays of one result.
+    """Named arrays of one result."""
 
-    Attributes
-    ----------
-    kind : str
-        What it is of: ``branch``, ``map``, ``design`` …
-    rows : tuple of str
-        The dimensions whose combinations are the rows of a table.
-    variables : mapping of name to Variable
-        A variable named like a dimension holds the coordinates along it.
-    attributes : mapping
-        Version, status, and under ``scene`` the TOML that reproduces it, where that is known.
-    """
-
-    kind: str
-    rows: tuple[str, ...]
-    variables: Mapping[str, Variable]
-    attributes: Mapping[str, Attribute] = field(default_factory=dict)
+    kind: Annotated[str, "What it is of: ``branch``, ``map``, ``design`` …"]
+    rows: Annotated[tuple[str, ...], "The dimensions whose combinations are the rows of a table."]
+    variables: Annotated[
+        Mapping[str, Variable], "A variable named like a dimension holds the coordinates along it."
+    ]
+    attributes: Annotated[
+        Mapping[str, Attribute],
+        "Version, status, and under ``scene`` the TOML that reproduces it, where that is known.",
+    ] = field(default_factory=dict)
 
     def summary(self) -> Summary:
         """Every variable with its dimensions and its unit."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 from solver.results import units
 from solver.results.notes import flag_words
@@ -17,32 +17,29 @@ _NUMBERS = ("peak_max_abs", "error_estimate", "peak_half_peak_to_peak", "half_pe
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Known(Piece):
-    """How well the highest peak of responses is known.
+    """How well the highest peak of responses is known."""
 
-    Attributes
-    ----------
-    measure : str
-        What it is to be judged by: ``max_abs``, or ``half_peak_to_peak`` where the mean is free, so that
-        max|x| depends on the history.
-    peak_max_abs, error_estimate : float
-        max|x| of the peak and its estimated error [m]; NaN if not known.
-    peak_half_peak_to_peak, half_peak_to_peak_error : float
-        The same of half peak to peak, where that is the measure; else NaN.
-    flags : tuple of str
-        What the responses assume or leave open, see `solver.results.notes.FLAGS`.
-    peaks_open : tuple of str
-        Why of some responses it is not known that no higher peak hides between their points.
-    """
+    JSON: ClassVar = (
+        "measure peak_max_abs error_estimate peak_half_peak_to_peak half_peak_to_peak_error"
+        " relative_error=relative flags peaks_open"
+    )
 
-    UNITS: ClassVar[Mapping[str, str]] = dict.fromkeys(_NUMBERS, "m")
-
-    measure: str = MAX_ABS
-    peak_max_abs: float = math.nan
-    error_estimate: float = math.nan
-    peak_half_peak_to_peak: float = math.nan
-    half_peak_to_peak_error: float = math.nan
-    flags: tuple[str, ...] = ()
-    peaks_open: tuple[str, ...] = ()
+    measure: Annotated[
+        str,
+        "What it is to be judged by: ``max_abs``, or ``half_peak_to_peak`` where the mean is free, so that "
+        "max|x| depends on the history.",
+    ] = MAX_ABS
+    peak_max_abs: Annotated[float, "max|x| of the peak [m]; NaN if not known."] = math.nan
+    error_estimate: Annotated[float, "Its estimated error [m]; NaN if not known."] = math.nan
+    peak_half_peak_to_peak: Annotated[float, "Half peak to peak [m], if that is the measure."] = math.nan
+    half_peak_to_peak_error: Annotated[float, "Its estimated error [m], likewise."] = math.nan
+    flags: Annotated[
+        tuple[str, ...], "What the responses assume or leave open, see `solver.results.notes.FLAGS`."
+    ] = ()
+    peaks_open: Annotated[
+        tuple[str, ...],
+        "Why of some responses it is not known that no higher peak hides between their points.",
+    ] = ()
 
     @property
     def value(self) -> float:
@@ -74,16 +71,6 @@ class Known(Piece):
             measure=found["measure"], flags=tuple(found["flags"]), peaks_open=tuple(found["peaks_open"]),
             **numbers,
         )  # fmt: skip
-
-    def to_json(self) -> dict[str, object]:
-        """Return it as one JSON object."""
-        numbers = {name: getattr(self, name) for name in _NUMBERS} | {"relative_error": self.relative}
-        return {
-            "measure": self.measure,
-            **{name: value if math.isfinite(value) else None for name, value in numbers.items()},
-            "flags": list(self.flags),
-            "peaks_open": list(self.peaks_open),
-        }
 
     def pairs(self) -> list[tuple[str, str]]:
         """Return it in words, name and value a line."""

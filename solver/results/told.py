@@ -1,20 +1,25 @@
-"""What is told of a result or a part of it: a short text, and a table in a notebook."""
+"""What is told of a result or a part of it: its numbers, each said once, a text, a table."""
 
 from __future__ import annotations
 
 import math
+import re
 from abc import ABC, abstractmethod
+from ast import literal_eval
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
 from enum import Enum
+from functools import cache
 from html import escape
-from typing import ClassVar
-
-import numpy as np
+from inspect import cleandoc
+from operator import attrgetter
+from typing import Any, ClassVar
 
 _MOST = 30
 _FEW = 6
 _DIGITS = 5
+_DESCRIBED = re.compile(r"Annotated\[(.+?), (['\"].+['\"])\]")
+_UNIT = re.compile(r"\[([^]]+)\]")
 
 
 def json_number(value: float) -> float | None:
@@ -27,6 +32,36 @@ def json_numbers(values: Iterable[float]) -> list[float | None]:
     return [json_number(value) for value in values]
 
 
+def json_value(value: Any) -> Any:
+    """A value as JSON has it: null where a number is not finite, an enum by its value, a scene by name."""
+    if isinstance(value, Enum):
+        return value.value
+    if value is None or isinstance(value, str | bool | int):
+        return value
+    if isinstance(value, float):
+        return json_number(value)
+    if hasattr(value, "tolist"):  # an array, or a number of one
+        # Loaded here, where it is already: the command knows criteria without it.
+        import numpy as np
+
+        known = value.dtype.kind != "f" or bool(np.isfinite(value).all())
+        return value.tolist() if known else json_value(value.tolist())
+    if isinstance(value, Mapping):
+        return {key: json_value(one) for key, one in value.items()}
+    if isinstance(value, tuple | list):
+        pairs = getattr(value, "_asdict", None)
+        return [json_value(one) for one in value] if pairs is None else json_value(pairs())
+    to_json = getattr(value, "to_json", None)
+    return value.name if to_json is None else to_json()
+
+
+@cache
+def json_keys(kind: type[Told]) -> dict[str, str]:
+    """The keys of the JSON of a class in their order, and the attributes that they have the values of."""
+    named = kind.JSON.split() or [one.name for one in fields(kind)]  # type: ignore[arg-type]
+    return {key: path or key for key, _, path in (name.partition("=") for name in named)}
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Summary:
     """What is most worth knowing of a result: a title, and names with their values."""
@@ -36,9 +71,44 @@ class Summary:
 
 
 class Told(ABC):
-    """Root of everything that is looked at: a short text, and a table in a notebook."""
+    """Root of everything that is looked at: its JSON, a short text, and a table in a notebook.
+
+    A field says its type, and in words what it is with its unit in brackets:
+    ``speed_rpm: Annotated[float, "Running speed [1/min]."]``. The attributes in the docstring of the class,
+    the units in texts and the schema of the JSON follow from that.
+
+    Attributes
+    ----------
+    JSON : str
+        The keys of the JSON in their order, ``key=path.of.attribute`` where they differ; if empty all fields.
+    WORDS : mapping
+        What each field is in words.
+    """
 
     __slots__ = ()
+    JSON: ClassVar[str] = ""
+    WORDS: ClassVar[Mapping[str, str]] = {}
+
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        rows = []
+        for name, text in cls.__annotations__.items():
+            if (said := _DESCRIBED.fullmatch(str(text))) is not None:
+                kind, words = said[1], literal_eval(said[2])
+                cls.__annotations__[name], cls.WORDS = kind, {**cls.WORDS, name: words}
+                rows.append(f"{name} : {kind}\n    {words}")
+        if rows:  # else nothing is said, or dataclass made the class anew for its slots
+            cls.__doc__ = "\n".join([cleandoc(cls.__doc__ or ""), "\nAttributes\n----------", *rows])
+
+    def to_json(self) -> dict[str, Any]:
+        """Return it as one JSON object."""
+        return self._json()
+
+    def _json(self, **others: object) -> dict[str, Any]:
+        """The JSON object; `others` are the values of keys that are not those of attributes."""
+        paths = json_keys(type(self)).items()
+        found = {key: others.pop(key) if key in others else attrgetter(path)(self) for key, path in paths}
+        return {key: json_value(value) for key, value in (found | others).items()}
 
     @abstractmethod
     def summary(self) -> Summary:
@@ -66,25 +136,27 @@ class Piece(Told):
     """A part of a result, a dataclass of a few numbers: its fields, arrays cut short."""
 
     __slots__ = ()
-    UNITS: ClassVar[Mapping[str, str]] = {}
 
     def summary(self) -> Summary:
         """Every field with its unit."""
-        units = self.UNITS
+        said = {name: _UNIT.search(words) for name, words in self.WORDS.items()}
+        units = {name: unit[1] for name, unit in said.items() if unit is not None}
         given = [(one.name, getattr(self, one.name)) for one in fields(self)]  # type: ignore[arg-type]
         pairs = tuple((name, _words(value, units.get(name, ""))) for name, value in given)
         return Summary(title="", pairs=pairs)
 
 
-def _words(value: object, unit: str) -> str:
+def _words(value: Any, unit: str) -> str:
     """A field in a few words."""
     if isinstance(value, Enum):
         return str(value.value)
     if isinstance(value, Told):
         return repr(value)
-    if isinstance(value, float | np.floating):
+    if isinstance(value, float):
         return f"{value:.6g} {unit}".rstrip()
-    if isinstance(value, np.ndarray):
+    if hasattr(value, "shape"):
+        import numpy as np
+
         if value.size > _FEW:
             return f"{' x '.join(map(str, value.shape))} numbers"
         return f"{np.array2string(value, precision=_DIGITS, separator=', ')} {unit}".rstrip()

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
+from typing import Annotated
 
 from solver.results.told import Piece
 
@@ -19,19 +20,14 @@ class Stable(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Verdict(Piece):
-    """Whether a response is stable, and how that is known.
+    """Whether a response is stable, and how that is known."""
 
-    Attributes
-    ----------
-    stable : Stable
-        The verdict.
-    ground : str
-        Why, in one line; of a response that is not stable also a stable one of the same frequency, if the
-        search of `solve_all` finds one.
-    """
-
-    stable: Stable
-    ground: str
+    stable: Annotated[Stable, "The verdict."]
+    ground: Annotated[
+        str,
+        "Why, in one line; of a response that is not stable also a stable one of the same frequency, if "
+        "the search of `solve_all` finds one.",
+    ]
 
     def to_json(self) -> dict[str, str]:
         """Return it as entries of an answer."""

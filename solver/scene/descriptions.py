@@ -1,4 +1,4 @@
-"""What editors show of a scene's keys, where the docstrings of the models say nothing of their own."""
+"""What editors show of a scene's keys beside the docstrings of its models; examples of parameter paths."""
 
 from __future__ import annotations
 
@@ -101,3 +101,12 @@ EXAMPLES: dict[str, list[Any]] = {
     "K": ["model-K.mtx"],
     "dofs": [{"tip": 98, "root": "1203.UX"}],
 }
+
+
+# Examples in help, schemas and errors.
+DISK_LOAD = "shroud.N0"
+"""Normal load of a contact of the shipped scene `bladed-disk`."""
+DAMPER_LOAD = "damper.N0"
+"""That of `two-dof`."""
+DISK_LOADS = "shroud.N0,root.N0"
+"""Both loads of `bladed-disk`, which share a value."""

@@ -17,25 +17,19 @@ from pydantic_core import core_schema
 from solver.contacts.laws import harmonics as load_harmonics
 from solver.contacts.laws.base import AnyContact
 from solver.contacts.laws.registry import laws
-from solver.matrices.file_units import UNITS
+from solver.matrices.values import UNITS
+from solver.scene import linear_terms
 from solver.scene import matrices_structure as matrices_part
 from solver.scene import parts as scene_parts
 from solver.scene.bodies import body as scene_bodies
-from solver.scene.bodies import patch as scene_patch
 from solver.scene.bodies import shapes as scene_shapes
 from solver.scene.bodies.validation import further_ends
 from solver.scene.descriptions import EXAMPLES, WORDS
 from solver.scene.scene import Scene
-from solver.scene.terms import linear_terms as scene_terms
-from solver.scene.terms import recovery as scene_recovery
-from solver.scene.terms import speed as scene_speed
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 _ENTRY = re.compile(r"^(\w+(?:, \w+)*) : .*\n((?:    .*\n?)+)", re.MULTILINE)
-_HOMES = (
-    scene_parts, scene_bodies, scene_shapes, scene_patch, scene_terms, scene_speed, scene_recovery,
-    matrices_part, load_harmonics,
-)  # fmt: skip
+_HOMES = (scene_parts, scene_bodies, scene_shapes, linear_terms, matrices_part, load_harmonics)
 
 
 class _Generator(GenerateJsonSchema):

@@ -13,8 +13,7 @@ from solver.matrices.sectors.parts import PartMatrices
 from solver.matrices.sectors.validation import check_sector
 from solver.matrices.validation import DofTable, antisymmetric, check_matrices, symmetric
 from solver.matrices.values import MOST_MODES, Matrix, Modes
-from solver.scene.cyclic.boundary import CyclicBoundary, Sectors
-from solver.scene.cyclic.mistuning import Mistuning
+from solver.scene.cyclic.sector_tables import CyclicBoundary, Mistuning, Sectors
 
 Ratio = Annotated[float, Field(strict=True, ge=0.0, le=10.0, allow_inf_nan=False)]
 

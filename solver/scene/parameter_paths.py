@@ -1,4 +1,4 @@
-"""Parameter paths of a scene: read and set ``shroud.N0``, ``excitation.amplitude``, ``structure.k1``, …"""
+"""Parameter paths of a scene, with units: ``shroud.N0``, ``excitation.amplitude``, ``structure.k1``, …"""
 
 from __future__ import annotations
 
@@ -12,10 +12,12 @@ from solver.contacts.fields import LARGEST, Part
 from solver.contacts.laws.base import AnyContact
 from solver.contacts.laws.parts import Quantity
 from solver.errors import SettingError
+from solver.results.units import number
 from solver.scene.bodies.kinematics import HasBodies
 from solver.scene.bodies.paths import SPEED, body_paths, body_value, changed_bodies, is_body_path
 from solver.scene.bodies.shape_parts import own_parts, shape_of, shape_paths, shape_value, with_shape_value
 from solver.scene.bodies.shapes import AnyShape
+from solver.scene.linear_terms import SpeedDependence, at_speed
 from solver.scene.parts import (
     Damper,
     Excitation,
@@ -24,7 +26,6 @@ from solver.scene.parts import (
     Spring,
     Structure,
 )
-from solver.scene.terms.speed import SpeedDependence, at_speed
 from solver.wording import listing, nearest
 
 FREQUENCY = "frequency"
@@ -323,3 +324,25 @@ def _unknown(scene: HasParts, path: object, *besides: str) -> SettingError:
         return SettingError("path", path, "must name a value of the scene; the frequency belongs to the run")
     known = (*besides, *parameter_paths(scene))
     return SettingError("path", path, f"must be one of {listing(known)}", nearest(str(path), known))
+
+
+def parameter_unit(path: str) -> str:
+    """The unit of the values of a parameter path; empty where there is none, or it depends on the scene."""
+    # Loaded here: help and tables of results need no laws.
+    from solver.contacts.laws.harmonics import higher_quantity, order_of
+    from solver.contacts.laws.registry import laws
+
+    units = {FREQUENCY: "Hz", AMPLITUDE: "N", PHASE: "rad"}
+    owner, _, key = path.rpartition(".")
+    if path in units or owner == "structure":
+        return units.get(path, "")
+    if order_of(key) is not None:
+        return higher_quantity(key).unit
+    # A path does not say which law its contact has: laws that share a word must agree.
+    found = {law.PARAMETERS[key].unit for law in laws().values() if key in law.PARAMETERS}
+    return found.pop() if len(found) == 1 else ""
+
+
+def parameter(path: str, value: float) -> str:
+    """A value of a parameter path with its unit."""
+    return f"{number(value, digits=6)} {parameter_unit(path)}".rstrip()

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal, Self, cast
+from collections.abc import Mapping
+from functools import reduce
+from operator import or_
+from typing import Annotated, Any, Literal, Self, cast
 
 from pydantic import (
+    Discriminator,
     Field,
     GetCoreSchemaHandler,
+    Tag,
     field_validator,
     model_validator,
 )
@@ -23,13 +28,16 @@ from solver.contacts.fields import (
     Positive,
     Vector,
 )
-from solver.scene.cyclic.boundary import CyclicBoundary as CyclicBoundary
-from solver.scene.cyclic.boundary import Sectors
-from solver.scene.cyclic.mistuning import Mistuning as Mistuning
+from solver.contacts.laws.base import AnyContact
+from solver.contacts.laws.registry import DEFAULT, laws
+from solver.scene.cyclic.sector_tables import CyclicBoundary as CyclicBoundary
+from solver.scene.cyclic.sector_tables import Mistuning as Mistuning
+from solver.scene.cyclic.sector_tables import Sectors
+from solver.scene.excitation import Excitation as Excitation
+from solver.scene.excitation import Shares
 from solver.scene.matrices_structure import LossFactor, Ratios
 from solver.scene.matrices_structure import MatricesStructure as MatricesStructure
 from solver.scene.matrices_structure import Reduction as Reduction
-from solver.scene.terms.excitation import Excitation as Excitation
 
 
 class _Grouped(Part):
@@ -230,3 +238,43 @@ class Observe(Part):
         if not low < high or not math.isfinite(high - low):
             raise ValueError(f"`band` must be [low, high] in Hz with low < high, got [{low!r}, {high!r}]")
         return band
+
+
+class Recovered(Part):
+    """A row of a recovery matrix: a quantity that may be observed like a DOF.
+
+    Attributes
+    ----------
+    name : str
+        What `observe` and time histories call it.
+    unit : str
+        Its unit, for example MPa; amplitudes are in it.
+    terms : table
+        DOF to its factor [unit/m].
+    """
+
+    name: MemberName
+    unit: Annotated[str, Field(min_length=1, max_length=20)]
+    terms: Shares
+
+
+LAW_TAG = "law "  # begins the tags of the union: no key of a contact has a space
+
+
+def _law_of(data: object) -> str:
+    """The tag of a contact's law: of a table or of a contact already read."""
+    law = data.get("law") if isinstance(data, Mapping) else getattr(data, "law", None)
+    return LAW_TAG + (DEFAULT if law is None else str(law))
+
+
+class _OfAnyLaw:
+    """The union of the classes of all laws there are when the schema of the scene is made."""
+
+    @classmethod
+    def __get_pydantic_core_schema__(cls, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
+        members: list[Any] = [Annotated[law, Tag(LAW_TAG + word)] for word, law in laws().items()]
+        union = Annotated[reduce(or_, members), Discriminator(_law_of)]  # type: ignore[valid-type]
+        return handler.generate_schema(union)
+
+
+ContactOfAnyLaw = Annotated[AnyContact, _OfAnyLaw]

@@ -31,11 +31,12 @@ from solver.scene.bodies.kinematics import Form
 from solver.scene.bodies.shape_parts import own_parts, with_shapes
 from solver.scene.bodies.shapes import AnyShape
 from solver.scene.bodies.validation import body_issues
-from solver.scene.contacts import ContactOfAnyLaw
 from solver.scene.cyclic.validation import cyclic_issues
-from solver.scene.io import load_raw, scene_folder, shipped_scenes
+from solver.scene.excitation import with_force_files
+from solver.scene.linear_terms import Aerodynamics, Coupling, SpeedDependence, at_speed
 from solver.scene.parts import (
     KINDS,
+    ContactOfAnyLaw,
     CyclicStructure,
     Damper,
     Excitation,
@@ -44,15 +45,12 @@ from solver.scene.parts import (
     MatricesStructure,
     Mistuning,
     Observe,
+    Recovered,
     Spring,
     Structure,
 )
-from solver.scene.terms.force_files import with_force_files
-from solver.scene.terms.linear_terms import Aerodynamics, Coupling
-from solver.scene.terms.recovery import Recovered
-from solver.scene.terms.speed import SpeedDependence, at_speed
-from solver.scene.terms.validation import term_issues
-from solver.scene.validation import cross_issues, field_issues, plain
+from solver.scene.toml import load_raw, scene_folder, shipped_scenes
+from solver.scene.validation import cross_issues, field_issues, plain, term_issues
 
 __all__ = [
     "KINDS",

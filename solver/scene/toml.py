@@ -1,11 +1,100 @@
-"""Tables as TOML text: the scene that reproduces a result."""
+"""Scenes from files, shipped ones by name and others by path; tables as TOML text."""
 
 from __future__ import annotations
 
+import difflib
 import json
 import re
+import tomllib
 from collections.abc import Mapping
+from functools import cache
+from importlib import resources
+from pathlib import Path
 from typing import Any
+
+from solver.errors import Issue, SceneError
+
+
+@cache
+def shipped_scenes() -> tuple[str, ...]:
+    """Names of the scenes that come with the package, sorted."""
+    folder = resources.files("solver.scene") / "shipped"
+    return tuple(sorted(f.name.removesuffix(".toml") for f in folder.iterdir() if f.name.endswith(".toml")))
+
+
+def scene_folder(name_or_path: object) -> Path:
+    """Where relative names of files in a scene begin: the folder of its file."""
+    if isinstance(name_or_path, str | Path) and name_or_path not in shipped_scenes():
+        return Path(name_or_path).parent
+    return Path(str(resources.files("solver.scene") / "shipped"))
+
+
+def load_raw(name_or_path: object) -> dict[str, object]:
+    """The tables and lists of a shipped scene or a file, not yet checked.
+
+    Raises
+    ------
+    SceneError
+        No such scene, or a file that cannot be read as TOML or JSON (with the line).
+    """
+    if isinstance(name_or_path, str) and name_or_path in shipped_scenes():
+        text = (resources.files("solver.scene") / "shipped" / f"{name_or_path}.toml").read_text(
+            encoding="utf-8"
+        )
+        return _parse(text, name_or_path, ".toml")
+    if not isinstance(name_or_path, str | Path):
+        raise _refusal(f"a scene must be a name or a path, got {name_or_path!r}")
+    path = Path(name_or_path)
+    try:
+        text = path.read_bytes().decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise _refusal(f"{str(path)!r} is not UTF-8 text (byte {error.start}): not a scene file") from error
+    except (OSError, ValueError) as error:
+        raise _refusal(_not_found(str(name_or_path), error)) from error
+    return _parse(text, str(path), path.suffix.lower())
+
+
+def _parse(text: str, source: str, suffix: str) -> dict[str, object]:
+    try:
+        if suffix == ".toml":
+            return tomllib.loads(text)
+        if suffix == ".json":
+            raw = json.loads(text, object_pairs_hook=_without_duplicates)
+        else:
+            raise _refusal(f"{source!r} must end in .toml or .json, got {suffix!r}")
+    except tomllib.TOMLDecodeError as error:
+        raise _refusal(f"{source!r} is not valid TOML: {error}") from error
+    except json.JSONDecodeError as error:
+        raise _refusal(f"{source!r} is not valid JSON: {error}") from error
+    except ValueError as error:
+        raise _refusal(f"{source!r} holds a number that cannot be read: {error}") from error
+    except RecursionError as error:
+        raise _refusal(f"{source!r} is nested too deeply for a scene") from error
+    if not isinstance(raw, dict):
+        raise _refusal(f"{source!r} must hold one table, got {type(raw).__name__}")
+    return raw
+
+
+def _without_duplicates(pairs: list[tuple[str, object]]) -> dict[str, object]:
+    table: dict[str, object] = {}
+    for key, value in pairs:
+        if key in table:
+            raise _refusal(f"`{key}` is given twice in one table: {table[key]!r} and {value!r}; keep one")
+        table[key] = value
+    return table
+
+
+def _not_found(name: str, error: Exception) -> str:
+    known = ", ".join(shipped_scenes())
+    near = difflib.get_close_matches(name, shipped_scenes(), n=1)
+    hint = f"; did you mean {near[0]!r}?" if near else ""
+    reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+    return f"no scene {name!r}: neither a shipped scene ({known}) nor a readable file ({reason}){hint}"
+
+
+def _refusal(message: str) -> SceneError:
+    return SceneError([Issue(pointer="", message=message)])
+
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 MOST_INLINE = 88

@@ -9,9 +9,9 @@ structural path needs the whole motion x = Z⁻¹ (f − Lᴴ F) and the adjoint
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated
 
 import numpy as np
 
@@ -71,23 +71,11 @@ _KINK = 1e-8  # relative difference of the slopes of max x and −min x beyond w
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Gradient(Piece):
-    """The amplitude at a solution with its derivatives, all others held fixed; NaN where it is singular.
+    """The amplitude at a solution with its derivatives, all others held fixed; NaN where it is singular."""
 
-    Attributes
-    ----------
-    value : float
-        max|x| of the observed DOF [m].
-    by_frequency : float
-        [m/Hz].
-    by_parameters : (n_paths,) array
-        At a fixed frequency [m per unit of each].
-    """
-
-    UNITS: ClassVar[Mapping[str, str]] = {"value": "m", "by_frequency": "m/Hz"}
-
-    value: float
-    by_frequency: float
-    by_parameters: Real
+    value: Annotated[float, "max|x| of the observed DOF [m]."]
+    by_frequency: Annotated[float, "[m/Hz]."]
+    by_parameters: Annotated[Real, "At a fixed frequency [m per unit of each], (n_paths,)."]
 
 
 class Amplitudes:

@@ -13,9 +13,8 @@ amplitude is stationary in ω the peak A(p) has the Hessian H_pp − H_pω H_ωp
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated
 
 import numpy as np
 
@@ -34,71 +33,34 @@ class PeakHessian(Piece):
 
     Drift and Hessian are NaN where the peak is not a smooth maximum over the frequency: at a kink (a contact
     changes state there), at an end of the band, or where the solution is not at the peak.
-
-    Attributes
-    ----------
-    value : float
-        max|x| at the peak [m].
-    gradient : (n,) array
-        d peak / dp [m per unit].
-    drift : (n,) array
-        d frequency / dp [Hz per unit].
-    hessian : (n, n) array
-        d² peak / dp² [m per both units].
     """
 
-    UNITS: ClassVar[Mapping[str, str]] = {"value": "m"}
-
-    value: float
-    gradient: Real
-    drift: Real
-    hessian: Real
+    value: Annotated[float, "max|x| at the peak [m]."]
+    gradient: Annotated[Real, "d peak / dp [m per unit], (n,)."]
+    drift: Annotated[Real, "d frequency / dp [Hz per unit], (n,)."]
+    hessian: Annotated[Real, "d² peak / dp² [m per both units], (n, n)."]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class EdgeHessian(Piece):
-    """A band edge, where the amplitude equals a limit, to second order.
+    """A band edge, where the amplitude equals a limit, to second order."""
 
-    Attributes
-    ----------
-    gradient : (n,) array
-        d frequency / dp [Hz per unit].
-    hessian : (n, n) array
-        d² frequency / dp² [Hz per both units].
-    """
-
-    gradient: Real
-    hessian: Real
+    gradient: Annotated[Real, "d frequency / dp [Hz per unit], (n,)."]
+    hessian: Annotated[Real, "d² frequency / dp² [Hz per both units], (n, n)."]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class AmplitudeHessian(Piece):
-    """The amplitude at a solution to second order in frequency and parameters; NaN where it has no such.
+    """The amplitude at a solution to second order in frequency and parameters; NaN where it has no such."""
 
-    Attributes
-    ----------
-    value : float
-        max|x| of the observed DOF [m].
-    by_frequency : float
-        [m/Hz].
-    gradient : (n,) array
-        At a fixed frequency [m per unit].
-    by_frequency_twice : float
-        [m/Hz²].
-    mixed : (n,) array
-        By the frequency and each parameter [m/Hz per unit].
-    hessian : (n, n) array
-        At a fixed frequency, that of a peak at an end of the band [m per both units].
-    """
-
-    UNITS: ClassVar[Mapping[str, str]] = {"value": "m", "by_frequency": "m/Hz", "by_frequency_twice": "m/Hz²"}
-
-    value: float
-    by_frequency: float
-    gradient: Real
-    by_frequency_twice: float
-    mixed: Real
-    hessian: Real
+    value: Annotated[float, "max|x| of the observed DOF [m]."]
+    by_frequency: Annotated[float, "[m/Hz]."]
+    gradient: Annotated[Real, "At a fixed frequency [m per unit], (n,)."]
+    by_frequency_twice: Annotated[float, "[m/Hz²]."]
+    mixed: Annotated[Real, "By the frequency and each parameter [m/Hz per unit], (n,)."]
+    hessian: Annotated[
+        Real, "At a fixed frequency, that of a peak at an end of the band [m per both units], (n, n)."
+    ]
 
     def of_peak(self) -> PeakHessian:
         """Return the same of the peak, where the amplitude is stationary in the frequency."""

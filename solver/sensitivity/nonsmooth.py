@@ -13,10 +13,9 @@ at two distances, and extrapolated to it.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
-from typing import ClassVar
+from typing import Annotated
 
 import numpy as np
 
@@ -45,23 +44,11 @@ class PeakKind(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class PeakGradient(Piece):
-    """The derivatives of a peak.
+    """The derivatives of a peak."""
 
-    Attributes
-    ----------
-    value : float
-        max|x| at the peak [m].
-    gradient : (n_paths,) array
-        d peak / dp [m per unit]; NaN where the balance is singular.
-    kind : PeakKind
-        What the derivative is.
-    """
-
-    UNITS: ClassVar[Mapping[str, str]] = {"value": "m"}
-
-    value: float
-    gradient: Real
-    kind: PeakKind
+    value: Annotated[float, "max|x| at the peak [m]."]
+    gradient: Annotated[Real, "d peak / dp [m per unit]; NaN where the balance is singular, (n_paths,)."]
+    kind: Annotated[PeakKind, "What the derivative is."]
 
 
 def peak_gradient(sensitivities: Sensitivities, peak: Peak) -> PeakGradient:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 
@@ -36,19 +36,13 @@ _OF_THE_SWEEP = 0.4  # share of the time; the rest looks for the peaks of the ot
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class BladeAmplitudes(Drawn):
-    """The motion of one DOF in every sector.
+    """The motion of one DOF in every sector."""
 
-    Attributes
-    ----------
-    dof : str
-        Its name in one sector.
-    max_abs, half_peak_to_peak : (sectors,) array
-        Over the period [m].
-    """
+    VIEWS: ClassVar = Views("solver.views", "of_amplitudes", "amplitudes_dataset", "of_amplitudes")
 
-    dof: str
-    max_abs: Real
-    half_peak_to_peak: Real
+    dof: Annotated[str, "Its name in one sector."]
+    max_abs: Annotated[Real, "Over the period [m], (sectors,)."]
+    half_peak_to_peak: Annotated[Real, "Over the period [m], (sectors,)."]
 
     @property
     def largest(self) -> float:
@@ -60,8 +54,6 @@ class BladeAmplitudes(Drawn):
         """The sector that has it."""
         return int(self.max_abs.argmax())
 
-    VIEWS: ClassVar = Views("solver.views", "of_amplitudes", "amplitudes_dataset", "of_amplitudes")
-
     def magnification(self, tuned: Solution | BladeAmplitudes) -> float:
         """Largest amplitude relative to that of another disk, usually the tuned one."""
         return self.largest / (tuned.largest if isinstance(tuned, BladeAmplitudes) else tuned.max_abs)
@@ -69,31 +61,24 @@ class BladeAmplitudes(Drawn):
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class BladePeaks(MadeOfResponses, Drawn):
-    """The highest peak of one DOF in every sector over a range of the frequency.
+    """The highest peak of one DOF in every sector over a range of the frequency."""
 
-    Attributes
-    ----------
-    dof : str
-        Its name in one sector.
-    value : (sectors,) array
-        Largest max|x| [m]; NaN where the branch did not reach the end of the range.
-    at_hz : (sectors,) array
-        Where [Hz].
-    status : tuple of BranchStatus
-        How each sector's branch ended.
-    branches : tuple of Branch
-        The response of each blade, the same one where all are alike; without those that were not reached.
-        Where no more was asked for, of the blade with the highest peak alone, with the peaks that may be it.
-    highest : Known
-        How well the highest peak of all is known.
-    """
+    VIEWS: ClassVar = Views("solver.views", "of_blade_peaks", "blade_peaks_dataset", "of_blade_peaks")
+    JSON: ClassVar = "dof peaks=value at_hz status"
 
-    dof: str
-    value: Real
-    at_hz: Real
-    status: tuple[BranchStatus, ...]
-    branches: tuple[Branch, ...]
-    highest: Known = NOTHING_KNOWN
+    dof: Annotated[str, "Its name in one sector."]
+    value: Annotated[
+        Real, "Largest max|x| [m]; NaN where the branch did not reach the end of the range, (sectors,)."
+    ]
+    at_hz: Annotated[Real, "Where [Hz], (sectors,)."]
+    status: Annotated[tuple[BranchStatus, ...], "How each sector's branch ended."]
+    branches: Annotated[
+        tuple[Branch, ...],
+        "The response of each blade, the same one where all are alike; without those that were not "
+        "reached. Where no more was asked for, of the blade with the highest peak alone, with the peaks "
+        "that may be it.",
+    ]
+    highest: Annotated[Known, "How well the highest peak of all is known."] = NOTHING_KNOWN
 
     @property
     def largest(self) -> float:
@@ -114,20 +99,9 @@ class BladePeaks(MadeOfResponses, Drawn):
             return self.branches[self.worst]
         return observing(self.branches[0], self.branches[0].balance.scene.observe.dof)
 
-    VIEWS: ClassVar = Views("solver.views", "of_blade_peaks", "blade_peaks_dataset", "of_blade_peaks")
-
     def known_parts(self) -> Iterable[Known]:
         """The response of the blade with the highest peak."""
         return (self.highest,)
-
-    def own_json(self) -> dict[str, object]:
-        """Return the peaks as one JSON object."""
-        numbers = {"peaks": self.value.tolist(), "at_hz": self.at_hz.tolist()}
-        return {
-            "dof": self.dof,
-            **{name: [x if math.isfinite(x) else None for x in row] for name, row in numbers.items()},
-            "status": [one.value for one in self.status],
-        }
 
     def magnification(self, tuned: BladePeaks) -> float:
         """The amplitude magnification factor: the highest peak relative to that of the tuned disk."""

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from enum import Enum
-from typing import ClassVar
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -22,13 +20,11 @@ from solver.continuation.branches.sweep import sweep
 from solver.continuation.extrema.error_estimate import truncation_error
 from solver.errors import SettingError
 from solver.jit.fourier import Real
-from solver.results.base import Drawn
 from solver.results.default_bar import shows_progress
-from solver.results.told import Piece
-from solver.results.views import Views
 from solver.results.watch import ShouldStop
 from solver.scene.harmonics import kept_harmonics
 from solver.scene.scene import Scene
+from solver.studies.accuracy_result import AccuracyRow, AccuracyStatus, AccuracyStudy
 
 CLOSED_FORM, SAMPLED = "closed form", "sampled"
 HARMONICS = (1, 3, 5, 7, 11, 15, 21, 31, 41)
@@ -39,108 +35,6 @@ _AWAY = 1e-3  # relative distance in frequency of the neighbour that Newton's me
 REPEATS = 15
 # Fewest samples for the shortest wave kept: below, the harmonics are aliased.
 _PER_WAVE = 4
-
-
-class AccuracyStatus(Enum):
-    """How a study ended; the value is a sentence a user can act on."""
-
-    COMPLETED = "Every way that converges was measured."
-    STOPPED = "The study was stopped by the caller: it has no rows, none was timed to the end."
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class AccuracyRow(Piece):
-    """One way to compute one point.
-
-    Attributes
-    ----------
-    harmonics : int
-        Highest harmonic kept.
-    evaluator : str
-        Of the contact forces: ``closed form`` or ``sampled``.
-    samples : int
-        In a period; 0 in closed form.
-    max_abs : float
-        The amplitude [m].
-    error : float
-        |max_abs − reference| [m].
-    milliseconds : float
-        Median processor time of Newton's method from a neighbouring solution.
-    iterations : int
-        Newton iterations of it.
-    residual : float
-        Relative residual left.
-    pareto : bool
-        No other row is both at least as accurate and at least as fast.
-    """
-
-    UNITS: ClassVar[Mapping[str, str]] = {"max_abs": "m", "error": "m", "milliseconds": "ms"}
-
-    harmonics: int
-    evaluator: str
-    samples: int
-    max_abs: float
-    error: float
-    milliseconds: float
-    iterations: int
-    residual: float
-    pareto: bool = False
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class AccuracyStudy(Drawn):
-    """Rows of `accuracy_study` with what they are measured against.
-
-    Attributes
-    ----------
-    reference : float
-        max|x| with `reference_harmonics` harmonics in closed form [m].
-    reference_error : float
-        Its estimated error [m]; errors below it are not known.
-    rows : tuple of AccuracyRow
-        Closed form first, then by samples; ways that did not converge are not in it.
-    branch : Branch or None
-        The sweep that found the highest peak; None if the frequency was given.
-    status : AccuracyStatus
-        How it ended.
-    """
-
-    scene: str
-    frequency_hz: float
-    reference: float
-    reference_harmonics: int
-    reference_error: float
-    rows: tuple[AccuracyRow, ...]
-    branch: Branch | None
-    status: AccuracyStatus
-
-    @property
-    def completed(self) -> bool:
-        """Whether no way was left out."""
-        return self.status is AccuracyStatus.COMPLETED
-
-    VIEWS: ClassVar = Views("solver.views", "of_accuracy", "accuracy_dataset", "accuracy:accuracy_figure")
-
-    def to_json(self) -> dict[str, object]:
-        """Return the study as one JSON object."""
-        known = math.isfinite(self.reference_error)
-        return {
-            "scene": self.scene,
-            "frequency_hz": self.frequency_hz,
-            "reference": self.reference,
-            "reference_harmonics": self.reference_harmonics,
-            "reference_error": self.reference_error if known else None,
-            "rows": [
-                {
-                    "harmonics": row.harmonics, "evaluator": row.evaluator, "samples": row.samples,
-                    "max_abs": row.max_abs, "error": row.error, "milliseconds": row.milliseconds,
-                    "iterations": row.iterations, "residual": row.residual, "pareto": row.pareto,
-                }
-                for row in self.rows
-            ],
-            "completed": self.completed,
-            "status": self.status.value,
-        }  # fmt: skip
 
 
 def _highest_peak(scene: Scene, should_stop: ShouldStop) -> tuple[Branch, float]:

@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
-from typing import ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
@@ -23,7 +23,7 @@ from solver.results.base import Drawn, MadeOfResponses
 from solver.results.default_bar import shows_progress
 from solver.results.known import Known
 from solver.results.order_statistics import quantile_json
-from solver.results.told import Piece, json_number
+from solver.results.told import Piece
 from solver.results.views import Views
 from solver.results.watch import OnProgress, ShouldStop, part_of
 from solver.scene.parts import LumpedStructure, Mistuning
@@ -51,76 +51,52 @@ class MistuningStatus(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class MistunedDisk(Piece):
-    """One disk of a study.
+    """One disk of a study."""
 
-    Attributes
-    ----------
-    seed : int
-        Of its factors.
-    factors : tuple of float
-        One for each sector.
-    peaks : BladePeaks
-        Of every blade; without the branches.
-    magnification : float
-        Its highest peak relative to that of the tuned disk; NaN if a blade's is not known.
-    magnification_error : float
-        Estimated error of that, by those of both peaks; NaN if it is not known.
-    """
+    JSON: ClassVar = (
+        "seed factors peaks=peaks.value at_hz=peaks.at_hz largest=peaks.largest worst_blade=peaks.worst"
+        " magnification error_estimate=peaks.highest.error_estimate magnification_error"
+        " measure=peaks.highest.measure flags=peaks.highest.flags"
+    )
 
-    seed: int
-    factors: tuple[float, ...]
-    peaks: BladePeaks
-    magnification: float
-    magnification_error: float = math.nan
+    seed: Annotated[int, "Of its factors."]
+    factors: Annotated[tuple[float, ...], "One for each sector."]
+    peaks: Annotated[BladePeaks, "Of every blade; without the branches."]
+    magnification: Annotated[
+        float, "Its highest peak relative to that of the tuned disk; NaN if a blade's is not known."
+    ]
+    magnification_error: Annotated[
+        float, "Estimated error of that, by those of both peaks; NaN if it is not known."
+    ] = math.nan
 
     @property
     def known(self) -> bool:
         """Whether the peaks of all blades are."""
         return math.isfinite(self.magnification)
 
-    def to_json(self) -> dict[str, object]:
+    def to_json(self) -> dict[str, Any]:
         """Return the disk as one JSON object."""
-        return {
-            "seed": self.seed,
-            "factors": list(self.factors),
-            "peaks": [json_number(value) for value in self.peaks.value.tolist()],
-            "at_hz": [json_number(value) for value in self.peaks.at_hz.tolist()],
-            "largest": self.peaks.largest if self.known else None,
-            "worst_blade": self.peaks.worst if self.known else None,
-            "magnification": json_number(self.magnification),
-            "error_estimate": json_number(self.peaks.highest.error_estimate),
-            "magnification_error": json_number(self.magnification_error),
-            "measure": self.peaks.highest.measure,
-            "flags": list(self.peaks.highest.flags),
-        }
+        return self._json() if self.known else self._json(largest=None, worst_blade=None)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class MistuningStudy(MadeOfResponses, Drawn):
-    """What becomes of the highest peak when blades are not quite equal.
+    """What becomes of the highest peak when blades are not quite equal."""
 
-    Attributes
-    ----------
-    scene : str
-        Its name.
-    of : tuple of str
-        The parts that have factors.
-    spread : float
-        Standard deviation of the factors.
-    tuned : BladePeaks
-        Of the disk without mistuning.
-    disks : tuple of MistunedDisk
-        In the order of their seeds.
-    branches : tuple of Branch
-        The responses of the worst blade of the tuned disk and of the worst one.
-    """
+    VIEWS: ClassVar = Views("solver.views", "of_mistuning", "mistuning_dataset", "disks:mistuning_figure")
+    JSON: ClassVar = (
+        "scene dof=tuned.dof of spread tuned samples=disks mean mean_error standard_error deviation"
+        " quantiles worst n_harmonics seconds completed status"
+    )
 
-    scene: str
-    of: tuple[str, ...]
-    spread: float
-    tuned: BladePeaks
-    disks: tuple[MistunedDisk, ...]
-    branches: tuple[Branch, ...]
+    scene: Annotated[str, "Its name."]
+    of: Annotated[tuple[str, ...], "The parts that have factors."]
+    spread: Annotated[float, "Standard deviation of the factors."]
+    tuned: Annotated[BladePeaks, "Of the disk without mistuning."]
+    disks: Annotated[tuple[MistunedDisk, ...], "In the order of their seeds."]
+    branches: Annotated[
+        tuple[Branch, ...], "The responses of the worst blade of the tuned disk and of the worst one."
+    ]
     n_harmonics: int
     status: MistuningStatus
     seconds: float
@@ -146,41 +122,28 @@ class MistuningStudy(MadeOfResponses, Drawn):
         """The disk with the highest peak."""
         return max((d for d in self.disks if d.known), key=lambda disk: disk.magnification, default=None)
 
-    VIEWS: ClassVar = Views("solver.views", "of_mistuning", "mistuning_dataset", "disks:mistuning_figure")
-
     def known_parts(self) -> Iterable[Known]:
         """The highest blades of the tuned disk and of every other."""
         return (self.tuned.highest, *(disk.peaks.highest for disk in self.disks if disk.known))
 
-    def own_json(self) -> dict[str, object]:
+    def to_json(self) -> dict[str, Any]:
         """Return the study as one JSON object."""
-        factors, worst = self.magnifications, self.worst
-        several = factors.size > 1
-        tuned = math.isfinite(self.tuned.largest)
-        return {
-            "scene": self.scene,
-            "dof": self.tuned.dof,
-            "of": list(self.of),
-            "spread": self.spread,
-            "tuned": {
-                "peak": self.tuned.largest if tuned else None,
-                "at_hz": float(self.tuned.at_hz[self.tuned.worst]) if tuned else None,
+        factors, tuned = self.magnifications, self.tuned
+        known = math.isfinite(tuned.largest)
+        deviation = float(factors.std(ddof=1)) if factors.size > 1 else None
+        return self._json(
+            tuned={
+                "peak": tuned.largest if known else None,
+                "at_hz": tuned.at_hz[tuned.worst] if known else None,
             },
-            "samples": [disk.to_json() for disk in self.disks],
-            "mean": float(factors.mean()) if factors.size else None,
-            "mean_error": json_number(self.mean_error),
-            "standard_error": float(factors.std(ddof=1) / math.sqrt(factors.size)) if several else None,
-            "deviation": float(factors.std(ddof=1)) if several else None,
-            "quantiles": [
+            mean=factors.mean() if factors.size else None,
+            standard_error=None if deviation is None else deviation / math.sqrt(factors.size),
+            deviation=deviation,
+            quantiles=[
                 quantile_json("magnification", float(np.quantile(factors, share)), factors.tolist(), share)
                 for share in (QUANTILES if factors.size else ())
             ],
-            "worst": None if worst is None else worst.to_json(),
-            "n_harmonics": self.n_harmonics,
-            "seconds": self.seconds,
-            "completed": self.completed,
-            "status": self.status.value,
-        }
+        )
 
 
 def _until_stopped(

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 
@@ -15,6 +14,7 @@ from solver.jit.fourier import Real
 from solver.linear.leading_ports import FEWEST_PORTS
 from solver.response.stability.cost import forecast
 from solver.results.base import Shown
+from solver.results.told import Piece
 from solver.results.views import Views
 from solver.scene.bodies.kinematics import static_forces
 from solver.scene.cyclic.annulus import sectors_needed
@@ -35,78 +35,43 @@ _FORMS = {
 }
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Effect:
-    """One effect, whether it is paid for, and why.
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Effect(Piece):
+    """One effect, whether it is paid for, and why."""
 
-    Attributes
-    ----------
-    name : str
-        For example ``separation``.
-    used : bool
-        Whether it is computed.
-    reason : str
-        In words and numbers.
-    """
-
-    name: str
-    used: bool
-    reason: str
+    name: Annotated[str, "For example ``separation``."]
+    used: Annotated[bool, "Whether it is computed."]
+    reason: Annotated[str, "In words and numbers."]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Plan(Shown):
-    """What solving a scene will take.
-
-    Attributes
-    ----------
-    effects : tuple of Effect
-        Those in use and those left out.
-    unknowns : int
-        Real unknowns of the condensed balance.
-    linear_dofs, contacts, harmonics : int
-        Sizes behind it.
-    seconds_a_point : float
-        Estimated cost of a point of a branch [s].
-    seconds_of_stability : float
-        Estimated cost of the Floquet multipliers of a response [s], infinite (null in JSON) where it is not
-        known; answers have them by themselves below a second.
-    dense_bytes : int
-        Estimated memory of the dense matrices of a response [bytes].
-    performance_curve : str
-        Whether the performance curve of one mode may stand in for responses in a design, and when it does.
-    """
-
-    scene: str
-    effects: tuple[Effect, ...]
-    unknowns: int
-    linear_dofs: int
-    contacts: int
-    harmonics: int
-    seconds_a_point: float
-    dense_bytes: int
-    performance_curve: str = ""
-    seconds_of_stability: float = 0.0
+    """What solving a scene will take."""
 
     VIEWS: ClassVar = Views("solver.views", "of_plan", "plan_dataset")
+    JSON: ClassVar = (
+        "scene effects unknowns linear_dofs contacts n_harmonics=harmonics"
+        " estimated_seconds_a_point=seconds_a_point estimated_seconds_of_stability=seconds_of_stability"
+        " estimated_dense_bytes=dense_bytes performance_curve"
+    )
 
-    def to_json(self) -> dict[str, object]:
-        """Return the plan as one JSON object."""
-        seconds = self.seconds_of_stability
-        return {
-            "scene": self.scene,
-            "effects": [
-                {"name": effect.name, "used": effect.used, "reason": effect.reason} for effect in self.effects
-            ],
-            "unknowns": self.unknowns,
-            "linear_dofs": self.linear_dofs,
-            "contacts": self.contacts,
-            "n_harmonics": self.harmonics,
-            "estimated_seconds_a_point": self.seconds_a_point,
-            "estimated_seconds_of_stability": seconds if math.isfinite(seconds) else None,
-            "estimated_dense_bytes": self.dense_bytes,
-            "performance_curve": self.performance_curve,
-        }
+    scene: Annotated[str, "Name of the scene."]
+    effects: Annotated[tuple[Effect, ...], "Those in use and those left out."]
+    unknowns: Annotated[int, "Real unknowns of the condensed balance."]
+    linear_dofs: Annotated[int, "Linear DOFs behind it."]
+    contacts: Annotated[int, "Contacts."]
+    harmonics: Annotated[int, "Highest harmonic kept."]
+    seconds_a_point: Annotated[float, "Estimated cost of a point of a branch [s]."]
+    dense_bytes: Annotated[int, "Estimated memory of the dense matrices of a response [bytes]."]
+    performance_curve: Annotated[
+        str,
+        "Whether the performance curve of one mode may stand in for responses in a design, and when it does.",
+    ] = ""
+    seconds_of_stability: Annotated[
+        float,
+        "Estimated cost of the Floquet multipliers of a response [s], infinite (null in JSON) where it is "
+        "not known; answers have them by themselves below a second.",
+    ] = 0.0
 
 
 def performance_curve_words(scene: Scene) -> str:

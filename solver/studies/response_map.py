@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from enum import Enum
-from typing import ClassVar
 
 import numpy as np
 
@@ -20,13 +18,12 @@ from solver.jit.fourier import Integer, Real
 from solver.response.known import known_of_solution
 from solver.response.solution import MEAN_UNDETERMINED
 from solver.response.solve import solve
-from solver.results.base import Drawn, MadeOfResponses
 from solver.results.default_bar import shows_progress
 from solver.results.known import NOTHING_KNOWN, Known
-from solver.results.views import Views
 from solver.results.watch import part_of
 from solver.scene.scene import Scene
 from solver.studies.kernels.map_rows import GIVEN, MAX_ABS, RESIDUAL, ROW_VALUES, SOLVED, solve_row
+from solver.studies.map_result import MapStatus, ResponseMap
 from solver.studies.peaks.results import PeakTrack, TrackStatus
 from solver.studies.peaks.track_peak import track_peak
 from solver.studies.peaks.tracker import check_laws
@@ -36,85 +33,6 @@ OF_THE_GRID = 0.7  # share of the progress, where the peaks are tracked too
 _WORK_OF_A_STRIP = 25_000  # frequencies × harmonics: 0.1 s, measured on bladed-disk
 _MOST_STRIPS = 256
 _SAME = 1e-6  # relative distance within which two solutions are one
-
-
-class MapStatus(Enum):
-    """How a map ended; the value is a sentence a user can act on."""
-
-    COMPLETED = "Every point is a solution."
-    HOLES = "Some points were not solved and are empty: use more harmonics or another range."
-    STOPPED = "The map was stopped by the caller: what is empty was not reached."
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class ResponseMap(MadeOfResponses, Drawn):
-    """max|x| of the observed DOF over a parameter and the frequency.
-
-    Attributes
-    ----------
-    scene, parameter_path, unit : str
-        Name of the scene, path and unit of the parameter.
-    parameter : (S,) array
-        Its values, evenly spaced, or in equal ratios where the ends differ by more than a few times.
-    frequency : (F,) array
-        Hz, evenly spaced over the scene's band.
-    amplitude, half_peak_to_peak : (S, F) arrays
-        m; NaN where no solution was found.
-    ridge : PeakTrack or None
-        The tracked peaks over the same range, if asked for.
-    largest_residual : float
-        Of all points that are solved.
-    given : Scene or None
-        What it is of, with the values that stayed fixed; None if it was read from a file.
-    highest : Known
-        How well the highest point of the grid is known.
-    """
-
-    scene: str
-    parameter_path: str
-    unit: str
-    parameter: Real
-    frequency: Real
-    amplitude: Real
-    half_peak_to_peak: Real
-    ridge: PeakTrack | None
-    n_harmonics: int
-    largest_residual: float
-    newton_iterations: int
-    status: MapStatus
-    seconds: float
-    given: Scene | None = None
-    highest: Known = NOTHING_KNOWN
-
-    @property
-    def completed(self) -> bool:
-        """Whether every point is a solution."""
-        return self.status is MapStatus.COMPLETED
-
-    VIEWS: ClassVar = Views("solver.views", "of_map", "map_dataset", "of_map")
-
-    def known_parts(self) -> Iterable[Known]:
-        """The highest point of the grid, and the sweeps of the ridge."""
-        return (self.highest, *(() if self.ridge is None else self.ridge.known_parts()))
-
-    def own_json(self) -> dict[str, object]:
-        """Return the map as one JSON object."""
-        return {
-            "scene": self.scene,
-            "parameter": self.parameter.tolist(),
-            "parameter_path": self.parameter_path,
-            "unit": self.unit,
-            "frequency": self.frequency.tolist(),
-            "amplitude": _rows(self.amplitude),
-            "half_peak_to_peak": _rows(self.half_peak_to_peak),
-            "ridge": None if self.ridge is None else self.ridge.to_json(),
-            "n_harmonics": self.n_harmonics,
-            "newton_iterations": self.newton_iterations,
-            "largest_residual": self.largest_residual,
-            "seconds": self.seconds,
-            "completed": self.completed,
-            "status": self.status.value,
-        }
 
 
 @shows_progress("map")
@@ -366,8 +284,3 @@ def _row(
             at += 1
     known[known != SOLVED] = 0
     return (solutions, known), spent
-
-
-def _rows(values: Real) -> list[list[float | None]]:
-    """Return a grid as JSON can carry it (null for NaN)."""
-    return [[value if math.isfinite(value) else None for value in row] for row in values.tolist()]

@@ -11,25 +11,25 @@ from solver.continuation.branch import BranchStatus
 from solver.results import units
 from solver.results.notes import BAND_OPEN, between_points, drift_words, flag_words
 from solver.results.told import Summary
-from solver.views.parameter_units import parameter
+from solver.scene.parameter_paths import parameter
 
 if TYPE_CHECKING:
     from solver.continuation.branch import AnyBranch
     from solver.marching.result import MarchResult
-    from solver.modes.driven.controlled import HeldAmplitude
-    from solver.modes.driven.phase_resonance import PhaseResonance
+    from solver.modes.driven.results import HeldAmplitude, PhaseResonance
     from solver.modes.peaks.performance import PerformanceCurve
     from solver.modes.results import NonlinearMode
     from solver.response.solution import Solution
     from solver.response.stability.floquet import Stability
+    from solver.studies.accuracy_result import AccuracyStudy
     from solver.studies.blades import BladeAmplitudes, BladePeaks
-    from solver.studies.convergence import AccuracyStudy
     from solver.studies.interference_result import InterferenceDiagram
+    from solver.studies.map_result import ResponseMap
     from solver.studies.mistuning import MistuningStudy
     from solver.studies.peaks.results import LeastPeak, PeakTrack
     from solver.studies.plan import Plan
-    from solver.studies.response_map import ResponseMap
 
+LEVEL = 1e-9  # relative difference of damping ratios that is none
 Pairs = list[tuple[str, str]]
 
 
@@ -180,7 +180,9 @@ def of_mode(found: NonlinearMode) -> Summary:
     """Frequency and damping ratio at both ends, and where it damps most."""
     pairs: Pairs = []
     if found.amplitude.size:
-        best = int(np.argmax(found.damping_ratio))
+        # Where damping is level, rounding would choose among its places.
+        most = found.damping_ratio.max()
+        best = int(np.argmax(found.damping_ratio >= most - LEVEL * abs(most)))
         for name, i in (("smallest", 0), ("most damping", best), ("largest", -1)):
             at = f"a = {found.amplitude[i]:.4g} √kg m"
             pairs.append((name, f"{found.frequency_hz[i]:.6g} Hz, ζ = {found.damping_ratio[i]:.5g} at {at}"))

@@ -3,49 +3,64 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.results.dataset import Dataset, Variable
-from solver.views.columns import AMPLITUDE, attributes, column, harmonics
-from solver.views.mode_datasets import held_dataset, mode_dataset, performance_dataset, resonance_dataset
+from solver.results.dataset import Attribute, Dataset, Variable
+from solver.views.io import scene_attributes
 
 if TYPE_CHECKING:
     from solver.continuation.branch import AnyBranch
     from solver.jit.fourier import Real
     from solver.marching.result import MarchResult
+    from solver.modes.driven.results import HeldAmplitude, PhaseResonance
+    from solver.modes.peaks.performance import PerformanceCurve
+    from solver.modes.results import ModalCurve, NonlinearMode
     from solver.response.solution import Solution
     from solver.response.stability.floquet import Stability
+    from solver.scene.scene import Scene
+    from solver.studies.accuracy_result import AccuracyStudy
     from solver.studies.blades import BladeAmplitudes, BladePeaks
-    from solver.studies.convergence import AccuracyStudy
     from solver.studies.interference_result import InterferenceDiagram
+    from solver.studies.map_result import ResponseMap
     from solver.studies.mistuning import MistuningStudy
     from solver.studies.peaks.results import LeastPeak, PeakTrack
     from solver.studies.plan import Plan
-    from solver.studies.response_map import ResponseMap
 
-__all__ = [
-    "accuracy_dataset",
-    "amplitudes_dataset",
-    "blade_peaks_dataset",
-    "branch_dataset",
-    "held_dataset",
-    "interference_dataset",
-    "least_dataset",
-    "map_dataset",
-    "march_dataset",
-    "mistuning_dataset",
-    "mode_dataset",
-    "performance_dataset",
-    "plan_dataset",
-    "point_variables",
-    "resonance_dataset",
-    "solution_dataset",
-    "stability_dataset",
-    "track_dataset",
-]
+AMPLITUDE = "max|x| of the observed DOF"
+
+
+def attributes(status: str, scene: Scene | None = None, **more: Attribute | None) -> dict[str, Attribute]:
+    """What every dataset says of itself: the version, the status, the scene."""
+    try:
+        made_by = f"stickslip {version('stickslip')}"
+    except PackageNotFoundError:
+        made_by = "stickslip"
+    given: Mapping[str, Attribute | None] = {"source": made_by, "status": status, **more}
+    known = {name: value for name, value in given.items() if value is not None}
+    return known if scene is None else {**known, **scene_attributes(scene)}
+
+
+def column(dim: str, values: object, unit: str = "", about: str = "") -> Variable:
+    """One value for each place along a dimension."""
+    return Variable(dims=(dim,), values=np.asarray(values), unit=unit, about=about)
+
+
+def harmonics(coefficients: Real, dims: tuple[str, ...], name: str, unit: str) -> dict[str, Variable]:
+    """Cosine and sine parts of full coefficients (..., 2H + 1), each (..., H + 1); the mean is the first."""
+    size = (coefficients.shape[-1] + 1) // 2
+    cosine, sine = np.zeros((2, *coefficients.shape[:-1], size))
+    cosine[..., 0], cosine[..., 1:] = coefficients[..., 0], coefficients[..., 1::2]
+    sine[..., 1:] = coefficients[..., 2::2]
+    words = f"of the {name.replace('_', ' ')}, by harmonic"
+    return {
+        f"{name}_cos": Variable(dims=dims, values=cosine, unit=unit, about=f"cosine part {words}"),
+        f"{name}_sin": Variable(dims=dims, values=sine, unit=unit, about=f"sine part {words}"),
+    }
+
 
 _SAMPLES = 500
 ContactStates = tuple[Sequence[str], NDArray[np.integer]]
@@ -333,3 +348,72 @@ def stability_dataset(found: Stability) -> Dataset:
     }
     notes = attributes(found.growth.value, frequency_hz=found.frequency_hz, neutral=found.neutral)
     return Dataset(kind="stability", rows=("multiplier",), variables=variables, attributes=notes)
+
+
+def mode_dataset(found: NonlinearMode) -> Dataset:
+    """A point a row: amplitude, frequency, damping ratio, the states of the contacts and the mode shape."""
+    variables = {
+        "amplitude": column("point", found.amplitude, "√kg m", "a² = Σ Q_kᴴ M Q_k"),
+        "frequency": column("point", found.frequency_hz, "Hz"),
+        "damping_ratio": column("point", found.damping_ratio),
+        "frequency_error": column("point", found.frequency_error, "Hz", "estimate by more harmonics"),
+        "damping_error": column("point", found.damping_error, "", "estimate by more harmonics"),
+        "max_abs": column("point", found.max_abs, "m", AMPLITUDE),
+        "forcing": column("point", found.forcing, "N/√kg", "|Qᴴ f| of the excitation, mode normalised"),
+        **_states(found),
+        "dof": column("dof", np.array(found.scene.dofs, dtype=np.str_)),
+        **harmonics(found.dof_motions, ("point", "dof", "harmonic"), "motion", "m"),
+    }
+    notes = attributes(
+        found.status.value, found.scene, mode_number=found.mode, harmonics=found.n_harmonics,
+        nodal_diameter=found.nodal_diameter,
+    )  # fmt: skip
+    return Dataset(kind="modes", rows=("point",), variables=variables, attributes=notes)
+
+
+def _states(found: ModalCurve) -> dict[str, Variable]:
+    words = np.array(found.state_words, np.str_).reshape(found.states.shape)
+    names = column("contact", np.array(found.contact_names, dtype=np.str_))
+    return {"contact": names, "state": Variable(dims=("point", "contact"), values=words)}
+
+
+def performance_dataset(curve: PerformanceCurve) -> Dataset:
+    """A point of the mode a row: factor on the excitation or on the loads, and the peak with it."""
+    variables = {
+        "excitation": column("point", curve.excitation, "", "factor on every force"),
+        "peak": column("point", curve.peak, "m", AMPLITUDE),
+        "frequency": column("point", curve.frequency_hz, "Hz", "of the peak"),
+        "load": column("point", curve.load, "", "factor on every load, the excitation as it is"),
+        "peak_at_load": column("point", curve.peak_at_load, "m", "the peak then"),
+    }
+    notes = attributes(curve.mode.status.value, curve.mode.scene, mode_number=curve.mode.mode)
+    return Dataset(kind="performance", rows=("point",), variables=variables, attributes=notes)
+
+
+def held_dataset(found: HeldAmplitude) -> Dataset:
+    """A frequency a row: the force that holds the amplitude, and the response to it."""
+    stable = ["" if one is None else "yes" if one else "no" for one in found.stable]
+    variables = {
+        "frequency": column("point", found.frequency_hz, "Hz"),
+        "excitation": column("point", found.excitation, "", "factor on every force"),
+        "excitation_error": column("point", found.excitation_error, "", "estimate by more harmonics"),
+        "phase": column("point", found.phase_deg, "deg", "of harmonic 1, ahead of the excitation"),
+        "max_abs": column("point", found.max_abs, "m", AMPLITUDE),
+        "stable": column("point", np.array(stable, dtype=np.str_), "", "while the force is held"),
+        **_states(found),
+        **harmonics(found.observed, ("point", "harmonic"), "observed", "m"),
+    }
+    notes = attributes(found.status.value, found.scene, amplitude=found.held, harmonics=found.n_harmonics)
+    return Dataset(kind="controlled", rows=("point",), variables=variables, attributes=notes)
+
+
+def resonance_dataset(found: PhaseResonance) -> Dataset:
+    """An amplitude a row: frequency and force of phase resonance."""
+    variables = {
+        "amplitude": column("point", found.amplitude, "√kg m", "a² = Σ Q_kᴴ M Q_k"),
+        "frequency": column("point", found.frequency_hz, "Hz"),
+        "excitation": column("point", found.excitation, "", "factor on every force"),
+        "max_abs": column("point", found.max_abs, "m", AMPLITUDE),
+    }
+    notes = attributes(found.status.value, found.scene, mode_number=found.mode)
+    return Dataset(kind="phase-resonance", rows=("point",), variables=variables, attributes=notes)

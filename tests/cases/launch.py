@@ -16,6 +16,13 @@ import pytest
 COMMAND = (sys.executable, "-c", "import sys; from service.cli import main; sys.exit(main())")
 
 
+def free_port() -> int:
+    """A port of this machine that nobody has."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
 def answers(port: int, path: str = "/health/live") -> bool:
     """Whether a service of this machine answers 200; cheap, as it is asked many times while one starts."""
     connection = http.client.HTTPConnection("127.0.0.1", port, timeout=20.0)
@@ -31,9 +38,7 @@ def answers(port: int, path: str = "/health/live") -> bool:
 @contextmanager
 def served(folder: Path, environment: Mapping[str, str] | None = None) -> Iterator[str]:
     """The address of a service started with `stickslip serve`; it must end cleanly when it is told to."""
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
+    port = free_port()
     arguments = ("serve", "--port", str(port), "--database", f"sqlite:///{folder}/jobs.db", "--workers", "1")
     with (folder / "log").open("w") as log:
         process = subprocess.Popen([*COMMAND, *arguments], stderr=log, stdout=log, env=environment)

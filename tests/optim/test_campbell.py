@@ -222,6 +222,7 @@ def test_words_name_the_crossings(capsys: pytest.CaptureFixture[str]) -> None:
     assert "above 40 µm from 11439.6 to 12000 rpm" in out
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize("suffix", [".png", ".svg", ".pdf"])
 @pytest.mark.parametrize("arguments", [DISK, PLAIN])
 def test_pictures_are_written(

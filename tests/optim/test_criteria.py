@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from sampling import sampled
 
 import solver
 from optim.criteria.evaluation import evaluate
@@ -58,9 +57,9 @@ def _difference(case: str, path: str, limit: float | None, criterion: str) -> tu
 
 
 # Every case by one criterion or two, and every criterion in cases of each scene.
-@pytest.mark.parametrize(
-    ("case", "criterion"), sampled([(case, one) for case in CASES for one in CRITERIA], 2)
-)
+@pytest.mark.few(4)
+@pytest.mark.parametrize("criterion", CRITERIA)
+@pytest.mark.parametrize("case", CASES)
 def test_gradient_equals_differences_of_the_whole_solve(case: str, criterion: str) -> None:
     values = CASES[case][2]
     plain = _evaluate(case, values, None)

@@ -112,6 +112,7 @@ def difference(moved: Moved, row: Row, path: str, step: float) -> tuple[float, f
     return (4.0 * fine - coarse) / 3.0, abs(fine - coarse)
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize("name", POINTS)
 def test_gradients_equal_differences_of_the_whole_solve(name: str) -> None:
     point, moved = POINTS[name], stepping(POINTS[name])

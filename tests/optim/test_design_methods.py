@@ -70,6 +70,7 @@ def test_every_result_says_which_conditions_hold(name: str, method: str) -> None
         assert sorted(row.at_hz for row in active) == pytest.approx([753.279, 765.750], abs=2e-3)
 
 
+@pytest.mark.few(6)
 @pytest.mark.parametrize("name", SCENES)
 def test_the_optimum_equals_brute_force(name: str) -> None:
     """A grid over the range, then finer and finer ones around its best down to steps of 1e-4 of the range."""

@@ -93,15 +93,16 @@ def test_contacts_that_share_a_value_have_one_variable() -> None:
 
 @pytest.mark.long
 def test_a_forbidden_range_keeps_the_resonance_out() -> None:
-    """Speeds times the order: 45000 to 45900 revolutions a minute forbid 750 to 765 Hz to order 1."""
-    scene, limit = solver.load_scene("bladed-disk"), 1.03e-4
-    problem = {"variables": DISK, "limit": limit, "harmonics": 3}
+    """Speeds times the order: 42900 to 43800 revolutions a minute forbid 715 to 730 Hz to order 1."""
+    scene, limit = solver.load_scene("bladed-disk"), 9.2e-5
+    problem = {"variables": DISK, "limit": limit, "harmonics": 8}  # three and six leave a peak open by 5 %
     free = optim.design(scene, **problem)  # type: ignore[arg-type]
-    kept = optim.design(scene, speeds_rpm=[[45000.0, 45900.0]], **problem)  # type: ignore[arg-type]
+    kept = optim.design(scene, speeds_rpm=[[42900.0, 43800.0]], **problem)  # type: ignore[arg-type]
+    assert free.problem.harmonics == kept.problem.harmonics
 
     def inside(N0: float) -> float:
         there = scene.with_values({"shroud.N0": N0})
-        return highest(there, start=750.0, stop=765.0, harmonics=3)
+        return highest(there, start=715.0, stop=730.0, harmonics=kept.problem.harmonics)
 
     assert inside(free.optimum["shroud.N0"]) > limit
     assert kept.reached
@@ -109,7 +110,7 @@ def test_a_forbidden_range_keeps_the_resonance_out() -> None:
     assert kept.peak.value >= free.peak.value * (1.0 - 1e-9)  # type: ignore[union-attr]
     for N0 in np.geomspace(20.0, 3000.0, 13):
         if inside(float(N0)) <= limit:
-            peak = highest(scene.with_values({"shroud.N0": float(N0)}), harmonics=3)
+            peak = highest(scene.with_values({"shroud.N0": float(N0)}), harmonics=kept.problem.harmonics)
             assert peak >= kept.peak.value * (1.0 - 1e-9)  # type: ignore[union-attr]
 
 

@@ -26,7 +26,6 @@ from random_designs import (
     rank,
     stands,
 )
-from sampling import others_long
 
 import optim
 import solver
@@ -63,7 +62,8 @@ def check_against(asked: dict[str, Any], judge: Callable[[Problem], Brute]) -> N
 
 
 # Seed 0 has a limit that no design keeps, 3 a forbidden range and an optimum on a bound.
-@pytest.mark.parametrize("seed", others_long((8, 3, 0, 18), keep=(3,)))
+@pytest.mark.few(keep=(3,))
+@pytest.mark.parametrize("seed", [8, 3, 0, 18])
 def test_one_variable(seed: int) -> None:
     check_design(random_design(seed, 1, limits=seed % 3 == 0), 25, levels=3)
 
@@ -73,10 +73,11 @@ def test_two_variables(seed: int) -> None:
     check_design(random_design(seed, 2), 7, places=2, levels=2, fine=5)
 
 
-@pytest.mark.parametrize("seed", others_long(range(15), keep=(4,)))
-def test_two_to_five_variables_with_cases_and_limits(seed: int) -> None:
+@pytest.mark.few(16)
+@pytest.mark.parametrize(("seed", "starts"), [(4, 15), *((seed, 60) for seed in range(15))])
+def test_two_to_five_variables_with_cases_and_limits(seed: int, starts: int) -> None:
     """One to three masses; designs at random and steps from the best of them find nothing better."""
-    check_against(limited_cases(seed), lambda problem: random_multistart(problem, seed, 60))
+    check_against(limited_cases(seed), lambda problem: random_multistart(problem, seed, starts))
 
 
 @pytest.mark.long

@@ -92,6 +92,7 @@ STUDIES: dict[str, Callable[[], Any]] = {
 }  # fmt: skip
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize("name", STUDIES)
 def test_every_form_of_a_result_tells_its_error(name: str) -> None:
     found = STUDIES[name]()

@@ -17,25 +17,25 @@ HARMONICS = 3
 BAND = (300.0, 420.0)  # Hz
 
 
-def _at(scene: Scene, hz: float) -> float:
-    found = solver.solve(scene, frequency_hz=float(hz), harmonics=HARMONICS)
-    return found.max_abs if found.converged else math.nan
-
-
-def highest_by_points(scene: Scene, n: int, finer: int = 1) -> float:
-    """The highest max|x| in the band [m] by solutions from nothing.
+def highest_by_points(scene: Scene, measure: str, harmonics: int, n: int, finer: int = 1) -> float:
+    """The highest `measure` of the motion in the band [m] by solutions from nothing.
 
     `n` of them over the band, `finer` in each interval of these that has a high end, since two peaks that
     hold a design may be closer than the intervals are wide, and a search about the tops of all.
     """
+
+    def at(hz: float) -> float:
+        found = solver.solve(scene, frequency_hz=float(hz), harmonics=harmonics)
+        return float(getattr(found, measure)) if found.converged else math.nan
+
     coarse = np.linspace(*BAND, n)
-    values = np.array([_at(scene, hz) for hz in coarse])
+    values = np.array([at(hz) for hz in coarse])
     high = np.nan_to_num(values) >= 0.9 * np.nanmax(values)
     between = [
         np.linspace(*coarse[i : i + 2], finer + 1)[1:-1] for i in range(n - 1) if high[i] or high[i + 1]
     ]
     grid = np.concatenate([coarse, *between])
-    values = np.concatenate([values, [_at(scene, hz) for hz in grid[n:]]])
+    values = np.concatenate([values, [at(hz) for hz in grid[n:]]])
     assert np.isfinite(values).mean() > 0.95
     order = np.argsort(grid)
     grid, values = grid[order], np.nan_to_num(values[order])
@@ -44,7 +44,7 @@ def highest_by_points(scene: Scene, n: int, finer: int = 1) -> float:
         if i in (0, grid.size - 1) or values[i] < max(values[i - 1], values[i + 1]):
             continue
         top = minimize_scalar(
-            lambda hz: -_at(scene, hz), bounds=(grid[i - 1], grid[i + 1]), method="bounded",
+            lambda hz: -at(hz), bounds=(grid[i - 1], grid[i + 1]), method="bounded",
             options={"xatol": 1e-9},
         )  # fmt: skip
         best = max(best, -top.fun)
@@ -60,14 +60,16 @@ def _is_least(
 ) -> None:
     """Its peak is that of the points, and no point beside it within the bounds is lower."""
     assert found.peak is not None
+    assert found.known is not None
+    by = found.known.measure, found.problem.harmonics, *points
     values = {path: float(value) for path, value in found.optimum.items()}
-    here = highest_by_points(scene.with_values(values), *points)
+    here = highest_by_points(scene.with_values(values), *by)
     assert found.peak.value == pytest.approx(here, rel=1e-6)
     for path, value in values.items():
         for step in steps:
             if not bounds[path][0] <= value * (1.0 + step) <= bounds[path][1]:
                 continue
-            beside = highest_by_points(scene.with_values({**values, path: value * (1.0 + step)}), *points)
+            beside = highest_by_points(scene.with_values({**values, path: value * (1.0 + step)}), *by)
             assert beside >= here * (1.0 - 1e-6), (path, step)
 
 

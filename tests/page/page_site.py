@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import socket
 import subprocess
 import time
 from collections.abc import Iterator
@@ -13,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
-from launch import COMMAND, answers
+from launch import COMMAND, answers, free_port
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, BrowserContext, Page
@@ -28,9 +27,7 @@ class Site:
         self._folder = folder
         # The first preview of a kind may take longer than the usual limit where the machine has other work.
         self._environment = {**os.environ, "STICKSLIP_PREVIEW_SECONDS": "60", **environment}
-        with socket.socket() as free:
-            free.bind(("127.0.0.1", 0))
-            self.port: int = free.getsockname()[1]
+        self.port = free_port()
         self.url = f"http://127.0.0.1:{self.port}"
         self.database = f"sqlite:///{folder}/jobs.db"
         self._process: subprocess.Popen[bytes] | None = None

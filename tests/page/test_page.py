@@ -235,6 +235,7 @@ def test_the_response_follows_the_sliders_and_nothing_is_stored(profile: Profile
     expect(page.locator("#live-status")).to_contain_text("peak 2.35 m")
 
 
+@pytest.mark.long
 def test_what_is_too_large_for_the_sliders_says_so_and_becomes_a_job(profile: Profile, site: Site) -> None:
     context, watch = profile
     watch.allowed = ("status of 422",)

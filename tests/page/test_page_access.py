@@ -172,6 +172,7 @@ def tab_through(page: Page) -> int:
     return int(page.evaluate("window.__seen.size"))
 
 
+@pytest.mark.few(keep=(320,))
 @pytest.mark.parametrize(("width", "height"), [(640, 450), (320, 600)])
 def test_zoomed_and_narrow_nothing_is_cut_off(
     browser: Browser, site: Site, studied: str, width: int, height: int
@@ -192,6 +193,7 @@ def test_zoomed_and_narrow_nothing_is_cut_off(
         assert page.evaluate(OVERLAPS) == [], "numbers of an axis stand on one another"
 
 
+@pytest.mark.long
 def test_the_theme_can_be_chosen_and_stays(profile: Profile, site: Site) -> None:
     context, _ = profile
     page = visit(context, site)

@@ -112,6 +112,7 @@ def test_as_good_and_of_which_case_are_said(profile: Profile, site: Site, found:
     expect(facts).to_contain_text(re.compile(r"held bypeak at [\d.]+ Hz.*\(of order 4\)"))
 
 
+@pytest.mark.long
 def test_the_range_and_the_harmonics_make_a_design_stale_too(
     profile: Profile, site: Site, found: str
 ) -> None:
@@ -128,6 +129,7 @@ def test_the_range_and_the_harmonics_make_a_design_stale_too(
     expect(page.locator("#accuracy-stale")).to_be_hidden()
 
 
+@pytest.mark.long
 def test_a_design_is_used_with_the_values_it_was_computed_for(
     profile: Profile, site: Site, found: str
 ) -> None:

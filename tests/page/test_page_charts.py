@@ -154,6 +154,7 @@ def test_what_the_cursor_reads_follows_the_sliders(profile: Profile, site: Site)
     assert min(max(abs(x - cx), abs(y - cy)) for x, y in points) <= 0.06, f"{at} {value} is not on the curve"
 
 
+@pytest.mark.long
 def test_a_curve_is_pinned_beside_those_after_it(profile: Profile, site: Site) -> None:
     page = visit(profile[0], site, "?scene=two-dof&tab=response")
     expect(page.locator("#live-status")).to_contain_text("peak 2.35 m")
@@ -170,6 +171,7 @@ def test_a_curve_is_pinned_beside_those_after_it(profile: Profile, site: Site) -
     expect(lines).to_have_count(1)
 
 
+@pytest.mark.long
 def test_numbers_of_an_axis_do_not_overlap(profile: Profile, site: Site) -> None:
     page = visit(profile[0], site, "?scene=two-dof&tab=all")
     expect(page.locator("#live-status")).to_contain_text("peak")
@@ -184,6 +186,7 @@ def test_numbers_of_an_axis_do_not_overlap(profile: Profile, site: Site) -> None
             assert right <= left, "two numbers of the axis stand on one another"
 
 
+@pytest.mark.long
 def test_a_length_has_a_unit_of_its_size(profile: Profile, site: Site) -> None:
     page = visit(profile[0], site, "?scene=two-dof")
     said = page.evaluate(
@@ -197,7 +200,7 @@ def test_a_length_has_a_unit_of_its_size(profile: Profile, site: Site) -> None:
     assert said == ["4.8e-14 m", "3 nm", "25 µm", "509000 N/m", "92.7 N"]
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(4)
 @pytest.mark.parametrize("harmonics", ["2.5", "0", "201", ""])
 def test_harmonics_that_cannot_be_are_refused_where_they_stand(
     profile: Profile, site: Site, harmonics: str

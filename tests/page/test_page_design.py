@@ -109,7 +109,7 @@ def test_a_robust_design_is_shown_beside_the_nominal_one(profile: Profile, site:
     )
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(4)
 @pytest.mark.parametrize(
     ("fold", "field", "text", "words"),
     [

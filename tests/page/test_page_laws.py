@@ -117,6 +117,7 @@ def test_every_law_has_its_sliders_and_units(page_of: Any) -> None:
     assert {"kn [N/m]", "gap [m]", "a3 [N/m^3]"} <= set(heads)
 
 
+@pytest.mark.long
 def test_what_is_left_out_follows_what_it_is_taken_from(page_of: Any) -> None:
     page = page_of("in-space")
     page.fill("#slide-pad-kt >> xpath=../span/input", "6")

@@ -20,7 +20,15 @@ def test_a_kind_without_a_view_has_a_form_and_a_result(browser: Browser, extende
         page.goto(f"{extended.url}/?scene=two-dof&tab=data")
         page.locator("html[data-ready]").wait_for(state="attached")
         names = page.locator("#others-kind option").all_text_contents()
-        assert set(names) == {"peaks", "solve", "mistuning", "controlled", "sensitivities", "distortion"}
+        assert set(names) == {
+            "peaks",
+            "plan",
+            "solve",
+            "mistuning",
+            "controlled",
+            "sensitivities",
+            "distortion",
+        }
         page.select_option("#others-kind", "distortion")
         expect(page.locator("#others-summary")).to_have_text(
             "How much of a response is not in its first harmonic."

@@ -10,12 +10,12 @@ import httpx
 import pytest
 from launch import COMMAND
 from page_site import Site, Watch, opened
-from page_visits import with_all
+from page_visits import visit
 
 expect = pytest.importorskip("playwright.sync_api", reason="the package playwright is not installed").expect
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser, BrowserContext, Page
+    from playwright.sync_api import Browser, BrowserContext
 
 Profile = tuple["BrowserContext", Watch]
 AWAY = ("ERR_CONNECTION_REFUSED", "ERR_EMPTY_RESPONSE", "ERR_INCOMPLETE_CHUNKED_ENCODING",
@@ -24,13 +24,6 @@ LONG_MAP: dict[str, Any] = {
     "kind": "map", "scene": "two-dof", "parameter": "damper.N0", "from": 20, "to": 1000, "steps": 200,
     "frequencies": 2000, "harmonics": 15, "ridge": False, "fresh": True,
 }  # fmt: skip
-
-
-def visit(context: BrowserContext, site: Site, words: str = "") -> Page:
-    page = context.new_page()
-    page.goto(f"{site.url}/{with_all(words)}")
-    page.locator("html[data-ready]").wait_for(state="attached")
-    return page
 
 
 def submit(site: Site, **changes: object) -> str:
@@ -90,6 +83,7 @@ def test_another_scene_in_the_middle_of_a_study_begins_anew(profile: Profile, si
             httpx.delete(f"{site.url}/v1/jobs/{job['id']}")
 
 
+@pytest.mark.long
 def test_a_study_that_falls_short_says_so(profile: Profile, site: Site) -> None:
     context, watch = profile
     watch.allowed = ("status of 422",)
@@ -105,6 +99,7 @@ def test_a_study_that_falls_short_says_so(profile: Profile, site: Site) -> None:
     expect(page.locator("#study-status")).to_contain_text("did not come to their end", timeout=60_000)
 
 
+@pytest.mark.long
 def test_the_service_stopped_and_started_under_the_page(profile: Profile, site: Site) -> None:
     context, watch = profile
     watch.allowed = AWAY

@@ -138,6 +138,7 @@ def test_what_was_identified_becomes_a_robust_design(profile: Profile, site: Sit
     assert set(request_of(site, page, "design")["uncertain"]) >= {"centre", "covariance"}
 
 
+@pytest.mark.long
 def test_a_front_against_an_amplitude_of_ones_own(profile: Profile, site: Site) -> None:
     page = visit(profile[0], site, "?scene=two-dof&tab=map&harmonics=1")
     page.fill("#front-limit", "2200")

@@ -109,6 +109,7 @@ def test_a_project_gathers_runs_that_are_named_found_and_thrown_away(profile: Pr
     expect(page.locator("#project")).to_have_value(project)
 
 
+@pytest.mark.long
 def test_a_run_that_somebody_else_changed_is_not_overwritten(profile: Profile, site: Site) -> None:
     context, watch = profile
     watch.allowed = ("status of 412",)
@@ -180,6 +181,7 @@ def test_what_is_under_way_is_seen_in_a_fresh_tab(profile: Profile, site: Site) 
         httpx.delete(f"{site.url}/v1/jobs/{job}")
 
 
+@pytest.mark.long
 def test_a_scene_that_is_not_there_is_named(profile: Profile, site: Site) -> None:
     page = visit(profile[0], site, "?scene=nosuch&set=damper.N0:5")
     expect(page.locator("#banner")).to_contain_text("There is no scene nosuch at this service")

@@ -12,7 +12,7 @@ from optim.problem.uncertainty_input import read_uncertain
 from service.cli import main
 from service.rendering.docs_tables import TABLES, with_tables
 from solver import load_scene
-from solver.scene.io import load_raw
+from solver.scene.toml import load_raw
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 PAGE_NAME = "identification.md"

@@ -24,9 +24,8 @@ import solver
 from service.cli import main
 from service.cli.app import command
 from service.cli.options.problem import OPTIONS
-from service.jobs.common.problem import arguments
-from service.jobs.kinds.design import DesignRequest, design_issues
 from service.jobs.registry import ABOUT_THE_RUN
+from service.jobs.studies.design import Design
 from service.jobs.validation import validated
 from service.settings.settings import Settings
 from solver.contacts.laws.registry import laws, unregister
@@ -217,13 +216,13 @@ def test_the_problem_of_the_readme_is_one() -> None:
     (shown,) = [text for text in blocks("toml") if text.startswith("scene =")]
     for text in (shown, (ROOT / "docs" / "problem.toml").read_text(encoding="utf-8")):
         body = tomllib.loads(text)
-        request = validated(DesignRequest, body)
-        assert design_issues(solver.load_scene(body["scene"]), arguments(request)) == []
+        request = validated(Design, body)
+        assert request.issues(solver.load_scene(body["scene"])) == []
 
 
 def test_the_page_knows_every_key_and_option_of_a_problem() -> None:
     table = (ROOT / "docs" / "design.md").read_text(encoding="utf-8")
-    keys = set(DesignRequest.model_fields) - {"fresh", "priority", "max_seconds", *ABOUT_THE_RUN}
+    keys = set(Design.model_fields) - {"fresh", "priority", "max_seconds", *ABOUT_THE_RUN}
     assert [key for key in keys if f"`{key}`" not in table] == []
     assert [option for option in OPTIONS.values() if f"`{option}" not in table] == []
 

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
+from pkgutil import walk_packages
 
 import pytest
 
@@ -13,6 +15,7 @@ import solver
 import stickslip
 from service.client.client import Client
 from service.errors import ServiceProblem
+from solver.results.views import Views, on_demand
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 HEAVY = {"numba", "llvmlite", "numpy", "scipy", "pydantic", "casadi", "httpx", "typer", "rich", "matplotlib"}
@@ -65,3 +68,24 @@ def test_errors_and_scenes_load_no_kernels() -> None:
     """What a script does before it computes."""
     code = "import stickslip; stickslip.SceneError; stickslip.load_scene('two-dof')"
     assert loaded_by(code) & {"numba", "scipy", "casadi", "matplotlib", "httpx"} == set()
+
+
+def test_every_result_is_shown_by_functions_that_are_there() -> None:
+    """`Views` names them as text, which no checker follows when they move."""
+    modules = [
+        import_module(found.name)
+        for package in (solver, optim)
+        for found in walk_packages(package.__path__, f"{package.__name__}.")
+    ]
+    views = {
+        each.VIEWS
+        for module in modules
+        for each in vars(module).values()
+        if isinstance(each, type) and isinstance(getattr(each, "VIEWS", None), Views)
+    }
+    assert len(views) > 15
+    for view in views:
+        figure = view.figure if ":" in view.figure else f"figures:{view.figure}"
+        places = [f"summary:{view.summary}", f"to_dataset:{view.dataset}"]
+        for place in [*places, *([f"plots.{figure}"] if view.figure else [])]:
+            assert callable(on_demand(f"{view.package}.{place}"))

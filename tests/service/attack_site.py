@@ -18,12 +18,12 @@ from pathlib import Path
 from typing import TypeVar
 
 from benchmarks.service_process import ServiceProcess, serving
-from service.auth import keys
+from service.auth import authenticator
 from service.auth.callers import Scope
 from service.db import revisions
 from service.db.clock import utc_now
 from service.db.engine import Database
-from service.db.repositories.keys import KeyRepository
+from service.db.repositories.owned import KeyRepository
 
 MOST_MEMORY = 300 * 1024**2
 """Bytes above those of the idle service that an attack may take."""
@@ -240,7 +240,7 @@ def attacked(folder: Path, **settings: object) -> Iterator[Site]:
     revisions.upgrade(url)
     database = Database(url)
     tokens = [
-        keys.create(KeyRepository(database), owner, [Scope.SUBMIT], utc_now()).token
+        authenticator.create(KeyRepository(database), owner, [Scope.SUBMIT], utc_now()).token
         for owner in ("eve", "ann")
     ]
     database.close()

@@ -16,14 +16,15 @@ from pathlib import Path
 
 import httpx
 import pytest
-from fault_site import SCRIPT, free_port
+from fault_site import SCRIPT
+from launch import free_port
 
-from service.auth import keys
+from service.auth import authenticator
 from service.auth.callers import KeyLimits, Scope
 from service.db import revisions
 from service.db.clock import utc_now
 from service.db.engine import Database
-from service.db.repositories.keys import KeyRepository
+from service.db.repositories.owned import KeyRepository
 
 MEMORY_MB = 300.0
 """Most that an attack may add to the memory of a service [MB]."""
@@ -132,7 +133,7 @@ def make_keys(url: str, owners: tuple[str, ...], limits: Mapping[str, KeyLimits]
     database = Database(url)
     try:
         made = {
-            one: keys.create(
+            one: authenticator.create(
                 KeyRepository(database), one, [Scope.SUBMIT], utc_now(), limits=limits.get(one, KeyLimits())
             )
             for one in owners

@@ -9,10 +9,9 @@ import httpx
 import pytest
 from postgresql_cluster import Cluster, binaries
 from private_kinds import PRIVATE
-from service_helpers import MakeSettings, serving, settings_of
+from service_helpers import MakeSettings, serving, settings_of, with_tables
 
 from service.client.embedded import EmbeddedService
-from service.db import revisions
 from service.db.engine import Database
 from service.jobs.kinds import SHIPPED
 
@@ -58,7 +57,7 @@ def lasting(
     """A service with the private kinds, shared by the tests of a module that leave no job behind."""
     with ExitStack() as stack:
         if request.param == "sqlite":
-            url = f"sqlite:///{tmp_path_factory.mktemp('lasting')}/jobs.db"
+            url = with_tables(tmp_path_factory.mktemp("lasting"))
         else:
             url = stack.enter_context(request.getfixturevalue("cluster").database())
         yield stack.enter_context(EmbeddedService(settings_of(url)(), PRIVATE))
@@ -83,9 +82,7 @@ def module_database(
 @contextmanager
 def migrated(request: pytest.FixtureRequest, folder: Path) -> Iterator[Database]:
     if request.param == "sqlite":
-        url = f"sqlite:///{folder}/jobs.db"
-        revisions.upgrade(url)
-        database = Database(url)
+        database = Database(with_tables(folder))
         yield database
         database.close()
         return

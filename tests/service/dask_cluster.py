@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import signal
-import socket
 import subprocess
 import sys
 from contextlib import suppress
@@ -12,6 +11,7 @@ from pathlib import Path
 from typing import Self
 
 import psutil
+from launch import free_port
 
 HERE = Path(__file__).parent
 ENVIRONMENT = {
@@ -21,12 +21,6 @@ ENVIRONMENT = {
     "NUMBA_NUM_THREADS": "1",
     "PYTHONPATH": os.pathsep.join([str(HERE), str(HERE.parents[1]), os.environ.get("PYTHONPATH", "")]),
 }
-
-
-def free_port() -> int:
-    with socket.socket() as listener:
-        listener.bind(("127.0.0.1", 0))
-        return int(listener.getsockname()[1])
 
 
 def lives(process: psutil.Process) -> bool:

@@ -7,7 +7,6 @@ import os
 import random
 import secrets
 import signal
-import socket
 import subprocess
 import sys
 import threading
@@ -33,12 +32,6 @@ _SETTINGS = {
     "STICKSLIP_GRACE_SECONDS": "0.3",
     "STICKSLIP_ANSWER_WORKERS": "1",
 }
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 @dataclass

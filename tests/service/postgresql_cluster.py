@@ -6,7 +6,6 @@ import os
 import pwd
 import secrets
 import shutil
-import socket
 import subprocess
 import tempfile
 import time
@@ -17,6 +16,7 @@ from typing import Any, Self
 
 import psycopg
 import pytest
+from launch import free_port
 from psycopg import sql
 
 from service.db import revisions
@@ -54,9 +54,7 @@ class Cluster:
         self._data = self.folder / "data"
         self._password = secrets.token_hex(8)
         self._process: subprocess.Popen[bytes] | None = None
-        with socket.socket() as free:
-            free.bind(("127.0.0.1", 0))
-            self._port = int(free.getsockname()[1])
+        self._port = free_port()
         self._how: dict[str, Any] = {
             "cwd": self.folder,
             "env": {"HOME": str(self.folder), "LC_ALL": "C.UTF-8", "PATH": os.defpath},

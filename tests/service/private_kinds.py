@@ -14,10 +14,10 @@ from pydantic import Field
 
 from service.jobs.arrays import encode
 from service.jobs.checkpoints import Checkpoints, RunParts
-from service.jobs.kinds import sweep
 from service.jobs.outputs import ContactValues, JobOutput, Progress, ShouldStop, SweepRecord
 from service.jobs.registry import JobKind, JobRequest, Registry, Resolved
 from service.jobs.studies import map as maps
+from service.jobs.studies.sweep import Sweep
 from solver.errors import Issue, SceneError, SettingError
 
 
@@ -174,7 +174,7 @@ def slow_sweep(
     spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop, checkpoints: Checkpoints
 ) -> JobOutput:
     """The kind `sweep`, slowly."""
-    return sweep.run_on(spec, progress, slow(should_stop), checkpoints)
+    return Sweep.run_on(spec, progress, slow(should_stop), checkpoints)
 
 
 def slow_map(
@@ -205,7 +205,7 @@ def confused(_request: IterationRequest, _source: object) -> Resolved:
 
 
 SLOW = (
-    replace(sweep.SWEEP, name="slow-sweep", run_on=slow_sweep),
+    replace(Sweep.as_kind(), name="slow-sweep", run_on=slow_sweep),
     replace(maps.Map.as_kind(), name="slow-map", parts=None, run_on=slow_map),
 )
 PRIVATE = Registry(

@@ -9,7 +9,7 @@ import sys
 
 from private_kinds import PRIVATE
 
-from service.http.process.server import serve, work
+from service.http.server import serve, work
 from service.settings.settings import load_settings
 
 if __name__ == "__main__":

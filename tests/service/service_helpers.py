@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 import re
+import tempfile
 import threading
 import time
 import zlib
@@ -16,10 +18,11 @@ import pytest
 from fastapi import FastAPI
 from sqlalchemy import text
 
+from service.db import revisions
 from service.db.engine import Database
 from service.db.repositories import NewJob
 from service.http.app import create_app
-from service.http.process.server import _bind, _config, _Server
+from service.http.server import _bind, _config, _Server
 from service.jobs.registry import Registry
 from service.queue.core import Service
 from service.settings.settings import Settings, load_settings
@@ -28,6 +31,20 @@ PATIENCE = 120.0
 """How long to wait for what must happen [s]: far longer than it takes on a busy machine."""
 
 MakeSettings = Callable[..., Settings]
+
+
+@functools.cache
+def _empty() -> bytes:
+    """A SQLite file with tables and nothing in them: made once, as it takes a tenth of a second."""
+    with tempfile.TemporaryDirectory() as folder:
+        revisions.upgrade(f"sqlite:///{folder}/jobs.db")
+        return Path(folder, "jobs.db").read_bytes()
+
+
+def with_tables(folder: Path) -> str:
+    """The address of a new database with its tables, a file in `folder`."""
+    (folder / "jobs.db").write_bytes(_empty())
+    return f"sqlite:///{folder}/jobs.db"
 
 
 def settings_of(url: str) -> MakeSettings:
@@ -74,7 +91,7 @@ def new_job(**values: object) -> NewJob:
 def serving(folder: Path, registry: Registry, **values: object) -> Iterator[ServedClient]:
     """A client of a real server on loopback."""
     defaults = {
-        "database": f"sqlite:///{folder}/jobs.db", "workers": 1, "port": 0, "max_body_bytes": 20_000,
+        "database": with_tables(folder), "workers": 1, "port": 0, "max_body_bytes": 20_000,
         "page_limit": 50, "answer_workers": 1,
     }  # fmt: skip
     settings = load_settings(**{**defaults, **values})

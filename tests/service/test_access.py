@@ -16,8 +16,7 @@ from private_kinds import PRIVATE
 from service_helpers import ServedClient, is_problem, serving, until
 from sqlalchemy import text
 
-from service.auth import keys
-from service.auth.authenticator import REMEMBERED_SECONDS, _neighbourhood
+from service.auth.authenticator import REMEMBERED_SECONDS, _neighbourhood, caller_of_row, create, id_of
 from service.auth.callers import KeyLimits, Scope
 from service.auth.rate_limit import Buckets
 from service.cli import main
@@ -25,7 +24,7 @@ from service.client.client import Client
 from service.db import tokens
 from service.db.clock import utc_now
 from service.db.engine import Database
-from service.db.repositories.keys import KeyRepository
+from service.db.repositories.owned import KeyRepository
 from service.errors import InvalidRequestError
 
 SLOW = {"kind": "iteration", "seconds": 60.0, "fresh": True}
@@ -40,7 +39,7 @@ def guarded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ServedClient]:
 
 def token_of(client: ServedClient, *scopes: Scope, owner: str = "ann", **limits: Any) -> str:
     chosen = scopes or (Scope.SUBMIT,)
-    return keys.create(client.service.keys, owner, chosen, utc_now(), None, KeyLimits(**limits)).token
+    return create(client.service.keys, owner, chosen, utc_now(), None, KeyLimits(**limits)).token
 
 
 def bearer(token: str) -> dict[str, str]:
@@ -49,7 +48,7 @@ def bearer(token: str) -> dict[str, str]:
 
 def test_only_a_digest_is_kept(database: Database) -> None:
     repository = KeyRepository(database)
-    made = keys.create(repository, "ann", [Scope.READ], utc_now(), None, KeyLimits(waiting=3))
+    made = create(repository, "ann", [Scope.READ], utc_now(), None, KeyLimits(waiting=3))
     with database.reading() as connection:
         [row] = connection.execute(text("SELECT * FROM api_key")).all()
     assert made.token.rpartition("_")[2] not in str(row)
@@ -59,7 +58,7 @@ def test_only_a_digest_is_kept(database: Database) -> None:
     other = repository.rotate(made.row.id)
     assert not tokens.matches(made.token, repository.get(made.row.id)), "the old secret ends"
     assert tokens.matches(other.token, repository.get(made.row.id))
-    assert keys.caller_of_row(other.row).limits.waiting == 3
+    assert caller_of_row(other.row).limits.waiting == 3
     assert repository.usable(utc_now())
     repository.revoke(made.row.id)
     assert not repository.usable(utc_now())
@@ -81,12 +80,12 @@ def test_an_unknown_key_is_compared_too(monkeypatch: pytest.MonkeyPatch) -> None
 @pytest.mark.parametrize("owner", ["", " ", "-x", "a\nb", "a" * 101])
 def test_an_owner_is_a_name(database: Database, owner: str) -> None:
     with pytest.raises(InvalidRequestError, match="`owner` must be"):
-        keys.create(KeyRepository(database), owner, [Scope.READ], utc_now())
+        create(KeyRepository(database), owner, [Scope.READ], utc_now())
 
 
 def test_a_key_expires_and_must_not_have_expired(database: Database) -> None:
     with pytest.raises(InvalidRequestError, match="in the future"):
-        keys.create(KeyRepository(database), "ann", [Scope.READ], utc_now(), utc_now() - timedelta(seconds=1))
+        create(KeyRepository(database), "ann", [Scope.READ], utc_now(), utc_now() - timedelta(seconds=1))
 
 
 def test_the_command_works_beside_a_service_and_a_revoked_key_ends(
@@ -120,7 +119,7 @@ def test_a_stream_ends_with_its_key(guarded: ServedClient) -> None:
     with guarded.stream("GET", f"{job['links']['self']}/events", headers=bearer(token)) as stream:
         lines = stream.iter_lines()
         next(lines)
-        guarded.service.keys.revoke(str(keys.id_of(token)))
+        guarded.service.keys.revoke(str(id_of(token)))
         rest = list(lines)
     assert not any(line.startswith("event: end") for line in rest)
     admin = bearer(token_of(guarded, Scope.ADMIN))
@@ -179,7 +178,7 @@ def test_wrong_keys_are_limited_and_working_ones_are_not(
     line = audited[-1]
     assert (line["status"], line["reason"], line["method"]) == (429, "too-many-requests", "GET")
     assert line["address"] == "127.0.0.1"
-    assert line["key"] == keys.id_of(good)
+    assert line["key"] == id_of(good)
     assert "\x1b" not in caplog.text
     assert good not in caplog.text
     assert wrong not in caplog.text

@@ -176,6 +176,7 @@ def test_a_run_goes_on_from_what_another_kept(name: str) -> None:
     assert not set(new) & {one.part for one in kept_before}, "nothing is computed twice"
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("name", SLOW)
 def test_what_cannot_be_used_is_not(name: str, caplog: pytest.LogCaptureFixture) -> None:
     good = stopped_midway(name)

@@ -48,6 +48,7 @@ def test_services_that_share_a_database_share_its_clock(database: Database) -> N
     assert abs(jobs.now() - utc_now()) < timedelta(seconds=60)
 
 
+@pytest.mark.few(keep=("postgresql",))
 @pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.long)])
 def test_a_clock_that_is_stepped_costs_nothing(url: str, seed: int) -> None:
     """Hours forth and back while jobs run: every job is done once, at its first attempt."""

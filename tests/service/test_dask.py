@@ -57,6 +57,7 @@ BODIES: dict[str, dict[str, Any]] = {
     "modes": {"scene": "two-dof", "from": 0.01, "to": 10.0, "harmonics": 3},
     "controlled": {"scene": "two-dof", "amplitude": 1.0, "harmonics": 3},
     "sensitivities": {"scene": "two-dof", "harmonics": 3},
+    "plan": {"scene": "two-dof"},
     "identify": {
         "scene": "two-dof", "unknowns": {"damper.N0": [20, 500]}, "harmonics": 3, "starts": 1,
         "data": [{"frequency": [0.9, 1.0, 1.1], "amplitude": [0.85, 1.95, 2.1]}],
@@ -127,11 +128,15 @@ def threads_idle(service: EmbeddedService) -> bool:
     return status.ready == 2 and status.busy == 0
 
 
-def test_every_kind_gives_what_it_gives_here(service: tuple[EmbeddedService, DaskCluster]) -> None:
+@pytest.mark.few(2)
+@pytest.mark.parametrize("kinds", [("sweep", "mistuning", "march"), tuple(BODIES)], ids=["three", "all"])
+def test_every_kind_gives_what_it_gives_here(
+    service: tuple[EmbeddedService, DaskCluster], kinds: tuple[str, ...]
+) -> None:
     """Bit for bit, divided or not, with the arrays of all sweeps."""
     assert set(BODIES) == {kind.name for kind in SHIPPED}
-    jobs = {kind: service[0].submit(kind, body) for kind, body in BODIES.items()}
-    here = {kind: computed(service[0], kind, body) for kind, body in BODIES.items()}
+    jobs = {kind: service[0].submit(kind, BODIES[kind]) for kind in kinds}
+    here = {kind: computed(service[0], kind, BODIES[kind]) for kind in kinds}
     for kind, job in jobs.items():
         assert results_of(service[0], job) == here[kind], kind
 
@@ -162,6 +167,7 @@ def test_failures_are_those_of_a_local_worker(service: tuple[EmbeddedService, Da
     assert set(embedded.results(threads).result.values()) == {"1"}
 
 
+@pytest.mark.long
 @pytest.mark.skipif(sys.platform != "linux", reason="memory is limited on Linux alone")
 def test_a_worker_has_the_limit_of_memory_of_the_service(
     service: tuple[EmbeddedService, DaskCluster], tmp_path: Path
@@ -225,6 +231,7 @@ def test_a_worker_with_another_version_computes_nothing(
     assert "the service 0.0.0, in attempt 3 of 3" in done.error["detail"]
 
 
+@pytest.mark.long
 def test_closing_gives_jobs_back_and_frees_the_workers(
     service: tuple[EmbeddedService, DaskCluster], tmp_path: Path
 ) -> None:

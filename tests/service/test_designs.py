@@ -25,7 +25,7 @@ from service.db.clock import utc_now
 from service.db.engine import Database, migrating
 from service.db.models import Base, Job, JobState
 from service.db.repositories import DesignRepository
-from service.db.repositories.designs import insert_design
+from service.db.repositories.stored import insert_design
 from service.errors import InvalidRequestError
 from service.jobs.common.records import design_record
 from service.jobs.ids import new_id
@@ -102,6 +102,7 @@ def meets(record: DesignRecord, query: dict[str, Any]) -> bool:
     )
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize(
     "query",
     [

@@ -15,7 +15,7 @@ from private_kinds import PRIVATE
 from service_helpers import PATIENCE, is_problem, serving, settings_of, until
 
 from service.auth.callers import KEYLESS
-from service.http.events import job_events
+from service.http.routes.events import job_events
 from service.queue.core import Service
 
 SLOW = {"kind": "iteration", "seconds": 60.0, "fresh": True}

@@ -30,13 +30,14 @@ from fault_kinds import (
     server_restarted,
     source_killed,
 )
-from fault_site import Site, clients, free_port
+from fault_site import Site, clients
+from launch import free_port
 from postgresql_cluster import Cluster
 from sqlalchemy import func, select
 
 from service.db.engine import Database
-from service.db.integrity import check
 from service.db.models import Job, JobResult, JobState, Sweep
+from service.db.repositories.integrity import check
 
 COMMON: dict[str, Fault] = {
     "worker killed": child_killed,

@@ -11,8 +11,9 @@ import solver
 from service.cli.commands.client import submit
 from service.cli.options.inputs import join_words
 from service.errors import InvalidRequestError
-from service.jobs.kinds.identify import IDENTIFY, IdentifyRequest
 from service.jobs.outputs import Silent
+from service.jobs.studies.identify import Identify
+from service.jobs.study import resolve
 from service.jobs.validation import validated
 
 BODY: Mapping[str, Any] = {
@@ -33,12 +34,11 @@ class Shipped:
 
 
 def test_it_finds_what_the_data_say() -> None:
-    spec = IDENTIFY.resolve(validated(IdentifyRequest, dict(BODY)), Shipped()).spec
-    output = IDENTIFY.run(spec, Silent(), lambda: False)
+    spec = resolve(validated(Identify, dict(BODY)), Shipped()).spec
+    output = Identify.run(spec, Silent(), lambda: False)
     assert output.shortfall is None
     assert output.result["values"]["damper.mu"] == pytest.approx(0.3, rel=0.02)
-    assert IDENTIFY.view.draw is not None
-    assert IDENTIFY.view.draw(output.result, (), lambda _: None).axes  # type: ignore[arg-type, return-value]
+    assert Identify.draw(output.result, (), lambda _: None).axes  # type: ignore[arg-type, return-value]
 
 
 @pytest.mark.parametrize(
@@ -57,7 +57,7 @@ def test_it_finds_what_the_data_say() -> None:
 )
 def test_what_is_wrong_has_its_pointer(changes: Mapping[str, Any], pointer: str) -> None:
     with pytest.raises(InvalidRequestError) as caught:
-        IDENTIFY.resolve(validated(IdentifyRequest, {**BODY, **changes}), Shipped())
+        resolve(validated(Identify, {**BODY, **changes}), Shipped())
     assert caught.value.issues[0].pointer.startswith(pointer)
 
 
@@ -67,7 +67,7 @@ def test_submit_takes_the_options_of_the_command(monkeypatch: pytest.MonkeyPatch
     words = ["submit", "identify", "two-dof", "--data", '[{"frequency": [1.0], "amplitude": [2.0]}]']
     words += ["--unknown", "damper.mu", "0.1", "0.6", "--prior", "damper.mu", "0.3", "0.1"]
     words += ["--candidate", "damper.N0=50,80", "--scaling", "damper.mu=linear", "--robust"]
-    command = submit.command_of(IDENTIFY)
+    command = submit.command_of(Identify.as_kind())
     command.main(args=join_words(words)[2:], standalone_mode=False)
     (body,) = told
     assert body["unknowns"] == {"damper.mu": [0.1, 0.6]}

@@ -12,8 +12,8 @@ from service_helpers import PATIENCE, MakeSettings, settings_of
 
 from service.cli import main
 from service.client.embedded import EmbeddedService
-from service.db.integrity import check
 from service.db.models import JobState
+from service.db.repositories.integrity import check
 from service.errors import DatabaseError
 
 SWEEP = {"scene": "two-dof", "parameter": "frequency", "from": 0.9, "to": 1.2, "harmonics": 3}

@@ -12,8 +12,8 @@ from alembic import command
 
 from service.db import revisions
 from service.db.engine import database_path, is_sqlite, migrating
-from service.db.integrity import check
 from service.db.models import JobState
+from service.db.repositories.integrity import check
 from service.jobs.arrays import decode
 from service.queue.core import Service
 from service.settings.settings import load_settings

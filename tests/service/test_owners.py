@@ -13,7 +13,7 @@ from service.auth.callers import KEYLESS, Caller, Scope, included
 from service.db.models import JobState
 from service.errors import ConflictError, IdempotencyError, InvalidRequestError, NotFoundError
 from service.jobs.common.scenes import HarmonicRequest, resolve_scene
-from service.jobs.kinds.sweep import SWEEP
+from service.jobs.studies.sweep import Sweep
 from service.queue.core import Service
 from solver.scene.scene import load_scene
 
@@ -24,7 +24,7 @@ BODY = {"kind": "iteration", "sweeps": 1}
 
 @pytest.fixture
 def service(url: str) -> Iterator[Service]:
-    made = Service(settings_of(url)(), PRIVATE.extended(SWEEP))
+    made = Service(settings_of(url)(), PRIVATE.extended(Sweep.as_kind()))
     made.start()
     yield made
     made.stop()

@@ -10,8 +10,7 @@ from sqlalchemy.dialects import sqlite
 
 from service.db import revisions
 from service.db.engine import Database
-from service.db.repositories import storage
-from service.db.repositories.jobs import claims, statements
+from service.db.repositories import job_statements, owned, waiting
 
 BY_KEY = "sqlite_autoindex_job_1"
 
@@ -19,15 +18,15 @@ BY_KEY = "sqlite_autoindex_job_1"
 @pytest.mark.parametrize(
     ("statement", "index"),
     [
-        (statements.COMPUTED_BEFORE, "ix_job_spec_hash_state"),
-        (claims.WAITING_OWNERS, "ix_job_state_owner_priority_id"),
-        (claims.NEXT_PRIORITY, "ix_job_state_owner_priority_id"),
-        (claims.NEXT_JOBS, "ix_job_state_owner_priority_id"),
-        (storage.OF_JOBS, "ix_job_owner_stored_bytes"),
-        (statements.TAKE, BY_KEY),
-        (statements.REPORT, BY_KEY),
-        (statements.SUCCEED, BY_KEY),
-        (statements.BY_ID, BY_KEY),
+        (job_statements.COMPUTED_BEFORE, "ix_job_spec_hash_state"),
+        (waiting.WAITING_OWNERS, "ix_job_state_owner_priority_id"),
+        (waiting.NEXT_PRIORITY, "ix_job_state_owner_priority_id"),
+        (waiting.NEXT_JOBS, "ix_job_state_owner_priority_id"),
+        (owned.OF_JOBS, "ix_job_owner_stored_bytes"),
+        (job_statements.TAKE, BY_KEY),
+        (job_statements.REPORT, BY_KEY),
+        (job_statements.SUCCEED, BY_KEY),
+        (job_statements.BY_ID, BY_KEY),
     ],
 )
 def test_it_goes_by_its_index(tmp_path: Path, statement: Select[tuple[object]] | Update, index: str) -> None:

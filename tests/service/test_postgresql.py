@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import signal
-import socket
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -14,6 +13,7 @@ from datetime import timedelta
 from pathlib import Path
 
 import pytest
+from launch import free_port
 from postgresql_cluster import Cluster
 from private_kinds import PRIVATE
 from service_helpers import PATIENCE, pids, settings_of, until
@@ -208,9 +208,7 @@ def start(url: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator
     with ExitStack() as stack:
 
         def begin() -> tuple[subprocess.Popen[bytes], Client]:
-            with socket.socket() as probe:
-                probe.bind(("127.0.0.1", 0))
-                port = int(probe.getsockname()[1])
+            port = free_port()
             with log.open("ab") as stderr:
                 process = subprocess.Popen([sys.executable, str(SCRIPT), url, str(port)], stderr=stderr)
             stack.callback(process.wait)

@@ -14,11 +14,11 @@ import optim
 import solver
 from optim.problem.problem import Method, pose
 from service.errors import InvalidRequestError
-from service.jobs.common.problem import arguments, problem_of
-from service.jobs.kinds.design import DesignRequest, resolve
-from service.jobs.kinds.pareto import ParetoRequest
-from service.jobs.kinds.pareto import resolve as resolve_front
+from service.jobs.common.problem import arguments
 from service.jobs.registry import ABOUT_THE_RUN
+from service.jobs.studies.design import Design
+from service.jobs.studies.pareto import Pareto
+from service.jobs.study import resolve
 from service.jobs.validation import validated
 
 VARIABLES = {"damper.N0": [20, 1000]}
@@ -58,7 +58,7 @@ class Shipped:
 def pointers(change: dict[str, Any]) -> list[str]:
     body = {"scene": "two-dof", "variables": VARIABLES, **change}
     with pytest.raises(InvalidRequestError) as caught:
-        resolve(validated(DesignRequest, body), Shipped())
+        resolve(validated(Design, body), Shipped())
     assert all(len(issue.message) > 20 for issue in caught.value.issues)
     return [issue.pointer for issue in caught.value.issues]
 
@@ -66,44 +66,44 @@ def pointers(change: dict[str, Any]) -> list[str]:
 def test_every_key_of_the_design_layer_is_one_of_the_body_and_arrives() -> None:
     keys = set(inspect.signature(optim.design).parameters) - NO_KEYS - {"tolerance"}
     assert keys == set(EVERY_KEY) - {"scene", "set"}, "a key of the design layer that the service lacks"
-    assert keys <= set(DesignRequest.model_fields)
-    assert DesignRequest.model_json_schema()["examples"]
-    spec = resolve(validated(DesignRequest, EVERY_KEY), Shipped()).spec
+    assert keys <= set(Design.model_fields)
+    assert Design.model_json_schema()["examples"]
+    spec = resolve(validated(Design, EVERY_KEY), Shipped()).spec
     assert {key: spec[key] for key in keys} == {key: EVERY_KEY[key] for key in keys}
     scene = solver.Scene.from_dict(spec["scene"])
     assert scene.value("shroud.mu") == 0.25
-    problem = pose(scene, **problem_of(spec))
+    problem = pose(scene, **Design.asked(spec)[1])
     assert [case.name for case in problem.cases] == ["first", "twice", "case 3, tip", "case 3, middle"]
 
 
 def test_the_key_of_a_performance_curve_arrives() -> None:
     body = {"scene": "two-dof", "method": "performance-curve", "tolerance": 0.02}
-    spec = resolve(validated(DesignRequest, body), Shipped()).spec
-    problem = pose(solver.Scene.from_dict(spec["scene"]), **problem_of(spec))
+    spec = resolve(validated(Design, body), Shipped()).spec
+    problem = pose(solver.Scene.from_dict(spec["scene"]), **Design.asked(spec)[1])
     assert (problem.method.value, problem.tolerance) == ("performance-curve", 0.02)
     assert pointers({"tolerance": 0.02}) == ["/tolerance"]
 
 
 def test_the_example_of_the_reference_is_one() -> None:
-    [example] = DesignRequest.model_json_schema()["examples"]
-    assert resolve(validated(DesignRequest, example), Shipped()).scene_name == "bladed-disk"
+    [example] = Design.model_json_schema()["examples"]
+    assert resolve(validated(Design, example), Shipped()).scene_name == "bladed-disk"
 
 
 def test_the_methods_are_those_of_the_design_layer() -> None:
     for method in Method:
-        assert arguments(validated(DesignRequest, {"scene": "two-dof", "method": method.value}))["method"]
+        assert arguments(validated(Design, {"scene": "two-dof", "method": method.value}))["method"]
 
 
 def test_a_spec_of_the_first_version_is_still_a_problem() -> None:
     spec = {
-        "scene": {},
+        "scene": solver.load_scene("two-dof").to_dict(),
         "variables": VARIABLES,
         "limit": None,
         "max_band_hz": None,
         "harmonics": 5,
         "start": None,
     }
-    assert problem_of(spec) == {"variables": VARIABLES, "harmonics": 5}
+    assert Design.asked(spec)[1] == {"variables": VARIABLES, "harmonics": 5}
 
 
 CASE = {"name": "one"}
@@ -189,15 +189,15 @@ def test_a_scene_without_friction_has_nothing_to_choose_by_itself() -> None:
 
 def test_a_front_has_the_keys_of_a_design_but_its_own() -> None:
     theirs = set(inspect.signature(optim.pareto_front).parameters) - NO_KEYS
-    keys = set(ParetoRequest.model_fields)
+    keys = set(Pareto.model_fields)
     assert theirs == keys - {"scene", "set", "fresh", "priority", "max_seconds", *ABOUT_THE_RUN}
     body = {**EVERY_KEY, "points": 5}
     for key in ("weights", "max_band_hz", "basins"):
         with pytest.raises(InvalidRequestError, match="is not a known key") as caught:
-            validated(ParetoRequest, body)
+            validated(Pareto, body)
         assert f"/{key}" in [issue.pointer for issue in caught.value.issues]
         del body[key]
-    spec = resolve_front(validated(ParetoRequest, body), Shipped()).spec
+    spec = resolve(validated(Pareto, body), Shipped()).spec
     assert theirs == {key for key in spec if key != "scene"}
 
 
@@ -252,7 +252,7 @@ def test_what_is_wrong_with_an_uncertainty(change: dict[str, Any], where: list[s
 
 def test_every_argument_of_a_robust_design_is_a_key() -> None:
     keys = set(inspect.signature(optim.robust_design).parameters) - NO_KEYS
-    assert keys <= set(DesignRequest.model_fields)
+    assert keys <= set(Design.model_fields)
 
 
 @pytest.mark.long

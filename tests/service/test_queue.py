@@ -51,6 +51,7 @@ def test_a_job_runs_and_keeps_its_result(lasting: EmbeddedService) -> None:
     assert 2 <= len(seen) <= 10 * elapsed + 2, "progress at most ten times a second"
 
 
+@pytest.mark.few(keep=("postgresql",))
 def test_a_killed_worker_costs_an_attempt_and_the_job_is_done_once(
     embedded: EmbeddedService, tmp_path: Path
 ) -> None:
@@ -64,6 +65,7 @@ def test_a_killed_worker_costs_an_attempt_and_the_job_is_done_once(
     assert len(embedded.sweeps(job=job)) == 1
 
 
+@pytest.mark.few(2)
 def test_a_job_that_loses_every_worker_fails_with_the_reason(
     embedded: EmbeddedService, tmp_path: Path
 ) -> None:
@@ -84,6 +86,7 @@ def test_a_job_that_loses_every_worker_fails_with_the_reason(
 
 
 # One that obeys stops long before it would be killed, one that does not is killed after 0.3 s.
+@pytest.mark.few(3)
 @pytest.mark.parametrize(
     ("kind", "grace", "within", "killed"), [("iteration", 30.0, 0.3, False), ("deaf", 0.3, 1.0, True)]
 )
@@ -165,6 +168,7 @@ def test_numbers_that_are_not_finite_are_null(lasting: EmbeddedService) -> None:
     assert lasting.results(job).result == {"mean": None, "list": [None, 1.0]}
 
 
+@pytest.mark.few(2)
 def test_memory_that_runs_out_is_tried_again(make_settings: MakeSettings) -> None:
     """Without a limit: another attempt may find more of it free."""
     with EmbeddedService(make_settings(worker_memory_bytes=0), PRIVATE) as service:
@@ -173,6 +177,7 @@ def test_memory_that_runs_out_is_tried_again(make_settings: MakeSettings) -> Non
     assert "ran out of memory" in done.error["detail"]
 
 
+@pytest.mark.few(2)
 def test_a_worker_that_meets_its_memory_limit_fails_the_job_and_goes_on(make_settings: MakeSettings) -> None:
     with EmbeddedService(make_settings(worker_memory_bytes=100_000_000), PRIVATE) as service:
         small = service.wait(service.submit("allocate", {"size": 500}), timeout=PATIENCE)
@@ -185,6 +190,7 @@ def test_a_worker_that_meets_its_memory_limit_fails_the_job_and_goes_on(make_set
     assert pids[0] == pids[1], "the same process computes what comes after"
 
 
+@pytest.mark.few(2)
 def test_a_job_that_takes_too_long_fails(make_settings: MakeSettings) -> None:
     with EmbeddedService(make_settings(job_seconds=0.3), PRIVATE) as service:
         done = service.wait(service.submit("deaf", {"seconds": 60.0}), timeout=PATIENCE)
@@ -193,6 +199,7 @@ def test_a_job_that_takes_too_long_fails(make_settings: MakeSettings) -> None:
     assert "0.3 s" in done.error["detail"]
 
 
+@pytest.mark.few(2)
 def test_workers_compute_with_one_thread_and_this_process_keeps_its_own(
     make_settings: MakeSettings, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -206,7 +213,7 @@ def test_workers_compute_with_one_thread_and_this_process_keeps_its_own(
     assert "MKL_NUM_THREADS" not in os.environ
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(keep=("postgresql",))
 def test_stopping_gives_running_jobs_back_without_an_attempt(
     make_settings: MakeSettings, tmp_path: Path
 ) -> None:
@@ -221,6 +228,7 @@ def test_stopping_gives_running_jobs_back_without_an_attempt(
     assert [(job.status, job.attempt) for job in done] == [(JobState.SUCCESSFUL, 1)] * 2
 
 
+@pytest.mark.few(2)
 def test_a_worker_killed_while_idle_costs_nothing(embedded: EmbeddedService, tmp_path: Path) -> None:
     file = tmp_path / "pids"
     embedded.wait(embedded.submit("iteration", {"pid_file": str(file)}))
@@ -255,6 +263,7 @@ def test_a_job_may_take_less_time_than_the_service_allows(lasting: EmbeddedServi
     assert "longer than the 0.3 s" in done.error["detail"]
 
 
+@pytest.mark.few(keep=("postgresql",))
 def test_a_lease_is_renewed_while_a_silent_job_runs(make_settings: MakeSettings) -> None:
     settings = make_settings(lease_seconds=1.5, progress_seconds=60.0)
     with EmbeddedService(settings, PRIVATE) as service:
@@ -262,6 +271,7 @@ def test_a_lease_is_renewed_while_a_silent_job_runs(make_settings: MakeSettings)
     assert (done.status, done.attempt) == (JobState.SUCCESSFUL, 1)
 
 
+@pytest.mark.few(keep=("postgresql",))
 def test_an_attempt_whose_job_was_taken_is_stopped_and_writes_nothing(make_settings: MakeSettings) -> None:
     service = Service(make_settings(), PRIVATE)
     service.start()
@@ -278,6 +288,7 @@ def test_an_attempt_whose_job_was_taken_is_stopped_and_writes_nothing(make_setti
         service.stop()
 
 
+@pytest.mark.few(2)
 def test_a_full_queue_takes_no_more(make_settings: MakeSettings) -> None:
     with EmbeddedService(make_settings(queue_limit=2), PRIVATE) as service:
         blocker = service.submit("iteration", {"seconds": 30.0})
@@ -289,6 +300,7 @@ def test_a_full_queue_takes_no_more(make_settings: MakeSettings) -> None:
         assert service.submit("iteration", {"seed": 1}, idempotency_key="known") == known
 
 
+@pytest.mark.few(2)
 def test_workers_that_do_not_come_up_are_told(make_settings: MakeSettings) -> None:
     service = Service(make_settings(), Registry(PRIVATE, warm_up=cannot_warm_up))
     service.start()

@@ -29,8 +29,7 @@ from sqlalchemy import Integer, String, bindparam, delete, select
 from service.db import revisions
 from service.db.engine import Database
 from service.db.models import Job, JobResult, JobState
-from service.db.repositories import Attempt, JobRepository, NewJob
-from service.db.repositories.jobs import statements as job_statements
+from service.db.repositories import Attempt, JobRepository, NewJob, job_statements
 from service.errors import IdempotencyError, QueueFullError
 from service.jobs.outputs import FailureKind, JobFailure, JobOutput
 
@@ -296,8 +295,8 @@ def unguarded() -> Iterator[None]:
     forgotten = (bindparam("number", type_=Integer) >= 0) & (bindparam("holder", type_=String) != "")
     with pytest.MonkeyPatch.context() as patch:
         weak = (Job.id == bindparam("job")) & (Job.state == JobState.RUNNING) & forgotten
-        for module in ("guards", "repository"):
-            patch.setattr(f"service.db.repositories.jobs.{module}.OWNED", weak)
+        for module in ("attempts", "jobs"):
+            patch.setattr(f"service.db.repositories.{module}.OWNED", weak)
         importlib.reload(job_statements)
         yield
     importlib.reload(job_statements)

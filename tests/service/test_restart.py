@@ -15,7 +15,7 @@ from pathlib import Path
 
 import httpx
 import pytest
-from launch import answers
+from launch import answers, free_port
 from service_helpers import PATIENCE, is_problem, pids, until
 
 import solver
@@ -30,9 +30,7 @@ SCRIPT = Path(__file__).with_name("serve_private.py")
 
 @pytest.fixture
 def port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
+    return free_port()
 
 
 @pytest.fixture

@@ -14,6 +14,8 @@ from service.jobs.outputs import Silent
 from service.jobs.validation import validated
 
 TWO = {"scene": "two-dof", "harmonics": 3}
+DISK = solver.load_scene("bladed-disk").to_dict()
+SMALL_DISK = {**DISK, "structure": {**DISK["structure"], "sectors": 3}}
 OVER = {**TWO, "parameter": "damper.N0", "from": 60, "to": 90}
 MARCH = {"scene": "two-dof", "frequency_hz": 1.2}
 BODIES: dict[str, tuple[str, Mapping[str, Any]]] = {
@@ -28,10 +30,11 @@ BODIES: dict[str, tuple[str, Mapping[str, Any]]] = {
     "interference": ("interference", {"scene": "bladed-disk", "speed_rpm": 11000}),
     "mistuning": (
         "mistuning",
-        {"scene": "bladed-disk", "of": "tip", "samples": 2, "harmonics": 1, "from": 740, "to": 780},
+        {"scene": SMALL_DISK, "of": "tip", "samples": 2, "harmonics": 1, "from": 740, "to": 780},
     ),
     "controlled": ("controlled", {**TWO, "amplitude": 1.0}),
     "sensitivities": ("sensitivities", TWO),
+    "plan": ("plan", TWO),
     "phase-resonance": ("modes", {**TWO, "from": 0.3, "to": 1.0, "phase_resonance": True}),
     "modes": ("modes", {**TWO, "from": 0.1, "to": 3.0}),
     "modes with motions": ("modes", {**TWO, "from": 0.1, "to": 3.0, "motions": True}),

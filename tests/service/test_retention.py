@@ -19,20 +19,17 @@ from service.client.embedded import EmbeddedService
 from service.db import revisions
 from service.db.clock import utc_now
 from service.db.engine import Database
-from service.db.integrity import check
-from service.db.models import Design, Job, JobResult, JobState, Sweep, SweepArray, Upload
+from service.db.models import Design, Job, JobResult, JobState, RunTag, Sweep, SweepArray, Upload
 from service.db.repositories import JobRepository, UploadRepository
-from service.db.repositories.projects import Projects
+from service.db.repositories.integrity import check
+from service.db.repositories.owned import Projects
 from service.db.repositories.retention import Pruned, RetentionRepository
 from service.db.repositories.rows import RunWords
-from service.db.repositories.runs import Runs
-from service.db.repositories.shares import Shares
-from service.db.run_models import RunTag
+from service.db.repositories.runs import Runs, Shares
 from service.errors import ConflictError, DatabaseError, StorageFullError
 from service.jobs.arrays import encode
 from service.jobs.outputs import DesignRecord, JobOutput, SweepRecord
-from service.queue.pruning import prune_database
-from service.queue.retention import Retention, prune, prune_uploads
+from service.queue.retention import Retention, prune, prune_database, prune_uploads
 
 DAY = timedelta(days=1)
 

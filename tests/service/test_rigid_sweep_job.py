@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from service.cli import main
-from service.jobs.kinds.sweep import SWEEP, SweepResult
 from service.jobs.outputs import Silent
+from service.jobs.studies.sweep import Sweep, SweepResult
 from solver.scene.scene import Scene
 from solver.scene.toml import toml_text
 
@@ -30,7 +30,7 @@ def test_a_job_gives_the_result_and_the_stored_sweep() -> None:
         "scene": SCENE, "parameter": "frequency", "start": 0.12, "stop": 0.2, "frequency_hz": None,
         "harmonics": 5, "limit": None, "stability": True,
     }  # fmt: skip
-    output = SWEEP.run(spec, Silent(), lambda: False)
+    output = Sweep.run(spec, Silent(), lambda: False)
     told = json.loads(json.dumps(output.result, allow_nan=False))
     SweepResult.model_validate(told)
     assert output.shortfall is None

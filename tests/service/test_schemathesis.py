@@ -77,7 +77,7 @@ def run(service: ServedClient, known: dict[str, str], examples: int) -> int:
 def test_no_answer_is_an_error_of_the_program_or_out_of_its_form(
     service: ServedClient, known: dict[str, str]
 ) -> None:
-    assert run(service, known, 2) > 40
+    assert run(service, known, 1) > 40
     assert service.get("/health/ready").json()["ready"]
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from service.db.engine import database_name
 from service.errors import ConfigurationError
-from service.http.process.server import _bind
+from service.http.server import _bind
 from service.settings.settings import Settings, is_loopback, load_settings
 
 

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from service.http.process.gc_freeze import Sparing
+from service.http.server import Sparing
 
 
 @pytest.fixture(autouse=True)

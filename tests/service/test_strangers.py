@@ -17,11 +17,11 @@ from private_kinds import PRIVATE
 from service_helpers import ServedClient, is_problem, serving
 from sqlalchemy import insert
 
-from service.auth import keys
+from service.auth import authenticator
 from service.auth.callers import Scope
 from service.db.clock import utc_now
 from service.db.models import Job, JobResult, JobState
-from service.db.repositories.designs import insert_design
+from service.db.repositories.stored import insert_design
 from service.http.routes import page
 from service.jobs.ids import new_id
 from service.jobs.outputs import DesignRecord
@@ -215,7 +215,7 @@ def make_tokens(client: ServedClient) -> dict[str, str | None]:
     repository, now = client.service.keys, utc_now()
 
     def token(owner: str, *scopes: Scope, **more: Any) -> str:
-        return keys.create(repository, owner, scopes, now, **more).token
+        return authenticator.create(repository, owner, scopes, now, **more).token
 
     tokens = {
         "none": None,
@@ -228,7 +228,7 @@ def make_tokens(client: ServedClient) -> dict[str, str | None]:
         "admin": token("chief", Scope.ADMIN),
         "monitor": token("watch", Scope.MONITOR),
     }
-    repository.revoke(str(keys.id_of(str(tokens["revoked"]))))
+    repository.revoke(str(authenticator.id_of(str(tokens["revoked"]))))
     return tokens
 
 

@@ -1,51 +1,96 @@
-"""Studies: bodies, commands, submissions and functions of Python take the same keys."""
+"""Studies: bodies, commands, submissions and functions of Python take the same keys, by one contract."""
 
 from __future__ import annotations
 
 import inspect
 import pickle
+from collections.abc import Iterator, Mapping
 
 import pytest
 
+from optim.problem.keys import options
+from service.cli.lazy import STUDY
 from service.cli.options.key_options import key_options, options_of
-from service.cli.study_command import command_of
-from service.jobs.kinds import SHIPPED
+from service.cli.table import COMMANDS
+from service.jobs.common.problem import ProblemRequest
+from service.jobs.kinds import SHIPPED, studies
+from service.jobs.kinds.registry.bodies import KIND, body_model
+from service.jobs.registry import JobRequest
 from service.jobs.study import Study
 from solver.results.views import on_demand
 
-STUDIES = {kind.name: kind.request for kind in SHIPPED if issubclass(kind.request, Study)}
-OF_THE_COMMAND = {"--set", "--plot", "--out", "--json"}
-# Taken otherwise by the function: as one of three words, as a pair, or by another function.
-OTHERWISE = {
-    "controlled": {"no_stability"}, "march": {"history"},
+STUDIES = studies()
+OF_THE_COMMAND = {"--set", "--plot", "--out", "--json", "--report", "--uncertain", "--problem"}
+# Functions besides that take keys of a study.
+BESIDES = {
+    "solve": ("solver:solve_all",), "design": ("optim:robust_design",), "sensitivities": (),
+    "modes": ("solver:limit_cycles",),
+}  # fmt: skip
+# Keys that Python takes otherwise: as one of three words, as a pair, or by a function of its own.
+OTHERWISE: Mapping[str, set[str]] = {
+    "controlled": {"no_stability"}, "march": {"history"}, "solve": {"every"},
+    "sweep": {"multipliers", "switched"},
     "modes": {
-        "start", "stop", "performance", "aero_damping", "mode_alone", "motions", "exact_peaks", "disturbance",
+        "start", "stop", "performance", "aero_damping", "motions", "exact_peaks", "disturbance",
         "phase_resonance",
     },
 }  # fmt: skip
+# Arguments of Python alone: objects and callbacks, and what keys say in other words.
+REQUIRED = inspect.Parameter.empty
+WATCHED = {"scene", "limits", "on_progress", "should_stop", "on_best", "on_points", "on_stretch"}
+OF_PYTHON: Mapping[str, set[str]] = {
+    "sweep": {"settings", "errors", "peaks", "guess", "resume"},
+    "sensitivities": {"values"},
+    "map": {"effects"},
+    "peaks": {"effects"},
+    "march": {"start", "tractions"},
+    "modes": {"amplitudes", "errors", "found", "most_points", "stability"},
+    "controlled": {"errors", "most_points", "stability"},
+}
+
+
+def parameters(study: type[Study]) -> Mapping[str, inspect.Parameter]:
+    """Those of the functions behind a study."""
+    places = (study.FUNCTION, *BESIDES.get(study.NAME, ()))
+    functions = [inspect.signature(inspect.unwrap(on_demand(place))) for place in places]
+    return {name: one for each in reversed(functions) for name, one in each.parameters.items()}
+
+
+def defaults(study: type[Study]) -> Iterator[tuple[str, object, object]]:
+    """Each key that may be left out, with the default of the body and that of the function."""
+    known = parameters(study)
+    for key in set(study.own_keys()) - OTHERWISE.get(study.NAME, set()):
+        field = study.model_fields[key]
+        if not field.is_required():
+            yield key, field.default, known[key].default
 
 
 @pytest.mark.parametrize("name", STUDIES)
 def test_every_face_has_the_same_keys(name: str) -> None:
-    study = STUDIES[name]
-    flags = {one.name: one.flag for one in key_options(SHIPPED[name], None)}
-    own = {flags[key] for key in study.own_keys()}
-    assert set(options_of(command_of(study))) - OF_THE_COMMAND == own
-    function = inspect.signature(inspect.unwrap(on_demand(study.FUNCTION)))
-    assert set(study.own_keys()) - OTHERWISE.get(name, set()) <= function.parameters.keys()
+    study, own = STUDIES[name], set(STUDIES[name].own_keys())
+    known = set(parameters(study))
+    assert own - OTHERWISE.get(name, set()) <= known, "a key that Python lacks"
+    assert known - WATCHED - OF_PYTHON.get(name, set()) - own == set(), "an argument without a key"
+    made = {one.name: one for one in key_options(SHIPPED[name], None)}
+    flags = {made[key].flag for key in own}
+    [command] = [entry.function() for entry in COMMANDS if entry.name == name]
+    taken = set(options_of(command)) - OF_THE_COMMAND
+    if name == "identify":  # measured data are files, an argument of the command
+        flags -= {"--data"}
+    if issubclass(study, ProblemRequest):  # tables stand in the problem file alone
+        flags = {one.flag for one in options(study).values()}
+    assert taken == flags
+    body = body_model(name, study)
+    keys = {made[key].key for key in own} | set(JobRequest.model_fields) | {KIND, "scene", "set"}
+    assert body.model_json_schema()["properties"].keys() == keys
 
 
 @pytest.mark.parametrize("name", STUDIES)
 def test_what_is_left_out_is_the_same_everywhere(name: str) -> None:
     """A default of a body, shown by the command, is that of the function."""
-    study = STUDIES[name]
-    function = inspect.signature(inspect.unwrap(on_demand(study.FUNCTION))).parameters
-    for key in study.own_keys():
-        field = study.model_fields[key]
-        if field.is_required() or key in OTHERWISE.get(name, ()):
-            continue
-        default = function[key].default
-        assert field.default == default or (field.default is None and default is not inspect.Parameter.empty)
+    for key, of_body, of_function in defaults(STUDIES[name]):
+        unsaid = of_body in (None, "auto") and (key == "uncertain" or of_function is not REQUIRED)
+        assert of_body == of_function or unsaid, key
 
 
 @pytest.mark.parametrize("name", STUDIES)
@@ -53,3 +98,10 @@ def test_a_worker_is_sent_it_by_name(name: str) -> None:
     kind = SHIPPED[name]
     assert pickle.loads(pickle.dumps((kind.request, kind.resolve))) == (kind.request, kind.resolve)
     assert callable(pickle.loads(pickle.dumps(kind.run)))
+    assert not hasattr(STUDIES[name], "FIGURE") or callable(on_demand(STUDIES[name].FIGURE))
+
+
+def test_every_kind_is_a_study_with_a_command() -> None:
+    assert STUDIES.keys() == {kind.name for kind in SHIPPED}
+    assert STUDIES.keys() <= {entry.name for entry in COMMANDS}
+    assert {entry.name for entry in COMMANDS if entry.home == STUDY} <= STUDIES.keys()

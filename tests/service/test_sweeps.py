@@ -16,7 +16,7 @@ from service.db.clock import utc_now
 from service.db.engine import Database
 from service.db.models import NOBODY
 from service.db.repositories import JobRepository, NewJob, SweepRepository
-from service.db.repositories.sweeps import insert_sweeps
+from service.db.repositories.stored import insert_sweeps
 from service.errors import InvalidRequestError
 from service.jobs.arrays import encode
 from service.jobs.outputs import ContactValues, JobOutput, SweepRecord
@@ -79,6 +79,7 @@ def meets(record: SweepRecord, query: dict[str, Any]) -> bool:
     )
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize(
     "query",
     [

@@ -15,7 +15,7 @@ from service.db.clock import utc_now
 from service.db.engine import Database
 from service.db.models import JobState
 from service.db.repositories import JobRepository
-from service.db.repositories.projects import Projects
+from service.db.repositories.owned import Projects
 from service.db.repositories.rows import RunWords
 from service.db.repositories.runs import RunFilter, Runs
 from service.errors import (

@@ -15,8 +15,7 @@ import numpy as np
 
 from optim.errors import DataError
 from optim.identification.data.measured import Column, DataKind, Measured, Model, Predicted
-from optim.identification.data.measured_units import Dimension
-from optim.identification.data.table import Table, check_monotone
+from optim.identification.data.table import Dimension, Table, check_monotone
 from optim.problem.variables import Real
 from solver.balance.balance import build
 from solver.balance.simplifications import Effects

@@ -1,15 +1,19 @@
-"""What every kind of data is to the fit: observations, their noise, and a model with derivatives."""
+"""What every kind of data is to the fit: observations, noise, a model with derivatives; all kinds.
+
+A further kind is one module and one line in `SHIPPED`.
+"""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache
+from importlib import import_module
 
 import numpy as np
 
-from optim.identification.data.measured_units import Dimension
-from optim.identification.data.table import Table
+from optim.identification.data.table import Dimension, Table
 from optim.problem.variables import Real
 from solver.jit.fourier import Integer
 from solver.scene.scene import Scene
@@ -155,3 +159,26 @@ class DataKind:
     marks: tuple[tuple[str, ...], ...]
     words: Mapping[str, str]
     read: Callable[[Scene, Table], Measured]
+
+
+SHIPPED = (
+    "optim.identification.data.response",
+    "optim.identification.data.loop",
+    "optim.identification.data.mode",
+)
+
+
+@cache
+def data_kinds() -> tuple[DataKind, ...]:
+    """Return every kind of data there is."""
+    return tuple(import_module(module).KIND for module in SHIPPED)
+
+
+def known_columns() -> dict[str, Column]:
+    """Return the columns of all kinds by name; a name means the same in each."""
+    return {column.name: column for kind in data_kinds() for column in kind.columns}
+
+
+def known_words() -> dict[str, str]:
+    """Return what the heads of all kinds may say."""
+    return {word: text for kind in data_kinds() for word, text in kind.words.items()}

@@ -14,8 +14,7 @@ import numpy as np
 
 from optim.errors import DataError
 from optim.identification.data.measured import Column, DataKind, Measured, Model, Predicted
-from optim.identification.data.measured_units import Dimension
-from optim.identification.data.table import Table, check_monotone, check_sign
+from optim.identification.data.table import Dimension, Table, check_monotone, check_sign
 from optim.problem.variables import Real
 from solver.errors import SettingError
 from solver.modes.at_amplitudes import ModePoints, mode_at_amplitudes

@@ -9,10 +9,8 @@ from typing import Any
 import numpy as np
 
 from optim.errors import DataError
-from optim.identification.data.measured_units import split_head
-from optim.identification.data.table import Table
-from optim.identification.readers.columns import Head, read_head, table_of
-from optim.identification.readers.registry import DataFormat
+from optim.identification.data.table import Table, split_head
+from optim.identification.readers.registry import DataFormat, Head, read_head, table_of
 from solver.jit.fourier import Real
 
 _SEPARATORS = (";", "\t", ",")

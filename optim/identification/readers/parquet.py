@@ -8,8 +8,7 @@ import numpy as np
 
 from optim.errors import DataError
 from optim.identification.data.table import Table
-from optim.identification.readers.columns import read_head, table_of
-from optim.identification.readers.registry import DataFormat
+from optim.identification.readers.registry import DataFormat, read_head, table_of
 from optim.problem.variables import Real
 from solver.errors import MissingExtraError
 

@@ -9,10 +9,8 @@ from typing import Any
 import numpy as np
 
 from optim.errors import DataError
-from optim.identification.data.measured_units import Dimension, unit_of
-from optim.identification.data.table import Table
-from optim.identification.readers.columns import read_head, table_of
-from optim.identification.readers.registry import DataFormat
+from optim.identification.data.table import Dimension, Table, unit_of
+from optim.identification.readers.registry import DataFormat, read_head, table_of
 from solver.errors import MissingExtraError
 
 _FREQUENCY, _FORCE = 18, 13  # specific data types of an axis

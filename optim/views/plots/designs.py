@@ -1,19 +1,21 @@
-"""Pictures of designs: the response with what it must keep, and both optima over an uncertainty."""
+"""Pictures of designs: one response, both optima over an uncertainty, the front, the shares of parameters."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from optim.criteria.forbidden import FORBIDDEN
 from optim.criteria.peak import PEAK
 from solver.jit.fourier import Real
 from solver.results import units
+from solver.results.units import LengthUnit
 from solver.views.plots import style
 from solver.views.plots.curves import Response
 from solver.views.plots.responses import Demands, response_figure
@@ -94,3 +96,118 @@ class _Peaks:
         known = np.sort([peak for peak in side["samples"]["peaks"] if peak is not None])
         worst = math.nan if side["worst"] is None else float(side["worst"]["peak"])
         return cls(known=known.astype(np.float64), worst=worst)
+
+
+MOST = 12  # parameters shown, those that matter most
+_LEAST = 1e-3  # per cent below which a bar is not worth a line
+
+
+def sensitivities_figure(answer: Mapping[str, Any], *, ax: Into = None) -> Figure:
+    """Bars of the per cent of the highest peak, and of the band, for one per cent of a parameter.
+
+    Parameters
+    ----------
+    answer : the JSON of `optim.SensitivityResult`, with at least one row that has a per cent.
+    """
+    known = [row for row in answer["rows"] if row["peak_percent"] is not None]
+    rows = [row for row in known if max(abs(row["peak_percent"]), abs(row["band_percent"] or 0.0)) >= _LEAST]
+    rows = rows[:MOST][::-1]
+    places = np.arange(len(rows), dtype=np.float64)
+    with style.styled():
+        page, (peaks, bands) = style.figure(9.2, 1.1 + 0.27 * max(len(rows), 3), columns=2, into=ax)
+        for axes, key, color in ((peaks, "peak_percent", style.BLUE), (bands, "band_percent", style.GREEN)):
+            axes.barh(places, [row[key] or 0.0 for row in rows], height=0.62, color=color)
+            axes.axvline(0.0, color=style.GREY, linewidth=0.7)
+            axes.set_yticks(places, [row["path"] for row in rows])
+            axes.grid(visible=False, axis="y")
+            axes.tick_params(axis="y", length=0)
+            axes.spines["left"].set_visible(False)
+            axes.margins(x=0.12)
+        bands.set_yticklabels([])
+        highest = answer["peaks"][0]
+        peaks.set_title(
+            f"{answer['scene']}: peak of {units.length(highest['value'])} at {highest['at']:.4g} Hz"
+        )
+        peaks.set_xlabel("change of the peak for 1 % more [%]")
+        width = answer["band_hz"]
+        bands.set_title("no resonance band" if width is None else f"band of {width:.4g} Hz")
+        bands.set_xlabel("change of the band for 1 % more [%]")
+    return page
+
+
+Point = Mapping[str, Any]
+_SHOWN = 3  # variables named beside a point
+_PRICED = 0.02  # share of the peak, rounded down to a power of ten, that the price is given for
+_TANGENT = 0.06  # half length of a tangent, as a share of the front's width and height
+
+
+def pareto_figure(answer: Mapping[str, Any], *, ax: Into = None) -> Figure:
+    """The front with its slopes and its knee, and beside it the frequencies at risk of every point.
+
+    Parameters
+    ----------
+    answer : the JSON of `optim.ParetoResult`, with at least one point.
+    """
+    points: Sequence[Point] = answer["points"]
+    unit = units.length_unit(min(point["peak"] for point in points))
+    with style.styled():
+        page, (front, risk) = style.figure(9.2, 3.7, columns=2, into=ax)
+        _draw_front(front, answer, unit)
+        _draw_risk(risk, points, unit)
+        dof = answer["dof"]
+        style.label(front, "resonance band [Hz]", f"highest peak, max |{dof}| [{unit.name}]")
+        style.label(risk, "frequency [Hz]", f"highest peak, max |{dof}| [{unit.name}]")
+        limit = "half power" if answer["limit"] is None else units.length(answer["limit"])
+        front.set_title(f"{answer['scene']}, band above {limit}")
+        risk.set_title("frequencies at risk")
+    return page
+
+
+def _draw_front(axes: Axes, answer: Mapping[str, Any], unit: LengthUnit) -> None:
+    """Draw the points, the slope at each, the dominated designs and the knee."""
+    points = answer["points"]
+    band = np.array([point["band_hz"] for point in points])
+    peak = np.array([point["peak"] for point in points]) * unit.per_metre
+    wide, tall = float(np.ptp(band)) or 1.0, float(np.ptp(peak)) or 1.0
+    for point, x, y in zip(points, band, peak, strict=True):
+        if point["slope"] is None:
+            continue
+        slope = point["slope"] * unit.per_metre
+        reach = _TANGENT / np.hypot(1.0 / wide, slope / tall)
+        axes.plot(
+            [x - reach, x + reach], [y - slope * reach, y + slope * reach], color=style.SKY, linewidth=4.0,
+            alpha=0.55,
+        )  # fmt: skip
+    axes.plot(band, peak, color=style.BLUE, marker="o", markersize=4.5)
+    for point in answer["dominated"]:
+        axes.plot(
+            [point["band_hz"]], [point["peak"] * unit.per_metre], color=style.GREY, marker="x", markersize=4.5
+        )
+    knee = answer["knee"]
+    if knee is not None:
+        _name(axes, points[knee], unit)
+    axes.margins(x=0.1, y=0.12)
+
+
+def _name(axes: Axes, point: Point, unit: LengthUnit) -> None:
+    """Mark the knee, with its design and its price."""
+    x, y = point["band_hz"], point["peak"] * unit.per_metre
+    lines = [f"{path} {style.quantity(path, value, 4)}" for path, value in point["values"].items()][:_SHOWN]
+    if point["hz_per_metre"] is not None:
+        step = 10.0 ** math.floor(math.log10(_PRICED * point["peak"]))
+        lines.append(f"{units.length(step)} lower: {units.number(point['hz_per_metre'] * step, 3)} Hz wider")
+    axes.plot([x], [y], color=style.VERMILION, marker="o", markersize=6.5, linestyle="none", zorder=5)
+    axes.annotate(
+        "knee: " + "\n".join(lines), (x, y), xytext=(10, 14), textcoords="offset points", va="bottom",
+        color=style.VERMILION, linespacing=1.35,
+    )  # fmt: skip
+
+
+def _draw_risk(axes: Axes, points: Sequence[Point], unit: LengthUnit) -> None:
+    """Draw the intervals of the band at the height of each point's peak, and where the peak is."""
+    for point in points:
+        y = point["peak"] * unit.per_metre
+        for low, high in point["intervals"]:
+            axes.plot([low, high], [y, y], color=style.SKY, linewidth=3.2, solid_capstyle="butt")
+        axes.plot([point["at"]], [y], color=style.BLUE, marker="o", markersize=4.0, linestyle="none")
+    axes.margins(x=0.06, y=0.12)

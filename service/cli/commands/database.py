@@ -51,7 +51,7 @@ def prune(
     An SQLite file must not be in use by a service, which can do this itself (STICKSLIP_RETENTION_DAYS,
     STICKSLIP_RETENTION_UPLOAD_DAYS).
     """
-    from service.queue.pruning import prune_database
+    from service.queue.retention import prune_database
 
     url = settings_of(database=database).database
     found = prune_database(
@@ -73,7 +73,7 @@ def check(database: options.Database = None, as_json: options.Json = False) -> N
     Exit status 1 if anything is wrong, 2 if there is no such database.
     """
     from service.db.engine import shown
-    from service.db.integrity import check as look
+    from service.db.repositories.integrity import check as look
 
     url = settings_of(database=database).database
     found = look(url)

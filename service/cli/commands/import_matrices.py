@@ -253,7 +253,7 @@ def _reduced(
     if of is not None and up_to is not None:
         raise InputError("`--up-to` is not for a sector: give --modes N, as many at each nodal diameter")
     if of is not None:
-        from solver.matrices.file_units import METRES
+        from solver.matrices.values import METRES
 
         mistune, metres = tuple(read.found.parts), METRES[read.found.units]
         return reduce_disk(given, rows_of(read.table, given), modes, of, path, mistune, metres)

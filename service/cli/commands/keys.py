@@ -18,7 +18,7 @@ from service.rendering.tables.text import print_json, print_table, say
 if TYPE_CHECKING:
     from service.auth.callers import KeyLimits, Scope
     from service.db.models import ApiKey
-    from service.db.repositories.keys import KeyRepository
+    from service.db.repositories.owned import KeyRepository
     from service.db.tokens import Made
 
 _PERIOD = re.compile(r"([1-9][0-9]{0,5})([dh])")
@@ -60,17 +60,17 @@ def create(
     as_json: options.Json = False,
 ) -> None:
     """Make a key and print it, this once."""
-    from service.auth import keys
+    from service.auth import authenticator
 
     scopes, limits, now = _scopes(scope or ["submit"]), _limits(limit or ()), datetime.now(UTC)
     ends = None if expires is None else _time(expires, now)
     with _repository(database) as repository:
-        _show(keys.create(repository, owner, scopes, now, ends, limits), as_json=as_json)
+        _show(authenticator.create(repository, owner, scopes, now, ends, limits), as_json=as_json)
 
 
 def show(database: options.Database = None, as_json: options.Json = False) -> None:
     """List the keys, also those that work no more. What opens the door is not kept, and not shown."""
-    from service.auth.keys import described
+    from service.auth.authenticator import described
 
     with _repository(database) as repository:
         found: list[dict[str, Any]] = [described(row) for row in repository.all()]
@@ -99,7 +99,7 @@ def _repository(database: str | None) -> Iterator[KeyRepository]:
     """The keys of a database, which is made if there is none."""
     from service.db import revisions
     from service.db.engine import Database
-    from service.db.repositories.keys import KeyRepository
+    from service.db.repositories.owned import KeyRepository
 
     url = settings_of(database=database).database
     revisions.prepare(url)
@@ -111,7 +111,7 @@ def _repository(database: str | None) -> Iterator[KeyRepository]:
 
 
 def _show(made: Made[ApiKey], *, as_json: bool) -> None:
-    from service.auth.keys import described
+    from service.auth.authenticator import described
 
     if as_json:
         print_json({**described(made.row), "key": made.token})

@@ -23,7 +23,7 @@ def serve(
     workers: options.Workers = None,
 ) -> None:
     """Serve the REST API and work off its queue."""
-    from service.http.process.server import serve as run
+    from service.http.server import serve as run
 
     run(settings_of(host=host, port=port, database=database, workers=workers))
 
@@ -39,7 +39,7 @@ def worker(
 
     On PostgreSQL beside any number of services; on SQLite only while no service uses the file.
     """
-    from service.http.process.server import work
+    from service.http.server import work
 
     work(settings_of(database=database, workers=workers), until_empty=until_empty)
 

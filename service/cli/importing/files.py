@@ -58,9 +58,8 @@ def sources(
     files: Sequence[str], mapping: str | None, units: str, mistune: Sequence[str] | None = None
 ) -> Sources:
     """Sort the files given by what they are."""
-    from solver.matrices.file_roles import MAPPING, sorted_files
-    from solver.matrices.file_units import UNITS
-    from solver.matrices.files import MatrixFileError
+    from solver.matrices.files import MAPPING, MatrixFileError, sorted_files
+    from solver.matrices.values import UNITS
 
     if units not in UNITS:
         raise InputError(

@@ -75,7 +75,7 @@ class Written:
 
 def reduced_file(text: str | None, target: Path) -> Path:
     """Where the reduced model goes, which must not exist."""
-    from solver.matrices.reduction.writing import WRITTEN
+    from solver.matrices.reduction.craig_bampton import WRITTEN
 
     name = text or str(target.with_name(f"{target.stem}-reduced.npz"))
     path = output_path("--reduced", name, WRITTEN)
@@ -89,8 +89,7 @@ def reduce(
 ) -> Written:
     """Reduce matrices onto the DOFs in `rows` and write them to `path`."""
     from solver.matrices.diagnostics import refuse
-    from solver.matrices.reduction.craig_bampton import craig_bampton
-    from solver.matrices.reduction.writing import write_reduced
+    from solver.matrices.reduction.craig_bampton import craig_bampton, write_reduced
     from solver.matrices.validation import DofTable
 
     if (modes is None) == (up_to is None):

@@ -11,7 +11,7 @@ import typer
 
 from service.errors import InputError
 from solver.errors import SettingError
-from solver.scene.examples import DISK_LOAD
+from solver.scene.descriptions import DISK_LOAD
 
 if TYPE_CHECKING:
     from pydantic import BaseModel

@@ -47,6 +47,8 @@ class KeyOption:
         Of the command.
     schema : mapping
         JSON schema of the key, without null.
+    metavar : str
+        What stands for its value, where that is said.
     """
 
     key: str
@@ -54,6 +56,7 @@ class KeyOption:
     flag: str
     parameter: inspect.Parameter
     schema: Schema
+    metavar: str = ""
 
     def in_body(self, given: Any) -> Any:
         """What stands in the body for what was given; None if the key is to be left out.
@@ -74,25 +77,27 @@ class KeyOption:
         if isinstance(given, tuple):
             return list(given) if _is_pair(self.schema) else [list(given)]
         if kind == "object" and isinstance(given, list):
-            return _by_path(self.flag, self.schema, given)
+            return self._by_path(given)
         return self._read(given) if isinstance(given, str) and kind in (None, "array", "object") else given
+
+    def _by_path(self, texts: Sequence[str]) -> Mapping[str, Any]:
+        """What stands in a table of parameter paths: numbers, pairs, lists or words, as its schema says."""
+        # Paths of a given form stand under patternProperties.
+        known = [
+            self.schema.get("additionalProperties"), *(self.schema.get("patternProperties") or {}).values()
+        ]  # fmt: skip
+        of_each: Schema = next((one for one in known if isinstance(one, Mapping)), {})
+        if of_each.get("type") == "array" and of_each.get("maxItems") == 2:
+            return inputs.bounds(self.flag, texts, self.metavar.partition(" ")[2] or _PAIR)
+        if of_each.get("type") == "array":
+            return inputs.lists_by_path(self.flag, texts)
+        return inputs.words_by_path(self.flag, texts) if "enum" in of_each else inputs.settings(texts)
 
     def _read(self, text: str) -> Any:
         try:
             return json.loads(text)
         except ValueError as error:
             raise InputError(f"`{self.flag}` takes JSON, got {text!r}: {error}") from error
-
-
-def _by_path(flag: str, schema: Schema, texts: Sequence[str]) -> Mapping[str, Any]:
-    """What stands in a table of parameter paths: numbers, pairs, lists or words, as its schema says."""
-    # Paths of a given form stand under patternProperties.
-    known = [schema.get("additionalProperties"), *(schema.get("patternProperties") or {}).values()]
-    of_each: Schema = next((one for one in known if isinstance(one, Mapping)), {})
-    if of_each.get("type") == "array":
-        read = inputs.bounds if of_each.get("maxItems") == 2 else inputs.lists_by_path
-        return read(flag, texts)
-    return inputs.words_by_path(flag, texts) if "enum" in of_each else inputs.settings(texts)
 
 
 def key_options(kind: JobKind, local: Command | None) -> list[KeyOption]:
@@ -117,9 +122,9 @@ def key_options(kind: JobKind, local: Command | None) -> list[KeyOption]:
     for key, flag in flags.items():
         whole, schema = described["properties"][key], schemas[key]
         words = as_options(whole.get("description", ""), flags)
-        mine = known.get(flag) or _made(flag, said[key].metavar, schema, whole, words, needed=key in needed)
+        mine = known.get(flag) or _made(flag, said[key], schema, whole, words, needed=key in needed)
         parameter = mine.replace(name=f"key_{key}", kind=inspect.Parameter.KEYWORD_ONLY)
-        found.append(KeyOption(key, asked[key][0], flag, parameter, schema))
+        found.append(KeyOption(key, asked[key][0], flag, parameter, schema, said[key].metavar))
     order = [*known, *(one.flag for one in found)]
     return sorted(found, key=lambda one: order.index(one.flag))
 
@@ -158,7 +163,7 @@ def as_options(words: str, flags: Mapping[str, str]) -> str:
 
 
 def _made(
-    flag: str, metavar: str, schema: Schema, whole: Schema, words: str, *, needed: bool
+    flag: str, said: Flag, schema: Schema, whole: Schema, words: str, *, needed: bool
 ) -> inspect.Parameter:
     """An option of the schema of its key."""
     if flag == "--set":
@@ -171,12 +176,16 @@ def _made(
         words = f"Switch off: {words}" if default is True else words
         return _parameter(Annotated[bool, typer.Option(flag, help=words)], False)
     type_, parser, shown = _read_as(schema)
-    if metavar == _PAIR:  # one of the ranges that a list may hold
+    if said.metavar and kind == "object":  # told by the metavariable
+        type_, parser = list[str], None
+    if said.metavar == _PAIR:  # one of the ranges that a list may hold
         type_, parser = tuple[float, float], None
-    if get_origin(type_) is list and kind == "array":
+    if get_origin(type_) is list:
         words = f"{words} Repeatable."
-    offered = completion.paths if metavar == _PATH else None
-    told = typer.Option(flag, metavar=metavar or shown, parser=parser, help=words, autocompletion=offered)
+    offered = completion.offered(said.words, paths=said.metavar == _PATH)
+    told = typer.Option(
+        flag, metavar=said.metavar or shown, parser=parser, help=words, autocompletion=offered
+    )
     if needed:
         return _parameter(Annotated[type_, told], inspect.Parameter.empty)
     return _parameter(

@@ -59,7 +59,7 @@ def given_key() -> str | None:
     InputError
         If the file cannot be read, or what is there is no key.
     """
-    from service.auth.keys import id_of
+    from service.auth.authenticator import id_of
 
     file = _file.get()
     if file is None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,8 +19,6 @@ from solver.errors import Issue, SceneError, SettingError
 if TYPE_CHECKING:
     from service.jobs.common.problem import ProblemRequest
     from solver.scene.scene import Scene
-
-IssuesOf = Callable[["Scene", Mapping[str, Any]], list[Issue]]
 
 SCENE_FILES = (".toml", ".json")
 
@@ -85,16 +83,13 @@ def description(scene: str | None, flags: ProblemFlags, kind: str, **further: tu
     return Description(body=body, options={key: options[key] for key in given}, file=file)
 
 
-def posed(
-    told: Description, model: type[ProblemRequest], issues_of: IssuesOf
-) -> tuple[Scene, dict[str, Any]]:
+def posed(told: Description, study: type[ProblemRequest]) -> tuple[Scene, dict[str, Any]]:
     """The scene and the arguments of the design layer, checked as the service checks them.
 
     Parameters
     ----------
     told : what was given.
-    model : its types and ranges.
-    issues_of : what is wrong with the arguments for the scene.
+    study : its types and ranges, and what is wrong with a problem for a scene.
 
     Raises
     ------
@@ -103,13 +98,11 @@ def posed(
     """
     from service.jobs.common.problem import arguments
 
-    request = checked(told, model)
+    request = checked(told, study)
     scene = _with_values(told, _scene(told), request)
-    given = arguments(request)
-    issues = issues_of(scene, given)
-    if issues:
+    if issues := request.issues(scene):
         raise told.refusal(issues)
-    return scene, given
+    return scene, arguments(request)
 
 
 def checked(told: Description, model: type[ProblemRequest]) -> ProblemRequest:

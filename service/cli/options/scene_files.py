@@ -33,7 +33,7 @@ def scene_to_submit(path: str) -> dict[str, Any] | SceneWithFiles:
         If it cannot be read, or is wrong and names no files.
     """
     import solver
-    from solver.scene.io import load_raw
+    from solver.scene.toml import load_raw
 
     raw = load_raw(path)
     structure = raw.get("structure")
@@ -72,7 +72,7 @@ def uploaded(client: Client, body: Mapping[str, Any]) -> dict[str, Any]:
 
 def _labels_beside(structure: Mapping[str, Any], folder: Path) -> Path | None:
     """The file that names the rows, where DOFs are named by node and only its place says so."""
-    from solver.matrices.labels import labels_beside
+    from solver.matrices.files import labels_beside
 
     dofs = structure.get("dofs")
     by_node = isinstance(dofs, Mapping) and any(isinstance(row, str) for row in dofs.values())

@@ -1,10 +1,8 @@
 """All SQL of the service: each method is one transaction, each change of a job's state is guarded."""
 
-from service.db.repositories.designs import DesignRepository
-from service.db.repositories.jobs.repository import Attempt, JobRepository, JobRow, NewJob, Recovered
-from service.db.repositories.scenes import SceneRepository
-from service.db.repositories.sweeps import SweepRepository
-from service.db.repositories.uploads import UploadRepository
+from service.db.repositories.jobs import Attempt, JobRepository, JobRow, NewJob, Recovered
+from service.db.repositories.owned import SceneRepository, UploadRepository
+from service.db.repositories.stored import DesignRepository, SweepRepository
 
 __all__ = [
     "Attempt",

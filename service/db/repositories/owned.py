@@ -1,18 +1,37 @@
-"""What belongs to owners: rows found, listed and stored; changed, put in the bin and taken out."""
+"""What belongs to owners: rows found, listed, stored, put in the bin; projects, scenes, uploads and keys."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
-from datetime import timedelta
+from datetime import datetime, timedelta
 from functools import cached_property
 from typing import Any, Generic, Protocol, TypeVar
 
-from sqlalchemy import ColumnElement, Connection, Select, func, insert, inspect, literal, select, update
-from sqlalchemy.orm import Session
+from sqlalchemy import (
+    BindParameter,
+    ColumnElement,
+    Connection,
+    Select,
+    and_,
+    bindparam,
+    delete,
+    func,
+    insert,
+    inspect,
+    literal,
+    or_,
+    select,
+    update,
+)
+from sqlalchemy.orm import Session, defer
 
 from service.db.clock import Clock, utc_now
 from service.db.engine import Database
+from service.db.models import ApiKey, Job, Project, Scene, Upload
+from service.db.tokens import Made, Tokens, digest_of
 from service.errors import ChangedMeanwhileError, ConflictError, NotFoundError, StorageFullError
+from service.jobs.ids import new_id
+from service.jobs.strict_json import encoded
 
 
 class Owned(Protocol):
@@ -238,3 +257,191 @@ class Binned(Generic[BinnedT]):
         counted = {"revision": self.said.revision + 1, "changed": self._now()}
         change = update(self.said).where(_key_of(self.said)[0] == row_id)
         connection.execute(change.values(**values, **counted))
+
+
+MOST_PROJECTS = 1000
+
+
+class Projects(Binned[Project], Rows[Project]):
+    """Projects of one database; a project in the bin keeps its runs."""
+
+    what, table, said = "project", Project, Project
+
+    def add(self, owner: str, name: str, notes: str, most: int = MOST_PROJECTS) -> Project:
+        """Make a project (StorageFullError if the owner has `most`, with those in the bin)."""
+        now = self._now()
+        with self._db.writing() as connection:
+            words = f"an owner may have {most} projects, with those in the bin"
+            self._require_room(connection, Project.owner == owner, most, words)
+            row = Project(
+                id=new_id(), owner=owner, name=name, notes=notes, created=now, changed=now, revision=1, runs=0
+            )
+            return self._insert(connection, row)
+
+    def page(
+        self,
+        limit: int,
+        before: str | None = None,
+        *,
+        owner: str | None = None,
+        text: str | None = None,
+        deleted: bool = False,
+    ) -> list[Project]:
+        """Projects of an owner, or of everybody (None), newest first, older than the project `before`."""
+        holds: list[ColumnElement[bool]] = [
+            Project.deleted.is_not(None) if deleted else Project.deleted.is_(None)
+        ]
+        if text is not None:
+            named = (one.icontains(text, autoescape=True) for one in (Project.name, Project.notes))
+            holds.append(or_(*named))
+        return self._newest(limit, before, owner, *holds)
+
+
+class SceneRepository(Rows[Scene]):
+    """Scenes of one database, each of an owner and a name; a stored scene never changes."""
+
+    table = Scene
+
+    def add(self, owner: str, name: str, scene_hash: str, body: dict[str, Any]) -> tuple[Scene, bool]:
+        """Store a scene, or find the one of this owner and name; whether it was stored."""
+        text = encoded(body)
+
+        def find_or_add(connection: Connection) -> tuple[Scene, bool]:
+            for known in self._read(connection, self._of((owner, name))):
+                return known, False
+            row = Scene(
+                owner=owner, name=name, scene_hash=scene_hash, created=self._now(), size=len(text), body=body
+            )
+            return self._insert(connection, row, body=text), True
+
+        return self._db.grouped(find_or_add)
+
+    def page(self, owner: str | None, after: tuple[str, str] | None, limit: int) -> list[Scene]:
+        """Scenes of an owner, or of everybody (None), by name, without their tables.
+
+        Parameters
+        ----------
+        after : name and owner of the last one on the page before.
+        limit : most that are listed.
+        """
+        query = self._select.options(defer(Scene.body)).order_by(Scene.name, Scene.owner).limit(limit)
+        if owner is not None:
+            query = query.where(Scene.owner == owner)
+        if after is not None:
+            name, whose = after
+            query = query.where(or_(Scene.name > name, and_(Scene.name == name, Scene.owner > whose)))
+        return self._all(query)
+
+
+class UploadRepository(Rows[Upload]):
+    """Uploads of one database; what a stored one holds never changes."""
+
+    table = Upload
+
+    def add(
+        self, *, owner: str, name: str, format: str, size: int, sha256: str, data: bytes
+    ) -> tuple[Upload, bool]:
+        """Store a file, or find the same one of the same owner and format; whether it was stored.
+
+        One that is there already counts as new from now on: who sent it is about to use it.
+        """
+        same = (Upload.owner == owner, Upload.sha256 == sha256, Upload.format == format)
+        with self._db.writing() as connection:
+            now = self._now()
+            for known in self._read(connection, self._select.where(*same).order_by(Upload.id).limit(1)):
+                known.created = now
+                connection.execute(update(Upload).where(Upload.id == known.id).values(created=now))
+                return known, False
+            row = Upload(
+                id=new_id(), owner=owner, name=name, format=format, size=size, sha256=sha256, created=now
+            )
+            return self._insert(connection, row, data=data), True
+
+    def page(self, limit: int, before: str | None = None, owner: str | None = None) -> list[Upload]:
+        """Uploads, newest first, older than the upload `before`; only those of `owner` if given."""
+        return self._newest(limit, before, owner)
+
+    def data(self, upload_id: str) -> bytes:
+        """The bytes of an upload (NotFoundError if it was deleted)."""
+        with self._db.reading() as connection:
+            data = connection.execute(select(Upload.data).where(Upload.id == upload_id)).scalar_one_or_none()
+        if data is None:
+            raise NotFoundError(f"there is no upload {upload_id!r}")
+        return data
+
+    def delete(self, upload_id: str) -> None:
+        """Forget an upload."""
+        self._updated(delete(Upload).where(Upload.id == upload_id))
+
+
+_OWNER: BindParameter[str] = bindparam("owner")
+OF_JOBS = select(func.coalesce(func.sum(Job.stored_bytes), 0)).where(Job.owner == _OWNER)
+_OF_UPLOADS = select(func.coalesce(func.sum(Upload.size), 0)).where(Upload.owner == _OWNER)
+_OF_SCENES = select(func.coalesce(func.sum(Scene.size), 0)).where(Scene.owner == _OWNER)
+
+
+class StorageRepository:
+    """What is stored in one database, by owner."""
+
+    def __init__(self, database: Database) -> None:
+        self._db = database
+
+    def of(self, owner: str) -> int:
+        """Bytes of an owner's jobs with results and sweeps, of their uploads and of their scenes."""
+        with self._db.reading() as connection:
+            counted = (
+                connection.execute(one, {"owner": owner}) for one in (OF_JOBS, _OF_UPLOADS, _OF_SCENES)
+            )
+            return sum(int(one.scalar_one()) for one in counted)
+
+
+KEYS = Tokens("stickslip", id_bytes=6)
+
+
+class KeyRepository(Rows[ApiKey]):
+    """Keys of one database. Its writes are short and may be made beside a running service, on SQLite too."""
+
+    table = ApiKey
+
+    def add(self, **values: Any) -> Made[ApiKey]:
+        """Make a key with these values of its row."""
+        key_id, token = KEYS.new()
+        with self._db.writing() as connection:
+            return Made(self._insert(connection, ApiKey(id=key_id, digest=digest_of(token), **values)), token)
+
+    def all(self) -> list[ApiKey]:
+        """Every key, also those that do not work any more, by owner and age."""
+        return self._all(self._select.order_by(ApiKey.owner, ApiKey.created, ApiKey.id))
+
+    def usable(self, now: datetime) -> bool:
+        """Whether any key works."""
+        alive = or_(ApiKey.expires.is_(None), ApiKey.expires > now)
+        with self._db.reading() as connection:
+            query = select(ApiKey.id).where(ApiKey.revoked.is_(None), alive).limit(1)
+            return connection.execute(query).one_or_none() is not None
+
+    def rotate(self, key_id: str) -> Made[ApiKey]:
+        """Give a key another secret; the old one ends.
+
+        Raises
+        ------
+        NotFoundError
+            If there is none of this id, or it was revoked.
+        """
+        _, token = KEYS.new(key_id)
+        self._change(key_id, digest=digest_of(token))
+        [row] = self._all(self._select.where(ApiKey.id == key_id))
+        return Made(row, token)
+
+    def revoke(self, key_id: str) -> None:
+        """End a key; errors as of `rotate`."""
+        self._change(key_id, revoked=self._now())
+
+    def touch(self, key_id: str, now: datetime) -> None:
+        """Note that a key was used."""
+        self._updated(update(ApiKey).where(ApiKey.id == key_id).values(last_used=now))
+
+    def _change(self, key_id: str, **values: object) -> None:
+        working = (ApiKey.id == key_id, ApiKey.revoked.is_(None))
+        if not self._updated(update(ApiKey).where(*working).values(**values)):
+            raise NotFoundError(f"there is no key {key_id!r} that works: `stickslip keys list` shows all")

@@ -11,9 +11,8 @@ from sqlalchemy import ColumnElement, Connection, Text, and_, cast, delete, func
 from sqlalchemy.orm import aliased
 
 from service.db.engine import Database
-from service.db.models import Design, Job, JobState, Sweep, SweepArray, Upload
-from service.db.repositories.jobs.statements import ADD_STORED
-from service.db.run_models import Project, Run, Share
+from service.db.models import Design, Job, JobState, Project, Run, Share, Sweep, SweepArray, Upload
+from service.db.repositories.job_statements import ADD_STORED
 from service.jobs.common.scenes import UPLOAD
 
 _ENDED = [state for state in JobState if state.finished]

@@ -1,23 +1,89 @@
-"""The runs: jobs with what is said of them."""
+"""The runs: jobs with what is said of them, and the links that show one without a key."""
 
 from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, fields
-from datetime import datetime
+from datetime import datetime, timedelta
 from typing import Any
 
-from sqlalchemy import ColumnElement, Connection, Select, func, literal, null, or_, select
+from sqlalchemy import (
+    ColumnElement,
+    Connection,
+    Select,
+    bindparam,
+    delete,
+    func,
+    insert,
+    literal,
+    null,
+    or_,
+    select,
+)
 from sqlalchemy.dialects import postgresql, sqlite
+from sqlalchemy.orm import InstrumentedAttribute
 
-from service.db.models import NOBODY, Job, JobState, Sweep
+from service.db.clock import Clock
+from service.db.engine import Database
+from service.db.models import ID_LENGTH, NOBODY, Job, JobState, Project, Run, RunTag, Share, Sweep
 from service.db.pagination import Condition, met, owner_condition, plain_conditions
-from service.db.repositories.owned import Binned
-from service.db.repositories.rows import JobRow, RunWords
-from service.db.repositories.run_words import in_the_bin, put_tags, require_project
-from service.db.run_models import Run, RunTag
-from service.errors import ConflictError
+from service.db.repositories.owned import Binned, Rows
+from service.db.repositories.rows import NO_WORDS, JobRow, RunWords
+from service.db.tokens import Made, Tokens, digest_of, matches
+from service.errors import ConflictError, InvalidRequestError, NotFoundError
+from solver.errors import Issue
+
+_TABLES = Run.metadata.tables
+_RUN, _TAG = _TABLES["run"], _TABLES["run_tag"]
+_INSERT, _INSERT_TAGS = insert(_RUN), insert(_TAG)
+# Locked until the run refers to it, so that it is not deleted for good in between.
+_PROJECT = (
+    select(Project.id)
+    .where(Project.id == bindparam("project"), Project.owner == bindparam("owner"))
+    .where(Project.deleted.is_(None))
+    .with_for_update(read=True)
+)
+
+
+def in_the_bin(job_id: InstrumentedAttribute[str]) -> ColumnElement[bool]:
+    """Whether the run of a job is in the bin; for rows with such a column."""
+    table: Any = job_id.class_
+    return select(Run.job_id).where(Run.job_id == job_id, Run.deleted.is_not(None)).correlate(table).exists()
+
+
+def require_project(connection: Connection, project: str | None, owner: str | None) -> None:
+    """Refuse a project that is not there.
+
+    Raises
+    ------
+    InvalidRequestError
+        If the owner has none of this id outside of the bin.
+    """
+    if project is None:
+        return
+    given = {"project": project[:ID_LENGTH], "owner": owner}
+    if len(project) > ID_LENGTH or connection.execute(_PROJECT, given).one_or_none() is None:
+        words = "must be the id of a project of the same owner, GET /v1/projects lists them"
+        message = f"`project` {words}, got {project!r:.80}"
+        raise InvalidRequestError([Issue(pointer="/project", message=message)])
+
+
+def insert_words(connection: Connection, job_id: str, words: RunWords, now: datetime) -> None:
+    """Write what is said of a job that was inserted just now, if anything is; see `require_project`."""
+    if words == NO_WORDS:
+        return
+    about = {"job_id": job_id, "project_id": words.project, "name": words.name, "notes": words.notes}
+    connection.execute(_INSERT, about | {"changed": now, "revision": 1, "deleted": None})
+    put_tags(connection, job_id, words.tags)
+
+
+def put_tags(connection: Connection, job_id: str, tags: tuple[str, ...]) -> None:
+    """Mark a run with these words and no others."""
+    connection.execute(delete(_TAG).where(_TAG.c.job_id == job_id))
+    if tags:
+        connection.execute(_INSERT_TAGS, [{"job_id": job_id, "tag": tag} for tag in tags])
+
 
 _NEVER_LEADS = -1
 _OF_JOBS = [getattr(Job, field.name) for field in fields(JobRow) if field.name != "request"]
@@ -212,3 +278,67 @@ def _sweeps(connection: Connection, jobs: Sequence[str]) -> dict[str, int]:
     """How many sweeps are stored with each of the jobs."""
     query = select(Sweep.job_id, func.count()).where(Sweep.job_id.in_(jobs)).group_by(Sweep.job_id)
     return {row[0]: row[1] for row in connection.execute(query)}
+
+
+MOST_SHARES = 20
+_TOKENS = Tokens("share", id_bytes=8)
+
+
+class Shares(Rows[Share]):
+    """Links to the runs of one database."""
+
+    table = Share
+
+    def __init__(self, database: Database, runs: Runs, now: Clock) -> None:
+        super().__init__(database, now)
+        self._runs = runs
+
+    def add(self, job_id: str, days: float | None, sees: str | None, most: int = MOST_SHARES) -> Made[Share]:
+        """Make a link to a run.
+
+        Parameters
+        ----------
+        days : after which it ends; None for never.
+
+        Raises
+        ------
+        NotFoundError, ConflictError, StorageFullError
+            There is no such run, it is in the bin, it has `most` links.
+        """
+        self._runs.outside(job_id, sees)
+        share_id, token = _TOKENS.new()
+        now = self._now()
+        expires = None if days is None else now + timedelta(days=days)
+        row = Share(id=share_id, job_id=job_id, digest=digest_of(token), created=now, expires=expires)
+        with self._db.writing() as connection:
+            words = f"a run may have {most} links: end one of run {job_id}"
+            self._require_room(connection, Share.job_id == job_id, most, words)
+            return Made(self._insert(connection, row), token)
+
+    def of_run(self, job_id: str, sees: str | None) -> list[Share]:
+        """The links to a run, without their tokens, oldest first."""
+        self._runs.seen(job_id, sees)
+        return self._all(self._select.where(Share.job_id == job_id).order_by(Share.created, Share.id))
+
+    def end(self, job_id: str, share_id: str, sees: str | None) -> None:
+        """End a link to a run (NotFoundError if there is none)."""
+        self._runs.seen(job_id, sees)
+        if not self._updated(delete(Share).where(Share.id == share_id, Share.job_id == job_id)):
+            raise NotFoundError(f"run {job_id} has no link {share_id!r:.80}")
+
+    def run_of(self, token: str) -> RunRow:
+        """The run that a link is to.
+
+        Raises
+        ------
+        NotFoundError
+            The link is none, has ended, or its run is in the bin.
+        """
+        share_id = _TOKENS.id_of(token)
+        row = None if share_id is None else self.get(share_id)
+        run = None
+        if matches(token, row) and row is not None and (row.expires is None or row.expires > self._now()):
+            run = self._runs.get(row.job_id)
+        if run is None or run.deleted is not None:
+            raise NotFoundError("there is no such link, or it has ended")
+        return run

@@ -5,8 +5,10 @@ It lets through what is listed here and refuses the rest: a new route needs a ke
 
 from __future__ import annotations
 
+import re
 import time
-from contextlib import ExitStack
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from urllib.parse import urlsplit
 
 from fastapi import Request
@@ -14,12 +16,58 @@ from starlette.concurrency import run_in_threadpool
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.auth import callers
-from service.auth.authenticator import REMEMBERED_SECONDS, Doorkeeper
+from service.auth.allowances import AtATime, share
+from service.auth.authenticator import REMEMBERED_SECONDS, Doorkeeper, id_of
 from service.auth.callers import LINK_READERS, Caller
-from service.auth.keys import id_of
 from service.errors import OriginRefusedError, ServiceError, UnauthorizedError
-from service.http.middleware.turnstile import Turnstile
+from service.http.middleware.connections import KEY, Connection
 from service.schemas.problems import AWAY, answered
+from service.settings.settings import Settings
+
+_STREAM = re.compile(r"/v1/jobs/[^/]+/events/?")
+_UPLOAD = "/v1/uploads"
+
+
+class Turnstile:
+    """Counts requests while they are answered.
+
+    Parameters
+    ----------
+    settings : Settings
+        The limits, of keys that have none of their own.
+    """
+
+    def __init__(self, settings: Settings) -> None:
+        self._settings = settings
+        self._requests = AtATime("requests")
+        self._uploads = AtATime("uploads")
+        self._streams = AtATime("event streams", settings.streams or None)
+
+    @contextmanager
+    def passed(self, caller: Caller, scope: Scope) -> Iterator[None]:
+        """Count a request inside the block; a stream counts as a stream alone, it is cheap and lasts.
+
+        Raises
+        ------
+        TooManyRequestsError, OverloadedError
+            The owner, or all together, have as many as they may.
+        """
+        owner = caller.owner
+        connection: Connection | None = scope.get("state", {}).get(KEY)
+        if connection is not None:
+            connection.owner = owner
+            connection.all_of_them.require_taken(owner)
+        if _STREAM.fullmatch(scope["path"]):
+            with self._streams.taken(owner, share(caller, self._settings, "streams")):
+                yield
+            return
+        with self._requests.taken(owner, share(caller, self._settings, "requests")):
+            if scope["method"] == "POST" and scope["path"].rstrip("/") == _UPLOAD:
+                with self._uploads.taken(owner, share(caller, self._settings, "uploads")):
+                    yield
+            else:
+                yield
+
 
 OPEN = frozenset({"/health/live", "/health/ready", "/openapi.json", "/docs", "/docs/style.css", "/"})
 """Paths that need no key: whether the service lives, what its API is, and the page, which asks for a key."""

@@ -13,8 +13,8 @@ from pydantic import Field
 from service.auth.callers import Caller
 from service.db.models import JobState
 from service.db.repositories import JobRow
-from service.http.computed import prepared
 from service.http.dependencies import (
+    LISTED,
     Context,
     InContext,
     TypedRoute,
@@ -27,8 +27,7 @@ from service.http.dependencies import (
     wait_for_end,
     with_raw,
 )
-from service.http.in_lane import reading
-from service.http.routes.described import LISTED
+from service.http.in_lane import prepared, reading
 from service.jobs.kinds.registry.bodies import (
     DESIGN,
     KIND,

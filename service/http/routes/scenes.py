@@ -1,23 +1,117 @@
-"""``/v1/scenes``: what sweeps and designs are about."""
+"""``/v1/scenes``: what sweeps and designs are about, stored, and from and to the text of a file."""
 
 from __future__ import annotations
 
 import json
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, Literal
 
-from fastapi import APIRouter, Query, Response
-from pydantic import Field
+from fastapi import APIRouter, Body, Query, Response
+from pydantic import BaseModel, ConfigDict, Field
 
 from service.db.models import Scene
-from service.http.computed import computed
-from service.http.dependencies import Context, InContext, JsonBody
-from service.http.in_lane import reading
+from service.http.dependencies import TEXT, Context, InContext, JsonBody, TypedRoute, media
+from service.http.in_lane import computed, reading
+from service.jobs import answering
 from service.jobs.answering import STORE
+from service.jobs.common.scenes import SceneRequest
 from service.queue.scene_store import shipped
 from service.schemas.answers import SceneAnswer, SceneDetail, SceneList
 from service.schemas.pages import Cursor, Limit, ListQuery, page_of
+from solver.scene.descriptions import DAMPER_LOAD
 
+texts = APIRouter(prefix="/v1/scenes", tags=["scenes"], route_class=TypedRoute)
 router = APIRouter(prefix="/v1/scenes", tags=["scenes"])
+
+_FILE: dict[str, Any] = {"text": 'name = "half a scene"', "form": "toml"}
+_EDIT: dict[str, Any] = {"text": 'name = "a" # mine', "scene": {"name": "b"}}
+_SCENE: dict[str, Any] = {"scene": "two-dof", "set": {DAMPER_LOAD: 80}, "comments": ["as set"]}
+MOST_CHARACTERS = 4_000_000
+
+
+class ReadRequest(BaseModel):
+    """The text of a scene file."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, json_schema_extra={"examples": [_FILE]})
+
+    text: str = Field(max_length=MOST_CHARACTERS)
+    form: Literal["toml", "json"] = "toml"
+
+
+class TextRequest(SceneRequest):
+    """A scene with its values set, and what to say above it."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [_SCENE]})
+
+    comments: list[Annotated[str, Field(max_length=2000)]] = Field(default=[], max_length=50)
+
+
+class EditRequest(BaseModel):
+    """The TOML of a scene, and the tables it is to hold if these were changed."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, json_schema_extra={"examples": [_EDIT]})
+
+    text: str = Field(max_length=MOST_CHARACTERS)
+    scene: dict[str, Any] | None = None
+
+
+ReadBody = Annotated[ReadRequest, Body(openapi_examples={"read": {"value": _FILE}})]
+TextBody = Annotated[TextRequest, Body(openapi_examples={"text": {"value": _SCENE}})]
+
+
+EditBody = Annotated[EditRequest, Body(openapi_examples={"edit": {"value": _EDIT}})]
+
+
+class SceneIssue(BaseModel):
+    """Something wrong: an RFC 6901 pointer into the scene, and a sentence."""
+
+    pointer: str
+    detail: str
+
+
+class SceneRead(BaseModel):
+    """The tables of a scene file and everything wrong with them."""
+
+    scene: dict[str, Any]
+    issues: list[SceneIssue]
+
+
+class PlacedIssue(SceneIssue):
+    """The same with its place in the text: line and column, from 1."""
+
+    line: int
+    column: int | None
+
+
+class SceneEdited(BaseModel):
+    """The text and the tables it holds (null where it cannot be read), and everything wrong with them."""
+
+    text: str
+    scene: dict[str, Any] | None
+    issues: list[PlacedIssue]
+
+
+@texts.post("/read", response_model=SceneRead)
+async def read(body: ReadBody, context: InContext) -> Response:
+    """Read the text of a scene file and list everything that is wrong with it; nothing is stored."""
+    found = await computed(context, answering.READ, body.model_dump(), about="/text")
+    return Response(found, media_type="application/json")
+
+
+@texts.post("/text", response_class=Response, responses={200: media({"application/toml": TEXT})})
+async def text(body: TextBody, context: InContext) -> Response:
+    """The TOML of a scene with its values set: the file that reproduces what was computed."""
+    words = {"scene": body.model_dump(exclude={"comments"}), "comments": body.comments}
+    return Response(await computed(context, answering.TEXT, words), media_type="application/toml")
+
+
+@texts.post("/edit", response_model=SceneEdited)
+async def edit(body: EditBody, context: InContext) -> Response:
+    """Text and tables side by side: `text` read, or changed so that it holds `scene`; nothing is stored.
+
+    Comments, order and spelling of what stays the same are kept.
+    """
+    found = await computed(context, answering.EDIT, body.model_dump(), about="/text")
+    return Response(found, media_type="application/json")
 
 
 class SceneQuery(ListQuery):

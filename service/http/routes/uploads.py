@@ -1,4 +1,4 @@
-"""``/v1/uploads``: files of matrices and modes that scenes refer to."""
+"""``/v1/uploads``, ``/v1/matrices``, ``/v1/measurements/read``: files, and what is in them."""
 
 from __future__ import annotations
 
@@ -7,18 +7,22 @@ from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
-from fastapi import APIRouter, Query, Response
+from fastapi import APIRouter, Body, Query, Response
 from fastapi.responses import JSONResponse
-from pydantic import Field, GetJsonSchemaHandler
+from pydantic import BaseModel, ConfigDict, Field, GetJsonSchemaHandler
 from pydantic_core import CoreSchema
 
-from service.http.bodies import saved
-from service.http.dependencies import InContext, listing
-from service.http.in_lane import reading, writing
-from service.http.routes.described import LISTED
+from service.errors import InvalidRequestError
+from service.http.dependencies import LISTED, InContext, JsonBody, TypedRoute, listing, saved
+from service.http.in_lane import computed, reading, writing
+from service.jobs import answering
+from service.jobs.common.scenes import SceneRequest
+from service.jobs.validation import validated
+from service.schemas.matrix_answers import FormatAnswer, FormatsAnswer, MatricesAnswer
 from service.schemas.pages import Cursor, Limit, ListQuery, newest
 from service.schemas.upload_answers import NewUpload, UploadAnswer, UploadedArray, UploadPage
 from service.uploads.uploads import Arrived, file_name, format_of
+from solver.errors import Issue
 
 router = APIRouter(prefix="/v1/uploads", tags=["uploads"])
 
@@ -115,3 +119,186 @@ def upload_media() -> tuple[str, ...]:
     from solver.matrices.readers import registry
 
     return (*registry.media(), "application/octet-stream")
+
+
+matrices = APIRouter(prefix="/v1/matrices", tags=["uploads"])
+
+Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_@-]{1,100}$")]
+UploadId = Annotated[str, Field(max_length=100)]
+_USUAL_ORDER = 1  # as `stickslip import` has it
+_EXAMPLE: dict[str, Any] = {
+    "name": "beam",
+    "structure": {"M": "upload:1", "K": "upload:2", "dofs": {"tip": "8.UY", "middle": 3}, "keep_modes": 10},
+    "contacts": [{"name": "damper", "between": ["tip", "ground"]}],
+    "excitation": {"dof": "middle"},
+    "observe": {"dof": "tip"},
+}
+
+
+class _Strict(BaseModel):
+    """No other keys."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class ContactPlace(_Strict):
+    """A contact to begin with: between which DOFs, or a DOF and `ground`."""
+
+    name: Name
+    between: Annotated[list[Name], Field(min_length=2, max_length=2)]
+
+
+class OfDof(_Strict):
+    """A DOF by its name."""
+
+    dof: Name
+
+
+class ForceOnDof(OfDof):
+    """A DOF by its name, and of a sector the wave of the force."""
+
+    engine_order: Annotated[int, Field(strict=True, ge=0, le=10_000)] | None = None
+
+
+class MatricesRequest(_Strict):
+    """Uploads to be looked at, or a structure that refers to them; with its DOFs, the scene it begins.
+
+    Attributes
+    ----------
+    uploads : list of str
+        Ids, in place of `structure`: which is M, K, C or names the rows is found out.
+    structure : dict or None
+        Tables of a structure of kind `matrices`; of a sector with `sectors` and `cyclic`.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True, json_schema_extra={"examples": [_EXAMPLE]})
+
+    uploads: list[UploadId] = Field(default=[], max_length=6, description="Ids, in place of `structure`.")
+    structure: dict[Annotated[str, Field(max_length=100)], Any] | None = None
+    name: Name = "my-model"
+    contacts: list[ContactPlace] = Field(default=[], max_length=100)
+    excitation: ForceOnDof | None = Field(
+        default=None, description="Where the force acts; of a sector also its engine order, 1 if null."
+    )
+    observe: OfDof | None = Field(default=None, description="What is observed; where the force acts if null.")
+
+
+@matrices.get("/formats")
+def formats() -> FormatsAnswer:
+    """The formats that can be uploaded."""
+    # Loaded here: a service that only lists does not need SciPy.
+    from solver.matrices.readers.registry import readers
+
+    return FormatsAnswer(
+        items=[
+            FormatAnswer(
+                name=reader.name, suffixes=list(reader.suffixes), word=reader.word, gives=list(reader.gives),
+                help=reader.help.replace("`", ""),
+            )
+            for reader in readers()
+        ]
+    )  # fmt: skip
+
+
+@matrices.post("")
+async def look(body: JsonBody, context: InContext) -> MatricesAnswer:
+    """Look at uploaded matrices: sizes, labels, mass, frequencies, what is wrong and what to do.
+
+    With `dofs` in the structure the answer has a scene that refers to the uploads, with a band around the
+    first mode and contacts whose values are of the right size to begin with. Of one sector of a disk the
+    structure has `sectors` and `cyclic` (`nodes`, `low`, `high`, `axis`, `keep_modes`), as in a scene file,
+    and the modes are those of the nodal diameter of the engine order. Nothing is stored.
+    """
+    request = validated(MatricesRequest, body)
+    if bool(request.uploads) == (request.structure is not None):
+        raise InvalidRequestError(
+            [Issue(pointer="/uploads", message="one of `uploads` and `structure` is needed")]
+        )
+    asked = request.model_dump()
+    if (request.structure or {}).get("dofs"):
+        if request.excitation is None:
+            raise InvalidRequestError(
+                [Issue(pointer="/excitation/dof", message="a DOF for the force is needed")]
+            )
+        asked["observe"] = asked["observe"] or {"dof": request.excitation.dof}
+        if (request.structure or {}).get("sectors") is not None and request.excitation.engine_order is None:
+            asked["excitation"]["engine_order"] = _USUAL_ORDER
+    service, caller = context.service, context.caller
+    found = await service.lanes.uploads.run(caller.owner, service.uploads.looked_at, asked, caller)
+    return MatricesAnswer.model_validate(found)
+
+
+measurements = APIRouter(prefix="/v1/measurements", tags=["scenes"], route_class=TypedRoute)
+
+_ROWS = "# damper.N0 = 100\nfrequency [Hz],amplitude [mm]\n1.0,1930\n1.1,2120\n1.2,1770\n"
+_FILES: dict[str, Any] = {"scene": "two-dof", "files": [{"name": "rig.csv", "text": _ROWS}]}
+MOST_CHARACTERS, MOST_FILES = 2_000_000, 50
+
+
+class MeasuredFile(BaseModel):
+    """A file of measured data in CSV."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    name: str = Field(min_length=1, max_length=200)
+    text: str = Field(max_length=MOST_CHARACTERS)
+
+
+class MeasurementsRequest(SceneRequest):
+    """The texts of files, and the scene they were measured of."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [_FILES]})
+
+    files: list[MeasuredFile] = Field(min_length=1, max_length=MOST_FILES)
+
+
+class MeasuredRun(BaseModel):
+    """Rows under the same conditions: amplitude [m] over frequency [Hz], or force [N] over motion [m]."""
+
+    kind: str
+    conditions: dict[str, float]
+    of: str = Field(description="The degree of freedom, or the contact.")
+    points: int
+    x: list[float]
+    data: list[float]
+
+
+class ReadFile(BaseModel):
+    """A file that can be read: its table in the words of a job of the kind `identify`, and its runs."""
+
+    name: str
+    table: dict[str, Any]
+    runs: list[MeasuredRun]
+
+
+class MeasurementIssue(BaseModel):
+    """Something wrong with a file; line and column where it is of a cell."""
+
+    file: str
+    line: int | None
+    column: str | None
+    detail: str
+
+
+class MeasurementsRead(BaseModel):
+    """What can be read, and what is wrong."""
+
+    files: list[ReadFile]
+    issues: list[MeasurementIssue]
+
+
+ReadBody = Annotated[MeasurementsRequest, Body(openapi_examples={"read": {"value": _FILES}})]
+
+
+@measurements.post("/read", response_model=MeasurementsRead)
+async def read_measurements(body: ReadBody, context: InContext) -> Response:
+    """Read measured data in CSV against a scene; nothing is stored.
+
+    The first thing that is wrong with each file is told with its line and column.
+    """
+    words = {
+        "scene": body.model_dump(exclude={"files"}),
+        "files": [file.model_dump() for file in body.files],
+    }
+    found = await computed(context, answering.MEASURED, words, about="/files")
+    return Response(found, media_type="application/json")

@@ -1,25 +1,63 @@
-"""What jobs that are design problems have in common: the keys of the design layer, with those of a job."""
+"""What studies of a design problem have in common: the keys of the design layer, with those of a job."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from pydantic import ConfigDict
 
 from optim.criteria.json_types import Name as Name
 from optim.criteria.json_types import Pair as Pair
 from optim.criteria.json_types import Ranges as Ranges
-from optim.problem.keys import ProblemKeys
+from optim.problem.keys import ROBUST, ProblemKeys
 from service.jobs.common.scenes import HarmonicRequest
-from service.jobs.registry import ABOUT_THE_RUN
-from solver.scene.scene import Scene
+from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
+from service.jobs.registry import ABOUT_THE_RUN, JobKind
+from service.jobs.study import Study
+from solver.errors import Issue
+
+if TYPE_CHECKING:
+    from solver.scene.scene import Scene
+
+_OF_OTHERS = ("points", *ROBUST)
 
 
-class ProblemRequest(ProblemKeys, HarmonicRequest):
-    """A design problem as a job, in the words of `optim.design`; kinds add the keys of the criteria."""
+class ProblemRequest(ProblemKeys, Study, HarmonicRequest):
+    """A design problem as a study, in the words of `optim.design`; kinds add the keys of the criteria."""
 
     model_config = ConfigDict(defer_build=True)
+    COUNTED = "computed"
+    KEYS: ClassVar[str] = ""
+
+    def issues(self, scene: Scene) -> list[Issue]:
+        """Return everything wrong with the problem."""
+        # Loaded here, as below: it brings the compiled loops along, which a service that only lists does not
+        # need.
+        from optim.problem.issues import problem_issues
+
+        known = {key: value for key, value in arguments(self).items() if key not in _OF_OTHERS}
+        return problem_issues(scene, known)
+
+    def sizes(self, scene: Scene) -> list[Issue]:
+        """Return what is too large."""
+        points, words = POINTS_OF_A_SWEEP * len(self.cases or [1]), "points of one design's responses"
+        return balance_issues("/cases", scene, self.harmonics, points, words)
+
+    def spec(self, scene: Scene) -> dict[str, Any]:
+        """Return what was given, with the variables that stand for none: a spec says what is chosen."""
+        from optim.problem.variables import check_variables
+
+        given = arguments(self)
+        if "variables" not in given:
+            given["variables"] = {v.name: [v.low, v.high] for v in check_variables(scene, None)}
+        return given
+
+    @classmethod
+    def as_kind(cls) -> JobKind:
+        """Return the kind of job, whose keys are described elsewhere."""
+        kind = super().as_kind()
+        return replace(kind, view=replace(kind.view, keys=cls.KEYS))
 
 
 ABOUT_THE_SCENE = ("scene", "set")
@@ -35,18 +73,3 @@ def arguments(request: ProblemRequest) -> dict[str, Any]:
         given["cases"] = [case.model_dump(mode="json", exclude_unset=True) for case in request.cases]
         given["cases"] = [{k: v for k, v in case.items() if v is not None} for case in given["cases"]]
     return given
-
-
-def default_variables(scene: Scene, given: Mapping[str, Any]) -> dict[str, Any]:
-    """The variables that stand for none, so that a spec says what is chosen."""
-    # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
-    from optim.problem.variables import check_variables
-
-    if "variables" in given:
-        return {}
-    return {"variables": {v.name: [v.low, v.high] for v in check_variables(scene, None)}}
-
-
-def problem_of(spec: Mapping[str, Any]) -> dict[str, Any]:
-    """The arguments of the design layer in a spec; those of an older version name what was not given too."""
-    return {key: value for key, value in spec.items() if key != "scene" and value is not None}

@@ -10,7 +10,7 @@ from pydantic import ConfigDict, Field
 from service.jobs.common.scenes import HarmonicRequest, Number, ParameterPath, check, refusal
 from service.jobs.registry import Flag
 from solver.errors import Issue
-from solver.scene.examples import DISK_LOAD
+from solver.scene.descriptions import DISK_LOAD
 
 if TYPE_CHECKING:
     from solver.scene.scene import Scene
@@ -47,6 +47,14 @@ def range_issues(request: RangeRequest, scene: Scene) -> list[Issue]:
     if request.start == request.stop:
         issues.append(refusal("/to", f"`to` must differ from `from`, got {request.stop!r} for both"))
     return issues or check("/parameter", partial(scale_of, scene, path, request.start, request.stop))
+
+
+def band_issues(scene: Scene, start: float | None, stop: float | None) -> list[Issue]:
+    """Refuse frequencies [Hz], the scene's band where left out, of which the last is not above the first."""
+    low, high = (
+        end if given is None else given for end, given in zip(scene.observe.band, (start, stop), strict=True)
+    )
+    return [] if low < high else [refusal("/to", f"`to` must be above `from` = {low!r} Hz, got {high!r}")]
 
 
 def law_issues(where: str, scene: Scene) -> list[Issue]:

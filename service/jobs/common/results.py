@@ -2,9 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+import builtins
+import inspect
+import sys
+from collections.abc import Mapping
+from enum import Enum
+from types import NoneType, UnionType
+from typing import TYPE_CHECKING, Annotated, Any, Union, get_args, get_origin
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, create_model
+
+if TYPE_CHECKING:
+    from solver.results.told import Told
+
 
 Table = dict[str, Any]
 Amplitude = Annotated[float | None, Field(description="Displacement [m].")]
@@ -70,3 +80,83 @@ class ReachedResult(KindResult):
 
     reached: bool
     status: str = Field(description="How it ended, and what to try if it fell short.")
+
+
+def result_model(kind: type[Told], name: str, **types: Any) -> type[KindResult]:
+    """Return the schema of the JSON of a class of results, by the types and words of its fields.
+
+    Parameters
+    ----------
+    kind : the class; how well responses are known, and how a result ended, is said in all alike.
+    name : of the schema.
+    types : of keys whose JSON has another one than the attribute, or none that is known here; of further keys
+        their fields, as of `pydantic.create_model`.
+    """
+    # Loaded here: the help of a command whose model is written out needs no numbers.
+    from solver.results.base import MadeOfResponses
+    from solver.results.told import json_keys
+
+    keys = json_keys(kind)
+    parts: dict[type[KindResult], bool] = {
+        KnownResult: issubclass(kind, MadeOfResponses),
+        EndedResult: "completed" in keys, ReachedResult: "reached" in keys,
+    }  # fmt: skip
+    bases = tuple(part for part, has in parts.items() if has)
+    shared = {key for base in bases for key in base.model_fields}
+    own: dict[str, Any] = {}
+    for key, path in keys.items():
+        if key not in shared:
+            kept, words = _described(kind, path)
+            given = types.pop(key, kept)
+            own[key] = given if isinstance(given, tuple) else (given, Field(description=words))
+    about = (kind.__doc__ or "").partition("\n")[0]
+    return create_model(name, __base__=bases or (KindResult,), __doc__=about, **own, **types)
+
+
+def _described(kind: Any, path: str) -> tuple[Any, str | None]:
+    """Return the type that the JSON of an attribute has, and its description."""
+    name, _, rest = path.partition(".")
+    found_in = (one for one in kind.__mro__ if name in {*inspect.get_annotations(one), *vars(one)})
+    owner = next(found_in, None)
+    if owner is None:  # of what is there for type checkers alone
+        return Table, None
+    made = getattr(vars(owner).get(name), "fget", None)
+    text = owner.__annotations__[name] if made is None else made.__annotations__["return"]
+    found = eval(text, {}, _Names({**vars(builtins), **vars(sys.modules[owner.__module__])}))
+    if rest:
+        return _described(found, rest)
+    words = getattr(kind, "WORDS", {}).get(name) if made is None else (made.__doc__ or "").partition("\n")[0]
+    return _json_type(found), words
+
+
+class _Names(dict[str, Any]):
+    """What annotations name; what is there for type checkers alone is a part of a result."""
+
+    def __missing__(self, _name: str) -> type[Told]:
+        from solver.results.told import Told
+
+        return Told
+
+
+def _json_type(given: Any) -> Any:
+    import numpy as np
+
+    from solver.arrays import FloatOrNaN
+    from solver.scene.scene import Scene
+
+    of, parts = get_origin(given), get_args(given)
+    if of in (Union, UnionType):
+        return Union[tuple(_json_type(one) for one in parts)]  # noqa: UP007 - made of what is found
+    if given is FloatOrNaN:
+        return float | None
+    if of is Annotated:
+        return _json_type(parts[0])
+    if of is np.ndarray:
+        return Curve
+    if of is Mapping:
+        return dict[str, _json_type(parts[1])]  # type: ignore[misc]
+    if of is tuple:
+        return list[_json_type(parts[0])]  # type: ignore[misc]
+    if given in (str, int, float, bool, NoneType, Any):
+        return given
+    return str if issubclass(given, Enum | Scene) else Table

@@ -9,8 +9,7 @@ from typing import Any
 from service.errors import MalformedBodyError
 from service.jobs.common.scene_text import issues_of_scene, read_text
 from service.jobs.registry import SceneSource
-from solver.scene.editing.edit import edited
-from solver.scene.editing.places import Place, place_at, places
+from solver.scene.editing import Place, edited, place_at, places
 
 _AT = re.compile(r"\bline (\d+)(?:, column (\d+))?")
 

@@ -20,7 +20,7 @@ from service.errors import InvalidRequestError
 from service.jobs.registry import Flag, JobRequest, Resolved, SceneSource
 from service.jobs.strict_json import digest
 from solver.errors import Issue, SceneError, SettingError, pointer
-from solver.scene.examples import DAMPER_LOAD
+from solver.scene.descriptions import DAMPER_LOAD
 
 if TYPE_CHECKING:
     from solver.scene.scene import Scene

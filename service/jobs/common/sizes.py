@@ -96,8 +96,9 @@ def size_issues(where: str, words: str, points: int, harmonics: int, dofs: int) 
 
 
 def balance_issues(
-    where: str, scene: Scene, harmonics: int, points: int = 1, words: str = "points"
-) -> list[Issue]:
+    where: str, scene: Scene, harmonics: int, points: int = 1, words: str = "points", *,
+    every_sector: bool = False,
+) -> list[Issue]:  # fmt: skip
     """Refuse responses whose balance is too large, or too many of them, at the pointer `where`.
 
     Parameters
@@ -106,31 +107,19 @@ def balance_issues(
     harmonics : highest one kept.
     points : periodic responses to be solved.
     words : what is counted, for people.
+    every_sector : the whole annulus is solved, even of a tuned disk under a travelling wave.
     """
-    # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
-    from solver.scene.cyclic.annulus import sectors_needed
-
-    large = _unknown_issues(scene, harmonics, sectors_needed(scene).sectors)
+    sectors = scene.structure.sector_count if every_sector else _sectors(scene)
     return (
-        large
-        or memory_issues(scene, harmonics)
-        or size_issues(where, words, points, harmonics, dofs_solved(scene))
+        _unknown_issues(scene, harmonics, sectors)
+        or memory_issues(scene, harmonics, every_sector=every_sector)
+        or size_issues(where, words, points, harmonics, len(scene.dofs) * sectors)
     )
-
-
-def annulus_issues(scene: Scene, harmonics: int) -> list[Issue]:
-    """Refuse a balance of all sectors that is too large."""
-    structure = scene.structure
-    sectors = structure.sector_count
-    return _unknown_issues(scene, harmonics, sectors) or memory_issues(scene, harmonics, every_sector=True)
 
 
 def contact_motions(scene: Scene) -> int:
     """Motions of the contacts, those of all sectors where one does not stand for them."""
-    # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
-    from solver.scene.cyclic.annulus import sectors_needed
-
-    return _motions(scene, sectors_needed(scene).sectors)
+    return _motions(scene, _sectors(scene))
 
 
 def coefficients(scene: Scene, harmonics: int) -> int:
@@ -138,6 +127,13 @@ def coefficients(scene: Scene, harmonics: int) -> int:
     from solver.scene.harmonics import kept_harmonics
 
     return 2 * len(kept_harmonics(scene, (), harmonics, odd=False)) - 1
+
+
+def _sectors(scene: Scene) -> int:
+    # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
+    from solver.scene.cyclic.annulus import sectors_needed
+
+    return sectors_needed(scene).sectors
 
 
 def _motions(scene: Scene, sectors: int) -> int:
@@ -181,10 +177,7 @@ def march_issues(scene: Scene, steps_per_period: int | None, max_periods: int) -
 
 def dofs_solved(scene: Scene) -> int:
     """The DOFs of the structure as it is solved: of one sector, or of the whole disk."""
-    # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
-    from solver.scene.cyclic.annulus import sectors_needed
-
-    return len(scene.dofs) * sectors_needed(scene).sectors
+    return len(scene.dofs) * _sectors(scene)
 
 
 def whole_disk_dofs(scene: Scene) -> int:

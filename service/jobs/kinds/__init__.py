@@ -2,24 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import optim
 import solver
-from service.jobs.kinds.design import DESIGN
-from service.jobs.kinds.identify import IDENTIFY
-from service.jobs.kinds.mistuning import MISTUNING
-from service.jobs.kinds.pareto import PARETO
-from service.jobs.kinds.solve import SOLVE
-from service.jobs.kinds.sweep import SWEEP
 from service.jobs.registry import Registry
 from service.jobs.studies.accuracy import Accuracy
 from service.jobs.studies.campbell import Campbell
 from service.jobs.studies.controlled import Controlled
+from service.jobs.studies.design import Design
+from service.jobs.studies.identify import Identify
 from service.jobs.studies.interference import Interference
 from service.jobs.studies.map import Map
 from service.jobs.studies.march import March
+from service.jobs.studies.mistuning import Mistuning
 from service.jobs.studies.modes import Modes
+from service.jobs.studies.pareto import Pareto
 from service.jobs.studies.peaks import Peaks
+from service.jobs.studies.plan import Plan
 from service.jobs.studies.sensitivities import Sensitivities
+from service.jobs.studies.solve import Solve
+from service.jobs.studies.sweep import Sweep
+from service.jobs.study import Study
 
 
 def warm_up() -> None:
@@ -32,21 +36,27 @@ def warm_up() -> None:
 
 SHIPPED = Registry(
     [
-        SWEEP,
+        Sweep.as_kind(),
         Map.as_kind(),
         Peaks.as_kind(),
-        DESIGN,
-        PARETO,
-        SOLVE,
+        Design.as_kind(),
+        Pareto.as_kind(),
+        Solve.as_kind(),
         March.as_kind(),
         Accuracy.as_kind(),
         Campbell.as_kind(),
         Interference.as_kind(),
-        MISTUNING,
-        IDENTIFY,
+        Mistuning.as_kind(),
+        Identify.as_kind(),
         Modes.as_kind(),
         Controlled.as_kind(),
         Sensitivities.as_kind(),
+        Plan.as_kind(),
     ],
     warm_up,
 )
+
+
+def studies(registry: Registry = SHIPPED) -> Mapping[str, type[Study]]:
+    """Return the studies among some kinds by their names."""
+    return {kind.name: kind.request for kind in registry if issubclass(kind.request, Study)}

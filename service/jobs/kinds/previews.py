@@ -5,7 +5,7 @@ A preview is a kind like those of jobs, with limits that keep it within a blink.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Annotated, Any
 
 from pydantic import ConfigDict, Field
@@ -31,7 +31,7 @@ from service.jobs.common.sizes import (
 from service.jobs.outputs import JobOutput, Progress, ShouldStop, Silent
 from service.jobs.registry import JobKind, Registry, Resolved, SceneSource
 from solver.errors import Issue
-from solver.scene.examples import DAMPER_LOAD
+from solver.scene.descriptions import DAMPER_LOAD
 from solver.scene.scene import Scene
 
 MOST_POINTS = 2000
@@ -173,9 +173,8 @@ def run_sensitivities(spec: Mapping[str, Any], _progress: Progress, _should_stop
     kept = ("peaks", "band_hz", "limit", "left_out", "peak_certificate", "seconds", "reached", "status")
     told = found.to_json()
     of_a_row = ("path", "unit", "value", "peaks_percent", "band_percent")
-    rows: Sequence[Mapping[str, Any]] = told["rows"]  # type: ignore[assignment]
     result = {key: told[key] for key in kept} | {
-        "rows": [{key: row[key] for key in of_a_row} for row in rows],
+        "rows": [{key: row[key] for key in of_a_row} for row in told["rows"]],
         "n_harmonics": spec["harmonics"],
     }
     return JobOutput(result=result, shortfall=None if found.reached else found.status.value)

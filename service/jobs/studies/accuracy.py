@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import ConfigDict, Field
 
-from service.jobs.common.results import Amplitude, EndedResult, Table
+from service.jobs.common.results import result_model
 from service.jobs.common.scenes import FrequencyHz, Harmonics, check, refusal
 from service.jobs.outputs import SweepRecord
 from service.jobs.registry import Flag
 from service.jobs.study import Study
 from solver.errors import Issue, pointer
+from solver.studies.accuracy_result import AccuracyStudy
 
 if TYPE_CHECKING:
-    from solver import AccuracyStudy
     from solver.scene.scene import Scene
 
 _EXAMPLE: dict[str, Any] = {"scene": "two-dof", "frequency_hz": 1.2, "harmonics": [1, 3, 7], "samples": [64]}
@@ -26,17 +26,6 @@ _Samples = Annotated[list[Annotated[int, Field(strict=True, ge=4, le=65536)]], F
 _Repeats = Annotated[int, Field(strict=True, ge=1, le=1000)]
 
 
-class AccuracyResult(EndedResult):
-    """Error and time of every way to compute one point."""
-
-    scene: str
-    frequency_hz: float
-    reference: float | None
-    reference_harmonics: int
-    reference_error: Amplitude
-    rows: list[Table]
-
-
 class Accuracy(Study):
     """Measure what accuracy costs.
 
@@ -44,7 +33,8 @@ class Accuracy(Study):
     """
 
     model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE]})
-    NAME, FUNCTION, RESULT = "accuracy", "solver:accuracy_study", AccuracyResult
+    NAME, FUNCTION = "accuracy", "solver:accuracy_study"
+    RESULT = result_model(AccuracyStudy, "AccuracyResult")
     SHOWS, SWEEPS, COUNTED = (
         "error against time ([accuracy](accuracy.md))",
         "the one that found the peak",

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 from pydantic import ConfigDict, Field
 
 from optim.criteria.json_types import Pair, PositiveNumber, Ranges
-from service.jobs.common.results import Amplitude, EndedResult, KnownResult, Table
+from optim.studies.crossings import CampbellDiagram
+from service.jobs.common.results import result_model
 from service.jobs.common.scenes import HarmonicRequest, refusal
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
 from service.jobs.kind_view import Json, NothingToDrawError, ReadSweep, StoredSweep
@@ -21,7 +22,6 @@ from solver.errors import Issue, pointer
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from optim.studies.crossings import CampbellDiagram
     from solver.scene.scene import Scene
     from solver.views.plots.curves import Response
 
@@ -35,18 +35,6 @@ _MOST_RPM = 6e10  # a revolution at the highest frequency that is accepted anywh
 _Order = Annotated[int, Field(strict=True, ge=1, le=10_000)]
 
 
-class CampbellResult(KnownResult, EndedResult):
-    """Crossings of every order with the peaks of its response, and speeds above the limit."""
-
-    scene: str
-    speeds_rpm: list[list[float]]
-    limit: Amplitude
-    clear: bool | None = Field(description="Whether no running speed is above the limit.")
-    orders: list[Table]
-    n_harmonics: int
-    seconds: float
-
-
 class Campbell(Study, HarmonicRequest):
     """Find the speeds at which orders of the running speed meet resonances.
 
@@ -55,7 +43,8 @@ class Campbell(Study, HarmonicRequest):
     """
 
     model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE]})
-    NAME, FUNCTION, RESULT = "campbell", "optim:campbell_diagram", CampbellResult
+    NAME, FUNCTION = "campbell", "optim:campbell_diagram"
+    RESULT = result_model(CampbellDiagram, "CampbellResult")
     SHOWS = "crossings and speeds above the limit ([Campbell diagrams](campbell.md))"
     EMPTY = ("orders", "it stored no sweep to draw")
     SWEEPS = "one an order; one for all without sectors"

@@ -8,38 +8,19 @@ from typing import TYPE_CHECKING, Annotated, Any
 from pydantic import ConfigDict, Field
 
 from optim.criteria.json_types import Name
-from service.jobs.common.results import Curve, EndedResult, Table
+from service.jobs.common.ranges import band_issues
+from service.jobs.common.results import Table, result_model
 from service.jobs.common.scenes import HarmonicRequest, PositiveNumber, refusal
 from service.jobs.common.sizes import balance_issues
 from service.jobs.registry import Flag
 from service.jobs.study import Answer, Study, Watch
 from solver.errors import Issue
+from solver.modes.driven.results import HeldAmplitude
 
 if TYPE_CHECKING:
     from solver.scene.scene import Scene
 
 _POINTS = 200  # a curve seldom has more
-
-
-class ControlledResult(EndedResult):
-    """The force that holds the amplitude, over the frequency."""
-
-    scene: str
-    dof: str
-    amplitude: float
-    frequency: Curve
-    excitation: Curve
-    excitation_error: Curve
-    phase: Curve
-    max_abs: Curve
-    contacts: list[str]
-    states: list[list[str]]
-    changes: list[Table]
-    stable: list[bool | None]
-    stability_unknown: str
-    least: Table | None
-    n_harmonics: int
-    seconds: float
 
 
 class Controlled(Study, HarmonicRequest):
@@ -49,7 +30,8 @@ class Controlled(Study, HarmonicRequest):
     """
 
     model_config = ConfigDict(json_schema_extra={"examples": [{"scene": "two-dof", "amplitude": 1.0}]})
-    NAME, FUNCTION, RESULT = "controlled", "solver:held_amplitude", ControlledResult
+    NAME, FUNCTION = "controlled", "solver:held_amplitude"
+    RESULT = result_model(HeldAmplitude, "ControlledResult", changes=list[Table], least=Table | None)
     SHOWS = "force and phase over the frequency ([a held amplitude](modes.md#a-held-amplitude))"
     EMPTY = ("frequency", "no response with this amplitude was found")
     FIGURE = "solver.views.plots.modes:held_figure"
@@ -72,11 +54,7 @@ class Controlled(Study, HarmonicRequest):
 
     def issues(self, scene: Scene) -> list[Issue]:
         """Return what is wrong with range and DOF for the scene."""
-        issues: list[Issue] = []
-        low = scene.observe.band[0] if self.start is None else self.start
-        high = scene.observe.band[1] if self.stop is None else self.stop
-        if low >= high:
-            issues.append(refusal("/to", f"`to` must be above `from` = {low!r} Hz, got {high!r}"))
+        issues = band_issues(scene, self.start, self.stop)
         if self.dof is not None and self.dof not in scene.dofs:
             words = f"`dof` must be one of {', '.join(scene.dofs)}, got {self.dof!r}"
             issues.append(refusal("/dof", words))

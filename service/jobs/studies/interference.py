@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, Annotated
 
 from pydantic import ConfigDict, Field
 
-from service.jobs.common.results import EndedResult, Table
+from service.jobs.common.results import result_model
 from service.jobs.common.scenes import PositiveNumber, check_named
 from service.jobs.common.sizes import memory_issues
 from service.jobs.kind_view import Json
 from service.jobs.registry import Flag
 from service.jobs.study import Study
 from solver.errors import Issue
+from solver.studies.interference_result import InterferenceDiagram
 
 if TYPE_CHECKING:
     from solver.scene.scene import Scene
@@ -25,20 +26,6 @@ _Orders = Annotated[
 ]
 
 
-class InterferenceResult(EndedResult):
-    """Natural frequencies at each nodal diameter, what the orders excite, and where they meet."""
-
-    scene: str
-    sectors: int
-    speed_rpm: float | None
-    within: float
-    diameters: list[Table] = Field(description="Frequencies with all contacts open, and all stuck.")
-    orders: list[Table] = Field(description="Nodal diameter and frequency of each order at the speed.")
-    crossings: list[Table] = Field(description="Orders that meet a family or are near one.")
-    missing: list[int] = Field(description="Nodal diameters that a reduced sector was not built for.")
-    seconds: float
-
-
 class Interference(Study):
     """Draw natural frequencies over the nodal diameter, with the engine orders that meet them.
 
@@ -46,9 +33,10 @@ class Interference(Study):
     """
 
     model_config = ConfigDict(json_schema_extra={"examples": [{"scene": "bladed-disk", "speed_rpm": 11000}]})
-    NAME, FUNCTION, RESULT = "interference", "solver:interference_diagram", InterferenceResult
+    NAME, FUNCTION = "interference", "solver:interference_diagram"
+    RESULT = result_model(InterferenceDiagram, "InterferenceResult")
     SHOWS = "frequencies at each nodal diameter, orders that meet them ([interference](disks.md))"
-    FIGURE = "solver.views.plots.interference:interference_figure"
+    FIGURE = "solver.views.plots.disks:interference_figure"
     COUNTED = "nodal diameters"
 
     speed_rpm: Annotated[_Speed | None, Flag("--speed", "RPM")] = Field(

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from pydantic import ConfigDict, Field
 
 from service.jobs.common.ranges import RangeRequest, law_issues, range_issues
-from service.jobs.common.results import Curve, EndedResult, KnownResult
+from service.jobs.common.results import Curve, result_model
 from service.jobs.common.scenes import refusal
 from service.jobs.common.sizes import MOST_POINTS, balance_issues
 from service.jobs.kind_view import Json
@@ -19,7 +19,8 @@ from service.jobs.registry import Flag, JobKind
 from service.jobs.studies.peaks import PeaksResult
 from service.jobs.study import Study
 from solver.errors import Issue
-from solver.scene.examples import DISK_LOAD
+from solver.scene.descriptions import DISK_LOAD
+from solver.studies.map_result import ResponseMap
 
 if TYPE_CHECKING:
     from solver.scene.scene import Scene
@@ -31,21 +32,10 @@ _EXAMPLE: dict[str, Any] = {
 _Count = Annotated[int, Field(strict=True, ge=2, le=MOST_POINTS // 2)]
 
 
-class MapResult(KnownResult, EndedResult):
-    """The response on the grid, a row for each value of the parameter; null where it was not found."""
-
-    scene: str
-    parameter: Curve
-    parameter_path: str
-    unit: str
-    frequency: Curve
-    amplitude: list[Curve]
-    half_peak_to_peak: list[Curve]
-    ridge: PeaksResult | None
-    n_harmonics: int
-    newton_iterations: int
-    largest_residual: float | None
-    seconds: float
+MapResult = result_model(
+    ResponseMap, "MapResult", amplitude=list[Curve], half_peak_to_peak=list[Curve], ridge=PeaksResult | None,
+    largest_residual=float | None,
+)  # fmt: skip
 
 
 class Map(Study, RangeRequest):

@@ -8,33 +8,19 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import ConfigDict, Field
 
-from service.jobs.common.results import Amplitude, KindResult, Table
+from service.jobs.common.results import Table, result_model
 from service.jobs.common.scenes import FrequencyHz
 from service.jobs.common.sizes import march_issues
 from service.jobs.registry import Flag
 from service.jobs.study import Answer, Study, Watch
 from solver.errors import Issue
+from solver.marching.result import MarchResult
 
 if TYPE_CHECKING:
     from solver.scene.scene import Scene
 
 SAMPLES = 512
 _Steps = Annotated[int, Field(strict=True, ge=16, le=1_000_000)]
-
-
-class MarchResult(KindResult):
-    """The motion a time march settled to."""
-
-    max_abs: Amplitude
-    half_peak_to_peak: Amplitude
-    mean: Amplitude
-    harmonics: list[float | None] | None = Field(description="Amplitudes of the harmonics from 0 on [m].")
-    periods: int
-    steps_per_period: int
-    error_estimate: float | None = Field(description="Relative to the largest displacement.")
-    status: str
-    seconds: float
-    history: Table | None = Field(default=None, description="The last period, where it was asked for.")
 
 
 class March(Study):
@@ -44,7 +30,10 @@ class March(Study):
     """
 
     model_config = ConfigDict(json_schema_extra={"examples": [{"scene": "two-dof", "frequency_hz": 1.2}]})
-    NAME, FUNCTION, RESULT = "march", "solver:march", MarchResult
+    NAME, FUNCTION = "march", "solver:march"
+    RESULT = result_model(
+        MarchResult, "MarchResult", harmonics=list[float | None] | None, history=(Table | None, None)
+    )
     SHOWS, COUNTED = "amplitude and periods marched", "periods"
     EMPTY = ("harmonics", "no response was found")
     FIGURE = "service.jobs.drawing:harmonics_of"

@@ -7,13 +7,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import ConfigDict, Field, RootModel
 
-from service.jobs.common.results import Curve, EndedResult, Table
+from service.jobs.common.results import Table, result_model
 from service.jobs.common.scenes import HarmonicRequest, Number, PositiveNumber, check_named, refusal
 from service.jobs.common.sizes import MOST_MOTIONS, POINTS_OF_A_SWEEP, balance_issues
 from service.jobs.kind_view import Json, ReadSweep, StoredSweep
 from service.jobs.registry import Flag
 from service.jobs.study import Answer, Study, Watch
 from solver.errors import Issue
+from solver.modes.driven.results import PhaseResonance
+from solver.modes.results import NonlinearMode
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -27,42 +29,14 @@ _Diameter = Annotated[int, Field(strict=True, ge=-10_000, le=10_000)]
 _Ratio = Annotated[Number, Field(ge=-10.0, le=10.0)]
 
 
-class _AmplitudeCurve(EndedResult):
-    """A curve over the modal amplitude, and what the contacts do along it."""
-
-    scene: str
-    mode: int
-    amplitude: Curve
-    frequency: Curve
-    dof: str
-    max_abs: Curve
-    contacts: list[str]
-    states: list[list[str]]
-    seconds: float
+NonlinearModeResult = result_model(
+    NonlinearMode, "NonlinearModeResult",
+    **dict.fromkeys(("performance", "limit_cycles", "motions"), (Table | None, None)),
+)  # fmt: skip
+PhaseResonanceResult = result_model(PhaseResonance, "PhaseResonanceResult")
 
 
-class PhaseResonanceResult(_AmplitudeCurve):
-    """Frequency and force of phase resonance over the amplitude."""
-
-    excitation: Curve
-
-
-class NonlinearModeResult(_AmplitudeCurve):
-    """Frequency and damping ratio over the amplitude."""
-
-    nodal_diameter: int | None
-    damping_ratio: Curve
-    frequency_error: Curve
-    damping_error: Curve
-    n_harmonics: int
-    newton_iterations: int
-    rejected_steps: int
-    performance: Table | None = None
-    limit_cycles: Table | None = None
-    motions: Table | None = None
-
-
-class ModesResult(RootModel[NonlinearModeResult | PhaseResonanceResult]):
+class ModesResult(RootModel[NonlinearModeResult | PhaseResonanceResult]):  # type: ignore[valid-type]
     """A nonlinear mode; with `phase_resonance` the forced responses."""
 
 
@@ -150,12 +124,13 @@ class Modes(Study, HarmonicRequest):
         given = {key: asked[key] for key in ("mode", "nodal_diameter", "harmonics") if key in asked}
         given["amplitudes"] = (asked["start"], asked["stop"])
         if asked.get("phase_resonance"):
-            return Answer.of(solver.phase_resonance(scene, **given, **watch._asdict()))
+            resonances = solver.phase_resonance(scene, **given, **watch._asdict())
+            return Answer.of(resonances, resonances.completed)
         of_peaks = asked.get("exact_peaks", 0)
         found = solver.nonlinear_mode(
             scene, **given, **watch.part(0.0, _OF_THE_CURVE if of_peaks else 1.0)._asdict()
         )
-        answer = Answer.of(found)
+        answer = Answer.of(found, found.completed)
         if asked.get("performance"):
             curve = solver.performance_curve(found)
             answer = answer.beside(curve, performance=curve.to_json())

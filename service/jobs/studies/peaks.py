@@ -8,38 +8,23 @@ from typing import TYPE_CHECKING, Annotated
 from pydantic import ConfigDict, Field
 
 from service.jobs.common.ranges import RangeRequest, law_issues, range_issues
-from service.jobs.common.results import Curve, EndedResult, KnownResult, Table
+from service.jobs.common.results import result_model
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
 from service.jobs.kind_view import Json, ReadSweep, StoredSweep
 from service.jobs.outputs import SweepRecord
 from service.jobs.registry import Flag
 from service.jobs.study import Study
 from solver.errors import Issue
-from solver.scene.examples import DISK_LOAD
+from solver.scene.descriptions import DISK_LOAD
+from solver.studies.peaks.results import PeakTrack
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from solver import PeakTrack
     from solver.scene.scene import Scene
 
 
-class PeaksResult(KnownResult, EndedResult):
-    """The highest peak over the parameter, what competes with it, and where it is least."""
-
-    scene: str
-    parameter: Curve
-    parameter_path: str
-    unit: str
-    peak: Curve
-    frequency: Curve
-    slope: Curve
-    optimum: Table
-    exchanges: list[Table]
-    competing: list[Table]
-    n_harmonics: int
-    sweeps: int
-    seconds: float
+PeaksResult = result_model(PeakTrack, "PeaksResult")
 
 
 class Peaks(Study, RangeRequest):

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import ConfigDict, Field
 
-from service.jobs.common.results import Amplitude, KnownResult, PeakAt, ReachedResult, Table
+from optim.studies.sensitivity_result import SensitivityResult
+from service.jobs.common.results import PeakAt, result_model
 from service.jobs.common.scenes import HarmonicRequest, PositiveNumber
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
 from service.jobs.kind_view import Json
@@ -17,22 +18,7 @@ from service.jobs.study import Answer, Study, Watch
 from solver.errors import Issue
 
 if TYPE_CHECKING:
-    from optim import SensitivityResult
     from solver.scene.scene import Scene
-
-
-class SensitivitiesResult(KnownResult, ReachedResult):
-    """Per cent of the highest peaks and of the band for one per cent of each parameter."""
-
-    scene: str
-    peaks: list[PeakAt]
-    band_hz: float | None
-    limit: Amplitude
-    band_by_limit: float | None = Field(description="Of the band's width by the limit [Hz/m].")
-    peak_certificate: Table
-    rows: list[Table]
-    left_out: list[Table] = Field(description="Parameters without a derivative, with the reason.")
-    seconds: float
 
 
 class Sensitivities(Study, HarmonicRequest):
@@ -42,9 +28,10 @@ class Sensitivities(Study, HarmonicRequest):
     """
 
     model_config = ConfigDict(json_schema_extra={"examples": [{"scene": "two-dof", "harmonics": 5}]})
-    NAME, FUNCTION, RESULT = "sensitivities", "optim:sensitivities", SensitivitiesResult
+    NAME, FUNCTION = "sensitivities", "optim:sensitivities"
+    RESULT = result_model(SensitivityResult, "SensitivitiesResult", peaks=list[PeakAt])
     SHOWS = "the change of peaks and band by one per cent of each parameter ([sensitivities](trade-offs.md))"
-    SWEEPS, FIGURE = "the response", "optim.views.plots.shares:sensitivities_figure"
+    SWEEPS, FIGURE = "the response", "optim.views.plots.designs:sensitivities_figure"
 
     limit: Annotated[PositiveNumber | None, Flag(metavar="A")] = Field(
         default=None,
@@ -61,7 +48,7 @@ class Sensitivities(Study, HarmonicRequest):
         import optim
 
         found = optim.sensitivities(scene, **asked)
-        return Answer(found, found.to_json(), found.reached, found.status.value, found.plot)
+        return Answer.of(found, found.reached)
 
     @classmethod
     def sweeps(cls, found: SensitivityResult) -> tuple[SweepRecord, ...]:

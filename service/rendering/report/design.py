@@ -24,8 +24,8 @@ from service.rendering.report.sections import (
 from service.rendering.tables.design import design_tables
 from solver.errors import SolverError
 from solver.results import units
+from solver.scene.parameter_paths import parameter
 from solver.scene.scene import Scene
-from solver.views.parameter_units import parameter
 from solver.views.plots import style
 from solver.views.plots.html import image, page, pairs, table
 
@@ -146,7 +146,7 @@ def _trade_off(result: Json) -> list[str]:
     """The front, of a job that computed one."""
     if not _is_front(result) or not result["points"]:
         return []
-    from optim.views.plots.pareto import pareto_figure
+    from optim.views.plots.designs import pareto_figure
 
     heads = [*result["points"][0]["values"], "peak", "band"]
     rows = [

@@ -14,9 +14,9 @@ from service.rendering.report.sections import (
     versions,
 )
 from service.rendering.tables.identify import candidate_words, estimate_row, told_pairs
+from solver.scene.parameter_paths import parameter
 from solver.scene.scene import Scene
 from solver.scene.toml import toml_text
-from solver.views.parameter_units import parameter
 from solver.views.plots.html import image, page, pairs, table
 
 _MOST_CANDIDATES = 10

@@ -23,8 +23,8 @@ from service.rendering.report.sections import (
 from service.rendering.tables.robust import effort_pairs, side_lines, uncertain_rows
 from solver.continuation.branch import AnyBranch
 from solver.results import units
+from solver.scene.parameter_paths import parameter
 from solver.scene.scene import Scene
-from solver.views.parameter_units import parameter
 from solver.views.plots import style
 from solver.views.plots.html import image, page, pairs, table
 

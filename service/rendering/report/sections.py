@@ -17,9 +17,9 @@ from service.rendering.report.responses import Line, comparison_figure
 from solver.continuation.branch import AnyBranch
 from solver.results import units
 from solver.results.notes import flag_words
+from solver.scene.parameter_paths import parameter
 from solver.scene.scene import Scene
 from solver.scene.toml import toml_text
-from solver.views.parameter_units import parameter
 from solver.views.plots.html import image, pairs, table
 from solver.views.plots.scenes import scene_figure
 

@@ -10,7 +10,7 @@ from typing import Any
 from service.rendering.tables.text import print_pairs, print_table, say
 from solver.results import units
 from solver.results.known import known_pairs
-from solver.views.parameter_units import parameter
+from solver.scene.parameter_paths import parameter
 
 Json = Mapping[str, Any]
 Pairs = list[tuple[str, str]]

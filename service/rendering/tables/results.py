@@ -9,7 +9,7 @@ from service.rendering.tables.text import print_pairs, print_table, say
 from solver.results import units
 from solver.results.notes import BAND_OPEN, FLAGS, between_points, drift_words, flag_words
 from solver.results.views import on_demand
-from solver.views.parameter_units import parameter
+from solver.scene.parameter_paths import parameter
 
 if TYPE_CHECKING:
     from solver.scene.scene import Scene
@@ -62,7 +62,10 @@ def plan(found: Json) -> None:
 
 
 def solution(found: Json) -> None:
-    """One response."""
+    """One response, or all that were found."""
+    if found.get("solutions") is not None:
+        all_solutions(found)
+        return
     title = f"{found['scene']} at {found['frequency_hz']:g} Hz, {found['n_harmonics']} harmonics"
     if not found["converged"]:
         notes = [("note", words) for words in flag_words(found["flags"])]
@@ -226,7 +229,7 @@ _HOMES = {
     "peaks": "track.track", "accuracy": "results.accuracy", "campbell": "campbell.diagram",
     "interference": "interference.diagram",
     "mistuning": "mistuning.report", "identify": "identify.report", "modes": "modes.report",
-    "controlled": "modes.held", "sensitivities": "sensitivities.shares",
+    "controlled": "modes.held", "sensitivities": "sensitivities.shares", "plan": "results.plan",
 }  # fmt: skip
 
 

@@ -9,7 +9,7 @@ from service.rendering.tables.text import print_pairs, print_table, say
 from solver.results import units
 from solver.results.known import known_pairs
 from solver.results.order_statistics import needed
-from solver.views.parameter_units import parameter
+from solver.scene.parameter_paths import parameter
 
 Json = Mapping[str, Any]
 

@@ -37,7 +37,7 @@ from solver.continuation.segment import Stretch, go_on_from, joined, rows_of, st
 from solver.continuation.settings import ContinuationSettings
 from solver.errors import SettingError
 from solver.jit.fourier import Integer, Real, to_full
-from solver.linear.undamped import undamped_resonance
+from solver.linear.modal import undamped_resonance
 from solver.results.default_bar import shows_progress
 from solver.results.notes import ABOVE_FRICTION
 from solver.scene.bodies.paths import SPEED

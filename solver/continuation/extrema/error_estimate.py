@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 
@@ -44,8 +43,6 @@ _ANYWHERE = 0.1
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class ErrorEstimate(Piece):
     """Estimated errors of an answer [m]; NaN where the balance with more harmonics is singular."""
-
-    UNITS: ClassVar[Mapping[str, str]] = {"max_abs": "m", "half_peak_to_peak": "m"}
 
     max_abs: float
     half_peak_to_peak: float

@@ -11,8 +11,7 @@ import re
 import numpy as np
 
 from solver.matrices.decks.coordinates import GLOBAL, Kind, System, ansys_axes
-from solver.matrices.decks.deck import Deck
-from solver.matrices.decks.text import DeckFile, real
+from solver.matrices.decks.deck import Deck, DeckFile, real
 from solver.matrices.readers.numbers_in_text import FormatError
 
 # Commands, by the four letters that tell them, that make, move or turn nodes in ways that are not read.

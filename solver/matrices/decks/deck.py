@@ -1,14 +1,62 @@
-"""What a deck says of its nodes: places, sets, and the axes along which each one moves."""
+"""The files of a deck, and what it says of its nodes: places, sets, the axes along which each one moves."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
 from solver.matrices.decks.coordinates import FloatArray, System
+from solver.matrices.readers.numbers_in_text import FormatError, fortran_real
 from solver.matrices.sectors.elements import Integer, Shape
+
+_DEEPEST = 10  # files that include each other
+
+
+@dataclass(frozen=True, slots=True)
+class DeckFile:
+    """A file of a deck.
+
+    Attributes
+    ----------
+    path : Path
+    alone : bool
+        Whether it may not include other files, as a stranger's.
+    depth : int
+        How many files include it.
+    """
+
+    path: Path
+    alone: bool = False
+    depth: int = 0
+
+    def lines(self) -> list[str]:
+        """The lines of the file."""
+        return self.path.read_text(encoding="latin-1").splitlines()
+
+    def other(self, name: str, line: int) -> DeckFile:
+        """The file that a line includes.
+
+        Raises
+        ------
+        FormatError
+            It may not, or files include each other.
+        """
+        if self.alone:
+            raise FormatError(
+                f"line {line} includes another file, which is not read here: put the nodes and sets into one "
+                "deck"
+            )
+        if self.depth == _DEEPEST:
+            raise FormatError(f"{self.path.name!r} includes {name!r} too deeply")
+        return DeckFile(self.path.parent / name, self.alone, self.depth + 1)
+
+
+def real(text: str) -> float:
+    """A number as `fortran_real` reads it, nothing being 0."""
+    return fortran_real(text) if text.strip() else 0.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,8 +15,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from solver.matrices.decks.coordinates import GLOBAL, Kind, System, around, axes_by, rotation
-from solver.matrices.decks.deck import Deck
-from solver.matrices.decks.text import DeckFile, real
+from solver.matrices.decks.deck import Deck, DeckFile, real
 from solver.matrices.readers.numbers_in_text import FormatError
 from solver.matrices.sectors.elements import elements_of, shape_of
 

@@ -13,8 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from solver.matrices.decks.coordinates import GLOBAL, FloatArray, Kind, System, axes_by
-from solver.matrices.decks.deck import Deck
-from solver.matrices.decks.text import DeckFile, real
+from solver.matrices.decks.deck import Deck, DeckFile, real
 from solver.matrices.readers.numbers_in_text import FormatError
 
 _KINDS = {"R": Kind.RECTANGULAR, "C": Kind.CYLINDRICAL, "S": Kind.SPHERICAL}

@@ -3,7 +3,8 @@
 I. S. Duff, R. G. Grimes, J. G. Lewis, Users' Guide for the Harwell-Boeing Sparse Matrix Collection (Release
 I), 1992: four or five header lines in fixed columns, then column pointers, row indices and values in the
 Fortran formats the header names. Symmetric matrices (RSA) hold one triangle. The Rutherford-Boeing format
-(1997) leaves out what concerns right-hand sides.
+(1997) leaves out what concerns right-hand sides. Ansys writes it by HBMAT, and names the rows in a file of
+the ending ``.mapping``.
 
 Some programs write other columns than their header names: SciPy's `hb_write` says 3E25.16 and writes 24
 characters a number. Where the columns hold no numbers but every line shows as many as it should, written out
@@ -22,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_array
 
+from solver.matrices.labels import Label, component, distinct, node_number
 from solver.matrices.readers.numbers_in_text import LARGEST, FormatError, ascii_lines
 from solver.matrices.readers.reader import Reader
 
@@ -291,6 +293,23 @@ def _check_structure(header: _Header, pointers: NDArray[np.int64], indices: NDAr
         raise FormatError(f"line {line}: a row index must be from 1 to {header.rows}, got {indices[bad[0]]}")
 
 
+def _mapping(path: Path) -> tuple[Label, ...]:
+    """A heading, then equation, node and DOF a line, as HBMAT writes them with its last argument YES."""
+    lines = ascii_lines(path, "a file of DOF labels")
+    labels: list[Label] = []
+    for number, line in enumerate(lines, start=1):
+        words = line.split()
+        if not words or (not labels and words[0].upper().startswith("MATRIX")):
+            continue
+        whole = all(re.fullmatch(r"-?\d{1,10}", word) for word in words[:2])
+        if len(words) != 3 or not whole:
+            raise FormatError(f"line {number} must hold equation, node and DOF, got {line.strip()[:80]!r}")
+        if int(words[0]) != len(labels) + 1:
+            raise FormatError(f"line {number} must be equation {len(labels) + 1}, got {words[0]}")
+        labels.append(Label(node_number(words[1], number), component(words[2])))
+    return distinct(labels, len(lines))
+
+
 READERS = (
     Reader(
         name="Harwell-Boeing",
@@ -301,5 +320,20 @@ READERS = (
         media=("application/x-harwell-boeing",),
         help="Harwell-Boeing and Rutherford-Boeing, real assembled, symmetric or not.",
         matrix=lambda path, _key: read_harwell_boeing(path),
+    ),
+    Reader(
+        name="Ansys HBMAT",
+        suffixes=(".matrix",),
+        word="hb",
+        help="Ansys, `HBMAT` (`ASCII`): Harwell-Boeing under Ansys' usual ending; call the file so. "
+        "`name.mapping` beside it names the rows.",
+        matrix=lambda path, _key: read_harwell_boeing(path),
+    ),
+    Reader(
+        name="Ansys mapping",
+        suffixes=(".mapping",),
+        word="mapping",
+        help="Ansys, `HBMAT` with its last argument `YES`: names the rows (equation, node and DOF a line).",
+        labels=_mapping,
     ),
 )  # fmt: skip

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from solver.matrices.readers.label import Label
+    from solver.matrices.labels import Label
 
 _SUFFIX = re.compile(r"\.[a-z0-9]{1,12}")
 _WORD = re.compile(r"[a-z0-9]{1,12}")
@@ -43,7 +43,7 @@ class Reader:
         an ending apart and names the format of a file with a wrong ending; None where nothing tells.
     matrix : callable or None
         Reads the matrix of a key (``M``, ``K``, ``C``) from a file: an array, a sparse array, or a
-        `solver.matrices.readers.triplets.Labelled` with the node and component of each row. It may raise any
+        `solver.matrices.readers.arrays.Labelled` with the node and component of each row. It may raise any
         error whose message says where the file is damaged.
     names : callable or None
         Names of the arrays of a file that may hold several; None for a format of one matrix.

@@ -6,24 +6,21 @@ by `solver.extensions`, or registered for one process.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import cache
 from importlib import import_module
 from pathlib import Path
+from typing import Literal
 
 from solver.extensions import extensions
 from solver.matrices.readers.reader import MatrixFileError, Reader
 
 SHIPPED = (
-    "solver.matrices.readers.numpy_files",
-    "solver.matrices.readers.matlab",
+    "solver.matrices.readers.array_files",
     "solver.matrices.readers.matrix_market",
     "solver.matrices.readers.harwell_boeing",
-    "solver.matrices.readers.ansys",
     "solver.matrices.readers.abaqus",
-    "solver.matrices.readers.calculix",
-    "solver.matrices.readers.nastran.output4",
-    "solver.matrices.readers.nastran.dmig",
+    "solver.matrices.readers.output4",
+    "solver.matrices.readers.dmig",
     "solver.matrices.sectors.decks",
 )
 _START = 200
@@ -60,28 +57,10 @@ def unregister(reader: Reader) -> None:
     _added.remove(reader)
 
 
-def matrix_suffixes() -> tuple[str, ...]:
-    """Endings of files that hold matrices or modes."""
-    return _suffixes(lambda reader: reader.matrix is not None)
-
-
-def label_suffixes() -> tuple[str, ...]:
-    """Endings of files that name the rows."""
-    return _suffixes(lambda reader: reader.labels is not None)
-
-
-def nodes_suffixes() -> tuple[str, ...]:
-    """Endings of decks, which have positions and sets of nodes."""
-    return _suffixes(lambda reader: reader.nodes is not None)
-
-
-def modes_suffixes() -> tuple[str, ...]:
-    """Endings of files that may hold modes."""
-    return _suffixes(lambda reader: reader.modes is not None)
-
-
-def _suffixes(fits: Callable[[Reader], bool]) -> tuple[str, ...]:
-    return tuple(dict.fromkeys(suffix for reader in readers() if fits(reader) for suffix in reader.suffixes))
+def suffixes(holding: Literal["matrix", "modes", "labels", "nodes"]) -> tuple[str, ...]:
+    """Endings of files whose readers read a matrix, modes, the names of rows, or nodes."""
+    fitting = [reader for reader in readers() if getattr(reader, holding) is not None]
+    return tuple(dict.fromkeys(suffix for reader in fitting for suffix in reader.suffixes))
 
 
 def role_of_suffix(suffix: str) -> str | None:
@@ -120,7 +99,7 @@ def reader_of(path: Path) -> Reader:
     suffix = path.suffix.lower()
     fitting = [reader for reader in readers() if suffix in reader.suffixes and reader.matrix is not None]
     if not fitting:
-        known = ", ".join(matrix_suffixes())
+        known = ", ".join(suffixes("matrix"))
         raise MatrixFileError(f"{str(path)!r} must end in {known}, got {suffix!r}{_looks_like(path)}")
     if len(fitting) == 1:
         return fitting[0]

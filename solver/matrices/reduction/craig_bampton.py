@@ -10,8 +10,9 @@ among the modes kept: the same space of motions but for a share σ / ω² of the
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -127,3 +128,38 @@ def _check(given: dict[str, Any], dofs: DofTable, n: int, keep_modes: int) -> No
                 f"`{key}` must be symmetric to {ASYMMETRY:g} of its largest entry {largest:g}, got a "
                 f"difference of {worst:g} from its transpose"
             )
+
+
+WRITTEN = (".npz", ".mat")
+
+
+def write_reduced(path: Path, reduced: Reduced, dofs: Sequence[str]) -> None:
+    """Write M, K and maybe C, with the names of the rows and the frequencies of the modes kept.
+
+    The arrays are ``M`` [kg], ``K`` [N/m], ``C`` [N s/m], ``names`` (DOFs in use, then ``mode1`` …),
+    ``held_hz``, ``system_hz`` [Hz] and ``good_to_hz``.
+
+    Raises
+    ------
+    ValueError
+        A suffix that is not one of `WRITTEN`.
+    OSError
+        The file cannot be written.
+    """
+    names = [*dofs, *(f"mode{i}" for i in range(1, reduced.modes + 1))]
+    quality = reduced.quality
+    arrays = {
+        **reduced.matrices,
+        "held_hz": quality.held_hz,
+        "system_hz": quality.system_hz,
+        "good_to_hz": np.array(quality.good_to_hz),
+    }
+    suffix = path.suffix.lower()
+    if suffix == ".npz":
+        np.savez_compressed(path, allow_pickle=False, **arrays, names=np.array(names))
+    elif suffix == ".mat":
+        from scipy.io import savemat
+
+        savemat(path, {**arrays, "names": np.array(names, dtype=object)}, do_compression=True)
+    else:
+        raise ValueError(f"a reduced model is written to {' or '.join(WRITTEN)}, got {path.suffix!r}")

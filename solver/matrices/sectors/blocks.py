@@ -1,16 +1,20 @@
-"""The matrices of a sector without its high boundary, and of the annulus of all sectors."""
+"""The matrices of a sector without its high boundary, and of all sectors, also where these are mistuned."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.errors import SettingError
 from solver.matrices.sectors.elimination import Circulant, Elimination, elimination
+from solver.matrices.sectors.parts import WHOLE, PartsAcross
 from solver.matrices.sectors.validation import Sector
 
+FloatArray = NDArray[np.float64]
 Matrices = tuple[NDArray[Any], NDArray[Any], NDArray[Any]]
 
 
@@ -86,3 +90,99 @@ def _written_out(folded: NDArray[Any], count: int) -> NDArray[np.float64]:
     j, n = np.arange(count), folded.shape[1]
     blocks = offsets[(j[:, None] - j[None, :]) % count]
     return np.ascontiguousarray(blocks.transpose(0, 2, 1, 3).reshape(count * n, count * n))
+
+
+def scalable(sector: Sector) -> tuple[str, ...]:
+    """Names that mistuning of a sector may give."""
+    if sector.diameters is not None:
+        return () if sector.diameters.parts is None else sector.diameters.parts.names
+    return (*WHOLE, *(sector.parts or ()))
+
+
+def added_by_mistuning(
+    sector: Sector, of: Sequence[str], factors: Sequence[float]
+) -> tuple[FloatArray, FloatArray]:
+    """What factors on parts of each sector add to K and M of all sectors, sector after sector.
+
+    Parameters
+    ----------
+    of : names of parts, K or M.
+    factors : one for each sector.
+
+    Returns
+    -------
+    (ΔK, ΔM), both (sectors · n, sectors · n), symmetric.
+
+    Raises
+    ------
+    SettingError
+        A name of none of them.
+    """
+    deviations = np.array(factors) - 1.0
+    names, size = scalable(sector), deviations.size * _size(sector)
+    K, M = np.zeros((size, size)), np.zeros((size, size))
+    for name in of:
+        if name not in names:
+            raise SettingError("of", name, f"must be one of {', '.join(names) or 'none'}")
+        target = M if name == "M" else K
+        if sector.diameters is not None and sector.diameters.parts is not None:
+            target += _between_diameters(sector.diameters.parts, names.index(name), deviations)
+        else:
+            target += _sector_by_sector(sector, name, deviations)
+    return K, M
+
+
+def _size(sector: Sector) -> int:
+    return sector.diameters.size if sector.diameters is not None else full_elimination(sector).kept.size
+
+
+def _sector_by_sector(sector: Sector, name: str, deviations: FloatArray) -> FloatArray:
+    """Add a part of a full sector: its high boundary is the low one of the next sector."""
+    eliminated = full_elimination(sector)
+    P = _matrix(sector, name)
+    n, count = eliminated.kept.size, deviations.size
+    both = np.hstack([eliminated.here.toarray(), eliminated.beyond.toarray()])
+    block = both.T @ P @ both
+    whole = np.zeros((count, n, count, n))
+    for j, deviation in enumerate(deviations):
+        ends = (j, (j + 1) % count)
+        for a in range(2):
+            for b in range(2):
+                part = block[a * n : (a + 1) * n, b * n : (b + 1) * n]
+                whole[ends[a], :, ends[b], :] += deviation * part
+    return whole.reshape(count * n, count * n)
+
+
+def _matrix(sector: Sector, name: str) -> FloatArray:
+    if name in WHOLE:
+        given = sector.K if name == "K" else sector.M
+        if given is None:
+            raise ValueError("a full sector needs M and K")
+        return given.array
+    parts = sector.parts
+    if parts is None:
+        raise ValueError("a sector without parts has none to be scaled")
+    return parts.matrices[parts.index(name)].array
+
+
+def _between_diameters(parts: PartsAcross, at: int, deviations: FloatArray) -> FloatArray:
+    """Add a part of a reduced sector, which couples all nodal diameters (`PartsAcross`)."""
+    count, n = deviations.size, parts.ahead.shape[3]
+    spectrum = np.fft.fft(deviations).conj() / count  # 1/N Σ_j δ_j e^{i m j α}
+    built, backward = _waves(count)
+    coupled: NDArray[Any] = np.empty((count, count, n, n), np.complex128)
+    for w in range(count):
+        for v in range(count):
+            stack = parts.ahead if backward[w] == backward[v] else parts.back
+            block = stack[at, built[w], built[v]]
+            coupled[w, v] = spectrum[(v - w) % count] * (block.conj() if backward[w] else block)
+    # Σ_wv e^{iwjα} X_wv e^{-ivlα} / N: forward over the second wave, backward over the first.
+    blocks = np.fft.fft(np.fft.ifft(coupled, axis=0), axis=1)
+    whole = blocks.real.transpose(0, 2, 1, 3).reshape(count * n, count * n)
+    return np.ascontiguousarray(0.5 * (whole + whole.T))
+
+
+def _waves(count: int) -> tuple[list[int], list[bool]]:
+    """Of waves 0 to N − 1: the nodal diameter, which all must be built, and whether it runs backward."""
+    backward = [2 * w > count for w in range(count)]
+    return [count - w if back else w for w, back in zip(range(count), backward, strict=True)], backward

@@ -8,10 +8,10 @@ from pathlib import Path
 
 from solver.matrices.decks.ansys import AnsysDeck
 from solver.matrices.decks.deck import Deck as Deck
+from solver.matrices.decks.deck import DeckFile
 from solver.matrices.decks.deck import positions as positions
 from solver.matrices.decks.keywords import KeywordDeck
 from solver.matrices.decks.nastran import read_nastran
-from solver.matrices.decks.text import DeckFile
 from solver.matrices.readers.numbers_in_text import FormatError
 from solver.matrices.readers.reader import Reader
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.matrices.decks.deck import Deck, frames, positions
-from solver.matrices.readers.label import COMPONENTS, OWN_COMPONENTS, Label
+from solver.matrices.labels import COMPONENTS, OWN_COMPONENTS, Label
 from solver.matrices.sectors.elimination import Group, rotation
 
 if TYPE_CHECKING:

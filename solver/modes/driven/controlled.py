@@ -5,27 +5,22 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
-from enum import Enum
-from typing import TYPE_CHECKING, Any, ClassVar, cast
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
 from solver.balance.speed_line import check_no_line
 from solver.errors import SettingError
-from solver.jit.fourier import Integer, Real
+from solver.jit.fourier import Real
 from solver.modes.corrector import Corrected
 from solver.modes.curve import End, walk
 from solver.modes.driven.held_amplitude import Held, first_held, least_force
+from solver.modes.driven.results import HeldAmplitude, HeldStatus, LeastForce
 from solver.modes.error_estimate import Wider
 from solver.modes.limit_cycles import stability_left_out
 from solver.modes.nonlinear_mode import LEAST, MOST_POINTS, pose
 from solver.modes.records import Record, Recorder
-from solver.response.contact_response import ContactState, state_of
 from solver.response.stability.floquet import motions_stability
-from solver.results.base import Drawn
-from solver.results.told import json_numbers
-from solver.results.views import Views
 
 if TYPE_CHECKING:
     from solver.scene.scene import Scene
@@ -35,128 +30,11 @@ _FAINT = 1e-12  # share of a motion in phase with the force below which the ampl
 _SAME = 1e-9  # relative distance of an end of the range within which a point is at it
 
 
-class HeldStatus(Enum):
-    """How a curve ended; the value is a sentence a user can act on."""
-
-    COMPLETED = "The curve reaches the end of the range."
-    NOT_BEGUN = (
-        "No response with this amplitude was found at the first frequency: begin elsewhere, with a smaller "
-        "amplitude, or fewer harmonics."
-    )
-    STOPPED = "The curve could not be followed beyond its last point: try other harmonics."
-    TURNED_BACK = (
-        "The curve turned back and left the range where it began: no response has this amplitude beyond."
-    )
-    TOO_LONG = "The end of the range was not reached within the points allowed: ask for more of them."
-    CANCELLED = "It was cancelled; the points up to then are there."
-
-
 _STATUS = {
     End.REACHED: HeldStatus.COMPLETED, End.NOT_BEGUN: HeldStatus.NOT_BEGUN, End.STOPPED: HeldStatus.STOPPED,
     End.TURNED_BACK: HeldStatus.TURNED_BACK, End.TOO_LONG: HeldStatus.TOO_LONG,
     End.CANCELLED: HeldStatus.CANCELLED,
 }  # fmt: skip
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class HeldAmplitude(Drawn):
-    """Responses of one amplitude over the frequency; n points along the curve.
-
-    Attributes
-    ----------
-    scene : Scene
-        As it was solved; it observes the DOF whose amplitude is held.
-    held : float
-        Amplitude of harmonic 1 of the observed DOF [m].
-    status : HeldStatus
-        How the curve ended.
-    frequency_hz : (n,) array
-        Of the excitation.
-    excitation : (n,) array
-        Factor on the scene's excitation that this response takes.
-    excitation_error : (n,) array
-        Estimate of what more harmonics would change of it: a Newton step with twice as many.
-    phase_deg : (n,) array
-        By which harmonic 1 of the observed DOF is ahead of the excitation.
-    max_abs : (n,) array
-        max|x| of the observed DOF [m].
-    states : (n, n_contacts) array
-        What each contact does over the period, see `contact_states` and `changes`.
-    stable : tuple of bool or None
-        Whether the response is stable while its force is held; None where `unknown` says why it is not known.
-    residual : (n,) array
-        Relative residual of the equations.
-    observed : (n, 2H + 1) array
-        Coefficients of the observed DOF [m].
-    least : (float, float)
-        The least factor on the excitation, solved for between points, and its frequency [Hz]: the peak of the
-        response to that force. NaN without a point.
-    seconds : float
-        What it took.
-    """
-
-    VIEWS: ClassVar = Views("solver.views", "of_held", "held_dataset", "modes:held_figure")
-
-    scene: Scene
-    held: float
-    n_harmonics: int
-    status: HeldStatus
-    frequency_hz: Real
-    excitation: Real
-    excitation_error: Real
-    phase_deg: Real
-    max_abs: Real
-    states: Integer
-    stable: tuple[bool | None, ...]
-    unknown: str
-    residual: Real
-    observed: Real
-    least: tuple[float, float]
-    seconds: float
-
-    @property
-    def completed(self) -> bool:
-        """Whether the curve reaches the end of the range."""
-        return self.status is HeldStatus.COMPLETED
-
-    def contact_states(self, i: int) -> dict[str, ContactState]:
-        """What each contact does at point i."""
-        names = [contact.name for contact in self.scene.contacts]
-        return {name: state_of(int(code)) for name, code in zip(names, self.states[i], strict=True)}
-
-    @property
-    def changes(self) -> tuple[tuple[float, float, str], ...]:
-        """Where the curve has a kink: two frequencies [Hz] between which a contact changes its state."""
-        found = []
-        for i in range(len(self.states) - 1):
-            for c in np.flatnonzero(self.states[i] != self.states[i + 1]).tolist():
-                ends = float(self.frequency_hz[i]), float(self.frequency_hz[i + 1])
-                found.append((*ends, self.scene.contacts[c].name))
-        return tuple(found)
-
-    def to_json(self) -> dict[str, Any]:
-        """Return the curve as one JSON object."""
-        factor, at = self.least
-        return {
-            "scene": self.scene.name,
-            "dof": self.scene.observe.dof,
-            "amplitude": self.held,
-            "completed": self.completed,
-            "status": self.status.value,
-            "frequency": self.frequency_hz.tolist(),
-            "excitation": self.excitation.tolist(),
-            "excitation_error": json_numbers(self.excitation_error),
-            "phase": self.phase_deg.tolist(),
-            "max_abs": self.max_abs.tolist(),
-            "contacts": [contact.name for contact in self.scene.contacts],
-            "states": [[state_of(int(code)).value for code in row] for row in self.states],
-            "changes": [{"from": low, "to": high, "contact": name} for low, high, name in self.changes],
-            "stable": list(self.stable),
-            "stability_unknown": self.unknown,
-            "least": {"excitation": factor, "frequency": at} if self.excitation.size else None,
-            "n_harmonics": self.n_harmonics,
-            "seconds": self.seconds,
-        }
 
 
 def held_amplitude(
@@ -289,11 +167,11 @@ def _collect(
     )  # fmt: skip
 
 
-def _force_of(equations: Held, point: Corrected | None) -> tuple[float, float]:
+def _force_of(equations: Held, point: Corrected | None) -> LeastForce:
     """Return the factor on the excitation and the frequency [Hz]; NaN without a point."""
     if point is None:
-        return math.nan, math.nan
-    return float(point.state.y[-1]) * equations.unit, float(point.state.y[-2]) / (2.0 * math.pi)
+        return LeastForce(math.nan, math.nan)
+    return LeastForce(float(point.state.y[-1]) * equations.unit, float(point.state.y[-2]) / (2.0 * math.pi))
 
 
 def _stable(

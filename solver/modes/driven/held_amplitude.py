@@ -48,6 +48,8 @@ class Held(Equations):
     whole : max|x| is held, not harmonic 1 alone.
     """
 
+    KEEPS_J = False
+
     def __init__(self, balance: Balance) -> None:
         super().__init__(balance)
         self.target, self.unit, self.whole = 1.0, 1.0, False
@@ -203,16 +205,12 @@ def _linear(equations: Held, rest: Real, omega: float) -> State:
     """Return a guess: the response with the contacts as they are at rest, in the amplitude asked for."""
     s, first = equations.structure, equations.structure.first
     number = s.nearest(omega, 0.0)
-    dynamics = s.at(omega, 0.0, number)
     slopes = slopes_at_rest(equations, rest, omega)
     span = np.eye(equations.r) if equations.span is None else equations.span
     shift = np.diag(equations.balance.system.shift).astype(np.complex128)
     tied = np.zeros_like(shift) if slopes is None else slopes - shift
     K = s.back[first] @ (span.T @ tied @ span) @ s.contact[first]
-    Z = np.linalg.inv(np.diag(dynamics.inverse[first]) if s.is_diagonal else dynamics.inverse[first])
-    b = dynamics.b
-    Z = Z - dynamics.rho * np.outer(b, b.conj()) + K
-    x = np.linalg.lstsq(Z, s.force, rcond=1e-14)[0]
+    x = np.linalg.lstsq(s.stiffness(omega) + K, s.force, rcond=1e-14)[0]
     seen = abs(complex(np.sum(s.observe[first] * x)))
     factor = equations.target / max(seen, 1e-300)
     equations.unit = factor
@@ -221,7 +219,7 @@ def _linear(equations: Held, rest: Real, omega: float) -> State:
     w, here = rest.copy(), int(cosine_position(s.ks, first))
     if equations.size:
         w[:, here], w[:, here + 1] = moved.real, -moved.imag
-    q = complex(np.vdot(b, x))
+    q = complex(np.vdot(s.carried[:, number], x))
     y = np.concatenate([w.reshape(-1), [q.real, q.imag, omega, 1.0]])
     return State(y=y, log_amplitude=math.log(omega), mode=number, phase=np.zeros(s.force.size, np.complex128))
 

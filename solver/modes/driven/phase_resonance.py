@@ -13,26 +13,24 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, ClassVar, cast
+from dataclasses import replace
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
 from solver.balance.balance import Balance
 from solver.balance.speed_line import check_no_line
 from solver.errors import SettingError
-from solver.jit.fourier import Complex, Integer, Real
+from solver.jit.fourier import Complex, Real
 from solver.modes.corrector import Corrected
 from solver.modes.curve import End, walk
+from solver.modes.driven.results import PhaseResonance
 from solver.modes.equations import Equations, Evaluated
 from solver.modes.nonlinear_mode import MOST_POINTS, STATUS, check_amplitudes, pose
 from solver.modes.records import Recorder
 from solver.modes.results import NonlinearModeStatus
 from solver.modes.start import begin, coordinates_of
 from solver.modes.structure import Dynamics
-from solver.response.contact_response import ContactState, state_of
-from solver.results.base import Drawn
-from solver.results.views import Views
 
 if TYPE_CHECKING:
     from solver.scene.scene import Scene
@@ -42,6 +40,8 @@ _FAINT = 1e-9  # share of the excitation along a mode below which it does not dr
 
 class Driven(Equations):
     """The responses to the excitation at a given amplitude; the last unknown is z, see the module."""
+
+    KEEPS_J = False
 
     def __init__(self, balance: Balance) -> None:
         super().__init__(balance)
@@ -71,75 +71,6 @@ class Driven(Equations):
         force = np.zeros((s.ks.size, s.force.size), np.complex128)
         force[s.first] = self.unit * math.exp(log_amplitude) * s.force
         return force
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class PhaseResonance(Drawn):
-    """Responses in phase resonance over the amplitude; n points along the curve.
-
-    Attributes
-    ----------
-    scene : Scene
-        As it was solved: with the engine order of the nodal diameter.
-    mode : int
-        Number of the linear mode it begins with.
-    status : NonlinearModeStatus
-        How the curve ended.
-    amplitude : (n,) array
-        Modal amplitude a [√kg m].
-    frequency_hz : (n,) array
-        Of the excitation [Hz].
-    excitation : (n,) array
-        Factor on the scene's excitation that this response takes; below 0 it lags by 270°.
-    max_abs : (n,) array
-        max|x| of the observed DOF [m].
-    states : (n, n_contacts) array
-        What each contact does over the period, see `contact_states`.
-    residual : (n,) array
-        Relative residual of the equations.
-    seconds : float
-        What it took.
-    """
-
-    VIEWS: ClassVar = Views("solver.views", "of_resonance", "resonance_dataset", "modes:resonance_figure")
-
-    scene: Scene
-    mode: int
-    status: NonlinearModeStatus
-    amplitude: Real
-    frequency_hz: Real
-    excitation: Real
-    max_abs: Real
-    states: Integer
-    residual: Real
-    seconds: float
-
-    @property
-    def completed(self) -> bool:
-        """Whether the curve reaches the amplitude asked for."""
-        return self.status is NonlinearModeStatus.COMPLETED
-
-    def contact_states(self, i: int) -> dict[str, ContactState]:
-        """What each contact does at point i."""
-        names = [contact.name for contact in self.scene.contacts]
-        return {name: state_of(int(code)) for name, code in zip(names, self.states[i], strict=True)}
-
-    def to_json(self) -> dict[str, Any]:
-        """Return the curve as one JSON object."""
-        return {
-            "scene": self.scene.name,
-            "mode": self.mode,
-            "completed": self.completed,
-            "status": self.status.value,
-            "amplitude": self.amplitude.tolist(),
-            "frequency": self.frequency_hz.tolist(),
-            "excitation": self.excitation.tolist(),
-            "dof": self.scene.observe.dof,
-            "max_abs": self.max_abs.tolist(),
-            "contacts": [contact.name for contact in self.scene.contacts],
-            "states": [[state_of(int(code)).value for code in row] for row in self.states],
-            "seconds": self.seconds,
-        }
 
 
 def phase_resonance(

@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, ClassVar, cast
+from typing import TYPE_CHECKING, Annotated, ClassVar, cast
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -39,24 +39,14 @@ _LONGEST = 0.3  # of ln A a secant step
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class PeakCorrection(Piece):
-    """The peak of a performance curve beside that of the whole balance next to it.
+    """The peak of a performance curve beside that of the whole balance next to it."""
 
-    Attributes
-    ----------
-    synthesised : float
-        Peak of the curve [m].
-    peak, frequency_hz : float
-        With all modes and harmonics, and where [Hz]; NaN if it was not found.
-    solves : int
-        Responses solved for.
-    """
+    JSON: ClassVar = "synthesised peak frequency=frequency_hz error solves"
 
-    UNITS: ClassVar = {"synthesised": "m", "peak": "m", "frequency_hz": "Hz"}
-
-    synthesised: float
-    peak: float
-    frequency_hz: float
-    solves: int
+    synthesised: Annotated[float, "Peak of the curve [m]."]
+    peak: Annotated[float, "With all modes and harmonics [m]; NaN if it was not found."]
+    frequency_hz: Annotated[float, "Where that is [Hz]."]
+    solves: Annotated[int, "Responses solved for."]
 
     @property
     def error(self) -> float:
@@ -66,14 +56,6 @@ class PeakCorrection(Piece):
     def suffices(self, tolerance: float) -> bool:
         """Whether the curve is good to a relative tolerance, as far as is known."""
         return abs(self.error) <= tolerance
-
-    def to_json(self) -> dict[str, float | int | None]:
-        """Return it as a JSON object."""
-        numbers = {
-            "synthesised": self.synthesised, "peak": self.peak, "frequency": self.frequency_hz,
-            "error": self.error,
-        }  # fmt: skip
-        return {k: v if math.isfinite(v) else None for k, v in numbers.items()} | {"solves": self.solves}
 
 
 def corrected_peak(curve: PerformanceCurve, factor: float) -> PeakCorrection:

@@ -14,14 +14,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import Annotated
 
 import numpy as np
 
 from solver.balance.kernels.output import extremes
 from solver.contacts.kernels.system import System, by_reference
 from solver.jit.fourier import Complex, Real
-from solver.modes.corrector import Corrected, State, correct, scales, step
+from solver.modes.corrector import Corrected, State, correct, scales
 from solver.modes.equations import Evaluated
 from solver.modes.gradient import ModeSensitivities
 from solver.modes.nonlinear_mode import pose
@@ -35,21 +35,15 @@ _SECANTS = 30
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class CurvePeak(Piece):
-    """The peak of one mode at an excitation.
+    """The peak of one mode at an excitation."""
 
-    Attributes
-    ----------
-    peak, frequency_hz : float
-        max|x| of the observed DOF [m], and where [Hz]; NaN where the curve does not reach the excitation.
-    gradient : (n_paths,) array
-        Of the peak by parameter paths [m per unit of each]; NaN where the curve turns back in its force.
-    """
-
-    UNITS: ClassVar = {"peak": "m", "frequency_hz": "Hz", "gradient": "m per unit"}
-
-    peak: float
-    frequency_hz: float
-    gradient: Real
+    peak: Annotated[float, "max|x| of the observed DOF [m]; NaN where the curve lacks the excitation."]
+    frequency_hz: Annotated[float, "Where that is [Hz]."]
+    gradient: Annotated[
+        Real,
+        "Of the peak by parameter paths [m per unit of each]; NaN where the curve turns back in its force, "
+        "(n_paths,).",
+    ]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -190,7 +184,7 @@ class _Solver:
         columns, reading = scales(state.y, size), self.read(point)
         tops, forces = [], []
         for j, change in enumerate((at.by_log_amplitude, *rows)):
-            dy = step(at.jacobian, -change, columns, least_squares=at.unheld)
+            dy = at.step(-change, columns)
             if dy is None:
                 return None
             dx = self._moved(state, at, dy, None if j == 0 else pushes[j - 1])

@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -24,7 +24,6 @@ from solver.jit.fourier import Real
 from solver.modes.nonlinear_mode import pose
 from solver.modes.results import NonlinearMode
 from solver.results.base import Drawn
-from solver.results.told import json_numbers
 from solver.results.views import Views
 from solver.scene.bodies.kinematics import static_forces
 from solver.scene.scene import Scene
@@ -32,37 +31,36 @@ from solver.scene.scene import Scene
 _SAME = 1e-9  # relative difference of forces that are proportional
 
 
+class LeastOverLoads(NamedTuple):
+    """Factor on the loads at which a peak is least, and that peak [m]."""
+
+    load: float
+    peak: float
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class PerformanceCurve(Drawn):
-    """Resonance peaks of one mode over the excitation, or over the loads; n points along the mode's curve.
-
-    Attributes
-    ----------
-    mode : NonlinearMode
-        It is of.
-    excitation : (n,) array
-        Factor on every force of the scene's excitation at which its response has this peak.
-    peak : (n,) array
-        max|x| of the observed DOF there [m].
-    frequency_hz : (n,) array
-        Where the peak is.
-    scales : bool
-        Whether forces, loads and motions grow together here; only then are `load` and `peak_at_load` known.
-    load : (n,) array
-        Factor on every load, the excitation as it is, of the same performance; NaN if not known.
-    peak_at_load : (n,) array
-        The peak then [m]. NaN if not known.
-    """
+    """Resonance peaks of one mode over the excitation, or over the loads; n points along the mode's curve."""
 
     VIEWS: ClassVar = Views("solver.views", "of_performance", "performance_dataset", "of_performance")
+    JSON: ClassVar = "excitation peak frequency=frequency_hz scales load peak_at_load least"
 
-    mode: NonlinearMode
-    excitation: Real
-    peak: Real
-    frequency_hz: Real
-    scales: bool
-    load: Real
-    peak_at_load: Real
+    mode: Annotated[NonlinearMode, "It is of."]
+    excitation: Annotated[
+        Real, "Factor on every force of the scene's excitation at which its response has this peak, (n,)."
+    ]
+    peak: Annotated[Real, "max|x| of the observed DOF there [m], (n,)."]
+    frequency_hz: Annotated[Real, "Where the peak is, (n,)."]
+    scales: Annotated[
+        bool,
+        "Whether forces, loads and motions grow together here; only then are `load` and `peak_at_load` "
+        "known.",
+    ]
+    load: Annotated[
+        Real,
+        "Factor on every load, the excitation as it is, of the same performance; NaN if not known, (n,).",
+    ]
+    peak_at_load: Annotated[Real, "The peak then [m]. NaN if not known. (n,)."]
 
     def at_excitation(self, factor: float) -> tuple[float, float]:
         """Return the highest peak [m] and its frequency [Hz] at a factor on the excitation; NaN if beyond.
@@ -78,27 +76,19 @@ class PerformanceCurve(Drawn):
         return _highest(self.load, self.peak_at_load, self.frequency_hz, factor)
 
     @property
-    def least(self) -> tuple[float, float]:
+    def least(self) -> LeastOverLoads:
         """Factor on the loads at which the peak is least, and that peak [m]; NaN where it is not known."""
         if not self.scales or not self.load.size:
-            return math.nan, math.nan
+            return LeastOverLoads(math.nan, math.nan)
         tops = [self.at_load(float(load))[0] for load in self.load]
         best = int(np.nanargmin(tops))
-        return float(self.load[best]), float(tops[best])
+        return LeastOverLoads(float(self.load[best]), float(tops[best]))
 
     def to_json(self) -> dict[str, Any]:
         """Return the curve as one JSON object."""
-        load, peak = self.least
-        known = self.scales and bool(self.load.size)
-        return {
-            "excitation": self.excitation.tolist(),
-            "peak": self.peak.tolist(),
-            "frequency": self.frequency_hz.tolist(),
-            "scales": self.scales,
-            "load": json_numbers(self.load) if self.scales else None,
-            "peak_at_load": json_numbers(self.peak_at_load) if self.scales else None,
-            "least": {"load": load, "peak": peak} if known else None,
-        }
+        if not self.scales:
+            return self._json(load=None, peak_at_load=None, least=None)
+        return self._json() if self.load.size else self._json(least=None)
 
 
 def performance_curve(found: NonlinearMode) -> PerformanceCurve:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 
@@ -98,28 +99,15 @@ class Orbits:
 class ExactBranch(AnyBranch):
     """Exact periodic responses over one parameter, from event to event: that of scenes with rigid contacts.
 
-    Attributes
-    ----------
-    orbits : Orbits
-        What was followed; its scene holds the values that stayed fixed.
-    solutions : tuple of Solution
-        The response at each point, as `solve` gives it.
-    highest : Solution or None
-        The response at the highest peak.
-    beyond : Solution or None
-        Why the branch ended before the end of the range.
-    verdicts : tuple of Verdict
-        Of the stability at each of `peaks`.
-    flags : tuple of str
-        ``mean_undetermined``, ``history_dependent`` where they hold at some point: there `amplitude` is that
-        after a start from rest, or after a slow change of the parameter where rest takes long to forget.
+    Flags are ``mean_undetermined`` and ``history_dependent`` where they hold at some point: there `amplitude`
+    is that after a start from rest, or after a slow change of the parameter where rest takes long to forget.
     """
 
-    orbits: Orbits
-    solutions: tuple[Solution, ...]
-    highest: Solution | None
-    beyond: Solution | None
-    verdicts: tuple[Verdict, ...]
+    orbits: Annotated[Orbits, "What was followed; its scene holds the values that stayed fixed."]
+    solutions: Annotated[tuple[Solution, ...], "The response at each point, as `solve` gives it."]
+    highest: Annotated[Solution | None, "The response at the highest peak."]
+    beyond: Annotated[Solution | None, "Why the branch ended before the end of the range."]
+    verdicts: Annotated[tuple[Verdict, ...], "Of the stability at each of `peaks`."]
 
     @property
     def posed(self) -> Orbits:

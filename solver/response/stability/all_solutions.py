@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
@@ -40,70 +40,45 @@ COMPLETE = "The list is complete: the response is proven to be the only one."
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class FoundSolution(Piece):
-    """One of the solutions found.
+    """One of the solutions found."""
 
-    Attributes
-    ----------
-    solution : Solution
-        As `solve` gives it.
-    stability : Stability or None
-        Its Floquet multipliers; None where a law does not say how it is perturbed.
-    sign : int
-        Of the determinant of dr/du: −1 where an odd number of real perturbations grows.
-    found_by : str
-        What led to it first: ``solve``, ``start`` (a random motion), ``deflation``, or ``branch`` (that of
-        another solution, followed through its folds and branch points).
-    times : int
-        How often the search came to it.
-    residual_forces : AmplitudeRange or None
-        What forces left in contacts that stick all the time may do to it; None where none sticks.
-    """
+    JSON: ClassVar = "stability sign found_by times residual_forces"
 
-    solution: Solution
-    stability: Stability | None
-    sign: int
-    found_by: str
-    times: int
-    residual_forces: AmplitudeRange | None
+    solution: Annotated[Solution, "As `solve` gives it."]
+    stability: Annotated[
+        Stability | None, "Its Floquet multipliers; None where a law does not say how it is perturbed."
+    ]
+    sign: Annotated[int, "Of the determinant of dr/du: −1 where an odd number of real perturbations grows."]
+    found_by: Annotated[
+        str,
+        "What led to it first: ``solve``, ``start`` (a random motion), ``deflation``, or ``branch`` (that "
+        "of another solution, followed through its folds and branch points).",
+    ]
+    times: Annotated[int, "How often the search came to it."]
+    residual_forces: Annotated[
+        AmplitudeRange | None,
+        "What forces left in contacts that stick all the time may do to it; None where none sticks.",
+    ]
 
-    def to_json(self) -> dict[str, object]:
+    def to_json(self) -> dict[str, Any]:
         """Return it as one JSON object."""
-        left = self.residual_forces
-        return {
-            **self.solution.to_json(),
-            "stability": None if self.stability is None else self.stability.to_json(),
-            "sign": self.sign,
-            "found_by": self.found_by,
-            "times": self.times,
-            "residual_forces": None if left is None else left.to_json(),
-        }
+        return self.solution.to_json() | self._json()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class AllSolutions(Piece):
-    """The distinct periodic responses found at one frequency.
+    """The distinct periodic responses found at one frequency."""
 
-    Attributes
-    ----------
-    solutions : tuple of FoundSolution
-        Largest half peak to peak first.
-    uniqueness : Uniqueness
-        Whether there is one alone, and why.
-    starts : int
-        How many random starts were made, with and without deflation.
-    stopped : bool
-        The caller ended the search.
-    seconds : float
-        What it took.
-    """
+    JSON: ClassVar = (
+        "solutions unique=uniqueness.unique unique_ground=uniqueness.ground complete"
+        " missing_by_signs=missing note starts stopped seconds"
+    )
 
-    UNITS: ClassVar[Mapping[str, str]] = {"seconds": "s"}
-
-    solutions: tuple[FoundSolution, ...]
-    uniqueness: Uniqueness
-    starts: int
-    stopped: bool
-    seconds: float
+    solutions: Annotated[tuple[FoundSolution, ...], "Largest half peak to peak first."]
+    uniqueness: Annotated[Uniqueness, "Whether there is one alone, and why."]
+    starts: Annotated[int, "How many random starts were made, with and without deflation."]
+    stopped: Annotated[bool, "The caller ended the search."]
+    seconds: Annotated[float, "What it took [s]."]
 
     @property
     def complete(self) -> bool:
@@ -125,20 +100,6 @@ class AllSolutions(Piece):
         if self.complete:
             return COMPLETE
         return INCOMPLETE if self.missing == 0 else MISSING.format(self.missing)
-
-    def to_json(self) -> dict[str, object]:
-        """Return the answer as one JSON object."""
-        return {
-            "solutions": [found.to_json() for found in self.solutions],
-            "unique": self.uniqueness.unique,
-            "unique_ground": self.uniqueness.ground,
-            "complete": self.complete,
-            "missing_by_signs": self.missing,
-            "note": self.note,
-            "starts": self.starts,
-            "stopped": self.stopped,
-            "seconds": self.seconds,
-        }
 
 
 @shows_progress("all solutions")

@@ -6,7 +6,7 @@ import time
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import Enum
-from typing import ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
@@ -42,29 +42,25 @@ class Growth(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Stability(Drawn):
-    """Whether small perturbations of a periodic response die out.
+    """Whether small perturbations of a periodic response die out."""
 
-    Attributes
-    ----------
-    multipliers : complex array
-        Floquet multipliers, largest modulus first, without the neutral ones. Contacts that slip leave
-        zeros: friction forgets.
-    neutral : int
-        Multipliers that are 1 by construction and left out: one for the slider of each contact that sticks
-        all the time (its residual force is history), one for each displacement that nothing resists.
-    growth : Growth
-        The kind of the largest multiplier, if it is beyond the unit circle.
-    frequency_hz : float
-        Of the response [Hz].
-    seconds : float
-        What it took.
-    """
+    VIEWS: ClassVar = Views("solver.views", "of_stability", "stability_dataset", "of_stability")
+    JSON: ClassVar = "stable growth radius neutral multipliers frequency_hz seconds"
 
-    multipliers: Complex
-    neutral: int
-    growth: Growth
-    frequency_hz: float
-    seconds: float
+    multipliers: Annotated[
+        Complex,
+        "Floquet multipliers, largest modulus first, without the neutral ones. Contacts that slip leave "
+        "zeros: friction forgets.",
+    ]
+    neutral: Annotated[
+        int,
+        "Multipliers that are 1 by construction and left out: one for the slider of each contact that "
+        "sticks all the time (its residual force is history), one for each displacement that nothing "
+        "resists.",
+    ]
+    growth: Annotated[Growth, "The kind of the largest multiplier, if it is beyond the unit circle."]
+    frequency_hz: Annotated[float, "Of the response [Hz]."]
+    seconds: Annotated[float, "What it took."]
 
     @property
     def radius(self) -> float:
@@ -76,19 +72,9 @@ class Stability(Drawn):
         """Whether no perturbation grows."""
         return self.growth is Growth.NONE
 
-    VIEWS: ClassVar = Views("solver.views", "of_stability", "stability_dataset", "of_stability")
-
-    def to_json(self) -> dict[str, object]:
+    def to_json(self) -> dict[str, Any]:
         """Return the answer as one JSON object; multipliers as [real, imaginary]."""
-        return {
-            "stable": self.stable,
-            "growth": self.growth.value,
-            "radius": self.radius,
-            "neutral": self.neutral,
-            "multipliers": [[float(m.real), float(m.imag)] for m in self.multipliers],
-            "frequency_hz": self.frequency_hz,
-            "seconds": self.seconds,
-        }
+        return self._json(multipliers=np.stack([self.multipliers.real, self.multipliers.imag], axis=1))
 
 
 @shows_progress("stability")

@@ -11,9 +11,8 @@ reached; a wider one is not excluded.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import Annotated
 
 import numpy as np
 
@@ -28,7 +27,7 @@ from solver.linear.contact_table import port_counts
 from solver.response.contact_response import ContactState, contact_responses
 from solver.response.history_dependence import held_sliders
 from solver.response.solution import Solution
-from solver.results.told import Piece, json_numbers
+from solver.results.told import Piece
 from solver.scene.bodies.body import Load
 from solver.scene.bodies.kinematics import Form
 from solver.scene.scene import Scene
@@ -43,37 +42,15 @@ _INSTANTS = 360
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class AmplitudeRange(Piece):
-    """Amplitudes over the forces that contacts which stick all the time may hold.
+    """Amplitudes over the forces that contacts which stick all the time may hold."""
 
-    Attributes
-    ----------
-    max_abs, half_peak_to_peak : (float, float)
-        Least and largest [m] that were reached; NaN where it was not looked for.
-    mean : (float, float)
-        Of the mean [m].
-    contacts : tuple of str
-        Which contacts stick all the time, in one direction at least.
-    exact : bool
-        The range is known; else it is what a search along gradients reached.
-    """
-
-    UNITS: ClassVar[Mapping[str, str]] = {"max_abs": "m", "half_peak_to_peak": "m", "mean": "m"}
-
-    max_abs: tuple[float, float]
-    half_peak_to_peak: tuple[float, float]
-    mean: tuple[float, float]
-    contacts: tuple[str, ...]
-    exact: bool
-
-    def to_json(self) -> dict[str, object]:
-        """Return the range as one JSON object."""
-        return {
-            "max_abs": json_numbers(self.max_abs),
-            "half_peak_to_peak": json_numbers(self.half_peak_to_peak),
-            "mean": json_numbers(self.mean),
-            "contacts": list(self.contacts),
-            "exact": self.exact,
-        }
+    max_abs: Annotated[
+        tuple[float, float], "Least and largest [m] that were reached; NaN where it was not looked for."
+    ]
+    half_peak_to_peak: Annotated[tuple[float, float], "The same of half peak to peak [m]."]
+    mean: Annotated[tuple[float, float], "Of the mean [m]."]
+    contacts: Annotated[tuple[str, ...], "Which contacts stick all the time, in one direction at least."]
+    exact: Annotated[bool, "The range is known; else it is what a search along gradients reached."]
 
 
 def amplitude_range(solution: Solution, effects: Effects | None = None) -> AmplitudeRange | None:

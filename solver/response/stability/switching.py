@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
@@ -33,31 +34,19 @@ _ORBITS = "must be of contacts with finite stiffnesses: exact orbits are not fol
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Switched(Piece):
-    """What leaves a branch at a branch point.
+    """What leaves a branch at a branch point."""
 
-    Attributes
-    ----------
-    mark : Mark
-        The branch point.
-    tangents : (2, n_unknowns + 1) array
-        Directions of the branch itself and of the other one there; motions relative to their size, λ relative
-        to the range, of length 1.
-    branches : tuple of Branch
-        The other branch on both sides of the point, each followed to an end of the range; fewer where one
-        side was not met.
-    """
-
-    mark: Mark
-    tangents: Real
-    branches: tuple[Branch, ...]
-
-    def to_json(self) -> dict[str, object]:
-        """Return it as one JSON object."""
-        return {
-            "mark": self.mark.to_json(),
-            "tangents": self.tangents.tolist(),
-            "branches": [branch.to_json() for branch in self.branches],
-        }
+    mark: Annotated[Mark, "The branch point."]
+    tangents: Annotated[
+        Real,
+        "Directions of the branch itself and of the other one there; motions relative to their size, λ "
+        "relative to the range, of length 1, (2, n_unknowns + 1).",
+    ]
+    branches: Annotated[
+        tuple[Branch, ...],
+        "The other branch on both sides of the point, each followed to an end of the range; fewer where "
+        "one side was not met.",
+    ]
 
 
 def switch_branches(

@@ -32,6 +32,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
@@ -66,18 +67,10 @@ _MAY_BE = "{} may let responses move apart, and no proof of a single one applies
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Uniqueness(Piece):
-    """Whether a response is the only one.
+    """Whether a response is the only one."""
 
-    Attributes
-    ----------
-    unique : str
-        ``proven`` or ``not known``.
-    ground : str
-        Why.
-    """
-
-    unique: str
-    ground: str
+    unique: Annotated[str, "``proven`` or ``not known``."]
+    ground: Annotated[str, "Why."]
 
     @property
     def proven(self) -> bool:

@@ -21,8 +21,8 @@ from typing import Any, NamedTuple, Protocol
 from solver.contacts.fields import NEXT, Between, Vector, parse_end
 from solver.contacts.frames import Axes, cross, unit
 from solver.scene.bodies.body import REVOLUTIONS, Body, Load, Node, Place
+from solver.scene.linear_terms import Aerodynamics
 from solver.scene.parts import Excitation, LumpedStructure, Structure
-from solver.scene.terms.linear_terms import Aerodynamics
 
 
 class Term(NamedTuple):

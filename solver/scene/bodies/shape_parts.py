@@ -14,7 +14,7 @@ from solver.scene.bodies.body import Body
 from solver.scene.bodies.kinematics import Form, HasBodies, Term, placed_forms
 from solver.scene.bodies.paths import UNITS as BODY_UNITS
 from solver.scene.bodies.shapes import POINTS, AnyShape
-from solver.scene.contacts import ContactOfAnyLaw
+from solver.scene.parts import ContactOfAnyLaw
 
 _UNITS = {
     **dict.fromkeys(("angle", "curved_angle"), "rad"), **dict.fromkeys(("width", "length", "radius"), "m"),

@@ -1,4 +1,4 @@
-"""Dampers by their shape: each yields a rigid body and the contacts of its faces.
+"""Dampers by their shape: each yields contacts of its faces, or of a meshed face, and maybe a rigid body.
 
 Directions are those of the damper: `out` (radially outward), `axial`, and across, out x axial, from the left
 platform to the right one. A face that is inclined by an angle a has the normal cos(a) out ± sin(a) across, so
@@ -9,16 +9,182 @@ N = load / (2 cos a) each. Stiffness and preload of a face are shared out evenly
 from __future__ import annotations
 
 import math
+from abc import abstractmethod
 from collections.abc import Iterator, Mapping
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
-from solver.contacts.fields import EndName, NonNegative, Positive
-from solver.contacts.frames import cross, unit
+from solver.contacts.fields import EndName, Friction, Name, NonNegative, Part, Positive, Signed, Vector
+from solver.contacts.frames import cross, dot, frame, is_unit, unit
 from solver.scene.bodies.body import Body, Row
-from solver.scene.bodies.patch import Patch
-from solver.scene.bodies.shape_base import Shape, Spot
+
+
+class Spot(NamedTuple):
+    """One point of a face: its name, what it joins, and its place; numbers may be symbols."""
+
+    name: str
+    between: tuple[str, str]
+    at: tuple[Any, Any, Any]
+    axes: tuple[tuple[Any, Any, Any], ...]
+
+
+class Shape(Part):
+    """What all shapes have.
+
+    Attributes
+    ----------
+    name : str
+        Name of the damper and of its body, in DOFs and parameter paths.
+    at : (3,) tuple
+        Position of the centre of mass; of a shroud, of the middle of its face [m].
+    out : (3,) tuple
+        Unit vector outward: along it the centrifugal load acts.
+    axial : (3,) tuple
+        Unit vector along the axis of rotation.
+    law : str
+        Contact law of every point.
+    kt, kn : float
+        Tangential and normal stiffness of a face [N/m], shared out over its points.
+    mu : float
+        Friction coefficient.
+    N0 : float
+        Preload of a face at rest [N], shared out over its points.
+    """
+
+    SHAPE: ClassVar[str]
+    GEOMETRY: ClassVar[tuple[str, ...]]
+    """Its parameters that the places of its contacts depend on."""
+    FACE: ClassVar[tuple[str, ...]] = ("kt", "kn", "mu", "N0")
+    """Its parameters that are those of its contacts."""
+    SHARED: ClassVar[tuple[str, ...]] = ("kt", "kn", "N0")
+    """Those that are shared out over the points of a face."""
+
+    name: Name
+    at: Vector = (0.0, 0.0, 0.0)
+    out: Vector = (0.0, 1.0, 0.0)
+    axial: Vector = (0.0, 0.0, 1.0)
+    law: Literal["coulomb-3d", "elastic-normal"]
+    kt: Positive
+    kn: Positive
+    mu: Friction
+    N0: Signed = 0.0
+
+    @model_validator(mode="after")
+    def _directions(self) -> Shape:
+        for key in ("out", "axial"):
+            if not is_unit(getattr(self, key)):
+                raise ValueError(f"`{key}` must be a unit vector, got {list(getattr(self, key))!r}")
+        if abs(dot(self.out, self.axial)) > 1e-2:
+            raise ValueError(f"`axial` must be perpendicular to `out`, got {list(self.axial)!r}")
+        return self
+
+    @abstractmethod
+    def spots(self, values: Mapping[str, Any]) -> Iterator[Spot]:
+        """The points of every face, with `values` for the parameters of `GEOMETRY`."""
+
+    @property
+    def geometry(self) -> dict[str, float]:
+        """The values of `GEOMETRY` as they are."""
+        return {key: float(getattr(self, key)) for key in self.GEOMETRY}
+
+    @property
+    def bodies(self) -> tuple[Body, ...]:
+        """Its rigid bodies."""
+        return ()
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Its numbers that are parameter paths."""
+        return (*self.GEOMETRY, *self.FACE)
+
+    @property
+    @abstractmethod
+    def shares(self) -> tuple[float, ...]:
+        """The part of its face that each of its contacts has; those of a face sum to 1."""
+
+    def contacts(self) -> list[dict[str, Any]]:
+        """Its contacts, as tables of a scene."""
+        return [
+            {
+                "name": spot.name, "group": f"{self.name}-faces", "law": self.law,
+                "between": list(spot.between), "at": list(spot.at), "normal": list(spot.axes[2]),
+                "tangents": [list(axis) for axis in spot.axes[:2]], "mu": self.mu,
+                **{key: getattr(self, key) * share for key in self.SHARED}, **self._settings,
+            }
+            for spot, share in zip(self.spots(self.geometry), self.shares, strict=True)
+        ]  # fmt: skip
+
+    @property
+    def _settings(self) -> dict[str, Any]:
+        return {}
+
+
+MOST_PAIRS = 1000
+
+
+class PatchPoint(Part):
+    """Two nodes of a patch that lie on each other, or a node and the ground.
+
+    Attributes
+    ----------
+    between : (str, str)
+        Nodes of the first and the second face.
+    at : (3,) tuple
+        Where they are [m].
+    area : float
+        Part of the face that belongs to them; in any unit, as only the share of it counts.
+    """
+
+    between: tuple[EndName, EndName]
+    at: Vector
+    area: Positive = 1.0
+
+
+class Patch(Shape):
+    """Two faces of finite-element meshes that lie on each other.
+
+    Stiffness and preload of the face are shared out over its points by their areas: a pressure that is even
+    over the face presses each point by its share. The parts were pressed together so when they were meshed:
+    the preload does not deform them once more.
+
+    Attributes
+    ----------
+    normal : (3,) tuple
+        Unit vector across the face, from the first to the second.
+    pairs : tuple of PatchPoint
+        Its points.
+    """
+
+    SHAPE: ClassVar[str] = "patch"
+    GEOMETRY: ClassVar[tuple[str, ...]] = ()
+
+    shape: Literal["patch"]
+    normal: Vector
+    pairs: Annotated[tuple[PatchPoint, ...], Field(min_length=1, max_length=MOST_PAIRS)]
+
+    @model_validator(mode="after")
+    def _across(self) -> Self:
+        if not is_unit(self.normal):
+            raise ValueError(f"`normal` must be a unit vector, got {list(self.normal)!r}")
+        return self
+
+    @property
+    def shares(self) -> tuple[float, ...]:
+        """The part of the face that each of its contacts has."""
+        whole = sum(pair.area for pair in self.pairs)
+        return tuple(pair.area / whole for pair in self.pairs)
+
+    @property
+    def _settings(self) -> dict[str, Any]:
+        return {"prestressed": True}
+
+    def spots(self, _values: Mapping[str, Any]) -> Iterator[Spot]:
+        """Its points; no number moves them."""
+        axes = frame(self.normal)
+        for number, pair in enumerate(self.pairs):
+            yield Spot(f"{self.name}-{number}", pair.between, pair.at, axes)
+
 
 MOST_POINTS = 100
 POINTS = "points"

@@ -10,7 +10,7 @@ from solver.contacts.fields import GROUND, parse_end
 from solver.contacts.laws.registry import DEFAULT, laws
 from solver.errors import Issue
 from solver.scene.bodies.shapes import WITH_BODY
-from solver.scene.cyclic.boundary import is_cyclic
+from solver.scene.cyclic.sector_tables import is_cyclic
 from solver.scene.validation import (
     MOST_ISSUES,
     RESERVED_PREFIXES,

@@ -10,7 +10,7 @@ from pydantic import ValidationError
 
 from solver.errors import Issue
 from solver.matrices.sectors.parts import WHOLE, PartsAcross
-from solver.scene.cyclic.boundary import is_cyclic
+from solver.scene.cyclic.sector_tables import is_cyclic
 from solver.scene.parts import Mistuning
 from solver.wording import listing, nearest, quoted
 

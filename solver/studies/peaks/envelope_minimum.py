@@ -30,6 +30,7 @@ DOUBT = 0.01  # relative error that is allowed for where cubics tell which minim
 EVEN = 1e-9  # relative change over the range up to which a peak does not depend on the parameter
 RISE = 1e-4  # relative height of what has to lie between two minima that are told apart
 LEVEL = 1e-8  # relative change of the peak over the range that is none
+ROUNDED = 1e-11  # relative difference of heights of which a good part may be rounding
 _MOST = 60
 
 
@@ -222,16 +223,25 @@ def _least(left: Mapping[int, Real], right: Mapping[int, Real]) -> float:
     if not both:
         return 0.5 * (low + high)
     length = high - low
-    cubics = [
-        (float(a[HEIGHT]), length * float(a[DHEIGHT]), float(b[HEIGHT]), length * float(b[DHEIGHT]))
-        for a, b in both
-    ]
+    cubics = [_cubic(a, b, length) for a, b in both]
     if _top_slope(0.0, cubics) >= 0.0:
         return low
     if _top_slope(1.0, cubics) <= 0.0:
         return high
     # The slope jumps where lines cross: a bracketing method finds that as well as a root.
     return low + float(brentq(_top_slope, 0.0, 1.0, args=(cubics,), xtol=1e-16)) * length
+
+
+def _cubic(a: Real, b: Real, length: float) -> tuple[float, float, float, float]:
+    """Return heights and slopes, by the share of the length, of a line's rows at both ends.
+
+    Where the heights differ by little but rounding, the slopes say better by how much.
+    """
+    da, db = length * float(a[DHEIGHT]), length * float(b[DHEIGHT])
+    height, other = float(a[HEIGHT]), float(b[HEIGHT])
+    if abs(other - height) <= ROUNDED * abs(height):
+        other = height + 0.5 * (da + db)
+    return height, da, other, db
 
 
 def _top_slope(t: float, cubics: list[tuple[float, float, float, float]]) -> float:

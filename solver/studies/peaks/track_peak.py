@@ -21,7 +21,7 @@ from solver.results.default_bar import shows_progress
 from solver.scene.scene import Scene
 from solver.studies.peaks.minimise_peak import COMPETES, MOST_LOOKS, THOROUGHLY, halted, prove
 from solver.studies.peaks.proof import EQUAL
-from solver.studies.peaks.results import CompetingPeak, LeastPeak, PeakTrack, TrackStatus
+from solver.studies.peaks.results import CompetingPeak, Exchange, LeastPeak, PeakTrack, TrackStatus
 from solver.studies.peaks.track import Line, LineEnd
 from solver.studies.peaks.tracker import Tracker
 from solver.studies.peaks.work_limit import RESPONSES, Allowance, HaltedError
@@ -139,7 +139,7 @@ def _result(tracker: Tracker, best: LeastPeak, status: TrackStatus, forward: boo
     )  # fmt: skip
 
 
-def _highest(tracker: Tracker) -> tuple[Real, tuple[tuple[float, float], ...]]:
+def _highest(tracker: Tracker) -> tuple[Real, tuple[Exchange, ...]]:
     """Return the rows of the highest line, ascending, with both rows where lines change places."""
     columns = tracker.lines[0].rows.shape[1] if tracker.lines else 0
     picked: list[tuple[float, int, Real]] = []
@@ -152,12 +152,13 @@ def _highest(tracker: Tracker) -> tuple[Real, tuple[tuple[float, float], ...]]:
         ]
     picked.sort(key=lambda item: item[:2])
     rows: list[Real] = []
-    exchanges: list[tuple[float, float]] = []
+    exchanges: list[Exchange] = []
     for at, (z, index, row) in enumerate(picked):
         if rows and picked[at - 1][1] != index:
             for meeting in _exchange(tracker, picked[at - 1][1], index, picked[at - 1][0], z):
                 rows.extend(meeting)
-                exchanges.append((tracker.scale.outside(float(meeting[0][Z])), float(meeting[0][HEIGHT])))
+                at_value = tracker.scale.outside(float(meeting[0][Z]))
+                exchanges.append(Exchange(at_value, float(meeting[0][HEIGHT])))
         rows.append(row)
     return (np.array(rows) if rows else np.zeros((0, columns))), tuple(exchanges)
 

@@ -1,4 +1,4 @@
-"""Mistuned disks: how much more their worst blades move, and every blade of the worst disk."""
+"""Disks: their interference diagram, and how much more the worst blades of mistuned ones move."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
@@ -13,6 +14,109 @@ from solver.jit.fourier import Real
 from solver.results import units
 from solver.views.plots import style
 from solver.views.plots.style import Into
+
+Json = Mapping[str, Any]
+
+_SHIFT = 0.06  # of the points of both directions to either side, where their frequencies differ
+_HEADROOM = 1.06
+_NAMED = 40  # orders that still have room for their numbers
+
+
+def interference_figure(answer: Json, *, ax: Into = None) -> Figure:
+    """Frequencies with all contacts open and stuck at each nodal diameter, and the orders at the speed.
+
+    Parameters
+    ----------
+    answer : the JSON of `solver.InterferenceDiagram`, with at least one nodal diameter.
+    ax : axes to draw into, as `solver.views.plots.style.figure`.
+    """
+    half = answer["sectors"] // 2
+    top = _HEADROOM * _highest(answer)
+    with style.styled():
+        page, (axes,) = style.figure(6.4, 4.4, into=ax)
+        _draw_ranges(axes, answer)
+        for key, colour, words in (
+            ("open_hz", style.BLUE, "all open"), ("stuck_hz", style.VERMILION, "all stuck"),
+        ):  # fmt: skip
+            _draw_families(axes, answer, key, colour, words)
+        if answer["speed_rpm"] is not None:
+            _draw_orders(axes, answer, top)
+        axes.set_xlim(-0.4, half + 0.4)
+        axes.set_ylim(0.0, top)
+        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+        style.label(axes, "nodal diameter", "natural frequency [Hz]")
+        at = "" if answer["speed_rpm"] is None else f" at {answer['speed_rpm']:g} rpm"
+        axes.set_title(f"{answer['scene']}, {answer['sectors']} sectors{at}")
+        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=4)
+    return page
+
+
+def _highest(answer: Json) -> float:
+    """The top of the picture: of the families with all contacts open, and of the lowest one stuck."""
+    free = [value for point in answer["diameters"] for value in point["open_hz"]]
+    stuck = [point["stuck_hz"][0] for point in answer["diameters"] if point["stuck_hz"]]
+    return max([*free, *stuck], default=1.0) or 1.0
+
+
+def _places(answer: Json) -> list[float]:
+    """Where each point stands: at its nodal diameter, beside it where the directions differ."""
+    shift = {"forward": _SHIFT, "backward": -_SHIFT}
+    return [point["diameter"] + shift.get(point["wave"], 0.0) for point in answer["diameters"]]
+
+
+def _draw_ranges(axes: Axes, answer: Json) -> None:
+    """What friction may move each natural frequency through."""
+    for x, point in zip(_places(answer), answer["diameters"], strict=True):
+        for free, stuck in zip(point["open_hz"], point["stuck_hz"], strict=True):
+            axes.plot([x, x], [free, stuck], color=style.GREY, linewidth=3.0, alpha=0.18)
+
+
+def _draw_families(axes: Axes, answer: Json, key: str, colour: str, words: str) -> None:
+    """Lines through the i-th frequency of each nodal diameter, of each direction."""
+    families = max((len(point[key]) for point in answer["diameters"]), default=0)
+    label: str | None = words
+    for way in ("forward", "backward"):
+        pairs = [
+            (x, point[key])
+            for x, point in zip(_places(answer), answer["diameters"], strict=True)
+            if point["wave"] in (way, "both", "standing")
+        ]
+        if way == "backward" and not any(point["wave"] == way for point in answer["diameters"]):
+            continue
+        marker = "o" if way == "forward" else "<"
+        for i in range(families):
+            heights = [values[i] if i < len(values) else np.nan for _, values in pairs]
+            axes.plot(
+                [x for x, _ in pairs], heights, color=colour, marker=marker, markersize=3.4, linewidth=0.9,
+                label=label,
+            )  # fmt: skip
+            label = None
+
+
+def _draw_orders(axes: Axes, answer: Json, top: float) -> None:
+    """The folded line, and the orders on it: full where they meet a family, with their numbers."""
+    shown = [one for one in answer["orders"] if one["frequency_hz"] <= top]
+    per_order, half = answer["speed_rpm"] / 60.0, answer["sectors"] / 2.0
+    folds = np.arange(0.0, top / per_order / half + 1.0)
+    line = np.where(folds % 2 == 0, 0.0, half)
+    axes.plot(line, folds * half * per_order, color=style.GREEN, linewidth=0.8, label="engine orders")
+    met = {one["order"] for one in answer["crossings"] if one["inside"]}
+    near = {one["order"] for one in answer["crossings"]} - met
+    label: str | None = "meets a family"
+    for one in shown:
+        x, y = one["diameter"], one["frequency_hz"]
+        hit = one["order"] in met
+        axes.plot(
+            [x], [y], color=style.GREEN, marker="D", markersize=5.0 if hit or one["order"] in near else 3.0,
+            markerfacecolor=style.GREEN if hit else "white", linestyle="none", zorder=5,
+            label=label if hit else None,
+        )  # fmt: skip
+        label = None if hit else label
+        if len(shown) <= _NAMED:
+            axes.annotate(
+                str(one["order"]), (x, y), xytext=(5, 3), textcoords="offset points", fontsize=7.5,
+                color=style.GREEN,
+            )  # fmt: skip
 
 
 def mistuning_figure(answer: Mapping[str, Any], *, ax: Into = None) -> Figure:
@@ -36,17 +140,15 @@ def mistuning_figure(answer: Mapping[str, Any], *, ax: Into = None) -> Figure:
         shares.set_ylim(0.0, 103.0)
         shares.set_title(f"{answer['scene']}, {factors.size} disks, spread {answer['spread']:g}")
         heights = np.array([np.nan if p is None else p for p in worst["peaks"]]) * unit.per_metre
-        colors = [style.VERMILION if i == worst["worst_blade"] else style.SKY for i in range(heights.size)]
-        blades.bar(np.arange(heights.size), heights, color=colors, width=0.7)
+        _draw_blades(
+            blades, heights, worst["worst_blade"], f"highest peak, max |{answer['dof']}| [{unit.name}]"
+        )
         blades.axhline(tuned * unit.per_metre, color=style.INK, linewidth=0.9, linestyle=(0, (5.0, 2.5)))
         blades.annotate(
             f"tuned {unit.show(tuned)}", (1.0, tuned * unit.per_metre),
             xycoords=("axes fraction", "data"), xytext=(0, 3), textcoords="offset points", ha="right",
             bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.0},
         )  # fmt: skip
-        blades.grid(visible=False, axis="x")
-        blades.xaxis.set_major_locator(MaxNLocator(integer=True))
-        style.label(blades, "blade", f"highest peak, max |{answer['dof']}| [{unit.name}]")
         blades.set_title(f"worst disk, seed {worst['seed']}")
     return page
 
@@ -65,9 +167,13 @@ def blades_figure(heights: Real, what: str, *, ax: Into = None) -> Figure:
     highest = int(np.nanargmax(heights)) if known.size else -1
     with style.styled():
         page, (axes,) = style.figure(5.0, 3.3, into=ax)
-        colors = [style.VERMILION if i == highest else style.SKY for i in range(heights.size)]
-        axes.bar(np.arange(heights.size), heights * unit.per_metre, color=colors, width=0.7)
-        axes.grid(visible=False, axis="x")
-        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-        style.label(axes, "blade", f"{what} [{unit.name}]")
+        _draw_blades(axes, heights * unit.per_metre, highest, f"{what} [{unit.name}]")
     return page
+
+
+def _draw_blades(axes: Axes, heights: Real, highest: int, words: str) -> None:
+    colors = [style.VERMILION if i == highest else style.SKY for i in range(heights.size)]
+    axes.bar(np.arange(heights.size), heights, color=colors, width=0.7)
+    axes.grid(visible=False, axis="x")
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    style.label(axes, "blade", words)

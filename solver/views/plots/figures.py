@@ -17,14 +17,13 @@ from solver.studies.peaks.results import PeakTrack
 from solver.views.plots.curves import Response
 from solver.views.plots.disks import blades_figure
 from solver.views.plots.modes import performance_figure
-from solver.views.plots.motion import Motion, motion_figure
-from solver.views.plots.multipliers import multipliers_figure
+from solver.views.plots.motion import Motion, motion_figure, multipliers_figure
 from solver.views.plots.responses import Demands, response_figure
 from solver.views.plots.style import Into
 from solver.views.plots.tracks import map_figure, track_figure
 
 if TYPE_CHECKING:
-    from solver.studies.response_map import ResponseMap
+    from solver.studies.map_result import ResponseMap
 
 
 def of_branch(branch: AnyBranch, ax: Into = None, *, limit: float | None = None) -> Figure:

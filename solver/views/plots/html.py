@@ -1,16 +1,19 @@
-"""Pictures as pages that need nothing else: the picture, the numbers behind it, how to have it again."""
+"""Pictures as files, also as pages that need nothing else: with the numbers behind and how to repeat them."""
 
 from __future__ import annotations
 
 import base64
 import math
 from html import escape
+from pathlib import Path
 from typing import Any
 
 from matplotlib.figure import Figure
 
 from solver.results.dataset import Dataset
+from solver.results.files import whole
 from solver.views.plots import style
+from solver.views.plots.style import write
 
 MOST_ROWS = 2000
 _DIGITS = 6
@@ -116,3 +119,19 @@ def _text(value: Any) -> str:
     if isinstance(value, float):
         return f"{value:.{_DIGITS}g}" if math.isfinite(value) else ""
     return "" if value is None else str(value)
+
+
+def save(page: Figure, path: Path, data: Dataset | None = None) -> None:
+    """Write a picture, whole or not at all; the suffix chooses the format.
+
+    Parameters
+    ----------
+    page : what was drawn.
+    path : ends in one of `solver.views.plots.SUFFIXES`.
+    data : the numbers behind it, which a page of HTML lists.
+    """
+    with whole(path) as temporary:
+        if path.suffix.lower() == ".html":
+            temporary.write_text(picture_page(page, data), "utf-8")
+            return
+        write(page, temporary, path.suffix.lower().removeprefix("."))

@@ -1,4 +1,4 @@
-"""One period of a motion: its time history and the hysteresis loops of the contacts."""
+"""One period of a motion: its time history, the hysteresis loops of the contacts, its Floquet multipliers."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from solver.views.plots.style import Into
 if TYPE_CHECKING:
     from solver.marching.result import MarchResult
     from solver.response.solution import Solution
+    from solver.response.stability.floquet import Stability
 
 MOST_LOOPS = 3
 _SAMPLES = 1000
@@ -170,3 +171,26 @@ def _loop(contact: str, slip: FloatArray, force: FloatArray) -> Loop:
 def _closed(samples: FloatArray) -> FloatArray:
     """Samples of a period with the first repeated at its end."""
     return np.append(samples, samples[:1])
+
+
+def multipliers_figure(found: Stability, *, ax: Into = None) -> Figure:
+    """The multipliers and the unit circle, inside which perturbations die out.
+
+    Parameters
+    ----------
+    found : of one response.
+    ax : axes to draw into, as `solver.views.plots.style.figure`.
+    """
+    around = np.linspace(0.0, 2.0 * np.pi, 361)
+    outside = np.abs(found.multipliers) > 1.0
+    with style.styled():
+        page, (axes,) = style.figure(3.8, 3.6, into=ax)
+        axes.plot(np.cos(around), np.sin(around), color=style.GREY, linewidth=0.9)
+        for these, color, marker in ((~outside, style.BLUE, "o"), (outside, style.VERMILION, "D")):
+            some = found.multipliers[these]
+            axes.plot(some.real, some.imag, color=color, marker=marker, markersize=4.0, linestyle="none")
+        axes.set_aspect("equal", adjustable="datalim")
+        style.label(axes, "real part of the multiplier", "imaginary part")
+        words = "stable" if found.stable else "not stable"
+        axes.set_title(f"{found.frequency_hz:.6g} Hz, {words}")
+    return page

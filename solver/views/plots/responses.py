@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from solver.results import units
-from solver.views.parameter_units import parameter_unit
+from solver.scene.parameter_paths import parameter_unit
 from solver.views.plots import style
 from solver.views.plots.curves import FloatArray, Response
 from solver.views.plots.style import Into

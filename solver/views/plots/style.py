@@ -17,7 +17,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from solver.errors import SettingError
 from solver.results import units
-from solver.views.parameter_units import parameter_unit
+from solver.scene.parameter_paths import parameter_unit
 
 # Okabe and Ito's colours, which the colour-blind can tell apart (jfly.uni-koeln.de/color).
 BLUE, VERMILION, GREEN = "#0072B2", "#D55E00", "#009E73"

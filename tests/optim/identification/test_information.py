@@ -11,7 +11,7 @@ from measured_cases import TWO_DOF, incremental_loop, table, two_dof_runs
 import optim
 import solver
 from optim.errors import DesignError
-from optim.identification.fit.evaluation import Runs
+from optim.identification.fit import Runs
 from optim.identification.reading import read_data
 from optim.identification.unknowns import read_unknowns
 from optim.problem.uncertainty_input import read_uncertain

@@ -90,7 +90,7 @@ def doubted(found: optim.Identification) -> bool:
 CASES = [(kind, seed, phase) for kind in KINDS for seed in range(20) for phase in (True, False)]
 
 
-@pytest.mark.few(9)
+@pytest.mark.few(27)
 @pytest.mark.parametrize(("kind", "seed", "phase"), CASES)
 def test_a_wrong_model_is_doubted(kind: str, seed: int, phase: bool) -> None:
     found, values = identified(seed, kind, phase=phase)
@@ -105,7 +105,7 @@ def test_a_wrong_model_is_doubted(kind: str, seed: int, phase: bool) -> None:
         assert found.status is optim.IdentifyStatus.NOT_CONVERGED
 
 
-@pytest.mark.few(8)
+@pytest.mark.few(20)
 @pytest.mark.parametrize("seed", range(40))
 def test_a_right_model_is_not(seed: int) -> None:
     found, values = identified(seed, "right", phase=bool(seed % 2), robust=seed % 3 == 0)

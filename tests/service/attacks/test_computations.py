@@ -78,7 +78,7 @@ LONG = {
 }  # fmt: skip
 
 
-@pytest.mark.few(4)
+@pytest.mark.few(8)
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=pytest.mark.long if name in LONG else ()) for name in ATTACKS]
 )

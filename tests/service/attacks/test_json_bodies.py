@@ -36,7 +36,7 @@ LONG = {
 }  # fmt: skip
 
 
-@pytest.mark.few(3)
+@pytest.mark.few(6)
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=pytest.mark.long if name in LONG else ()) for name in BODIES]
 )

@@ -12,7 +12,7 @@ from launch import COMMAND
 
 import solver
 from optim.problem.problem import Method
-from service.cli.options import shared as options
+from service.jobs.common.balance import WORDS
 from solver.scene.parameter_paths import parameter_paths
 
 ROOT = Path(__file__).resolve().parent.parent.parent.parent
@@ -86,8 +86,8 @@ def test_a_scene_that_cannot_be_read_offers_nothing(tmp_path: Path) -> None:
 
 def test_the_words_offered_are_those_accepted(tmp_path: Path) -> None:
     assert offered("design two-dof --method ", tmp_path) == [method.value for method in Method]
-    assert offered("solve two-dof --effects ", tmp_path) == ["auto", "all", *options.EFFECTS]
-    assert solver.Effects.read(",".join(options.EFFECTS)) == solver.Effects.everything()
+    assert offered("solve two-dof --effects ", tmp_path) == list(WORDS)
+    assert solver.Effects.read(",".join(WORDS[2:])) == solver.Effects.everything()
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])

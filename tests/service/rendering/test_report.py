@@ -302,6 +302,7 @@ band = [0.5, 2.2]
 """
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize(("load", "bounded"), [((0.2, 6.0), True), ((5e5, 1e6), False)])
 def test_a_design_without_damping_is_reported_with_the_right_word(
     load: tuple[float, float], bounded: bool, server: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]

@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 from hard_scenes import HARD, Hard, together, weakly_damped
 from referee import law_error, lost_power, motion_error
-from sampling import others_long
 from scene_cases import bladed_disk, two_dof
 from walked_branches import UNSTABLE, Walked, walked, with_damping
 
@@ -44,6 +43,7 @@ def confirm(solution: Solution) -> None:
     assert lost_power(solution) <= BALANCED
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("name", [name for name in HARD if name != RATCHETING])
 def test_solve(name: str):
     hard = HARD[name]
@@ -80,7 +80,8 @@ def test_a_contact_too_stiff_to_be_swept():
 SWEPT = [name for name, hard in HARD.items() if hard.band and name not in (RATCHETING, TOO_STIFF)]
 
 
-@pytest.mark.parametrize("name", others_long(SWEPT, keep=set(SWEPT) - {COSTLY}))
+@pytest.mark.few(keep=set(SWEPT) - {COSTLY})
+@pytest.mark.parametrize("name", SWEPT)
 def test_sweep(name: str):
     hard = HARD[name]
     assert hard.band is not None

@@ -13,7 +13,6 @@ from floating_scenes import floating_scene
 from moving_scenes import moving_scene
 from random_scenes import random_scene
 from referee import lost_power
-from sampling import sampled
 
 from solver import BranchStatus, ContinuationSettings, Scene, solve_all, sweep
 from solver.balance.balance import build
@@ -42,7 +41,8 @@ KINDS = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("seed", sampled(range(40), 5))
+@pytest.mark.few(5)
+@pytest.mark.parametrize("seed", range(40))
 @pytest.mark.parametrize("kind", KINDS)
 def test_it_passes_answers_and_refuses_what_is_off(kind: str, seed: int) -> None:
     scene, frequency_hz, harmonics = KINDS[kind](seed)

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from referee import law_error, lost_power, motion_error
-from sampling import sampled
 
 from benchmarks.random_scenes import Seeded, random_scene
 from solver import BranchStatus, Scene, Solution, load_scene, march, solve, sweep
@@ -74,12 +73,14 @@ def failures(count: int, judge: Callable[[int], object]) -> list[str]:
     return failed
 
 
-@pytest.mark.parametrize("seed", sampled(range(BEYOND, BEYOND + 150), 3))
+@pytest.mark.few(3)
+@pytest.mark.parametrize("seed", range(BEYOND, BEYOND + 150))
 def test_random_solves(seed: int):
     solved(*drawn(seed))
 
 
-@pytest.mark.parametrize("seed", sampled(range(BEYOND, BEYOND + 25), 3))
+@pytest.mark.few(3)
+@pytest.mark.parametrize("seed", range(BEYOND, BEYOND + 25))
 def test_random_responses(seed: int):
     swept(*drawn(seed)[:2])
 

@@ -122,6 +122,7 @@ def test_the_force_is_continuous_across_a_transition(name: str):
     assert np.abs(after.F - before.F).max() < 1e-6
 
 
+@pytest.mark.few(4)
 @pytest.mark.parametrize("seed", range(30))
 def test_the_force_is_continuous_where_a_contact_closes(seed: int):
     """It sticks or slips at once, and slips briefly within a grid interval: 2e-3 of the force were missed."""

@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 from contact_cases import central_difference
 from lumped_structure import lumped
-from sampling import sampled
 from scene_cases import bladed_disk, loose_mass, mixed_disk, oscillator, two_dof
 from walked_branches import UNSTABLE, walked, with_damping
 
@@ -61,9 +60,9 @@ def band_of(scene: Scene) -> tuple[float, float]:
 
 
 # Every scene with one predictor or two, each of the three with scenes of both kinds.
-@pytest.mark.parametrize(
-    ("predictor", "name"), sampled([(p, name) for name in RESPONSES for p in Predictor], 2)
-)
+@pytest.mark.few(2)
+@pytest.mark.parametrize("predictor", Predictor)
+@pytest.mark.parametrize("name", RESPONSES)
 def test_whole_responses(predictor: Predictor, name: str):
     """From end to end of the band, up and down, every point converged, nothing turned or stalled."""
     scene = RESPONSES[name]()

@@ -16,8 +16,7 @@ import solver
 from service.cli import main
 from solver.matrices.files import read_matrix
 from solver.matrices.normal_modes import undamped_modes
-from solver.matrices.reduction.craig_bampton import Reduced, craig_bampton
-from solver.matrices.reduction.writing import write_reduced
+from solver.matrices.reduction.craig_bampton import Reduced, craig_bampton, write_reduced
 from solver.matrices.validation import DofTable
 from solver.scene.scene import load_scene
 

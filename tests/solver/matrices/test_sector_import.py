@@ -21,8 +21,8 @@ import solver
 from service.cli import main
 from solver import Scene
 from solver.linear.assembly import linear_model
+from solver.matrices.labels import Label
 from solver.matrices.load_set import MatrixSet, read_set
-from solver.matrices.readers.label import Label
 from solver.matrices.readers.numbers_in_text import FormatError
 from solver.matrices.reduction import fixed_interface_modes
 from solver.matrices.sectors.decks import Deck, read_deck

@@ -109,6 +109,7 @@ def test_a_curve_that_ends_before_the_most_says_so() -> None:
     assert solver.limit_cycles(short, -0.001, stability=False).most_at_end
 
 
+@pytest.mark.few(4)
 @pytest.mark.parametrize("harmonics", [3, 7, 11, 15, 23])
 def test_estimates_cover_the_error_of_few_harmonics(harmonics: int) -> None:
     # 0.24112 and 7.6196 m by 95 harmonics; the march of the cycle settles at 7.6193 m.

@@ -66,6 +66,7 @@ def check(seed: int, kind: str, further: int, settings: dict[str, float]) -> str
     return "agrees"
 
 
+@pytest.mark.few(keep=("given", "box"))
 @pytest.mark.parametrize("kind", ["given", "moving", "box", "box-moving"])
 def test_without_a_flag_rest_leads_to_the_answer(kind: str) -> None:
     said = [check(seed, kind, 2, BRIEFLY) for seed in range(8)]

@@ -70,6 +70,7 @@ def with_stops(b: float, F: float) -> float:
     return float(brentq(way, xs[i], xs[i + 1], xtol=1e-14))
 
 
+@pytest.mark.few(4)
 @pytest.mark.parametrize(("b", "F"), [each for each in GRID if each not in WITH_STOPS])
 def test_den_hartog_without_stops(b: float, F: float) -> None:
     found = stickslip.solve(one_mass(F), frequency_hz=b / (2.0 * math.pi))
@@ -84,6 +85,7 @@ def test_den_hartog_without_stops(b: float, F: float) -> None:
     assert math.hypot(*found.contacts[0].force[1:3]) == pytest.approx(4.0 * F / math.pi, rel=1e-11)
 
 
+@pytest.mark.few(6)
 @pytest.mark.parametrize(("b", "F"), WITH_STOPS)
 def test_den_hartog_with_stops(b: float, F: float) -> None:
     found = stickslip.solve(one_mass(F), frequency_hz=b / (2.0 * math.pi))
@@ -136,6 +138,7 @@ def random_scene(seed: int) -> tuple[stickslip.Scene, float]:
     return stickslip.Scene.from_dict(raw), spread(-1.3, -0.3)
 
 
+@pytest.mark.few(4)
 @pytest.mark.parametrize("seed", range(8))
 def test_random_scenes_are_what_a_march_finds(seed: int) -> None:
     """Elastic contacts, gaps, loads that vary and move beside rigid ones."""
@@ -204,6 +207,7 @@ def test_a_large_kt_comes_near_like_its_root() -> None:
 CERTIFIED = json.loads((Path(__file__).parents[2] / "data" / "certified_orbits.json").read_text())
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize("case", CERTIFIED, ids=[case["id"] for case in CERTIFIED])
 def test_elastic_orbits_with_proofs(case: dict[str, Any]) -> None:
     """Periodic orbits enclosed by interval arithmetic to 18 digits, with no code of this package."""

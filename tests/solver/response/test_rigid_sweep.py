@@ -28,6 +28,7 @@ def amplitude(hz: float, F: float) -> float:
     return without_stops(2.0 * math.pi * hz, F)
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize(("F", "low", "high"), [(0.2, 0.6, 0.95), (0.4, 1.08, 1.6), (0.6, 0.75, 0.9)])
 def test_every_point_is_den_hartogs(F: float, low: float, high: float) -> None:
     """Both ways; the band ends where his amplitude is the limit."""
@@ -67,12 +68,14 @@ def test_over_another_parameter() -> None:
 
 
 def test_a_resonance_without_damping_ends_the_branch() -> None:
-    found = stickslip.sweep(one_mass(0.4), start=0.12, stop=0.2)
+    found = stickslip.sweep(one_mass(0.4), start=0.14, stop=0.18)
     assert found.status is stickslip.BranchStatus.UNDAMPED
     assert found.values[-1] < 0.5 / math.pi
     assert found.bifurcations.marks[-1].why == found.status.value
-    # above π/4 of the force, friction bounds it
-    bounded = stickslip.sweep(one_mass(0.8), start=0.12, stop=0.2)
+
+
+def test_friction_above_a_quarter_of_pi_of_the_force_bounds_it() -> None:
+    bounded = stickslip.sweep(one_mass(0.8), start=0.15, stop=0.2)
     assert bounded.completed
     assert bounded.amplitude[-1] == pytest.approx(with_stops(0.4 * math.pi, 0.8), rel=1e-10)
     i = int(np.argmax(bounded.amplitude))
@@ -81,6 +84,7 @@ def test_a_resonance_without_damping_ends_the_branch() -> None:
     assert bounded.amplitude[i] == pytest.approx(marched.max_abs, rel=near)
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize(
     ("scene", "low", "high"), [(damped(0.4, 0.02), 0.13, 0.19), (damped(0.7, 0.1), 0.1, 0.2)]
 )
@@ -114,6 +118,7 @@ def test_the_highest_peak_is_the_maximum_of_single_solves(
     assert not found.bifurcations.unstable.any()
 
 
+@pytest.mark.few(keep=(3,))
 @pytest.mark.parametrize("seed", [0, 1, 3])
 def test_random_scenes_are_what_single_solves_find(seed: int) -> None:
     """Elastic contacts, gaps, loads that vary and move beside rigid ones."""

@@ -10,7 +10,7 @@ import pytest
 import solver
 from solver import Scene
 from solver.continuation.branch import BranchStatus
-from solver.linear.undamped import undamped_resonance
+from solver.linear.modal import undamped_resonance
 
 
 def scene(**structure: Any) -> Scene:

@@ -11,9 +11,8 @@ from typing import Any
 
 import pytest
 
-from solver.scene.editing import edit
-from solver.scene.editing.edit import edited
-from solver.scene.editing.places import place_at, places
+from solver.scene import editing
+from solver.scene.editing import edited, place_at, places
 
 SHIPPED = {
     file.name.removesuffix(".toml"): file.read_text("utf-8")
@@ -158,7 +157,7 @@ def leaves(item: Any) -> list[tuple[Any, Any]]:
 def test_any_change_gives_what_is_wanted(name: str, most: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever is changed; the whole is seldom written anew."""
     anew: list[str] = []
-    monkeypatch.setattr(edit, "_leading_comments", lambda text: (anew.append(text), ())[1])
+    monkeypatch.setattr(editing, "_leading_comments", lambda text: (anew.append(text), ())[1])
     text = ODD if name == "odd" else SHIPPED[name]
     chance = random.Random(name)
     for _ in range(120):

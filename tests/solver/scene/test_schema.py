@@ -16,7 +16,7 @@ from jsonschema import Draft202012Validator
 import solver
 from service.cli import main
 from service.schemas.json_schema import Described, schema_of
-from solver.scene.io import load_raw
+from solver.scene.toml import load_raw
 
 ROOT = Path(__file__).resolve().parent.parent.parent.parent
 SCHEMAS = {what: Draft202012Validator(schema_of(what)) for what in Described}

@@ -77,6 +77,7 @@ def checked(sectors: int, order: int, seed: int, spread: float) -> dict[str, Any
     return {"magnification": found.magnification(tuned)}
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize(("sectors", "order", "spread"), [(6, 1, 0.02), (12, 3, 0.01), (24, 5, 0.03)])
 def test_peaks_of_linear_disks_are_those_of_a_direct_solve_and_below_whiteheads_bound(
     sectors: int, order: int, spread: float

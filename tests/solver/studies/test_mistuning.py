@@ -266,6 +266,7 @@ def test_peaks_of_every_blade(written: bool):
         assert np.all(every.max_abs <= found.value * (1.0 + 1e-6))
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize("written", [False, True], ids=["cyclic", "annulus"])
 @pytest.mark.parametrize("every_branch", [False, True], ids=["one branch", "every branch"])
 def test_one_sweep_gives_the_same_peaks_as_one_for_each_blade(written: bool, every_branch: bool):
@@ -285,6 +286,7 @@ def test_one_sweep_gives_the_same_peaks_as_one_for_each_blade(written: bool, eve
         assert found.at_hz[sector] == pytest.approx(alone.at, rel=1e-9)
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize("seed", range(3))
 def test_no_blade_moves_more_anywhere_than_at_its_highest_peak(seed: int):
     """Random disks with contacts that slip little or much, against single solutions all over the band."""

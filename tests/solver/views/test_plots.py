@@ -16,8 +16,8 @@ from matplotlib.figure import Figure
 import solver
 from solver.results import units
 from solver.results.files import whole
-from solver.views.parameter_units import parameter
-from solver.views.plots import SUFFIXES, saving, style
+from solver.scene.parameter_paths import parameter
+from solver.views.plots import SUFFIXES, html, style
 from solver.views.plots.curves import Response, above, with_peak
 from solver.views.plots.motion import Motion, motion_figure
 from solver.views.plots.responses import Demands, Family, family_figure, peak_figure, response_figure
@@ -133,7 +133,7 @@ def test_a_picture_has_at_most_three_loops() -> None:
 @pytest.mark.parametrize("suffix", SUFFIXES)
 def test_the_suffix_chooses_the_format_and_the_bytes_repeat(tmp_path: Path, suffix: str) -> None:
     for name in ("one", "two"):
-        saving.save(response_figure(bump(1e-4)), tmp_path / f"{name}{suffix}")
+        html.save(response_figure(bump(1e-4)), tmp_path / f"{name}{suffix}")
     one, two = ((tmp_path / f"{name}{suffix}").read_bytes() for name in ("one", "two"))
     assert one == two
     begins = {".png": b"\x89PNG", ".svg": b"<?xml", ".pdf": b"%PDF", ".html": b"<!DOC"}
@@ -146,7 +146,7 @@ def test_a_picture_that_fails_leaves_the_old_one(tmp_path: Path) -> None:
     page = response_figure(bump(1e-4))
     page.axes[0].set_title(r"$\nosuchcommand$")
     with pytest.raises(ValueError, match="nosuchcommand"):
-        saving.save(page, path)
+        html.save(page, path)
     assert path.read_bytes() == b"old"
     assert [file.name for file in tmp_path.iterdir()] == ["picture.png"]
 

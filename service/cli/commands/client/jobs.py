@@ -17,8 +17,8 @@ from service.cli.options.keyed import given_key
 from service.cli.options.scene_files import scene_to_submit, uploaded
 from service.cli.progress import bar
 from service.errors import InputError
-from service.rendering.tables import results as reports
-from service.rendering.tables.text import print_json, print_pairs, print_table, say
+from service.rendering.plain import print_result
+from service.rendering.tables.text import print_json, print_table, say
 
 if TYPE_CHECKING:
     from service.client.client import Client
@@ -148,23 +148,11 @@ def _show(job: JobAnswer, answer: ResultsAnswer, *, as_json: bool) -> None:
         print_table("Stored sweeps", ("id", "parameter", "points", "peak [m]"), rows, right="23")
 
 
-def print_result(kind: str, result: Mapping[str, Any]) -> None:
-    """Print a result: as the local command does, as its kind says, or by its keys."""
-    if reports.knows(kind):
-        reports.of_kind(kind)(result)
-        return
-    from service.rendering.plain import told
-    from service.settings.kinds import registry_here
-
-    view = told(kind, result, registry_here())
-    print_pairs(view.title, view.pairs)
-
-
 def _draw(client: Client, kind: str, answer: ResultsAnswer, picture: Path) -> None:
     from service.jobs.kind_view import NothingToDrawError
     from service.rendering.plots import result_figure
     from service.settings.kinds import registry_here
-    from solver.views.plots.saving import save
+    from solver.views.plots.html import save
 
     try:
         page = result_figure(kind, answer.result, answer.sweeps, client.sweep, registry_here())

@@ -12,7 +12,7 @@ from service.cli.options.numeric import amount, count
 from service.errors import InputError
 from service.rendering.tables.text import print_json, print_table
 from solver.results import units
-from solver.views.parameter_units import parameter
+from solver.scene.parameter_paths import parameter
 
 if TYPE_CHECKING:
     from service.client.client import Client

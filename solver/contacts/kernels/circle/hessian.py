@@ -72,11 +72,17 @@ ROUNDS = 4  # of Newton's method from a real solution, each of which all but squ
 
 
 @compiled
+def over(part: Number, whole: Number) -> Number:
+    """Return a quotient, NaN by 0: there the motion is not smooth, and complex numbers would raise."""
+    return part / whole if whole != 0.0 else complex(np.nan, np.nan)
+
+
+@compiled
 def _zero_of_limit(waves: Array, tau: Number, at: Array) -> Number:
     """Move a time to where L is 0."""
     for _ in range(3):
         curves_at(waves, tau, at)
-        tau -= at[LIMIT] / at[DLIMIT]
+        tau -= over(at[LIMIT], at[DLIMIT])
     return tau
 
 
@@ -90,7 +96,7 @@ def _end_of_stick(
         tx, ty = offset_x + at[X], offset_y + at[Y] / kappa
         excess = tx * tx + ty * ty - at[LIMIT] * at[LIMIT]
         rise = 2.0 * (tx * at[DX] + ty * at[DY] / kappa - at[LIMIT] * at[DLIMIT])
-        tau -= excess / rise
+        tau -= over(excess, rise)
     return tau
 
 
@@ -98,10 +104,7 @@ def _end_of_stick(
 def _direction(theta: float, tx: Number, ty: Number) -> Number:
     """Return the direction of (tx, ty), whose real part is near `theta`; NaN of a force that is 0."""
     c, s = np.cos(theta), np.sin(theta)
-    along = c * tx + s * ty
-    if along == 0.0:
-        along = complex(np.nan, np.nan)
-    return theta + (c * ty - s * tx) / along
+    return theta + over(c * ty - s * tx, c * tx + s * ty)
 
 
 @apart
@@ -133,11 +136,11 @@ def _carry_slip(
         slope = SLOPES[STAGES - 1, 0] * panel[START]
         for j in range(STAGES):
             slope += SLOPES[STAGES - 1, j + 1] * panel[START + 1 + j]
-        slope /= panel[TO] - panel[FROM]
+        slope = over(slope, panel[TO] - panel[FROM])
         c, s = np.cos(theta), np.sin(theta)
         fall = c * last[DDX] + s * last[DDY] / kappa - last[DDLIMIT]
         fall += (c * last[DY] / kappa - s * last[DX]) * slope
-        row[END] -= slip_rate(last, kappa, theta) / fall
+        row[END] -= over(slip_rate(last, kappa, theta), fall)
 
 
 @apart
@@ -179,7 +182,7 @@ def _carry(
             theta = given[first, START] + 0.0j
             for _ in range(ROUNDS):
                 F, slope, _, _ = turning(at, kappa, theta)
-                theta -= F / slope
+                theta -= over(F, slope)
             panels[first, START] = theta
         else:
             panels[first, START] = _direction(given[first, START], tx, ty)
@@ -209,7 +212,7 @@ def _carried(
         curves_at(waves, 0.0j, at)
         start[0], start[1] = at[X], at[Y] / kappa
         if pieces[0, BEGAN] != UNLOADED:
-            share = at[LIMIT] / np.sqrt(start[0] * start[0] + start[1] * start[1])
+            share = over(at[LIMIT], np.sqrt(start[0] * start[0] + start[1] * start[1]))
             start[0], start[1] = share * start[0], share * start[1]
     tx, ty = pieces[0, TX] + 0.0j, pieces[0, TY] + 0.0j
     rounds = ROUNDS if found[HOW] == CLOSES else 1
@@ -219,7 +222,7 @@ def _carried(
         _carry(waves, kappa, found, out_pieces, out_panels, panels, pieces, start)
         memory = found[FACTOR] * (found[PX] * found[MX] + found[PY] * found[MY])
         along = found[FACTOR] * (found[PX] * (start[0] - tx) + found[PY] * (start[1] - ty))
-        step = along / (1.0 - memory)
+        step = over(along, 1.0 - memory)
         tx, ty = start[0] + step * found[MX], start[1] + step * found[MY]
 
 

@@ -50,8 +50,10 @@ def against_march(scene: Scene, frequency_hz: float, harmonics: int) -> tuple[fl
     return solution.max_abs, solution.error_estimate, marched.max_abs, marched.error_estimate
 
 
-@pytest.mark.parametrize("count", [6, pytest.param(40, marks=pytest.mark.long)])
-@pytest.mark.parametrize("stiffness", [1e3, 1e4, 1e5])
+@pytest.mark.few(2)
+@pytest.mark.parametrize(
+    ("stiffness", "count"), [(1e3, 6), (1e3, 40), (1e5, 3), (1e4, 40), (1e4, 6), (1e5, 40)]
+)
 def test_stiff_friction(stiffness: float, count: int):
     """Den Hartog's oscillator with and without stops, the contact up to 1e5 times as stiff as the spring."""
     rng, asked = np.random.default_rng(5), []
@@ -65,11 +67,12 @@ def test_stiff_friction(stiffness: float, count: int):
     assert useful >= FEWEST_USEFUL or count * (1.0 - useful) <= 1.0
 
 
-@pytest.mark.parametrize("harmonics", [11, pytest.param(21, marks=pytest.mark.long)])
-def test_stiff_contacts_under_small_loads(harmonics: int):
+@pytest.mark.few(3)
+@pytest.mark.parametrize(("harmonics", "count"), [(11, 6), (11, 12), (21, 12)])
+def test_stiff_contacts_under_small_loads(harmonics: int, count: int):
     """Far below the resonance, of any size of numbers."""
     asked = []
-    for seed in range(12):
+    for seed in range(count):
         rng = np.random.default_rng(seed)
         k, m, force = 10.0 ** rng.uniform(-2, 8), 10.0 ** rng.uniform(-4, 1), 10.0 ** rng.uniform(-4, 2)
         contacts: list[dict[str, object]] = [

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from peak_cases import case_a, highest, scene_of
 from random_scenes import random_scene
-from sampling import others_long
 from scene_cases import oscillator
 
 import solver
@@ -91,6 +90,7 @@ def test_the_disk_s_two_peaks_are_equally_high() -> None:
     assert min(peak.slope for peak in best.active) < 0.0 < max(peak.slope for peak in best.active)
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize("first", [20.0, 60.0, 100.0, 150.0, 400.0, 1000.0, 3000.0])
 def test_it_does_not_depend_on_where_the_first_sweep_is(first: float) -> None:
     best = least_peak(scene_of("bladed-disk"), "shroud.N0", 20.0, 3000.0, first=first)
@@ -170,16 +170,13 @@ def check_random(seed: int, points: int) -> None:
             assert branch.peak.value >= best.peak * (1.0 - 1e-8)
 
 
-@pytest.mark.few(2)
-@pytest.mark.parametrize("seed", others_long([2, 8, 14, 30, 34, 37, 48, 72], keep=(2, 30, 48, 72)))
-def test_random_scenes_against_brute_force(seed: int) -> None:
-    check_random(seed, 13)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("seed", range(100, 140))
-def test_more_random_scenes_against_brute_force(seed: int) -> None:
-    check_random(seed, 41)
+@pytest.mark.few(keep=(2, 48))
+@pytest.mark.parametrize(
+    ("seed", "points"),
+    [*((seed, 13) for seed in (2, 8, 14, 30, 34, 37, 48, 72)), *((seed, 41) for seed in range(100, 140))],
+)
+def test_random_scenes_against_brute_force(seed: int, points: int) -> None:
+    check_random(seed, points)
 
 
 def test_the_optimum_is_the_first_basin() -> None:

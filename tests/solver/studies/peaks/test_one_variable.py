@@ -61,6 +61,7 @@ def check(seed: int, points: int, rounds: int) -> None:
 
 
 # On 41 the highest peak is the same over an interval; on 269 peaks leave the band.
+@pytest.mark.few(2)
 @pytest.mark.parametrize("seed", [41, 269])
 def test_random_problems_against_brute_force(seed: int) -> None:
     check(seed, 13, 2)

@@ -156,6 +156,7 @@ OTHERS = [
 ]
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize(("name", "path", "start", "stop"), OTHERS)
 def test_other_parameters(name: str, path: str, start: float, stop: float) -> None:
     """Friction, stiffness, the ratio of the varying load, its phase, the level, a spring of the structure."""

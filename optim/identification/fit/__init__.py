@@ -1,1 +1,0 @@
-"""The fit: predictions of all runs, least squares, and where to start."""

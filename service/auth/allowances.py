@@ -1,0 +1,138 @@
+"""What one owner may have at a time and store: the limits of their key, else those of the settings."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import Counter, OrderedDict
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from service.auth.callers import Caller
+from service.db.repositories.owned import StorageRepository
+from service.errors import OverloadedError, StorageFullError, TooManyRequestsError
+from service.settings.settings import Limits
+
+_RETRY_SECONDS = 5
+
+
+def share(caller: Caller, settings: Limits, name: str) -> int | None:
+    """One limit of a caller: that of their key, else `owner_<name>` of the settings; None for no limit."""
+    own: int | None = getattr(caller.limits, name)
+    most: int = getattr(settings, f"owner_{name}") if own is None else own
+    return most or None
+
+
+def highest_priority(caller: Caller, settings: Limits) -> int:
+    """The highest priority the caller may give a job."""
+    own = caller.limits.priority
+    return settings.owner_priority if own is None else own
+
+
+class AtATime:
+    """How many of something each owner has now.
+
+    Parameters
+    ----------
+    words : str
+        What is counted.
+    most : int or None
+        Of all owners together.
+    """
+
+    def __init__(self, words: str, most: int | None = None) -> None:
+        self._words = words
+        self._most = most
+        self._held: Counter[str] = Counter()
+        self._lock = threading.Lock()
+
+    def __getitem__(self, owner: str) -> int:
+        return self._held[owner]
+
+    @contextmanager
+    def taken(self, owner: str, most: int | None) -> Iterator[None]:
+        """Count one more inside the block.
+
+        Raises
+        ------
+        TooManyRequestsError
+            The owner has `most` already.
+        OverloadedError
+            All owners together have as many as there may be.
+        """
+        with self._lock:
+            if most is not None and self._held[owner] >= most:
+                raise TooManyRequestsError(
+                    f"{most} {self._words} at a time are allowed, as many are open", _RETRY_SECONDS
+                )
+            if self._most is not None and self._held.total() >= self._most:
+                raise OverloadedError(
+                    f"the service has {self._most} {self._words} at a time, as many are open", _RETRY_SECONDS
+                )
+            self._held[owner] += 1
+        try:
+            yield
+        finally:
+            with self._lock:
+                self._held[owner] -= 1
+                if not self._held[owner]:
+                    del self._held[owner]
+
+
+_COUNTED_SECONDS = 5.0
+_MOST_OWNERS = 10_000
+
+
+class Storage:
+    """Refuses what would be too much.
+
+    What an owner stores is counted now and then; between two counts what was accepted here is added. Jobs
+    are not known to be large before they end: those that wait may exceed the limit by their results.
+
+    Parameters
+    ----------
+    repository : StorageRepository
+        Counts.
+    settings : Limits
+        The limit of keys that have none of their own.
+    steady : callable
+        Seconds that never jump.
+    """
+
+    def __init__(
+        self, repository: StorageRepository, settings: Limits, steady: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._repository = repository
+        self._settings = settings
+        self._steady = steady
+        self._counted: OrderedDict[str, tuple[int, float]] = OrderedDict()
+        self._lock = threading.Lock()
+
+    def require(self, caller: Caller, more: int = 0) -> None:
+        """Count `more` bytes that are about to be stored.
+
+        Raises
+        ------
+        StorageFullError
+            If that is more than the caller's owner may store.
+        """
+        most = share(caller, self._settings, "storage_bytes")
+        if most is None:
+            return
+        stored, at = self._counted.get(caller.owner, (0, -_COUNTED_SECONDS))
+        if self._steady() - at >= _COUNTED_SECONDS or stored + more > most:
+            stored, at = self._repository.of(caller.owner), self._steady()
+        if stored + more > most or stored >= most:
+            raise StorageFullError(
+                f"{stored} bytes are in storage and {more} would come, {most} are allowed: delete uploads, "
+                "or ask the keeper of the service to delete old jobs (`stickslip db prune`)"
+            )
+        with self._lock:
+            self._counted[caller.owner] = (stored + more, at)
+            while len(self._counted) > _MOST_OWNERS:
+                self._counted.popitem(last=False)
+
+    def forget(self, owner: str) -> None:
+        """Something was deleted: count anew."""
+        with self._lock:
+            self._counted.pop(owner, None)

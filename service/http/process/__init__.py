@@ -1,1 +1,0 @@
-"""The process that serves: its start and end, its memory."""

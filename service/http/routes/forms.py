@@ -1,0 +1,120 @@
+"""``/v1/templates``, ``/v1/scenes-schema``, ``/v1/laws``, ``/v1/kinds``: what forms are made of."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Body, Request, Response
+from pydantic import BaseModel, ConfigDict, Field
+
+from service.errors import InvalidRequestError
+from service.http.dependencies import InContext, TypedRoute, tagged
+from service.jobs.kinds.registry.bodies import body_model
+from service.jobs.registry import JobKind
+from service.jobs.strict_json import encoded
+from service.schemas.answers import Answer, KindAnswer, KindList
+from service.schemas.law_answers import LawList, law_list
+from solver.errors import Issue, SceneError
+from solver.scene.json_schema import plain, scene_schema
+from solver.scene.templates import TEMPLATES, template_schema, template_tables
+
+templates = APIRouter(prefix="/v1", tags=["scenes"], route_class=TypedRoute)
+
+_ANSWERS: dict[str, Any] = {"template": "platform-damper", "answers": {"frequency_hz": 420, "blades": 60}}
+
+
+class FillRequest(BaseModel):
+    """A template and answers to its questions; those left out have defaults."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, json_schema_extra={"examples": [_ANSWERS]})
+
+    template: str = Field(max_length=100)
+    answers: dict[str, Any] = {}
+
+
+FillBody = Annotated[FillRequest, Body(openapi_examples={"answers": {"value": _ANSWERS}})]
+
+
+class TemplateAnswer(Answer):
+    """A template: a case of which a scene is made.
+
+    Attributes
+    ----------
+    title : for people.
+    questions : JSON Schema of the answers, each with unit, range and default.
+    """
+
+    name: str
+    title: str
+    questions: dict[str, Any]
+
+
+class TemplateList(Answer):
+    """All templates."""
+
+    items: list[TemplateAnswer]
+
+
+class TemplateScene(Answer):
+    """The tables of a scene."""
+
+    scene: dict[str, Any]
+
+
+@templates.get("/templates")
+def list_templates() -> TemplateList:
+    """The cases of which scenes can be made, each with its questions."""
+    items = [
+        TemplateAnswer(name=name, title=each.TITLE, questions=template_schema(each))
+        for name, each in TEMPLATES.items()
+    ]
+    return TemplateList(items=items)
+
+
+@templates.post("/templates")
+async def fill_template(body: FillBody) -> TemplateScene:
+    """The scene of a case, made of the answers to its questions; nothing is stored."""
+    if body.template not in TEMPLATES:
+        message = f"`template` must be one of {', '.join(TEMPLATES)}, got {body.template!r}"
+        raise InvalidRequestError([Issue(pointer="/template", message=message)])
+    try:
+        return TemplateScene(scene=template_tables(body.template, body.answers))
+    except SceneError as error:
+        issues = [Issue(pointer=f"/answers{one.pointer}", message=one.message) for one in error.issues]
+        raise InvalidRequestError(issues) from error
+
+
+@cache
+def _schema() -> bytes:
+    return encoded(scene_schema()).encode()
+
+
+@templates.get("/scenes-schema", response_model=dict[str, Any])
+def schema(request: Request) -> Response:
+    """The JSON Schema of scenes, as `stickslip schema` prints it, with the laws of this service."""
+    return tagged(request, _schema())
+
+
+laws = APIRouter(prefix="/v1/laws", tags=["scenes"])
+
+
+@laws.get("")
+def list_laws() -> LawList:
+    """The contact laws of this service, each with its parameters: unit, words, what a slider covers."""
+    return law_list()
+
+
+kinds = APIRouter(prefix="/v1/kinds", tags=["jobs"])
+
+
+@kinds.get("")
+def list_kinds(context: InContext) -> KindList:
+    """The kinds of job of this service, each with the schema of its body and of its result."""
+    return KindList(items=[_answer(kind) for kind in context.service.registry])
+
+
+def _answer(kind: JobKind) -> KindAnswer:
+    result = None if kind.result is None else plain(kind.result.model_json_schema())
+    body = plain(body_model(kind.name, kind.request).model_json_schema())
+    return KindAnswer(name=kind.name, summary=kind.summary, body=body, result=result)

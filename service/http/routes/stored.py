@@ -1,0 +1,124 @@
+"""``/v1/sweeps`` and ``/v1/designs``: what was computed and designed, to be queried."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from fastapi import APIRouter, Query, Response
+
+from service.db.models import Sweep
+from service.http.dependencies import (
+    BINARY,
+    LISTED,
+    TEXT,
+    UNCHANGED,
+    Context,
+    InContext,
+    listing,
+    media,
+    tagged,
+)
+from service.http.in_lane import drawing, reading, writing_files
+from service.rendering.representations import (
+    BY_FORMAT,
+    JSON,
+    SUFFIXES,
+    SWEEP_MEDIA,
+    chosen,
+    sweep_body,
+    sweep_picture,
+)
+from service.schemas.answers import DesignDetail, DesignPage, SweepDetail, SweepPage
+from service.schemas.design_queries import DesignQuery, design_detail, design_page
+from service.schemas.sweep_queries import SweepQuery, sweep_page
+
+sweeps = APIRouter(prefix="/v1/sweeps", tags=["sweeps"])
+
+_PICTURE_TYPES = {"svg": "image/svg+xml", "png": "image/png"}
+SWEEP_FORMS: dict[int | str, dict[str, Any]] = {
+    200: media({form: TEXT if form.startswith("text/") else BINARY for form in SWEEP_MEDIA if form != JSON}),
+    **UNCHANGED,
+}
+
+
+SweepForm = Annotated[
+    Literal["json", "csv", "npz", "parquet"] | None,
+    Query(alias="format", description="In place of `Accept`, for links."),
+]
+
+
+@sweeps.get("", response_model=SweepPage, responses=LISTED)
+@reading
+def list_sweeps(context: InContext, query: Annotated[SweepQuery, Query()]) -> Response:
+    """Stored sweeps that meet every filter, newest first unless `sort` says otherwise."""
+    return listing(context, sweep_page(context.service.sweeps, query, context.service.settings, context.sees))
+
+
+@sweeps.get("/{sweep_id}", response_model=SweepDetail, responses=SWEEP_FORMS)
+@writing_files
+def get_sweep(sweep_id: str, context: InContext, form: SweepForm = None) -> Response:
+    """A stored sweep with its arrays, in the form that `Accept` prefers.
+
+    `text/csv` has a row for each point and a column for each array of one number a point. All arrays are in
+    `application/x-npz` (also as `application/zip`), which `numpy.load` reads, and in
+    `application/vnd.apache.parquet`.
+    """
+    return sweep_answer(context.service.sweep(sweep_id, context.caller), form, context)
+
+
+def sweep_answer(sweep: Sweep, form: str | None, context: Context) -> Response:
+    """A stored sweep in the form of `form`, or the one that `Accept` prefers."""
+    service, request = context.service, context.request
+    accept = request.headers.get("accept") if form is None else BY_FORMAT[form]
+    kind = chosen(accept, SWEEP_MEDIA)
+    headers = {"Vary": "Accept"}
+    if kind in SUFFIXES:
+        headers["Content-Disposition"] = f'attachment; filename="sweep-{sweep.id}.{SUFFIXES[kind]}"'
+    scene = None if kind == "application/json" else service.jobs.spec(sweep.job_id).get("scene")
+    return tagged(request, sweep_body(sweep, kind, service.sweeps, scene), kind, headers)
+
+
+@sweeps.get(
+    "/{sweep_id}/plot.svg",
+    response_class=Response,
+    responses={200: media({"image/svg+xml": TEXT}), **UNCHANGED},
+)
+@drawing
+def plot_svg(sweep_id: str, context: InContext) -> Response:
+    """The curve of a stored sweep, its peak marked, its band shaded."""
+    return _picture(context.service.sweep(sweep_id, context.caller), "svg", context)
+
+
+@sweeps.get(
+    "/{sweep_id}/plot.png",
+    response_class=Response,
+    responses={200: media({"image/png": BINARY}), **UNCHANGED},
+)
+@drawing
+def plot_png(sweep_id: str, context: InContext) -> Response:
+    """The curve of a stored sweep, its peak marked, its band shaded."""
+    return _picture(context.service.sweep(sweep_id, context.caller), "png", context)
+
+
+def _picture(sweep: Sweep, suffix: str, context: Context) -> Response:
+    picture = sweep_picture(sweep, suffix, context.service.sweeps)
+    return tagged(context.request, picture, _PICTURE_TYPES[suffix])
+
+
+designs = APIRouter(prefix="/v1/designs", tags=["designs"])
+
+
+@designs.get("", response_model=DesignPage, responses=LISTED)
+@reading
+def list_designs(context: InContext, query: Annotated[DesignQuery, Query()]) -> Response:
+    """Stored designs that meet every filter, newest first unless `sort` says otherwise."""
+    service = context.service
+    return listing(context, design_page(service.designs, query, service.settings, context.sees))
+
+
+@designs.get("/{design_id}", response_model=DesignDetail, responses=UNCHANGED)
+@reading
+def get_design(design_id: str, context: InContext) -> Response:
+    """A stored design with the whole result of its job; its id is that of the job. Has a strong ETag."""
+    answer = design_detail(context.service.design(design_id, context.caller), context.service.designs)
+    return tagged(context.request, answer.model_dump_json().encode())

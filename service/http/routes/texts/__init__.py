@@ -1,1 +1,0 @@
-"""Routes that read the texts of files: scenes, measured data."""

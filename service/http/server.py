@@ -1,0 +1,255 @@
+"""`stickslip serve` and `stickslip worker`: processes that run a service until told to stop."""
+
+from __future__ import annotations
+
+import asyncio
+import ctypes
+import gc
+import logging
+import os
+import signal
+import socket
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any, cast
+
+import uvicorn
+from fastapi import FastAPI
+
+from service.db.models import JobState
+from service.errors import ConfigurationError
+from service.http.app import create_app
+from service.http.middleware.connections import Connections
+from service.jobs.registry import Registry
+from service.queue.core import Service
+from service.settings import logs
+from service.settings.settings import Settings
+from service.uploads.scratch import scratch_folder
+
+log = logging.getLogger("stickslip.service")
+
+_TICK_SECONDS = 0.2
+# Files of a service besides its connections: database, workers, pipes, uploads.
+_OTHER_FILES = 256
+_LEAST_CONNECTIONS = 16
+_FORCED = 1
+
+
+class _Server(uvicorn.Server):
+    """A server that sends waiting requests home before it waits for them to end."""
+
+    def __init__(self, config: uvicorn.Config, service: Service) -> None:
+        super().__init__(config)
+        self._service = service
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        """Stop."""
+        self._service.stop_waiting()
+        await super().shutdown(sockets)
+
+
+def serve(settings: Settings, registry: Registry | None = None) -> None:
+    """Serve HTTP until SIGINT or SIGTERM; jobs that run then go back to the queue.
+
+    Raises
+    ------
+    ConfigurationError
+        If the address cannot be used.
+    DatabaseError
+        If the database cannot be used (see `Service.start`).
+    """
+    logs.configure(settings.log_level, settings.log_format)
+    app = create_app(settings, registry)
+    service: Service = app.state.service
+    listener = _bind(settings)
+    try:
+        service.open()
+        log.info("listening on http://%s:%d", settings.host, listener.getsockname()[1])
+        server = _Server(_config(app, settings), service)
+        spare_modules()
+        give_back_large_blocks()
+
+        def stop() -> None:
+            server.should_exit = True
+            _end_by_force_after(settings.exit_seconds)
+
+        later = threading.Thread(target=_begin_answers, args=(service,), daemon=True)
+        with _signals(stop), scratch_folder():
+            later.start()
+            server.run(sockets=[listener])
+    finally:
+        service.database.close()
+        listener.close()
+
+
+def work(settings: Settings, registry: Registry | None = None, *, until_empty: bool = False) -> None:
+    """Run the queue and its workers without HTTP until SIGINT or SIGTERM.
+
+    On PostgreSQL this adds workers to the services that run, from any machine. On SQLite one process owns
+    the file: this works off the jobs that wait in it while no service does.
+
+    Parameters
+    ----------
+    until_empty : bool
+        End when no job waits or runs.
+
+    Raises
+    ------
+    DatabaseError
+        If the database cannot be used; `DatabaseInUseError` if a service has it.
+    """
+    logs.configure(settings.log_level, settings.log_format)
+    stop = threading.Event()
+    service = Service(settings, registry)
+
+    def told_to_stop() -> None:
+        stop.set()
+        _end_by_force_after(settings.exit_seconds)
+
+    with _signals(told_to_stop):
+        service.start()
+        try:
+            while not stop.wait(_TICK_SECONDS):
+                if until_empty and _nothing_left(service):
+                    return
+        finally:
+            service.stop()
+
+
+def _config(app: FastAPI, settings: Settings) -> uvicorn.Config:
+    connections: Connections = app.state.connections
+    room = max(_files_allowed() - _OTHER_FILES, _LEAST_CONNECTIONS)
+    if room < connections.most:
+        log.warning("the system's limit of open files leaves room for %d connections", room)
+        connections.most = room
+    return uvicorn.Config(
+        app,
+        http=cast(type[asyncio.Protocol], connections.protocol),
+        log_config=None,
+        access_log=False,
+        lifespan="on",
+        timeout_graceful_shutdown=max(1, round(settings.shutdown_seconds)),
+        server_header=False,
+        proxy_headers=bool(settings.trusted_proxies),
+        forwarded_allow_ips=list(settings.trusted_proxies),
+    )
+
+
+def _begin_answers(service: Service) -> None:
+    """Start the processes that compute answers when a worker is ready: nothing is to delay readiness.
+
+    Who asks for an answer before starts them at once.
+    """
+    while not service.queue.status().ready:
+        if service.stopping.wait(_TICK_SECONDS):
+            return
+    service.answers.begin()
+
+
+def _end_by_force_after(seconds: float) -> None:
+    """End this process in some time [s] if it has not ended by itself; its workers notice and end too.
+
+    Jobs that ran are then computed again, as after a crash.
+    """
+
+    def end() -> None:
+        log.error("the service did not end within %g s and is ended by force", seconds)
+        logging.shutdown()
+        os._exit(_FORCED)
+
+    timer = threading.Timer(seconds, end)
+    timer.daemon = True
+    timer.start()
+
+
+def _files_allowed() -> int:
+    """How many files, connections among them, this process may open; as many as it can be given."""
+    if sys.platform == "win32":
+        return 1 << 20
+    import resource
+
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if soft != hard:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
+        log.info("may open %d files, %d before", hard, soft)
+    return 1 << 20 if hard == resource.RLIM_INFINITY else hard
+
+
+@contextmanager
+def _signals(stop: Callable[[], object]) -> Iterator[None]:
+    """Call `stop` on SIGINT and SIGTERM; the process then ends by itself, with status 0."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    numbers = (signal.SIGINT, signal.SIGTERM)
+    handlers = {number: signal.signal(number, lambda *_: stop()) for number in numbers}
+    try:
+        yield
+    finally:
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
+
+
+def _nothing_left(service: Service) -> bool:
+    counts = service.jobs.count()
+    return counts[JobState.ACCEPTED] + counts[JobState.RUNNING] == 0
+
+
+def _bind(settings: Settings) -> socket.socket:
+    """A listening socket; said before workers start if the port is taken."""
+    family = socket.AF_INET6 if ":" in settings.host else socket.AF_INET
+    # With the protocol named, asyncio switches Nagle's algorithm off, which would hold answers for 40 ms.
+    listener = socket.socket(family, socket.SOCK_STREAM, socket.IPPROTO_TCP)
+    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        listener.bind((settings.host, settings.port))
+    except OSError as error:
+        listener.close()
+        raise ConfigurationError(
+            f"cannot listen on {settings.host} port {settings.port}: {error.strerror or error}. "
+            "Choose another `--port`, or stop what uses this one"
+        ) from error
+    return listener
+
+
+class Sparing:
+    """A callback of the collector that takes loaded modules out of its work.
+
+    A service has a quarter of a million objects of modules, many loaded by the first request that needs
+    them. A full collection walks through them all, and every request waits for it: 0.1 s on an idle machine.
+    Here the first one after modules were loaded is the last that sees them.
+    """
+
+    def __init__(self) -> None:
+        self._modules = 0
+
+    def __call__(self, phase: str, info: dict[str, Any]) -> None:
+        """After a full collection, spare what it left, if modules were loaded since the last time."""
+        if phase == "stop" and info["generation"] == 2 and len(sys.modules) != self._modules:
+            self._modules = len(sys.modules)
+            gc.freeze()
+
+
+def spare_modules() -> None:
+    """Begin, with what is loaded now."""
+    gc.callbacks.append(Sparing())
+    gc.collect()
+
+
+_M_MMAP_THRESHOLD = -3
+_LARGE_BYTES = 256 * 1024
+
+
+def give_back_large_blocks() -> None:
+    """Have glibc map large blocks by themselves, whatever came before.
+
+    By default it raises the size from which it does so to that of the largest block that was freed, up to
+    32 MB; below it what a thread has freed stays in the arena of that thread, and a service has many.
+    """
+    if sys.platform != "linux":
+        return
+    mallopt = getattr(ctypes.CDLL(None), "mallopt", None)  # musl has none
+    if mallopt is not None:
+        mallopt(_M_MMAP_THRESHOLD, _LARGE_BYTES)

@@ -1,1 +1,0 @@
-"""The routes of the workbench: projects, runs, links that share a run."""

@@ -1,0 +1,147 @@
+"""The study `design`: the best damper of a scene, of what is known or in spite of what is not."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from pydantic import ConfigDict, Field, RootModel
+
+import optim
+from optim.problem.keys import ROBUST, NominalAndRobustKeys, of_design
+from service.jobs.common.problem import ProblemRequest, arguments
+from service.jobs.common.results import PeakAt, Table, result_model
+from service.jobs.common.scenes import refusal
+from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
+from service.jobs.kind_view import Json, ReadSweep, StoredSweep
+from service.jobs.outputs import JobOutput, SweepRecord
+from service.jobs.study import Answer, Watch
+from solver.errors import Issue, pointer
+from solver.scene.descriptions import DISK_LOAD
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from optim import DesignResult as Optimum
+    from optim import RobustResult as Robust
+    from solver.scene.scene import Scene
+
+UNCERTAIN = "uncertain"
+_NOT_ROBUST = ("basins",)
+
+_EXAMPLE: dict[str, Any] = {
+    "scene": "bladed-disk",
+    "variables": {DISK_LOAD: [20, 3000], "root.kt": [1e6, 1e8]},
+    "cases": [{"name": "first bending"}, {"name": "twice the force", "set": {"excitation.amplitude": 100}}],
+    "limit": 8e-5,
+    "max_band_hz": 60,
+    "forbidden_hz": [[520, 560]],
+    "contact_states": {"shroud": "never-separates"},
+    "method": "auto",
+}
+
+
+_Rows = list[Table]
+_HARMONICS = "Highest harmonic kept; more than asked for where the peak needs them."
+OptimumResult = result_model(
+    optim.DesignResult, "OptimumResult", peak=PeakAt | None, peaks=_Rows, bands=_Rows, rows=_Rows,
+    errors=_Rows, looked_at=_Rows, tried=_Rows, broken=_Rows, plateau=Table, conditions=Table | None,
+    objective=float | None, limit=float | None, stable=str, stable_ground=str, newton_iterations=int,
+    multipliers=list[float | None], n_harmonics=(int, Field(description=_HARMONICS)),
+)  # fmt: skip
+RobustResult = result_model(
+    optim.RobustResult, "RobustResult", scene=str, quantile=float | None, nominal=Table | None,
+    robust=Table | None, optimality=float | None, violation=float | None, inner_look=bool | None,
+    nominal_status=str, warnings=list[str],
+)  # fmt: skip
+
+
+class DesignResult(RootModel[OptimumResult | RobustResult]):  # type: ignore[valid-type]
+    """A design; with `uncertain` a robust one."""
+
+    model_config = ConfigDict(defer_build=True)
+
+
+class _Design(NominalAndRobustKeys, ProblemRequest):
+    """Find the best damper.
+
+    Parameters are chosen within bounds so that the highest peak over the scene's band is least, or what a
+    problem file describes. An option given beside the file replaces the key it stands for.
+    """
+
+    model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE]})
+    NAME, FUNCTION, RESULT = "design", "optim:design", DesignResult
+    KEYS = "those of [a design problem](design.md)"
+    SHOWS, SWEEPS = "the optimum and what holds it", "every response computed"
+
+    def issues(self, scene: Scene) -> list[Issue]:
+        """Return everything wrong with a design, robust or not."""
+        # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
+        from optim.problem.issues import uncertainty_issues
+
+        given, robust = arguments(self), self.uncertain is not None
+        apart, which = (_NOT_ROBUST, "without") if robust else (ROBUST, "with")
+        words = f"is for a design {which} `uncertain` parameters"
+        found = super().issues(scene) + [
+            refusal(pointer(key), f"`{key}` {words}, got {given[key]!r}") for key in apart if key in given
+        ]
+        known = {key: value for key, value in given.items() if key not in ROBUST}
+        return found + (uncertainty_issues(scene, known, given[UNCERTAIN]) if robust else [])
+
+    def sizes(self, scene: Scene) -> list[Issue]:
+        """Return what is too large."""
+        if self.samples is None or self.uncertain is None:
+            return super().sizes(scene)
+        points = POINTS_OF_A_SWEEP * len(self.cases or [1]) * self.samples
+        words = "points of one design's responses"
+        return balance_issues("/samples", scene, self.harmonics, points, words)
+
+    @classmethod
+    def compute(cls, scene: Scene, asked: Mapping[str, Any], watch: Watch) -> Answer:
+        """Search, over the uncertainty if there is one."""
+        import optim
+
+        best = getattr(watch.on_progress, "best", None)
+        on_best = None if best is None else lambda found: best(found.to_json())
+        search = optim.robust_design if UNCERTAIN in asked else optim.design
+        found = search(scene, **asked, **watch._asdict(), on_best=on_best)
+        return Answer.of(found, found.reached)
+
+    @classmethod
+    def sweeps(cls, found: Optimum | Robust) -> tuple[SweepRecord, ...]:
+        """Return the responses computed; of a robust design those of the search without uncertainty."""
+        from service.jobs.common.records import sweep_records
+
+        nominal: Any = getattr(found, "design", found)
+        return sweep_records(nominal.sweeps, intermediate=True)
+
+    @classmethod
+    def output(cls, answer: Answer, sweeps: Sequence[SweepRecord]) -> JobOutput:
+        """Return what a worker gives back, with the design to be stored."""
+        from service.jobs.common.records import design_record, robust_record
+
+        record: Any = robust_record if "nominal" in answer.json else design_record
+        return replace(super().output(answer, sweeps), design=record(answer.result))
+
+    @classmethod
+    def empty(cls, result: Json) -> str:
+        """Return why there is nothing to draw."""
+        if "nominal" in result:
+            return "" if result["nominal"] is not None else "no design was found"
+        return "" if result.get("peak") is not None else "it stored no sweep to draw"
+
+    @classmethod
+    def figure(cls, result: Json, sweeps: Sequence[StoredSweep], read: ReadSweep) -> Figure:
+        """Return the response of the optimum; of a robust design both optima over the uncertainty."""
+        if "nominal" in result:
+            from optim.views.plots.designs import robust_figure
+
+            return robust_figure(result)
+        from service.jobs.drawing import best_sweep_figure
+
+        return best_sweep_figure(result, sweeps, read)
+
+
+Design = of_design(_Design)
+STUDY = Design

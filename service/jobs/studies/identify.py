@@ -1,0 +1,159 @@
+"""The study `identify`: parameters of a scene from measured responses and hysteresis loops."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Annotated, Any
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+
+from optim.criteria.json_types import Pair
+from optim.errors import DesignError
+from optim.identification.result import Identification
+from optim.problem.keys import MAX_VARIABLES, VariableName
+from optim.problem.words import ScalingWord
+from service.jobs.common.results import Table, result_model
+from service.jobs.common.scenes import HarmonicRequest, Number, ParameterPath, refusal
+from service.jobs.common.sizes import balance_issues
+from service.jobs.registry import Flag
+from service.jobs.study import Answer, Study, Watch
+from solver.errors import Issue, SceneError, SettingError, pointer
+
+if TYPE_CHECKING:
+    from solver.scene.scene import Scene
+
+MOST_TABLES, MOST_NUMBERS = 200, 200_000
+EVALUATIONS = 30
+"""Of all points one identification seldom has more."""
+_EXAMPLE: dict[str, Any] = {
+    "scene": "two-dof",
+    "harmonics": 3,
+    "starts": 2,
+    "data": [
+        {
+            "frequency": [1.0, 1.1, 1.2, 1.3, 1.4],
+            "amplitude": [1.93, 2.12, 1.77, 1.48, 1.25],
+            "conditions": {"excitation.amplitude": 100.0, "damper.N0": 100.0},
+        }
+    ],
+    "unknowns": {"damper.mu": [0.1, 0.6]},
+}
+
+
+_Values = Annotated[list[Number], Field(min_length=1, max_length=100)]
+
+
+def _small(value: object) -> object:
+    """Lists of numbers and tables of words, not too many; what they mean the design layer looks at."""
+    if not isinstance(value, list) or not all(isinstance(table, dict) for table in value):
+        raise ValueError("must be a list of tables: files are read by the command")
+    lists = [item for table in value for item in table.values() if isinstance(item, list)]
+    if sum(map(len, lists)) > MOST_NUMBERS:
+        raise ValueError(f"must hold at most {MOST_NUMBERS} numbers")
+    return value
+
+
+class EstimateResult(BaseModel):
+    """An unknown with how sure it is; bounds in place of an interval where the data do not tell it."""
+
+    model_config = ConfigDict(extra="allow", defer_build=True)
+
+    name: str
+    unit: str
+    value: float
+    standard_error: float | None
+    interval: list[float]
+    told: bool
+    at_bound: bool
+
+
+IdentifyResult = result_model(
+    Identification, "IdentifyResult", estimates=list[EstimateResult], correlated=list[Table],
+    covariance=list[list[float]], correlation=list[list[float]],
+)  # fmt: skip
+
+
+class Identify(Study, HarmonicRequest):
+    """Find parameters from measured responses and hysteresis loops.
+
+    Least squares over whole responses, from many starts: estimates with 95 % intervals, what the data do not
+    tell, and which measurement would tell most.
+    """
+
+    model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE]})
+    NAME, FUNCTION, RESULT = "identify", "optim:identify", IdentifyResult
+    SHOWS = "estimates, intervals, what the data do not tell ([identification](identification.md))"
+    EMPTY, COUNTED = ("runs", "there is no fit to draw"), "places"
+    FIGURE = "optim.views.plots.identification:identification_figure"
+
+    data: Annotated[
+        list[dict[str, Any]], BeforeValidator(_small), Field(min_length=1, max_length=MOST_TABLES)
+    ] = Field(
+        description="Measured runs: tables of columns (lists), `conditions` (path to value), `units` "
+        "(column to unit) and words such as `dof`."
+    )
+    unknowns: Annotated[
+        dict[VariableName, Pair],
+        Field(min_length=1, max_length=MAX_VARIABLES),
+        Flag("--unknown", "PATH LO HI"),
+    ] = Field(description="Parameters looked for: path to [low, high].")
+    scaling: Annotated[dict[VariableName, ScalingWord] | None, Flag(metavar="PATH=HOW")] = Field(
+        default=None,
+        max_length=MAX_VARIABLES,
+        description="Whether equal steps or equal ratios of an unknown count equally; by its bounds.",
+    )
+    priors: Annotated[dict[VariableName, Pair] | None, Flag("--prior", "PATH MEAN SD")] = Field(
+        default=None,
+        max_length=MAX_VARIABLES,
+        description="What was known before: path to [mean, standard deviation].",
+    )
+    noise: Annotated[Annotated[float, Field(strict=True, gt=0.0, lt=1.0)] | None, Flag(metavar="R")] = Field(
+        default=None, description="Noise relative to the amplitude; found from the data if left out."
+    )
+    robust: bool = Field(default=False, description="Let outliers weigh less (Huber).")
+    candidates: Annotated[dict[ParameterPath, _Values] | None, Flag("--candidate", "PATH=V,V,…")] = Field(
+        default=None,
+        max_length=10,
+        description="Conditions of measurements that could be made next: path to values.",
+    )
+    starts: Annotated[int, Field(strict=True, ge=1, le=1000), Flag(metavar="N")] = Field(
+        default=16, description="Places within the bounds that are tried."
+    )
+    seed: Annotated[int, Field(strict=True, ge=0, lt=2**53), Flag(metavar="N")] = Field(
+        default=0, description="Of those places."
+    )
+
+    def sizes(self, scene: Scene) -> list[Issue]:
+        """Return what is too large; what is not is read, as a run will read it, to see what is wrong."""
+        columns = [[v for v in table.values() if isinstance(v, list)] for table in self.data]
+        points = sum(max(map(len, lists), default=0) for lists in columns)
+        needed, words = EVALUATIONS * max(points, 1), "points of all runs"
+        return balance_issues("/data", scene, self.harmonics, needed, words) or self._read(scene)
+
+    def _read(self, scene: Scene) -> list[Issue]:
+        """Return what is wrong with the whole description, by the pointer of its field."""
+        # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
+        from optim.identification.next_measurement import read_candidates
+        from optim.identification.reading import read_data
+        from optim.identification.unknowns import read_unknowns
+
+        try:
+            known = read_unknowns(scene, self.unknowns, self.scaling, self.priors)
+            runs = read_data(scene, self.data, known.paths)
+            read_candidates(scene, runs, known, self.candidates)
+        except SceneError as error:
+            return [Issue(pointer=pointer("data"), message=issue.message) for issue in error.issues]
+        except (DesignError, SettingError) as error:
+            return [refusal(pointer(*(error.place or ("data",))), str(error))]
+        return []
+
+    @classmethod
+    def compute(cls, scene: Scene, asked: Mapping[str, Any], watch: Watch) -> Answer:
+        """Fit; the data may be files too, for the command."""
+        import optim
+
+        found = optim.identify(scene, **asked, **watch._asdict())
+        return Answer.of(found, found.reached)
+
+
+STUDY = Identify

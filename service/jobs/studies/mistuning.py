@@ -1,0 +1,268 @@
+"""The study `mistuning`: the blades of many disks that are not quite equal, against the tuned disk."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+from pydantic import BeforeValidator, ConfigDict, Field, WithJsonSchema
+
+from optim.criteria.json_types import Name
+from service.jobs.arrays import decode, encode
+from service.jobs.common.ranges import band_issues
+from service.jobs.common.results import EndedResult, KnownResult, Table
+from service.jobs.common.scenes import FrequencyHz, HarmonicRequest, refusal
+from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
+from service.jobs.outputs import JobOutput, OnProgress, ShouldStop
+from service.jobs.parts import Part, PartOutput, Parts, PartStoppedError
+from service.jobs.registry import Flag, JobKind
+from service.jobs.study import Study
+from solver.errors import Issue, SceneError, SettingError, pointer
+from solver.results.known import Known
+
+if TYPE_CHECKING:
+    from solver import BladePeaks
+    from solver.scene.scene import Scene
+
+_EXAMPLE: dict[str, Any] = {
+    "scene": "bladed-disk",
+    "of": ["tip_middle", "tip"],
+    "spread": 0.02,
+    "samples": 100,
+    "seed": 1,
+    "harmonics": 5,
+}
+_MOST_SAMPLES = 10_000
+_MOST_NAMES = 100
+_WORK_OF_A_PART = 4  # sectors × harmonics: 0.1 s, measured on bladed-disk
+_MOST_DIVIDED = 256
+_OF_THE_PEAKS = ("value", "at_hz")
+
+
+def _listed(value: object) -> object:
+    """A part alone is a list of one."""
+    return [value] if isinstance(value, str) else value
+
+
+_PartName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{1,100}$")]
+PartNames = Annotated[
+    list[_PartName],
+    Field(min_length=1, max_length=_MOST_NAMES),
+    BeforeValidator(_listed),
+    WithJsonSchema(
+        {
+            "anyOf": [
+                {"type": "string"},
+                {"type": "array", "items": {"type": "string"}, "minItems": 1, "maxItems": _MOST_NAMES},
+            ]
+        }
+    ),
+]
+
+
+class MistuningResult(KnownResult, EndedResult):
+    """The peaks of every blade of every disk, and how much higher they are than the tuned disk's."""
+
+    scene: str
+    dof: str
+    of: list[str]
+    spread: float
+    tuned: Table
+    samples: list[Table]
+    mean: float | None = Field(description="Of the magnification.")
+    mean_error: float | None = Field(description="Estimated error of the mean, by those of the peaks.")
+    standard_error: float | None = Field(description="Of the mean, as that of so many disks.")
+    deviation: float | None = Field(description="Standard deviation of the magnifications of the disks.")
+    quantiles: list[Table]
+    worst: Table | None
+    n_harmonics: int
+    seconds: float
+
+
+class Mistuning(Study, HarmonicRequest):
+    """Study disks whose blades are not quite equal.
+
+    Of each disk the highest peak of every blade, and how much higher it is than that of the tuned disk.
+    """
+
+    model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE]})
+    NAME, FUNCTION, RESULT = "mistuning", "solver:mistuning_study", MistuningResult
+    SHOWS = "the magnification over many disks and the worst of them ([disks](disks.md))"
+    SWEEPS, COUNTED = "the tuned disk's, and that of the worst blade", "disks"
+    EMPTY = ("worst", "the peaks of no disk are known")
+    FIGURE = "solver.views.plots.disks:mistuning_figure"
+
+    of: Annotated[PartNames, Flag(metavar="NAME")] = Field(
+        description="Springs (k), dashpots (c) and masses by name, or DOFs (their mass)."
+    )
+    spread: Annotated[float, Field(strict=True, ge=0.0, le=1.0), Flag(metavar="S")] = Field(
+        default=0.02, description="Standard deviation of the factors 1 + spread z, z normal."
+    )
+    samples: Annotated[int, Field(strict=True, ge=1, le=_MOST_SAMPLES), Flag(metavar="N")] = Field(
+        default=100, description="How many disks."
+    )
+    seed: Annotated[int, Field(strict=True, ge=0, lt=2**53), Flag(metavar="N")] = Field(
+        default=1, description="Of the first disk; disk k has the seed of the first plus k."
+    )
+    dof: Annotated[Name | None, Flag(metavar="DOF")] = Field(
+        default=None, description="DOF of one sector whose amplitude counts; the observed one."
+    )
+    start: Annotated[FrequencyHz | None, Flag(metavar="F")] = Field(
+        default=None, alias="from", description="Lowest frequency [Hz]; the scene's band."
+    )
+    stop: Annotated[FrequencyHz | None, Flag(metavar="F")] = Field(
+        default=None, alias="to", description="Highest frequency [Hz]; the scene's band."
+    )
+
+    def issues(self, scene: Scene) -> list[Issue]:
+        """Return why it is no disk, and what is wrong with DOF and range."""
+        if not scene.structure.has_sectors:
+            words = f"`scene` {scene.name!r} must have a cyclic structure to be mistuned"
+            return [refusal("/scene", words)]
+        found = band_issues(scene, self.start, self.stop)
+        if self.dof is not None and self.dof not in scene.dofs:
+            words = f"must be a DOF of every sector, one of {', '.join(scene.dofs)}, got {self.dof!r}"
+            found.append(refusal("/dof", f"`dof` {words}"))
+        return found
+
+    def sizes(self, scene: Scene) -> list[Issue]:
+        """Return what is too large; the factors are drawn if they are not too many, to see that they can."""
+        points, words = (
+            POINTS_OF_A_SWEEP * self.samples * scene.structure.sector_count,
+            "points of all sweeps",
+        )
+        large = balance_issues("/samples", scene, self.harmonics, points, words, every_sector=True)
+        return large or self._drawn(scene)
+
+    def _drawn(self, scene: Scene) -> list[Issue]:
+        """Refuse parts that are not there, and factors that are not above 0."""
+        # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
+        from solver.studies.mistuning import disk_factors
+
+        try:
+            disk_factors(scene, self.of, self.spread, self.samples, self.seed)
+        except SceneError as error:
+            prefix = "/structure/mistuning/of"
+            within = [issue for issue in error.issues if issue.pointer.startswith(prefix)]
+            known = [refusal("/of" + issue.pointer.removeprefix(prefix), issue.message) for issue in within]
+            return known or [refusal("/of", issue.message) for issue in error.issues]
+        except SettingError as error:
+            return [refusal(pointer(error.name), str(error))]
+        return []
+
+    @classmethod
+    def as_kind(cls) -> JobKind:
+        """Return the kind of job, which is computed in parts."""
+        return replace(super().as_kind(), run=PARTS.run, parts=PARTS)
+
+
+def split(spec: Mapping[str, Any]) -> list[Part]:
+    """The tuned disk, and then some of the others at a time."""
+    from solver.scene.scene import Scene
+
+    sectors = Scene.from_dict(spec["scene"]).structure.sector_count
+    a_disk, samples = sectors * max(spec["harmonics"], 1), spec["samples"]
+    size = max(math.ceil(_WORK_OF_A_PART / a_disk), math.ceil(samples / _MOST_DIVIDED))
+    return [Part(spec={"tuned": True})] + [
+        Part(spec={"first": first, "last": min(first + size, samples)}, weight=min(size, samples - first))
+        for first in range(0, samples, size)
+    ]
+
+
+def run_part(
+    spec: Mapping[str, Any], part: Mapping[str, Any], progress: OnProgress, should_stop: ShouldStop
+) -> PartOutput:
+    """Find the peaks of all blades of the tuned disk, or of some others."""
+    import solver
+    from service.jobs.common.records import packed, sweep_records
+    from solver.scene.scene import Scene
+    from solver.studies.mistuning import without_mistuning, worst_branch
+
+    scene, begun = Scene.from_dict(spec["scene"]), time.perf_counter()
+    tuned = bool(part.get("tuned"))
+    disks = range(1) if tuned else range(part["first"], part["last"])
+    found: list[BladePeaks] = []
+    worst: BladePeaks | None = None
+    for done, k in enumerate(disks):
+
+        def each(share: float, _blades: int, done: int = done) -> None:
+            progress((done + share) / len(disks), done)
+
+        peaks = solver.blade_peaks(
+            without_mistuning(scene)
+            if tuned
+            else solver.mistuned(scene, of=spec["of"], spread=spec["spread"], seed=spec["seed"] + k),
+            spec["start"],
+            spec["stop"],
+            dof=spec["dof"],
+            harmonics=spec["harmonics"],
+            every_branch=False,
+            on_progress=each,
+            should_stop=should_stop,
+        )
+        if should_stop():
+            raise PartStoppedError
+        found.append(replace(peaks, branches=()))
+        if peaks.largest > (0.0 if worst is None else worst.largest):
+            worst = peaks
+    sweeps, arrays = packed(sweep_records(() if worst is None else worst_branch(worst)))
+    arrays |= {key: encode(np.array([getattr(peaks, key) for peaks in found])) for key in _OF_THE_PEAKS}
+    status = [[each.name for each in peaks.status] for peaks in found]
+    return PartOutput(
+        result={
+            "dof": found[0].dof, "status": status, "sweeps": sweeps,
+            "known": [peaks.highest.to_json() for peaks in found],
+            "largest": 0.0 if worst is None else worst.largest, "seconds": time.perf_counter() - begun,
+        },
+        arrays=arrays, points=0 if tuned else len(found), final=tuned and worst is None,
+    )  # fmt: skip
+
+
+def join(spec: Mapping[str, Any], outputs: Mapping[int, PartOutput]) -> JobOutput:
+    """The study of all disks; the stored sweeps are those of the tuned disk and of the worst blade of all."""
+    from service.jobs.common.records import unpacked
+    from solver.scene.scene import Scene
+    from solver.studies.mistuning import joined_study
+
+    parts = list(outputs.values())
+    [tuned], others = _peaks(parts[0]), parts[1:]
+    study = joined_study(
+        Scene.from_dict(spec["scene"]),
+        of=spec["of"],
+        spread=spec["spread"],
+        seed=spec["seed"],
+        harmonics=spec["harmonics"],
+        tuned=tuned,
+        disks=[peaks for part in others for peaks in _peaks(part)],
+        seconds=sum(part.result["seconds"] for part in parts),
+    )
+    # The first of those that are equally high.
+    highest = max(others, key=lambda part: part.result["largest"], default=None)
+    sweeps = [part for part in (parts[0], highest) if part is not None]
+    return JobOutput.of(
+        study,
+        reached=study.completed,
+        sweeps=tuple(record for part in sweeps for record in unpacked(part.result["sweeps"], part.arrays)),
+    )
+
+
+def _peaks(part: PartOutput) -> list[BladePeaks]:
+    """The peaks that a part found, a disk each."""
+    import solver
+
+    value, at_hz = (decode(part.arrays[key]) for key in _OF_THE_PEAKS)
+    return [
+        solver.BladePeaks(
+            dof=part.result["dof"], value=value[i], at_hz=at_hz[i], branches=(),
+            status=tuple(solver.BranchStatus[name] for name in names), highest=Known.of_json(known),
+        )
+        for i, (names, known) in enumerate(zip(part.result["status"], part.result["known"], strict=True))
+    ]  # fmt: skip
+
+
+PARTS = Parts(split=split, run_part=run_part, join=join)
+STUDY = Mistuning

@@ -1,0 +1,72 @@
+"""The study `plan`: which effects a scene calls for, before anything is computed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from pydantic import BaseModel, ConfigDict
+
+from service.jobs.common.balance import AUTO, EffectsWord, effects_issues, solved_issues, with_effects
+from service.jobs.common.results import KindResult
+from service.jobs.common.scenes import HarmonicRequest
+from service.jobs.study import Answer, Study, Watch
+from solver.errors import Issue
+from solver.scene.descriptions import DISK_LOAD
+
+if TYPE_CHECKING:
+    from solver.scene.scene import Scene
+
+EXAMPLE: dict[str, Any] = {"scene": "bladed-disk", "set": {DISK_LOAD: 150}}
+
+
+class EffectResult(BaseModel):
+    """An effect that a scene calls for or does not."""
+
+    name: str
+    used: bool
+    reason: str
+
+
+class PlanResult(KindResult):
+    """The effects of a scene; sizes and cost."""
+
+    scene: str
+    effects: list[EffectResult]
+    unknowns: int
+    linear_dofs: int
+    contacts: int
+    n_harmonics: int
+    estimated_seconds_a_point: float
+    estimated_seconds_of_stability: float | None
+    performance_curve: str
+    estimated_dense_bytes: int
+
+
+class Plan(Study, HarmonicRequest):
+    """Say which effects a scene calls for, and why."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [EXAMPLE]})
+    NAME, FUNCTION, RESULT = "plan", "solver:plan", PlanResult
+    SHOWS = "the effects in use and left out, sizes and estimated cost"
+
+    effects: EffectsWord = AUTO
+
+    def issues(self, _scene: Scene) -> list[Issue]:
+        """Return what is wrong with the word of effects."""
+        return effects_issues(self.effects)
+
+    def sizes(self, scene: Scene) -> list[Issue]:
+        """Return what is too large."""
+        return solved_issues("/harmonics", scene, self.harmonics, self.effects)
+
+    @classmethod
+    def compute(cls, scene: Scene, asked: Mapping[str, Any], _watch: Watch) -> Answer:
+        """Plan."""
+        import solver
+
+        found = solver.plan(scene, **with_effects(asked))
+        return Answer(found, found.to_json(), True, "")
+
+
+STUDY = Plan

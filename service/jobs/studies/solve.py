@@ -1,0 +1,140 @@
+"""The study `solve`: the periodic response at one frequency, or all that are found."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Annotated, Any
+
+from pydantic import ConfigDict, Field
+
+from service.jobs.common.balance import (
+    AUTO,
+    Accuracy,
+    EffectsWord,
+    effects_issues,
+    solved_issues,
+    with_effects,
+)
+from service.jobs.common.results import Amplitude, KindResult
+from service.jobs.common.scenes import FrequencyHz, HarmonicRequest, refusal
+from service.jobs.registry import Flag
+from service.jobs.study import Answer, Study, Watch
+from solver.errors import Issue
+from solver.response.stability import MOST_STARTS
+from solver.scene.descriptions import DAMPER_LOAD
+
+if TYPE_CHECKING:
+    from solver.scene.scene import Scene
+
+_EXAMPLE: dict[str, Any] = {"scene": "two-dof", "frequency_hz": 1.2, "set": {DAMPER_LOAD: 80}}
+_EVERY: dict[str, Any] = {"scene": "two-dof", "frequency_hz": 1.05, "all": True, "starts": 8}
+_STOPPED = "The search was stopped: these are the solutions found until then."
+_NONE = "No solution was found: try more starts or more harmonics."
+
+
+class SolveResult(KindResult):
+    """One periodic response: of a search for all, the largest."""
+
+    scene: str
+    frequency_hz: float
+    converged: bool
+    status: str
+    max_abs: Amplitude
+    half_peak_to_peak: Amplitude
+    mean: Amplitude
+    harmonics: list[float] | None = Field(description="Amplitudes of the harmonics from 0 on [m].")
+    flags: list[str]
+    contacts: dict[str, str] = Field(description="What each contact does during the period.")
+    stable: str = Field(
+        default="not known", description="Whether small perturbations die out: yes, no, not known."
+    )
+    stable_ground: str = Field(default="", description="Why, and a stable response beside one that is not.")
+    unique: str = Field(
+        default="not known", description="Whether it is the only response: proven or not known."
+    )
+    unique_ground: str = Field(default="", description="Why.")
+    residual: float | None
+    error_estimate: Amplitude
+    n_harmonics: int
+    newton_iterations: int
+    seconds: float
+    mean_range: list[float | None] | None = Field(
+        default=None, description="Means that any history can leave [m], if the mean depends on it."
+    )
+    drift_per_period: float | None = Field(
+        default=None, description="How far a part that ratchets drifts in a period [m], if that is known."
+    )
+    solutions: list[dict[str, Any]] | None = Field(
+        default=None, description="Of a search for all: each solution with its stability, largest first."
+    )
+    complete: bool | None = Field(default=None, description="Whether these are proven to be all.")
+    missing_by_signs: int | None = Field(
+        default=None, description="How many are missing at least, by the signs of the determinants."
+    )
+    starts: int | None = Field(default=None, description="Random starts that were made.")
+    stopped: bool | None = Field(default=None, description="Whether the search was ended before its end.")
+    note: str | None = Field(default=None, description="What is known of the list.")
+
+
+class Solve(Study, HarmonicRequest):
+    """Compute one periodic response, or look for all of them."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE, _EVERY]})
+    NAME, FUNCTION, RESULT = "solve", "solver:solve", SolveResult
+    SHOWS, COUNTED = "the response at one frequency", "solutions"
+    EMPTY = ("harmonics", "no response was found")
+    FIGURE = "service.jobs.drawing:harmonics_of"
+
+    frequency_hz: Annotated[FrequencyHz, Flag("--frequency", "HZ")] = Field(
+        description="Excitation frequency [Hz]."
+    )
+    accuracy: Accuracy = None
+    effects: EffectsWord = AUTO
+    exact: Annotated[bool, Field(strict=True)] = Field(
+        default=False, description="Follow the events of the contacts in place of harmonics, to rounding."
+    )
+    every: Annotated[bool, Field(strict=True)] = Field(
+        default=False,
+        alias="all",
+        description="Look for all solutions, with their stability, by random starts, deflation and branches.",
+    )
+    starts: Annotated[int, Field(strict=True, ge=0, le=MOST_STARTS), Flag(metavar="N")] = Field(
+        default=40, description="Random starts of `all`."
+    )
+    seed: Annotated[int, Field(strict=True, ge=0, lt=2**63), Flag(metavar="N")] = Field(
+        default=0, description="Of the random starts of `all`."
+    )
+
+    def issues(self, _scene: Scene) -> list[Issue]:
+        """Return what does not go together, and words of effects that are none."""
+        alone = {"accuracy": self.accuracy, "exact": self.exact or None} if self.every else {}
+        return effects_issues(self.effects) + [
+            refusal(f"/{key}", f"`{key}` does not go with `all`, got {given!r}: leave one of them out")
+            for key, given in alone.items()
+            if given is not None
+        ]
+
+    def sizes(self, scene: Scene) -> list[Issue]:
+        """Return what is too large."""
+        return solved_issues("/harmonics", scene, self.harmonics, self.effects, accuracy=self.accuracy)
+
+    @classmethod
+    def compute(cls, scene: Scene, asked: Mapping[str, Any], watch: Watch) -> Answer:
+        """Solve the balance, once or from many starts: the answer is then the largest solution, with all."""
+        import solver
+
+        given = with_effects(asked)
+        search = {key: given.pop(key) for key in ("starts", "seed") if key in given}
+        if not given.pop("every", False):
+            one = solver.solve(scene, **given)
+            shown = one if one.converged else None
+            return Answer(shown, one.to_json(), one.reached, one.status.value, one.plot)
+        given = {key: value for key, value in given.items() if key != "exact"}
+        found = solver.solve_all(scene, **given, **search, **watch._asdict())
+        largest = found.solutions[0].solution if found.solutions else solver.solve(scene, **given)
+        reached, status = bool(found.solutions) and not found.stopped, _STOPPED if found.stopped else _NONE
+        shown = largest if found.solutions else None
+        return Answer(shown, largest.to_json() | found.to_json(), reached, status, largest.plot)
+
+
+STUDY = Solve

@@ -1,0 +1,275 @@
+"""What a structure has beside masses, springs and dashpots: linear terms, and what depends on its speed.
+
+Couplings that are not symmetric, gyroscopic, of the gas: all of them are entries of K and C. The equation of
+the DOF `on` gains (k + i k_imaginary) x + c x' of the DOF `of`, here or some sectors further on. A nodal
+diameter sees Σ X_m e^{jmθ} of entries at the offsets m.
+
+Normal loads and forces may follow the speed. Along an engine-order line the speed follows the frequency,
+speed [1/min] = 60 f / order, so that a sweep over the frequency is one over the speed; `Scene.at_frequency`
+is the scene at one point of it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Annotated, Any, NamedTuple, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from solver.contacts.fields import DofName, Name, NonNegative, Part, Signed
+
+Offset = Annotated[int, Field(strict=True, ge=-10_000, le=10_000)]
+_ROUNDING = 1e-14  # of the largest coefficient: less is what a Fourier transform leaves
+
+
+class Entry(NamedTuple):
+    """One entry of K and C between two DOFs.
+
+    Attributes
+    ----------
+    on, of : row and column.
+    offset : the column is of the sector so many ahead.
+    k : complex stiffness [N/m]; its imaginary part is of a motion e^{iωt}, ω > 0, and has no static share.
+    c : damping [N s/m].
+    g : damping per speed of rotation [N s/m per rad/s].
+    k_omega2 : stiffness per squared speed [N/m per (rad/s)²].
+    """
+
+    on: str
+    of: str
+    offset: int
+    k: complex
+    c: complex
+    g: float
+    k_omega2: float
+
+
+class Coupling(Part):
+    """Entries of stiffness and damping in the row of one DOF and the column of another.
+
+    Attributes
+    ----------
+    on : str
+        DOF in whose equation of motion it stands (with the sign of the left-hand side, as a spring's k).
+    of : str
+        DOF whose motion it multiplies.
+    offset : int
+        Cyclic structures only: `of` is that of the sector so many ahead (negative: behind).
+    antisymmetric : bool
+        Also the negative in the row of `of` and the column of `on`, as gyroscopic terms have it.
+    k : float
+        Stiffness [N/m].
+    k_imaginary : float
+        Imaginary part of the stiffness [N/m]: damping that does not depend on the frequency; none at rest.
+    c : float
+        Damping [N s/m].
+    gyroscopic : float
+        Damping per speed of rotation [N s/m per rad/s]: of a disk on tilting DOFs its polar moment of inertia
+        [kg m²].
+    k_omega2 : float
+        Stiffness per squared speed of rotation [N/m per (rad/s)²].
+    """
+
+    on: DofName
+    of: DofName
+    offset: Offset = 0
+    antisymmetric: bool = False
+    k: Signed = 0.0
+    k_imaginary: Signed = 0.0
+    c: Signed = 0.0
+    gyroscopic: Signed = 0.0
+    k_omega2: Signed = 0.0
+
+    @model_validator(mode="after")
+    def _apart(self) -> Self:
+        if self.antisymmetric and self.on == self.of and self.offset == 0:
+            raise ValueError(f"`antisymmetric` couples two different DOFs, got {self.on!r} twice")
+        return self
+
+    @property
+    def turns(self) -> bool:
+        """Whether it depends on the speed of rotation."""
+        return self.gyroscopic != 0.0 or self.k_omega2 != 0.0
+
+    def entries(self) -> tuple[Entry, ...]:
+        """What it adds to the matrices."""
+        k = complex(self.k, self.k_imaginary)
+        first = Entry(self.on, self.of, self.offset, k, self.c, self.gyroscopic, self.k_omega2)
+        if not self.antisymmetric:
+            return (first,)
+        back = Entry(self.of, self.on, -self.offset, -k, -self.c, -self.gyroscopic, -self.k_omega2)
+        return first, back
+
+
+class Influence(Part):
+    """What the motion of a blade does to another: pressure of the gas.
+
+    Attributes
+    ----------
+    offset : int
+        The blade that moves is so many ahead of the one that feels it; 0 is the blade itself.
+    stiffness : float
+        Real part of the coefficient [N/m].
+    imaginary : float
+        Imaginary part [N/m] at e^{iωt}, ω > 0; of the blade itself, damping where positive.
+    damping : float
+        Damping [N s/m].
+    """
+
+    offset: Offset = 0
+    stiffness: Signed = 0.0
+    imaginary: Signed = 0.0
+    damping: Signed = 0.0
+
+
+class DiameterCoefficient(Part):
+    """What the gas does to a wave of one nodal diameter.
+
+    Attributes
+    ----------
+    diameter : int
+        Nodal diameter of the wave x_{j+1} = x_j e^{2πi·diameter/sectors}; a wave the other way round is a
+        negative one, or sectors less so many.
+    stiffness, imaginary : float
+        Real and imaginary part of the coefficient [N/m]; damping where the imaginary part is positive.
+    damping : float
+        Damping [N s/m].
+    """
+
+    diameter: Offset
+    stiffness: Signed = 0.0
+    imaginary: Signed = 0.0
+    damping: Signed = 0.0
+
+
+class Aerodynamics(Part):
+    """Aerodynamic influence on one DOF of every blade, between neighbours or for each nodal diameter.
+
+    The force on a blade is minus the sum of the coefficients times the motions.
+
+    Attributes
+    ----------
+    dof : str
+        DOF of a sector that the gas acts on and that moves the gas.
+    name : str or None
+        Makes `factor` a parameter ``<name>.factor``.
+    factor : float
+        Multiplies all coefficients.
+    influence : tuple of Influence
+        Coefficients between a blade and those so many ahead; or
+    nodal_diameters : tuple of DiameterCoefficient
+        coefficients of waves; 0 for those left out.
+    """
+
+    dof: DofName
+    name: Name | None = None
+    factor: Signed = 1.0
+    influence: tuple[Influence, ...] = ()
+    nodal_diameters: tuple[DiameterCoefficient, ...] = ()
+
+    @model_validator(mode="after")
+    def _one_way(self) -> Self:
+        if bool(self.influence) == bool(self.nodal_diameters):
+            given = "both" if self.influence else "neither"
+            raise ValueError(
+                f"`aerodynamics` needs `influence` or `nodal_diameters`, one of them, got {given}"
+            )
+        return self
+
+    def entries(self, sectors: int) -> tuple[Entry, ...]:
+        """What it adds to the matrices of a disk of so many sectors."""
+        given = self.influence or _of_diameters(self.nodal_diameters, sectors)
+        return tuple(
+            Entry(self.dof, self.dof, offset, self.factor * k, self.factor * c, 0.0, 0.0)
+            for offset, k, c in (each if isinstance(each, tuple) else _of_blade(each) for each in given)
+        )
+
+
+def _of_blade(given: Influence) -> tuple[int, complex, complex]:
+    return given.offset, complex(given.stiffness, given.imaginary), complex(given.damping)
+
+
+def _of_diameters(
+    given: Sequence[DiameterCoefficient], sectors: int
+) -> tuple[tuple[int, complex, complex], ...]:
+    """Coefficients between blades, X_m = (1/N) Σ X(θ_n) e^{−jmθ_n}, without what is rounding of 0."""
+    waves = np.zeros((2, sectors), np.complex128)
+    for each in given:
+        waves[:, each.diameter % sectors] += complex(each.stiffness, each.imaginary), each.damping
+    blades = np.fft.fft(waves, axis=1) / sectors
+    least = _ROUNDING * np.abs(waves).max(axis=1, initial=0.0)[:, None]
+    real, imaginary = (np.where(np.abs(part) > least, part, 0.0) for part in (blades.real, blades.imag))
+    blades = real + 1j * imaginary
+    return tuple(
+        (_shortest(m, sectors), complex(blades[0, m]), complex(blades[1, m]))
+        for m in range(sectors)
+        if np.any(blades[:, m])
+    )
+
+
+def _shortest(offset: int, sectors: int) -> int:
+    """The offset the short way round."""
+    return offset - sectors if offset > math.floor(sectors / 2) else offset
+
+
+Coefficients = Annotated[tuple[Signed, ...], Field(min_length=1, max_length=3)]
+Table = Annotated[tuple[tuple[NonNegative, Signed], ...], Field(min_length=2, max_length=3)]
+
+
+class SpeedDependence(Part):
+    """A parameter that follows the speed of rotation.
+
+    Attributes
+    ----------
+    path : str
+        ``<contact>.N0`` (or of a group), or ``excitation.amplitude``.
+    polynomial : tuple of float or None
+        c0, c1, c2 of c0 + c1 speed + c2 speed², the speed in 1/min; or
+    table : tuple of (float, float) or None
+        two or three rows [speed in 1/min, value], through which the polynomial of least degree goes.
+    """
+
+    path: str
+    polynomial: Coefficients | None = None
+    table: Table | None = None
+
+    @model_validator(mode="after")
+    def _one_way(self) -> Self:
+        if (self.polynomial is None) == (self.table is None):
+            given = "neither" if self.table is None else "both"
+            raise ValueError(f"`with_speed` needs `polynomial` or `table`, one of them, got {given}")
+        if self.table is not None and len({speed for speed, _ in self.table}) < len(self.table):
+            raise ValueError(f"`table` must have different speeds, got {[row[0] for row in self.table]}")
+        return self
+
+    @property
+    def coefficients(self) -> tuple[float, float, float]:
+        """c0, c1, c2 by powers of the speed in 1/min."""
+        if self.polynomial is not None:
+            c0, c1, c2 = (*self.polynomial, 0.0, 0.0)[:3]
+            return c0, c1, c2
+        speeds, values = np.array(self.table).T
+        scale = float(speeds.max())
+        found = np.linalg.solve(np.vander(speeds / scale, increasing=True), values)
+        c0, c1, c2 = (*(found / scale ** np.arange(found.size)).tolist(), 0.0)[:3]
+        return c0, c1, c2
+
+    def at(self, speed: float) -> float:
+        """Value at a speed [1/min]."""
+        c0, c1, c2 = self.coefficients
+        return c0 + speed * (c1 + speed * c2)
+
+
+def at_speed(scene: Any, speed: float) -> Any:
+    """Return a scene (with `speed`, `with_speed` and `with_values`) at a speed [1/min], all that follows set.
+
+    Raises
+    ------
+    SettingError
+        A value that a parameter must not have.
+    """
+    there = scene.model_copy(update={"speed": float(speed), "speed_order": None, "with_speed": ()})
+    values = there.with_values({each.path: each.at(speed) for each in scene.with_speed})
+    return values.model_copy(update={"with_speed": scene.with_speed})

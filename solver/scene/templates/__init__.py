@@ -1,1 +1,0 @@
-"""Scenes of the common cases, made of the few things a designer knows."""

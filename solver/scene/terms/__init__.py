@@ -1,1 +1,0 @@
-"""Linear terms beside masses, springs and dashpots, and what depends on the speed of rotation."""
