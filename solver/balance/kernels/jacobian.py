@@ -343,8 +343,10 @@ def _border(system: System, point: Evaluation, tangent: Real, weight_u: float, w
         point.border[i] = weight_u * tangent[i]
     forces = point.work[0, :nt]
     if point.counts[MIXED] == 0:
-        _times(system, point, kept, gone, True, point.border, 1.0, along)
-        slopes_times(system, point, True, along, forces)
+        fill(forces, 0.0)
+        if gone.size > 0:
+            _times(system, point, kept, gone, True, point.border, 1.0, along)
+            slopes_times(system, point, True, along, forces)
         for a in range(kept.size):
             for i in range(n):
                 at = kept[a] * n + i

@@ -12,8 +12,8 @@ import math
 
 import numpy as np
 
-from solver.balance.kernels.locate import solve_on_plane
-from solver.balance.kernels.newton import newton
+from solver.balance.kernels.locate import measured_on_plane
+from solver.balance.kernels.newton import arc_newton, newton
 from solver.balance.kernels.output import HIGH, HIGH_SLOPE, LOW, LOW_SLOPE, PIECE, piece
 from solver.balance.kernels.residual import contact_values, element
 from solver.contacts.kernels.columns import KT, MU
@@ -149,21 +149,21 @@ def locate_change(
         p = lo + margin if (p - lo) * (hi - lo) < margin * (hi - lo) else p
         p = hi - margin if (hi - p) * (hi - lo) < margin * (hi - lo) else p
         good, share = False, (p - lo) / (hi - lo)
-        for damped in range(0 if point.counts[SIZE] >= _LARGE else 1, 2):
+        if point.counts[SIZE] >= _LARGE:
             _interpolated(found, ways, share, row[:n])
-            row[n] = p
-            if damped == 1:
-                receptance(system, p, linear)
-                reached, iterations, _ = newton(system, linear, row[:n], p, 0.0, point)
-                total += iterations
-                if not reached:
-                    break
-            good, iterations = solve_on_plane(
-                system, linear, point, row.copy(), onward, 0.0, 1.0, most, False, row, way, at, out
+            good, iterations, _, norm = arc_newton(
+                system, linear, row[:n], p, row, p, onward, 0.0, 1.0, point, most
             )
             total += iterations
-            if good:
-                break
+        if not good:
+            _interpolated(found, ways, share, row[:n])
+            receptance(system, p, linear)
+            good, iterations, norm = newton(system, linear, row[:n], p, 0.0, point)
+            total += iterations
+        row[n] = p
+        good = good and measured_on_plane(
+            system, linear, point, onward, 0.0, 1.0, False, norm, row, way, at, out
+        )
         if not (good and math.isfinite(out[HIGH] + out[LOW] + out[HIGH_SLOPE] + out[LOW_SLOPE])):
             break
         behind = piece(point) != measures[0, PIECE]
