@@ -137,7 +137,8 @@ def _eliminate(system: System, linear: Receptance, point: Evaluation) -> bool:
     free, held = point.counts[FREE], point.counts[HELD]
     kept, gone = point.free[:free], point.held[:held]
     if held == 0:
-        copy_block(point.responses, linear.A[0])
+        for i in range(system.ks.size):
+            copy_block(point.responses[i], linear.A[0, i])
         return True
     D, inverse = np.empty((held, held), np.complex128), np.empty((held, held), np.complex128)
     W, down = np.empty((held, free), np.complex128), np.empty((held, free), np.complex128)
