@@ -195,7 +195,7 @@ class Workspace:
         soft = partial(solve_softened, self.balance.system, linear, point)
         at_rest = partial(self._by_level, at_rest=True)
         if self.balance.system.constant_mean:
-            return (self._from_fewer, stuck, self._by_level, soft, at_rest, rungs), 3
+            return (self._from_fewer, stuck, self._by_level, soft, at_rest, rungs), 2
         if np.any(self.balance.system.shift):  # contacts hold it: the less they stick the farther it may seem
             # What sticks with all it can carry is at its limit, where Newton's method is slow.
             onward = (self._onward,) if self.balance.system.hold else ()
