@@ -16,7 +16,7 @@ from solver.balance.kernels.mechanics import ALLOWED, unaccounted
 from solver.balance.kernels.newton import from_stuck, ladder, newton, stuck_start
 from solver.balance.kernels.output import MEASURES
 from solver.balance.kernels.residual import evaluate
-from solver.balance.mean_loads import friction_can_hold
+from solver.balance.mean_loads import friction_can_hold, may_stick
 from solver.balance.softening import solve_softened
 from solver.contacts.kernels.stick_slip_events import FAILED, STUCK
 from solver.contacts.kernels.system import (
@@ -154,11 +154,14 @@ class Workspace:
                 converged=False, u=nothing, iterations=0, residual=np.inf, ratchets=True, above_friction=True
             )
         # Under given loads what holds a part shows at once; a load that moves may hold it elsewhere.
-        if all(contact.keeps_together for contact in self.balance.scene.contacts):
+        together = all(contact.keeps_together for contact in self.balance.scene.contacts)
+        if together:
             first = 1
         found = self._plain(p, ways[:first], guess)
         if not found.converged:
             held = self._held_in_place(p, found.iterations)
+            if held.ratchets and not together and self._may_stick(p):
+                held = replace(held, ratchets=False)
             found = held if held.converged or held.ratchets or first == len(ways) else found
         if found.converged or found.ratchets or first == len(ways):
             return found
@@ -233,12 +236,20 @@ class Workspace:
         """
         return bool(unaccounted(self.system, self.linear, u, self.point) <= ALLOWED)
 
+    def _stuck(self, p: float) -> Real:
+        """Return the response of stuck contacts."""
+        receptance(self.system, p, self.linear)
+        u = np.zeros(self.balance.n_unknowns)
+        stuck_start(self.system, self.linear, p, u)
+        return u
+
+    def _may_stick(self, p: float) -> bool:
+        """Return whether residual friction forces let every contact stick."""
+        return may_stick(self.balance, self.system, self.receptance(p), self._stuck(p), p)
+
     def law_fails(self, p: float, u: Real | None = None) -> bool:
         """Return whether a contact has no force at u, without one at the stuck response."""
-        if u is None:
-            self.receptance(p)
-            u = np.zeros(self.balance.n_unknowns)
-            stuck_start(self.system, self.linear, p, u)
+        u = self._stuck(p) if u is None else u
         states = evaluation_by_value(self.point).states
         states[:] = STUCK
         self.forces(u, p)

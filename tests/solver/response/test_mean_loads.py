@@ -101,6 +101,9 @@ def test_a_wedge_that_stands_is_not_said_to_creep() -> None:
     """What its contacts do where a constant force holds it leaves some of that force; full stick stands."""
     scene = pulled_wedge(0.08048523954147624, 32.77681945965323)
     assert solve(scene, frequency_hz=310.42194540783146, harmonics=3).converged
+    # A march of this one repeats after 1314 periods: slips leave forces under which all contacts stick.
+    scene, frequency_hz = pulled_body(128)
+    assert solve(scene, frequency_hz=frequency_hz, harmonics=3).status is not SolutionStatus.RATCHETS
 
 
 @pytest.mark.few(keep=(14, 15))
