@@ -19,7 +19,6 @@ from sqlalchemy.sql.elements import BinaryExpression, UnaryExpression
 from sqlalchemy.sql.operators import custom_op
 
 from service.errors import InvalidRequestError
-from solver.errors import Issue
 
 Range = tuple[float | None, float | None]
 Position = tuple[float | None, str]
@@ -216,5 +215,6 @@ def next_link(path: str, query: BaseModel, value: float | None, row_id: str) -> 
 
 
 def _refused(cursor: str) -> InvalidRequestError:
-    message = f"`cursor` must come from the `next` link of a page, got {cursor[:80]!r}"
-    return InvalidRequestError([Issue(pointer="/cursor", message=message)], source="query")
+    return InvalidRequestError.of(
+        ("cursor",), "must come from the `next` link of a page", cursor[:80], source="query"
+    )

@@ -6,7 +6,7 @@ from collections.abc import Awaitable, Callable, Mapping
 from functools import wraps
 from typing import Any, TypeVar
 
-from service.errors import InvalidRequestError
+from service.errors import InvalidRequestError, issues_to_json
 from service.http.dependencies import Context
 from service.jobs.answering import KIND, PREVIEW, RESOLVE, Prepared
 from service.jobs.registry import JobKind, SceneSource
@@ -42,7 +42,7 @@ _MOST_LOOKED_UP = 8
 """Scenes and uploads of one request; shipped scenes need no looking up."""
 
 
-async def computed(context: Context, task: str, words: Mapping[str, Any], about: str = "/scene") -> Any:
+async def computed(context: Context, task: str, words: Mapping[str, Any], about: str = "scene") -> Any:
     """What a task of `service.jobs.answering` finds.
 
     Parameters
@@ -87,5 +87,5 @@ def _look_up(needs: Mapping[str, Any], source: SceneSource, spec: dict[str, Any]
     try:
         found: dict[str, Any] = {"scene": source.with_uploads(needs["uploads"])}
     except InvalidRequestError as error:
-        found = {"issues": [[issue.pointer, issue.message] for issue in error.issues]}
+        found = {"issues": issues_to_json(error.issues)}
     spec["uploads"][needs["as"]] = found

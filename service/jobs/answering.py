@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from service.errors import BodyTooLargeError, InvalidRequestError, MalformedBodyError
+from service.errors import BodyTooLargeError, InvalidRequestError, MalformedBodyError, issues_to_json
 from service.jobs.common.measurements import read_measurements
 from service.jobs.common.scene_editing import side_by_side
 from service.jobs.common.scene_text import issues_of_scene, read_text
@@ -30,7 +30,6 @@ from service.jobs.strict_json import JsonText, digest, encoded
 from service.jobs.studies.plan import Plan
 from service.jobs.study import Watch
 from service.jobs.validation import validated
-from solver.errors import Issue
 
 PLAN, READ, TEXT, STORE, RESOLVE, PREVIEW = "plan", "read", "text", "store", "resolve", "preview"
 MEASURED, EDIT = "measured", "edit"
@@ -77,7 +76,7 @@ class LookedUp:
         if found is None:
             raise NeededError({"uploads": body, "as": key})
         if "issues" in found:
-            raise InvalidRequestError([Issue(pointer=where, message=said) for where, said in found["issues"]])
+            raise InvalidRequestError.from_json(found["issues"])
         whole: Mapping[str, object] = found["scene"]
         return whole
 
@@ -159,7 +158,7 @@ def _plan(words: Words, source: SceneSource) -> dict[str, Any]:
 
 def _read(words: Words, source: SceneSource) -> JsonText:
     raw = read_text(words["text"], words["form"])
-    issues = [{"pointer": issue.pointer, "detail": issue.message} for issue in issues_of_scene(raw, source)]
+    issues = [{"pointer": issue.pointer, "detail": issue.said()} for issue in issues_of_scene(raw, source)]
     return encoded({"scene": raw, "issues": issues})
 
 
@@ -205,7 +204,7 @@ class Answering:
         except NeededError as error:
             return {"needs": error.what}
         except InvalidRequestError as error:
-            return {"issues": [[issue.pointer, issue.message] for issue in error.issues]}
+            return {"issues": issues_to_json(error.issues)}
         except MalformedBodyError as error:
             return {"malformed": error.detail}
         except BodyTooLargeError as error:

@@ -249,7 +249,7 @@ class JobFailure:
         """The error of a job, as JSON."""
         body: dict[str, Any] = {"type": self.kind.value, "detail": self.detail}
         if self.issues:
-            body["issues"] = [{"pointer": issue.pointer, "detail": issue.message} for issue in self.issues]
+            body["issues"] = [{"pointer": issue.pointer, "detail": issue.said()} for issue in self.issues]
         return body
 
 

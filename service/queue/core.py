@@ -50,7 +50,6 @@ from service.uploads.uploads import Uploads
 from service.workers.answers import AnswerLimits, Answers
 from service.workers.executors import executor_of
 from service.workers.preview_workers import Previews
-from solver.errors import Issue
 
 log = logging.getLogger("stickslip.service")
 
@@ -208,7 +207,7 @@ class Service:
             See `JobRepository.submit`.
         """
         if KIND not in body:
-            raise InvalidRequestError([Issue(pointer="/kind", message="`kind` is missing")])
+            raise InvalidRequestError.of(("kind",), "is missing")
         kind = self.registry.get(body[KIND])
         request = validated(kind.request, {key: value for key, value in body.items() if key != KIND})
         return self.accept(kind, request, body, idempotency_key, caller)
@@ -264,8 +263,9 @@ class Service:
     def _require_priority(self, request: JobRequest, caller: Caller) -> None:
         most = highest_priority(caller, self.settings)
         if request.priority > most:
-            message = f"`priority` must be at most {most} with this key, got {request.priority}"
-            raise InvalidRequestError([Issue(pointer="/priority", message=message)])
+            raise InvalidRequestError.of(
+                ("priority",), f"must be at most {most} with this key", request.priority
+            )
 
     def _seconds_limit(self, request: JobRequest, caller: Caller) -> float | None:
         """The longest time an attempt may take, if the request or the key says so [s]."""
@@ -273,8 +273,9 @@ class Service:
         most = min(self.settings.job_seconds, of_key or math.inf)
         if asked is not None and asked > most:
             whose = "the key's limit" if most == of_key else "the service's own limit"
-            message = f"`max_seconds` must be at most {most:g}, which is {whose}, got {asked!r}"
-            raise InvalidRequestError([Issue(pointer="/max_seconds", message=message)])
+            raise InvalidRequestError.of(
+                ("max_seconds",), f"must be at most {most:g}, which is {whose}", asked
+            )
         return asked if asked is not None else of_key
 
     def job(self, job_id: str, caller: Caller = KEYLESS) -> JobRow:

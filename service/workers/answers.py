@@ -90,7 +90,7 @@ class Answers(WarmPool):
         self._budgets = Buckets()
         self._ended_one: set[str] = set()
 
-    async def ask(self, task: str, spec: dict[str, Any], owner: str = "", about: str = "/scene") -> Any:
+    async def ask(self, task: str, spec: dict[str, Any], owner: str = "", about: str = "scene") -> Any:
         """What a task finds.
 
         Parameters
@@ -98,7 +98,7 @@ class Answers(WarmPool):
         task : one of `runs`.
         spec : what it is given.
         owner : whose turn and whose budget it is.
-        about : pointer of the field that makes it costly.
+        about : the field that makes it costly.
 
         Raises
         ------
@@ -173,12 +173,10 @@ class Answers(WarmPool):
 
     def _beyond(self, lost: Lost, about: str) -> Exception:
         """A process that ended did so at one of its limits, or at what it was given."""
-        name = about.strip("/")
         ended_by = "" if lost.signal is None else signal.Signals(lost.signal).name
         if ended_by in _AT_THE_TIME:
             most = f"{self._limits.seconds:g} s of processor time"
-            message = f"`{name}` takes more than {most} to be looked at, the limit of an answer"
-            return InvalidRequestError([Issue(pointer=about, message=message)])
+            return _too_costly(about, most)
         log.warning("an answer was lost: %s", lost.reason)
         if ended_by in _WITHOUT_MEMORY:
             return self._too_much_memory(about)
@@ -186,14 +184,18 @@ class Answers(WarmPool):
 
     def _too_much_memory(self, about: str) -> InvalidRequestError:
         most = f"{self._limits.memory_bytes / 1e6:.0f} MB of memory"
-        message = f"`{about.strip('/')}` takes more than {most} to be looked at, the limit of an answer"
-        return InvalidRequestError([Issue(pointer=about, message=message)])
+        return _too_costly(about, most)
+
+
+def _too_costly(key: str, most: str) -> InvalidRequestError:
+    wanted = f"takes more than {most} to be looked at, the limit of an answer"
+    return InvalidRequestError.of((key,) if key else (), wanted)
 
 
 def _accepted(told: Mapping[str, Any]) -> Any:
     """What a task found or needs; its refusals as errors."""
     if "issues" in told:
-        raise InvalidRequestError([Issue(pointer=where, message=said) for where, said in told["issues"]])
+        raise InvalidRequestError.from_json(told["issues"])
     if "malformed" in told:
         raise MalformedBodyError(told["malformed"])
     if "too_large" in told:
@@ -203,5 +205,5 @@ def _accepted(told: Mapping[str, Any]) -> Any:
 
 def _refusal(failure: JobFailure) -> Exception:
     if failure.kind in (FailureKind.SCENE, FailureKind.SETTING, FailureKind.GOAL):
-        return InvalidRequestError(failure.issues or (Issue(pointer="", message=failure.detail),))
+        return InvalidRequestError(failure.issues or (Issue((), failure.detail, named=False),))
     return RuntimeError(failure.detail)

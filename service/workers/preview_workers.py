@@ -136,7 +136,7 @@ def _answer(outcome: Outcome) -> bytes:
         raise PreviewError("the service stops")
     failure = outcome.failure
     if failure.kind is FailureKind.MEMORY_LIMIT:
-        raise InvalidRequestError([Issue(pointer="/scene", message=f"`scene`: {failure.detail}")])
+        raise InvalidRequestError.of(("scene",), f"`scene`: {failure.detail}", named=False)
     if failure.kind in (FailureKind.SCENE, FailureKind.SETTING):
-        raise InvalidRequestError(failure.issues or (Issue(pointer="", message=failure.detail),))
+        raise InvalidRequestError(failure.issues or (Issue((), failure.detail, named=False),))
     raise JobFailedError(failure.detail, failure.to_json())

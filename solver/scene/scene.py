@@ -23,7 +23,7 @@ from solver.contacts.laws.friction import FrictionContact
 from solver.contacts.laws.gap import GapSpring
 from solver.contacts.laws.polynomial import PolynomialSpring
 from solver.contacts.laws.registry import on_change
-from solver.errors import Issue, SceneError, SettingError
+from solver.errors import SceneError, SettingError
 from solver.scene import parameter_paths as scene_paths
 from solver.scene.bodies import kinematics
 from solver.scene.bodies.body import Body, Load, Node
@@ -191,9 +191,7 @@ class Scene(Part):
             return data
         raw = plain(data)
         if not isinstance(raw, dict):
-            raise SceneError(
-                [Issue(pointer="", message=f"a scene must be a table, got {type(raw).__name__}")]
-            )
+            raise SceneError.of((), f"a scene must be a table, got {type(raw).__name__}", named=False)
         try:
             scene, issues = handler(data), []
         except ValidationError as error:
@@ -305,7 +303,7 @@ def _at_its_speed(scene: Scene) -> Scene:
     try:
         there: Scene = at_speed(scene, scene.speed or 0.0)
     except SettingError as error:
-        raise SceneError([Issue(pointer="/with_speed", message=str(error))]) from error
+        raise SceneError([error.issue.at("with_speed")]) from error
     return there
 
 

@@ -112,7 +112,7 @@ def deaf(spec: Mapping[str, Any], progress: Progress, _should_stop: ShouldStop) 
 
 
 def bad_scene(_spec: Mapping[str, Any], _progress: Progress, _should_stop: ShouldStop) -> JobOutput:
-    raise SceneError([Issue(pointer="/contacts/0/mu", message="`mu` must be >= 0, got -0.1")])
+    raise SceneError([Issue(("contacts", 0, "mu"), "must be >= 0", -0.1)])
 
 
 def bad_setting(_spec: Mapping[str, Any], _progress: Progress, _should_stop: ShouldStop) -> JobOutput:

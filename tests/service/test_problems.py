@@ -59,7 +59,7 @@ def pointers(change: dict[str, Any]) -> list[str]:
     body = {"scene": "two-dof", "variables": VARIABLES, **change}
     with pytest.raises(InvalidRequestError) as caught:
         resolve(validated(Design, body), Shipped())
-    assert all(len(issue.message) > 20 for issue in caught.value.issues)
+    assert all(len(issue.said()) > 20 for issue in caught.value.issues)
     return [issue.pointer for issue in caught.value.issues]
 
 

@@ -159,7 +159,7 @@ def path_of(option: str) -> Iterator[None]:
         yield
     except SettingError as error:
         if error.name == "path":
-            raise InputError(str(error).replace("`path`", f"`{option}`", 1)) from error
+            raise InputError(error.issue.said(option)) from error
         raise
 
 

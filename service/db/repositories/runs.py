@@ -32,7 +32,7 @@ from service.db.repositories.owned import Binned, Rows
 from service.db.repositories.rows import NO_WORDS, JobRow, RunWords
 from service.db.tokens import Made, Tokens, digest_of, matches
 from service.errors import ConflictError, InvalidRequestError, NotFoundError
-from solver.errors import Issue
+from solver.errors import Shown
 
 _TABLES = Run.metadata.tables
 _RUN, _TAG = _TABLES["run"], _TABLES["run_tag"]
@@ -65,8 +65,7 @@ def require_project(connection: Connection, project: str | None, owner: str | No
     given = {"project": project[:ID_LENGTH], "owner": owner}
     if len(project) > ID_LENGTH or connection.execute(_PROJECT, given).one_or_none() is None:
         words = "must be the id of a project of the same owner, GET /v1/projects lists them"
-        message = f"`project` {words}, got {project!r:.80}"
-        raise InvalidRequestError([Issue(pointer="/project", message=message)])
+        raise InvalidRequestError.of(("project",), words, Shown(f"{project!r:.80}"))
 
 
 def insert_words(connection: Connection, job_id: str, words: RunWords, now: datetime) -> None:

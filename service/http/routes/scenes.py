@@ -93,7 +93,7 @@ class SceneEdited(BaseModel):
 @texts.post("/read", response_model=SceneRead)
 async def read(body: ReadBody, context: InContext) -> Response:
     """Read the text of a scene file and list everything that is wrong with it; nothing is stored."""
-    found = await computed(context, answering.READ, body.model_dump(), about="/text")
+    found = await computed(context, answering.READ, body.model_dump(), about="text")
     return Response(found, media_type="application/json")
 
 
@@ -110,7 +110,7 @@ async def edit(body: EditBody, context: InContext) -> Response:
 
     Comments, order and spelling of what stays the same are kept.
     """
-    found = await computed(context, answering.EDIT, body.model_dump(), about="/text")
+    found = await computed(context, answering.EDIT, body.model_dump(), about="text")
     return Response(found, media_type="application/json")
 
 

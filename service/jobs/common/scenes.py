@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from functools import lru_cache
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -19,7 +19,7 @@ from optim.criteria.json_types import PositiveNumber as PositiveNumber
 from service.errors import InvalidRequestError
 from service.jobs.registry import Flag, JobRequest, Resolved, SceneSource
 from service.jobs.strict_json import digest
-from solver.errors import Issue, SceneError, SettingError, pointer
+from solver.errors import Issue, SceneError, SettingError
 from solver.scene.descriptions import DAMPER_LOAD
 
 if TYPE_CHECKING:
@@ -33,6 +33,7 @@ FILE_KEYS = ("M", "K", "C", "G", "K_omega2", "modes", "mapping", "diameters", "n
 
 Place = tuple[str, ...]
 """Keys that lead to a value in a structure."""
+SCENE = "scene"
 
 _SCENE_NAME = re.compile(r"[A-Za-z0-9_-]{1,100}")
 
@@ -103,7 +104,7 @@ def resolve_scene(request: SceneRequest, source: SceneSource) -> Scene:
         try:
             scene = scene.with_values({path: value})
         except SettingError as error:
-            issues.append(Issue(pointer=pointer("set", path), message=str(error)))
+            issues.append(error.issue.at("set", path))
     if issues:
         raise InvalidRequestError(issues)
     return scene
@@ -123,14 +124,13 @@ def _read(reference: object, source: SceneSource) -> Scene:
         return shipped
     body = source.scene_body(reference) if isinstance(reference, str) else reference
     if not isinstance(body, Mapping):
-        message = f"`scene` {reference!r} is neither a shipped scene nor a stored one"
-        raise InvalidRequestError([Issue(pointer=pointer("scene"), message=message)])
+        raise InvalidRequestError.of(("scene",), f"{reference!r} is neither a shipped scene nor a stored one")
     if body is reference and refers_to_uploads(body):
         try:
             body = source.with_uploads(body)
         except InvalidRequestError as error:
-            raise _below_scene(error.issues) from error
-    return read_scene(body, prefix=pointer("scene"))
+            raise InvalidRequestError([issue.below(SCENE) for issue in error.issues]) from error
+    return read_scene(body, SCENE)
 
 
 def refers_to_uploads(body: Mapping[str, object]) -> bool:
@@ -164,18 +164,13 @@ def with_named(structure: Mapping[str, Any], names: Mapping[Place, str]) -> dict
     return changed
 
 
-def _below_scene(issues: Iterable[Issue]) -> InvalidRequestError:
-    found = [Issue(pointer=pointer("scene") + issue.pointer, message=issue.message) for issue in issues]
-    return InvalidRequestError(found)
-
-
-def read_scene(body: Mapping[str, object], prefix: str = "") -> Scene:
+def read_scene(body: Mapping[str, object], *place: str) -> Scene:
     """A scene from a request body.
 
     Raises
     ------
     InvalidRequestError
-        Lists everything that is wrong, with pointers below `prefix`.
+        Lists everything that is wrong, with subjects below `place`.
     """
     # Loaded here: the help of a command needs the keys alone.
     from solver.scene.scene import Scene
@@ -183,31 +178,16 @@ def read_scene(body: Mapping[str, object], prefix: str = "") -> Scene:
     try:
         return Scene.from_dict(body)
     except SceneError as error:
-        issues = [Issue(pointer=prefix + issue.pointer, message=issue.message) for issue in error.issues]
-        raise InvalidRequestError(issues) from error
+        raise InvalidRequestError([issue.below(*place) for issue in error.issues]) from error
 
 
-def check(where: str, attempt: Callable[[], object]) -> list[Issue]:
-    """Nothing if `attempt` goes through; its SettingError as an issue at the pointer `where` otherwise."""
+def check(attempt: Callable[[], object], *place: str | int) -> list[Issue]:
+    """Nothing if `attempt` goes through; its SettingError otherwise, of `place` if one is given."""
     try:
         attempt()
     except SettingError as error:
-        return [Issue(pointer=where, message=str(error))]
+        return [error.issue.at(*place) if place else error.issue]
     return []
-
-
-def check_named(attempt: Callable[[], object]) -> list[Issue]:
-    """As `check`, at the key that the error names."""
-    try:
-        attempt()
-    except SettingError as error:
-        return [Issue(pointer=pointer(error.name), message=str(error))]
-    return []
-
-
-def refusal(where: str, message: str) -> Issue:
-    """Something wrong with the field at the pointer `where`."""
-    return Issue(pointer=where, message=message)
 
 
 def require(issues: list[Issue]) -> None:

@@ -16,7 +16,6 @@ from service.jobs.common.scenes import (
     FrequencyHz,
     HarmonicRequest,
     PositiveNumber,
-    refusal,
     require,
     resolve_scene,
     resolved,
@@ -93,14 +92,24 @@ def _scene(request: PreviewRequest, source: SceneSource, points: int, harmonics:
     scene = resolve_scene(request, source)
     issues: list[Issue] = []
     if request.harmonics > MOST_HARMONICS:
-        message = f"`harmonics` of a preview must be at most {MOST_HARMONICS}, got {request.harmonics}"
-        issues.append(refusal("/harmonics", message))
+        issues.append(
+            Issue(
+                ("harmonics",),
+                f"of a preview must be at most {MOST_HARMONICS}",
+                request.harmonics,
+            )
+        )
     unknowns = dofs_solved(scene) * (2 * request.harmonics + 1)
     if unknowns > MOST_UNKNOWNS:
         words = "DOFs × coefficients of a preview"
-        message = f"{words} must be at most {MOST_UNKNOWNS}, got {unknowns}: submit a job"
-        issues.append(refusal("/scene", message))
-    require(issues or balance_issues("/harmonics", scene, harmonics, points))
+        issues.append(
+            Issue(
+                ("scene",),
+                f"{words} must be at most {MOST_UNKNOWNS}, got {unknowns}: submit a job",
+                named=False,
+            )
+        )
+    require(issues or balance_issues("harmonics", scene, harmonics, points))
     return scene
 
 
@@ -128,16 +137,14 @@ def resolve_limits(request: LimitsPreviewRequest, source: SceneSource) -> Resolv
     scene = _scene(request, source, 2 * POINTS_OF_A_SWEEP, 1)
     names = [contact.name for contact in scene.contacts]
     if request.contact is not None and request.contact not in names:
-        message = f"`contact` must be one of {', '.join(names)}, got {request.contact!r}"
-        require([refusal("/contact", message)])
+        require([Issue(("contact",), f"must be one of {', '.join(names)}", request.contact)])
     return resolved(scene, harmonics=request.harmonics, contact=request.contact)
 
 
 def resolve_point(request: PointPreviewRequest, source: SceneSource) -> Resolved:
     """Look up the scene, check its size, and choose the harmonics that can be kept in time."""
     if request.frequency_hz < LEAST_HZ:
-        message = f"`frequency_hz` must be at least {LEAST_HZ:g}, got {request.frequency_hz!r}"
-        require([refusal("/frequency_hz", message)])
+        require([Issue(("frequency_hz",), f"must be at least {LEAST_HZ:g}", request.frequency_hz)])
     scene = _scene(request, source, 1, request.harmonics)
     kept = harmonics_in_time(scene, request.harmonics, POINT_UNKNOWNS)
     return resolved(scene, harmonics=kept, frequency_hz=request.frequency_hz)

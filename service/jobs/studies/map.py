@@ -10,7 +10,6 @@ from pydantic import ConfigDict, Field
 
 from service.jobs.common.ranges import RangeRequest, law_issues, range_issues
 from service.jobs.common.results import Curve, result_model
-from service.jobs.common.scenes import refusal
 from service.jobs.common.sizes import MOST_POINTS, balance_issues
 from service.jobs.kind_view import Json
 from service.jobs.outputs import JobOutput, OnProgress, ShouldStop
@@ -56,14 +55,14 @@ class Map(Study, RangeRequest):
 
     def issues(self, scene: Scene) -> list[Issue]:
         """Return what is wrong with the range and, with a ridge, with the laws of the contacts."""
-        return range_issues(self, scene) + (law_issues("/ridge", scene) if self.ridge else [])
+        return range_issues(self, scene) + (law_issues("ridge", scene) if self.ridge else [])
 
     def sizes(self, scene: Scene) -> list[Issue]:
         """Return what is too large."""
         points = self.steps * self.frequencies
         if points > MOST_POINTS:
-            return [refusal("/steps", f"`steps` × `frequencies` must be at most {MOST_POINTS}, got {points}")]
-        return balance_issues("/steps", scene, self.harmonics, points, "`steps` × `frequencies`")
+            return [Issue(("steps",), f"× `frequencies` must be at most {MOST_POINTS}", points)]
+        return balance_issues("steps", scene, self.harmonics, points, "`steps` × `frequencies`")
 
     @classmethod
     def empty(cls, result: Json) -> str:

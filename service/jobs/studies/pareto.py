@@ -44,7 +44,7 @@ class _Pareto(PointsOfFront, ProblemRequest):
         """Return what is too large."""
         points = POINTS_OF_A_SWEEP * len(self.cases or [1]) * (self.points or 1)
         words = "points of the responses of a front"
-        return balance_issues("/points", scene, self.harmonics, points, words)
+        return balance_issues("points", scene, self.harmonics, points, words)
 
     @classmethod
     def compute(cls, scene: Scene, asked: Mapping[str, Any], watch: Watch) -> Answer:

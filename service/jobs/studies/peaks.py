@@ -49,12 +49,12 @@ class Peaks(Study, RangeRequest):
 
     def issues(self, scene: Scene) -> list[Issue]:
         """Return what is wrong with the range and the laws of the contacts."""
-        return range_issues(self, scene) + law_issues("/scene", scene)
+        return range_issues(self, scene) + law_issues("scene", scene)
 
     def sizes(self, scene: Scene) -> list[Issue]:
         """Return what is too large."""
         points = POINTS_OF_A_SWEEP * (self.checks + 2)
-        return balance_issues("/checks", scene, self.harmonics, points)
+        return balance_issues("checks", scene, self.harmonics, points)
 
     @classmethod
     def sweeps(cls, found: PeakTrack) -> tuple[SweepRecord, ...]:

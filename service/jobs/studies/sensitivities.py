@@ -40,7 +40,7 @@ class Sensitivities(Study, HarmonicRequest):
 
     def sizes(self, scene: Scene) -> list[Issue]:
         """Return what is too large."""
-        return balance_issues("/harmonics", scene, self.harmonics, POINTS_OF_A_SWEEP)
+        return balance_issues("harmonics", scene, self.harmonics, POINTS_OF_A_SWEEP)
 
     @classmethod
     def compute(cls, scene: Scene, asked: Mapping[str, Any], _watch: Watch) -> Answer:
