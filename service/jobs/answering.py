@@ -16,7 +16,6 @@ from service.jobs.common.measurements import read_measurements
 from service.jobs.common.scene_editing import side_by_side
 from service.jobs.common.scene_text import issues_of_scene, read_text
 from service.jobs.common.scenes import (
-    SceneRequest,
     read_scene,
     refers_to_uploads,
     require,
@@ -29,7 +28,6 @@ from service.jobs.registry import JobRequest, Registry, Resolve, RunOn, SceneSou
 from service.jobs.strict_json import JsonText, digest, encoded
 from service.jobs.studies.plan import Plan
 from service.jobs.study import Watch
-from service.jobs.validation import validated
 
 PLAN, READ, TEXT, STORE, RESOLVE, PREVIEW = "plan", "read", "text", "store", "resolve", "preview"
 MEASURED, EDIT = "measured", "edit"
@@ -132,25 +130,23 @@ def prepared(
 class _Resolving:
     """The task that resolves requests of some kinds; sent to the processes by the names of its parts."""
 
-    kinds: Mapping[str, tuple[type[JobRequest], Resolve]]
+    kinds: Mapping[str, Resolve]
 
     @classmethod
     def of(cls, registry: Registry) -> _Resolving:
-        return cls({kind.name: (kind.request, kind.resolve) for kind in registry})
+        return cls({kind.name: kind.resolve for kind in registry})
 
     def __call__(self, words: Words, source: SceneSource) -> dict[str, Any]:
-        name, body = words[KIND], words["body"]
-        request, resolve = self.kinds[name]
-        asked = validated(request, {key: value for key, value in body.items() if key != KIND})
+        name = words[KIND]
         found = prepared(
-            name, resolve, asked, body, source,
+            name, self.kinds[name], words["request"], words["body"], source,
             work=words["work"], memory=words["memory"], version=words["version"],
         )  # fmt: skip
         return asdict(found)
 
 
 def _plan(words: Words, source: SceneSource) -> dict[str, Any]:
-    request = Plan.model_validate(words)
+    request: Plan = words["request"]
     scene = resolve_scene(request, source)
     require(request.issues(scene))
     return Plan.compute(scene, request.spec(scene), Watch()).json
@@ -169,12 +165,12 @@ def _edit(words: Words, source: SceneSource) -> JsonText:
 def _text(words: Words, source: SceneSource) -> str:
     from solver.scene.toml import toml_text
 
-    scene = resolve_scene(SceneRequest.model_validate(words["scene"]), source)
+    scene = resolve_scene(words["request"], source)
     return toml_text(scene.to_dict(), tuple(words["comments"]))
 
 
 def _measured(words: Words, source: SceneSource) -> JsonText:
-    scene = resolve_scene(SceneRequest.model_validate(words["scene"]), source)
+    scene = resolve_scene(words["request"], source)
     return encoded(read_measurements(scene, words["files"]))
 
 

@@ -178,9 +178,10 @@ def submissions(registry: Registry) -> APIRouter:
 async def _submit(context: Context, asked: Asked, raw: dict[str, Any], body: JobRequest) -> Response:
     service, caller = context.service, context.caller
     kind = service.registry.get(raw[KIND])
-    found = await prepared(context, kind, raw)
+    request = request_of(kind, body)
+    found = await prepared(context, kind, request, raw)
     row, _ = await service.lanes.writes.run(
-        caller.owner, service.accept, kind, request_of(kind, body), raw, asked.key, caller, found
+        caller.owner, service.accept, kind, request, raw, asked.key, caller, found
     )
     headers = {"Location": f"/v1/jobs/{row.id}"}
     answer = partial(_job_or_result, service, headers)

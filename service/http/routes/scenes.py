@@ -100,7 +100,7 @@ async def read(body: ReadBody, context: InContext) -> Response:
 @texts.post("/text", response_class=Response, responses={200: media({"application/toml": TEXT})})
 async def text(body: TextBody, context: InContext) -> Response:
     """The TOML of a scene with its values set: the file that reproduces what was computed."""
-    words = {"scene": body.model_dump(exclude={"comments"}), "comments": body.comments}
+    words = {"request": body, "comments": body.comments}
     return Response(await computed(context, answering.TEXT, words), media_type="application/toml")
 
 

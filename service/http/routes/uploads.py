@@ -292,7 +292,7 @@ async def read_measurements(body: ReadBody, context: InContext) -> Response:
     The first thing that is wrong with each file is told with its line and column.
     """
     words = {
-        "scene": body.model_dump(exclude={"files"}),
+        "request": body,
         "files": [file.model_dump() for file in body.files],
     }
     found = await computed(context, answering.MEASURED, words, about="files")

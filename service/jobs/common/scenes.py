@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
-from functools import lru_cache
+from functools import cache, lru_cache
+from importlib.metadata import version
 from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import BeforeValidator, Field, WithJsonSchema
@@ -33,7 +34,8 @@ FILE_KEYS = ("M", "K", "C", "G", "K_omega2", "modes", "mapping", "diameters", "n
 
 Place = tuple[str, ...]
 """Keys that lead to a value in a structure."""
-SCENE = "scene"
+SCENE, CHECKED_BY = "scene", "checked_by"
+"""Keys of a spec."""
 
 _SCENE_NAME = re.compile(r"[A-Za-z0-9_-]{1,100}")
 
@@ -197,6 +199,32 @@ def require(issues: list[Issue]) -> None:
 
 
 def resolved(scene: Scene, **settings: object) -> Resolved:
-    """The spec of a request about `scene`; the settings are JSON."""
+    """The spec of a request about `scene`, which says what version checked it; the settings are JSON."""
     body = scene.to_dict()
-    return Resolved(spec={"scene": body, **settings}, scene_name=scene.name, scene_hash=digest(body))
+    spec = {SCENE: body, CHECKED_BY: installed(), **settings}
+    return Resolved(spec=spec, scene_name=scene.name, scene_hash=digest(body))
+
+
+def stored_scene(spec: Mapping[str, Any]) -> Scene:
+    """The scene of a spec; it is checked again if another version did so.
+
+    Raises
+    ------
+    SceneError
+        It does not fit this version.
+    """
+    from solver.scene.scene import Scene
+
+    if spec.get(CHECKED_BY) == installed():
+        return Scene.from_checked(spec[SCENE])
+    try:
+        return Scene.from_dict(spec[SCENE])
+    except SceneError as error:
+        said = "was stored by another version and does not fit this one: submit the job again"
+        raise SceneError([Issue((SCENE,), said), *(one.below(SCENE) for one in error.issues)]) from error
+
+
+@cache
+def installed() -> str:
+    """The version of the package."""
+    return version("stickslip")

@@ -19,6 +19,7 @@ from service.jobs.common.scenes import (
     require,
     resolve_scene,
     resolved,
+    stored_scene,
 )
 from service.jobs.common.sizes import (
     POINTS_OF_A_SWEEP,
@@ -152,7 +153,7 @@ def resolve_point(request: PointPreviewRequest, source: SceneSource) -> Resolved
 
 def run_sweep(spec: Mapping[str, Any], _progress: Progress, should_stop: ShouldStop) -> JobOutput:
     """Follow the response over the band; with the state of every contact at the highest peak."""
-    scene = Scene.from_dict(spec["scene"])
+    scene = stored_scene(spec)
     branch = _response(scene, spec["harmonics"], spec["limit"], should_stop)
     found = branch.to_json()
     kept = (
@@ -174,9 +175,7 @@ def run_sensitivities(spec: Mapping[str, Any], _progress: Progress, _should_stop
     """Differentiate the peaks and the band by every parameter of the scene."""
     import optim
 
-    found = optim.sensitivities(
-        Scene.from_dict(spec["scene"]), limit=spec["limit"], harmonics=spec["harmonics"]
-    )
+    found = optim.sensitivities(stored_scene(spec), limit=spec["limit"], harmonics=spec["harmonics"])
     kept = ("peaks", "band_hz", "limit", "left_out", "peak_certificate", "seconds", "reached", "status")
     told = found.to_json()
     of_a_row = ("path", "unit", "value", "peaks_percent", "band_percent")
@@ -189,7 +188,7 @@ def run_sensitivities(spec: Mapping[str, Any], _progress: Progress, _should_stop
 
 def run_limits(spec: Mapping[str, Any], _progress: Progress, should_stop: ShouldStop) -> JobOutput:
     """Follow the response with the contact removed, and with it stuck."""
-    scene = Scene.from_dict(spec["scene"])
+    scene = stored_scene(spec)
     result: dict[str, Any] = {}
     one = spec["contact"]
     freed = [contact.name for contact in scene.contacts] if one is None else [one]
@@ -205,7 +204,7 @@ def run_point(spec: Mapping[str, Any], _progress: Progress, _should_stop: Should
     from service.jobs.common.periods import period_of
 
     solution = solver.solve(
-        Scene.from_dict(spec["scene"]), frequency_hz=spec["frequency_hz"], harmonics=spec["harmonics"]
+        stored_scene(spec), frequency_hz=spec["frequency_hz"], harmonics=spec["harmonics"]
     )
     result = solution.to_json()
     if solution.converged:

@@ -15,7 +15,7 @@ from optim.criteria.json_types import Name
 from service.jobs.arrays import decode, encode
 from service.jobs.common.ranges import band_issues
 from service.jobs.common.results import EndedResult, KnownResult, Table
-from service.jobs.common.scenes import FrequencyHz, HarmonicRequest
+from service.jobs.common.scenes import FrequencyHz, HarmonicRequest, stored_scene
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
 from service.jobs.outputs import JobOutput, OnProgress, ShouldStop
 from service.jobs.parts import Part, PartOutput, Parts, PartStoppedError
@@ -160,9 +160,7 @@ class Mistuning(Study, HarmonicRequest):
 
 def split(spec: Mapping[str, Any]) -> list[Part]:
     """The tuned disk, and then some of the others at a time."""
-    from solver.scene.scene import Scene
-
-    sectors = Scene.from_dict(spec["scene"]).structure.sector_count
+    sectors = stored_scene(spec).structure.sector_count
     a_disk, samples = sectors * max(spec["harmonics"], 1), spec["samples"]
     size = max(math.ceil(_WORK_OF_A_PART / a_disk), math.ceil(samples / _MOST_DIVIDED))
     return [Part(spec={"tuned": True})] + [
@@ -177,10 +175,9 @@ def run_part(
     """Find the peaks of all blades of the tuned disk, or of some others."""
     import solver
     from service.jobs.common.records import packed, sweep_records
-    from solver.scene.scene import Scene
     from solver.studies.mistuning import without_mistuning, worst_branch
 
-    scene, begun = Scene.from_dict(spec["scene"]), time.perf_counter()
+    scene, begun = stored_scene(spec), time.perf_counter()
     tuned = bool(part.get("tuned"))
     disks = range(1) if tuned else range(part["first"], part["last"])
     found: list[BladePeaks] = []
@@ -223,13 +220,12 @@ def run_part(
 def join(spec: Mapping[str, Any], outputs: Mapping[int, PartOutput]) -> JobOutput:
     """The study of all disks; the stored sweeps are those of the tuned disk and of the worst blade of all."""
     from service.jobs.common.records import unpacked
-    from solver.scene.scene import Scene
     from solver.studies.mistuning import joined_study
 
     parts = list(outputs.values())
     [tuned], others = _peaks(parts[0]), parts[1:]
     study = joined_study(
-        Scene.from_dict(spec["scene"]),
+        stored_scene(spec),
         of=spec["of"],
         spread=spec["spread"],
         seed=spec["seed"],
