@@ -65,6 +65,11 @@ class Issue(NamedTuple):
         keys = [i for i, step in enumerate(self.subject) if isinstance(step, str)]
         return written(self.subject[keys[-1] if keys else 0 :])
 
+    @property
+    def message(self) -> str:
+        """The sentence, with the subject by its own name."""
+        return self.said()
+
     def said(self, name: str = "") -> str:
         """Return the sentence, with what a face calls the subject."""
         shown = repr(self.got)

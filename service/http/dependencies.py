@@ -281,8 +281,8 @@ def idempotency_key(headers: Mapping[str, str]) -> str | None:
         return key
     raise InvalidRequestError.of(
         ("Idempotency-Key",),
-        (f"`Idempotency-Key` must be 1 to 200 printable ASCII characters without spaces, got {key[:80]!r}"),
-        named=False,
+        "must be 1 to 200 printable ASCII characters without spaces",
+        key[:80],
         source="header",
     )
 

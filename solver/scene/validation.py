@@ -356,10 +356,7 @@ def _contact_name_issues(raw: dict[str, Any], cyclic: bool) -> Iterator[Issue]:
     for steps, name in [*names, *groups]:
         key = steps[-1]
         if name in RESERVED_PREFIXES:
-            yield Issue(
-                steps,
-                f"= {name!r} is reserved in parameter paths: give the contact another {key}",
-            )
+            yield Issue(steps, f"= {name!r} is reserved in parameter paths: give the contact another {key}")
         if key == "group" and name in taken:
             yield Issue(steps, f"= {name!r} is also the name of a contact")
         if cyclic and "@" in name:
@@ -418,10 +415,7 @@ def _issues(raw: dict[str, Any], structure: dict[str, Any]) -> Iterator[Issue]:
     for steps, row in rows_of(raw, "aerodynamics"):
         yield from _places(steps, row, ("dof",), dofs)
         if not cyclic:
-            yield Issue(
-                steps,
-                "acts between the blades of a cyclic structure; this one has no sectors",
-            )
+            yield Issue(steps, "acts between the blades of a cyclic structure; this one has no sectors")
     tables = ("aerodynamics", "bodies", "nodes", "loads", "dampers", "contacts")
     rows = [row for table in tables for row in rows_of(raw, table)]
     named = [((*steps, "name"), row["name"]) for steps, row in rows if isinstance(row.get("name"), str)]

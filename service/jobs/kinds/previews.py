@@ -94,11 +94,7 @@ def _scene(request: PreviewRequest, source: SceneSource, points: int, harmonics:
     issues: list[Issue] = []
     if request.harmonics > MOST_HARMONICS:
         issues.append(
-            Issue(
-                ("harmonics",),
-                f"of a preview must be at most {MOST_HARMONICS}",
-                request.harmonics,
-            )
+            Issue(("harmonics",), f"of a preview must be at most {MOST_HARMONICS}", request.harmonics)
         )
     unknowns = dofs_solved(scene) * (2 * request.harmonics + 1)
     if unknowns > MOST_UNKNOWNS:

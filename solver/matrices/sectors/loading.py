@@ -260,10 +260,8 @@ def _refuse_unreduced(tables: Mapping[str, Any], found: MatrixSet) -> None:
     for key in keys[:1]:
         raise SceneError.of(
             ("structure", key),
-            (
-                "does not go with `keep_modes` of a sector, which reduces symmetric M, K and C: leave "
-                "`keep_modes` out, or give such terms as [[couplings]] of the DOFs in use"
-            ),
+            "does not go with `keep_modes` of a sector, which reduces symmetric M, K and C: leave "
+            "`keep_modes` out, or give such terms as [[couplings]] of the DOFs in use",
         )
 
 
@@ -281,11 +279,9 @@ def _dense(found: MatrixSet) -> dict[str, object]:
         if matrix.shape[0] > MOST_DOFS:
             raise SceneError.of(
                 ("structure", key),
-                (
-                    f"has {matrix.shape[0]} rows, {MOST_DOFS} are the most without reduction: `stickslip "
-                    "import --sectors … --reduce` reduces them once; `keep_modes` = 40 (say) in "
-                    "[structure.cyclic] does it whenever the scene is loaded"
-                ),
+                f"has {matrix.shape[0]} rows, {MOST_DOFS} are the most without reduction: `stickslip "
+                "import --sectors … --reduce` reduces them once; `keep_modes` = 40 (say) in "
+                "[structure.cyclic] does it whenever the scene is loaded",
             )
     dense: dict[str, object] = {key: Matrix(matrix.toarray()) for key, matrix in found.matrices.items()}
     if found.parts:

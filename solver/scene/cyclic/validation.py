@@ -132,8 +132,6 @@ def _factor_issues(mistuning: dict[str, Any], sectors: object) -> Iterator[Issue
     if bad is not None:
         yield Issue(
             ("structure", "mistuning", "spread"),
-            (
-                f"= {read.spread:g} gives sector {bad} the factor {factors[bad]:.3g}, which must be > "
-                "0: choose a smaller spread or another `seed`"
-            ),
+            f"= {read.spread:g} gives sector {bad} the factor {factors[bad]:.3g}, which must be > "
+            "0: choose a smaller spread or another `seed`",
         )
