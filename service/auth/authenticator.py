@@ -91,7 +91,7 @@ _USED_EVERY = timedelta(minutes=1)
 _HALF_OF_IPV6 = 64
 
 
-class Doorkeeper:
+class Authenticator:
     """Turns keys into callers.
 
     Parameters

@@ -162,7 +162,7 @@ class Context:
 
 # Dependencies are asynchronous: others would be run in a thread each, which costs more than they do.
 async def context_of(request: Request) -> Context:
-    """The context of a request; the gate has put there who asks."""
+    """The context of a request; who asks was put there on admission."""
     return Context(request, service_behind(request), getattr(request.state, "caller", KEYLESS))
 
 

@@ -190,7 +190,7 @@ class Service:
         self._open = False
 
     def stop_waiting(self) -> None:
-        """Send everybody home who waits for a job."""
+        """End every request that waits for a job."""
         self.stopping.set()
         self.waiters.wake_all()
 

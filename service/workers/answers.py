@@ -23,7 +23,7 @@ from service.jobs.outputs import FailureKind, JobFailure
 from service.jobs.registry import RunOn, WarmUp
 from service.workers.base import Finished, Lost, Outcome, Stopped
 from service.workers.process_limits import ProcessLimits
-from service.workers.warm_pool import Asked, WarmPool
+from service.workers.warm_pool import WarmPool, WarmTask
 from solver.errors import Issue
 
 log = logging.getLogger("stickslip.answers")
@@ -114,12 +114,12 @@ class Answers(WarmPool):
             most = f"{self._limits.budget_seconds} s of processor time a minute"
             detail = f"what was computed for answers took more than {most}: ask again in {wait:.0f} s"
             raise TooManyRequestsError(detail, retry_after=max(1, round(wait)))
-        asked = Asked.of(task, spec, owner)
+        asked = WarmTask.of(task, spec, owner)
         with self._waited_for(asked):
             outcome = await self._outcome(asked)
         return await self._found(outcome, owner, about)
 
-    async def _outcome(self, asked: Asked) -> Outcome:
+    async def _outcome(self, asked: WarmTask) -> Outcome:
         """Wait for a computation; longer while the first process starts, which the kernels may hold up."""
         waiting = asyncio.wrap_future(asked.outcome)
         for _ in range(_PATIENCE_AT_THE_START):
@@ -130,14 +130,14 @@ class Answers(WarmPool):
                 break
         raise QueueFullError("no process was free to compute the answer", _RETRY_SECONDS)
 
-    def _admit(self, asked: Asked) -> None:
+    def _admit(self, asked: WarmTask) -> None:
         if self._closed:
             raise QueueFullError("the service stops", _RETRY_SECONDS)
         others = sum(other.owner == asked.owner for other in self._waiting)
         if len(self._waiting) >= MOST_WAITING or others >= MOST_WAITING // 2:
             raise QueueFullError(f"{others} requests of yours wait to be computed", _RETRY_SECONDS)
 
-    def _next(self) -> Asked | None:
+    def _next(self) -> WarmTask | None:
         """The first, but of each owner no more at a time than leaves a process for another."""
         busy = Counter(asked.owner for asked in self._running.values())
         # While the process that an owner ended starts anew, the other one is not for the same owner.
@@ -147,7 +147,7 @@ class Answers(WarmPool):
                 return asked
         return None
 
-    def _concluded(self, asked: Asked, outcome: Outcome) -> None:
+    def _concluded(self, asked: WarmTask, outcome: Outcome) -> None:
         if isinstance(outcome, Lost):
             self._ended_one.add(asked.owner)
         else:

@@ -136,23 +136,23 @@ def results_answer(service: Service, job_id: str, caller: Caller) -> Response:
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
+class SubmissionHeaders:
     """What the headers of a submission ask for: its idempotency key, and the seconds to wait for the end."""
 
     key: str | None
     seconds: float | None
 
 
-async def asked(context: InContext) -> Asked:
+async def asked(context: InContext) -> SubmissionHeaders:
     """Read the headers of a submission; `idempotency_key` lists the errors."""
     headers = context.request.headers
-    return Asked(
+    return SubmissionHeaders(
         key=idempotency_key(headers),
         seconds=preferred_wait(headers, context.service.settings.max_wait_seconds),
     )
 
 
-AskedDependency = Annotated[Asked, Depends(asked)]
+AskedDependency = Annotated[SubmissionHeaders, Depends(asked)]
 
 
 def submissions(registry: Registry) -> APIRouter:
@@ -175,7 +175,9 @@ def submissions(registry: Registry) -> APIRouter:
     return taking
 
 
-async def _submit(context: Context, asked: Asked, raw: dict[str, Any], body: JobRequest) -> Response:
+async def _submit(
+    context: Context, asked: SubmissionHeaders, raw: dict[str, Any], body: JobRequest
+) -> Response:
     service, caller = context.service, context.caller
     kind = service.registry.get(raw[KIND])
     request = request_of(kind, body)
