@@ -70,7 +70,7 @@ class InvalidRequestError(ServiceError):
 
 def issues_to_json(issues: Iterable[Issue]) -> list[list[object]]:
     """Return issues as another process reads them, see `InvalidRequestError.from_json`."""
-    return [[list(one.subject), one.wanted, repr(one.got), one.named] for one in issues]
+    return [[list(one.subject), one.words({}), repr(one.got), one.named] for one in issues]
 
 
 class UnknownKindError(ServiceError):

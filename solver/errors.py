@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from types import MappingProxyType
 from typing import NamedTuple, Self
 
 Place = tuple[str | int, ...]
@@ -32,6 +33,17 @@ class Shown(str):
 
 
 UNSAID = Shown("")
+
+
+class Naming(str):
+    """What would be right with other keys in braces, ``needs {accuracy}``: each face names them too."""
+
+    __slots__ = ()
+
+
+class _Names(dict[str, str]):
+    def __missing__(self, key: str) -> str:
+        return f"`{key}`"
 
 
 class Issue(NamedTuple):
@@ -70,10 +82,16 @@ class Issue(NamedTuple):
         """The sentence, with the subject by its own name."""
         return self.said()
 
-    def said(self, name: str = "") -> str:
-        """Return the sentence, with what a face calls the subject."""
-        shown = repr(self.got)
-        sentence = f"{self.wanted}, got {shown}" if shown else self.wanted
+    def words(self, names: Mapping[str, str]) -> str:
+        """Return what would be right, with what a face calls other keys."""
+        if isinstance(self.wanted, Naming):
+            return self.wanted.format_map(_Names({key: f"`{one}`" for key, one in names.items()}))
+        return self.wanted
+
+    def said(self, name: str = "", names: Mapping[str, str] = MappingProxyType({})) -> str:
+        """Return the sentence, with what a face calls the subject, and other keys."""
+        shown, words = repr(self.got), self.words(names)
+        sentence = f"{words}, got {shown}" if shown else words
         if self.named:
             return f"`{name or self.name}` {sentence}"
         return f"`{name}`: {sentence}" if name else sentence

@@ -44,7 +44,7 @@ def _worded(issue: Issue, flags: Mapping[str, str], file: object) -> str:
     if key not in flags:
         return _told(issue) if file is None else f"{file}: {_told(issue)}"
     named = [flags[str(key)], *(part for part in parts if isinstance(part, str))]
-    return issue.said(" ".join(named))
+    return issue.said(" ".join(named), flags)
 
 
 class ShortfallError(Exception):

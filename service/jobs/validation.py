@@ -70,9 +70,8 @@ def _unknown_tag(error: Mapping[str, Any], location: Place) -> Issue:
     key = str(context["discriminator"]).strip("'")
     if error["type"] == "union_tag_not_found":
         return Issue((*location, key), "is missing")
-    return Issue(
-        (*location, key), f"must be one of {context['expected_tags']}", Shown(_short(error["input"][key]))
-    )
+    known = str(context["expected_tags"]).replace("'", "")
+    return Issue((*location, key), f"must be one of {known}", Shown(_short(error["input"][key])))
 
 
 def _short(value: object) -> str:

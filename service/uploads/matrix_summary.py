@@ -89,7 +89,7 @@ def _read(tables: dict[str, Any]) -> MatrixSet:
     if missing:
         words = {"M": "mass", "K": "stiffness"}
         raise SceneError(
-            [Issue(("structure", key), f"is missing: the {words[key]} matrix") for key in missing]
+            [Issue(("structure", key), f"(the {words[key]} matrix) is missing") for key in missing]
         )
     given = read_matrices(tables, Path())
     try:

@@ -9,7 +9,7 @@ from pydantic import ConfigDict, Field
 
 from service.jobs.common.scenes import HarmonicRequest, Number, ParameterPath, check
 from service.jobs.registry import Flag
-from solver.errors import Issue, Shown
+from solver.errors import Issue, Naming, Shown
 from solver.scene.descriptions import DISK_LOAD
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ def range_issues(request: RangeRequest, scene: Scene) -> list[Issue]:
     for key, value in (("from", request.start), ("to", request.stop)):
         issues += check(partial(scene.with_values, {path: value}), key)
     if request.start == request.stop:
-        issues.append(Issue(("to",), "must differ from the start", Shown(f"{request.stop!r} for both")))
+        issues.append(Issue(("to",), Naming("must differ from {from}"), Shown(f"{request.stop!r} for both")))
     return issues or check(partial(scale_of, scene, path, request.start, request.stop), "parameter")
 
 
@@ -54,11 +54,12 @@ def band_issues(scene: Scene, start: float | None, stop: float | None) -> list[I
     low, high = (
         end if given is None else given for end, given in zip(scene.observe.band, (start, stop), strict=True)
     )
-    return [] if low < high else [Issue(("to",), f"must be above the start, {low!r} Hz", high)]
+    return [] if low < high else [Issue(("to",), Naming(f"must be above {{from}} = {low!r} Hz"), high)]
 
 
 def law_issues(key: str, scene: Scene) -> list[Issue]:
     """Refuse contacts whose peaks cannot be tracked, as what is wrong with `key`."""
     from solver.studies.peaks.tracker import check_laws
 
-    return check(partial(check_laws, scene), key)
+    found = check(partial(check_laws, scene))
+    return [Issue((key,), issue.message, named=False) for issue in found]

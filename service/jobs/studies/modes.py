@@ -13,7 +13,7 @@ from service.jobs.common.sizes import MOST_MOTIONS, POINTS_OF_A_SWEEP, balance_i
 from service.jobs.kind_view import Json, ReadSweep, StoredSweep
 from service.jobs.registry import Flag
 from service.jobs.study import Answer, Study, Watch
-from solver.errors import Issue
+from solver.errors import Issue, Naming
 from solver.modes.driven.results import PhaseResonance
 from solver.modes.results import NonlinearMode
 
@@ -97,16 +97,16 @@ class Modes(Study, HarmonicRequest):
         apart = self.phase_resonance and (self.performance or fed)
         words = (
             ("exact_peaks", bool(self.exact_peaks and not self.performance),
-             f"needs `performance`, which is false here, got {self.exact_peaks!r}"),
+             f"needs {{performance}}, which is false here, got {self.exact_peaks!r}"),
             ("from", self.start <= 0.0, f"must be greater than 0, got {self.start!r}"),
             ("to", self.start >= self.stop,
              f"must be above `from` = {self.start!r} √kg m, got {self.stop!r}"),
             ("disturbance", self.disturbance is not None and not fed,
-             "needs `aero_damping`: without gas that feeds, every disturbance dies down"),
-            ("mode_alone", self.mode_alone and not fed, "needs `aero_damping`: it says what the gas feeds"),
-            ("phase_resonance", apart, "is a curve of its own: leave `performance` and `aero_damping` out"),
+             "needs {aero_damping}: without gas that feeds, every disturbance dies down"),
+            ("mode_alone", self.mode_alone and not fed, "needs {aero_damping}: it says what the gas feeds"),
+            ("phase_resonance", apart, "is a curve of its own: leave {performance} and {aero_damping} out"),
         )  # fmt: skip
-        wrong = [Issue((key,), said) for key, bad, said in words if bad]
+        wrong = [Issue((key,), Naming(said)) for key, bad, said in words if bad]
         return wrong + check(lambda: check_mode(at_nodal_diameter(scene, self.nodal_diameter), self.mode))
 
     def sizes(self, scene: Scene) -> list[Issue]:

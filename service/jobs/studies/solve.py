@@ -19,7 +19,7 @@ from service.jobs.common.results import Amplitude, KindResult
 from service.jobs.common.scenes import FrequencyHz, HarmonicRequest
 from service.jobs.registry import Flag
 from service.jobs.study import Answer, Study, Watch
-from solver.errors import Issue, Shown
+from solver.errors import Issue, Naming, Shown
 from solver.response.stability import MOST_STARTS
 from solver.scene.descriptions import DAMPER_LOAD
 
@@ -109,7 +109,7 @@ class Solve(Study, HarmonicRequest):
         """Return what does not go together, and words of effects that are none."""
         alone = {"accuracy": self.accuracy, "exact": self.exact or None} if self.every else {}
         return effects_issues(self.effects) + [
-            Issue((key,), "does not go with `all`", Shown(f"{given!r}: leave one of them out"))
+            Issue((key,), Naming("does not go with {all}"), Shown(f"{given!r}: leave one of them out"))
             for key, given in alone.items()
             if given is not None
         ]

@@ -32,7 +32,7 @@ from service.jobs.kind_view import Json, ReadSweep, StoredSweep
 from service.jobs.outputs import JobOutput, Progress, ShouldStop
 from service.jobs.registry import Flag, JobKind
 from service.jobs.study import Answer, Study, Watch
-from solver.errors import Issue, SettingError, Shown
+from solver.errors import Issue, Naming, SettingError, Shown
 from solver.scene.descriptions import DISK_LOAD
 
 if TYPE_CHECKING:
@@ -160,10 +160,10 @@ class Sweep(Study, HarmonicRequest):
             elif end <= 0.0:
                 issues.append(Issue((name,), "must be a frequency > 0 Hz", end))
         if ends[0] is not None and ends[0] == ends[1]:
-            issues.append(Issue(("to",), "must differ from the start", Shown(f"{ends[1]!r} for both")))
+            issues.append(Issue(("to",), Naming("must differ from {from}"), Shown(f"{ends[1]!r} for both")))
         at = self.frequency_hz
         if over_frequency and at is not None:
-            words = "must be left out when the frequency is swept"
+            words = Naming("must be left out when the frequency is swept, from {from} to {to}")
             issues.append(Issue(("frequency_hz",), words, at))
         if not over_frequency and at is None:
             issues.append(Issue(("frequency_hz",), f"is needed for a sweep of `{path}`"))
