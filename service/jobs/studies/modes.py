@@ -100,7 +100,7 @@ class Modes(Study, HarmonicRequest):
              f"needs {{performance}}, which is false here, got {self.exact_peaks!r}"),
             ("from", self.start <= 0.0, f"must be greater than 0, got {self.start!r}"),
             ("to", self.start >= self.stop,
-             f"must be above `from` = {self.start!r} √kg m, got {self.stop!r}"),
+             f"must be above {{from}} = {self.start!r} √kg m, got {self.stop!r}"),
             ("disturbance", self.disturbance is not None and not fed,
              "needs {aero_damping}: without gas that feeds, every disturbance dies down"),
             ("mode_alone", self.mode_alone and not fed, "needs {aero_damping}: it says what the gas feeds"),

@@ -194,7 +194,7 @@ def test_bad_scenes_are_named(run: Run, tmp_path: Path, command: str, case: str)
         ("design two-dof --weight peak=-1", ["--weight", "-1.0"]),
         ("design two-dof --forbidden 1", ["--forbidden", "LO HI"]),
         ("design two-dof --forbidden 1 2", ["--limit", "must be given"]),
-        ("design two-dof --limit 1 --forbidden 1 2 --forbidden 2 1", ["--forbidden"]),
+        ("design two-dof --limit 1 --forbidden 1 2 --forbidden 2 1", ["`--forbidden`", "got [2.0, 1.0]"]),
         ("design two-dof --limit 1 --speeds 1 few", ["--speeds", "few"]),
         ("design two-dof --max-work bumper=1", ["--max-work", "bumper", "damper"]),
         ("design two-dof --max-work damper=1 --max-work damper=2", ["--max-work", "damper", "twice"]),
