@@ -127,7 +127,9 @@ def _with_enough_harmonics(
     if problem is None:
         return found, tried
     same = problem.cases is found.problem.cases
-    again = _solved(problem, tally.again(found.evaluations), should_stop, on_best, found)
+    told = tuple(one for one in tried if one.harmonics == problem.harmonics)  # its responses serve again
+    seen = replace(found, history=(*found.history, *told))
+    again = _solved(problem, tally.again(found.evaluations), should_stop, on_best, seen)
     if again.status is DesignStatus.STOPPED:
         return replace(found, status=DesignStatus.STOPPED), tried
     if again.evaluation is None or not again.evaluation.good:
@@ -154,7 +156,7 @@ def _solved(
         tracked = tracked_optimum(problem, on_progress=on_progress, should_stop=should_stop, on_best=on_best)
         if problem.method is Method.TRACKED or tracked.status is not DesignStatus.NOT_TRACKED:
             return _of_tracked(problem, tracked, time.perf_counter() - begun)
-    earlier = () if before is None else (*before.history, *before.looked_at)
+    earlier = () if before is None else (*before.looked_at, *before.history)
     search = Search(problem, on_progress, should_stop, on_best=on_best, before=earlier)
     eased = Eased.of(search, tracked)
     if eased.proven is not None:

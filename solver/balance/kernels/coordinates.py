@@ -125,7 +125,7 @@ def _pushed_through(system: System, point: Evaluation, x: Real, y: Real) -> None
     forces, gathered = np.empty(x.size), np.empty(y.size)
     slopes_times(system, point, False, x, forces)
     _gather(system, forces, gathered)
-    _respond(system.ks, point.reduced, False, gathered, y)
+    _respond(system.ks, point.responses, False, gathered, y)
 
 
 @apart
@@ -170,7 +170,7 @@ def _assemble(system: System, point: Evaluation) -> None:
             for q in range(m):
                 copy_to(right[q * r + a], springs[here + q, a])
             for b in range(r):
-                entry = point.reduced[i, a, b]
+                entry = point.responses[i, a, b]
                 left[a, b] = entry.real
                 if m == 2:
                     left[a, r + b], left[r + a, b], left[r + a, r + b] = entry.imag, -entry.imag, entry.real
@@ -193,7 +193,7 @@ def factorise_coordinates(
     for i in range(system.ks.size):
         for a in range(r):
             for b in range(r):
-                point.reduced[i, a, b] = linear.A[0, i, a, b]
+                point.responses[i, a, b] = linear.A[0, i, a, b]
     _fill_springs(system, point)
     _assemble(system, point)
     size, lu = r * n, point.lu
@@ -202,9 +202,9 @@ def factorise_coordinates(
         corner = weight_p * tangent[tangent.size - 1]
         for i in range(point.border.size):
             point.border[i] = weight_u * tangent[i]
-            point.held_slope[i] = point.dr_dp[i]
+            point.settled[i] = point.dr_dp[i]
             corner -= point.border[i] * point.dr_dp[i]
-        _pushed_through(system, point, point.held_slope, column)
+        _pushed_through(system, point, point.settled, column)
         _gather(system, point.border, row)
         for i in range(size):
             lu[i, size], lu[size, i] = column[i], -row[i]
@@ -229,7 +229,7 @@ def step_in_coordinates(system: System, point: Evaluation, x: Real) -> None:
     if size > inner:
         x[nt] = y[inner]
         for i in range(nt):
-            x[i] -= y[inner] * point.held_slope[i]
+            x[i] -= y[inner] * point.settled[i]
     _take_away(system, y, x)
 
 
@@ -240,7 +240,7 @@ def step_in_coordinates_transposed(system: System, point: Evaluation, x: Real) -
     z, moved, along, back = np.empty(inner), np.empty(inner), np.zeros(nt), np.empty(nt)
     _gather(system, x, z)
     back_substitute_transposed(point.lu, inner, point.pivots, z)
-    _respond(system.ks, point.reduced, True, z, moved)
+    _respond(system.ks, point.responses, True, z, moved)
     _take_away(system, moved, along)
     slopes_times(system, point, True, along, back)
     for i in range(nt):

@@ -1,16 +1,24 @@
 """The Jacobian of the balance: assembled whole where it is looked at, condensed where a step is solved for.
 
 A contact that sticks all the time from the unloaded state is a spring, F = kt u (in space one for each of
-its directions), and one that never touches has F = 0: their ports (`held`) do not couple the harmonics, so
-they are eliminated exactly, harmonic by harmonic. With g = slope − shift of those ports, G = ∂F/∂U − shift of
-the others (`free`), and
+its directions), one that never touches has F = 0, and the normal force of one that never opens is a spring's
+whatever friction does: the forces of such ports (`held`) do not couple the harmonics, so they are eliminated
+exactly, harmonic by harmonic. With g = slope − shift of those ports, G = ∂F/∂U − shift, of which the rows of
+the others (`free`) are looked at, and
 
-  D = I + A_hh g,  W = D⁻¹ A_hf,  V = A_fh g D⁻¹,  A' = A_ff − V A_hf,
+  D = I + A_hh g,  V = A_fh g D⁻¹,  T b = (b_f − V b_h, D⁻¹ b_h),  R = (A_ff − V A_hf, D⁻¹ A_hf),
 
-the step of the free ports solves (I + A' G) δ_f = r_f − V r_h and δ_h = D⁻¹ r_h − W G δ_f. A bordered system
-[dr/du dr/dλ; tᵀ w] condenses in the same way. Nothing is approximated: a contact that begins to slip is free
-at the next evaluation. Where fewer leading ports move all others, `solver.balance.kernels.coordinates` takes
-its place.
+the step δ that solves dr/du δ = b is T b − R φ with the forces φ of the free ports. Where friction feels
+ports that are eliminated these are the unknowns, (I + G R) φ = G T b, and a bordered system [dr/du d; tᵀ w]
+condenses to
+
+  [I + G R, G T d; −tᵀ R, w − tᵀ T d].
+
+Elsewhere the motions are, φ = G δ_f and (I + R_ff G) δ_f = (T b)_f, which loses nothing near resonances that
+nothing damps: there T b and R φ cancel. Both have the sign of det dr/du.
+
+Nothing is approximated: a contact that begins to slip is free at the next evaluation. Where fewer leading
+ports move all others, `solver.balance.kernels.coordinates` takes its place.
 """
 
 from __future__ import annotations
@@ -26,11 +34,12 @@ from solver.balance.kernels.coordinates import (
     step_in_coordinates_transposed,
 )
 from solver.balance.kernels.gauge import keep_means
-from solver.balance.kernels.slopes import take_slopes
+from solver.balance.kernels.slopes import slopes_times, take_slopes
 from solver.contacts.kernels.system import (
     AT_BRANCH_POINT,
     FREE,
     HELD,
+    MIXED,
     SIZE,
     UNHELD,
     Evaluation,
@@ -44,10 +53,13 @@ from solver.jit.lapack import (
     back_substitute_transposed,
     copy_block,
     copy_to,
+    dot,
     fill,
     fill_block,
     invert,
+    largest_entry,
     multiply,
+    set_to,
     take_block,
 )
 from solver.jit.lapack import factorise as factorise_block
@@ -103,35 +115,37 @@ def whole_jacobian(system: System, A: Complex, point: Evaluation, J: Real) -> No
 @compiled
 def _part(system: System, point: Evaluation) -> None:
     """Divide the ports into those kept and those eliminated; all are kept where nothing holds a part."""
-    free, held = 0, 0
+    free, held, mixed, before = 0, 0, 0, False
     whole = system.condense == 0 or point.counts[UNHELD] > 0
     for c in range(system.owner.size):
-        if whole or math.isnan(point.slopes[c]) or point.elastic[c] > 0.0:
+        kept = whole or math.isnan(point.slopes[c]) or point.elastic[c] > 0.0
+        if c > 0 and system.owner[c] == system.owner[c - 1] and kept != before:
+            mixed = 1
+        before = kept
+        if kept:
             point.free[free] = c
             free += 1
         else:
             point.held[held] = c
             held += 1
-    point.counts[FREE], point.counts[HELD] = free, held
+    point.counts[FREE], point.counts[HELD], point.counts[MIXED] = free, held, mixed
 
 
 @apart
 def _eliminate(system: System, linear: Receptance, point: Evaluation) -> bool:
-    """Fill D⁻¹, W, V and A' of all harmonics; False if one's D is singular."""
+    """Fill R, V and D⁻¹ of all harmonics into `responses`; False if one's D is singular."""
     free, held = point.counts[FREE], point.counts[HELD]
-    kept, gone = point.free, point.held
+    kept, gone = point.free[:free], point.held[:held]
     if held == 0:
         for i in range(system.ks.size):
-            for a in range(free):
-                for b in range(free):
-                    point.reduced[i, a, b] = linear.A[0, i, kept[a], kept[b]]
+            copy_block(point.responses[i], linear.A[0, i])
         return True
     D, inverse = np.empty((held, held), np.complex128), np.empty((held, held), np.complex128)
     W, down = np.empty((held, free), np.complex128), np.empty((held, free), np.complex128)
     V, up = np.empty((free, held), np.complex128), np.empty((free, held), np.complex128)
     taken = np.empty((free, free), np.complex128)
     for i in range(system.ks.size):
-        A = linear.A[0, i]
+        A, R = linear.A[0, i], point.responses[i]
         take_block(A, gone, gone, D)
         take_block(A, gone, kept, down)
         take_block(A, kept, gone, up)
@@ -150,35 +164,34 @@ def _eliminate(system: System, linear: Receptance, point: Evaluation) -> bool:
         multiply(V, down, taken)
         for a in range(free):
             for b in range(free):
-                point.reduced[i, a, b] = A[kept[a], kept[b]] - taken[a, b]
-        copy_block(point.inverse[i], inverse)
-        copy_block(point.W[i], W)
-        copy_block(point.V[i], V)
+                R[kept[a], kept[b]] = A[kept[a], kept[b]] - taken[a, b]
+            for h in range(held):
+                R[kept[a], gone[h]], R[gone[h], kept[a]] = V[a, h], W[h, a]
+        for h in range(held):
+            for other in range(held):
+                R[gone[h], gone[other]] = inverse[h, other]
     return True
 
 
 @apart
-def _assemble(system: System, point: Evaluation, J: Real) -> None:
-    """Fill the leading block of `J` with I + A' G."""
-    n, free = coefficient_count(system.ks), point.counts[FREE]
+def _assemble(system: System, point: Evaluation) -> None:
+    """Fill the leading block of the factors with I + R G of the free ports."""
+    n, free, J, kept = coefficient_count(system.ks), point.counts[FREE], point.lu, point.free
     for i in range(free * n):
-        for j in range(free * n):
-            J[i, j] = 0.0
+        fill(J[i, : free * n], 0.0)
     for i in range(system.ks.size):
-        here = cosine_position(system.ks, i)
-        has_sine = system.ks[i] > 0
+        here, has_sine = cosine_position(system.ks, i), system.ks[i] > 0
         for a in range(free):
-            row = a * n + here
-            b = 0
+            row, b = a * n + here, 0
             while b < free:
                 # The ports of an element are free together, and stand side by side.
-                e = system.owner[point.free[b]]
+                e = system.owner[kept[b]]
                 m = system.first_port[e + 1] - system.first_port[e]
                 for d in range(m):
+                    response = point.responses[i, kept[a], kept[b + d]]
                     for q in range(m):
-                        block = system.first_block[e] + d * m + q
-                        response = point.reduced[i, a, b + d]
-                        _add_block(J, point.G[block], row, (b + q) * n, here, response, has_sine)
+                        G = point.G[system.first_block[e] + d * m + q]
+                        _add_block(J, G, row, (b + q) * n, here, response, has_sine)
                 b += m
             J[row, row] += 1.0
             if has_sine:
@@ -187,60 +200,101 @@ def _assemble(system: System, point: Evaluation, J: Real) -> None:
 
 
 @apart
-def _times(
-    system: System, matrices: Complex, transposed: bool, rows: int, columns: int, x: Real, sign: float,
-    y: Real,
+def _assemble_mixed(system: System, point: Evaluation) -> None:
+    """Fill the leading block of the factors with the transpose of I + G R."""
+    n, free, lu = coefficient_count(system.ks), point.counts[FREE], point.lu
+    columns = np.empty((n, n))
+    for i in range(free * n):
+        fill(lu[i, : free * n], 0.0)
+        lu[i, i] = 1.0
+    for a in range(free):
+        e = system.owner[point.free[a]]
+        first, m = system.first_port[e], system.first_port[e + 1] - system.first_port[e]
+        for q in range(m):
+            G = point.G[system.first_block[e] + (point.free[a] - first) * m + q]
+            for i in range(n):
+                for j in range(n):
+                    columns[j, i] = G[i, j]
+            for b in range(free):
+                for i in range(system.ks.size):
+                    r = point.responses[i, first + q, point.free[b]]
+                    if r != 0.0:
+                        here = cosine_position(system.ks, i)
+                        _add_rows(lu, columns, b * n + here, a * n, here, r, system.ks[i] > 0)
+
+
+@compiled
+def _add_rows(
+    lu: Real, columns: Real, row: int, column: int, here: int, r: complex, has_sine: bool
 ) -> None:  # fmt: skip
-    """Add sign·(matrix of each harmonic) @ x to y, or with its conjugate transpose; x, y (ports·n,)."""
+    """Add what forces of one harmonic at a port bring about through the motion r of another one."""
+    real, imag = r.real, r.imag
+    if not has_sine:
+        for j in range(columns.shape[1]):
+            lu[row, column + j] += real * columns[here, j]
+        return
+    for j in range(columns.shape[1]):
+        cosine, sine = columns[here, j], columns[here + 1, j]
+        lu[row, column + j] += real * cosine - imag * sine
+        lu[row + 1, column + j] += imag * cosine + real * sine
+
+
+@apart
+def _times(
+    system: System, point: Evaluation, rows: Integer, columns: Integer, transposed: bool, x: Real,
+    sign: float, y: Real,
+) -> None:  # fmt: skip
+    """Add sign · (`responses` of `rows` to `columns`) x to y, or its transpose; x and y are of all ports."""
     n = coefficient_count(system.ks)
     for i in range(system.ks.size):
-        here = cosine_position(system.ks, i)
-        has_sine = system.ks[i] > 0
-        for row in range(rows):
+        here, has_sine = cosine_position(system.ks, i), system.ks[i] > 0
+        for c in rows:
             total = complex(0.0)
-            for column in range(columns):
-                at = column * n + here
+            for d in columns:
+                at = d * n + here
                 value = complex(x[at], -x[at + 1] if has_sine else 0.0)
-                entry = matrices[i, column, row].conjugate() if transposed else matrices[i, row, column]
+                entry = point.responses[i, d, c].conjugate() if transposed else point.responses[i, c, d]
                 total += entry * value
-            at = row * n + here
+            at = c * n + here
             y[at] += sign * total.real
             if has_sine:
                 y[at + 1] -= sign * total.imag
 
 
 @compiled
-def _gather(n: int, ports: Integer, count: int, source: Real, target: Real) -> None:
-    """Copy the coefficients of some ports to the front of `target`."""
-    for a in range(count):
-        for j in range(n):
-            target[a * n + j] = source[ports[a] * n + j]
+def _settled(system: System, point: Evaluation, x: Real, y: Real) -> None:
+    """Fill y = T x: the motions left of x once the ports eliminated have answered it."""
+    n, held = coefficient_count(system.ks), point.counts[HELD]
+    kept, gone = point.free[: point.counts[FREE]], point.held[:held]
+    copy_to(y, x)
+    if held > 0:
+        for h in gone:
+            fill(y[h * n : (h + 1) * n], 0.0)
+        _times(system, point, gone, gone, False, x, 1.0, y)
+        _times(system, point, kept, gone, False, x, -1.0, y)
 
 
 @compiled
-def _slopes_times(system: System, point: Evaluation, transposed: bool, x: Real, y: Real) -> None:
-    """Fill y = G x over the free ports, or Gᵀ x."""
-    n, free = coefficient_count(system.ks), point.counts[FREE]
-    for i in range(free * n):
-        y[i] = 0.0
-    b = 0
-    while b < free:
-        e = system.owner[point.free[b]]
-        m = system.first_port[e + 1] - system.first_port[e]
-        for d in range(m):
-            for q in range(m):
-                G = point.G[system.first_block[e] + d * m + q]
-                for i in range(n):
-                    if transposed:
-                        value = x[(b + d) * n + i]
-                        for j in range(n):
-                            y[(b + q) * n + j] += G[i, j] * value
-                    else:
-                        total = 0.0
-                        for j in range(n):
-                            total += G[i, j] * x[(b + q) * n + j]
-                        y[(b + d) * n + i] += total
-        b += m
+def _gather(n: int, ports: Integer, source: Real, target: Real) -> None:
+    """Copy the coefficients of some ports to the front of `target`."""
+    for a in range(ports.size):
+        copy_to(target[a * n : (a + 1) * n], source[ports[a] * n : (ports[a] + 1) * n])
+
+
+@compiled
+def _dot_of(n: int, ports: Integer, one: Real, other: Real) -> float:
+    """Return the scalar product of the coefficients of some ports."""
+    total = 0.0
+    for c in ports:
+        total += dot(one[c * n : (c + 1) * n], other[c * n : (c + 1) * n])
+    return total
+
+
+@compiled
+def _spread(n: int, ports: Integer, source: Real, target: Real) -> None:
+    """Copy them back."""
+    for a in range(ports.size):
+        copy_to(target[ports[a] * n : (ports[a] + 1) * n], source[a * n : (a + 1) * n])
 
 
 @apart
@@ -259,52 +313,58 @@ def factorise(
     """
     if is_reduced(system, linear):
         return factorise_coordinates(system, linear, point, tangent, weight_u, weight_p)
-    n, lu = coefficient_count(system.ks), point.lu
     _part(system, point)
     take_slopes(system, point)
     if not _eliminate(system, linear, point):
         return 0.0
-    _assemble(system, point, lu)
-    size = point.counts[FREE] * n
+    if point.counts[MIXED] == 0:
+        _assemble(system, point)
+    else:
+        _assemble_mixed(system, point)
+    size = point.counts[FREE] * coefficient_count(system.ks)
     point.counts[AT_BRANCH_POINT] = 0
     if weight_p > 0.0:
         _border(system, point, tangent, weight_u, weight_p)
         size += 1
     point.counts[SIZE] = size
-    return 1.0 if size == 0 else factorise_block(lu, size, point.pivots)
+    return 1.0 if size == 0 else factorise_block(point.lu, size, point.pivots)
 
 
 @apart
 def _border(system: System, point: Evaluation, tangent: Real, weight_u: float, weight_p: float) -> None:
-    """Put condensed dr/dλ and tangent around the leading block of the factors."""
-    n, lu = coefficient_count(system.ks), point.lu
-    free, held = point.counts[FREE], point.counts[HELD]
-    end = free * n
-    column, row, q = point.work[0], point.work[1], point.work[2]
-    for i in range(point.border.size):
+    """Put dr/dλ and the tangent, of motions or forces, around the leading block of the factors.
+
+    That of forces is scaled to 1: pivots are chosen among equations.
+    """
+    n, nt, lu = coefficient_count(system.ks), point.border.size, point.lu
+    kept, gone = point.free[: point.counts[FREE]], point.held[: point.counts[HELD]]
+    corner, end, along = weight_p * tangent[nt], kept.size * n, np.zeros(nt)
+    _settled(system, point, point.dr_dp, point.settled[:nt])
+    for i in range(nt):
         point.border[i] = weight_u * tangent[i]
-    corner = weight_p * tangent[tangent.size - 1]
-    _gather(n, point.free, free, point.dr_dp, column)
-    _gather(n, point.free, free, point.border, row)
-    if held > 0:
-        slope, along = np.empty(held * n), np.empty(held * n)
-        _gather(n, point.held, held, point.dr_dp, slope)
-        _gather(n, point.held, held, point.border, along)
-        for i in range(held * n):
-            point.held_slope[i] = 0.0
-        _times(system, point.inverse, False, held, held, slope, 1.0, point.held_slope)
-        _times(system, point.V, False, free, held, slope, -1.0, column)
-        for i in range(held * n):
-            corner -= along[i] * point.held_slope[i]
-        weighted = np.zeros(max(end, 1))
-        _times(system, point.W, True, free, held, along, 1.0, weighted)
-        _slopes_times(system, point, True, weighted, q)
-        for i in range(end):
-            row[i] -= q[i]
+    forces = point.work[0, :nt]
+    if point.counts[MIXED] == 0:
+        fill(forces, 0.0)
+        if gone.size > 0:
+            _times(system, point, kept, gone, True, point.border, 1.0, along)
+            slopes_times(system, point, True, along, forces)
+        for a in range(kept.size):
+            for i in range(n):
+                at = kept[a] * n + i
+                lu[a * n + i, end], lu[end, a * n + i] = point.settled[at], point.border[at] - forces[at]
+        lu[end, end] = corner - _dot_of(n, gone, point.border, point.settled)
+        return
+    corner -= dot(point.border, point.settled[:nt])
+    slopes_times(system, point, False, point.settled[:nt], forces)
+    _gather(n, kept, forces, lu[end])
+    _times(system, point, kept, kept, True, point.border, -1.0, along)
+    _times(system, point, kept, gone, True, point.border, -1.0, along)
+    _gather(n, kept, along, forces)
+    most = max(largest_entry(forces[:end]), abs(corner))
+    scale = 1.0 / most if most > 0.0 else 1.0
     for i in range(end):
-        lu[i, end] = column[i]
-        lu[end, i] = row[i]
-    lu[end, end] = corner
+        lu[i, end] = scale * forces[i]
+    lu[end, end], point.settled[nt] = scale * corner, scale
 
 
 @apart
@@ -318,51 +378,44 @@ def step_back(system: System, point: Evaluation, x: Real) -> None:
     if point.pushed.shape[1] > 0:
         step_in_coordinates(system, point, x)
         return
-    n = coefficient_count(system.ks)
-    free, held = point.counts[FREE], point.counts[HELD]
-    end, size = free * n, point.counts[SIZE]
-    bordered = size > end
-    rhs, z = point.work[0], point.work[1]
-    _gather(n, point.free, free, x, rhs)
-    last = x.size - 1
-    if bordered:
-        rhs[end] = x[last]
-    if held == 0:
+    n, nt, size = coefficient_count(system.ks), point.border.size, point.counts[SIZE]
+    kept, gone = point.free[: point.counts[FREE]], point.held[: point.counts[HELD]]
+    end, motions, forces, rhs = kept.size * n, point.work[0, :nt], point.work[1, :nt], point.work[2]
+    _settled(system, point, x[:nt], motions)
+    mixed = point.counts[MIXED] == 1
+    if mixed:
+        slopes_times(system, point, False, motions, forces)
+        _gather(n, kept, forces, rhs)
+        if size > end:
+            rhs[end] = (x[nt] - dot(point.border, motions)) * point.settled[nt]
+        back_substitute_transposed(point.lu, size, point.pivots, rhs)
+        _spread(n, kept, rhs, forces)
+    else:
+        _gather(n, kept, motions, rhs)
+        if size > end:
+            rhs[end] = x[nt] - _dot_of(n, gone, point.border, motions)
         back_substitute(point.lu, size, point.pivots, rhs)
-        for a in range(end):
-            x[a] = rhs[a]
-        if bordered:
-            x[last] = rhs[end]
-        return
-    given, moved = point.work[2], point.work[3]
-    _gather(n, point.held, held, x, given)
-    for i in range(held * n):
-        moved[i] = 0.0
-    _times(system, point.inverse, False, held, held, given, 1.0, moved)
-    _times(system, point.V, False, free, held, given, -1.0, rhs)
-    if bordered:
-        for h in range(held):
-            for j in range(n):
-                rhs[end] -= point.border[point.held[h] * n + j] * moved[h * n + j]
-    if size > 0:
-        back_substitute(point.lu, size, point.pivots, rhs)
-    if bordered:
-        x[last] = rhs[end]
-        for i in range(held * n):
-            moved[i] -= rhs[end] * point.held_slope[i]
-    _slopes_times(system, point, False, rhs, z)
-    _times(system, point.W, False, held, free, z, -1.0, moved)
-    for a in range(free):
-        copy_to(x[point.free[a] * n : (point.free[a] + 1) * n], rhs[a * n : (a + 1) * n])
-    for h in range(held):
-        copy_to(x[point.held[h] * n : (point.held[h] + 1) * n], moved[h * n : (h + 1) * n])
+    copy_to(x[:nt], motions)
+    if size > end:
+        x[nt] = rhs[end]
+        set_to(x[:nt], motions, -rhs[end], point.settled)
+    if mixed:
+        _times(system, point, kept, kept, False, forces, -1.0, x)
+    else:
+        _spread(n, kept, rhs, x)
+        if gone.size > 0:
+            fill(motions, 0.0)
+            _spread(n, kept, rhs, motions)
+            slopes_times(system, point, False, motions, forces)
+    if gone.size > 0:
+        _times(system, point, gone, kept, False, forces, -1.0, x)
 
 
 @apart
 def step_back_transposed(system: System, point: Evaluation, x: Real) -> None:
     """Solve with the transpose of what `factorise` factorised without a border, in place.
 
-    λ_f = (I + A' G)⁻ᵀ (b_f − Gᵀ Wᵀ b_h) and λ_h = D⁻ᵀ b_h − Vᵀ λ_f.
+    λ = Tᵀ (b − G_fᵀ (I + G_f R)⁻ᵀ Rᵀ b), or Tᵀ (λ_f, b_h) with (I + R G)ᵀ λ_f = b_f − Gᵀ R_hfᵀ b_h.
 
     Parameters
     ----------
@@ -371,25 +424,36 @@ def step_back_transposed(system: System, point: Evaluation, x: Real) -> None:
     if point.pushed.shape[1] > 0:
         step_in_coordinates_transposed(system, point, x)
         return
-    n = coefficient_count(system.ks)
-    free, held = point.counts[FREE], point.counts[HELD]
-    size = point.counts[SIZE]
-    rhs, z, given, moved = point.work[0], point.work[1], point.work[2], point.work[3]
-    _gather(n, point.free, free, x, rhs)
-    if held > 0:
-        _gather(n, point.held, held, x, given)
-        fill(moved, 0.0)
-        _times(system, point.W, True, free, held, given, 1.0, moved)
-        _slopes_times(system, point, True, moved, z)
-        for i in range(size):
-            rhs[i] -= z[i]
-    if size > 0:
+    n, nt, size = coefficient_count(system.ks), x.size, point.counts[SIZE]
+    kept, gone = point.free[: point.counts[FREE]], point.held[: point.counts[HELD]]
+    forces, motions, rhs = point.work[0, :nt], point.work[1, :nt], point.work[2]
+    fill(forces, 0.0)
+    _times(system, point, kept, gone, True, x, 1.0, forces)
+    if point.counts[MIXED] == 0:
+        slopes_times(system, point, True, forces, motions)
+        set_to(motions, x, -1.0, motions)
+        _gather(n, kept, motions, rhs)
         back_substitute_transposed(point.lu, size, point.pivots, rhs)
-    for a in range(free):
-        copy_to(x[point.free[a] * n : (point.free[a] + 1) * n], rhs[a * n : (a + 1) * n])
-    if held > 0:
-        fill(moved, 0.0)
-        _times(system, point.inverse, True, held, held, given, 1.0, moved)
-        _times(system, point.V, True, held, free, rhs, -1.0, moved)
-        for h in range(held):
-            copy_to(x[point.held[h] * n : (point.held[h] + 1) * n], moved[h * n : (h + 1) * n])
+        copy_to(motions, x)
+        _spread(n, kept, rhs, motions)
+    else:
+        _times(system, point, kept, kept, True, x, 1.0, forces)
+        _gather(n, kept, forces, rhs)
+        back_substitute(point.lu, size, point.pivots, rhs)
+        fill(forces, 0.0)
+        _spread(n, kept, rhs, forces)
+        slopes_times(system, point, True, forces, motions)
+        set_to(motions, x, -1.0, motions)
+    _settled_transposed(system, point, motions, x)
+
+
+@compiled
+def _settled_transposed(system: System, point: Evaluation, x: Real, y: Real) -> None:
+    """Fill y = Tᵀ x."""
+    n, held = coefficient_count(system.ks), point.counts[HELD]
+    kept, gone = point.free[: point.counts[FREE]], point.held[:held]
+    copy_to(y, x)
+    for h in gone:
+        fill(y[h * n : (h + 1) * n], 0.0)
+    _times(system, point, gone, gone, True, x, 1.0, y)
+    _times(system, point, gone, kept, True, x, -1.0, y)

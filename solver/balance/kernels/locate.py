@@ -110,12 +110,9 @@ def _on_plane(
     system: System, linear: Receptance, point: Evaluation, left: Real, right: Real, folds: bool, share: float,
     most: int, sharp: bool, found: Real, tangent: Real, x: Real, out: Real,
 ) -> tuple[bool, int]:  # fmt: skip
-    """Solve as `between` from the guess in `found`; `folds`: whether the branch turns between the points.
-
-    `sharp`: with one step more, by the factors of the tangent.
-    """
+    """Solve as `between` from the guess in `found`; `folds`: whether the branch turns between the points."""
     n = left.size - 1
-    chord, plane, u = np.empty(n + 1), np.empty(n), np.empty(n)
+    chord, plane = np.empty(n + 1), np.empty(n + 1)
     set_to(chord, right, -1.0, left)
     size, span = max(largest_entry(left[:n]), system.least_size), abs(chord[n])
     weight_u = 1.0 / (size * size) if size > 0.0 else 1.0
@@ -124,14 +121,37 @@ def _on_plane(
         # λ goes there and back, and only u tells the places on the arc apart.
         weight_p *= _AT_A_FOLD
     set_to(plane, left, share, chord)
-    copy_to(u, found)
-    good, iterations, p, norm = arc_newton(
-        system, linear, u, found[n], plane, left[n] + share * chord[n], chord, weight_u, weight_p, point, most
+    good, iterations, found[n], norm = arc_newton(
+        system, linear, found[:n], found[n], plane, plane[n], chord, weight_u, weight_p, point, most
     )
-    if not good:
-        return False, iterations
+    if good:
+        good = measured_on_plane(
+            system, linear, point, chord, weight_u, weight_p, sharp, norm, found, tangent, x, out
+        )
+    return good, iterations
+
+
+@apart
+def measured_on_plane(
+    system: System, linear: Receptance, point: Evaluation, chord: Real, weight_u: float, weight_p: float,
+    sharp: bool, norm: float, found: Real, tangent: Real, x: Real, out: Real,
+) -> bool:  # fmt: skip
+    """Measure the solution in `found`, which was evaluated last, with its tangent by the share of a chord.
+
+    Parameters
+    ----------
+    chord : (nt + 1,), λ last, as are the weights of the scalar product; with weight_u = 0 slopes are by λ.
+    sharp : with one step more, by the factors of the tangent.
+    norm : the residual left.
+    found, tangent, x, out : as in `between`.
+
+    Returns
+    -------
+    False where the Jacobian with the chord as its border is singular, or mechanics is not obeyed.
+    """
+    n, p = found.size - 1, found[-1]
     if factorise(system, linear, point, chord, weight_u, weight_p) == 0.0:
-        return False, iterations
+        return False
     for i in range(n):
         tangent[i] = 0.0
     tangent[n] = weight_p * chord[n] * chord[n]
@@ -139,25 +159,23 @@ def _on_plane(
         tangent[n] += weight_u * chord[i] * chord[i]
     step_back(system, point, tangent)
     if sharp and norm > _ROUNDED:
-        copy_to(chord[:n], point.residual)
-        chord[n] = 0.0
-        rebase(system, linear, u, point, chord)
-        step_back(system, point, chord)
-        set_to(found[:n], u, -1.0, chord[:n])
-        found[n] = p - chord[n]
+        u, step = found[:n].copy(), np.zeros(n + 1)
+        copy_to(step[:n], point.residual)
+        rebase(system, linear, u, point, step)
+        step_back(system, point, step)
+        set_to(found, found, -1.0, step)
         receptance(system, found[n], linear)
         again = evaluate(system, linear, found[:n], found[n], 0.0, point)
         if again < norm:
-            copy_to(u, found[:n])
-            p, norm = found[n], again
+            norm = again
         else:
+            copy_to(found[:n], u)
+            found[n] = p
             receptance(system, p, linear)
             norm = evaluate(system, linear, u, p, 0.0, point)
-    copy_to(found[:n], u)
-    found[n] = p
-    measure(system, linear, u, point, tangent[:n], tangent[n], x, out)
+    measure(system, linear, found[:n], point, tangent[:n], tangent[n], x, out)
     out[RESIDUAL] = norm
-    return out[LOST] <= ALLOWED, iterations
+    return bool(out[LOST] <= ALLOWED)
 
 
 @compiled

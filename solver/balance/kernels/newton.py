@@ -29,9 +29,9 @@ TARGET = 1e-11  # relative residual aimed at
 ACCEPTED = 1e-9  # relative residual still a solution when rounding allows no better
 # Factors serve another step where they are at least this large and the last one left this share at most.
 _KEPT_FROM, _KEPT = 100, 0.02
-# A step along an arc is given up if so many iterations leave more than this share of the first residual.
-_TRIED, _NO_NEARER = 3, 0.7
-_IN_VAIN = 2  # steps in a row that bring the residual no lower, after which one so large is given up
+# Steps in a row that leave more than this share of the least residual, after which one along an arc is given
+# up: between pieces that contacts change to and fro it would go round in circles.
+_IN_VAIN, _NO_NEARER = 3, 0.7
 _HALVINGS = 5
 _UPHILL_STEPS = 8
 _MOST = 25
@@ -121,8 +121,8 @@ def arc_newton(
     """
     n = u.size
     rhs, best = np.empty(n + 1), np.empty(n)
-    before, norm, first, stalls, vain, kept = np.inf, np.inf, np.inf, 0, 0, False
-    best_p, best_norm = p, np.inf
+    before, norm, stalls, vain, kept = np.inf, np.inf, 0, 0, False
+    best_p, best_norm, nearer = p, np.inf, np.inf
     iteration = 0
     for iteration in range(most + 1):
         receptance(system, p, linear)
@@ -130,21 +130,18 @@ def arc_newton(
         if not math.isfinite(norm):
             break
         vain += 1
+        if norm <= _NO_NEARER * nearer:
+            nearer, vain = norm, 0
         if norm < best_norm:
             copy_to(best, u)
-            best_p, best_norm, vain = p, norm, 0
+            best_p, best_norm = p, norm
         # A first stall far above the target may be a kink on the way; a second one is rounding.
         stalls = stalls + 1 if norm > 0.5 * before else 0
         settled = norm <= 0.1 * ACCEPTED or stalls > 1
         if norm <= TARGET or (norm <= ACCEPTED and stalls > 0 and settled):
             return True, iteration, p, norm
-        if iteration == 0:
-            first = norm
-        hopeless = iteration >= _TRIED and norm > _NO_NEARER * first and norm > ACCEPTED
-        if iteration == most or hopeless or norm > 1e3 * max(before, 1e-3):
+        if iteration == most or vain >= _IN_VAIN or norm > 1e3 * max(before, 1e-3):
             break
-        if vain >= _IN_VAIN and point.counts[SIZE] >= _KEPT_FROM:
-            break  # between pieces that contacts change to and fro it goes round in circles
         serves = _is_close(norm, before) or (norm <= _KEPT * before and point.counts[SIZE] >= _KEPT_FROM)
         if not (kept and serves):
             if factorise(system, linear, point, tangent, weight_u, weight_p) == 0.0:

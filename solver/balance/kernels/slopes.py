@@ -13,22 +13,27 @@ from solver.jit.separate import apart
 
 @compiled
 def springs_of(blocks: Real, slopes: Real) -> None:
-    """Fill slopes (m,) with the stiffness of each port where m² blocks of ∂F/∂U are springs', else NaN.
+    """Fill slopes (m,) with the stiffness of each port where the blocks of ∂F/∂U are a spring's, else NaN.
 
-    That is where it sticks all the time or is open: no port feels another's motion, no harmonic another.
+    Its force feels no other port's motion then, and no harmonic of it another one.
     """
-    m, n = slopes.size, blocks.shape[1]
+    m = slopes.size
     for a in range(m):
         slopes[a] = blocks[a * m + a, 0, 0]
-    for a in range(m):
         for b in range(m):
-            block = blocks[a * m + b]
-            for i in range(n):
-                for j in range(n):
-                    if block[i, j] != (slopes[a] if a == b and i == j else 0.0):
-                        for c in range(m):
-                            slopes[c] = np.nan
-                        return
+            if not _is_diagonal(blocks[a * m + b], slopes[a] if a == b else 0.0):
+                slopes[a] = np.nan
+                break
+
+
+@compiled
+def _is_diagonal(block: Real, value: float) -> bool:
+    """Return whether a block is `value` times the identity."""
+    for i in range(block.shape[0]):
+        for j in range(block.shape[1]):
+            if block[i, j] != (value if i == j else 0.0):
+                return False
+    return True
 
 
 @compiled

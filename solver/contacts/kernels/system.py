@@ -36,8 +36,8 @@ FREQUENCY, LEVEL, FORCE_PHASE, STRUCTURE = 0, 1, 2, 3
 # How Z⁻¹ is kept.
 MODES, POLES, DENSE = 0, 1, 2
 # Numbers in `Evaluation.counts`.
-FREE, HELD, SIZE, AT_BRANCH_POINT, UNHELD, PINNED = 0, 1, 2, 3, 4, 5
-COUNTS = 6
+FREE, HELD, SIZE, AT_BRANCH_POINT, UNHELD, PINNED, MIXED = 0, 1, 2, 3, 4, 5, 6
+COUNTS = 7
 # Numbers that say where and of what a receptance's A was filled.
 PLACE = 5
 
@@ -134,7 +134,7 @@ class Evaluation(NamedTuple):
     dF_dN: Real  # (n, 3)
     states: Integer  # (ne,)
     pieces: Integer  # (ne,) which smooth piece of its law a contact is on, see `events.piece_of`
-    slopes: Real  # (nc,) ∂F/∂U of a port where that is a spring's (stuck or separated), else NaN
+    slopes: Real  # (nc,) ∂F/∂U of a port whose force is a spring's (stuck, pressed, separated), else NaN
     segments: Real  # scratch
     jacobian: Real  # (nt, nt) dr/du
     lu: Real  # (nt + 1, nt + 1) factors of the condensed, perhaps bordered, Jacobian in their leading block
@@ -142,15 +142,14 @@ class Evaluation(NamedTuple):
     free: Integer  # (nc,) ports kept in it
     held: Integer  # (nc,) ports eliminated
     counts: Integer  # (COUNTS,) numbers of both, size of the factors, whether they belong to a branch point,
-    # the number of directions in which nothing holds a part, and that at the factors' point
+    # the number of directions in which nothing holds a part, and that at the factors' point; whether an
+    # element has both ports kept and eliminated
     G: Real  # (blocks, n, n) dF_dU less the shift, at the factors' point
-    inverse: Complex  # (nk, nc, nc) D⁻¹, likewise below; see `solver.balance.kernels.jacobian`
-    V: Complex  # (nk, nc, nc)
-    W: Complex  # (nk, nc, nc)
-    reduced: Complex  # (nk, nc, nc) A' of the ports kept
+    responses: Complex  # (nk, nc, nc) R in the columns of ports kept, V and D⁻¹ in those of ports eliminated,
+    # likewise below; see `solver.balance.kernels.jacobian`. Of leading ports (nk, r, r), Â
     border: Real  # (nt,) the weighted tangent
-    held_slope: Real  # (nt,) D⁻¹ dr/dλ of the ports eliminated
-    work: Real  # (4, nt + 1) scratch
+    settled: Real  # (nt + 1,) T dr/dλ, and what the border is scaled with
+    work: Real  # (3, nt + 1) scratch
     gauge: Real  # (nr, nc) motions of the ports that nothing holds, see `solver.balance.kernels.gauge`
     unheld: Real  # (nr, nr) forces along them, over the rigid-body motions
     elastic: Real  # (nc,) stiffness of contacts that carry all the mean force they can [N/m], else 0
@@ -228,9 +227,9 @@ def evaluation_arrays(point: Evaluation) -> Evaluation:
     return Evaluation(
         point.residual, point.dr_dp, point.F, point.dF_dU, point.dF_dp, point.dF_dkt, point.dF_dmu,
         point.dF_dN, point.states, point.pieces, point.slopes, point.segments, point.jacobian, point.lu,
-        point.pivots, point.free, point.held, point.counts, point.G, point.inverse, point.V, point.W,
-        point.reduced, point.border, point.held_slope, point.work, point.gauge, point.unheld,
-        point.elastic, point.pinned, point.pushed, point.springs, point.rows,
+        point.pivots, point.free, point.held, point.counts, point.G, point.responses, point.border,
+        point.settled, point.work, point.gauge, point.unheld, point.elastic, point.pinned, point.pushed,
+        point.springs, point.rows,
     )  # fmt: skip
 
 
@@ -298,7 +297,7 @@ def _new_evaluation(system: System, spanned: bool) -> Evaluation:
     ne, nc, n, nk = system.laws.size, system.owner.size, coefficient_count(system.ks), system.ks.size
     blocks, nt, rigid = system.first_block[ne], nc * n, system.loose.shape[0]
     r = system.leading.size if spanned else 0
-    size, whole, ports = (r * n, 0, 0) if spanned else (nt, nt, nc)
+    size, whole = (r * n, 0) if spanned else (nt, nt)
     kept = r if spanned else nc
     return _evaluation_of(
         np.zeros(nt), np.zeros(nt), np.zeros((nc, n)), np.zeros((blocks, n, n)), np.zeros((nc, n)),
@@ -308,8 +307,7 @@ def _new_evaluation(system: System, spanned: bool) -> Evaluation:
         np.empty((whole, whole)),
         np.empty((size + 1, size + 1)), np.zeros(nt + 1, np.int32), np.zeros(nc, np.int64),
         np.zeros(nc, np.int64), np.zeros(COUNTS, np.int64), np.zeros((blocks, n, n)),
-        np.empty((nk, ports, ports), np.complex128), np.empty((nk, ports, ports), np.complex128),
-        np.empty((nk, ports, ports), np.complex128), np.empty((nk, kept, kept), np.complex128), np.zeros(nt),
-        np.zeros(nt), np.zeros((4, nt + 1)), np.zeros((rigid, nc)), np.zeros((rigid, rigid)), np.zeros(nc),
-        np.zeros((rigid, nc)), np.empty((nc, r * n)), np.empty((n, r, r * n)), np.empty((4 * r, r * n)),
+        np.empty((nk, kept, kept), np.complex128), np.zeros(nt), np.zeros(nt + 1), np.zeros((3, nt + 1)),
+        np.zeros((rigid, nc)), np.zeros((rigid, rigid)), np.zeros(nc), np.zeros((rigid, nc)),
+        np.empty((nc, r * n)), np.empty((n, r, r * n)), np.empty((4 * r, r * n)),
     )  # fmt: skip

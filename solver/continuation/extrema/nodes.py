@@ -273,7 +273,7 @@ class NodeSolver:
         workspace = self.workspace
         self.spent += int(locate_change(
             workspace.system, workspace.linear, workspace.point, found, ways, x, measures, states, allowed,
-            MOST_SOLVES, sides,
+            MOST_SOLVES, MOST_ITERATIONS, sides,
         ))  # fmt: skip
         ways *= onward
         for column in SLOPES:

@@ -110,9 +110,15 @@ class ChangeSearch:
         """Return the nodes with those in the middle of intervals beside changes, until cubics foretell these.
 
         Of the two neighbours of such an interval only the one that is not the change foretells anything.
+        Where a point of the branch stands next to the change, the interval on its other side is the longer
+        one, and as much beside the change.
         """
         departs = self._departs(nodes, top, FORETOLD_BESIDE)
-        wanted = (kinds == _BETWEEN) | ((kinds == _BEFORE) & departs[0]) | ((kinds == _BEHIND) & departs[1])
+        length = np.abs(np.diff(self._solver.look(nodes, top).at))
+        before, behind = kinds == _BEFORE, kinds == _BEHIND
+        before[:-1] |= before[1:] & (length[:-1] > length[1:])
+        behind[1:] |= behind[:-1] & (length[1:] > length[:-1])
+        wanted = (kinds == _BETWEEN) | (before & departs[0]) | (behind & departs[1])
         for _ in range(MOST_HALVINGS):
             if not wanted.any():
                 break

@@ -20,6 +20,7 @@ from solver.balance.kernels.coordinates import is_reduced, responses
 from solver.balance.kernels.jacobian import factorise, step_back
 from solver.balance.kernels.output import SAME_HEIGHT, extremes, observed_motion
 from solver.balance.kernels.residual import contact_values, evaluate
+from solver.balance.kernels.slopes import springs_of
 from solver.contacts.kernels.columns import KT, MU
 from solver.contacts.kernels.coulomb.force import contact_force
 from solver.contacts.kernels.stick_slip_events import FAILED
@@ -129,7 +130,7 @@ def slopes_along(
 
 @apart
 def _transpose(system: System, linear: Receptance, point: Evaluation) -> None:
-    """Transpose A and ∂F/∂U in place."""
+    """Transpose A and ∂F/∂U in place, and see anew which forces are springs'."""
     forget(linear)
     for i in range(system.ks.size):
         A = linear.A[0, i]
@@ -145,6 +146,9 @@ def _transpose(system: System, linear: Receptance, point: Evaluation) -> None:
                 for i in range(n):
                     for j in range(i + 1 if a == b else n):
                         one[i, j], other[j, i] = other[j, i], one[i, j]
+        if m > 1:
+            ports = point.slopes[system.first_port[e] : system.first_port[e + 1]]
+            springs_of(point.dF_dU[first : first + m * m], ports)
 
 
 @compiled

@@ -23,13 +23,48 @@ from solver.jit.lapack import back_substitute, back_substitute_transposed
 from solver.jit.lapack import factorise as factorise_block
 from solver.scene.scene import Scene
 
-# Scene, frequency [Hz], harmonics, free and held contacts.
+
+def pressed() -> Scene:
+    """Two points in space that rub and stay closed: friction feels the normal motions, which are springs'."""
+    names, k = ("p", "q"), 4.0 * math.pi**2
+    springs = [{"between": [f"{name}{axis}", "ground"], "k": k, "c": 0.4} for name in names for axis in "xyz"]
+    springs += [
+        {"between": ends, "k": 0.5 * k, "c": 0.1} for ends in (["px", "qx"], ["py", "qz"], ["px", "pz"])
+    ]
+    contacts = [
+        {
+            "name": f"on_{name}", "law": "coulomb-3d", "between": [f"{name}x", "ground"],
+            "between_second": [f"{name}y", "ground"], "normal_between": [f"{name}z", "ground"],
+            "kt": 0.7 * k, "kn": k, "mu": 0.3, "N0": 60.0,
+        }
+        for name in names
+    ]  # fmt: skip
+    return Scene.from_dict(
+        {
+            "name": "pressed",
+            "structure": {
+                "kind": "lumped",
+                "masses": {f"{name}{axis}": 1.0 for name in names for axis in "xyz"},
+                "springs": springs,
+            },
+            "contacts": contacts,
+            "excitation": [
+                {"dof": f"{name}{axis}", "amplitude": 20.0, "phase": 0.3 * i}
+                for i, (name, axis) in enumerate((name, axis) for name in names for axis in "xyz")
+            ],
+            "observe": {"dof": "px", "band": [0.7, 1.7]},
+        }
+    )
+
+
+# Scene, frequency [Hz], harmonics, free and held ports.
 CASES = [
     (two_dof(), 1.0, 11, (1, 0)),
     (two_dof(N0=1e5), 1.0, 11, (0, 1)),
     (bladed_disk(N0=150.0), 750.0, 11, (1, 1)),
     (bladed_disk(N0=150.0), 750.0, 3, (1, 1)),
     (mixed_disk(), 700.0, 7, None),
+    (pressed(), 0.8, 5, (4, 2)),
 ]
 
 
@@ -56,6 +91,31 @@ def test_solves_as_the_whole_jacobian(
         assert direct == pytest.approx(np.linalg.solve(J, rhs), rel=1e-9, abs=1e-10 * np.abs(direct).max())
         exact = np.linalg.solve(J.T, rhs)
         assert transposed == pytest.approx(exact, rel=1e-9, abs=1e-10 * np.abs(exact).max())
+
+
+@pytest.mark.parametrize(("scene", "frequency", "harmonics", "parts"), CASES)
+def test_solves_as_the_whole_jacobian_with_a_border(
+    scene: Scene, frequency: float, harmonics: int, parts: tuple[int, int] | None
+) -> None:
+    workspace = Workspace.of(build(scene, harmonics=harmonics))
+    found = workspace.solve(2.0 * math.pi * frequency, None)
+    fill_jacobian(workspace.system, workspace.linear, workspace.point)
+    point, n = evaluation_by_value(workspace.point), found.u.size
+    rng = np.random.default_rng(6)
+    tangent, weight_u, weight_p = rng.normal(size=n + 1), 1.0 / np.abs(found.u).max() ** 2, 3.0
+    tangent[:n] *= np.abs(found.u).max()
+    border = np.append(weight_u * tangent[:n], weight_p * tangent[n])
+    whole = np.vstack([np.column_stack([point.jacobian, point.dr_dp]), border])
+    sign = factorise(workspace.system, workspace.linear, workspace.point, tangent, weight_u, weight_p)
+    if parts is not None:
+        assert (point.counts[FREE], point.counts[HELD]) == parts
+    assert sign == np.linalg.slogdet(whole)[0]
+    rhs = rng.normal(size=n + 1)
+    x = rhs.copy()
+    step_back(workspace.system, workspace.point, x)
+    exact = np.linalg.solve(whole, rhs)
+    for part in (slice(n), slice(n, n + 1)):
+        assert x[part] == pytest.approx(exact[part], rel=1e-8, abs=1e-9 * np.abs(exact[part]).max())
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 4, 5, 7, 24, 36, 37, 60])

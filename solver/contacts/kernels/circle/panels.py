@@ -59,6 +59,21 @@ def curves_at(waves: Array, tau: Number, out: Array) -> None:
 
 
 @compiled
+def _slopes_at(waves: Array, tau: Number, out: Array) -> None:
+    """Fill in `out` (CURVES,) what a direction turns by: L and the slopes of X, Y and L."""
+    cos1, sin1 = np.cos(tau), np.sin(tau)
+    cosine, sine = cos1, sin1
+    load, dx, dy, rise = waves[LIMIT, 0, 0], 0.0 * tau, 0.0 * tau, 0.0 * tau
+    for k in range(1, waves.shape[2]):
+        load += waves[LIMIT, 0, k] * cosine + waves[LIMIT, 1, k] * sine
+        rise += k * (waves[LIMIT, 1, k] * cosine - waves[LIMIT, 0, k] * sine)
+        dx += k * (waves[X, 1, k] * cosine - waves[X, 0, k] * sine)
+        dy += k * (waves[Y, 1, k] * cosine - waves[Y, 0, k] * sine)
+        cosine, sine = cosine * cos1 - sine * sin1, sine * cos1 + cosine * sin1
+    out[LIMIT], out[DX], out[DY], out[DLIMIT] = load, dx, dy, rise
+
+
+@compiled
 def turning(at: Array, kappa: Number, theta: Number) -> tuple[Number, Number, Number, Number]:
     """Return F, ∂F/∂θ, g and ∂g/∂θ with the curves `at` a point."""
     c, s = np.cos(theta), np.sin(theta)
@@ -167,11 +182,13 @@ def solve_panel(
 ) -> bool:  # fmt: skip
     """Solve R = 0 at the nodes of [begin, end] by Newton's method from `theta`, or a `fresh` guess.
 
-    On return `nodes` has the curves at the nodes and column 1 of `right` ∂θ/∂θ0. False if it fails.
+    On return `nodes` has L and the slopes of X, Y and L at the nodes, all curves at the last one, and `right`
+    ∂θ/∂θ0 as its column 1. False if it fails.
     """
     h = end - begin
-    for i in range(STAGES):
-        curves_at(waves, begin + h * NODES[i], nodes[i])
+    for i in range(STAGES - 1):
+        _slopes_at(waves, begin + h * NODES[i], nodes[i])
+    curves_at(waves, end, nodes[STAGES - 1])
     if fresh:
         _guess(nodes, kappa, h, theta0, theta)
     for _ in range(NEWTON_STEPS):

@@ -57,6 +57,7 @@ SMALL_TAIL = 1e-6  # integrals over a panel are right to nearly the square of it
 LEAST_PANEL, SHORT_PANEL = 1e-13, 1e-9  # rad
 NOWHERE = 2.0  # no place in a panel, which is 0..1
 NEAR = 1e-6  # of a panel, within which the end of a slip is looked for
+CLOSED_IN = 1e-11  # rad: there the rate of slip is so small that the force is right to its square
 # Lengths in which directions decay: of the first panel, the same where the force begins along the motion (its
 # derivatives alone have a transient), and after how many nothing is left to be resolved.
 FIRST_PANEL, ALIGNED_PANEL, DECAYED = 3.0, 6.0, 24.0
@@ -162,7 +163,7 @@ def _end_of_slip(
         fall += (c * last[DY] / kappa - s * last[DX]) * slope
         step = -slip_rate(last, kappa, angle) / fall if fall < 0.0 else 0.0
         step = min(max(step, -0.5 * (end - begin)), 0.5 * (end - begin))
-        if abs(step) < 1e-14 * (1.0 + abs(end)) or turn == 11:
+        if abs(step) < CLOSED_IN * (1.0 + abs(end)) or turn == 11:
             break
         moved = (end + step - begin) / (end - begin)
         old = theta.copy()

@@ -12,25 +12,14 @@ import math
 
 import numpy as np
 
-from solver.balance.kernels.jacobian import factorise, step_back
-from solver.balance.kernels.mechanics import ALLOWED
-from solver.balance.kernels.newton import newton
-from solver.balance.kernels.output import (
-    HIGH,
-    HIGH_SLOPE,
-    LOST,
-    LOW,
-    LOW_SLOPE,
-    PIECE,
-    RESIDUAL,
-    measure,
-    piece,
-)
+from solver.balance.kernels.locate import measured_on_plane
+from solver.balance.kernels.newton import arc_newton, newton
+from solver.balance.kernels.output import HIGH, HIGH_SLOPE, LOW, LOW_SLOPE, PIECE, piece
 from solver.balance.kernels.residual import contact_values, element
 from solver.contacts.kernels.columns import KT, MU
 from solver.contacts.kernels.state_durations import find_segments
 from solver.contacts.kernels.stick_slip_events import piece_of
-from solver.contacts.kernels.system import Evaluation, Receptance, System
+from solver.contacts.kernels.system import SIZE, Evaluation, Receptance, System
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Integer, Real, coefficient_count
 from solver.jit.lapack import copy_to
@@ -39,6 +28,7 @@ from solver.linear.kernels.receptance import receptance
 
 _FORETOLD = 5  # halvings of the interpolated motion: the cubic is no better than their result
 _BEYOND = 0.1  # share of a step between two solutions by which the next one goes beyond the change foretold
+_LARGE = 100  # unknowns from which steps are tried first for which old factors may serve
 _NEAREST = 1e-3  # share of the interval left next to an end
 
 
@@ -121,30 +111,10 @@ def _settled(measures: Real, width: float, allowed: float) -> bool:
     return True
 
 
-@compiled
-def _solve_at(
-    system: System, linear: Receptance, point: Evaluation, u: Real, p: float, way: Real, x: Real, out: Real
-) -> tuple[bool, int]:
-    """Solve at λ = p from `u`, in place, and measure; `way` (nt + 1,) becomes the slopes by λ."""
-    n = u.size
-    receptance(system, p, linear)
-    good, iterations, norm = newton(system, linear, u, p, 0.0, point)
-    if not good or factorise(system, linear, point, way[:n], 0.0, 0.0) == 0.0:
-        return False, iterations
-    for i in range(n):
-        way[i] = -point.dr_dp[i]
-    way[n] = 1.0
-    step_back(system, point, way[:n])
-    measure(system, linear, u, point, way[:n], 1.0, x, out)
-    out[RESIDUAL] = norm
-    finite = math.isfinite(out[HIGH] + out[LOW] + out[HIGH_SLOPE] + out[LOW_SLOPE])
-    return finite and out[LOST] <= ALLOWED, iterations
-
-
 @apart
 def locate_change(
     system: System, linear: Receptance, point: Evaluation, found: Real, ways: Real, x: Real, measures: Real,
-    states: Integer, allowed: float, trials: int, sides: Integer,
+    states: Integer, allowed: float, trials: int, most: int, sides: Integer,
 ) -> int:  # fmt: skip
     """Close in on the first change of a contact's piece between two points of a branch.
 
@@ -154,7 +124,7 @@ def locate_change(
         measures : (2, MEASURES) with slopes by λ; states : (2, ne). They become those of the
         nearest solutions before and behind the change.
     allowed : amplitude [m] up to which a maximum between both sides does not matter.
-    trials : solutions at most.
+    trials : solutions at most; most : Newton iterations of each.
     sides : (2,) 1 where such a solution was found, else 0; filled.
 
     Returns
@@ -162,29 +132,43 @@ def locate_change(
     Newton iterations.
     """
     n = found.shape[1] - 1
-    row, way, at, out = np.empty(n), np.empty(n + 1), np.empty(x.shape[1]), np.empty(measures.shape[1])
+    row, way, at, out = np.empty(n + 1), np.empty(n + 1), np.empty(x.shape[1]), np.empty(measures.shape[1])
+    onward = np.zeros(n + 1)
+    onward[n] = 1.0
     last, behind, total = 0.0, False, 0
     pieces, asked = np.empty(states.shape[1], np.int64), np.ones(states.shape[1], np.int64)
     _changing(system, found, pieces, asked, point)
     sides[0], sides[1] = 0, 0
     for _ in range(trials):
         lo, hi = found[0, n], found[1, n]
-        p = _foretold(system, point, found, ways, pieces, asked, row)
+        p = _foretold(system, point, found, ways, pieces, asked, row[:n])
         if sides[0] + sides[1] > 0:
             beyond = max(_BEYOND * abs(p - last), abs(hi - lo) * 0.5**_FORETOLD)
             p += math.copysign(beyond, (hi - lo) * (-1.0 if behind else 1.0))
         margin = _NEAREST * (hi - lo)
         p = lo + margin if (p - lo) * (hi - lo) < margin * (hi - lo) else p
         p = hi - margin if (hi - p) * (hi - lo) < margin * (hi - lo) else p
-        _interpolated(found, ways, (p - lo) / (hi - lo), row)
-        good, iterations = _solve_at(system, linear, point, row, p, way, at, out)
-        total += iterations
+        good, share = False, (p - lo) / (hi - lo)
+        if point.counts[SIZE] >= _LARGE:
+            _interpolated(found, ways, share, row[:n])
+            good, iterations, _, norm = arc_newton(
+                system, linear, row[:n], p, row, p, onward, 0.0, 1.0, point, most
+            )
+            total += iterations
         if not good:
+            _interpolated(found, ways, share, row[:n])
+            receptance(system, p, linear)
+            good, iterations, norm = newton(system, linear, row[:n], p, 0.0, point)
+            total += iterations
+        row[n] = p
+        good = good and measured_on_plane(
+            system, linear, point, onward, 0.0, 1.0, False, norm, row, way, at, out
+        )
+        if not (good and math.isfinite(out[HIGH] + out[LOW] + out[HIGH_SLOPE] + out[LOW_SLOPE])):
             break
         behind = piece(point) != measures[0, PIECE]
         side, last = (1 if behind else 0), p
-        copy_to(found[side, :n], row)
-        found[side, n] = p
+        copy_to(found[side], row)
         copy_to(ways[side], way)
         copy_to(x[side], at)
         copy_to(measures[side], out)
