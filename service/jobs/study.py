@@ -16,8 +16,9 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol
 from pydantic import BaseModel, ConfigDict
 
 from service.jobs.common.scenes import HarmonicRequest, SceneRequest, require, resolve_scene, resolved
+from service.jobs.figures import SweepRecord
 from service.jobs.kind_view import Json, KindView, NothingToDrawError, ReadSweep, StoredSweep
-from service.jobs.outputs import JobOutput, OnProgress, Progress, ShouldStop, SweepRecord
+from service.jobs.outputs import JobOutput, OnProgress, Progress, ShouldStop
 from service.jobs.registry import JobKind, Resolved, SceneSource
 from solver.errors import Issue
 from solver.results.views import on_demand

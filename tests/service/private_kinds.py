@@ -14,7 +14,8 @@ from pydantic import Field
 
 from service.jobs.arrays import encode
 from service.jobs.checkpoints import Checkpoints, RunParts
-from service.jobs.outputs import ContactValues, JobOutput, Progress, ShouldStop, SweepRecord
+from service.jobs.figures import ContactValues, SweepRecord
+from service.jobs.outputs import JobOutput, Progress, ShouldStop
 from service.jobs.registry import JobKind, JobRequest, Registry, Resolved
 from service.jobs.studies import map as maps
 from service.jobs.studies.sweep import Sweep

@@ -21,10 +21,10 @@ from service.auth import authenticator
 from service.auth.callers import Scope
 from service.db.clock import utc_now
 from service.db.models import Job, JobResult, JobState
-from service.db.repositories.stored import insert_design
+from service.db.repositories.results import insert_results
 from service.http.routes import page
+from service.jobs.figures import DesignRecord
 from service.jobs.ids import new_id
-from service.jobs.outputs import DesignRecord
 from solver.scene.scene import load_scene
 
 ROLES = ("none", "wrong", "another", "revoked", "expired", "read", "submit", "admin")
@@ -207,7 +207,7 @@ def add_design(client: ServedClient, owner: str) -> str:
     with client.service.database.writing() as connection:
         connection.execute(insert(Job).values(**job))
         connection.execute(insert(JobResult).values(job_id=name, body={}))
-        insert_design(connection, name, record, now, owner)
+        insert_results(connection, name, [record], now, owner)
     return name
 
 
