@@ -40,11 +40,14 @@ class Condition:
     ----------
     few : int
         Up to so many rows it leads a query (see `met`).
+    apart : bool
+        It is about rows of another table.
     """
 
     ids: Select[Any]
     holds: ColumnElement[bool]
     few: int = FEW
+    apart: bool = False
 
 
 def plain_conditions(
@@ -94,11 +97,13 @@ def met(
     SQLite does not know how many rows a condition leaves and would read the whole table in the order of
     the ids for four rows of a rare kind. So each condition with an index is counted first, up to
     `few` rows, which its index answers in well under a millisecond. PostgreSQL keeps statistics and knows,
-    if it plans with the values (see `plan_with_values`).
+    if it plans with the values (see `plan_with_values`). Only what another table leaves of the rows it
+    guesses badly, and reads ten thousand in order for a page of two thousand.
     """
     sqlite = connection.dialect.name == "sqlite"
     plan_with_values(connection)
-    lead = next((one for one in conditions if sqlite and is_few(connection, one)), None)
+    asked = (one for one in conditions if sqlite or one.apart)
+    lead = next((one for one in asked if is_few(connection, one)), None)
     for condition in conditions:
         holds = condition.holds
         if condition is lead:

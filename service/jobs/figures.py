@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, fields
 from datetime import datetime
 from functools import cache
@@ -108,7 +108,7 @@ class Record:
                         yield FigureValue(key, part.name, number)
 
     @classmethod
-    def stored(cls, head: Mapping[str, Any], found: list[FigureValue]) -> Self:
+    def stored(cls, head: Mapping[str, Any], found: Iterable[tuple[str, str, float]]) -> Self:
         """Return what was stored: the fields of every record, and its figures; None for one that is not."""
         parts: dict[str, dict[str, Any]] = {}
         values: dict[str, Any] = {}
@@ -140,9 +140,9 @@ class KindRecord(Record):
         yield from self.values
 
     @classmethod
-    def stored(cls, head: Mapping[str, Any], found: list[FigureValue]) -> Self:
+    def stored(cls, head: Mapping[str, Any], found: Iterable[tuple[str, str, float]]) -> Self:
         """Return what was stored."""
-        return cls(**head, values=tuple(found))
+        return cls(**head, values=tuple(FigureValue(*one) for one in found))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -236,13 +236,13 @@ RECORDS: Mapping[str, type[Record]] = {SWEEP: SweepRecord, DESIGN: DesignRecord}
 
 
 @cache
-def _own(record: type[Record]) -> list[Any]:
+def _own(record: Any) -> list[Any]:
     shared = {one.name for one in fields(Record)}
     return [one for one in fields(record) if one.name not in shared and one.name != "arrays"]
 
 
 @cache
-def quantities_of_record(record: type[Any]) -> dict[str, Quantity]:
+def quantities_of_record(record: Any) -> dict[str, Quantity]:
     """Return the figures of a kind of records, or of a part of one, by name."""
     hints = get_type_hints(record, include_extras=True)
     return {
@@ -253,7 +253,7 @@ def quantities_of_record(record: type[Any]) -> dict[str, Quantity]:
 
 
 @cache
-def part_names(record: type[Record]) -> tuple[str, ...]:
+def part_names(record: Any) -> tuple[str, ...]:
     """Return the names of the figures of its parts."""
     return () if record.PART_TYPE is None else tuple(quantities_of_record(record.PART_TYPE))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import datetime
 from typing import Any
 from weakref import WeakKeyDictionary, WeakSet
@@ -44,7 +44,7 @@ from service.db.pagination import (
 )
 from service.db.postgresql import lock_quantities
 from service.db.repositories.runs import in_the_bin
-from service.jobs.figures import RECORDS, SWEEP, FigureValue, KindRecord, Record, StoredArray
+from service.jobs.figures import RECORDS, SWEEP, KindRecord, Record, StoredArray
 from service.jobs.ids import new_id
 
 Name = tuple[str, str]
@@ -54,6 +54,7 @@ CREATED = "created"
 _ANY: Range = (None, None)
 # Of 100 000 results: so many are read and sorted in the time in which a page of more is found in order.
 _FEW = 5000
+_NEVER_LEADS = -1
 _MOST_DIGITS = 18
 _NONE = 0
 """Of no quantity."""
@@ -69,10 +70,11 @@ _SELECT = select(*(_RESULT.c[name] for name in _HEAD))
 # What is known of quantities, and who stored some that may be taken back yet.
 _storing: WeakSet[Any] = WeakSet()
 _stored: WeakKeyDictionary[Engine, dict[tuple[str, str, str], int]] = WeakKeyDictionary()
-_FIGURES = (
-    select(Figure.result, Quantity.name, Quantity.label, Figure.value)
-    .join(Quantity, Quantity.id == Figure.quantity)
-    .where(Figure.result.in_(bindparam("results", expanding=True)))
+_FIGURES = select(_FIGURE.c.result, _FIGURE.c.quantity, _FIGURE.c.value).where(
+    _FIGURE.c.result.in_(bindparam("results", expanding=True))
+)
+_NAMES = select(Quantity.id, Quantity.name, Quantity.label).where(
+    Quantity.id.in_(bindparam("ids", expanding=True))
 )
 
 
@@ -122,6 +124,7 @@ class ResultRepository:
 
     def __init__(self, database: Database) -> None:
         self._db = database
+        self._names: dict[int, Name] = {}
 
     def get(self, result_id: str, of: str) -> Any:
         """The result of an id, whoever owns it, or None."""
@@ -149,7 +152,7 @@ class ResultRepository:
         with self._db.reading() as connection:
             query = _query(connection, wanted, limit, after)
             rows = connection.execute(query).mappings().all()
-            records = _read(connection, wanted.of, rows)
+            records = self._read(connection, wanted.of, rows)
         return [
             (record, (row.get(_ALONG), str(record.number)))
             for row, record in zip(rows, records, strict=True)
@@ -158,21 +161,25 @@ class ResultRepository:
     def _all(self, of: str, holds: ColumnElement[bool]) -> list[Any]:
         query = _SELECT.where(holds, Result.of == of).order_by(Result.position)
         with self._db.reading() as connection:
-            return _read(connection, of, connection.execute(query).mappings().all())
+            return self._read(connection, of, connection.execute(query).mappings().all())
+
+    def _read(self, connection: Connection, of: str, rows: Sequence[Any]) -> list[Record]:
+        """The records of rows, with their figures."""
+        numbers = {"results": [row["number"] for row in rows]}
+        stored = connection.execute(_FIGURES, numbers).all() if rows else ()
+        unknown = {quantity for _, quantity, _ in stored} - self._names.keys()
+        if unknown:  # what a quantity is never changes
+            found = connection.execute(_NAMES, {"ids": list(unknown)})
+            self._names |= {quantity: (name, label) for quantity, name, label in found}
+        figures: dict[int, list[tuple[str, str, float]]] = defaultdict(list)
+        for number, quantity, value in stored:
+            figures[number].append((*self._names[quantity], value))
+        heads = ({name: row[name] for name in _HEAD} for row in rows)
+        return [_record(of).stored(head, figures[head["number"]]) for head in heads]
 
 
 def _record(of: str) -> type[Record]:
     return RECORDS.get(of, KindRecord)
-
-
-def _read(connection: Connection, of: str, rows: Sequence[Mapping[str, Any]]) -> list[Record]:
-    """The records of rows, with their figures."""
-    numbers = {"results": [row["number"] for row in rows]}
-    figures: dict[int, list[FigureValue]] = defaultdict(list)
-    for number, *figure in connection.execute(_FIGURES, numbers) if rows else ():
-        figures[number].append(FigureValue(*figure))
-    heads = ({name: row[name] for name in _HEAD} for row in rows)
-    return [_record(of).stored(head, figures[head["number"]]) for head in heads]
 
 
 def _query(connection: Connection, wanted: Filter, limit: int, after: Position | None) -> Select[Any]:
@@ -215,15 +222,15 @@ def _query(connection: Connection, wanted: Filter, limit: int, after: Position |
 
 def _figures(wanted: Filter, known: Mapping[Name, int], source: Any, number: Any) -> list[Condition]:
     """The conditions on figures of the results of a number."""
-    asked = [[(_ids(known, name, ""), bounds)] for name, bounds in wanted.ranges.items()]
-    asked += [[(_ids(known, name, word), _ANY)] for name, word in wanted.words.items()]
+    asked = [(_ids(known, name, ""), bounds) for name, bounds in wanted.ranges.items()]
+    asked += [(_ids(known, name, word), _ANY) for name, word in wanted.words.items()]
     ranges = wanted.part_ranges or ({} if wanted.part is None else {_record(wanted.of).PART: _ANY})
     inside = [(_ids(known, name, wanted.part), bounds) for name, bounds in ranges.items()]
-    if wanted.part is None and inside:
-        asked.append(inside)
-    else:
-        asked += [[one] for one in inside]
-    return [_condition(one, source, number) for one in asked]
+    conditions = [_condition([one], source, number) for one in [*asked, *inside]]
+    if wanted.part is None and len(inside) > 1:
+        # Of all ranges in one part it takes as long to count the results as the first range is wide.
+        conditions.append(replace(_condition(inside, source, number), few=_NEVER_LEADS))
+    return conditions
 
 
 def _known(connection: Connection, wanted: Filter, part: str) -> dict[Name, int]:
@@ -326,21 +333,22 @@ def insert_results(
     connection: Connection, job_id: str, records: Iterable[Record], created: datetime, owner: str = NOBODY
 ) -> None:
     """Write results of a job inside the transaction that writes its own; `owner` is the job's."""
+    figures, arrays = [], []
     for position, record in enumerate(records):
         result_id = new_id() if record.of == SWEEP else job_id
         about = {"id": result_id, "job_id": job_id, "position": position, "created": created, "owner": owner}
         same = {name: getattr(record, name) for name in ("of", "scene_name", "scene_hash", "status")}
-        number = connection.execute(_INSERT, about | same).inserted_primary_key[0]
-        figures = list(record.figures())
-        ids = _quantities(connection, record.of, {(one.name, one.label) for one in figures})
-        rows = [
-            {"quantity": ids[one.name, one.label], "value": one.value, "result": number} for one in figures
+        (number,) = connection.execute(_INSERT, about | same).inserted_primary_key or ()
+        told = list(record.figures())
+        ids = _quantities(connection, record.of, {(one.name, one.label) for one in told})
+        figures += [
+            {"quantity": ids[one.name, one.label], "value": one.value, "result": number} for one in told
         ]
-        if rows:
-            connection.execute(_INSERT_FIGURES, rows)
-        arrays = [
+        arrays += [
             {"sweep_id": result_id, "name": name, "sha256": stored.sha256, "data": stored.data}
             for name, stored in getattr(record, "arrays", {}).items()
         ]
-        if arrays:
-            connection.execute(_INSERT_ARRAYS, arrays)
+    if figures:
+        connection.execute(_INSERT_FIGURES, figures)
+    if arrays:
+        connection.execute(_INSERT_ARRAYS, arrays)
