@@ -16,7 +16,7 @@ def disk_response() -> None:
     branch, timing = timed(lambda: solver.sweep(scene, start=500.0, stop=900.0), runs=15)
     fine = solver.sweep(scene, start=500.0, stop=900.0, harmonics=FINE)
     for one in (branch, fine):
-        expect(f"{one.status.value}, residual {one.residuals.max():.0e}", one.completed)
+        expect(f"{one.status.value}, residual {one.residuals.max():.0e}", one.reached)
         expect("every point converged", bool(one.residuals.max() <= 1e-9))
         expect("there is a peak", one.peak is not None)
     marched = solver.march(scene, frequency_hz=fine.peak.at)
@@ -43,7 +43,7 @@ def disk_map() -> None:
             ),
             runs=2,
         )
-        expect(f"map: {found.status.value}", found.completed)
+        expect(f"map: {found.status.value}", found.reached)
         row, column = 17, 229
         one = solver.solve(
             scene.with_values({"shroud.N0": float(found.parameter[row])}),

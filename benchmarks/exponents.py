@@ -48,7 +48,7 @@ def _ports(size: int) -> Callable[[], bool]:
 
 def _harmonics(size: int) -> Callable[[], bool]:
     scene = graded_chain(8)
-    return lambda: solver.sweep(scene, harmonics=size).completed
+    return lambda: solver.sweep(scene, harmonics=size).reached
 
 
 def _blades(size: int) -> Callable[[], bool]:
@@ -58,7 +58,7 @@ def _blades(size: int) -> Callable[[], bool]:
 
 def _modes(size: int) -> Callable[[], bool]:
     scene = chain(size, sliders=False)
-    return lambda: solver.sweep(scene, harmonics=5).completed
+    return lambda: solver.sweep(scene, harmonics=5).reached
 
 
 def _variables(size: int) -> Callable[[], bool]:

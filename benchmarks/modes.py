@@ -45,12 +45,12 @@ def modes() -> None:
             return solver.performance_curve(found)
 
         curve, quick = timed(approximate, runs=5)
-        expect(f"the mode of {case.scene}: {curve.mode.status.value}", curve.mode.completed)
+        expect(f"the mode of {case.scene}: {curve.mode.status.value}", curve.mode.reached)
         levels = np.geomspace(*case.factors, LEVELS)
         begun, exact = time.process_time(), []
         for level in levels:
             branch = solver.sweep(scene.with_values({PATH: own * level}), harmonics=case.harmonics)
-            exact.append(np.nan if branch.peak is None or not branch.completed else branch.peak.value)
+            exact.append(np.nan if branch.peak is None or not branch.reached else branch.peak.value)
         swept = time.process_time() - begun
         begun = time.process_time()
         track = solver.track_peak(
@@ -64,7 +64,7 @@ def modes() -> None:
                 case.scene, f"{curve.excitation.size}", f"{100.0 * np.median(off):.1f} %",
                 f"{100.0 * np.quantile(off, 0.9):.1f} %", f"{100.0 * off.max():.0f} %",
                 f"{1e3 * quick.cpu:.0f}", f"{1e3 * swept:.0f}", f"{swept / quick.cpu:.0f}",
-                f"{1e3 * tracked:.0f}" + ("" if track.completed else " (not whole)"),
+                f"{1e3 * tracked:.0f}" + ("" if track.reached else " (not whole)"),
                 f"{tracked / quick.cpu:.1f}",
             )
         )  # fmt: skip

@@ -46,7 +46,7 @@ def robustness() -> None:
         solution = solver.solve(scene, frequency_hz=middle, harmonics=harmonics)
         endings[f"sweep {branch.status.name}"] += 1
         endings[f"solve {solution.status.name}"] += 1
-        if not (branch.completed and solution.converged):
+        if not (branch.reached and solution.converged):
             failed.append(f"{seed} ({branch.status.name}, {solution.status.name})")
         worst = float(branch.residuals.max()) if len(branch.values) else 0.0
         lost = lost_power(solution) if solution.converged else 0.0

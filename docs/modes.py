@@ -28,7 +28,7 @@ def compared(case: Case) -> tuple[solver.PerformanceCurve, NDArray[np.float64], 
     for i, level in enumerate(levels):
         there = scene.with_values({PATH: scene.value(PATH) * float(level)})
         branch = solver.sweep(there, harmonics=case.harmonics)
-        if branch.completed and branch.peak is not None:
+        if branch.reached and branch.peak is not None:
             peaks[i] = branch.peak.value
         else:
             print(f"{case.scene} at {level:.4g} times its excitation: {branch.status.value}")

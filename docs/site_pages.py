@@ -20,12 +20,8 @@ from pdoc.docstrings import convert
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
-MODULES = {
-    "solver": "Scenes, periodic responses, continuation, time marching.",
-    "optim": "Criteria, designs, studies.",
-    "service.client": "The client of a running service.",
-    "service.schemas.answers": "What the service answers.",
-}
+SUBJECTS = sorted(f"stickslip.{path.stem}" for path in (ROOT / "stickslip").glob("[!_]*.py"))
+MODULES = ("stickslip", *SUBJECTS, "service.client", "service.schemas.answers")
 _SECTION = re.compile(r"^## (.+)$")
 _ENTRY = re.compile(r"^- \[(?P<title>[^]]+)\]\((?P<page>[\w-]+\.md)\)")
 OUTSIDE = (
@@ -73,7 +69,7 @@ def made() -> dict[str, str]:
     for name in ("readme.md", "CONTRIBUTING.md", "CHANGELOG.md"):
         found[name] = found[name].replace("](docs/", "](")
     found |= {"gallery.md": gallery(), "index.md": FRONT}
-    return found | {_page(module): reference(module, words) for module, words in MODULES.items()}
+    return found | {_page(module): reference(module) for module in MODULES}
 
 
 FRONT = '<meta http-equiv="refresh" content="0; url=readme.html">\n\n# stickslip\n\n[Overview](readme.md)\n'
@@ -91,10 +87,10 @@ def gallery() -> str:
     return "\n".join(parts)
 
 
-def reference(module: str, words: str) -> str:
+def reference(module: str) -> str:
     """Return the page of the public names of a module."""
     loaded = import_module(module)
-    parts = [f"# {module}\n", f"{words}\n", f"{convert(inspect.getdoc(loaded) or '', 'numpy', None)}\n"]
+    parts = [f"# {module}\n", f"{convert(inspect.getdoc(loaded) or '', 'numpy', None)}\n"]
     for name in public_names(module):
         found = getattr(loaded, name)
         parts += [f"## {name}\n", f"```python\n{_signature(name, found)}\n```\n", _described(found)]
@@ -105,16 +101,16 @@ def reference(module: str, words: str) -> str:
 
 
 def public_names(module: str) -> list[str]:
-    """Return the names of `__all__`, or those defined in the module itself."""
+    """Return the names a package gives, or those a module gives or passes on: classes and functions."""
     loaded = import_module(module)
-    if hasattr(loaded, "__all__"):
-        return list(loaded.__all__)
+    offered = {name: getattr(loaded, name) for name in getattr(loaded, "__all__", vars(loaded))}
     return [
         name
-        for name, value in vars(loaded).items()
-        if not name.startswith("_")
+        for name, value in offered.items()
+        if name.isidentifier()  # not what a generic class leaves there of each of its kinds
+        and not name.startswith("_")
         and (inspect.isclass(value) or inspect.isfunction(value))
-        and value.__module__ == module
+        and (value.__module__ == module or module.startswith("stickslip") or hasattr(loaded, "__all__"))
     ]
 
 

@@ -37,7 +37,7 @@ def response(name: str, value: float) -> solver.Branch:
     """Sweep a scene with one value of what its study varies; say so where it ends early."""
     study = STUDIES[name]
     branch = solver.sweep(solver.load_scene(name).with_values({study.path: value}), harmonics=study.harmonics)
-    if not branch.completed:
+    if not branch.reached:
         print(f"{name} {study.path} {value:.4g}: {branch.status.name}", flush=True)
     return branch
 
@@ -57,7 +57,7 @@ def draw(name: str, left: Axes, right: Axes) -> None:
     peaks = np.full(STEPS, np.nan)  # a branch that ends early has no highest point
     for i, value in enumerate(values):
         branch = response(name, float(value))
-        if branch.completed:
+        if branch.reached:
             highest = int(branch.half_peak_to_peak.argmax())
             peaks[i] = 1e6 * branch.half_peak_to_peak[highest]
             where = f"{peaks[i]:.2f} µm at {branch.values[highest]:.2f} Hz"

@@ -14,11 +14,12 @@ from importlib import import_module
 def names_of(package: str, file: str) -> dict[str, str]:
     """The module of every public name of a package, from the stub beside its ``__init__``."""
     with open(f"{file.rpartition('.')[0]}.pyi", encoding="utf-8") as stub:
-        statements = [part.partition(" import ") for part in stub.read().split("from .")[1:]]
+        statements = [part.partition(" import ") for part in f"\n{stub.read()}".split("\nfrom ")[1:]]
     return {
-        name.split()[0]: f"{package}.{module}"
+        name.split()[0]: f"{package}{module}" if module.startswith(".") else module
         for module, _, names in statements
-        for name in names.strip("(), \n").split(",")
+        for name in names.partition(")")[0].strip("( \n").split(",")
+        if name.strip()
     }
 
 
@@ -29,7 +30,8 @@ def on_first_use(
 
     def load(name: str) -> object:
         if name not in homes:
-            raise AttributeError(f"module {package!r} has no attribute {name!r}")
+            known = sys.modules[package]  # what Python reads to ask "Did you mean …?"
+            raise AttributeError(f"module {package!r} has no attribute {name!r}", name=name, obj=known)
         value = getattr(import_module(homes[name]), name)
         setattr(sys.modules[package], name, value)
         return value

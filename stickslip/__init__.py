@@ -5,23 +5,35 @@
     scene = stickslip.load_scene("bladed-disk")
     best = stickslip.design(scene, variables={"shroud.N0": (20.0, 3000.0)})
 
-Every public name of `solver` and of `optim` stands here too, the very same object; no name is in both.
-`Client` talks to a running service. A name is loaded on first use, so that importing costs nothing.
+What a script asks stands here; what goes further, by subject: `stickslip.modes`, `stickslip.disks`, ….
+Every name is the very object of `solver` or `optim`, loaded on first use, so that importing costs nothing.
 """
 
-import optim
-import solver
-from solver.first_use import on_first_use
+from solver.first_use import names_of, on_first_use
 
-_homes = {"Client": "service.client.client", "ServiceProblem": "service.errors"}
-_homes |= dict.fromkeys(solver.__all__, "solver") | dict.fromkeys(optim.__all__, "optim")
+_homes = names_of(__name__, __file__)
+_SUBJECTS = sorted(name for name, home in _homes.items() if home == f"{__name__}.")
 _load, __dir__, __all__ = on_first_use(__name__, _homes)
 
 
 def __getattr__(name: str) -> object:
-    """Load a public name on first use."""
-    if name != "__version__":
-        return _load(name)
-    from importlib.metadata import version
+    """Load a public name on first use; one that has moved to a subject is found there, with a warning."""
+    from importlib import import_module
 
-    return version("stickslip")
+    if name in _SUBJECTS:
+        return import_module(f"{__name__}.{name}")
+    if name == "__version__":
+        from importlib.metadata import version
+
+        return version("stickslip")
+    if name in _homes or name.startswith("_"):
+        return _load(name)
+    for subject in _SUBJECTS:
+        module = import_module(f"{__name__}.{subject}")
+        if name in vars(module):
+            import warnings
+
+            told = f"stickslip.{name} is stickslip.{subject}.{name} now; the short form goes with 0.2"
+            warnings.warn(told, DeprecationWarning, stacklevel=2)
+            return getattr(module, name)
+    return _load(name)

@@ -1,6 +1,51 @@
-from optim import *
+from . import (
+    branches as branches,
+    designs as designs,
+    disks as disks,
+    errors as errors,
+    identification as identification,
+    laws as laws,
+    modes as modes,
+    peaks as peaks,
+    results as results,
+    solutions as solutions,
+    wear as wear,
+)
+from optim import (
+    Case as Case,
+    DesignResult as DesignResult,
+    Limit as Limit,
+    design as design,
+    identify as identify,
+    pareto_front as pareto_front,
+    robust_design as robust_design,
+    sensitivities as sensitivities,
+)
 from service.client.client import Client as Client
-from service.errors import ServiceProblem as ServiceProblem
-from solver import *
+from solver import (
+    Branch as Branch,
+    Effects as Effects,
+    Peak as Peak,
+    Scene as Scene,
+    SceneBuilder as SceneBuilder,
+    SceneError as SceneError,
+    SettingError as SettingError,
+    Solution as Solution,
+    SolverError as SolverError,
+    accuracy_study as accuracy_study,
+    load as load,
+    load_scene as load_scene,
+    march as march,
+    new_scene as new_scene,
+    plan as plan,
+    progress_bar as progress_bar,
+    response_map as response_map,
+    save as save,
+    shipped_scenes as shipped_scenes,
+    solve as solve,
+    solve_all as solve_all,
+    stability as stability,
+    sweep as sweep,
+)
 
 __version__: str

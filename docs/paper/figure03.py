@@ -30,7 +30,7 @@ say("highest peak", f"{highest(branch).value:.3f} m at {highest(branch).at:.3f} 
 say("resonance near a", f"{max(main):.3f} Hz")
 say("resonance near b", f"{highest(branch).at:.3f} Hz")
 say("super-harmonic resonances", " and ".join(f"{at:.3f}" for at in low) + " Hz")
-fine = stickslip.ContinuationSettings(largest_step=0.05)  # the largest of a ratio stands at a point
+fine = stickslip.branches.ContinuationSettings(largest_step=0.05)  # the largest of a ratio stands at a point
 for phase, name in ((0.0, "in phase"), (0.25 * np.pi, "load 45° ahead")):
     other = stickslip.sweep(scene.with_values({"damper.N1_phase": phase}), settings=fine)
     ratios = [(harmonic(other, k) / harmonic(other, 1))[other.values < 0.6].max() for k in (2, 3)]

@@ -12,8 +12,8 @@ worst = 0.0
 with figure("figure04", columns=4, rows=2, height=2.5, width=10.0) as panels:
     for (letter, at), motion, loop in zip(points.items(), panels[:4], panels[4:], strict=True):
         found, marched = stickslip.solve(scene, frequency_hz=at), stickslip.march(scene, frequency_hz=at)
-        time, x = stickslip.time_history(found, "m2")
-        slip, force = stickslip.hysteresis_loop(found, "damper", samples=2000)
+        time, x = stickslip.solutions.time_history(found, "m2")
+        slip, force = stickslip.solutions.hysteresis_loop(found, "damper", samples=2000)
         some = np.linspace(0, marched.time.size - 1, 33, dtype=int)[:-1]
         motion.plot(np.append(time, time + 1 / at), np.tile(x, 2), color=FOUR[letter])
         motion.plot(np.append(marched.time[some], marched.time[some] + 1 / at),

@@ -7,7 +7,7 @@ import stickslip
 scene = stickslip.load_scene("two-dof").with_values({"damper.N0": 100.0, "damper.N1": 30.0})
 values = [5, 10, 20, 30, 45, 60]  # N/m
 responses = {kt: stickslip.sweep(scene.with_values({"damper.kt": kt})) for kt in values}
-track = stickslip.track_peak(scene, "damper.kt", 5.0, 60.0)
+track = stickslip.peaks.track_peak(scene, "damper.kt", 5.0, 60.0)
 first = track.frequency < 2.0  # Hz; beyond it the peak of the second mode is higher
 
 with figure("figure06") as (left, right):

@@ -16,7 +16,7 @@ with figure("figure10") as (left, right):
     left.set_ylim(1e-4, 1.0)
     finish(left, "frequency [Hz]", "amplitude of tip [mm]", legend="harmonic")
     for (H, found), color in zip(kept.items(), shades(len(kept)), strict=True):
-        time, x = stickslip.time_history(found, "tip")
+        time, x = stickslip.solutions.time_history(found, "tip")
         right.plot(1e3 * time, 1e3 * x, color=color, label=f"{H} harmonics" if H > 1 else "1 harmonic")
     some = np.linspace(0, marched.time.size - 1, 41, dtype=int)[:-1]
     right.plot(1e3 * marched.time[some], 1e3 * marched.displacement[some], label="marched", **MARCHED)

@@ -72,7 +72,7 @@ def curve(branch: stickslip.Branch, unit: float = 1.0) -> tuple[np.ndarray, np.n
 
 def highest(branch: stickslip.Branch) -> stickslip.Peak:
     """The highest peak of a branch that reached its end."""
-    if not branch.completed or branch.peak is None:
+    if not branch.reached or branch.peak is None:
         raise SystemExit(branch.status.value)
     return branch.peak
 

@@ -23,7 +23,7 @@ with figure("superharmonics") as (left, right):
     finish(left, "frequency [Hz]", "max |m2| [m]", legend="kt")
     finish(right, "frequency [Hz]", "harmonic 3 of m1 [m]")
 
-small_steps = stickslip.ContinuationSettings(largest_step=0.01)
+small_steps = stickslip.branches.ContinuationSettings(largest_step=0.01)
 near = stickslip.sweep(first, "frequency", 0.7, 0.85, settings=small_steps)
 top = harmonic(near, 3).argmax()
 three, one, at = harmonic(near, 3)[top], harmonic(near, 1)[top], near.values[top]

@@ -49,7 +49,7 @@ def evaluate(
         found = _case(problem, case, values, known, earlier, gradients, errors, should_stop)
         responses += found[0]
         rows += found[1]
-        if not all(response.branch.completed for response in found[0]):
+        if not all(response.branch.reached for response in found[0]):
             return Evaluation(values=dict(values), responses=tuple(responses), rows=())
     return Evaluation(values=dict(values), responses=tuple(responses), rows=tuple(rows))
 
@@ -75,7 +75,7 @@ def _case(
         shared = there is not None and there.balance.n_harmonics == problem.harmonics
         if there is not None and shared:
             branch = there
-            if there.completed:
+            if there.reached:
                 branch = observing(there, here.observe.dof, measure=here.observe.measure, limit=problem.limit)
         else:
             branch = sweep(
@@ -152,7 +152,7 @@ class Judge:
 
     def rows(self, branch: Branch, over: Range) -> list[Row]:
         """Return the rows of a response over a range; none unless it covers it and has a peak."""
-        if not branch.completed or not branch.peaks:
+        if not branch.reached or not branch.peaks:
             return []
         hertz = None if over.low is None or over.high is None else (over.low, over.high)
         judged = Judged(

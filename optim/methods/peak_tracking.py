@@ -127,7 +127,7 @@ class _Lowest:
 def _evaluation(problem: Problem, found: LeastPeak) -> Evaluation | None:
     """Return the rows of the optimum, from the response that proves it where that has the limit asked for."""
     case, variable = problem.cases[0], problem.variables[0]
-    if found.branch is None or not found.branch.completed:
+    if found.branch is None or not found.branch.reached:
         return None
     if problem.limit is not None:
         return evaluate(problem, {variable.name: found.at})

@@ -222,7 +222,7 @@ def _of_all_blades(
             here, start=over.low, stop=over.high, harmonics=problem.harmonics, limit=problem.limit,
             effects=effects, errors=False, should_stop=should_stop,
         )  # fmt: skip
-        if not branch.completed:
+        if not branch.reached:
             return [], len(ranges)
         for j in range(sectors):
             name = f"{case.name}, {dof}@{j}"

@@ -90,9 +90,9 @@ def campbell_diagram(
         if stopped:
             break
     status = CampbellStatus.COMPLETED
-    if stopped and not (len(found) == len(chosen) and found[-1].branch.completed):
+    if stopped and not (len(found) == len(chosen) and found[-1].branch.reached):
         status = CampbellStatus.STOPPED
-    elif not all(one.branch.completed for one in found):
+    elif not all(one.branch.reached for one in found):
         status = CampbellStatus.INCOMPLETE
     return CampbellDiagram(
         scene=scene, speeds_rpm=speeds, limit=limit, orders=tuple(found), n_harmonics=harmonics,

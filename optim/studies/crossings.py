@@ -51,7 +51,7 @@ class OrderResponse(Piece):
         "order range_hz running_hz limit peaks bands_hz exceeded_rpm exceeded_running_rpm crossings_rpm"
         " crossings highest_running stuck_hz open_hz peak_certificate=branch.peak_certificate band_known"
         " measure peak_max_abs error_estimate peak_half_peak_to_peak half_peak_to_peak_error relative_error"
-        " flags completed=branch.completed status=branch.status"
+        " flags completed=branch.reached status=branch.status"
     )
 
     order: Annotated[int, "Excitations a revolution."]
@@ -87,7 +87,7 @@ class CampbellDiagram(MadeOfResponses, Drawn):
     """Orders of a running speed against the resonances of a scene."""
 
     VIEWS: ClassVar = Views("optim.views", "of_campbell", "campbell_dataset", "of_campbell")
-    JSON: ClassVar = "scene speeds_rpm limit clear orders n_harmonics seconds completed status"
+    JSON: ClassVar = "scene speeds_rpm limit clear orders n_harmonics seconds completed=reached status"
 
     scene: Annotated[Scene, "With the values all responses share."]
     speeds_rpm: Annotated[Ranges, "The running speeds [1/min]."]
@@ -98,7 +98,7 @@ class CampbellDiagram(MadeOfResponses, Drawn):
     seconds: Annotated[float, "Time taken [s]."]
 
     @property
-    def completed(self) -> bool:
+    def reached(self) -> bool:
         """Whether every response covers its whole range."""
         return self.status is CampbellStatus.COMPLETED
 
@@ -115,7 +115,7 @@ class CampbellDiagram(MadeOfResponses, Drawn):
         else:
             meets = any(one.exceeded_running_rpm for one in self.orders)
         known = all(one.branch.peak_certificate.known and self._within(one) for one in self.orders)
-        return False if meets else True if self.completed and known else None
+        return False if meets else True if self.reached and known else None
 
     def _within(self, one: OrderResponse) -> bool:
         """Return whether the amplitude at running speeds stays within the limit whatever its error is."""

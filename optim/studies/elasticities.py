@@ -59,7 +59,7 @@ def sensitivities(
     known = here.parameter_paths()
     effects = Effects(even_harmonics=even_harmonics_reason(here, known) is not None)
     branch = sweep(here, harmonics=harmonics, limit=limit, effects=effects)
-    if not branch.completed or branch.peak is None:
+    if not branch.reached or branch.peak is None:
         undamped = branch.status is BranchStatus.UNDAMPED
         status = SensitivityStatus.UNDAMPED if undamped else SensitivityStatus.NO_RESPONSE
         return SensitivityResult(

@@ -10,9 +10,9 @@ from typing import Annotated
 import typer
 
 from service.cli.failures import REPORTED, report
-from service.cli.lazy import DeferredGroup, LazyGroup, group
+from service.cli.lazy import LazyGroup
 from service.cli.options.inputs import join_words
-from service.cli.table import COMMANDS, GROUPS, SUBMIT
+from service.cli.table import COMMANDS
 
 _app = typer.Typer(
     cls=LazyGroup,
@@ -50,10 +50,8 @@ def command(asked: str = "") -> LazyGroup:
     root = typer.main.get_command(_app)
     if not isinstance(root, LazyGroup):
         raise TypeError(f"typer made {type(root).__name__} of the application")
-    root.add(COMMANDS)
-    root.add_command(DeferredGroup(SUBMIT))
-    for name, summary, entries in GROUPS:
-        root.add_command(group(name, summary, entries))
+    for heading, entries in COMMANDS.items():
+        root.add(heading, entries)
     if os.environ.get("STICKSLIP_KINDS") and asked not in root.commands:
         from service.cli.study_command import add_others
 

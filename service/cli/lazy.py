@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import groupby
+from operator import itemgetter
 from typing import Any
 
 import typer
@@ -28,12 +31,19 @@ class Entry:
         The first line of the function's docstring, which `--help` shows.
     keyed : bool
         It talks to a service, and takes ``--key-file``.
+    group : bool
+        What stands there is the class of a group, not a function.
     """
 
     name: str
     home: str
     summary: str
     keyed: bool = False
+    group: bool = False
+
+    def command(self) -> Deferred:
+        """Return it as help lists it."""
+        return (DeferredGroup if self.group else Deferred)(self)
 
     def function(self) -> Any:
         """Import the module and return what stands there."""
@@ -43,6 +53,21 @@ class Entry:
             return command_named(self.name)
         module, _, name = self.home.rpartition(".")
         return on_demand(f"service.cli.{module}:{name}")
+
+
+@dataclass(frozen=True, slots=True)
+class Entries:
+    """A command in the table that only has commands under it."""
+
+    name: str
+    summary: str
+    entries: Sequence[Entry]
+
+    def command(self) -> LazyGroup:
+        """Return it with its commands."""
+        made = LazyGroup(name=self.name, help=self.summary, no_args_is_help=True, rich_markup_mode=None)
+        made.add("Commands", self.entries)
+        return made
 
 
 class Deferred(TyperCommand):
@@ -79,10 +104,31 @@ class DeferredGroup(Deferred):
 class LazyGroup(TyperGroup):
     """A group whose commands are loaded when they are looked up to be run or completed."""
 
-    def add(self, entries: Iterable[Entry]) -> None:
-        """Add commands, in the order in which help lists them."""
+    def add(self, heading: str, entries: Iterable[Entry | Entries]) -> None:
+        """Add commands, which help lists below a heading, in their order."""
         for entry in entries:
-            self.add_command(Deferred(entry))
+            self.add_command(entry.command())
+            self.headings[entry.name] = heading
+
+    @cached_property
+    def headings(self) -> dict[str, str]:
+        """The heading of each command; those of studies from outside have none."""
+        return {}
+
+    def format_commands(self, _ctx: Any, formatter: Any) -> None:
+        """Write the commands below their headings."""
+        widest = max(map(len, self.commands))
+        rows = [
+            (
+                self.headings.get(name, "Further studies"),
+                name,
+                command.get_short_help_str(formatter.width - 6 - widest),
+            )
+            for name, command in self.commands.items()
+        ]
+        for heading, listed in groupby(rows, key=itemgetter(0)):
+            with formatter.section(heading):
+                formatter.write_dl([(name.ljust(widest), summary) for _, name, summary in listed])
 
     def get_params(self, ctx: Any) -> Any:
         """Return the options; flags that are not given are False: to look at None, Typer imports pydantic."""
@@ -99,10 +145,3 @@ class LazyGroup(TyperGroup):
             command = command.load()
             self.add_command(command)
         return name, command, rest
-
-
-def group(name: str, summary: str, entries: Sequence[Entry]) -> LazyGroup:
-    """Return a command that only has commands under it."""
-    made = LazyGroup(name=name, help=summary, no_args_is_help=True, rich_markup_mode=None)
-    made.add(entries)
-    return made

@@ -1,58 +1,8 @@
-"""Every command, in the order in which help lists them; a further one is a function and a line here."""
+"""Every command, as help lists them; a further one is a function and a line here."""
 
 from __future__ import annotations
 
-from service.cli.lazy import STUDY, Entry
-
-COMMANDS = (
-    Entry("scenes", "commands.scenes.scenes", "List the shipped scenes."),
-    Entry("plan", STUDY, "Say which effects a scene calls for, and why."),
-    Entry("solve", STUDY, "Compute one periodic response, or look for all of them."),
-    Entry("sweep", STUDY, "Follow the response over a parameter."),
-    Entry("accuracy", STUDY, "Measure what accuracy costs."),
-    Entry("design", "commands.design.design", "Find the best damper."),
-    Entry("pareto", "commands.design.pareto", "Find the front of peak against resonance band."),
-    Entry(
-        "identify", "commands.identify.identify",
-        "Find parameters from measured responses and hysteresis loops.",
-    ),
-    Entry(
-        "sensitivities", STUDY,
-        "Say what matters: per cent of the peaks and the band for one per cent of each parameter.",
-    ),
-    Entry("march", STUDY, "March in time until the motion repeats."),
-    Entry("demo", "commands.service.demo", "Run the main job end to end, with pictures."),
-    Entry("serve", "commands.service.serve", "Serve the REST API and work off its queue."),
-    Entry("worker", "commands.service.worker", "Work off a queue without HTTP."),
-    Entry("watch", "commands.client.jobs.watch", "Follow a job until it has ended.", keyed=True),
-    Entry(
-        "results", "commands.client.jobs.results", "Print what a job computed, or list the stored designs.",
-        keyed=True,
-    ),
-    Entry("peaks", STUDY, "Track the highest peak over a parameter."),
-    Entry("map", STUDY, "Map the response over frequency and a parameter, with the ridge of its peaks."),
-    Entry("campbell", STUDY, "Find the speeds at which orders of the running speed meet resonances."),
-    Entry(
-        "interference", STUDY,
-        "Draw natural frequencies over the nodal diameter, with the engine orders that meet them.",
-    ),
-    Entry("modes", STUDY, "Follow a mode's frequency and damping over its amplitude."),
-    Entry(
-        "controlled", STUDY, "Follow the response over the frequency with one amplitude held, as rigs do.",
-    ),
-    Entry("mistuning", STUDY, "Study disks whose blades are not quite equal."),
-    Entry(
-        "schema", "commands.schema.schema",
-        "Print the JSON Schema of scene files, design problems or jobs, for editors.",
-    ),
-    Entry(
-        "report", "commands.report.report",
-        "Write the report of a design or an identification that the service computed.",
-    ),
-    Entry("import", "commands.import_matrices.import_scene", "Make a scene of matrices or modes in files."),
-)  # fmt: skip
-
-SUBMIT = Entry("submit", "submit_group.SubmitGroup", "Hand a job to a running service.")
+from service.cli.lazy import STUDY, Entries, Entry
 
 DATABASE = (
     Entry("upgrade", "commands.service.upgrade", "Bring a database to this version's revision."),
@@ -99,9 +49,70 @@ PROJECTS = (
     Entry("restore", "commands.client.projects.restore", "Take a project out of the bin.", keyed=True),
 )
 
-GROUPS = (
-    ("runs", "Name, find, compare and delete runs of a service.", RUNS),
-    ("projects", "Gather runs in projects.", PROJECTS),
-    ("db", "Look after the database.", DATABASE),
-    ("keys", "Make and end keys to the service.", KEYS),
-)
+COMMANDS = {
+    "Compute": (
+        Entry("plan", STUDY, "Say which effects a scene calls for, and why."),
+        Entry("solve", STUDY, "Compute one periodic response, or look for all of them."),
+        Entry("sweep", STUDY, "Follow the response over a parameter."),
+        Entry("map", STUDY, "Map the response over frequency and a parameter, with the ridge of its peaks."),
+        Entry("march", STUDY, "March in time until the motion repeats."),
+        Entry("accuracy", STUDY, "Measure what accuracy costs."),
+        Entry(
+            "sensitivities", STUDY,
+            "Say what matters: per cent of the peaks and the band for one per cent of each parameter.",
+        ),
+        Entry("peaks", STUDY, "Track the highest peak over a parameter."),
+    ),
+    "Design": (
+        Entry("design", "commands.design.design", "Find the best damper."),
+        Entry("pareto", "commands.design.pareto", "Find the front of peak against resonance band."),
+        Entry(
+            "identify", "commands.identify.identify",
+            "Find parameters from measured responses and hysteresis loops.",
+        ),
+    ),
+    "Disks and modes": (
+        Entry("campbell", STUDY, "Find the speeds at which orders of the running speed meet resonances."),
+        Entry(
+            "interference", STUDY,
+            "Draw natural frequencies over the nodal diameter, with the engine orders that meet them.",
+        ),
+        Entry("mistuning", STUDY, "Study disks whose blades are not quite equal."),
+        Entry("modes", STUDY, "Follow a mode's frequency and damping over its amplitude."),
+        Entry(
+            "controlled", STUDY,
+            "Follow the response over the frequency with one amplitude held, as rigs do.",
+        ),
+    ),
+    "Scenes and files": (
+        Entry("scenes", "commands.scenes.scenes", "List the shipped scenes."),
+        Entry(
+            "import", "commands.import_matrices.import_scene", "Make a scene of matrices or modes in files.",
+        ),
+        Entry(
+            "schema", "commands.schema.schema",
+            "Print the JSON Schema of scene files, design problems or jobs, for editors.",
+        ),
+        Entry(
+            "report", "commands.report.report",
+            "Write the report of a design or an identification that the service computed.",
+        ),
+        Entry("demo", "commands.service.demo", "Run the main job end to end, with pictures."),
+    ),
+    "Service": (
+        Entry("serve", "commands.service.serve", "Serve the REST API and work off its queue."),
+        Entry("worker", "commands.service.worker", "Work off a queue without HTTP."),
+        Entry("submit", "submit_group.SubmitGroup", "Hand a job to a running service.", group=True),
+        Entry("watch", "commands.client.jobs.watch", "Follow a job until it has ended.", keyed=True),
+        Entry(
+            "results", "commands.client.jobs.results",
+            "Print what a job computed, or list the stored designs.", keyed=True,
+        ),
+        Entries("runs", "Name, find, compare and delete runs of a service.", RUNS),
+        Entries("projects", "Gather runs in projects.", PROJECTS),
+        Entries("db", "Look after the database.", DATABASE),
+        Entries("keys", "Make and end keys to the service.", KEYS),
+    ),
+}  # fmt: skip
+
+TOP = {entry.name: entry for entries in COMMANDS.values() for entry in entries}

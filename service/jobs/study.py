@@ -60,6 +60,10 @@ class Found(Drawn, Protocol):
     """A result of a study."""
 
     @property
+    def reached(self) -> bool:
+        """Whether it is what was asked for."""
+
+    @property
     def status(self) -> enum.Enum:
         """How it ended; the value is a sentence that says what to try."""
 
@@ -77,9 +81,9 @@ class Answer(NamedTuple):
     plot: Callable[[], Figure] | None = None
 
     @classmethod
-    def of(cls, found: Found, reached: bool) -> Answer:
-        """Return what a result says of itself, and whether that is what was asked for."""
-        return cls(found, found.to_json(), reached, str(found.status.value), found.plot)
+    def of(cls, found: Found) -> Answer:
+        """Return what a result says of itself."""
+        return cls(found, found.to_json(), found.reached, str(found.status.value), found.plot)
 
     @classmethod
     def told(cls, json: dict[str, Any]) -> Answer:
@@ -123,7 +127,7 @@ class Study(SceneRequest):
     def compute(cls, scene: Scene, asked: Mapping[str, Any], watch: Watch) -> Answer:
         """Compute what was asked, by keys that are the function's; left out, its own defaults count."""
         found = on_demand(cls.FUNCTION)(scene, **asked, **watch._asdict())
-        return Answer.of(found, found.completed)
+        return Answer.of(found)
 
     @classmethod
     def sweeps(cls, _found: Any) -> tuple[SweepRecord, ...]:

@@ -112,7 +112,7 @@ class AnyBranch(Drawn):
         " half_peak_to_peak mean peak peaks stable stable_ground peaks_stable band_hz band_limit"
         " band_intervals_hz band_known peak_certificate drift_per_period points n_harmonics"
         " error_estimate newton_iterations rejected_steps folds unstable marks stability_known_by"
-        " mean_undetermined largest_residual seconds flags completed status"
+        " mean_undetermined largest_residual seconds flags completed=reached status"
     )
 
     status: Annotated[BranchStatus, "How it ended."]
@@ -205,7 +205,7 @@ class AnyBranch(Drawn):
         return self.posed.parameter.unit
 
     @property
-    def completed(self) -> bool:
+    def reached(self) -> bool:
         """Whether the branch reached the end of the range."""
         return self.status is BranchStatus.COMPLETED
 

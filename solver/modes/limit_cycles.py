@@ -87,7 +87,8 @@ class LimitCycles(Piece):
     """The limit cycles of a mode under aerodynamic excitation, in the order of its curve."""
 
     JSON: ClassVar = (
-        "aero_damping mode_alone completed most_damping most_at most_error most_at_end unsolved cycles"
+        "aero_damping mode_alone completed=reached most_damping most_at most_error most_at_end unsolved"
+        " cycles"
     )
 
     aero_damping: Annotated[float, "ζ_aero; below 0 it feeds the mode."]
@@ -104,7 +105,7 @@ class LimitCycles(Piece):
     ]
     scales: Annotated[bool, "Whether amplitudes of cycles grow in proportion to the loads."]
     mode_alone: Annotated[bool, "Whether the gas acts on the one mode alone."]
-    completed: Annotated[
+    reached: Annotated[
         bool,
         "Whether the curve that they were looked for on reaches its largest amplitude: else there may be "
         "more.",
@@ -185,7 +186,7 @@ def limit_cycles(
         names = [c.name for c in found.scene.contacts if c.load is not None and c.load.orders]
         raise SettingError("N1", names, "must be 0: a limit cycle has no phase that a load could follow")
     missing = stability_left_out(found.scene, stability)
-    curve, ended = points_of(problem.equations, found), found.completed
+    curve, ended = points_of(problem.equations, found), found.reached
     if mode_alone:
         problem = _alone(problem, found)
         curve, ended = _followed(problem, found)
@@ -210,7 +211,7 @@ def limit_cycles(
         most_damping=zeta_of(points[most]) if points else math.nan,
         most_at=math.exp(points[most].state.log_amplitude) if points else math.nan,
         most_error=ladder.most_damping_error(points, most) if points else math.nan,
-        most_at_end=most in (0, len(points) - 1), completed=ended, mode_alone=mode_alone,
+        most_at_end=most in (0, len(points) - 1), reached=ended, mode_alone=mode_alone,
         scales=bool(points) and grows_together(found),
     )  # fmt: skip
 

@@ -73,7 +73,7 @@ class NonlinearMode(ModalCurve):
 
     VIEWS: ClassVar = Views("solver.views", "of_mode", "mode_dataset", "modes:mode_figure")
     JSON: ClassVar = (
-        "scene mode nodal_diameter completed status amplitude frequency=frequency_hz damping_ratio"
+        "scene mode nodal_diameter completed=reached status amplitude frequency=frequency_hz damping_ratio"
         " frequency_error damping_error dof=scene.observe.dof max_abs contacts=contact_names"
         " states=state_words n_harmonics newton_iterations rejected_steps seconds"
     )
@@ -114,7 +114,7 @@ class NonlinearMode(ModalCurve):
     rejected_steps: Annotated[int, "Steps that were tried again."]
 
     @property
-    def completed(self) -> bool:
+    def reached(self) -> bool:
         """Whether the curve reaches the amplitude asked for."""
         return self.status is NonlinearModeStatus.COMPLETED
 

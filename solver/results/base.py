@@ -26,6 +26,15 @@ class Shown(Told):
     __slots__ = ()
     VIEWS: ClassVar[Views]
 
+    @property
+    def completed(self) -> bool:
+        """`reached`, as it was called before; goes with 0.2."""
+        import warnings
+
+        warnings.warn("result.completed is result.reached now", DeprecationWarning, stacklevel=2)
+        found: bool = self.reached  # type: ignore[attr-defined]
+        return found
+
     def summary(self) -> Summary:
         """What is most worth knowing, in words and with units."""
         found: Summary = self.VIEWS.call("summary", self)

@@ -42,7 +42,9 @@ class AccuracyStudy(Drawn):
     """Rows of `accuracy_study` with what they are measured against."""
 
     VIEWS: ClassVar = Views("solver.views", "of_accuracy", "accuracy_dataset", "accuracy:accuracy_figure")
-    JSON: ClassVar = "scene frequency_hz reference reference_harmonics reference_error rows completed status"
+    JSON: ClassVar = (
+        "scene frequency_hz reference reference_harmonics reference_error rows completed=reached status"
+    )
 
     scene: Annotated[str, "Name of the scene."]
     frequency_hz: Annotated[float, "Excitation frequency [Hz]."]
@@ -56,6 +58,6 @@ class AccuracyStudy(Drawn):
     status: Annotated[AccuracyStatus, "How it ended."]
 
     @property
-    def completed(self) -> bool:
+    def reached(self) -> bool:
         """Whether no way was left out."""
         return self.status is AccuracyStatus.COMPLETED

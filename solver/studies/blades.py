@@ -81,6 +81,11 @@ class BladePeaks(MadeOfResponses, Drawn):
     highest: Annotated[Known, "How well the highest peak of all is known."] = NOTHING_KNOWN
 
     @property
+    def reached(self) -> bool:
+        """Whether the peak of every blade is known."""
+        return all(status is BranchStatus.COMPLETED for status in self.status)
+
+    @property
     def largest(self) -> float:
         """Highest peak of all blades [m]; NaN if one is not known."""
         return float(self.value.max())
@@ -154,14 +159,14 @@ def blade_peaks(
 
     whole, seen = every_branch or len(names) == 1, _observing(scene, names[0])
     branch = None if whole or settings is not None else sampled(seen, start, stop, harmonics, should_stop)
-    if branch is not None and branch.completed:
+    if branch is not None and branch.reached:
         progress(1.0, len(branch.values))
     if branch is None:
         branch = sweep(
             seen, start=start, stop=stop, harmonics=harmonics, settings=settings, errors=whole, peaks=whole,
             on_progress=progress, should_stop=should_stop,
         )  # fmt: skip
-    if not whole and branch.completed:
+    if not whole and branch.reached:
         peaks, highest = highest_peaks(branch, names)
         return BladePeaks(
             dof=name, value=np.array([peak.value for peak in peaks]),
@@ -177,7 +182,7 @@ def blade_peaks(
         if on_progress is not None:
             on_progress(_OF_THE_SWEEP + (1.0 - _OF_THE_SWEEP) * (done + 1.0) / len(names), done)
     missing = len(names) * repeats - len(branches)
-    known = [each.peak if each.completed else None for each in branches] + [None] * missing
+    known = [each.peak if each.reached else None for each in branches] + [None] * missing
     found = BladePeaks(
         dof=name,
         value=np.array([math.nan if peak is None else peak.value for peak in known]),

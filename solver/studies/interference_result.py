@@ -77,7 +77,8 @@ class InterferenceDiagram(Drawn):
         "solver.views", "of_interference", "interference_dataset", "disks:interference_figure"
     )
     JSON: ClassVar = (
-        "scene sectors speed_rpm within diameters=points orders crossings missing seconds completed status"
+        "scene sectors speed_rpm within diameters=points orders crossings missing seconds completed=reached"
+        " status"
     )
 
     scene: Annotated[Scene, "The disk, as it was given."]
@@ -97,6 +98,6 @@ class InterferenceDiagram(Drawn):
     seconds: Annotated[float, "Time taken [s]."]
 
     @property
-    def completed(self) -> bool:
+    def reached(self) -> bool:
         """Whether no nodal diameter is missing that the structure is known at."""
         return self.status is InterferenceStatus.COMPLETED

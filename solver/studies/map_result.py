@@ -30,7 +30,7 @@ class ResponseMap(MadeOfResponses, Drawn):
     VIEWS: ClassVar = Views("solver.views", "of_map", "map_dataset", "of_map")
     JSON: ClassVar = (
         "scene parameter parameter_path unit frequency amplitude half_peak_to_peak ridge n_harmonics"
-        " newton_iterations largest_residual seconds completed status"
+        " newton_iterations largest_residual seconds completed=reached status"
     )
 
     scene: Annotated[str, "Name of the scene."]
@@ -52,7 +52,7 @@ class ResponseMap(MadeOfResponses, Drawn):
     highest: Annotated[Known, "How well the highest point of the grid is known."] = NOTHING_KNOWN
 
     @property
-    def completed(self) -> bool:
+    def reached(self) -> bool:
         """Whether every point is a solution."""
         return self.status is MapStatus.COMPLETED
 

@@ -86,7 +86,7 @@ class MistuningStudy(MadeOfResponses, Drawn):
     VIEWS: ClassVar = Views("solver.views", "of_mistuning", "mistuning_dataset", "disks:mistuning_figure")
     JSON: ClassVar = (
         "scene dof=tuned.dof of spread tuned samples=disks mean mean_error standard_error deviation"
-        " quantiles worst n_harmonics seconds completed status"
+        " quantiles worst n_harmonics seconds completed=reached status"
     )
 
     scene: Annotated[str, "Its name."]
@@ -102,7 +102,7 @@ class MistuningStudy(MadeOfResponses, Drawn):
     seconds: float
 
     @property
-    def completed(self) -> bool:
+    def reached(self) -> bool:
         """Whether all peaks are known."""
         return self.status is MistuningStatus.COMPLETED
 

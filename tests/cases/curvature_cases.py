@@ -70,7 +70,7 @@ def error_of_hessian(scene: Scene, hz: float, paths: tuple[str, ...], effects: E
 
 def peak_of(scene: Scene, near: float) -> tuple[solver.Branch, solver.Peak]:
     branch = solver.sweep(scene, harmonics=HARMONICS, effects=ALL)
-    assert branch.completed
+    assert branch.reached
     return branch, min((p for p in branch.peaks if p.interior), key=lambda p: abs(p.at - near))
 
 

@@ -68,11 +68,11 @@ def judge(
 def says_it_knows(branch: Branch) -> bool:
     """Whether a branch claims that its peaks are all there are."""
     certificate = getattr(branch, "peak_certificate", None)
-    return branch.completed and (certificate is None or bool(certificate.known))
+    return branch.reached and (certificate is None or bool(certificate.known))
 
 
 def status_of(branch: Branch) -> str:
-    return branch.status.name if not branch.completed else "peaks not known"
+    return branch.status.name if not branch.reached else "peaks not known"
 
 
 def highest_faults(branch: Branch, truth: Truth) -> list[str]:

@@ -37,6 +37,6 @@ def scene_of(name: str) -> Scene:
 def highest(scene: Scene, path: str, value: float) -> tuple[float, float]:
     """Height and frequency of the highest peak by a sweep."""
     branch = solver.sweep(scene.with_values({path: value}))
-    assert branch.completed
+    assert branch.reached
     assert branch.peak is not None
     return branch.peak.value, branch.peak.at

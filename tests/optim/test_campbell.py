@@ -148,7 +148,7 @@ def test_a_response_that_ends_early_is_not_clear() -> None:
     )
     assert ended.status is CampbellStatus.INCOMPLETE
     assert ended.clear is None
-    assert not ended.completed
+    assert not ended.reached
     nothing = campbell_diagram(
         scene, speeds_rpm=(12.0, 15.0), band_hz=(1.0 / (2.0 * math.pi), 0.3), limit=1.0, harmonics=3
     )

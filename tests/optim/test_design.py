@@ -155,7 +155,7 @@ def test_progress_rises_to_one_and_the_sweeps_end_with_the_optimum() -> None:
     assert len(result.sweeps) == len(result.sweep_values) == result.evaluations
     assert result.sweep_values[-1] == result.optimum
     assert result.sweeps[-1].peak.value == result.peak.value  # type: ignore[union-attr]
-    assert result.sweeps[-1].completed
+    assert result.sweeps[-1].reached
 
 
 def test_the_json_has_the_keys_of_the_contract() -> None:

@@ -25,7 +25,7 @@ def best(name: str, method: str) -> DesignResult:
 
 def peak(scene: solver.Scene, path: str, value: float) -> float:
     branch = solver.sweep(scene.with_values({path: value}))
-    assert branch.completed
+    assert branch.reached
     return branch.peaks[0].value
 
 

@@ -11,6 +11,7 @@ import subprocess
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
+from textwrap import dedent
 
 import numpy as np
 import pytest
@@ -206,7 +207,7 @@ def test_scenes_work(text: str, tmp_path: Path) -> None:
     matrix_files(tmp_path)
     (tmp_path / "scene.toml").write_text(text, encoding="utf-8")
     branch = solver.sweep(solver.load_scene(tmp_path / "scene.toml"))
-    assert branch.completed
+    assert branch.reached
     assert branch.peak is not None
     assert branch.peak.interior
 
@@ -325,11 +326,26 @@ def test_the_index_lists_every_page_once_and_the_readme_knows_it() -> None:
     assert "(docs/index.md)" in README
 
 
-def test_the_readme_is_short_and_knows_every_command() -> None:
+def test_the_readme_is_short_and_its_first_screen_has_a_picture_a_command_and_a_design() -> None:
     assert len(README.splitlines()) <= LONGEST_README
-    assert [
-        name for name in command().commands if not re.search(rf"^\|.*`{name}\b", README, re.MULTILINE)
-    ] == []
+    screen = "\n".join(README.splitlines()[:30])
+    for part in ("](docs/img/", "make demo", "stickslip design ", "peak     "):
+        assert part in screen
+
+
+def test_the_design_of_the_first_screen_is_what_the_command_prints(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    shown = re.search(r"```sh\n(stickslip design .+)\n```\n\n.+\n\n((?:    .+\n)+)", README)
+    assert shown is not None
+    assert main(shlex.split(shown[1])[1:]) == 0
+    assert capsys.readouterr().out.startswith(dedent(shown[2]))
+
+
+def test_a_page_knows_every_command() -> None:
+    page = (ROOT / "docs" / "command.md").read_text("utf-8")
+    names = [name for name in command().commands if not re.search(rf"^\|.*`{name}\b", page, re.MULTILINE)]
+    assert names == []
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)

@@ -21,17 +21,40 @@ ROOT = Path(__file__).resolve().parent.parent.parent
 HEAVY = {"numba", "llvmlite", "numpy", "scipy", "pydantic", "casadi", "httpx", "typer", "rich", "matplotlib"}
 
 
+SUBJECTS = sorted(path.stem for path in (ROOT / "stickslip").glob("[!_]*.py"))
+
+
+def passed_on(subject: str) -> set[str]:
+    """The names a subject gives."""
+    return {name for name in vars(import_module(f"stickslip.{subject}")) if not name.startswith("_")}
+
+
+def test_every_public_name_is_at_the_top_or_in_one_subject() -> None:
+    names = {*solver.__all__, *optim.__all__, "Client", "ServiceProblem"}
+    top = set(stickslip.__all__) - set(SUBJECTS)
+    found = [*top, *(name for subject in SUBJECTS for name in passed_on(subject))]
+    assert set(found) == names
+    twice = {name for name in found if found.count(name) > 1}
+    assert twice == {"SceneError", "SettingError", "SolverError"}
+    assert len(top) <= 32
+    assert set(stickslip.__all__) - top == set(SUBJECTS)
+
+
 def test_every_name_is_that_of_its_home() -> None:
     for home in (solver, optim):
-        assert [name for name in home.__all__ if getattr(stickslip, name) is not getattr(home, name)] == []
+        for name in home.__all__:
+            given = [stickslip, *(getattr(stickslip, subject) for subject in SUBJECTS)]
+            assert {getattr(one, name) for one in given if name in vars(one)} <= {getattr(home, name)}
     assert stickslip.Client is Client
-    assert stickslip.ServiceProblem is ServiceProblem
+    assert stickslip.errors.ServiceProblem is ServiceProblem
 
 
-def test_no_name_has_two_homes() -> None:
-    names = [*solver.__all__, *optim.__all__, "Client", "ServiceProblem"]
-    assert len(names) == len(set(names))
-    assert sorted(stickslip.__all__) == sorted(names)
+def test_the_names_of_before_lead_to_their_subject_and_say_so() -> None:
+    for subject in SUBJECTS:
+        for name in passed_on(subject) - set(stickslip.__all__):
+            with pytest.warns(DeprecationWarning, match=rf"is stickslip\.{subject}\.{name} now"):
+                found = getattr(stickslip, name)
+            assert found is getattr(getattr(stickslip, subject), name)
 
 
 @pytest.mark.parametrize("module", [stickslip, solver, optim], ids=lambda module: module.__name__)
@@ -40,8 +63,10 @@ def test_completion_offers_every_public_name(module: object) -> None:
 
 
 def test_what_is_not_there_is_said() -> None:
-    with pytest.raises(AttributeError, match=r"module 'stickslip' has no attribute 'solv'"):
+    with pytest.raises(AttributeError, match=r"module 'stickslip' has no attribute 'solv'") as raised:
         stickslip.solv  # type: ignore[attr-defined]  # noqa: B018
+    # By these Python asks "Did you mean: 'solve'?"
+    assert (raised.value.name, raised.value.obj) == ("solv", stickslip)
     with pytest.raises(ImportError):
         from stickslip import solv  # type: ignore[attr-defined]  # noqa: F401
 

@@ -11,7 +11,7 @@ import pytest
 from optim.problem.keys import options
 from service.cli.lazy import STUDY
 from service.cli.options.key_options import key_options, options_of
-from service.cli.table import COMMANDS
+from service.cli.table import TOP
 from service.jobs.common.problem import ProblemRequest
 from service.jobs.kinds import SHIPPED, studies
 from service.jobs.kinds.registry.bodies import KIND, body_model
@@ -73,7 +73,7 @@ def test_every_face_has_the_same_keys(name: str) -> None:
     assert known - WATCHED - OF_PYTHON.get(name, set()) - own == set(), "an argument without a key"
     made = {one.name: one for one in key_options(SHIPPED[name], None)}
     flags = {made[key].flag for key in own}
-    [command] = [entry.function() for entry in COMMANDS if entry.name == name]
+    command = TOP[name].function()
     taken = set(options_of(command)) - OF_THE_COMMAND
     if name == "identify":  # measured data are files, an argument of the command
         flags -= {"--data"}
@@ -103,5 +103,5 @@ def test_a_worker_is_sent_it_by_name(name: str) -> None:
 
 def test_every_kind_is_a_study_with_a_command() -> None:
     assert STUDIES.keys() == {kind.name for kind in SHIPPED}
-    assert STUDIES.keys() <= {entry.name for entry in COMMANDS}
-    assert {entry.name for entry in COMMANDS if entry.home == STUDY} <= STUDIES.keys()
+    assert STUDIES.keys() <= TOP.keys()
+    assert {name for name, entry in TOP.items() if getattr(entry, "home", "") == STUDY} <= STUDIES.keys()

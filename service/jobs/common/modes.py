@@ -80,7 +80,7 @@ def exact_peaks(
             found.scene.with_values({_AMPLITUDE: factor * own}), harmonics=found.n_harmonics,
             **watch.part(i / len(factors), (i + 1) / len(factors))._asdict(),
         )  # fmt: skip
-        peak = branch.peak if branch.completed else None
+        peak = branch.peak if branch.reached else None
         told.append({
             "excitation": factor,
             "peak": None if peak is None else peak.value,

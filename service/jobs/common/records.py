@@ -59,7 +59,7 @@ def sweep_record(
         newton_iterations=branch.newton_iterations,
         rejected_steps=branch.rejected_steps,
         seconds=branch.seconds,
-        completed=branch.completed,
+        completed=branch.reached,
         status=branch.status.value,
         error_estimate=json_number(branch.error_estimate),
         peaks_known=branch.peak_certificate.known,

@@ -160,7 +160,7 @@ def run_sweep(spec: Mapping[str, Any], _progress: Progress, should_stop: ShouldS
         # Those of all sectors where one does not stand for them.
         names = [contact.name for contact in branch.scene.contacts]
         result["states"] = _states(names, branch.states[at].tolist())
-    return JobOutput(result=result, shortfall=None if branch.completed else branch.status.value)
+    return JobOutput(result=result, shortfall=None if branch.reached else branch.status.value)
 
 
 def run_sensitivities(spec: Mapping[str, Any], _progress: Progress, _should_stop: ShouldStop) -> JobOutput:

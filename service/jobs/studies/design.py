@@ -107,7 +107,7 @@ class _Design(NominalAndRobustKeys, ProblemRequest):
         on_best = None if best is None else lambda found: best(found.to_json())
         search = optim.robust_design if UNCERTAIN in asked else optim.design
         found = search(scene, **asked, **watch._asdict(), on_best=on_best)
-        return Answer.of(found, found.reached)
+        return Answer.of(found)
 
     @classmethod
     def sweeps(cls, found: Optimum | Robust) -> tuple[SweepRecord, ...]:

@@ -153,7 +153,7 @@ class Identify(Study, HarmonicRequest):
         import optim
 
         found = optim.identify(scene, **asked, **watch._asdict())
-        return Answer.of(found, found.reached)
+        return Answer.of(found)
 
 
 STUDY = Identify

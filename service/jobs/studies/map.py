@@ -127,7 +127,7 @@ def join(spec: Mapping[str, Any], outputs: Mapping[int, PartOutput]) -> JobOutpu
     return JobOutput(
         result=result,
         sweeps=() if ridge is None else unpacked(ridge.result["sweeps"], ridge.arrays),
-        shortfall=None if found.completed else found.status.value,
+        shortfall=None if found.reached else found.status.value,
     )
 
 

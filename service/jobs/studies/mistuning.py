@@ -245,7 +245,7 @@ def join(spec: Mapping[str, Any], outputs: Mapping[int, PartOutput]) -> JobOutpu
     sweeps = [part for part in (parts[0], highest) if part is not None]
     return JobOutput.of(
         study,
-        reached=study.completed,
+        reached=study.reached,
         sweeps=tuple(record for part in sweeps for record in unpacked(part.result["sweeps"], part.arrays)),
     )
 

@@ -125,12 +125,12 @@ class Modes(Study, HarmonicRequest):
         given["amplitudes"] = (asked["start"], asked["stop"])
         if asked.get("phase_resonance"):
             resonances = solver.phase_resonance(scene, **given, **watch._asdict())
-            return Answer.of(resonances, resonances.completed)
+            return Answer.of(resonances)
         of_peaks = asked.get("exact_peaks", 0)
         found = solver.nonlinear_mode(
             scene, **given, **watch.part(0.0, _OF_THE_CURVE if of_peaks else 1.0)._asdict()
         )
-        answer = Answer.of(found, found.completed)
+        answer = Answer.of(found)
         if asked.get("performance"):
             curve = solver.performance_curve(found)
             answer = answer.beside(curve, performance=curve.to_json())

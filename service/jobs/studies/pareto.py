@@ -52,7 +52,7 @@ class _Pareto(PointsOfFront, ProblemRequest):
         import optim
 
         found = optim.pareto_front(scene, **asked, **watch._asdict())
-        return Answer.of(found, found.reached)
+        return Answer.of(found)
 
     @classmethod
     def sweeps(cls, found: Front) -> tuple[SweepRecord, ...]:

@@ -48,7 +48,7 @@ class Sensitivities(Study, HarmonicRequest):
         import optim
 
         found = optim.sensitivities(scene, **asked)
-        return Answer.of(found, found.reached)
+        return Answer.of(found)
 
     @classmethod
     def sweeps(cls, found: SensitivityResult) -> tuple[SweepRecord, ...]:

@@ -234,7 +234,7 @@ def _followed(
         found["branches"] = [each.to_json() for each in points]
         branches += (other for each in points for other in each.branches)
     plot = partial(branch.plot, limit=asked.get("limit"))
-    return Answer(branch, found, branch.completed, branch.status.value, plot), branches
+    return Answer(branch, found, branch.reached, branch.status.value, plot), branches
 
 
 def _kept(

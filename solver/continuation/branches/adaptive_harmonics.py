@@ -178,18 +178,18 @@ def sweep_to(sweep_with: Callable[[int], Branch], accuracy: float) -> Branch:
     met = False
     for _ in range(_MOST_SWEEPS):
         harmonics, limit = branch.balance.n_harmonics, limit_of(branch.balance)
-        given_up = not branch.completed and harmonics >= FIRST_TRIES[-1]
+        given_up = not branch.reached and harmonics >= FIRST_TRIES[-1]
         if branch.status is BranchStatus.STOPPED or given_up or harmonics >= limit:
-            met = branch.completed and harmonics_for(branch, accuracy) is None
+            met = branch.reached and harmonics_for(branch, accuracy) is None
             break
-        needed = harmonics_for(branch, accuracy) if branch.completed else min(2 * harmonics + 1, limit)
+        needed = harmonics_for(branch, accuracy) if branch.reached else min(2 * harmonics + 1, limit)
         if needed is None:
             met = True
             break
         branch = sweep_with(needed)
         iterations += branch.newton_iterations
         seconds += branch.seconds
-    status = branch.status if met or not branch.completed else BranchStatus.ACCURACY_NOT_REACHED
+    status = branch.status if met or not branch.reached else BranchStatus.ACCURACY_NOT_REACHED
     return replace(branch, status=status, newton_iterations=iterations, seconds=seconds)
 
 

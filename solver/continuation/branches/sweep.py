@@ -169,7 +169,7 @@ def sweep(
     branch = _finish(workspace, stretches, status, first, last, limit, begun - earlier, peaks=peaks)
     if errors:
         branch = with_error(branch, workspace)
-    if on_progress is not None and branch.completed:
+    if on_progress is not None and branch.reached:
         on_progress(1.0, len(branch.values))
     return branch
 
@@ -360,7 +360,7 @@ def surveyed(branch: Branch, survey: Survey, limit: float | None) -> Branch:
     return replace(
         with_points(branch, survey.points), peaks=survey.peaks, band=band,
         newton_iterations=branch.newton_iterations + survey.spent,
-        peak_certificate=survey.certificate(completed=branch.completed),
+        peak_certificate=survey.certificate(completed=branch.reached),
     )  # fmt: skip
 
 

@@ -42,9 +42,9 @@ class HeldAmplitude(ModalCurve):
 
     VIEWS: ClassVar = Views("solver.views", "of_held", "held_dataset", "modes:held_figure")
     JSON: ClassVar = (
-        "scene dof=scene.observe.dof amplitude=held completed status frequency=frequency_hz excitation"
-        " excitation_error phase=phase_deg max_abs contacts=contact_names states=state_words changes stable"
-        " stability_unknown=unknown least n_harmonics seconds"
+        "scene dof=scene.observe.dof amplitude=held completed=reached status frequency=frequency_hz"
+        " excitation excitation_error phase=phase_deg max_abs contacts=contact_names states=state_words"
+        " changes stable stability_unknown=unknown least n_harmonics seconds"
     )
 
     held: Annotated[float, "Amplitude of harmonic 1 of the observed DOF [m]."]
@@ -67,7 +67,7 @@ class HeldAmplitude(ModalCurve):
     ]
 
     @property
-    def completed(self) -> bool:
+    def reached(self) -> bool:
         """Whether the curve reaches the end of the range."""
         return self.status is HeldStatus.COMPLETED
 
@@ -93,8 +93,8 @@ class PhaseResonance(ModalCurve):
 
     VIEWS: ClassVar = Views("solver.views", "of_resonance", "resonance_dataset", "modes:resonance_figure")
     JSON: ClassVar = (
-        "scene mode completed status amplitude frequency=frequency_hz excitation dof=scene.observe.dof"
-        " max_abs contacts=contact_names states=state_words seconds"
+        "scene mode completed=reached status amplitude frequency=frequency_hz excitation"
+        " dof=scene.observe.dof max_abs contacts=contact_names states=state_words seconds"
     )
 
     mode: Annotated[int, "Number of the linear mode it begins with."]
@@ -106,6 +106,6 @@ class PhaseResonance(ModalCurve):
     ]
 
     @property
-    def completed(self) -> bool:
+    def reached(self) -> bool:
         """Whether the curve reaches the amplitude asked for."""
         return self.status is NonlinearModeStatus.COMPLETED

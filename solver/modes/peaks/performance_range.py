@@ -85,7 +85,7 @@ def performance_over(
         curve = performance_curve(found)
         if again == _AGAIN - 1 or not curve.excitation.size or (should_stop is not None and should_stop()):
             break
-        short = curve.excitation[0] > factors[0], found.completed and curve.excitation[-1] < factors[1]
+        short = curve.excitation[0] > factors[0], found.reached and curve.excitation[-1] < factors[1]
         if not any(short):
             break
         low, high = low * (_LOWER if short[0] else 1.0), high * (_HIGHER if short[1] else 1.0)

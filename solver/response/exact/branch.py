@@ -146,7 +146,7 @@ class ExactBranch(AnyBranch):
     def bifurcations(self) -> Bifurcations:
         """By the Floquet multipliers of every orbit; the end, if it is early, is all that is marked."""
         marks: tuple[Mark, ...] = ()
-        if not self.completed and self.solutions:
+        if not self.reached and self.solutions:
             at, u = float(self.values[-1]), Point(0.0, self.solutions[-1], None).motions.ravel()
             marks = (
                 Mark(kind=MarkKind.END, at=at, amplitude=float(self.amplitude[-1]),

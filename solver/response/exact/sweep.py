@@ -94,7 +94,7 @@ def sweep_exactly(
             walk.status = BranchStatus.STOPPED
             break
     branch = _finished(walk, limit, begun)
-    if on_progress is not None and branch.completed:
+    if on_progress is not None and branch.reached:
         on_progress(1.0, len(branch.values))
     return branch
 

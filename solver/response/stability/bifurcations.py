@@ -61,7 +61,7 @@ def bifurcations(branch: AnyBranch, *, multipliers: bool = False) -> Bifurcation
             unstable=np.zeros(0, bool), marks=(), known_by="determinant", parameter=branch.parameter,
             seconds=time.perf_counter() - begun,
         )  # fmt: skip
-    if is_unique(branch.balance) and branch.completed:
+    if is_unique(branch.balance) and branch.reached:
         return Bifurcations(
             unstable=np.zeros(len(branch.values), bool), marks=(), known_by="uniqueness",
             parameter=branch.parameter, seconds=time.perf_counter() - begun,
@@ -187,7 +187,7 @@ def _by_multipliers(branch: Branch, along: Along) -> tuple[NDArray[np.bool_], tu
 
 def _end(branch: Branch, along: Along) -> tuple[Mark, ...]:
     """The last point, where the branch did not reach the end of the range."""
-    if branch.completed or branch.status is BranchStatus.ACCURACY_NOT_REACHED:
+    if branch.reached or branch.status is BranchStatus.ACCURACY_NOT_REACHED:
         return ()
     last = along.nodes[-1]
     return (along.mark(MarkKind.END, last, len(along.nodes) - 1, why=branch.status.value),)

@@ -213,14 +213,14 @@ def _least_next(tracker: Tracker, looks: list[Look], constant: list[Peak], prove
 
 def _free(inner: Tracker) -> float | None:
     """Return the least place at which a sweep shows no peak that counts; None if every one shows some."""
-    empty = [look.z for look in inner.looks if look.branch.completed and not look.peaks]
+    empty = [look.z for look in inner.looks if look.branch.reached and not look.peaks]
     if not empty:
         return None
     ends = [line.high for line in inner.lines if line.high < empty[0]]
     nearer = max(ends, default=inner.scale.low) + BEYOND * inner.scale.span
     if nearer < empty[0]:
         look = inner.look(nearer)
-        if look.branch.completed and not look.peaks:
+        if look.branch.reached and not look.peaks:
             return nearer
     return empty[0]
 

@@ -133,6 +133,11 @@ class LeastPeak(MadeOfResponses):
         "half power; the least value of the parameter.",
     ] = ChosenBy.HIGHEST_PEAK.value
 
+    @property
+    def reached(self) -> bool:
+        """Whether it is proven over the whole range."""
+        return self.status.proven
+
     def plot(self, ax: Axes | Sequence[Axes] | None = None) -> Figure:
         """Draw the response at the optimum; `ax`: axes to draw into, else a new figure."""
         if self.branch is None:
@@ -167,7 +172,7 @@ class PeakTrack(MadeOfResponses, Drawn):
     VIEWS: ClassVar = Views("solver.views", "of_track", "track_dataset", "of_track")
     JSON: ClassVar = (
         "scene parameter parameter_path unit peak frequency slope optimum exchanges competing peaks_open"
-        " n_harmonics sweeps seconds completed status"
+        " n_harmonics sweeps seconds completed=reached status"
     )
 
     scene: Annotated[str, "Name of the scene."]
@@ -195,7 +200,7 @@ class PeakTrack(MadeOfResponses, Drawn):
         return tuple(unsettled(one.peak_certificate for one in self.branches))
 
     @property
-    def completed(self) -> bool:
+    def reached(self) -> bool:
         """Whether the whole range was covered and checked."""
         return self.status is TrackStatus.TRACKED
 

@@ -229,4 +229,4 @@ class Look:
     @property
     def seen(self) -> bool:
         """Whether the whole band was seen."""
-        return self.branch.completed and bool(self.peaks)
+        return self.branch.reached and bool(self.peaks)

@@ -118,7 +118,7 @@ def test_from_end_to_end_of_a_parameter(path: str, ends: tuple[float, float]):
     """Both ends as solving gives them, whichever way."""
     for start, stop in (ends, ends[::-1]):
         branch = sweep(two_dof(), path, start, stop, frequency_hz=1.198)
-        assert branch.completed
+        assert branch.reached
         assert branch.residuals.max() <= 1e-9
         for i in (0, -1):
             solution = solve(two_dof().with_values({path: float(branch.values[i])}), frequency_hz=1.198)
@@ -156,7 +156,7 @@ def test_monotone_with_separation():
     """
     for scene, band in ((two_dof(N1=200.0), (0.3, 2.6)), (bladed_disk(N1=500.0), (500.0, 900.0))):
         branch = sweep(scene, start=band[0], stop=band[1], harmonics=7)
-        assert branch.completed
+        assert branch.reached
         assert np.count_nonzero(branch.states == LIFTING) > 10
         workspace = Workspace.of(branch.balance)
         signs = set()
@@ -225,13 +225,13 @@ def closed(workspace: Workspace, start: float, stop: float, guess: np.ndarray) -
 def test_a_branch_reached_over_the_load_goes_on_over_the_frequency():
     """N1 from none to separation, then the frequency: the same branch as without the detour."""
     over_load = sweep(two_dof(), "damper.N1", 0.0, 150.0, frequency_hz=1.1)
-    assert over_load.completed
+    assert over_load.reached
     scene = two_dof(N1=150.0)
     even = Workspace.of(build(scene)).balance.n_unknowns == over_load.balance.n_unknowns
     guess = over_load.solutions[-1, :-1] if even else None
     detour = sweep(scene, start=1.1, stop=2.6, guess=guess)
     straight = sweep(scene, start=1.1, stop=2.6)
-    assert detour.completed
+    assert detour.reached
     assert detour.peak is not None
     assert straight.peak is not None
     assert detour.peak.value == pytest.approx(straight.peak.value, rel=1e-9)

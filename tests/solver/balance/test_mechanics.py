@@ -92,6 +92,6 @@ def test_bars_above_friction_have_no_peak_and_no_solution(force: float) -> None:
     """Light masses that fly as far as inertia lets them: forces there are rounding."""
     bar = Bar(n=4, force=force, stiffness_ratio=20.0, mass=1e-6, frequency_hz=0.01)
     branch = sweep(bar.scene(), harmonics=5)
-    assert not branch.completed
+    assert not branch.reached
     assert branch.peak is None
     assert not solve_all(bar.scene(), frequency_hz=0.01, harmonics=5, starts=2).solutions

@@ -205,7 +205,7 @@ def test_duffing_with_one_harmonic_is_its_formula(way: int):
     """((1 - ω² + ¾ a3 A²)² + (c ω)²) A² = F² on every point, over both folds, from either side."""
     ends = (0.08, 0.5)[::way]
     branch = sweep(duffing(), parameter="frequency", start=ends[0], stop=ends[1], harmonics=1)
-    assert branch.completed
+    assert branch.reached
     assert branch.folds == 2
     A, omega = branch.amplitude, 2.0 * np.pi * branch.values
     left = np.hypot(1.0 - omega**2 + 0.375 * A**2, 0.05 * omega) * A
@@ -234,7 +234,7 @@ def test_the_peak_of_duffing_with_one_harmonic():
 def test_continuation_in_a_law_s_own_parameter(contact: dict[str, Any], path: str, start: float, stop: float):
     law = scene(contact)
     branch = sweep(law, parameter=path, start=start, stop=stop, frequency_hz=0.16, harmonics=7)
-    assert branch.completed
+    assert branch.reached
     assert branch.residuals.max() < 1e-9
     for i in (len(branch.values) // 3, -1):
         value = float(branch.values[i])
@@ -248,7 +248,7 @@ def test_a_gap_bends_the_peak_over():
     both = [
         sweep(stop, parameter="frequency", start=a, stop=b, harmonics=9) for a, b in ((0.1, 0.5), (0.5, 0.1))
     ]
-    assert all(branch.completed for branch in both)
+    assert all(branch.reached for branch in both)
     assert all(branch.folds >= 2 for branch in both)
     assert both[0].peak is not None
     assert both[1].peak is not None

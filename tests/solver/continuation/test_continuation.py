@@ -85,7 +85,7 @@ def test_whole_responses(predictor: Predictor, name: str):
 
 def test_paper_band_of_two_dof():
     branch = sweep(two_dof(), start=0.2, stop=2.6)
-    assert branch.completed
+    assert branch.reached
     assert (branch.values[0], branch.values[-1]) == (0.2, 2.6)
 
 
@@ -135,7 +135,7 @@ def test_any_parameter_both_ways(scene: Scene, path: str, ends: tuple[float, flo
     there = sweep(scene, path, *ends, frequency_hz=frequency_hz, harmonics=7)
     back = sweep(scene, path, ends[1], ends[0], frequency_hz=frequency_hz, harmonics=7)
     for branch in (there, back):
-        assert branch.completed
+        assert branch.reached
         assert branch.residuals.max() <= 1e-9
         assert branch.values.min() == ends[0]
         assert branch.values.max() == ends[1]
@@ -150,7 +150,7 @@ def test_any_parameter_both_ways(scene: Scene, path: str, ends: tuple[float, flo
 @pytest.mark.parametrize("scene", [mixed_disk(), loose_mass()], ids=["mixed disk", "loose mass"])
 def test_other_scenes(scene: Scene):
     branch = sweep(scene, harmonics=7)
-    assert branch.completed
+    assert branch.reached
     assert branch.residuals.max() <= 1e-9
 
 
@@ -171,7 +171,7 @@ def test_random_oscillators(count: int):
         branch = sweep(
             scene, start=0.03, stop=0.5 * math.sqrt(1.0 + kt), harmonics=int(rng.choice([3, 7, 11]))
         )
-        assert branch.completed, contact
+        assert branch.reached, contact
         assert branch.folds == 0
         assert branch.residuals.max() <= 1e-9
 
@@ -192,7 +192,7 @@ def test_cusps(contact: dict[str, float], c: float, harmonics: int):
     """The amplitude rises steeply and falls as steeply: the way on and the way back look alike."""
     scene = oscillator({"mu": 0.3, **contact}, k=1.0, c=c)
     branch = sweep(scene, start=0.03, stop=0.5 * math.sqrt(1.0 + contact["kt"]), harmonics=harmonics)
-    assert branch.completed
+    assert branch.reached
 
 
 @pytest.mark.parametrize("predictor", Predictor)
@@ -204,7 +204,7 @@ def test_the_known_kink(harmonics: int, predictor: Predictor):
     settings = ContinuationSettings(predictor=predictor)
     for ends in ((0.2, 2.5), (2.5, 0.2), (1.58, 1.64)):
         branch = sweep(scene, start=ends[0], stop=ends[1], harmonics=harmonics, settings=settings)
-        assert branch.completed
+        assert branch.reached
         assert branch.residuals.max() <= 1e-9
     changes = branch.values[1:][np.diff(branch.states[:, 0]) != 0]
     assert changes.size

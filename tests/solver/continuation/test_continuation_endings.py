@@ -20,7 +20,7 @@ def test_undamped():
     scene = oscillator({"kt": 0.3, "mu": 0.3, "N0": 0.5}, k=1.0)
     branch = sweep(scene, start=0.05, stop=0.3, harmonics=3)
     assert branch.status is BranchStatus.UNDAMPED
-    assert not branch.completed
+    assert not branch.reached
     assert branch.residuals.max() <= 1e-9
     assert branch.values[-1] == pytest.approx(1.0 / (2.0 * math.pi), rel=1e-6)
     assert "no damping" in branch.to_json()["status"]
@@ -43,7 +43,7 @@ def test_no_start():
 def test_too_many_points():
     branch = sweep(two_dof(), settings=ContinuationSettings(most_points=50, largest_step=0.01))
     assert branch.status is BranchStatus.TOO_MANY_POINTS
-    assert not branch.completed
+    assert not branch.reached
     assert len(branch.values) >= 50
     assert branch.values[-1] < 2.6
 
@@ -77,7 +77,7 @@ def test_progress_rises_to_one():
 def test_a_guess_is_used():
     branch = sweep(two_dof(), start=1.0, stop=1.1)
     again = sweep(two_dof(), start=1.1, stop=1.2, guess=branch.solutions[-1, :-1])
-    assert again.completed
+    assert again.reached
     assert again.amplitude[0] == pytest.approx(branch.amplitude[-1], rel=1e-9)
     fresh = sweep(two_dof(), start=1.1, stop=1.2)
     assert again.newton_iterations < fresh.newton_iterations
@@ -90,7 +90,7 @@ def test_settings_change_the_cost_not_the_answer():
     assert usual.peak is not None
     assert len(fine.values) > 2 * len(usual.values) > 2 * len(loose.values) * 0.5
     for branch in (fine, loose):
-        assert branch.completed
+        assert branch.reached
         assert branch.peak is not None
         assert branch.peak.value == pytest.approx(usual.peak.value, rel=1e-9)
 

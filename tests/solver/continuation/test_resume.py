@@ -48,7 +48,7 @@ def test_a_resumed_branch_is_the_branch(name: str) -> None:
     scene, arguments = CASES[name]
     stretches: list[Stretch] = []
     whole = sweep(scene, settings=FINE, on_stretch=stretches.append, **arguments)
-    assert whole.completed
+    assert whole.reached
     assert len(stretches) >= 3
     if name == "folds":
         assert whole.folds >= 2
@@ -95,7 +95,7 @@ def test_resumed_twice_and_stopped_between() -> None:
         )
         if branch.status is not BranchStatus.STOPPED:
             break
-    assert branch.completed
+    assert branch.reached
     np.testing.assert_array_equal(branch.solutions, whole.solutions)
     assert shares == sorted(shares)
     assert len(kept) >= 3

@@ -71,7 +71,7 @@ def test_a_response_without_a_flag_is_stable_or_one_of_several(seed: int):
 
 def test_a_branch_through_an_unstable_symmetric_response_says_so():
     unstable = sweep(duffing(15.0), start=0.2, stop=0.3, harmonics=9)
-    assert unstable.completed
+    assert unstable.reached
     assert unstable.flags == (SYMMETRIC_UNSTABLE,)
     assert unstable.to_json()["flags"] == [SYMMETRIC_UNSTABLE]
     assert sweep(duffing(0.1), start=0.2, stop=0.3, harmonics=5).flags == ()

@@ -82,12 +82,12 @@ def test_with_friction_it_is_the_scene_in_absolute_motion() -> None:
 def test_a_sweep_over_the_frequency_and_over_the_level() -> None:
     scene = Scene.from_dict(driven(contacts=[RUB]))
     branch = solver.sweep(scene, harmonics=3)
-    assert branch.completed
+    assert branch.reached
     assert branch.peak is not None
     at_peak = solver.solve(scene, frequency_hz=branch.peak.at, harmonics=3)
     assert branch.peak.value == pytest.approx(at_peak.max_abs, rel=1e-8)
     levels = solver.sweep(scene, "excitation.amplitude", 0.1, 1.4, frequency_hz=0.9, harmonics=3)
-    assert levels.completed
+    assert levels.reached
     double = solver.solve(scene.with_values({"excitation.amplitude": 1.4}), frequency_hz=0.9, harmonics=3)
     assert levels.amplitude[-1] == pytest.approx(double.max_abs, rel=1e-8)
 
@@ -255,7 +255,7 @@ def test_gradients_where_patterns_differ(ground: bool) -> None:
         )
         assert slope == pytest.approx((high - low) / (2.0 * step), rel=3e-6), path
     branch = solver.sweep(scene, harmonics=3)
-    assert branch.completed
+    assert branch.reached
     assert branch.peak is not None
     at_peak = solver.solve(scene, frequency_hz=branch.peak.at, harmonics=3)
     assert branch.peak.value == pytest.approx(at_peak.max_abs, rel=1e-8)

@@ -32,7 +32,7 @@ def test_one_slider_with_one_harmonic_is_the_formula(seed: int) -> None:
     found = solver.nonlinear_mode(
         one_mass(m, k, c, kt, limit), amplitudes=(0.1 * full, 1e4 * full), harmonics=1
     )
-    assert found.completed, found.status
+    assert found.reached, found.status
     for a, frequency, zeta in zip(found.amplitude, found.frequency_hz, found.damping_ratio, strict=True):
         stiffness, damping = slider(a / math.sqrt(m), kt, limit)
         omega = math.sqrt((k + stiffness) / m)
@@ -56,7 +56,7 @@ def test_a_mode_no_contact_sees_is_linear() -> None:
         "observe": {"dof": "x", "band": [0.5, 2.0]},
     }
     found = solver.nonlinear_mode(solver.Scene.from_dict(raw), 1, amplitudes=(1e-3, 1.0), harmonics=3)
-    assert found.completed
+    assert found.reached
     np.testing.assert_allclose(found.frequency_hz, 5.0 / (2.0 * math.pi), rtol=1e-12)
     np.testing.assert_allclose(found.damping_ratio, 0.3 / (2.0 * 2.0 * 5.0), rtol=1e-10)
 
@@ -65,7 +65,7 @@ def test_a_mode_without_contacts_is_the_linear_one() -> None:
     scene = one_mass(2.0, 50.0, 0.4, 1.0, 1.0)
     bare = scene.model_copy(update={"contacts": ()})
     found = solver.nonlinear_mode(bare, amplitudes=(1e-3, 1.0))
-    assert found.completed
+    assert found.reached
     np.testing.assert_allclose(found.damping_ratio, 0.4 / (2.0 * math.sqrt(100.0)), rtol=1e-10)
 
 

@@ -139,7 +139,7 @@ def test_a_mode_of_sparse_matrices_is_that_of_whole_ones(monkeypatch: pytest.Mon
         monkeypatch.setattr(sparse, "SPARSE_FROM", least)
         curves.append(solver.nonlinear_mode(_lap(6), 1, amplitudes=(1e-3, 1e-2), harmonics=3))
     one, other = curves
-    assert one.completed
+    assert one.reached
     assert np.any(one.states[-1] != one.states[0])
     np.testing.assert_allclose(one.amplitude, other.amplitude, rtol=1e-8)
     np.testing.assert_allclose(one.frequency_hz, other.frequency_hz, rtol=1e-9)

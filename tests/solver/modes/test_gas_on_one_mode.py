@@ -19,7 +19,7 @@ def _cycle(seed: int, *, stability: bool) -> tuple[solver.NonlinearMode, float, 
     aero = -AERO * float(mode.damping_ratio.max())
     found = solver.limit_cycles(mode, aero, mode_alone=True, stability=stability)
     assert found.mode_alone
-    assert found.completed
+    assert found.reached
     return mode, aero, found.cycles[0]
 
 

@@ -35,7 +35,7 @@ def test_the_first_mode_of_regularised_friction_is_that_of_nlvib() -> None:
     found = solver.nonlinear_mode(
         _regularised(0.05), 1, amplitudes=(10**-1.5, 10.0), harmonics=21, errors=False
     )
-    assert found.completed
+    assert found.reached
     omega = 2.0 * math.pi * found.frequency_hz
     assert omega[[0, -1]] == pytest.approx([math.sqrt(640.0), 24.156], rel=2e-4)
     assert found.damping_ratio.max() == pytest.approx(

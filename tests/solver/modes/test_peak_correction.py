@@ -20,7 +20,7 @@ TOLERANCE = 0.05
 
 def _exact(scene: solver.Scene, factor: float, harmonics: int) -> float:
     branch = solver.sweep(scene.with_values({LEVEL: factor * scene.value(LEVEL)}), harmonics=harmonics)
-    return branch.peak.value if branch.completed and branch.peak is not None else math.nan
+    return branch.peak.value if branch.reached and branch.peak is not None else math.nan
 
 
 def test_the_correction_is_the_peak_of_the_whole_response() -> None:

@@ -15,7 +15,7 @@ LEVEL = "excitation.amplitude"
 
 def _exact(scene: solver.Scene, factor: float, harmonics: int) -> float:
     branch = solver.sweep(scene.with_values({LEVEL: factor * scene.value(LEVEL)}), harmonics=harmonics)
-    assert branch.completed
+    assert branch.reached
     assert branch.peak is not None
     return branch.peak.value
 
@@ -67,7 +67,7 @@ def test_a_force_that_does_not_drive_the_mode_is_refused() -> None:
 def test_a_mode_does_not_lead_over_into_another_in_a_higher_harmonic() -> None:
     # With short steps mode 1 of the two masses leads over into mode 2, moving in harmonic 2, from a = 1.4 on.
     found = solver.nonlinear_mode(solver.load_scene("two-dof"), amplitudes=(0.6, 1e3), errors=False)
-    assert found.completed
+    assert found.reached
     squares = found.dof_motions[:, :, 1:] ** 2
     # Both masses are 1 kg.
     first = squares[:, :, :2].sum(axis=(1, 2)) / squares.sum(axis=(1, 2))

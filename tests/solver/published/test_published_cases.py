@@ -58,7 +58,7 @@ def test_three_masses_with_friction_cubic_springs_and_a_stop(observed: str, rms:
         three_masses(observed), parameter="frequency", start=0.6 / RAD, stop=3.0 / RAD, harmonics=7,
         settings=ContinuationSettings(largest_step=0.05),
     )  # fmt: skip
-    assert branch.completed
+    assert branch.reached
     assert branch.folds == 4
     arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(branch.solutions, axis=0), axis=1))])
     size = CubicSpline(arc, np.sqrt(0.5 * (branch.observed**2).sum(axis=1)))

@@ -71,8 +71,8 @@ def test_both_tangents_at_a_branch_point_and_what_leaves_it():
     assert abs(along @ across) < 0.05
     assert np.linalg.norm(across) == pytest.approx(1.0)
     first, second = switched.branches
-    assert first.completed
-    assert second.completed
+    assert first.reached
+    assert second.reached
     np.testing.assert_allclose(first.mean[-1], -second.mean[-1], rtol=1e-6)
     assert abs(first.mean[-1]) > 0.1
     # What left there comes back to the same place from the other side.

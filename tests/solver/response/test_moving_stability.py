@@ -104,7 +104,7 @@ def test_between_folds_of_random_contacts_the_motion_is_left():
 def test_folds_of_a_rubbing_contact_are_passed_and_marked():
     branch = sweep(bending_scene(0), harmonics=11)
     found, whole = bifurcations(branch), bifurcations(branch, multipliers=True)
-    assert branch.completed
+    assert branch.reached
     assert branch.folds == 2
     assert [mark.kind.name for mark in found.marks] == ["FOLD", "FOLD"]
     assert (found.known_by, whole.known_by) == ("determinant", "multipliers")

@@ -160,7 +160,7 @@ def test_random_scenes_are_what_a_march_finds(seed: int) -> None:
 def test_several_masses_have_the_powers_in_balance() -> None:
     scene, hz = random_scene(4)
     found = stickslip.solve(scene, frequency_hz=hz, harmonics=200)
-    assert stickslip.power_balance(found).imbalance < 1e-3
+    assert stickslip.solutions.power_balance(found).imbalance < 1e-3
 
 
 def test_parallel_contacts_are_one() -> None:

@@ -38,7 +38,7 @@ def test_every_point_is_den_hartogs(F: float, low: float, high: float) -> None:
     for begin, end in ((start, stop), (stop, start)):
         found = stickslip.sweep(one_mass(F), start=begin, stop=end, limit=limit)
         assert isinstance(found, ExactBranch)
-        assert found.completed
+        assert found.reached
         assert found.values[0] == begin
         assert found.values[-1] == end
         assert found.amplitude == pytest.approx([amplitude(hz, F) for hz in found.values], rel=1e-10)
@@ -59,7 +59,7 @@ def test_over_another_parameter() -> None:
     """Over the load at a fixed frequency, with stops and without."""
     b = 1.5
     found = stickslip.sweep(one_mass(0.2), "f.N0", 0.3, 0.75, frequency_hz=b / (2.0 * math.pi))
-    assert found.completed
+    assert found.reached
     assert found.band is None
     assert found.amplitude[0] == pytest.approx(without_stops(b, 0.3), rel=1e-10)
     assert found.amplitude[-1] == pytest.approx(with_stops(b, 0.75), rel=1e-10)
@@ -69,14 +69,14 @@ def test_over_another_parameter() -> None:
 
 def test_a_resonance_without_damping_ends_the_branch() -> None:
     found = stickslip.sweep(one_mass(0.4), start=0.14, stop=0.18)
-    assert found.status is stickslip.BranchStatus.UNDAMPED
+    assert found.status is stickslip.branches.BranchStatus.UNDAMPED
     assert found.values[-1] < 0.5 / math.pi
     assert found.bifurcations.marks[-1].why == found.status.value
 
 
 def test_friction_above_a_quarter_of_pi_of_the_force_bounds_it() -> None:
     bounded = stickslip.sweep(one_mass(0.8), start=0.15, stop=0.2)
-    assert bounded.completed
+    assert bounded.reached
     assert bounded.amplitude[-1] == pytest.approx(with_stops(0.4 * math.pi, 0.8), rel=1e-10)
     i = int(np.argmax(bounded.amplitude))
     marched = stickslip.march(one_mass(0.8), frequency_hz=float(bounded.values[i]))
@@ -124,7 +124,7 @@ def test_random_scenes_are_what_single_solves_find(seed: int) -> None:
     """Elastic contacts, gaps, loads that vary and move beside rigid ones."""
     scene, hz = random_scene(seed)
     found = stickslip.sweep(scene, start=0.95 * hz, stop=1.05 * hz)
-    assert found.completed
+    assert found.reached
     for i in range(0, len(found.values), max(len(found.values) // 5, 1)):
         alone = stickslip.solve(scene, frequency_hz=float(found.values[i]))
         if not alone.converged or "history_dependent" in alone.flags:
@@ -136,13 +136,13 @@ def test_random_scenes_are_what_single_solves_find(seed: int) -> None:
 
 def test_where_a_rigid_normal_contact_opens_the_branch_ends() -> None:
     found = stickslip.sweep(pressed(math.inf, N0=1.2), start=0.12, stop=0.3)
-    assert found.status is stickslip.BranchStatus.RIGID_OPENS
+    assert found.status is stickslip.branches.BranchStatus.RIGID_OPENS
     assert 0.12 < found.values[-1] < 0.3
     opens = pressed(math.inf, N0=1.2)
     assert stickslip.march(opens, frequency_hz=float(found.values[-1]) - 0.01).converged
     assert not stickslip.march(opens, frequency_hz=float(found.values[-1]) + 0.01).converged
     nothing = stickslip.sweep(pressed(math.inf, N0=0.5), start=0.12, stop=0.3)
-    assert nothing.status is stickslip.BranchStatus.RIGID_OPENS
+    assert nothing.status is stickslip.branches.BranchStatus.RIGID_OPENS
     assert len(nothing.values) == 0
     assert nothing.peak is None
     assert nothing.to_json()["points"] == 0
@@ -175,15 +175,14 @@ def test_it_is_watched_and_stopped() -> None:
         on_points=lambda values, amplitudes: (seen.extend(values), heights.extend(amplitudes)),
         on_progress=lambda share, _count: shares.append(share), should_stop=lambda: len(seen) == 7,
     )  # fmt: skip
-    assert found.status is stickslip.BranchStatus.STOPPED
+    assert found.status is stickslip.branches.BranchStatus.STOPPED
     assert len(seen) == 7
     assert seen == sorted(seen)
     assert shares == sorted(shares)
     assert set(seen) <= set(found.values.tolist())
-    few = stickslip.sweep(
-        damped(0.4, 0.05), start=0.1, stop=0.2, settings=stickslip.ContinuationSettings(most_points=4)
-    )
-    assert few.status is stickslip.BranchStatus.TOO_MANY_POINTS
+    settings = stickslip.branches.ContinuationSettings(most_points=4)
+    few = stickslip.sweep(damped(0.4, 0.05), start=0.1, stop=0.2, settings=settings)
+    assert few.status is stickslip.branches.BranchStatus.TOO_MANY_POINTS
 
 
 def test_what_needs_a_balance_refuses_by_name() -> None:
@@ -197,7 +196,7 @@ def test_what_needs_a_balance_refuses_by_name() -> None:
             study()
     branch = stickslip.sweep(scene, start=0.1, stop=0.12)
     with pytest.raises(stickslip.SettingError, match="orbits"):
-        stickslip.switch_branches(branch)
+        stickslip.branches.switch_branches(branch)
     assert not isinstance(branch, Branch)
     for name in ("guess", "resume"):
         with pytest.raises(stickslip.SettingError, match=name):

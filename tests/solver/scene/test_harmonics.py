@@ -126,7 +126,7 @@ def test_the_peak_of_a_fast_force(highest: int):
     """0.2324 m at 0.1304 Hz, where 12 ω meets a resonance; without the force of harmonic 12, 0.0065 m."""
     scene = fast_force()
     branch = sweep(scene, start=0.12, stop=0.14, harmonics=highest)
-    assert branch.completed
+    assert branch.reached
     assert branch.peak is not None
     fine = solve(scene, frequency_hz=branch.peak.at, harmonics=61)
     assert branch.peak.at == pytest.approx(0.13036, rel=1e-4)

@@ -140,7 +140,7 @@ def test_it_can_be_stopped() -> None:
         load_scene("bladed-disk"), on_progress=lambda _, n: seen.append(n), should_stop=lambda: len(seen) == 2
     )
     assert stopped.status is InterferenceStatus.STOPPED
-    assert not stopped.completed
+    assert not stopped.reached
     assert [point.diameter for point in stopped.points] == [0, 1]
 
 

@@ -57,7 +57,7 @@ def test_the_grid_spans_band_and_range(disk: solver.ResponseMap) -> None:
 def test_the_ridge_is_above_every_row(disk: solver.ResponseMap) -> None:
     ridge = disk.ridge
     assert ridge is not None
-    assert ridge.completed
+    assert ridge.reached
     for row, value in enumerate(disk.parameter):
         right = int(np.clip(np.searchsorted(ridge.parameter, value), 1, ridge.parameter.size - 1))
         top = ridge.peak[[right - 1, right]].max()
@@ -77,7 +77,7 @@ def test_points_without_a_solution_stay_empty(monkeypatch: pytest.MonkeyPatch) -
         solver.load_scene("two-dof"), "damper.N0", 50.0, 60.0, steps=2, frequencies=4, ridge=False
     )
     assert found.status is MapStatus.HOLES
-    assert not found.completed
+    assert not found.reached
     assert np.isnan(found.amplitude).all()
     assert found.to_json()["amplitude"] == [[None] * 4] * 2
 
@@ -101,7 +101,7 @@ def test_the_ridge_counts_and_can_be_stopped_too() -> None:
     whole = response_map(
         two_dof, "damper.N0", 50.0, 60.0, **keys, on_progress=lambda share, count: seen.append((share, count))
     )
-    assert whole.completed
+    assert whole.reached
     assert seen == sorted(seen)
     assert seen[2] == (pytest.approx(0.7), 21)
     assert len(seen) > 4

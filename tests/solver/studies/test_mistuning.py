@@ -339,7 +339,7 @@ def test_peaks_that_were_not_reached():
 def test_sweeps_and_groups():
     scene = with_mistuning(disk(), of=["root"], values=VALUES)
     branch = sweep(scene, start=3.0, stop=3.8, harmonics=3)
-    assert branch.completed
+    assert branch.reached
     assert branch.peak is not None
     point = solve(scene, frequency_hz=branch.peak.at, harmonics=3)
     assert point.max_abs == pytest.approx(branch.peak.value, rel=1e-8)

@@ -84,7 +84,7 @@ def test_more_disks_begin_with_the_same_and_a_stop_keeps_those_that_are_whole(st
         should_stop=lambda: bool(done) and done[-1][1] == 2,
     )  # fmt: skip
     assert stopped.status is MistuningStatus.STOPPED
-    assert not stopped.completed
+    assert not stopped.reached
     assert [disk.magnification for disk in stopped.disks] == [d.magnification for d in study.disks[:2]]
     shares = [share for share, _ in done]
     assert shares == sorted(shares)

@@ -119,6 +119,18 @@ def test_every_public_result_says_what_it_is(kind: type) -> None:
         assert issubclass(kind, Shown | Piece)
 
 
+@pytest.mark.parametrize("kind", public_dataclasses(), ids=lambda kind: kind.__name__)
+def test_every_result_with_a_status_says_in_one_word_whether_it_answers(kind: type) -> None:
+    if issubclass(kind, Shown) and any(field.name == "status" for field in dataclasses.fields(kind)):
+        assert "reached" in dir(kind)
+
+
+def test_the_word_of_before_warns() -> None:
+    branch = solver.sweep(two_dof(), "frequency", 0.8, 1.4, harmonics=1)
+    with pytest.warns(DeprecationWarning, match="reached"):
+        assert branch.completed is branch.reached is True
+
+
 def test_pieces_say_their_numbers_with_units() -> None:
     scene = two_dof()
     branch = solver.sweep(scene, "frequency", 0.8, 1.4, harmonics=3, limit=2.0)

@@ -10,6 +10,7 @@ import typer
 
 from optim.problem.keys import options as key_options_of
 from service.cli.commands.client.jobs import hand_in, scene_of
+from service.cli.lazy import Entry
 from service.cli.options import problem_inputs
 from service.cli.options import shared as options
 from service.cli.options.key_options import (
@@ -21,7 +22,7 @@ from service.cli.options.key_options import (
 )
 from service.cli.options.keyed import keyed
 from service.cli.options.problem import FLAGS, ProblemFlags, takes_problem
-from service.cli.table import COMMANDS
+from service.cli.table import TOP
 from service.jobs.registry import ABOUT_THE_RUN, JobKind
 
 if TYPE_CHECKING:
@@ -40,7 +41,8 @@ def command_of(kind: JobKind) -> Any:
 
 def _local(name: str) -> Command | None:
     """The command that computes here what a kind computes on a service, if there is one."""
-    return next((entry.function() for entry in COMMANDS if entry.name == name), None)
+    entry = TOP.get(name)
+    return entry.function() if isinstance(entry, Entry) else None
 
 
 def submission(kind: JobKind, local: Command | None) -> Command:

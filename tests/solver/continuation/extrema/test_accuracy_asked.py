@@ -66,7 +66,7 @@ def test_out_of_reach_says_so(monkeypatch: pytest.MonkeyPatch):
     assert solution.error_estimate > 1e-7 * solution.max_abs
     branch = sweep(scene, "frequency", 690.0, 710.0, accuracy=1e-7)
     assert branch.status is BranchStatus.ACCURACY_NOT_REACHED
-    assert not branch.completed
+    assert not branch.reached
     assert branch.balance.n_harmonics == 15
 
 
@@ -89,7 +89,7 @@ def test_a_linear_scene_needs_the_first_harmonics_only():
     assert solution.reached
     assert solution.n_harmonics == adaptive.FIRST_HARMONICS
     branch = sweep(oscillator(k=2.0, c=0.1), "frequency", 0.1, 0.4, accuracy=1e-9)
-    assert branch.completed
+    assert branch.reached
     assert branch.balance.n_harmonics == adaptive.FIRST_HARMONICS
 
 
@@ -98,7 +98,7 @@ def test_a_linear_scene_needs_the_first_harmonics_only():
 )
 def test_a_branch(scene: Scene, accuracy: float):
     branch = sweep(scene, accuracy=accuracy)
-    assert branch.completed
+    assert branch.reached
     assert branch.peak is not None
     assert branch.error_estimate <= accuracy * branch.peak.value
     fine = sweep(scene, harmonics=61)
@@ -111,7 +111,7 @@ def test_a_branch(scene: Scene, accuracy: float):
 
 def test_a_branch_over_another_parameter():
     branch = sweep(two_dof(), "damper.N0", 20.0, 200.0, frequency_hz=1.2, accuracy=1e-3)
-    assert branch.completed
+    assert branch.reached
     for index in (0, len(branch.values) // 2, -1):
         scene = two_dof(N0=float(branch.values[index]))
         truth = solve(scene, frequency_hz=1.2, harmonics=61).max_abs

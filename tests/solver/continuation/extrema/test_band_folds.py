@@ -129,7 +129,7 @@ def folded_scene(seed: int) -> Scene:
 def check_slopes(scene: Scene, harmonics: int, most: int) -> int:
     """Compare the derivatives of a band with differences of whole sweeps; return how many were compared."""
     branch = sweep(scene, harmonics=harmonics)
-    if not branch.completed or branch.band is None or not any(edge.fold for edge in branch.band.edges):
+    if not branch.reached or branch.band is None or not any(edge.fold for edge in branch.band.edges):
         return 0
     limit = branch.band.limit
     found = sensitivities(scene, limit=limit, harmonics=harmonics)
@@ -156,7 +156,7 @@ def check_slopes(scene: Scene, harmonics: int, most: int) -> int:
 
 
 def width(branch: Branch) -> float:
-    assert branch.completed
+    assert branch.reached
     assert branch.band is not None
     return branch.band.width
 
@@ -186,7 +186,7 @@ TURNS = (4, 15, 18, 40, 55, 93, 106, 119, 126, 128)  # seeds of branches that we
 def test_no_branch_goes_back_the_way_it_came(seed: int) -> None:
     """Branch points and kinks in one step: the sign of the determinant alone does not tell where to go on."""
     branch = sweep(folded_scene(seed), harmonics=5)
-    assert branch.completed
+    assert branch.reached
     finer = sweep(folded_scene(seed), harmonics=5, settings=ContinuationSettings(largest_step=0.03))
     assert branch.peak is not None
     assert finer.peak is not None

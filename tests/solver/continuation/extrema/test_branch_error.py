@@ -49,11 +49,11 @@ def coverage(seeds: range, few: tuple[int, ...], many: int, seconds: float) -> t
         fine = sweep(
             scene, harmonics=many, should_stop=lambda begun=begun: time.perf_counter() - begun > seconds
         )
-        if not fine.completed or fine.peak is None:
+        if not fine.reached or fine.peak is None:
             continue
         for harmonics in few:
             branch = sweep(scene, harmonics=harmonics)
-            if not branch.completed or branch.peak is None:
+            if not branch.reached or branch.peak is None:
                 continue
             error = abs(branch.peak.value - fine.peak.value)
             allowed = branch.error_estimate + fine.error_estimate + ROUNDING * fine.peak.value
@@ -90,7 +90,7 @@ def test_a_resonance_wider_than_its_frequency_is_high_is_followed_from_above_zer
     raw["excitation"]["engine_order"] = 3
     scene = solver.Scene.from_dict(raw).with_values({"shroud.N0": 500.0, "shroud.kt": 4e6})
     branch = solver.sweep(scene, harmonics=3)
-    assert branch.completed
+    assert branch.reached
     assert branch.peak is not None
     true = solver.sweep(scene, harmonics=41)
     assert true.peak is not None

@@ -158,7 +158,7 @@ def test_a_map_of_narrow_resonances():
         here = scene.with_values({"d.N0": float(load)})
         assert found.amplitude[i] == pytest.approx(PointSolver(here, 3).amplitudes(found.frequency), rel=1e-7)
     assert found.ridge is not None
-    if found.ridge.completed:
+    if found.ridge.reached:
         for load, peak in zip(found.ridge.parameter[[0, -1]], found.ridge.peak[[0, -1]], strict=True):
             here = scene.with_values({"d.N0": float(load)})
             assert peak == pytest.approx(true_response(here, 3).highest, rel=HEIGHT)

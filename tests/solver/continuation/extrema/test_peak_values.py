@@ -31,7 +31,7 @@ def test_the_peak_does_not_depend_on_the_way_along_the_branch(
     )  # fmt: skip
     assert coarse.peak is not None
     assert fine.peak is not None
-    assert fine.completed
+    assert fine.reached
     assert coarse.peak.value == pytest.approx(fine.peak.value, rel=1e-8)
 
 

@@ -135,7 +135,7 @@ def check_random(seed: int, points: int) -> None:
 
     def top(value: float) -> float:
         branch = solver.sweep(scene.with_values({path: value}), harmonics=5)
-        return branch.peak.value if branch.completed and branch.peak is not None else np.inf
+        return branch.peak.value if branch.reached and branch.peak is not None else np.inf
 
     for basin in best.basins:
         if basin.proven:

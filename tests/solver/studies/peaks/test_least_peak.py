@@ -73,7 +73,7 @@ def test_the_branch_at_the_optimum_needs_no_other_sweep(
 ) -> None:
     best = best_of(name, path, low, high)
     assert best.branch is not None
-    assert best.branch.completed
+    assert best.branch.reached
     assert best.branch.balance.scene.value(path) == best.at
     assert best.branch.peak is not None
     assert best.branch.peak.value == pytest.approx(best.peak, rel=1e-9)
@@ -165,7 +165,7 @@ def check_random(seed: int, points: int) -> None:
         return
     for value in np.geomspace(0.1 * N0, 10.0 * N0, points):
         branch = solver.sweep(scene.with_values({path: float(value)}), harmonics=5)
-        if branch.completed:
+        if branch.reached:
             assert branch.peak is not None
             assert branch.peak.value >= best.peak * (1.0 - 1e-8)
 

@@ -26,7 +26,7 @@ K = (2.0 * math.pi) ** 2
 def top(problem: OneVariable, value: float) -> float:
     """The highest amplitude of any point or peak of a sweep; infinity where it does not reach the end."""
     branch = solver.sweep(problem.scene.with_values({problem.path: value}), harmonics=HARMONICS)
-    if not branch.completed or not branch.peaks:
+    if not branch.reached or not branch.peaks:
         return math.inf
     return max(branch.peaks[0].value, float(branch.amplitude.max()))
 
@@ -87,7 +87,7 @@ def check_ridge(seed: int, points: int) -> None:
     problem = one_variable(seed, LIGHTEST)
     scene, path, low, high = problem
     track = track_peak(scene, path, low, high, harmonics=HARMONICS)
-    if not track.completed:
+    if not track.reached:
         return
     inside = track.parameter[1:-1]
     for index in np.linspace(0, inside.size - 1, points).astype(int):
@@ -245,7 +245,7 @@ def test_a_track_whose_work_is_used_up_says_so(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr("solver.studies.peaks.track_peak.RESPONSES", 4.0)
     track = track_peak(three_contacts(), "c0.N0", 0.17, 17.0, harmonics=5)
     assert track.status is TrackStatus.WORK_USED_UP
-    assert not track.completed
+    assert not track.reached
     assert track.parameter.size > 0
 
 

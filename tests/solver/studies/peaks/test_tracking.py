@@ -231,7 +231,7 @@ def test_stopped_by_the_caller() -> None:
         on_progress=lambda share, count: seen.append((share, count)),
     )  # fmt: skip
     assert track.status is TrackStatus.STOPPED
-    assert not track.completed
+    assert not track.reached
     assert seen[0][1] == 1
 
 
