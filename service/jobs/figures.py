@@ -8,11 +8,22 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, fields
 from datetime import datetime
 from functools import cache
-from typing import Annotated, Any, ClassVar, NamedTuple, Self, get_args, get_origin, get_type_hints
+from typing import (
+    Annotated,
+    Any,
+    ClassVar,
+    NamedTuple,
+    Self,
+    TypeVar,
+    cast,
+    get_args,
+    get_origin,
+    get_type_hints,
+)  # fmt: skip
 
 from pydantic import BaseModel
 
@@ -21,7 +32,13 @@ STATUS = "status"
 _LONGEST = 200  # characters of the name of a figure
 _WORD = re.compile(r"\S{1,64}")
 _PEAK = {"value", "at"}
+_F = TypeVar("_F", bound=Callable[..., Any])
 _UNIT = re.compile(r"\[([^]]+)\]")
+
+
+def _once(function: _F) -> _F:
+    """`functools.cache`, whose types take no class of a frozen dataclass for one that can be hashed."""
+    return cast("_F", cache(function))
 
 
 class FigureValue(NamedTuple):
@@ -235,13 +252,13 @@ RECORDS: Mapping[str, type[Record]] = {SWEEP: SweepRecord, DESIGN: DesignRecord}
 """What is stored in records of its own; of other kinds the figures of the result."""
 
 
-@cache
+@_once
 def _own(record: Any) -> list[Any]:
     shared = {one.name for one in fields(Record)}
     return [one for one in fields(record) if one.name not in shared and one.name != "arrays"]
 
 
-@cache
+@_once
 def quantities_of_record(record: Any) -> dict[str, Quantity]:
     """Return the figures of a kind of records, or of a part of one, by name."""
     hints = get_type_hints(record, include_extras=True)
@@ -252,13 +269,13 @@ def quantities_of_record(record: Any) -> dict[str, Quantity]:
     }  # fmt: skip
 
 
-@cache
+@_once
 def part_names(record: Any) -> tuple[str, ...]:
     """Return the names of the figures of its parts."""
     return () if record.PART_TYPE is None else tuple(quantities_of_record(record.PART_TYPE))
 
 
-@cache
+@_once
 def quantities_of_model(model: type[BaseModel] | None) -> dict[str, Quantity]:
     """Return the figures that a model of results declares, by name; of several models in one all of them."""
     found: dict[str, Quantity] = {}

@@ -294,7 +294,7 @@ class Service:
         NotFoundError
             If there is none of this id that the caller may see.
         """
-        found = self.stored.get(sweep_id, SWEEP)
+        found: SweepRecord | None = self.stored.get(sweep_id, SWEEP)
         return visible(found, caller.sees, f"there is no sweep {sweep_id!r}")
 
     def dismiss(self, job_id: str, caller: Caller = KEYLESS) -> JobRow:

@@ -262,7 +262,7 @@ def result_page(
 
 @cache
 def _model(_of: str, keys: tuple[tuple[str, Any], ...]) -> type[ResultQuery]:
-    made: type[ResultQuery] = create_model("Results", __base__=ResultQuery, **dict(keys))  # type: ignore[call-overload]
+    made: type[ResultQuery] = create_model("Results", __base__=ResultQuery, **dict(keys))
     return made
 
 

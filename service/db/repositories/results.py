@@ -338,7 +338,7 @@ def insert_results(
         result_id = new_id() if record.of == SWEEP else job_id
         about = {"id": result_id, "job_id": job_id, "position": position, "created": created, "owner": owner}
         same = {name: getattr(record, name) for name in ("of", "scene_name", "scene_hash", "status")}
-        (number,) = connection.execute(_INSERT, about | same).inserted_primary_key or ()
+        [number] = connection.execute(_INSERT, about | same).inserted_primary_key or [None]
         told = list(record.figures())
         ids = _quantities(connection, record.of, {(one.name, one.label) for one in told})
         figures += [
