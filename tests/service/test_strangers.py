@@ -84,6 +84,8 @@ TABLE: dict[str, tuple[tuple[int, ...], Any]] = {
     # Its kind is not among those of these tests, which says so to whoever gets that far.
     "POST /v1/designs": ((401, 401, 422, 401, 401, 403, 422, 422), {}),
     "GET /v1/designs/{design_id}": (OWNED, None),
+    # Of what is not said here: who may ask hears so.
+    "GET /v1/results": ((401, 401, 422, 401, 401, 422, 422, 422), None),
     "GET /v1/sweeps": (LISTED, None),
     "GET /v1/sweeps/{sweep_id}": (OWNED, None),
     "GET /v1/sweeps/{sweep_id}/plot.svg": (OWNED, None),

@@ -10,11 +10,14 @@ from typing import Any
 from weakref import WeakKeyDictionary, WeakSet
 
 from sqlalchemy import (
+    ARRAY,
+    BigInteger,
     ColumnElement,
     Connection,
     Engine,
     Select,
     and_,
+    any_,
     bindparam,
     func,
     insert,
@@ -32,7 +35,6 @@ from service.db.pagination import (
     Range,
     aside,
     encode,
-    first,
     is_few,
     ordered,
     owner_condition,
@@ -213,7 +215,9 @@ def _query(connection: Connection, wanted: Filter, limit: int, after: Position |
     if lead is not None:
         # With a lead, SQLite is to read results by their numbers, not by an index of a column.
         held = [aside(one) if on_sqlite else one for one in held]
-        held.append(Result.number.in_(first(lead.ids)))
+        # PostgreSQL would look through them for every result; an array it looks up in the key.
+        array = func.array(lead.ids.scalar_subquery(), type_=ARRAY(BigInteger()))
+        held.append(Result.number.in_(lead.ids) if on_sqlite else Result.number == any_(array))
     if "job_id" not in wanted.equal and wanted.run is None:
         held.append(~in_the_bin(Result.job_id))
     place = _place(after, len(keys))
