@@ -64,8 +64,45 @@ def friction_can_hold(balance: Balance, reference: System, linear: Receptance, p
     return found.status != 0 or bool(found.x[-1] <= _LEFT)
 
 
-def _limits(balance: Balance, table: Real, loads: Real) -> tuple[Real, Real]:
-    """Return rows and bounds of what the mean forces of the ports F (nc,) obey, rows · F <= bounds [N]."""
+def may_stick(balance: Balance, reference: System, linear: Receptance, stuck: Real, p: float) -> bool:
+    """Return whether residual friction forces let every contact stick and stay closed at λ = p.
+
+    What sticks answers as springs, and a slip long ago leaves forces that do not vary: if any such keep all
+    contacts within their limits at every instant the motion repeats (shakedown, E. Melan, Sitzungsber. Akad.
+    Wiss. Wien 145 (1936) 195). The force of a contact is judged at `_INSTANTS` of a period.
+
+    Parameters
+    ----------
+    linear : receptance of all ports; stuck : (n_unknowns,) response of stuck contacts [m].
+    """
+    system = balance.system
+    if system.ks[0] != 0:
+        return False
+    from scipy.optimize import linprog
+
+    table, loads, _, _ = contact_values(reference, p, 0.0)
+    stiffness = table[system.owner, system.held[:, 0]]
+    tau = np.asarray(2.0 * math.pi / _INSTANTS * np.arange(_INSTANTS), np.float64)
+    basis = fourier.from_full(fourier.basis(tau, int(system.ks[-1])), system.ks)
+    forces = stiffness[:, None] * (stuck.reshape(stiffness.size, -1) @ basis.T)
+    rows, bounds = _limits(balance, table, loads, least=True)
+    A, one = linear.A[0, 0].real, np.eye(stiffness.size)
+    left = stiffness[:, None] * np.linalg.solve(one + A * (stiffness - system.shift), A) - one
+    size = float(np.abs(forces).max())
+    found = linprog(
+        np.zeros(int(np.count_nonzero(system.rubs))),
+        A_ub=rows @ left[:, system.rubs != 0], b_ub=(bounds - (rows @ forces).max(axis=1)) / size,
+        bounds=(None, None),
+    )  # fmt: skip
+    return bool(found.status == 0)
+
+
+def _limits(balance: Balance, table: Real, loads: Real, *, least: bool = False) -> tuple[Real, Real]:
+    """Return rows and bounds of what the mean forces of the ports F (nc,) obey, rows · F <= bounds [N].
+
+    With `least`, what they obey at every instant.
+    """
+    of_load = _least if least else _mean_of_open
     system = balance.system
     rows, bounds = [np.zeros((0, system.owner.size))], [np.zeros(0)]
     for e, contact in enumerate(balance.scene.contacts):
@@ -78,7 +115,7 @@ def _limits(balance: Balance, table: Real, loads: Real) -> tuple[Real, Real]:
         row[:, [first + port for port in slider.ports]] = sides
         mu = float(table[e, MU])
         if normal is None:
-            bound = mu * _mean_of_open(loads[e])
+            bound = mu * of_load(loads[e])
         else:  # μ N with N the normal force and what of it is in equilibrium at rest, N >= 0
             row[:, first + normal] = -mu
             rest = max(float(table[e, N0]), 0.0) if table[e, PRESTRESSED] > 0.0 else 0.0
@@ -103,5 +140,14 @@ def _sides(slider: Slider) -> Real:
 
 def _mean_of_open(load: Real) -> float:
     """Return the mean of max(N, 0) of a load with these coefficients [N]."""
+    return float(_open(load).mean())
+
+
+def _least(load: Real) -> float:
+    """Return the least max(N, 0) of a load with these coefficients [N]."""
+    return float(_open(load).min())
+
+
+def _open(load: Real) -> Real:
     tau = np.asarray(2.0 * math.pi / _INSTANTS * (np.arange(_INSTANTS) + 0.5), np.float64)
-    return float(np.maximum(fourier.basis(tau, (load.size - 1) // 2) @ load, 0.0).mean())
+    return np.maximum(fourier.basis(tau, (load.size - 1) // 2) @ load, 0.0)

@@ -16,8 +16,9 @@ from solver.balance.kernels.mechanics import ALLOWED, unaccounted
 from solver.balance.kernels.newton import from_stuck, ladder, newton, stuck_start
 from solver.balance.kernels.output import MEASURES
 from solver.balance.kernels.residual import evaluate
-from solver.balance.mean_loads import friction_can_hold
+from solver.balance.mean_loads import friction_can_hold, may_stick
 from solver.balance.softening import solve_softened
+from solver.contacts.kernels.stick_slip_events import FAILED, STUCK
 from solver.contacts.kernels.system import (
     UNHELD,
     Evaluation,
@@ -138,14 +139,13 @@ class Workspace:
         """Solve at λ = `p` (inside unit): from `guess` if given, else from nothing.
 
         From nothing, Newton starts at the fully stuck response; if that fails, the harmonics are added
-        little by little, beginning with the first alone, and the contacts are made soft and then stiffer
-        (under constant forces these two come before it, and the excitation is raised from the static
-        equilibrium); if that fails too, the load is walked down rung by rung from full stick, and at last the
-        excitation is raised from nothing. Where contacts alone hold a part, it is looked first whether
-        friction can hold its mean load, and where no contact holds it, whether a force drives it away. What
-        is found obeys mechanics, see `solver.balance.kernels.mechanics`.
+        little by little, beginning with the first alone, the contacts are made soft and then stiffer, the
+        load is walked down rung by rung from full stick, and the excitation is raised from nothing (under
+        constant forces also from the static equilibrium). Where contacts alone hold a part, it is looked
+        first whether friction can hold its mean load, and where no contact holds it, whether a force drives
+        it away. What is found obeys mechanics, see `solver.balance.kernels.mechanics`.
         """
-        ways = self._ways()
+        ways, first = self._ways()
         if not len(self.balance.system.loose) or self.balance.system.hold:
             return self._plain(p, ways, guess)
         if not self.friction_can_hold(p):
@@ -154,10 +154,14 @@ class Workspace:
                 converged=False, u=nothing, iterations=0, residual=np.inf, ratchets=True, above_friction=True
             )
         # Under given loads what holds a part shows at once; a load that moves may hold it elsewhere.
-        first = 1 if all(contact.keeps_together for contact in self.balance.scene.contacts) else len(ways)
+        together = all(contact.keeps_together for contact in self.balance.scene.contacts)
+        if together:
+            first = 1
         found = self._plain(p, ways[:first], guess)
         if not found.converged:
             held = self._held_in_place(p, found.iterations)
+            if held.ratchets and not together and self._may_stick(p):
+                held = replace(held, ratchets=False)
             found = held if held.converged or held.ratchets or first == len(ways) else found
         if found.converged or found.ratchets or first == len(ways):
             return found
@@ -182,11 +186,11 @@ class Workspace:
             lost |= bool(good)
         return PointSolution(converged=False, u=u, iterations=spent, residual=float(norm), loses_power=lost)
 
-    def _ways(self) -> tuple[Way, ...]:
+    def _ways(self) -> tuple[tuple[Way, ...], int]:
         """Return the ways to a solution from nothing in their order, each as `newton` with u in place.
 
-        Under constant forces full stick comes late: the load is not known before the equilibrium, and stiff
-        contacts may slip far beyond what their springs give.
+        The number of them that are tried before a part is held in place is the second value. Under constant
+        forces the others take most of the time and find no motion of a part that a force drives away.
         """
         system, linear, point = self.system, self.linear, self.point
         stuck = partial(_in_place, from_stuck, system, linear, point)
@@ -194,12 +198,14 @@ class Workspace:
         soft = partial(solve_softened, self.balance.system, linear, point)
         at_rest = partial(self._by_level, at_rest=True)
         if self.balance.system.constant_mean:
-            return self._from_fewer, soft, stuck, at_rest, rungs, self._by_level
+            return (self._from_fewer, stuck, self._by_level, soft, at_rest, rungs), 2
         if np.any(self.balance.system.shift):  # contacts hold it: the less they stick the farther it may seem
             # What sticks with all it can carry is at its limit, where Newton's method is slow.
             onward = (self._onward,) if self.balance.system.hold else ()
-            return stuck, *onward, rungs, self._from_fewer, soft, self._by_level
-        return stuck, self._from_fewer, soft, rungs, self._by_level
+            ways = (stuck, *onward, rungs, self._from_fewer, soft, self._by_level)
+        else:
+            ways = (stuck, self._from_fewer, soft, rungs, self._by_level)
+        return ways, len(ways)
 
     def _onward(self, u: Real, p: float) -> tuple[bool, int, float]:
         """Go on from `u` while that brings it ten times nearer, the result in `u`; as `newton`."""
@@ -229,6 +235,25 @@ class Workspace:
         The residual is relative to motions: of a light part far away it is small whatever the forces are.
         """
         return bool(unaccounted(self.system, self.linear, u, self.point) <= ALLOWED)
+
+    def _stuck(self, p: float) -> Real:
+        """Return the response of stuck contacts."""
+        receptance(self.system, p, self.linear)
+        u = np.zeros(self.balance.n_unknowns)
+        stuck_start(self.system, self.linear, p, u)
+        return u
+
+    def _may_stick(self, p: float) -> bool:
+        """Return whether residual friction forces let every contact stick."""
+        return may_stick(self.balance, self.system, self.receptance(p), self._stuck(p), p)
+
+    def law_fails(self, p: float, u: Real | None = None) -> bool:
+        """Return whether a contact has no force at u, without one at the stuck response."""
+        u = self._stuck(p) if u is None else u
+        states = evaluation_by_value(self.point).states
+        states[:] = STUCK
+        self.forces(u, p)
+        return bool(np.any(states == FAILED))
 
     def _unheld(self, u: Real) -> bool:
         """Return whether nothing holds a part against the mean force on it, where u was last evaluated.

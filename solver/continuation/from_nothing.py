@@ -18,10 +18,11 @@ def solve_from_nothing(workspace: Workspace, p: float, guess: Real | None = None
     Returns
     -------
     The solution, or the attempt without one of `Workspace.solve`; its iterations are those of both ways. A
-    motion that ratchets is not looked for further: there is no periodic one.
+    motion that ratchets is not looked for further: there is no periodic one. Nor is one where a contact has
+    no force at the stuck response: the arc creeps towards the level from which on it has none.
     """
     found = workspace.solve(p, guess)
-    if found.converged or found.ratchets:
+    if found.converged or found.ratchets or workspace.law_fails(p):
         return found
     # Loaded here: hardly any point needs the kernels of the arc, and a command starts sooner without them.
     from solver.continuation.along_level import solve_along_level

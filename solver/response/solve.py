@@ -11,12 +11,11 @@ import numpy as np
 
 from solver.balance.balance import Balance, build, check_frequency, check_harmonics
 from solver.balance.kernels.gauge import FREE
-from solver.balance.kernels.newton import stuck_start
 from solver.balance.kernels.output import HALF_RANGE, MEAN, extremes
 from solver.balance.parameter import Kind
 from solver.balance.simplifications import Effects
 from solver.balance.workspace import PointSolution, Workspace
-from solver.contacts.kernels.stick_slip_events import FAILED, STUCK
+from solver.contacts.kernels.stick_slip_events import STUCK
 from solver.contacts.kernels.system import UNHELD, evaluation_by_value
 from solver.continuation.branches.adaptive_harmonics import solve_to
 from solver.continuation.branches.symmetry_breaking import assumed_flags, seen
@@ -91,7 +90,7 @@ def solve(
         from solver.continuation.endings import too_stiff_between
 
         failed = _failure(workspace.balance, frequency_hz, found, time.perf_counter() - begun)
-        if not found.ratchets and _law_fails(workspace, found.u, omega):
+        if not found.ratchets and (workspace.law_fails(omega) or workspace.law_fails(omega, found.u)):
             failed = replace(failed, status=SolutionStatus.LAW_FAILED)
         elif failed.status is SolutionStatus.NOT_CONVERGED and too_stiff_between(
             workspace, omega, NEARBY * omega
@@ -176,20 +175,6 @@ def _described(branch: Branch, at: float, u: Real) -> Solution:
         balance = build(scene, harmonics=balance.n_harmonics, effects=effects)
     found = PointSolution(converged=True, u=u, iterations=0, residual=0.0)
     return describe(Workspace.of(balance), found, frequency_hz, time.perf_counter(), estimated=False)
-
-
-def _law_fails(workspace: Workspace, u: Real, p: float) -> bool:
-    """Return whether a contact has no force where Newton's method ended, or where it begins."""
-    start = np.zeros(u.size)
-    workspace.receptance(p)
-    stuck_start(workspace.system, workspace.linear, p, start)
-    states = evaluation_by_value(workspace.point).states
-    for motion in (u, start):
-        states[:] = STUCK
-        workspace.forces(motion, p)
-        if np.any(states == FAILED):
-            return True
-    return False
 
 
 def _nothing_holds_a_part(workspace: Workspace) -> bool:

@@ -179,6 +179,13 @@ class FreeMarch:
         omega = self.omega * np.sqrt(virial / kinetic)
         return omega, work / (2.0 * self.omega * kinetic)
 
+    def last_harmonics(self) -> Real:
+        """The speed in the last third of the harmonics, relative to that in the first."""
+        size = np.hypot(self.motions[:, :, 1::2], self.motions[:, :, 2::2])
+        speeds = np.arange(1, size.shape[2] + 1) * size
+        last = speeds[:, :, 2 * size.shape[2] // 3 :].sum(axis=2).max(axis=1)
+        return np.asarray(last / size[:, :, 0].max(axis=1))
+
     def departure(self) -> Real:
         """How far a march is from where it began after one period, relative to the largest motion.
 

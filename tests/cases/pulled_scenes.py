@@ -83,6 +83,28 @@ def pulled_wedge(newtons: float, amplitude: float = 60.0) -> Scene:
     )
 
 
+def pulled_body(seed: int) -> Pulled:
+    """A shipped wedge or cylinder in space, pulled by a constant force.
+
+    An even seed pulls the wedge along its axis by up to all its friction; an odd one scales mass and contacts
+    of either by 0.3 to 3, shakes it by up to 25 times its force and pulls it any way.
+    """
+    rng = np.random.default_rng([seed, 15])
+    if seed % 2 == 0:
+        pull = wedge_limit(load_scene("platform-wedge")) * float(10.0 ** rng.uniform(-3.0, 0.0))
+        return Pulled(pulled_wedge(pull, float(10.0 ** rng.uniform(0.5, 2.7))), float(rng.uniform(300, 420)))
+    name = str(rng.choice(["wedge", "cylinder"]))
+    raw: dict[str, Any] = load_scene(f"platform-{name}").to_dict()
+    damper = raw["dampers"][0]
+    damper |= {key: damper[key] * float(10.0 ** rng.uniform(-0.5, 0.5)) for key in ("kt", "kn", "mu", "mass")}
+    shaken = float(10.0 ** rng.uniform(-1.3, 1.4))
+    forces = [{**each, "amplitude": shaken * each["amplitude"]} for each in raw["excitation"]]
+    way, pull = str(rng.choice(["x", "y", "z"])), float(10.0 ** rng.uniform(-1.0, 2.3))
+    forces.append({"dof": f"{name}.{way}", "amplitude": pull, "harmonic": 0})
+    scene = Scene.from_dict({**raw, "excitation": forces})
+    return Pulled(scene, float(rng.uniform(*scene.observe.band)))
+
+
 def wedge_limit(scene: Scene) -> float:
     """The largest axial force that both faces of a wedge can carry, pressed outward by its rotation [N].
 

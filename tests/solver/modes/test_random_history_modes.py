@@ -7,6 +7,8 @@ harmonics miss may differ by what the result says of it.
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -16,6 +18,7 @@ from tests.cases.history_modes import FreeMarch, Real, chain_of_history
 HARMONICS, STEPS, POINTS = 15, 4000, 6
 MOST_DAMPING = 0.25  # beyond, a march grows by more than exp(2πζ) = 5 a period
 SHARE = 0.6  # of the most damping that gas feeds
+LEAP = 1.6  # times the amplitude, more than a step along the curve makes
 SMALLEST = 0.05  # amplitude in sizes of the motion at which contacts give way
 # Below, a nearly rigid contact lets nothing swing: ζ is 10 with 5 harmonics and 33 with 15.
 CREEPS_BELOW = {95: 0.5}
@@ -41,7 +44,9 @@ def test_a_march_repeats_modes_and_cycles_of_a_random_chain(seed: int) -> None:
     _check(march, found.frequency_error[chosen] / found.frequency_hz[chosen], found.damping_error[chosen])
     fed = SHARE * float(found.damping_ratio.max())
     held = solver.limit_cycles(found, -fed, stability=False)
-    assert not held.unsolved
+    # A cycle where the curve leaps, over a kink or into another mode, is told and not found.
+    leaps = [(0.999 * a, 1.001 * b) for a, b in pairwise(found.amplitude) if b > LEAP * a]
+    assert all(any(low <= a and b <= high for low, high in leaps) for a, b in held.unsolved)
     cycles = held.cycles if fed < MOST_DAMPING else ()
     for cycle in cycles:
         omega = np.array([2.0 * np.pi * cycle.frequency_hz])
@@ -58,6 +63,7 @@ def _check(march: FreeMarch, omega_error: Real, zeta_error: Real) -> None:
     assert np.all(np.abs(omega / march.omega - 1.0) < 3e-5 + 3.0 * missing[0])
     assert np.all(np.abs(zeta - march.zeta) < 3e-5 + 3.0 * missing[1])
     # A hundredth of ω or of ζ would make a sixteenth.
-    # What is missing of ω and ζ turns and feeds the motion; its shape misses about as much.
-    grown = 4.0 * np.pi * np.exp(2.0 * np.pi * march.zeta)
-    assert np.all(march.departure() < 2e-3 + grown * sum(missing))
+    # What is missing of ω and ζ turns and feeds the motion; its shape, of which they miss but the square,
+    # lacks about as much as the last harmonics have.
+    grown = 2.0 * np.pi * np.exp(2.0 * np.pi * march.zeta)
+    assert np.all(march.departure() < 2e-3 + grown * sum(missing) + march.last_harmonics())

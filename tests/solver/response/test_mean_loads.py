@@ -9,7 +9,7 @@ import pytest
 from floating_cases import pulled, two_blades
 from floating_scenes import floating_scene
 from hard_scenes import HARD
-from pulled_scenes import Pulled, pulled_bar, pulled_mass, pulled_wedge, wedge_limit
+from pulled_scenes import Pulled, pulled_bar, pulled_body, pulled_mass, pulled_wedge, wedge_limit
 
 from solver import BranchStatus, Scene, SolutionStatus, load_scene, march, solve, sweep
 from solver.marching.result import MarchStatus
@@ -95,6 +95,25 @@ def test_a_wedge_that_nothing_holds_along_its_axis_creeps() -> None:
     assert found.status is SolutionStatus.RATCHETS
     assert found.flags == ()
     assert found.drift_per_period == pytest.approx(march(scene, frequency_hz=345.0).drift, rel=0.05)
+
+
+def test_a_wedge_that_stands_is_not_said_to_creep() -> None:
+    """What its contacts do where a constant force holds it leaves some of that force; full stick stands."""
+    scene = pulled_wedge(0.08048523954147624, 32.77681945965323)
+    assert solve(scene, frequency_hz=310.42194540783146, harmonics=3).converged
+    # A march of this one repeats after 1314 periods: slips leave forces under which all contacts stick.
+    scene, frequency_hz = pulled_body(128)
+    assert solve(scene, frequency_hz=frequency_hz, harmonics=3).status is not SolutionStatus.RATCHETS
+
+
+@pytest.mark.few(keep=(14, 15))
+@pytest.mark.parametrize("seed", range(250))
+def test_random_bodies_in_space_that_creep(seed: int) -> None:
+    """What is said to ratchet never comes to repeat in a march."""
+    scene, frequency_hz = pulled_body(seed)
+    if solve(scene, frequency_hz=frequency_hz, harmonics=3).status is SolutionStatus.RATCHETS:
+        marched = march(scene, frequency_hz=frequency_hz, max_periods=500)
+        assert marched.status in (MarchStatus.RATCHETS, MarchStatus.CHATTER, MarchStatus.MAX_PERIODS)
 
 
 def test_a_branch_that_ends_as_ratcheting_says_how_far() -> None:
