@@ -93,7 +93,8 @@ def create_app(settings: Settings | None = None, registry: Registry | None = Non
     events.install(app)
     app.include_router(jobs.submissions(service.registry))
     for router in (
-        jobs.router, forms.kinds, forms.laws, events.router, stored.designs, stored.sweeps, scenes.texts,
+        jobs.router, forms.kinds, forms.laws, events.router, stored.designs, stored.results,
+        stored.sweeps, scenes.texts,
         forms.templates, scenes.router, uploads.router, uploads.matrices, uploads.measurements, at_once.plans,
         at_once.previews, runs.projects, runs.reports, runs.runs, runs.shares, health.router,
         page.reference, page.router,

@@ -25,8 +25,9 @@ from service.jobs.common.scenes import (
     resolved,
     stored_scene,
 )
+from service.jobs.figures import SweepRecord
 from service.jobs.kind_view import Json, KindView, NothingToDrawError, ReadSweep, StoredSweep
-from service.jobs.outputs import JobOutput, OnProgress, Progress, ShouldStop, SweepRecord
+from service.jobs.outputs import JobOutput, OnProgress, Progress, ShouldStop
 from service.jobs.registry import JobKind, Resolved, SceneSource
 from solver.errors import Issue, SettingError
 from solver.results.views import on_demand

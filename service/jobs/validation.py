@@ -25,8 +25,8 @@ _MESSAGES = {
 }
 
 
-def validated(model: type[ModelT], body: object) -> ModelT:
-    """`body` as a checked `model`.
+def validated(model: type[ModelT], body: object, source: str = "body") -> ModelT:
+    """`body` as a checked `model`; `source` says what it is.
 
     Raises
     ------
@@ -40,7 +40,7 @@ def validated(model: type[ModelT], body: object) -> ModelT:
     try:
         return model.model_validate(dict(body))
     except ValidationError as error:
-        raise InvalidRequestError(issues_of(error.errors(include_url=False)[:MOST_TOLD])) from error
+        raise InvalidRequestError(issues_of(error.errors(include_url=False)[:MOST_TOLD]), source) from error
 
 
 def issues_of(errors: Sequence[Any]) -> list[Issue]:

@@ -18,15 +18,14 @@ from service.auth.callers import KEYLESS, Caller
 from service.db import revisions
 from service.db.clock import Clock
 from service.db.engine import Database
-from service.db.models import Design, JobState, Sweep
+from service.db.models import JobState
 from service.db.pg_notify import Notices
 from service.db.repositories import (
-    DesignRepository,
     JobRepository,
     JobRow,
     NewJob,
+    ResultRepository,
     SceneRepository,
-    SweepRepository,
     UploadRepository,
 )
 from service.db.repositories.owned import KeyRepository, Projects, StorageRepository, visible
@@ -35,6 +34,7 @@ from service.db.repositories.runs import Runs, Shares
 from service.errors import ConflictError, InvalidRequestError, JobFailedError, NotFoundError
 from service.jobs import answering
 from service.jobs.answering import Prepared, prepared
+from service.jobs.figures import DESIGN, SWEEP, DesignRecord, SweepRecord
 from service.jobs.kinds.registry.bodies import KIND
 from service.jobs.kinds.registry.loading import registry_of
 from service.jobs.outputs import OnProgress
@@ -64,7 +64,7 @@ class Results:
 
     job: JobRow
     text: str
-    sweeps: list[Sweep]
+    sweeps: list[SweepRecord]
 
     @property
     def result(self) -> dict[str, Any]:
@@ -77,7 +77,7 @@ class Results:
 class WholeDesign:
     """A stored design with the job that found it and the result of that job."""
 
-    row: Design
+    row: DesignRecord
     job: JobRow
     result: dict[str, Any]
 
@@ -111,8 +111,7 @@ class Service:
         self.registry = registry_of(settings.kinds) if registry is None else registry
         self.database = Database(settings.database, settings.database_connections, settings.database_seconds)
         self.jobs = JobRepository(self.database, now)
-        self.sweeps = SweepRepository(self.database)
-        self.designs = DesignRepository(self.database)
+        self.stored = ResultRepository(self.database)
         self.keys = KeyRepository(self.database)
         self.storage = Storage(StorageRepository(self.database), settings)
         self.uploads = Uploads(UploadRepository(self.database), settings, self.storage)
@@ -288,7 +287,7 @@ class Service:
         """
         return visible(self.jobs.get(job_id), caller.sees, f"there is no job {job_id!r}")
 
-    def sweep(self, sweep_id: str, caller: Caller = KEYLESS) -> Sweep:
+    def sweep(self, sweep_id: str, caller: Caller = KEYLESS) -> SweepRecord:
         """A stored sweep.
 
         Raises
@@ -296,7 +295,8 @@ class Service:
         NotFoundError
             If there is none of this id that the caller may see.
         """
-        return visible(self.sweeps.get(sweep_id), caller.sees, f"there is no sweep {sweep_id!r}")
+        found: SweepRecord | None = self.stored.get(sweep_id, SWEEP)
+        return visible(found, caller.sees, f"there is no sweep {sweep_id!r}")
 
     def dismiss(self, job_id: str, caller: Caller = KEYLESS) -> JobRow:
         """Cancel a job. A running one ends within the grace; the row given back may say `running` still.
@@ -349,7 +349,7 @@ class Service:
         source = row.result_of or row.id
         text = self.jobs.result_text(source)
         if text is not None:
-            return Results(job=row, text=text, sweeps=self.sweeps.of_job(source))
+            return Results(job=row, text=text, sweeps=self.stored.of_job(source))
         if row.state is JobState.FAILED:
             error = row.error or {}
             raise JobFailedError(f"job {job_id} failed: {error.get('detail', 'for no known reason')}", error)
@@ -368,7 +368,7 @@ class Service:
         missing = f"there is no design {design_id!r}"
         asked = visible(self.jobs.get(design_id), caller.sees, missing)
         job = asked if asked.result_of is None else self.jobs.get(asked.result_of)
-        row = None if job is None else self.designs.get(job.id)
+        row = None if job is None else self.stored.get(job.id, DESIGN)
         result = None if row is None else self.jobs.result(row.job_id)
         if job is None or row is None or result is None:
             raise NotFoundError(missing)

@@ -129,7 +129,7 @@ def results_answer(service: Service, job_id: str, caller: Caller) -> Response:
     """What a job computed, to a caller."""
     with service.database.reading():
         found = service.results(job_id, caller)
-        sweeps = SweepAnswer.of_rows(found.sweeps, service.sweeps)
+        sweeps = [SweepAnswer.of(one) for one in found.sweeps]
     about = ResultsHead(job=found.job.id, status=found.job.state)
     body = with_raw(about, result=found.text.encode(), sweeps=raw_list(sweeps))
     return Response(body, media_type="application/json")
@@ -202,7 +202,7 @@ def _job_or_result(service: Service, headers: Mapping[str, str], row: JobRow) ->
     with service.database.reading():
         source = row.result_of or row.id
         text = service.jobs.result_text(source)
-        sweeps = SweepAnswer.of_rows(service.sweeps.of_job(source), service.sweeps)
+        sweeps = [SweepAnswer.of(one) for one in service.stored.of_job(source)]
     result = b"null" if text is None else text.encode()
     body = with_raw(JobAnswer.of(row), result=result, sweeps=raw_list(sweeps))
     return Response(body, 200, headers, "application/json")

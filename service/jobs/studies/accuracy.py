@@ -9,7 +9,7 @@ from pydantic import ConfigDict, Field
 
 from service.jobs.common.results import result_model
 from service.jobs.common.scenes import FrequencyHz, Harmonics, check
-from service.jobs.outputs import SweepRecord
+from service.jobs.figures import SweepRecord
 from service.jobs.registry import Flag
 from service.jobs.study import Study
 from solver.errors import Issue

@@ -12,7 +12,7 @@ from optim.problem.keys import PointsOfFront, of_front
 from service.jobs.common.problem import ProblemRequest
 from service.jobs.common.results import result_model
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
-from service.jobs.outputs import SweepRecord
+from service.jobs.figures import SweepRecord
 from service.jobs.study import Answer, Watch
 from solver.errors import Issue
 from solver.scene.descriptions import DISK_LOAD
