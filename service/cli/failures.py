@@ -42,7 +42,9 @@ def refused(
 def _worded(issue: Issue, flags: Mapping[str, str], file: object) -> str:
     key, *parts = issue.subject or ("",)
     if key not in flags:
-        return _told(issue) if file is None else f"{file}: {_told(issue)}"
+        if file is None:
+            return _told(issue) if parts else issue.said()
+        return f"{file}: {_told(issue)}"
     named = [flags[str(key)], *(part for part in parts if isinstance(part, str))]
     return issue.said(" ".join(named), flags)
 
