@@ -10,7 +10,7 @@ from benchmarks.harness import WrongResultError
 
 GROUPS = {
     "chains": ("chain-8", "chain-32", "one-slider"),
-    "service": ("load", "latency", "requests", "lists", "scale"),
+    "service": ("load", "latency", "requests", "lists", "figures", "scale"),
 }
 
 
@@ -44,6 +44,7 @@ def _cases() -> dict[str, Callable[[], None]]:
         space_kernel,
         space_peers,
         start,
+        stored_sweeps,
         sweep_costs,
         truth,
     )  # fmt: skip
@@ -74,6 +75,7 @@ def _cases() -> dict[str, Callable[[], None]]:
         "space": space.space,
         "space-kernel": space_kernel.space_kernel,
         "stages": sweep_costs.stages,
+        "figures": stored_sweeps.figures,
         "two-hundred": large.two_hundred_contacts,
         "reduction": reduction.reduction,
         "sector": sector.sector,

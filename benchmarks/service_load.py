@@ -21,7 +21,7 @@ from benchmarks.harness import expect, table
 from benchmarks.service_process import Cpu, ServiceProcess, serving
 from benchmarks.stored_sweeps import fill
 from service.db.engine import Database
-from service.db.models import Job, JobResult, JobState, Sweep
+from service.db.models import Job, JobResult, JobState, Result
 
 JOBS = 10_000
 CLIENTS = 16
@@ -127,7 +127,9 @@ def check_jobs(database: str, jobs: int) -> None:
             states = connection.execute(select(Job.state, Job.attempt, Job.result_of, func.count()).group_by(
                 Job.state, Job.attempt, Job.result_of)).all()  # fmt: skip
             results = connection.execute(select(func.count()).select_from(JobResult)).scalar_one()
-            sweeps = connection.execute(select(func.count(Sweep.job_id.distinct()), func.count())).one()
+            sweeps = connection.execute(
+                select(func.count(Result.job_id.distinct()), func.count()).where(Result.of == "sweep")
+            ).one()
     finally:
         opened.close()
     expect(

@@ -15,7 +15,7 @@ from benchmarks.service_load import small_job
 from benchmarks.service_process import ServiceProcess, serving
 from benchmarks.stored_sweeps import fill
 from service.db.engine import Database
-from service.db.models import Sweep
+from service.db.models import Result
 
 SWEEPS = 100_000
 _PAUSE_SECONDS = 0.01
@@ -79,6 +79,6 @@ def _ended(service: ServiceProcess, until_deleted: bool, seconds: float) -> bool
     opened = Database(service.database)
     try:
         with opened.reading() as connection:
-            return connection.execute(select(func.count()).select_from(Sweep)).scalar_one() <= 10
+            return connection.execute(select(func.count()).where(Result.of == "sweep")).scalar_one() <= 10
     finally:
         opened.close()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from solver.errors import Place
+from solver.errors import Issue, Place, written
 
 
 class DesignError(Exception):
@@ -24,7 +24,8 @@ class DesignError(Exception):
         self.name = written(steps)
         self.value = value
         self.place: Place = steps if place is None else place
-        super().__init__(f"`{self.name}` {wanted}, got {value!r}")
+        self.issue = Issue(steps, wanted, value)
+        super().__init__(self.issue.said(self.name))
 
 
 class DataError(DesignError):
@@ -47,10 +48,5 @@ class DataError(DesignError):
         where = source + (f", line {line}" if line is not None else "") + (f", `{column}`" if column else "")
         super().__init__("data", value, wanted, place=place)
         self.source, self.line, self.column = source, line, column
-        self.args = (f"{where}: {wanted}, got {value!r}",)
-
-
-def written(place: Place) -> str:
-    """Return a place as text, ``cases[0].band``."""
-    steps = (f"[{step}]" if isinstance(step, int) else f".{step}" for step in place)
-    return "".join(steps).removeprefix(".")
+        self.issue = Issue(place, f"{where}: {wanted}", value, named=False)
+        self.args = (self.issue.said(),)

@@ -5,9 +5,10 @@ What each of them becomes over HTTP is decided in one place, `service.schemas.pr
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Self
 
-from solver.errors import Issue
+from solver.errors import UNSAID, Issue, Place, Shown
 
 
 class ServiceError(Exception):
@@ -52,7 +53,24 @@ class InvalidRequestError(ServiceError):
     def __init__(self, issues: Sequence[Issue], source: str = "body") -> None:
         self.issues = tuple(issues)
         self.source = source
-        super().__init__("; ".join(issue.message for issue in self.issues))
+        super().__init__("; ".join(issue.said() for issue in self.issues))
+
+    @classmethod
+    def of(
+        cls, subject: Place, wanted: str, got: object = UNSAID, *, named: bool = True, source: str = "body"
+    ) -> Self:
+        """Return the error of one `Issue`."""
+        return cls([Issue(subject, wanted, got, named)], source)
+
+    @classmethod
+    def from_json(cls, rows: Iterable[tuple[list[str | int], str, str, bool]]) -> Self:
+        """Return the error that another process told by `issues_to_json`."""
+        return cls([Issue(tuple(place), wanted, Shown(got), named) for place, wanted, got, named in rows])
+
+
+def issues_to_json(issues: Iterable[Issue]) -> list[list[object]]:
+    """Return issues as another process reads them, see `InvalidRequestError.from_json`."""
+    return [[list(one.subject), one.words({}), repr(one.got), one.named] for one in issues]
 
 
 class UnknownKindError(ServiceError):

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from types import MappingProxyType
+from typing import NamedTuple, Self
 
 Place = tuple[str | int, ...]
 """Keys and indices that lead to a field of nested tables and lists."""
@@ -22,20 +23,86 @@ class SolverError(Exception):
     place: Place = ()
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Issue:
-    """One thing wrong with a scene.
+class Shown(str):
+    """What was given as a message shows it, where that is not its `repr`."""
+
+    __slots__ = ()
+
+    def __repr__(self) -> str:
+        return str(self)
+
+
+UNSAID = Shown("")
+
+
+class Naming(str):
+    """What would be right with other keys in braces, ``needs {accuracy}``: each face names them too."""
+
+    __slots__ = ()
+
+
+class _Names(dict[str, str]):
+    def __missing__(self, key: str) -> str:
+        return f"`{key}`"
+
+
+class Issue(NamedTuple):
+    """One thing wrong with a description or an argument; each face says it with its own name of the subject.
 
     Attributes
     ----------
-    pointer : str
-        RFC 6901 JSON pointer of the bad field, for example ``/contacts/0/mu``.
-    message : str
-        Names the key, quotes the value and says what would be right.
+    subject : tuple of str and int
+        Keys and indices that lead to the bad field, ``("contacts", 0, "mu")``; empty: the whole.
+    wanted : str
+        What would be right, as it follows the name of the subject: ``must be > 0``.
+    got : object
+        What was given; `UNSAID` where that says nothing.
+    named : bool
+        Whether `wanted` follows the name; otherwise it is a whole sentence.
     """
 
-    pointer: str
-    message: str
+    subject: Place
+    wanted: str
+    got: object = UNSAID
+    named: bool = True
+
+    @property
+    def pointer(self) -> str:
+        """RFC 6901 JSON pointer of the subject, for example ``/contacts/0/mu``."""
+        return pointer(*self.subject)
+
+    @property
+    def name(self) -> str:
+        """The last key with its indices: ``mu``, ``contacts[1]``."""
+        keys = [i for i, step in enumerate(self.subject) if isinstance(step, str)]
+        return written(self.subject[keys[-1] if keys else 0 :])
+
+    @property
+    def message(self) -> str:
+        """The sentence, with the subject by its own name."""
+        return self.said()
+
+    def words(self, names: Mapping[str, str]) -> str:
+        """Return what would be right, with what a face calls other keys."""
+        if isinstance(self.wanted, Naming):
+            return self.wanted.format_map(_Names({key: f"`{one}`" for key, one in names.items()}))
+        return self.wanted
+
+    def said(self, name: str = "", names: Mapping[str, str] = MappingProxyType({})) -> str:
+        """Return the sentence, with what a face calls the subject, and other keys."""
+        shown, words = repr(self.got), self.words(names)
+        sentence = f"{words}, got {shown}" if shown else words
+        if self.named:
+            return f"`{name or self.name}` {sentence}"
+        return f"`{name}`: {sentence}" if name else sentence
+
+    def at(self, *place: str | int) -> Issue:
+        """Return the same of another subject."""
+        return self._replace(subject=place)
+
+    def below(self, *place: str | int) -> Issue:
+        """Return the same where the description stands inside another one."""
+        return self.at(*place, *self.subject)
 
 
 class SceneError(SolverError):
@@ -43,7 +110,12 @@ class SceneError(SolverError):
 
     def __init__(self, issues: Sequence[Issue]) -> None:
         self.issues = tuple(issues)
-        super().__init__("; ".join(issue.message for issue in self.issues))
+        super().__init__("; ".join(issue.said() for issue in self.issues))
+
+    @classmethod
+    def of(cls, subject: Place, wanted: str, got: object = UNSAID, *, named: bool = True) -> Self:
+        """Return the error of one `Issue`."""
+        return cls([Issue(subject, wanted, got, named)])
 
 
 class StoppedError(SolverError):
@@ -59,7 +131,16 @@ class SettingError(SolverError):
     def __init__(self, name: str, value: object, wanted: str, hint: str = "") -> None:
         self.name = name
         self.value = value
-        super().__init__(f"`{name}` {wanted}, got {value!r}{hint}")
+        self.issue = Issue((name,), wanted, Shown(f"{value!r}{hint}") if hint else value)
+        super().__init__(self.issue.said())
+
+
+class FieldError(ValueError):
+    """A field that cannot be read, said before it is known in which description it stands."""
+
+    def __init__(self, subject: Place, wanted: str, got: object = UNSAID, *, named: bool = True) -> None:
+        self.issue = Issue(subject, wanted, got, named)
+        super().__init__(self.issue.said())
 
 
 @contextmanager
@@ -75,6 +156,12 @@ def at(*place: str | int) -> Iterator[None]:
 def pointer(*steps: object) -> str:
     """Return the JSON pointer (RFC 6901) of keys and indices."""
     return "".join("/" + str(step).replace("~", "~0").replace("/", "~1") for step in steps)
+
+
+def written(place: Place) -> str:
+    """Return a place as text, ``cases[0].band``."""
+    steps = "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in place)
+    return steps.removeprefix(".")
 
 
 class MissingExtraError(SolverError):

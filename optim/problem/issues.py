@@ -17,7 +17,7 @@ from optim.problem.numbers import positive
 from optim.problem.problem import READERS, pose, read_start
 from optim.problem.uncertainty_input import read_uncertain
 from optim.problem.variables import check_variables
-from solver.errors import Issue, Place, SceneError, SettingError, pointer
+from solver.errors import Issue, Place, SceneError, SettingError
 from solver.scene.scene import Scene
 
 Refusal = DesignError | SettingError | SceneError
@@ -125,5 +125,5 @@ def _told(error: Refusal, given: Mapping[str, Any]) -> list[Issue]:
         there, value = (*there, step), value[step]
     # A key that is missing is named all the same.
     there = there or error.place[:1]
-    messages = [one.message for one in error.issues] if isinstance(error, SceneError) else [str(error)]
-    return [Issue(pointer=pointer(*there), message=message) for message in messages]
+    issues = error.issues if isinstance(error, SceneError) else (error.issue,)
+    return [one.at(*there) for one in issues]

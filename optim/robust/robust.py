@@ -266,13 +266,13 @@ def _search(search: RobustSearch, drawn: tuple[Scenario, ...], state: _State) ->
         unknown = state.sides["robust"].unknown
         if unknown is not None:
             raise UnknownScenarioError(unknown)
-        status = _honest(search, state, status)
+        status = _checked_status(search, state, status)
         if status is RobustStatus.OPTIMAL and state.sides["robust"].known.relative > WELL_KNOWN:
             return RobustStatus.NOT_KNOWN
     return status
 
 
-def _honest(search: RobustSearch, state: _State, status: RobustStatus) -> RobustStatus:
+def _checked_status(search: RobustSearch, state: _State, status: RobustStatus) -> RobustStatus:
     """Return the status once the worst scenario of all looks is known: it may be worse than all cuts."""
     best, side = state.progress.best, state.sides["robust"]
     if search.aim is not Aim.WORST_CASE or best is None or side.worst is None:

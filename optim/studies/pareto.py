@@ -99,7 +99,7 @@ def pareto_front(
         on_progress(1.0, max(front.reported, front.evaluations))
     kept, dominated = front_of(front.found)
     return ParetoResult(
-        problem=front.problem, status=_honest(front, status), ends=tuple(front.ends), points=kept,
+        problem=front.problem, status=_status_of_known(front, status), ends=tuple(front.ends), points=kept,
         dominated=dominated,
         missed=tuple(front.missed), evaluations=front.evaluations, seconds=time.perf_counter() - begun,
     )  # fmt: skip
@@ -239,7 +239,7 @@ class _Front:
         return min(ends, key=lambda local: (local.standing, not local.settled))
 
 
-def _honest(front: _Front, status: ParetoStatus) -> ParetoStatus:
+def _status_of_known(front: _Front, status: ParetoStatus) -> ParetoStatus:
     """Return the status of a front that is called whole only if the peaks of its points are known."""
     whole = status in (ParetoStatus.COMPLETE, ParetoStatus.NO_TRADE_OFF)
     doubtful = any(point.design.status is DesignStatus.NOT_KNOWN for point in front.found)

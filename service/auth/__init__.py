@@ -1,1 +1,1 @@
-"""Who may do what: callers, keys, limits, and the gate that every request passes."""
+"""Who may do what: callers, keys, limits, and who a key belongs to."""

@@ -23,7 +23,7 @@ from service.db.repositories.owned import KEYS, KeyRepository
 from service.db.tokens import Made, matches
 from service.errors import ForbiddenError, InvalidRequestError, TooManyRequestsError, UnauthorizedError
 from service.settings.settings import Settings
-from solver.errors import Issue
+from solver.errors import Issue, Shown
 
 _OWNER = re.compile(r"[A-Za-z0-9][A-Za-z0-9._@+-]{0,99}")
 
@@ -58,14 +58,12 @@ def create(
     issues = []
     if _OWNER.fullmatch(owner) is None:
         words = "must be 1 to 100 letters, digits or . _ @ + -, the first a letter or digit"
-        issues.append(Issue(pointer="/owner", message=f"`owner` {words}, got {owner[:120]!r}"))
+        issues.append(Issue(("owner",), words, owner[:120]))
     if not scopes:
         known = ", ".join(scope.value for scope in Scope)
-        issues.append(Issue(pointer="/scopes", message=f"`scope` must be given: {known}"))
+        issues.append(Issue(("scopes",), f"`scope` must be given: {known}", named=False))
     if expires is not None and expires <= now:
-        issues.append(
-            Issue(pointer="/expires", message=f"`expires` must be in the future, got {expires.isoformat()}")
-        )
+        issues.append(Issue(("expires",), "must be in the future", Shown(expires.isoformat())))
     if issues:
         raise InvalidRequestError(issues)
     return keys.add(
@@ -93,7 +91,7 @@ _USED_EVERY = timedelta(minutes=1)
 _HALF_OF_IPV6 = 64
 
 
-class Doorkeeper:
+class Authenticator:
     """Turns keys into callers.
 
     Parameters

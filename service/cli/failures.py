@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import re
 import sys
+from collections.abc import Iterable, Mapping
 
-from optim.criteria.registry import limit_keys
 from optim.errors import DesignError
 from service import errors
 from solver.errors import Issue, SceneError, SettingError, SolverError
@@ -13,23 +13,6 @@ from solver.errors import Issue, SceneError, SettingError, SolverError
 FELL_SHORT = 1
 BAD_INPUT = 2
 
-# Arguments of the Python interface as the user of the command knows them.
-_OPTIONS = {
-    "frequency_hz": "--frequency",
-    "start": "--from",
-    "stop": "--to",
-    "to": "--to",
-    "harmonics": "--harmonics",
-    "accuracy": "--accuracy",
-    "effects": "--effects",
-    "parameter": "--parameter",
-    "limit": "--limit",
-    "variables": "--variable",
-    "unknowns": "--unknown",
-    "priors": "--prior",
-    "candidates": "--candidate",
-    "orders": "--order",
-}
 # What is not the user's input: the state of a file or of a service.
 _STATE = (
     errors.DamagedDatabaseError,
@@ -42,12 +25,28 @@ _STATE = (
 _CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")
 
 
-def option_name(name: str) -> str:
-    """The option that sets an argument of the Python interface."""
-    # One of several values of a repeatable option has its number behind the name.
-    plain = name.partition("[")[0]
-    of_keys = (key.flag for key in limit_keys() if key.name == plain)
-    return _OPTIONS.get(plain) or next(of_keys, name)
+def refused(
+    issues: Iterable[Issue], flags: Mapping[str, str], file: object = None
+) -> errors.InputError:  # fmt: skip
+    """Return what is wrong with options, and with keys of a file, as the user of the command knows them.
+
+    Parameters
+    ----------
+    issues : by the keys of a body, or the arguments of a function.
+    flags : key to its option; a part of what an option takes stands behind it, ``--variable damper.N0``.
+    file : where the other keys stand.
+    """
+    return errors.InputError("\nstickslip: ".join(_worded(one, flags, file) for one in issues))
+
+
+def _worded(issue: Issue, flags: Mapping[str, str], file: object) -> str:
+    key, *parts = issue.subject or ("",)
+    if key not in flags:
+        if file is None:
+            return _told(issue) if parts else issue.said()
+        return f"{file}: {_told(issue)}"
+    named = [flags[str(key)], *(part for part in parts if isinstance(part, str))]
+    return issue.said(" ".join(named), flags)
 
 
 class ShortfallError(Exception):
@@ -82,20 +81,14 @@ def _status(error: Exception) -> int:
 
 def _lines(error: Exception) -> list[str]:
     if isinstance(error, (SceneError, errors.InvalidRequestError)):
-        return [_issue(issue) for issue in error.issues]
-    if isinstance(error, (SettingError, DesignError)):
-        return [_as_option(str(error), error.name)]
+        return [_told(issue) for issue in error.issues]
     if isinstance(error, errors.ServiceProblem):
         return _problem(error)
     return [str(error)]
 
 
-def _issue(issue: Issue) -> str:
-    return f"{issue.pointer}: {issue.message}" if issue.pointer else issue.message
-
-
-def _as_option(message: str, name: str) -> str:
-    return message.replace(f"`{name}`", f"`{option_name(name)}`", 1)
+def _told(issue: Issue) -> str:
+    return f"{issue.pointer}: {issue.said()}" if issue.subject else issue.said()
 
 
 def _problem(error: errors.ServiceProblem) -> list[str]:

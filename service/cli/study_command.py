@@ -14,17 +14,17 @@ import typer
 from typer.core import TyperGroup
 
 from optim.errors import DesignError
-from service.cli.failures import end
+from service.cli.failures import end, refused
 from service.cli.options import inputs
 from service.cli.options import shared as options
-from service.cli.options.key_options import KeyOption, as_options, key_options
+from service.cli.options.key_options import KeyOption, key_options
 from service.cli.output_files import Outputs
 from service.cli.progress import bar
-from service.errors import InputError, InvalidRequestError
+from service.errors import InputError
 from service.jobs.study import Answer, Study, Watch
 from service.rendering.plain import print_result
 from service.rendering.tables.text import show
-from solver.errors import Issue, SettingError
+from solver.errors import SettingError
 from solver.results.views import on_demand
 
 if TYPE_CHECKING:
@@ -81,7 +81,7 @@ class Keys:
         try:
             yield
         except (SettingError, DesignError) as error:
-            raise InputError(as_options(str(error), self.flags)) from error
+            raise refused([error.issue], self.flags) from error
 
     def command(
         self, function: Callable[..., None], before: Mapping[str, Any], behind: Mapping[str, Any], *,
@@ -119,8 +119,7 @@ def command_of(study: type[Study]) -> Callable[..., None]:
         scene = inputs.scene(name, values)
         asked = keys.read(given)
         if wrong := study.model_construct(**asked).issues(scene):
-            named = [Issue(pointer="", message=as_options(one.message, keys.flags)) for one in wrong]
-            raise InvalidRequestError(named)
+            raise refused(wrong, keys.flags)
         with keys.named(), bar(study.NAME, study.COUNTED) as on_progress:
             answer = study.compute(scene, asked, Watch(on_progress))
         give(study, answer, outputs, scene, as_json=as_json)

@@ -26,10 +26,12 @@ from service.schemas.answers import (
     JobScene,
     KindAnswer,
     KindList,
+    ResultPage,
     ResultsAnswer,
     SceneAnswer,
     SceneDetail,
     SceneList,
+    StoredResult,
     SweepAnswer,
     SweepDetail,
     SweepPage,
@@ -224,6 +226,10 @@ class Client(Workbench):
     def sweep_plot(self, sweep_id: str, form: Literal["svg", "png"] = "svg") -> bytes:
         """A picture of a stored sweep."""
         return self._transport.send("GET", f"/v1/sweeps/{segment(sweep_id)}/plot.{form}").content
+
+    def stored(self, of: str, **filters: Any) -> Iterator[StoredResult]:
+        """Every stored result of a kind that meets the filters of ``GET /v1/results``, page after page."""
+        return self._pages(ResultPage, "/v1/results", {**filters, "of": of})
 
     def designs(self, **filters: Any) -> Iterator[DesignAnswer]:
         """Every stored design that meets the filters of ``GET /v1/designs``, page after page."""

@@ -14,11 +14,18 @@ from service.schemas.answers import (
     DesignDetail,
     JobAnswer,
     ResultsAnswer,
+    StoredResult,
     SweepAnswer,
     SweepDetail,
 )
-from service.schemas.design_queries import DesignQuery, design_detail, design_page
-from service.schemas.sweep_queries import SweepQuery, sweep_page
+from service.schemas.result_queries import (
+    DesignQuery,
+    ResultQuery,
+    SweepQuery,
+    design_page,
+    result_page,
+    sweep_page,
+)
 from service.settings.settings import Settings, load_settings
 
 
@@ -75,26 +82,31 @@ class EmbeddedService:
 
     def results(self, job_id: str) -> ResultsAnswer:
         """What a job computed (ConflictError, JobFailedError if there is nothing)."""
-        return ResultsAnswer.of(self._service.results(job_id), self._service.sweeps)
+        return ResultsAnswer.of(self._service.results(job_id))
 
     def dismiss(self, job_id: str) -> JobAnswer:
         """Cancel a job and wait until it has stopped."""
         self._service.dismiss(job_id)
         return self.wait(job_id, timeout=self._service.settings.grace_seconds + 1.0)
 
+    def stored(self, of: str, **filters: Any) -> list[StoredResult]:
+        """Stored results of a kind, by any of their figures; the filters of ``GET /v1/results``."""
+        service, asked = self._service, validated(ResultQuery, {**filters, "of": of})
+        return result_page(service.stored, asked, service.registry, service.settings).items
+
     def sweeps(self, **filters: Any) -> list[SweepAnswer]:
         """Stored sweeps, newest first unless `sort` is given; the filters of ``GET /v1/sweeps``."""
-        return sweep_page(self._service.sweeps, validated(SweepQuery, filters), self._service.settings).items
+        return sweep_page(self._service.stored, validated(SweepQuery, filters), self._service.settings).items
 
     def sweep(self, sweep_id: str) -> SweepDetail:
         """A stored sweep with its arrays (NotFoundError if there is none)."""
-        return SweepDetail.load(self._service.sweep(sweep_id), self._service.sweeps)
+        return SweepDetail.load(self._service.sweep(sweep_id), self._service.stored)
 
     def designs(self, **filters: Any) -> list[DesignAnswer]:
         """Stored designs, newest first unless `sort` is given; the filters of ``GET /v1/designs``."""
         asked = validated(DesignQuery, filters)
-        return design_page(self._service.designs, asked, self._service.settings).items
+        return design_page(self._service.stored, asked, self._service.settings).items
 
     def design(self, design_id: str) -> DesignDetail:
         """A stored design with the whole result (NotFoundError if there is none)."""
-        return design_detail(self._service.design(design_id), self._service.designs)
+        return DesignDetail.whole(self._service.design(design_id))

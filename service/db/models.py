@@ -15,13 +15,13 @@ from sqlalchemy import (
     Enum,
     ForeignKey,
     Index,
+    Integer,
     LargeBinary,
     MetaData,
     String,
     Text,
     TypeDecorator,
     UniqueConstraint,
-    false,
     func,
     select,
 )
@@ -230,78 +230,59 @@ class Scene(Base):
         return self.created is None
 
 
-class Sweep(Base):
-    """One branch that a job computed, without its contacts and arrays: what people filter by."""
+class Result(Base):
+    """What was computed and can be asked for: a sweep, a design, or the result of a job of another kind.
 
-    __tablename__ = "sweep"
+    Its figures are rows of `Figure`. Results are numbered in the order in which they were stored. The id of
+    what a job has one of is that of the job.
+    """
 
-    id: Mapped[str] = mapped_column(String(ID_LENGTH), primary_key=True)
+    __tablename__ = "result"
+
+    number: Mapped[int] = mapped_column(BigInteger().with_variant(Integer(), "sqlite"), primary_key=True)
+    id: Mapped[str] = mapped_column(String(ID_LENGTH), unique=True)
+    of: Mapped[str] = mapped_column(String(32))
     job_id: Mapped[str] = mapped_column(String(ID_LENGTH), ForeignKey("job.id", ondelete="CASCADE"))
     position: Mapped[int]
-    owner: Mapped[str] = mapped_column(String(OWNER_LENGTH), default=NOBODY, server_default=NOBODY)
-    scene_name: Mapped[str] = mapped_column(String(200))
-    scene_hash: Mapped[str] = mapped_column(String(64))
-    parameter: Mapped[str] = mapped_column(String(200))
-    from_value: Mapped[float]
-    to_value: Mapped[float]
-    frequency_hz: Mapped[float | None]
-    excitation_amplitude: Mapped[float | None]
-    harmonics: Mapped[int]
-    points: Mapped[int]
-    peak: Mapped[float | None]
-    peak_at: Mapped[float | None]
-    limit: Mapped[float | None]
-    band_hz: Mapped[float | None]
-    error_estimate: Mapped[float | None]
-    peaks_known: Mapped[bool | None]
-    newton_iterations: Mapped[int]
-    rejected_steps: Mapped[int]
-    seconds: Mapped[float]
-    completed: Mapped[bool]
-    intermediate: Mapped[bool] = mapped_column(default=False, server_default=false())
+    owner: Mapped[str] = mapped_column(String(OWNER_LENGTH))
+    scene_name: Mapped[str | None] = mapped_column(String(200))
+    scene_hash: Mapped[str | None] = mapped_column(String(64))
     status: Mapped[str] = mapped_column(Text())
     created: Mapped[datetime]
 
-    @property
-    def key(self) -> str:
-        """Its id."""
-        return self.id
-
     __table_args__ = (
-        Index(None, "job_id", "id"),
-        Index(None, "owner", "id"),
-        Index(None, "scene_name", "peak", "id"),
-        Index(None, "scene_name", "id"),
-        Index(None, "scene_hash", "id"),
-        Index(None, "completed", "id"),
-        Index(None, "intermediate", "id"),
-        Index(None, "parameter", "id"),
-        Index(None, "peak", "id"),
-        Index(None, "peak_at", "id"),
-        Index(None, "band_hz", "id"),
-        Index(None, "points", "id"),
-        Index(None, "seconds", "id"),
-        Index(None, "harmonics", "id"),
+        Index(None, "job_id", "of"),
+        Index(None, "of", "number"),
+        Index(None, "of", "owner", "number"),
+        Index(None, "of", "scene_name", "number"),
+        Index(None, "of", "scene_hash", "number"),
     )
 
 
-class SweepContact(Base):
-    """The values of one contact during a sweep; the value that was swept is NULL, it has no single value."""
+class Quantity(Base):
+    """What figures are: of what results, and their name. A part has its name for a label, a word itself."""
 
-    __tablename__ = "sweep_contact"
+    __tablename__ = "quantity"
 
-    sweep_id: Mapped[str] = mapped_column(
-        String(ID_LENGTH), ForeignKey("sweep.id", ondelete="CASCADE"), primary_key=True
-    )
-    name: Mapped[str] = mapped_column(String(200), primary_key=True)
-    position: Mapped[int]
-    kt: Mapped[float | None]
-    mu: Mapped[float | None]
-    N0: Mapped[float | None] = mapped_column("N0")
-    N1: Mapped[float | None] = mapped_column("N1")
-    N1_phase: Mapped[float | None] = mapped_column("N1_phase")
+    id: Mapped[int] = mapped_column(primary_key=True)
+    of: Mapped[str] = mapped_column(String(32))
+    name: Mapped[str] = mapped_column(String(200))
+    label: Mapped[str] = mapped_column(String(500))
 
-    __table_args__ = (Index(None, "N0", "name", "sweep_id"), Index(None, "name", "N0", "sweep_id"))
+    __table_args__ = (UniqueConstraint("of", "name", "label"),)
+
+
+class Figure(Base):
+    """A figure of a result: a number, a truth as 1 or 0, or 0 for a word or the place of a part."""
+
+    __tablename__ = "figure"
+
+    quantity: Mapped[int] = mapped_column(ForeignKey("quantity.id"), primary_key=True)
+    value: Mapped[float] = mapped_column(primary_key=True)
+    result: Mapped[int] = mapped_column(ForeignKey("result.number", ondelete="CASCADE"), primary_key=True)
+
+    # SQLite keeps such a table in the order of its key: a filter reads what it finds, and nothing else.
+    __table_args__ = (Index(None, "result", "quantity", "value"), {"sqlite_with_rowid": False})
 
 
 class SweepArray(Base):
@@ -310,78 +291,11 @@ class SweepArray(Base):
     __tablename__ = "sweep_array"
 
     sweep_id: Mapped[str] = mapped_column(
-        String(ID_LENGTH), ForeignKey("sweep.id", ondelete="CASCADE"), primary_key=True
+        String(ID_LENGTH), ForeignKey("result.id", ondelete="CASCADE"), primary_key=True
     )
     name: Mapped[str] = mapped_column(String(64), primary_key=True)
     sha256: Mapped[str] = mapped_column(String(64))
     data: Mapped[bytes] = mapped_column(LargeBinary())
-
-
-class Design(Base):
-    """What a design job found, without its variables: what people filter by. Its id is its job's."""
-
-    __tablename__ = "design"
-
-    job_id: Mapped[str] = mapped_column(
-        String(ID_LENGTH), ForeignKey("job.id", ondelete="CASCADE"), primary_key=True
-    )
-    owner: Mapped[str] = mapped_column(String(OWNER_LENGTH), default=NOBODY, server_default=NOBODY)
-    scene_name: Mapped[str] = mapped_column(String(200))
-    scene_hash: Mapped[str] = mapped_column(String(64))
-    method: Mapped[str] = mapped_column(String(32))
-    robust: Mapped[bool]
-    reached: Mapped[bool]
-    feasible: Mapped[bool]
-    status: Mapped[str] = mapped_column(Text())
-    objective: Mapped[float | None]
-    peak: Mapped[float | None]
-    peak_at: Mapped[float | None]
-    limit: Mapped[float | None]
-    band_hz: Mapped[float | None]
-    harmonics: Mapped[int]
-    evaluations: Mapped[int]
-    work: Mapped[float | None]
-    seconds: Mapped[float]
-    created: Mapped[datetime]
-
-    @property
-    def key(self) -> str:
-        """Its id."""
-        return self.job_id
-
-    __table_args__ = (
-        Index(None, "owner", "job_id"),
-        Index(None, "scene_name", "peak", "job_id"),
-        Index(None, "scene_name", "job_id"),
-        Index(None, "scene_hash", "job_id"),
-        Index(None, "method", "job_id"),
-        Index(None, "robust", "job_id"),
-        Index(None, "reached", "job_id"),
-        Index(None, "feasible", "job_id"),
-        Index(None, "objective", "job_id"),
-        Index(None, "peak", "job_id"),
-        Index(None, "peak_at", "job_id"),
-        Index(None, "band_hz", "job_id"),
-        Index(None, "work", "job_id"),
-        Index(None, "seconds", "job_id"),
-    )
-
-
-class DesignVariable(Base):
-    """A variable of a design with its bounds and its best value, NULL if no design could be computed."""
-
-    __tablename__ = "design_variable"
-
-    design_id: Mapped[str] = mapped_column(
-        String(ID_LENGTH), ForeignKey("design.job_id", ondelete="CASCADE"), primary_key=True
-    )
-    name: Mapped[str] = mapped_column(String(500), primary_key=True)
-    position: Mapped[int]
-    value: Mapped[float | None]
-    low: Mapped[float]
-    high: Mapped[float]
-
-    __table_args__ = (Index(None, "name", "value", "design_id"), Index(None, "value", "name", "design_id"))
 
 
 NAME_LENGTH = 200

@@ -19,7 +19,6 @@ from sqlalchemy.sql.elements import BinaryExpression, UnaryExpression
 from sqlalchemy.sql.operators import custom_op
 
 from service.errors import InvalidRequestError
-from solver.errors import Issue
 
 Range = tuple[float | None, float | None]
 Position = tuple[float | None, str]
@@ -44,14 +43,14 @@ class Condition:
         It is about rows of another table.
     """
 
-    ids: Select[str]
+    ids: Select[Any]
     holds: ColumnElement[bool]
     few: int = FEW
     apart: bool = False
 
 
 def plain_conditions(
-    identity: InstrumentedAttribute[str], found: Sequence[ColumnElement[bool]]
+    identity: InstrumentedAttribute[Any], found: Sequence[ColumnElement[bool]]
 ) -> list[Condition]:
     """Conditions on the columns of the table itself."""
     return [Condition(ids=select(identity).where(holds), holds=holds) for holds in found]
@@ -59,7 +58,7 @@ def plain_conditions(
 
 def owner_condition(
     connection: Connection,
-    identity: InstrumentedAttribute[str],
+    identity: InstrumentedAttribute[Any],
     column: InstrumentedAttribute[str],
     owner: str | None,
     *,
@@ -78,8 +77,7 @@ def owner_condition(
         return []
     holds = column == owner
     if connection.dialect.name == "sqlite" and not leads:
-        # The unary plus of SQLite's documentation: the value as it is, but no index.
-        holds = UnaryExpression(column.expression, operator=custom_op("+")) == owner
+        holds = aside(holds)
     ids = select(identity).where(column == owner)
     return [Condition(ids=ids, holds=holds, few=_FEW_OF_AN_OWNER)]
 
@@ -89,63 +87,68 @@ def met(
     query: Select[Any],
     identity: InstrumentedAttribute[str],
     conditions: Sequence[Condition],
-    column: InstrumentedAttribute[Any] | None = None,
 ) -> Select[Any]:
     """The query with every condition, led by one that few rows meet if there is one.
 
-    Without such a one the rows are read in the order of `column` (None: of the ids), which finds a page of
-    those that many rows meet after a few of them; see `_in_order`.
+    Without such a one the rows are read in the order of the ids, which finds a page of those that many rows
+    meet after a few of them.
 
     SQLite does not know how many rows a condition leaves and would read the whole table in the order of
-    the ids for four rows with a low peak. So each condition with an index is counted first, up to
+    the ids for four rows of a rare kind. So each condition with an index is counted first, up to
     `few` rows, which its index answers in well under a millisecond. PostgreSQL keeps statistics and knows,
-    if it plans with the values: a plan kept for any owner is wrong for who has few rows, or most of them.
-    Only what another table leaves of the rows it guesses badly, and reads ten thousand in order for a page
-    of two thousand. Starting its parallel workers takes longer than a page should.
+    if it plans with the values (see `plan_with_values`). Only what another table leaves of the rows it
+    guesses badly, and reads ten thousand in order for a page of two thousand.
     """
     sqlite = connection.dialect.name == "sqlite"
-    if not sqlite:
-        connection.exec_driver_sql(_PLANNING)
-    asked = (condition for condition in conditions if sqlite or condition.apart)
-    lead = next((condition for condition in asked if _is_few(connection, condition)), None)
+    plan_with_values(connection)
+    asked = (one for one in conditions if sqlite or one.apart)
+    lead = next((one for one in asked if is_few(connection, one)), None)
     for condition in conditions:
+        holds = condition.holds
         if condition is lead:
-            query = query.where(identity.in_(_first(condition.ids)))
-        else:
-            in_order = sqlite and lead is None
-            query = query.where(_in_order(condition.holds, column) if in_order else condition.holds)
+            holds = identity.in_(first(condition.ids))
+        elif sqlite and lead is None and getattr(holds, "operator", None) is not operators.eq:
+            # An index of the column and the ids serves an equality alone in the order of the ids.
+            holds = aside(holds)
+        query = query.where(holds)
     return query
 
 
-def _first(ids: Select[str]) -> Select[str]:
+def plan_with_values(connection: Connection) -> None:
+    """Have PostgreSQL plan the queries of this transaction with their values.
+
+    A plan kept for any owner is wrong for who has few rows, or most of them. Starting its parallel workers
+    takes longer than a page should.
+    """
+    if connection.dialect.name == "postgresql":
+        connection.exec_driver_sql(_PLANNING)
+
+
+def first(ids: Select[Any]) -> Select[Any]:
     """The same ids, of which PostgreSQL too begins."""
     leading = ids.cte("leading").prefix_with("MATERIALIZED", dialect="postgresql")
     return select(leading.c[0])
 
 
-def _in_order(holds: ColumnElement[bool], column: InstrumentedAttribute[Any] | None) -> ColumnElement[bool]:
-    """The condition such that SQLite does not take its index where it would have to sort what that finds.
-
-    An index of the column and the ids serves an equality in the order of the ids; one of the column and
-    the column of the order serves that order.
-    """
+def aside(holds: ColumnElement[bool]) -> ColumnElement[bool]:
+    """The condition such that SQLite does not take the index of its column (see `unindexed`)."""
     if not isinstance(holds, BinaryExpression) or not isinstance(holds.left, Column):
         return holds
-    if holds.operator is operators.eq and _serves(holds.left, column):
-        return holds
-    aside = holds._clone()
-    aside.left = UnaryExpression(holds.left, operator=custom_op("+"), type_=holds.left.type)
-    return aside
+    same = holds._clone()
+    same.left = unindexed(holds.left)
+    return same
 
 
-def _serves(left: Column[Any], column: InstrumentedAttribute[Any] | None) -> bool:
-    if column is None:
-        return True
-    wanted = [left.name, column.key]
-    return any([part.name for part in index.columns][:2] == wanted for index in left.table.indexes)
+def unindexed(column: Any) -> UnaryExpression[Any]:
+    """A column with the unary plus of SQLite's documentation: the value as it is, but no index is taken.
+
+    Of numbers PostgreSQL takes it the same way.
+    """
+    return UnaryExpression(column, operator=custom_op("+"), type_=column.type)
 
 
-def _is_few(connection: Connection, condition: Condition) -> bool:
+def is_few(connection: Connection, condition: Condition) -> bool:
+    """Whether no more rows than its `few` meet a condition."""
     bounded = condition.ids.limit(condition.few + 1).subquery()
     return connection.execute(select(func.count()).select_from(bounded)).scalar_one() <= condition.few
 
@@ -162,25 +165,16 @@ def within(column: InstrumentedAttribute[Any], bounds: Range) -> list[ColumnElem
 
 def ordered(
     query: Select[Any],
-    identity: InstrumentedAttribute[str],
-    column: InstrumentedAttribute[Any] | None,
+    keys: Sequence[InstrumentedAttribute[Any]],
     *,
     descending: bool,
-    after: Position | None,
+    after: Sequence[Any] | None,
 ) -> Select[Any]:
-    """Order by a column (None: by id alone, which is the time), then by id, and go on behind `after`.
-
-    Rows without a value in the column are left out.
-    """
-    keys = [identity] if column is None else [column, identity]
+    """Order by columns, the last of which tells all rows apart, and go on behind their values `after`."""
     query = query.order_by(*(key.desc() if descending else key.asc() for key in keys))
-    if column is not None:
-        query = query.where(column.is_not(None))
     if after is None:
         return query
-    value, row_id = after
-    here = tuple_(*keys)
-    there = tuple_(*(literal(item) for item in ((row_id,) if column is None else (value, row_id))))
+    here, there = tuple_(*keys), tuple_(*(literal(item) for item in after))
     return query.where(here < there if descending else here > there)
 
 
@@ -201,10 +195,10 @@ def decode(cursor: str) -> Position:
         padded = cursor + "=" * (-len(cursor) % 4)
         value, row_id = json.loads(base64.urlsafe_b64decode(padded.encode("ascii")))
     except (ValueError, TypeError, binascii.Error, RecursionError) as error:
-        raise _refused(cursor) from error
+        raise refused(cursor) from error
     number = value is None or (isinstance(value, int | float) and math.isfinite(value))
     if not number or isinstance(value, bool) or not isinstance(row_id, str):
-        raise _refused(cursor)
+        raise refused(cursor)
     return value, row_id
 
 
@@ -215,6 +209,8 @@ def next_link(path: str, query: BaseModel, value: float | None, row_id: str) -> 
     return f"{path}?" + urlencode({**words, "cursor": encode(value, row_id)}, doseq=True)
 
 
-def _refused(cursor: str) -> InvalidRequestError:
-    message = f"`cursor` must come from the `next` link of a page, got {cursor[:80]!r}"
-    return InvalidRequestError([Issue(pointer="/cursor", message=message)], source="query")
+def refused(cursor: str) -> InvalidRequestError:
+    """The error of a cursor that is none of this service."""
+    return InvalidRequestError.of(
+        ("cursor",), "must come from the `next` link of a page", cursor[:80], source="query"
+    )

@@ -28,10 +28,11 @@ _WAIT_SECONDS = 30.0
 _CONNECT_SECONDS = 10
 _LEAST_CONNECT_SECONDS = 2  # libpq takes no less
 _MARGIN_SECONDS = 1.0  # the server is the first to give up, and says why
-# Two numbers of our own; advisory locks know their holders' agreement by number alone.
+# Numbers of our own; advisory locks know their holders' agreement by number alone.
 _SERVICES = 0x5354_4943_4B01
 _TABLES = 0x5354_4943_4B02
 _ROOM = 0x5354_4943_4B03
+_QUANTITIES = 0x5354_4943_4B04
 # More rows than `work_mem` has room for: the server keeps them in a temporary file until they are counted.
 _OF_PROBE = (("work_mem", "64kB"), ("temp_tablespaces", ""))
 _SPILL = (
@@ -213,6 +214,11 @@ def lock_tables(connection: Connection) -> None:
 def lock_room(connection: Connection) -> None:
     """Be the only one, until the transaction ends, who adds jobs to a queue that may be full."""
     connection.execute(text(f"SELECT pg_advisory_xact_lock({_ROOM})"))
+
+
+def lock_quantities(connection: Connection) -> None:
+    """Be the only one, until the transaction ends, who says what new figures are."""
+    connection.execute(text(f"SELECT pg_advisory_xact_lock({_QUANTITIES})"))
 
 
 def refuse_running(connection: Connection, name: str) -> None:

@@ -9,13 +9,13 @@ from contextlib import asynccontextmanager
 from fastapi import FastAPI
 from starlette.concurrency import run_in_threadpool
 
-from service.auth.authenticator import Doorkeeper
+from service.auth.authenticator import Authenticator
 from service.http import openapi
 from service.http.dependencies import HostCheck, Turns
 from service.http.metrics import Measured, Metrics
-from service.http.middleware.admission import Gate, Turnstile
+from service.http.middleware.admission import Admission, ConcurrencyLimits
 from service.http.middleware.connections import Connections
-from service.http.middleware.every_answer import Head, RequestLog, Seal
+from service.http.middleware.every_answer import Head, HeadersAndAudit, RequestLog
 from service.http.routes import (
     at_once,
     events,
@@ -80,18 +80,21 @@ def create_app(settings: Settings | None = None, registry: Registry | None = Non
     service.lanes.guard(connections.require_taken)
     # The last one added is the outermost.
     app.add_middleware(Head)
-    doorkeeper = Doorkeeper(service.keys, service.settings, service.jobs.now)
-    app.state.doorkeeper = doorkeeper
-    app.add_middleware(Gate, doorkeeper=doorkeeper, turnstile=Turnstile(service.settings))
+    authenticator = Authenticator(service.keys, service.settings, service.jobs.now)
+    app.state.authenticator = authenticator
+    app.add_middleware(
+        Admission, authenticator=authenticator, concurrency=ConcurrencyLimits(service.settings)
+    )
     app.add_middleware(HostCheck, hosts=service.settings.hosts)
     app.add_middleware(Measured, metrics=app.state.metrics)
     app.add_middleware(RequestLog)
     problems.install(app)
-    app.add_middleware(Seal, settings=service.settings)
+    app.add_middleware(HeadersAndAudit, settings=service.settings)
     events.install(app)
     app.include_router(jobs.submissions(service.registry))
     for router in (
-        jobs.router, forms.kinds, forms.laws, events.router, stored.designs, stored.sweeps, scenes.texts,
+        jobs.router, forms.kinds, forms.laws, events.router, stored.designs, stored.results,
+        stored.sweeps, scenes.texts,
         forms.templates, scenes.router, uploads.router, uploads.matrices, uploads.measurements, at_once.plans,
         at_once.previews, runs.projects, runs.reports, runs.runs, runs.shares, health.router,
         page.reference, page.router,

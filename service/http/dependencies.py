@@ -40,7 +40,6 @@ from service.queue.running import Event
 from service.rendering.representations import JSON, LIST_MEDIA, chosen, csv_of_items
 from service.schemas.answers import Page
 from service.schemas.problems import service_problem
-from solver.errors import Issue
 
 SMALL_BYTES = 32 * 1024
 """A body that is read in a millisecond, on the event loop."""
@@ -163,7 +162,7 @@ class Context:
 
 # Dependencies are asynchronous: others would be run in a thread each, which costs more than they do.
 async def context_of(request: Request) -> Context:
-    """The context of a request; the gate has put there who asks."""
+    """The context of a request; who asks was put there on admission."""
     return Context(request, service_behind(request), getattr(request.state, "caller", KEYLESS))
 
 
@@ -280,10 +279,12 @@ def idempotency_key(headers: Mapping[str, str]) -> str | None:
     key = headers.get("idempotency-key")
     if key is None or _KEY.fullmatch(key):
         return key
-    message = (
-        f"`Idempotency-Key` must be 1 to 200 printable ASCII characters without spaces, got {key[:80]!r}"
+    raise InvalidRequestError.of(
+        ("Idempotency-Key",),
+        "must be 1 to 200 printable ASCII characters without spaces",
+        key[:80],
+        source="header",
     )
-    raise InvalidRequestError([Issue(pointer="/Idempotency-Key", message=message)], source="header")
 
 
 def tagged(

@@ -6,10 +6,10 @@ from collections.abc import Awaitable, Callable, Mapping
 from functools import wraps
 from typing import Any, TypeVar
 
-from service.errors import InvalidRequestError
+from service.errors import InvalidRequestError, issues_to_json
 from service.http.dependencies import Context
 from service.jobs.answering import KIND, PREVIEW, RESOLVE, Prepared
-from service.jobs.registry import JobKind, SceneSource
+from service.jobs.registry import JobKind, JobRequest, SceneSource
 from service.jobs.strict_json import JsonText
 from service.queue.core import SOLVER_VERSION
 from service.queue.lanes import Lane, Lanes
@@ -42,12 +42,12 @@ _MOST_LOOKED_UP = 8
 """Scenes and uploads of one request; shipped scenes need no looking up."""
 
 
-async def computed(context: Context, task: str, words: Mapping[str, Any], about: str = "/scene") -> Any:
+async def computed(context: Context, task: str, words: Mapping[str, Any], about: str = "scene") -> Any:
     """What a task of `service.jobs.answering` finds.
 
     Parameters
     ----------
-    about : pointer of the field that makes it costly.
+    about : the field that makes it costly.
 
     Raises
     ------
@@ -67,13 +67,15 @@ async def computed(context: Context, task: str, words: Mapping[str, Any], about:
     raise RuntimeError(f"the task {task!r} looks up more than {_MOST_LOOKED_UP} scenes")
 
 
-async def prepared(context: Context, kind: JobKind, body: Mapping[str, Any], task: str = RESOLVE) -> Prepared:
+async def prepared(
+    context: Context, kind: JobKind, request: JobRequest, body: Mapping[str, Any], task: str = RESOLVE
+) -> Prepared:
     """A request for a job or a preview, resolved; `computed` lists the errors."""
     settings = context.service.settings
     memory = settings.answer_memory_bytes if task == PREVIEW else settings.worker_memory_bytes or None
     words = {
-        KIND: kind.name, "body": dict(body), "work": context.caller.limits.work, "memory": memory,
-        "version": SOLVER_VERSION,
+        KIND: kind.name, "request": request, "body": dict(body),
+        "work": context.caller.limits.work, "memory": memory, "version": SOLVER_VERSION,
     }  # fmt: skip
     found = await computed(context, task, words)
     return Prepared(**{**found, "spec": JsonText(found["spec"])})
@@ -87,5 +89,5 @@ def _look_up(needs: Mapping[str, Any], source: SceneSource, spec: dict[str, Any]
     try:
         found: dict[str, Any] = {"scene": source.with_uploads(needs["uploads"])}
     except InvalidRequestError as error:
-        found = {"issues": [[issue.pointer, issue.message] for issue in error.issues]}
+        found = {"issues": issues_to_json(error.issues)}
     spec["uploads"][needs["as"]] = found

@@ -197,6 +197,7 @@ _OF: dict[tuple[str, str], tuple[str, ...]] = {
     ("get", "/v1/jobs"): _LIST,
     ("get", "/v1/designs"): _LIST,
     ("get", "/v1/sweeps"): _LIST,
+    ("get", "/v1/results"): _LIST,
     ("get", "/v1/uploads"): _LIST,
     ("get", "/v1/sweeps/{sweep_id}"): ("NotAcceptable", "InvalidQuery"),
     ("delete", "/v1/jobs/{job_id}"): ("Conflict",),

@@ -11,12 +11,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from service.errors import BodyTooLargeError, InvalidRequestError, MalformedBodyError
+from service.errors import BodyTooLargeError, InvalidRequestError, MalformedBodyError, issues_to_json
 from service.jobs.common.measurements import read_measurements
 from service.jobs.common.scene_editing import side_by_side
 from service.jobs.common.scene_text import issues_of_scene, read_text
 from service.jobs.common.scenes import (
-    SceneRequest,
     read_scene,
     refers_to_uploads,
     require,
@@ -29,8 +28,6 @@ from service.jobs.registry import JobRequest, Registry, Resolve, RunOn, SceneSou
 from service.jobs.strict_json import JsonText, digest, encoded
 from service.jobs.studies.plan import Plan
 from service.jobs.study import Watch
-from service.jobs.validation import validated
-from solver.errors import Issue
 
 PLAN, READ, TEXT, STORE, RESOLVE, PREVIEW = "plan", "read", "text", "store", "resolve", "preview"
 MEASURED, EDIT = "measured", "edit"
@@ -77,7 +74,7 @@ class LookedUp:
         if found is None:
             raise NeededError({"uploads": body, "as": key})
         if "issues" in found:
-            raise InvalidRequestError([Issue(pointer=where, message=said) for where, said in found["issues"]])
+            raise InvalidRequestError.from_json(found["issues"])
         whole: Mapping[str, object] = found["scene"]
         return whole
 
@@ -133,25 +130,23 @@ def prepared(
 class _Resolving:
     """The task that resolves requests of some kinds; sent to the processes by the names of its parts."""
 
-    kinds: Mapping[str, tuple[type[JobRequest], Resolve]]
+    kinds: Mapping[str, Resolve]
 
     @classmethod
     def of(cls, registry: Registry) -> _Resolving:
-        return cls({kind.name: (kind.request, kind.resolve) for kind in registry})
+        return cls({kind.name: kind.resolve for kind in registry})
 
     def __call__(self, words: Words, source: SceneSource) -> dict[str, Any]:
-        name, body = words[KIND], words["body"]
-        request, resolve = self.kinds[name]
-        asked = validated(request, {key: value for key, value in body.items() if key != KIND})
+        name = words[KIND]
         found = prepared(
-            name, resolve, asked, body, source,
+            name, self.kinds[name], words["request"], words["body"], source,
             work=words["work"], memory=words["memory"], version=words["version"],
         )  # fmt: skip
         return asdict(found)
 
 
 def _plan(words: Words, source: SceneSource) -> dict[str, Any]:
-    request = Plan.model_validate(words)
+    request: Plan = words["request"]
     scene = resolve_scene(request, source)
     require(request.issues(scene))
     return Plan.compute(scene, request.spec(scene), Watch()).json
@@ -159,7 +154,7 @@ def _plan(words: Words, source: SceneSource) -> dict[str, Any]:
 
 def _read(words: Words, source: SceneSource) -> JsonText:
     raw = read_text(words["text"], words["form"])
-    issues = [{"pointer": issue.pointer, "detail": issue.message} for issue in issues_of_scene(raw, source)]
+    issues = [{"pointer": issue.pointer, "detail": issue.said()} for issue in issues_of_scene(raw, source)]
     return encoded({"scene": raw, "issues": issues})
 
 
@@ -170,12 +165,12 @@ def _edit(words: Words, source: SceneSource) -> JsonText:
 def _text(words: Words, source: SceneSource) -> str:
     from solver.scene.toml import toml_text
 
-    scene = resolve_scene(SceneRequest.model_validate(words["scene"]), source)
+    scene = resolve_scene(words["request"], source)
     return toml_text(scene.to_dict(), tuple(words["comments"]))
 
 
 def _measured(words: Words, source: SceneSource) -> JsonText:
-    scene = resolve_scene(SceneRequest.model_validate(words["scene"]), source)
+    scene = resolve_scene(words["request"], source)
     return encoded(read_measurements(scene, words["files"]))
 
 
@@ -205,7 +200,7 @@ class Answering:
         except NeededError as error:
             return {"needs": error.what}
         except InvalidRequestError as error:
-            return {"issues": [[issue.pointer, issue.message] for issue in error.issues]}
+            return {"issues": issues_to_json(error.issues)}
         except MalformedBodyError as error:
             return {"malformed": error.detail}
         except BodyTooLargeError as error:

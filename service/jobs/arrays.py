@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from service.errors import DatabaseError
-from service.jobs.outputs import StoredArray
+from service.jobs.figures import StoredArray
 
 
 def encode(array: NDArray[Any]) -> StoredArray:

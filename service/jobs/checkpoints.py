@@ -18,7 +18,8 @@ from dataclasses import dataclass
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
-from service.jobs.outputs import JobOutput, Pace, Piece, Progress, Run, ShouldStop, StoredArray
+from service.jobs.figures import StoredArray
+from service.jobs.outputs import JobOutput, Pace, Piece, Progress, Run, ShouldStop
 from service.jobs.parts import PartOutput, Parts
 
 if TYPE_CHECKING:

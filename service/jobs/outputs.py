@@ -4,9 +4,19 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol, Self
 
+from service.jobs.figures import (
+    RECORDS,
+    STATUS,
+    DesignRecord,
+    FigureValue,
+    KindRecord,
+    Record,
+    SweepRecord,
+    figures,
+)
 from service.jobs.strict_json import JsonText
 from solver.errors import Issue
 
@@ -53,26 +63,6 @@ class Silent:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ContactValues:
-    """The values of a contact during a sweep; None where the value is swept or its law has none."""
-
-    name: str
-    kt: float | None
-    mu: float | None
-    N0: float | None
-    N1: float | None
-    N1_phase: float | None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class StoredArray:
-    """An array as it is stored: npy bytes and their SHA-256 in hexadecimal."""
-
-    sha256: str
-    data: bytes
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Piece:
     """A piece of what an unfinished job has computed, with the SHA-256 of its bytes in hexadecimal."""
 
@@ -104,74 +94,6 @@ class Pace:
     log_format: str = "text"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SweepRecord:
-    """A branch to be stored: the columns people filter by, and its parts.
-
-    Attributes
-    ----------
-    intermediate : bool
-        Whether it was computed on the way to another result, rather than being what was asked for.
-    """
-
-    scene_name: str
-    scene_hash: str
-    parameter: str
-    from_value: float
-    to_value: float
-    frequency_hz: float | None
-    excitation_amplitude: float | None
-    harmonics: int
-    points: int
-    peak: float | None
-    peak_at: float | None
-    limit: float | None
-    band_hz: float | None
-    newton_iterations: int
-    rejected_steps: int
-    seconds: float
-    completed: bool
-    status: str
-    error_estimate: float | None = None
-    peaks_known: bool | None = None
-    intermediate: bool = False
-    contacts: tuple[ContactValues, ...] = ()
-    arrays: Mapping[str, StoredArray] = field(default_factory=dict)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class VariableValues:
-    """A variable of a design: its best value (None if no design could be computed) and its bounds."""
-
-    name: str
-    value: float | None
-    low: float
-    high: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DesignRecord:
-    """A design to be stored: the columns people filter by, and its parts."""
-
-    scene_name: str
-    scene_hash: str
-    method: str
-    robust: bool
-    reached: bool
-    feasible: bool
-    status: str
-    objective: float | None
-    peak: float | None
-    peak_at: float | None
-    limit: float | None
-    band_hz: float | None
-    harmonics: int
-    evaluations: int
-    work: float | None
-    seconds: float
-    variables: tuple[VariableValues, ...] = ()
-
-
 class Found(Protocol):
     """A result of a computation."""
 
@@ -200,13 +122,30 @@ class JobOutput:
         then fails with it; result and sweeps are kept.
     encoded : JsonText or None
         The result as it is stored, if the worker has encoded it already; `result` is then empty.
+    figures : tuple of FigureValue
+        The figures of a result that is encoded.
     """
 
     result: dict[str, Any]
     sweeps: tuple[SweepRecord, ...] = ()
     encoded: JsonText | None = None
+    figures: tuple[FigureValue, ...] = ()
     design: DesignRecord | None = None
     shortfall: str | None = None
+
+    def records(self, kind: str, scene_name: str | None, scene_hash: str | None) -> list[Record]:
+        """Return what is stored of it beside its sweeps: the design, or the figures of the result.
+
+        What a kind of sweeps or designs computes is told by those.
+        """
+        if self.design is not None or kind in RECORDS:
+            return [] if self.design is None else [self.design]
+        told = self.figures or tuple(figures(self.result))
+        status = next((one.label for one in told if one.name == STATUS), self.shortfall or "")
+        values = tuple(one for one in told if one.name != STATUS)
+        return [
+            KindRecord(of=kind, scene_name=scene_name, scene_hash=scene_hash, status=status, values=values)
+        ]
 
     @classmethod
     def of(
@@ -249,7 +188,7 @@ class JobFailure:
         """The error of a job, as JSON."""
         body: dict[str, Any] = {"type": self.kind.value, "detail": self.detail}
         if self.issues:
-            body["issues"] = [{"pointer": issue.pointer, "detail": issue.message} for issue in self.issues]
+            body["issues"] = [{"pointer": issue.pointer, "detail": issue.said()} for issue in self.issues]
         return body
 
 

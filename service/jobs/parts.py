@@ -13,7 +13,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from service.jobs.outputs import JobOutput, OnProgress, ShouldStop, StoredArray
+from service.jobs.figures import StoredArray
+from service.jobs.outputs import JobOutput, OnProgress, ShouldStop
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -18,7 +18,7 @@ from service.errors import InvalidRequestError
 from service.jobs.kind_view import KindView
 from service.jobs.outputs import JobOutput, Progress, Run, ShouldStop
 from service.jobs.run_words import Notes, RunName, Tags
-from solver.errors import Issue, pointer
+from solver.errors import Shown
 
 if TYPE_CHECKING:
     from service.jobs.checkpoints import Checkpoints
@@ -206,8 +206,9 @@ class Registry:
         """
         if isinstance(name, str) and name in self._kinds:
             return self._kinds[name]
-        message = f"`kind` must be one of {', '.join(self._kinds)}, got {name!r:.80}"
-        raise InvalidRequestError([Issue(pointer=pointer("kind"), message=message)])
+        raise InvalidRequestError.of(
+            ("kind",), f"must be one of {', '.join(self._kinds)}", Shown(f"{name!r:.80}")
+        )
 
     def extended(self, *kinds: JobKind) -> Registry:
         """This registry with further kinds."""

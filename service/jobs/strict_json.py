@@ -11,7 +11,7 @@ from itertools import islice
 from typing import Any
 
 from service.errors import BodyTooLargeError, InvalidRequestError, MalformedBodyError
-from solver.errors import Issue, pointer
+from solver.errors import Issue, Shown, pointer
 
 _Way = Any  # None at the top, or a pair: the way to a container, and a key or an index in it
 
@@ -70,7 +70,7 @@ def loads(data: bytes) -> object:
     if numbers.wrong:
         issues = issues_of_numbers(value)
         if numbers.unending:
-            raise MalformedBodyError("; ".join(issue.message for issue in issues))
+            raise MalformedBodyError("; ".join(issue.said() for issue in issues))
         raise InvalidRequestError(issues)
     return value
 
@@ -179,14 +179,15 @@ def _not_finite(items: Mapping[str, object] | list[object], way: _Way) -> Iterat
 
 
 def _issue_of_number(item: str | float, way: _Way) -> Issue:
-    parts: list[object] = []
+    parts: list[str | int] = []
     while way is not None:
         way, part = way
         parts.append(part)
-    where = pointer(*parts[-2::-1])  # the first is the place in the list around the whole
+    place = tuple(parts[-2::-1])  # the first is the place in the list around the whole
     text = str(item)
     shown = text if len(text) <= 40 else f"one of {len(text)} digits"
-    return Issue(pointer=where, message=f"`{where[-200:]}` must be a finite number, got {shown}")
+    said = f"`{pointer(*place)[-200:]}` must be a finite number"
+    return Issue(place, said, Shown(shown), named=False)
 
 
 def _without_duplicates(pairs: list[tuple[str, object]]) -> dict[str, object]:

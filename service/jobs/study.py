@@ -15,11 +15,21 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol
 
 from pydantic import BaseModel, ConfigDict
 
-from service.jobs.common.scenes import HarmonicRequest, SceneRequest, require, resolve_scene, resolved
+from service.jobs.common.scenes import (
+    CHECKED_BY,
+    SCENE,
+    HarmonicRequest,
+    SceneRequest,
+    require,
+    resolve_scene,
+    resolved,
+    stored_scene,
+)
+from service.jobs.figures import SweepRecord
 from service.jobs.kind_view import Json, KindView, NothingToDrawError, ReadSweep, StoredSweep
-from service.jobs.outputs import JobOutput, OnProgress, Progress, ShouldStop, SweepRecord
+from service.jobs.outputs import JobOutput, OnProgress, Progress, ShouldStop
 from service.jobs.registry import JobKind, Resolved, SceneSource
-from solver.errors import Issue
+from solver.errors import Issue, SettingError
 from solver.results.views import on_demand
 from solver.results.watch import part_of
 
@@ -165,12 +175,17 @@ class Study(SceneRequest):
     @classmethod
     def asked(cls, spec: Mapping[str, Any]) -> tuple[Scene, dict[str, Any]]:
         """Return the scene of a spec, and the keys that were given."""
-        from solver.scene.scene import Scene
-
         # A job that an earlier version took may have the keys of its body.
         by_key = {field.alias or name: name for name, field in cls.model_fields.items()}
-        given = {by_key.get(key, key): value for key, value in spec.items() if value is not None}
-        return Scene.from_dict(spec["scene"]), {name: given[name] for name in cls.own_keys() if name in given}
+        given = {
+            by_key.get(key, key): value
+            for key, value in spec.items()
+            if value is not None and key not in (SCENE, CHECKED_BY)
+        }
+        known = cls.own_keys()
+        for key in given.keys() - set(known):
+            raise SettingError(key, given[key], "is no key of this version: submit the job again")
+        return stored_scene(spec), {name: given[name] for name in known if name in given}
 
     @classmethod
     def run(cls, spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop) -> JobOutput:

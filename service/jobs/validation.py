@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from typing import Any, TypeVar
 
@@ -10,11 +9,10 @@ from pydantic import BaseModel, ValidationError
 
 from service.errors import InvalidRequestError
 from service.jobs.strict_json import MOST_TOLD
-from solver.errors import Issue, pointer
+from solver.errors import UNSAID, Issue, Place, Shown
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
 
-_SHOULD = re.compile(r"^(?:Input|String|List|Tuple) should (be|have)\b")
 _SHOWN = 80  # characters of what was given
 _MESSAGES = {
     "extra_forbidden": "is not a known key",
@@ -27,8 +25,8 @@ _MESSAGES = {
 }
 
 
-def validated(model: type[ModelT], body: object) -> ModelT:
-    """`body` as a checked `model`.
+def validated(model: type[ModelT], body: object, source: str = "body") -> ModelT:
+    """`body` as a checked `model`; `source` says what it is.
 
     Raises
     ------
@@ -36,12 +34,13 @@ def validated(model: type[ModelT], body: object) -> ModelT:
         Lists everything that is wrong.
     """
     if not isinstance(body, Mapping):
-        message = f"the body must be a JSON object, got {type(body).__name__}"
-        raise InvalidRequestError([Issue(pointer="", message=message)])
+        raise InvalidRequestError.of(
+            (), f"the body must be a JSON object, got {type(body).__name__}", named=False
+        )
     try:
         return model.model_validate(dict(body))
     except ValidationError as error:
-        raise InvalidRequestError(issues_of(error.errors(include_url=False)[:MOST_TOLD])) from error
+        raise InvalidRequestError(issues_of(error.errors(include_url=False)[:MOST_TOLD]), source) from error
 
 
 def issues_of(errors: Sequence[Any]) -> list[Issue]:
@@ -50,29 +49,29 @@ def issues_of(errors: Sequence[Any]) -> list[Issue]:
 
 
 def _issue(error: Mapping[str, Any]) -> Issue:
-    location = [part for part in error["loc"] if part != "[key]"]
+    location = tuple(part for part in error["loc"] if part != "[key]")
     kind = error["type"]
     if kind in ("union_tag_not_found", "union_tag_invalid"):
         return _unknown_tag(error, location)
-    key = _cut(str(location[-1])) if location else "body"
-    message = _MESSAGES.get(kind) or str(error["msg"]).removeprefix("Value error, ")
-    message = _SHOULD.sub(r"must \1", message)
-    if not message.startswith("`"):
-        message = f"`{key}` {message}"
-        if kind not in ("missing", "extra_forbidden"):
-            message += f", got {_short(error.get('input'))}"
-    return Issue(pointer=pointer(*location), message=message)
+    if kind == "value_error":
+        wanted = str(error["ctx"]["error"])
+    else:
+        _, _, should = str(error["msg"]).partition(" should ")
+        wanted = _MESSAGES.get(kind) or (f"must {should}" if should else str(error["msg"]))
+    # The validator of several keys says itself which it means.
+    named = not wanted.startswith("`")
+    told = named and kind not in ("missing", "extra_forbidden")
+    return Issue(location, wanted, Shown(_short(error.get("input"))) if told else UNSAID, named)
 
 
-def _unknown_tag(error: Mapping[str, Any], location: Sequence[object]) -> Issue:
+def _unknown_tag(error: Mapping[str, Any], location: Place) -> Issue:
     """The key that tells the members of a union apart is missing, or names none of them."""
     context = error["ctx"]
     key = str(context["discriminator"]).strip("'")
-    message = f"`{key}` is missing"
-    if error["type"] == "union_tag_invalid":
-        known = str(context["expected_tags"]).replace("'", "")
-        message = f"`{key}` must be one of {known}, got {_short(error['input'][key])}"
-    return Issue(pointer=pointer(*location, key), message=message)
+    if error["type"] == "union_tag_not_found":
+        return Issue((*location, key), "is missing")
+    known = str(context["expected_tags"]).replace("'", "")
+    return Issue((*location, key), f"must be one of {known}", Shown(_short(error["input"][key])))
 
 
 def _short(value: object) -> str:

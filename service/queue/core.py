@@ -18,15 +18,14 @@ from service.auth.callers import KEYLESS, Caller
 from service.db import revisions
 from service.db.clock import Clock
 from service.db.engine import Database
-from service.db.models import Design, JobState, Sweep
+from service.db.models import JobState
 from service.db.pg_notify import Notices
 from service.db.repositories import (
-    DesignRepository,
     JobRepository,
     JobRow,
     NewJob,
+    ResultRepository,
     SceneRepository,
-    SweepRepository,
     UploadRepository,
 )
 from service.db.repositories.owned import KeyRepository, Projects, StorageRepository, visible
@@ -35,6 +34,7 @@ from service.db.repositories.runs import Runs, Shares
 from service.errors import ConflictError, InvalidRequestError, JobFailedError, NotFoundError
 from service.jobs import answering
 from service.jobs.answering import Prepared, prepared
+from service.jobs.figures import DESIGN, SWEEP, DesignRecord, SweepRecord
 from service.jobs.kinds.registry.bodies import KIND
 from service.jobs.kinds.registry.loading import registry_of
 from service.jobs.outputs import OnProgress
@@ -50,7 +50,6 @@ from service.uploads.uploads import Uploads
 from service.workers.answers import AnswerLimits, Answers
 from service.workers.executors import executor_of
 from service.workers.preview_workers import Previews
-from solver.errors import Issue
 
 log = logging.getLogger("stickslip.service")
 
@@ -65,7 +64,7 @@ class Results:
 
     job: JobRow
     text: str
-    sweeps: list[Sweep]
+    sweeps: list[SweepRecord]
 
     @property
     def result(self) -> dict[str, Any]:
@@ -78,7 +77,7 @@ class Results:
 class WholeDesign:
     """A stored design with the job that found it and the result of that job."""
 
-    row: Design
+    row: DesignRecord
     job: JobRow
     result: dict[str, Any]
 
@@ -112,8 +111,7 @@ class Service:
         self.registry = registry_of(settings.kinds) if registry is None else registry
         self.database = Database(settings.database, settings.database_connections, settings.database_seconds)
         self.jobs = JobRepository(self.database, now)
-        self.sweeps = SweepRepository(self.database)
-        self.designs = DesignRepository(self.database)
+        self.stored = ResultRepository(self.database)
         self.keys = KeyRepository(self.database)
         self.storage = Storage(StorageRepository(self.database), settings)
         self.uploads = Uploads(UploadRepository(self.database), settings, self.storage)
@@ -191,7 +189,7 @@ class Service:
         self._open = False
 
     def stop_waiting(self) -> None:
-        """Send everybody home who waits for a job."""
+        """End every request that waits for a job."""
         self.stopping.set()
         self.waiters.wake_all()
 
@@ -208,7 +206,7 @@ class Service:
             See `JobRepository.submit`.
         """
         if KIND not in body:
-            raise InvalidRequestError([Issue(pointer="/kind", message="`kind` is missing")])
+            raise InvalidRequestError.of(("kind",), "is missing")
         kind = self.registry.get(body[KIND])
         request = validated(kind.request, {key: value for key, value in body.items() if key != KIND})
         return self.accept(kind, request, body, idempotency_key, caller)
@@ -264,8 +262,9 @@ class Service:
     def _require_priority(self, request: JobRequest, caller: Caller) -> None:
         most = highest_priority(caller, self.settings)
         if request.priority > most:
-            message = f"`priority` must be at most {most} with this key, got {request.priority}"
-            raise InvalidRequestError([Issue(pointer="/priority", message=message)])
+            raise InvalidRequestError.of(
+                ("priority",), f"must be at most {most} with this key", request.priority
+            )
 
     def _seconds_limit(self, request: JobRequest, caller: Caller) -> float | None:
         """The longest time an attempt may take, if the request or the key says so [s]."""
@@ -273,8 +272,9 @@ class Service:
         most = min(self.settings.job_seconds, of_key or math.inf)
         if asked is not None and asked > most:
             whose = "the key's limit" if most == of_key else "the service's own limit"
-            message = f"`max_seconds` must be at most {most:g}, which is {whose}, got {asked!r}"
-            raise InvalidRequestError([Issue(pointer="/max_seconds", message=message)])
+            raise InvalidRequestError.of(
+                ("max_seconds",), f"must be at most {most:g}, which is {whose}", asked
+            )
         return asked if asked is not None else of_key
 
     def job(self, job_id: str, caller: Caller = KEYLESS) -> JobRow:
@@ -287,7 +287,7 @@ class Service:
         """
         return visible(self.jobs.get(job_id), caller.sees, f"there is no job {job_id!r}")
 
-    def sweep(self, sweep_id: str, caller: Caller = KEYLESS) -> Sweep:
+    def sweep(self, sweep_id: str, caller: Caller = KEYLESS) -> SweepRecord:
         """A stored sweep.
 
         Raises
@@ -295,7 +295,8 @@ class Service:
         NotFoundError
             If there is none of this id that the caller may see.
         """
-        return visible(self.sweeps.get(sweep_id), caller.sees, f"there is no sweep {sweep_id!r}")
+        found: SweepRecord | None = self.stored.get(sweep_id, SWEEP)
+        return visible(found, caller.sees, f"there is no sweep {sweep_id!r}")
 
     def dismiss(self, job_id: str, caller: Caller = KEYLESS) -> JobRow:
         """Cancel a job. A running one ends within the grace; the row given back may say `running` still.
@@ -348,7 +349,7 @@ class Service:
         source = row.result_of or row.id
         text = self.jobs.result_text(source)
         if text is not None:
-            return Results(job=row, text=text, sweeps=self.sweeps.of_job(source))
+            return Results(job=row, text=text, sweeps=self.stored.of_job(source))
         if row.state is JobState.FAILED:
             error = row.error or {}
             raise JobFailedError(f"job {job_id} failed: {error.get('detail', 'for no known reason')}", error)
@@ -367,7 +368,7 @@ class Service:
         missing = f"there is no design {design_id!r}"
         asked = visible(self.jobs.get(design_id), caller.sees, missing)
         job = asked if asked.result_of is None else self.jobs.get(asked.result_of)
-        row = None if job is None else self.designs.get(job.id)
+        row = None if job is None else self.stored.get(job.id, DESIGN)
         result = None if row is None else self.jobs.result(row.job_id)
         if job is None or row is None or result is None:
             raise NotFoundError(missing)

@@ -9,10 +9,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from service.db.models import Sweep
-from service.db.repositories import SweepRepository
+from service.db.repositories import ResultRepository
 from service.errors import NotAcceptableError
 from service.jobs.arrays import decode
+from service.jobs.figures import SweepRecord
 from service.jobs.strict_json import digest
 from service.schemas.answers import SweepDetail
 from solver.results.csv import csv_text
@@ -115,7 +115,7 @@ def chosen(accept: str | None, media: Sequence[str]) -> str:
 
 
 def sweep_body(
-    row: Sweep, media: str, repository: SweepRepository, scene: Mapping[str, Any] | None = None
+    row: SweepRecord, media: str, repository: ResultRepository, scene: Mapping[str, Any] | None = None
 ) -> bytes:
     """A stored sweep in a media type of `SWEEP_MEDIA`: the files are those that `solver.save` writes.
 
@@ -128,7 +128,7 @@ def sweep_body(
     return written(sweep_dataset(row, repository, scene), f".{SUFFIXES[media]}")
 
 
-def sweep_picture(row: Sweep, suffix: str, repository: SweepRepository) -> bytes:
+def sweep_picture(row: SweepRecord, suffix: str, repository: ResultRepository) -> bytes:
     """The curve of a stored sweep as `svg` or `png`; its peak is marked, its band shaded."""
     from service.jobs.stored_curves import response_of
     from solver.views.plots import style
@@ -175,7 +175,9 @@ def _unit(path: str, scene: Scene | None) -> str:
     return "" if scene is None else structure_unit(scene.structure, name)
 
 
-def sweep_dataset(row: Sweep, repository: SweepRepository, scene: Mapping[str, Any] | None = None) -> Dataset:
+def sweep_dataset(
+    row: SweepRecord, repository: ResultRepository, scene: Mapping[str, Any] | None = None
+) -> Dataset:
     """A stored sweep, a point a row.
 
     Sweeps that an earlier version stored have no column `residual` and none of the states.
@@ -185,7 +187,7 @@ def sweep_dataset(row: Sweep, repository: SweepRepository, scene: Mapping[str, A
     scene : that of its job; it is told only if it is the one that was swept.
     """
     arrays = {name: decode(stored) for name, stored in repository.arrays(row.id).items()}
-    names = [contact.name for contact in repository.parts([row.id])[row.id]]
+    names = [contact.name for contact in row.contacts]
     states = arrays.get("states")
     swept = None
     if scene is not None and digest(dict(scene)) == row.scene_hash:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping
 from datetime import datetime
 from typing import TYPE_CHECKING, Any, Generic, Self, TypeVar
 
@@ -11,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
-from service.db.models import Design, JobState, Scene, Sweep
-from service.db.repositories import JobRow, SweepRepository
-from service.db.repositories.stored import StoredRepository
+from service.db.models import JobState, Scene
+from service.db.repositories import JobRow, ResultRepository
 from service.jobs.arrays import decode
-from service.jobs.outputs import ContactValues, Told, VariableValues
+from service.jobs.figures import DESIGN, SWEEP, DesignRecord, Quantity, Record, SweepRecord
+from service.jobs.outputs import Told
 
 if TYPE_CHECKING:
-    from service.queue.core import Results
+    from service.queue.core import Results, WholeDesign
 
 
 BEST = (
@@ -120,27 +119,16 @@ class Peak(Answer):
     at: float
 
 
-class StoredAnswer(Answer, ABC):
+class StoredAnswer(Answer):
     """What the answers for a stored sweep and a stored design share."""
 
     @classmethod
-    @abstractmethod
-    def of(cls, row: Any, parts: Sequence[Any], **more: Any) -> Self:
-        """The answer for a row with its parts."""
-
-    @classmethod
-    def _stored(cls, row: Sweep | Design, **more: Any) -> Self:
+    def _stored(cls, record: SweepRecord | DesignRecord, **more: Any) -> Self:
         """The answer with what both have: the scene, and a peak with its place."""
         peak = None
-        if row.peak is not None and row.peak_at is not None:
-            peak = Peak(value=row.peak, at=row.peak_at)
-        return cls._from(row, scene=row.scene_name, peak=peak, **more)
-
-    @classmethod
-    def of_rows(cls, rows: Sequence[Any], repository: StoredRepository[Any, Any]) -> list[Self]:
-        """The answers for several rows."""
-        parts = repository.parts([row.key for row in rows])
-        return [cls.of(row, parts[row.key]) for row in rows]
+        if record.peak is not None and record.peak_at is not None:
+            peak = Peak(value=record.peak, at=record.peak_at)
+        return cls._from(record, scene=record.scene_name, peak=peak, **more)
 
 
 class ContactAnswer(Answer):
@@ -191,11 +179,11 @@ class SweepAnswer(StoredAnswer):
     links: dict[str, str]
 
     @classmethod
-    def of(cls, row: Sweep, parts: Sequence[ContactValues], **more: Any) -> Self:
-        """The answer for a row with its contacts."""
+    def of(cls, row: SweepRecord, **more: Any) -> Self:
+        """The answer for a sweep."""
         return cls._stored(
             row, job=row.job_id, from_=row.from_value, to=row.to_value,
-            contacts={contact.name: ContactAnswer._from(contact) for contact in parts},
+            contacts={contact.name: ContactAnswer._from(contact) for contact in row.contacts},
             links={"self": f"/v1/sweeps/{row.id}", "job": f"/v1/jobs/{row.job_id}"}, **more,
         )  # fmt: skip
 
@@ -206,10 +194,10 @@ class SweepDetail(SweepAnswer):
     arrays: dict[str, list[Any]]
 
     @classmethod
-    def load(cls, row: Sweep, repository: SweepRepository) -> Self:
-        """The sweep of a row."""
+    def load(cls, row: SweepRecord, repository: ResultRepository) -> Self:
+        """The sweep with its arrays."""
         arrays = {name: _listed(decode(array)) for name, array in repository.arrays(row.id).items()}
-        return cls.of(row, repository.parts([row.id])[row.id], arrays=arrays)
+        return cls.of(row, arrays=arrays)
 
 
 class SweepPage(Page[SweepAnswer]):
@@ -237,14 +225,10 @@ class ResultsAnswer(ResultsHead):
     sweeps: list[SweepAnswer]
 
     @classmethod
-    def of(cls, results: Results, repository: SweepRepository) -> Self:
+    def of(cls, results: Results) -> Self:
         """The answer for the results of a job."""
-        return cls(
-            job=results.job.id,
-            status=results.job.state,
-            result=results.result,
-            sweeps=SweepAnswer.of_rows(results.sweeps, repository),
-        )
+        sweeps = [SweepAnswer.of(one) for one in results.sweeps]
+        return cls(job=results.job.id, status=results.job.state, result=results.result, sweeps=sweeps)
 
 
 class VariableAnswer(Answer):
@@ -280,15 +264,15 @@ class DesignAnswer(StoredAnswer):
     links: dict[str, str]
 
     @classmethod
-    def of(cls, row: Design, parts: Sequence[VariableValues], **more: Any) -> Self:
-        """The answer for a row with its variables."""
+    def of(cls, row: DesignRecord, **more: Any) -> Self:
+        """The answer for a design."""
         links = {
             "self": f"/v1/designs/{row.job_id}",
             "job": f"/v1/jobs/{row.job_id}",
             "sweeps": f"/v1/sweeps?job={row.job_id}",
         }
-        variables = {one.name: VariableAnswer._from(one) for one in parts}
-        return cls._stored(row, id=row.job_id, variables=variables, links=links, **more)
+        variables = {one.name: VariableAnswer._from(one) for one in row.variables}
+        return cls._stored(row, variables=variables, links=links, **more)
 
 
 class DesignDetail(DesignAnswer):
@@ -297,9 +281,54 @@ class DesignDetail(DesignAnswer):
     problem: dict[str, Any] = Field(description="What was asked: the body of the request.")
     result: dict[str, Any]
 
+    @classmethod
+    def whole(cls, found: WholeDesign) -> Self:
+        """The answer for a design with its job."""
+        return cls.of(found.row, problem=found.job.request or {}, result=found.result)
+
 
 class DesignPage(Page[DesignAnswer]):
     """A page of designs."""
+
+
+class QuantityAnswer(Answer):
+    """What a figure is."""
+
+    unit: str = Field(description="Empty if it has none, or one that the result says.")
+    description: str
+
+
+class StoredResult(Answer):
+    """A stored result with its figures."""
+
+    id: str
+    of: str
+    owner: str
+    job: str
+    scene: str | None
+    scene_hash: str | None
+    status: str = Field(description="How the computation ended.")
+    created: datetime
+    figures: dict[str, bool | int | float | str] = Field(description="Numbers, truths and words by name.")
+    links: dict[str, str]
+
+    @classmethod
+    def of_record(cls, record: Record, known: Mapping[str, Quantity]) -> Self:
+        """The answer for a record; of its figures those that are known."""
+        places = {SWEEP: f"/v1/sweeps/{record.id}", DESIGN: f"/v1/designs/{record.id}"}
+        own = places.get(record.of, f"/v1/jobs/{record.job_id}/results")
+        stored = ((one.name, one.label or one.value) for one in record.figures() if one.name in known)
+        return cls._from(
+            record, job=record.job_id, scene=record.scene_name,
+            figures={name: known[name].of(value) for name, value in stored},
+            links={"self": own, "job": f"/v1/jobs/{record.job_id}"},
+        )  # fmt: skip
+
+
+class ResultPage(Page[StoredResult]):
+    """A page of results of one kind."""
+
+    quantities: dict[str, QuantityAnswer] = Field(description="What the figures are, by name.")
 
 
 class FinishedJob(JobAnswer):

@@ -7,6 +7,7 @@ from typing import Any
 
 from service.auth.callers import Caller
 from service.db.repositories.runs import RunRow
+from service.jobs.common.scenes import CHECKED_BY
 from service.jobs.differences import differences, figures
 from service.queue.core import Service
 from service.schemas.workbench_answers import Comparison, Figure, InputDifference, RunAnswer
@@ -32,7 +33,8 @@ def comparison(service: Service, a: str, b: str, caller: Caller) -> Comparison:
 
 def _inputs(service: Service, row: RunRow) -> dict[str, Any]:
     """What a run computes: its kind, its scene with every value, its settings."""
-    return {"kind": row.job.kind, **service.jobs.spec(row.job.id)}
+    spec = service.jobs.spec(row.job.id)
+    return {"kind": row.job.kind, **{key: value for key, value in spec.items() if key != CHECKED_BY}}
 
 
 def _figures(service: Service, row: RunRow) -> dict[str, Any]:

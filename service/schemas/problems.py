@@ -128,7 +128,7 @@ def service_problem(request: Request, error: errors.ServiceError) -> JSONRespons
 
 
 def _entry(issue: Issue, source: str) -> dict[str, str]:
-    entry = {"pointer": issue.pointer, "detail": issue.message}
+    entry = {"pointer": issue.pointer, "detail": issue.said()}
     return entry if source == "body" else {**entry, "in": source}
 
 

@@ -449,7 +449,9 @@ def load_settings(**values: object) -> Settings:
 
 def _sentence(item: dict[str, object]) -> str:
     """One of pydantic's errors as a sentence that names the setting."""
-    message = str(item["msg"]).removeprefix("Value error, ")
+    context = item.get("ctx")
+    raised = context.get("error") if isinstance(context, dict) else None
+    message = str(item["msg"] if raised is None else raised)
     location = item["loc"]
     if not isinstance(location, tuple) or not location or message.startswith("`"):
         return message

@@ -17,9 +17,8 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
-from service.errors import InvalidRequestError, QueueFullError, UnreadableUploadError
+from service.errors import InvalidRequestError, QueueFullError, UnreadableUploadError, issues_to_json
 from service.workers.processes import start
-from solver.errors import Issue
 
 MEMORY_BYTES = 2 * 1024**3
 _AT_ONCE = threading.BoundedSemaphore(2)
@@ -96,7 +95,7 @@ def _ask(task: str, folder: Path, argument: Any, seconds: float, most_bytes: int
             process.join()
             process.close()
     if "issues" in answer:
-        raise InvalidRequestError([Issue(pointer=where, message=text) for where, text in answer["issues"]])
+        raise InvalidRequestError.from_json(answer["issues"])
     if "error" in answer:
         raise UnreadableUploadError(answer["error"])
     return answer["found"]
@@ -158,7 +157,7 @@ def _answer(task: str, argument: Any) -> dict[str, Any]:
     try:
         return {"found": tasks[task](argument)}
     except SceneError as error:
-        return {"issues": [[issue.pointer, issue.message] for issue in error.issues]}
+        return {"issues": issues_to_json(error.issues)}
     except MatrixFileError as error:
         return {"error": str(error)}
     except MemoryError:
@@ -215,16 +214,15 @@ def _resolve(scene: dict[str, Any]) -> dict[str, Any]:
     from solver.matrices.sectors.decks import check_alone
     from solver.matrices.values import as_json
 
-    for key in ("cyclic/nodes", "nodes"):
-        table = scene["structure"].get("cyclic") if key.startswith("cyclic") else scene["structure"]
+    for place in (("structure", "cyclic"), ("structure",)):
+        table = scene["structure"].get("cyclic") if place[1:] else scene["structure"]
         name = table.get("nodes") if isinstance(table, dict) else None
         if not isinstance(name, str):
             continue
         try:
             check_alone(Path(name))
         except FormatError as error:
-            message = f"`nodes`: {name!r}: {error}"
-            raise SceneError([Issue(pointer=f"/structure/{key}", message=message)]) from error
+            raise SceneError.of((*place, "nodes"), f"`nodes`: {name!r}: {error}", named=False) from error
     tables = with_files(scene, Path())["structure"]
     if not isinstance(tables, dict):
         raise TypeError(f"the structure is {type(tables).__name__}")

@@ -7,7 +7,6 @@ stranger's.
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.errors import Issue, SceneError
+from solver.errors import FieldError, Issue, SceneError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -29,7 +28,6 @@ MOST_LABELS = 400
 MOST_SOUGHT = 20_000
 """Rows of a model whose lowest frequencies are looked for before it is reduced."""
 _SHOWN = 10
-_OPTION = re.compile(r" \(--[^)]*\)")
 
 
 def look(asked: Mapping[str, Any]) -> dict[str, Any]:
@@ -90,23 +88,15 @@ def _read(tables: dict[str, Any]) -> MatrixSet:
     missing = [key for key in "MK" if key not in tables]
     if missing:
         words = {"M": "mass", "K": "stiffness"}
-        raise SceneError([_issue(key, f"`{key}`, the {words[key]} matrix, is missing") for key in missing])
+        raise SceneError(
+            [Issue(("structure", key), f"(the {words[key]} matrix) is missing") for key in missing]
+        )
     given = read_matrices(tables, Path())
     try:
         refuse(given, reduced=True)
-    except ValueError as error:
-        raise SceneError([_about(str(error))]) from error
+    except FieldError as error:
+        raise SceneError([error.issue.below("structure")]) from error
     return given
-
-
-def _about(message: str) -> Issue:
-    """An issue beside the matrix that it names first."""
-    found = re.match(r"`([MKC])`", message)
-    return _issue(found[1] if found else "", _OPTION.sub("", message))
-
-
-def _issue(key: str, message: str) -> Issue:
-    return Issue(pointer=f"/structure/{key}".rstrip("/"), message=message)
 
 
 def _entries(given: MatrixSet) -> list[dict[str, Any]]:
@@ -149,7 +139,7 @@ def _lowest(given: MatrixSet, notes: list[str]) -> NDArray[Any] | None:
         whole = interior(K, M, np.arange(size), np.arange(0))
         return held_modes(whole, min(size, _SHOWN + 6), None)[0]
     except ValueError as error:
-        notes.append(_OPTION.sub("", str(error)))
+        notes.append(str(error))
         return None
 
 
@@ -158,7 +148,7 @@ def _frequencies(given: MatrixSet, omega2: NDArray[Any] | None, notes: list[str]
 
     if omega2 is None:
         return {"frequencies_hz": None}
-    notes += [_OPTION.sub("", note) for note in notes_of(given, omega2)]
+    notes += notes_of(given, omega2)
     return {"frequencies_hz": [math.sqrt(max(float(v), 0.0)) / (2.0 * math.pi) for v in omega2[:_SHOWN]]}
 
 
@@ -187,11 +177,13 @@ def _scene(
     if given.matrices:
         size = int(given.matrices["K"].shape[0])
         if size > MOST_DOFS and "keep_modes" not in tables:
-            raise SceneError([_issue("keep_modes", _TOO_LARGE.format(size=size, most=MOST_DOFS))])
+            raise SceneError.of(
+                ("structure", "keep_modes"), _TOO_LARGE.format(size=size, most=MOST_DOFS), named=False
+            )
         try:
             refuse(given, reduced="keep_modes" in tables)
-        except ValueError as error:
-            raise SceneError([_issue("keep_modes", _OPTION.sub("", str(error)))]) from error
+        except FieldError as error:
+            raise SceneError([error.issue.at("structure", "keep_modes")]) from error
         kept, reduced = as_kept(tables, given.matrices)
     else:
         kept = with_files({"structure": tables}, Path())["structure"]  # type: ignore[assignment]
@@ -217,8 +209,8 @@ def _sector(
     cyclic = structure.get("cyclic")
     try:
         refuse(given, reduced=isinstance(cyclic, Mapping) and "keep_modes" in cyclic)
-    except ValueError as error:
-        raise SceneError([_about(str(error))]) from error
+    except FieldError as error:
+        raise SceneError([error.issue.below("structure")]) from error
     return kept_sector(structure, asked["excitation"], int(given.matrices["K"].shape[0]))
 
 

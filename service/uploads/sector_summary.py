@@ -9,12 +9,13 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from solver.errors import Issue, SceneError
+from solver.errors import SceneError, Shown
 
 if TYPE_CHECKING:
     from solver.matrices.sectors.reduction import ReducedSector
 
 MOST_SETS = 400
+_NODES = ("structure", "cyclic", "nodes")
 _FIRST = 6
 
 
@@ -31,7 +32,7 @@ def told_apart(files: Sequence[str]) -> tuple[list[str], dict[str, Any]]:
 
     decks = [name for name in files if Path(name).suffix.lower() in registry.suffixes("nodes")]
     if len(decks) > 1:
-        raise SceneError([_issue("cyclic/nodes", f"one deck tells the nodes, got {', '.join(decks)}")])
+        raise SceneError.of(_NODES, "one deck tells the nodes", Shown(", ".join(decks)), named=False)
     rest = [name for name in files if name not in decks]
     found: dict[str, Any] = {"cyclic": {"nodes": decks[0]}} if decks else {}
     if (
@@ -62,7 +63,7 @@ def deck_of(structure: Mapping[str, Any]) -> list[dict[str, Any]] | None:
         check_alone(Path(name))
         sets = read_deck(Path(name)).sets
     except FormatError as error:
-        raise SceneError([_issue("cyclic/nodes", f"`nodes`: {name!r}: {error}")]) from error
+        raise SceneError.of(_NODES, f"`nodes`: {name!r}: {error}", named=False) from error
     return [{"name": key, "nodes": len(sets[key])} for key in sorted(sets)[:MOST_SETS]]
 
 
@@ -80,7 +81,7 @@ def reduced_sector(structure: Mapping[str, Any]) -> dict[str, Any]:
     try:
         found, was, _ = read_sector(Path(structure["diameters"]))
     except MatrixFileError as error:
-        raise SceneError([_issue("diameters", f"`diameters`: {error}")]) from error
+        raise SceneError.of(("structure", "diameters"), f"`diameters`: {error}", named=False) from error
     return {"rows": found.size, "modes": was["modes"], "matrices": [], "diameters": list(found.diameters)}
 
 
@@ -104,17 +105,17 @@ def kept_sector(
 
     sectors, cyclic = structure["sectors"], structure.get("cyclic") or {}
     if type(sectors) is not int or not 1 <= sectors <= MOST_SECTORS:
-        message = f"`sectors` must be a whole number from 1 to {MOST_SECTORS}, got {str(sectors)[:80]}"
-        raise SceneError([_issue("sectors", message)])
+        got = Shown(str(sectors)[:80])
+        raise SceneError.of(("structure", "sectors"), f"must be a whole number from 1 to {MOST_SECTORS}", got)
     if rows is not None and rows > MOST_DOFS and isinstance(cyclic, Mapping) and "keep_modes" not in cyclic:
         message = (
             f"the sector has {rows} rows, {MOST_DOFS} are the most as they stand: reduce it onto the DOFs "
             "named and some modes of the rest at each nodal diameter, say 20"
         )
-        raise SceneError([_issue("cyclic/keep_modes", message)])
+        raise SceneError.of(("structure", "cyclic", "keep_modes"), message, named=False)
     if "keep_modes" in structure:
-        message = "`keep_modes` of a sector stands in `cyclic`: it is reduced at each nodal diameter"
-        raise SceneError([_issue("keep_modes", message)])
+        wanted = "of a sector stands in `cyclic`: it is reduced at each nodal diameter"
+        raise SceneError.of(("structure", "keep_modes"), wanted)
     order = excitation.get("engine_order")
     return sector_with_files({"kind": "matrices", **structure}, Path(), [order if type(order) is int else 0])
 
@@ -134,7 +135,3 @@ def kept_answer(reduced: ReducedSector) -> dict[str, Any]:
             for n, quality in zip(reduced.matrices.diameters, reduced.quality, strict=True)
         ],
     }  # fmt: skip
-
-
-def _issue(key: str, message: str) -> Issue:
-    return Issue(pointer=f"/structure/{key}", message=message)

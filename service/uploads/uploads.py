@@ -20,7 +20,7 @@ from service.jobs.common.scenes import UPLOAD, Place, named_files, with_named
 from service.jobs.strict_json import digest
 from service.settings.settings import Settings
 from service.uploads.inspection import contents, look_at, resolved_structure
-from solver.errors import Issue, pointer
+from solver.errors import Issue
 
 _KEPT = 4
 _LARGEST_STRUCTURE = 16 * 1024 * 1024
@@ -57,8 +57,7 @@ def format_of(asked: str | None, name: str, content_type: str) -> str:
     if found in known:
         return found
     reason = f"got {asked!r}" if asked else f"neither the name {name!r} nor the content type says it"
-    message = f"`format` must be one of {', '.join(known)}: {reason}"
-    raise InvalidRequestError([Issue(pointer="/format", message=message)], source="query")
+    raise InvalidRequestError.of(("format",), f"must be one of {', '.join(known)}: {reason}", source="query")
 
 
 class Uploads:
@@ -155,8 +154,8 @@ class Uploads:
                     {**asked, "structure": placed, "files": files}, folder, self._seconds, _LARGEST_STRUCTURE
                 )
             except UnreadableUploadError as error:
-                where = "/uploads" if structure is None else pointer("structure")
-                raise InvalidRequestError([Issue(pointer=where, message=error.detail)]) from error
+                key = "uploads" if structure is None else "structure"
+                raise InvalidRequestError.of((key,), error.detail, named=False) from error
         resolved = found.pop("resolved", None)
         if resolved is not None:
             self._remember(_digest(structure, rows, _engine_orders(asked)), resolved)
@@ -171,7 +170,7 @@ class Uploads:
         try:
             return self.get(upload_id, caller)
         except NotFoundError as error:
-            raise InvalidRequestError([Issue(pointer=pointer(key, at), message=error.detail)]) from error
+            raise InvalidRequestError.of((key, at), error.detail, named=False) from error
 
     def _rows(self, structure: Mapping[str, Any], caller: Caller) -> dict[Place, Upload]:
         """The uploads a structure names, by their places.
@@ -185,13 +184,13 @@ class Uploads:
         for place, given in named_files(structure).items():
             key = place[-1]
             if not _is_reference(given):
-                message = f"`{key}` must be inline or an upload, `{UPLOAD}ID`: files are not read here"
-                issues.append(_issue(place, message))
+                wanted = f"must be inline or an upload, `{UPLOAD}ID`: files are not read here"
+                issues.append(Issue(("structure", *place), wanted))
                 continue
             try:
                 rows[place] = self.get(given.removeprefix(UPLOAD), caller)
             except NotFoundError as error:
-                issues.append(_issue(place, f"`{key}`: {error.detail}"))
+                issues.append(Issue(("structure", *place), f"`{key}`: {error.detail}", named=False))
         if issues:
             raise InvalidRequestError(issues)
         return rows
@@ -211,7 +210,9 @@ class Uploads:
                 found = resolved_structure(placed, folder, self._seconds, _LARGEST_STRUCTURE, orders)
             except UnreadableUploadError as error:
                 message = error.detail + (_REDUCE if structure.get("sectors") is not None else "")
-                raise InvalidRequestError([_issue(next(iter(rows)), message)]) from error
+                raise InvalidRequestError.of(
+                    ("structure", *next(iter(rows))), message, named=False
+                ) from error
         self._remember(known, found)
         return found
 
@@ -271,7 +272,3 @@ def _engine_orders(body: Mapping[str, object]) -> list[int]:
 
 def _is_reference(value: object) -> bool:
     return isinstance(value, str) and value.startswith(UPLOAD)
-
-
-def _issue(place: Place, message: str) -> Issue:
-    return Issue(pointer=pointer("structure", *place), message=message)

@@ -23,7 +23,7 @@ from service.jobs.outputs import FailureKind, JobFailure
 from service.jobs.registry import RunOn, WarmUp
 from service.workers.base import Finished, Lost, Outcome, Stopped
 from service.workers.process_limits import ProcessLimits
-from service.workers.warm_pool import Asked, WarmPool
+from service.workers.warm_pool import WarmPool, WarmTask
 from solver.errors import Issue
 
 log = logging.getLogger("stickslip.answers")
@@ -90,7 +90,7 @@ class Answers(WarmPool):
         self._budgets = Buckets()
         self._ended_one: set[str] = set()
 
-    async def ask(self, task: str, spec: dict[str, Any], owner: str = "", about: str = "/scene") -> Any:
+    async def ask(self, task: str, spec: dict[str, Any], owner: str = "", about: str = "scene") -> Any:
         """What a task finds.
 
         Parameters
@@ -98,7 +98,7 @@ class Answers(WarmPool):
         task : one of `runs`.
         spec : what it is given.
         owner : whose turn and whose budget it is.
-        about : pointer of the field that makes it costly.
+        about : the field that makes it costly.
 
         Raises
         ------
@@ -114,12 +114,12 @@ class Answers(WarmPool):
             most = f"{self._limits.budget_seconds} s of processor time a minute"
             detail = f"what was computed for answers took more than {most}: ask again in {wait:.0f} s"
             raise TooManyRequestsError(detail, retry_after=max(1, round(wait)))
-        asked = Asked.of(task, spec, owner)
+        asked = WarmTask.of(task, spec, owner)
         with self._waited_for(asked):
             outcome = await self._outcome(asked)
         return await self._found(outcome, owner, about)
 
-    async def _outcome(self, asked: Asked) -> Outcome:
+    async def _outcome(self, asked: WarmTask) -> Outcome:
         """Wait for a computation; longer while the first process starts, which the kernels may hold up."""
         waiting = asyncio.wrap_future(asked.outcome)
         for _ in range(_PATIENCE_AT_THE_START):
@@ -130,14 +130,14 @@ class Answers(WarmPool):
                 break
         raise QueueFullError("no process was free to compute the answer", _RETRY_SECONDS)
 
-    def _admit(self, asked: Asked) -> None:
+    def _admit(self, asked: WarmTask) -> None:
         if self._closed:
             raise QueueFullError("the service stops", _RETRY_SECONDS)
         others = sum(other.owner == asked.owner for other in self._waiting)
         if len(self._waiting) >= MOST_WAITING or others >= MOST_WAITING // 2:
             raise QueueFullError(f"{others} requests of yours wait to be computed", _RETRY_SECONDS)
 
-    def _next(self) -> Asked | None:
+    def _next(self) -> WarmTask | None:
         """The first, but of each owner no more at a time than leaves a process for another."""
         busy = Counter(asked.owner for asked in self._running.values())
         # While the process that an owner ended starts anew, the other one is not for the same owner.
@@ -147,7 +147,7 @@ class Answers(WarmPool):
                 return asked
         return None
 
-    def _concluded(self, asked: Asked, outcome: Outcome) -> None:
+    def _concluded(self, asked: WarmTask, outcome: Outcome) -> None:
         if isinstance(outcome, Lost):
             self._ended_one.add(asked.owner)
         else:
@@ -173,12 +173,10 @@ class Answers(WarmPool):
 
     def _beyond(self, lost: Lost, about: str) -> Exception:
         """A process that ended did so at one of its limits, or at what it was given."""
-        name = about.strip("/")
         ended_by = "" if lost.signal is None else signal.Signals(lost.signal).name
         if ended_by in _AT_THE_TIME:
             most = f"{self._limits.seconds:g} s of processor time"
-            message = f"`{name}` takes more than {most} to be looked at, the limit of an answer"
-            return InvalidRequestError([Issue(pointer=about, message=message)])
+            return _too_costly(about, most)
         log.warning("an answer was lost: %s", lost.reason)
         if ended_by in _WITHOUT_MEMORY:
             return self._too_much_memory(about)
@@ -186,14 +184,18 @@ class Answers(WarmPool):
 
     def _too_much_memory(self, about: str) -> InvalidRequestError:
         most = f"{self._limits.memory_bytes / 1e6:.0f} MB of memory"
-        message = f"`{about.strip('/')}` takes more than {most} to be looked at, the limit of an answer"
-        return InvalidRequestError([Issue(pointer=about, message=message)])
+        return _too_costly(about, most)
+
+
+def _too_costly(key: str, most: str) -> InvalidRequestError:
+    wanted = f"takes more than {most} to be looked at, the limit of an answer"
+    return InvalidRequestError.of((key,) if key else (), wanted)
 
 
 def _accepted(told: Mapping[str, Any]) -> Any:
     """What a task found or needs; its refusals as errors."""
     if "issues" in told:
-        raise InvalidRequestError([Issue(pointer=where, message=said) for where, said in told["issues"]])
+        raise InvalidRequestError.from_json(told["issues"])
     if "malformed" in told:
         raise MalformedBodyError(told["malformed"])
     if "too_large" in told:
@@ -203,5 +205,5 @@ def _accepted(told: Mapping[str, Any]) -> Any:
 
 def _refusal(failure: JobFailure) -> Exception:
     if failure.kind in (FailureKind.SCENE, FailureKind.SETTING, FailureKind.GOAL):
-        return InvalidRequestError(failure.issues or (Issue(pointer="", message=failure.detail),))
+        return InvalidRequestError(failure.issues or (Issue((), failure.detail, named=False),))
     return RuntimeError(failure.detail)

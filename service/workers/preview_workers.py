@@ -23,7 +23,7 @@ from service.jobs.outputs import FailureKind
 from service.jobs.registry import Registry
 from service.workers.base import Failed, Finished, Lost, Outcome
 from service.workers.process_limits import ProcessLimits
-from service.workers.warm_pool import Asked, WarmPool
+from service.workers.warm_pool import WarmPool, WarmTask
 from solver.errors import Issue
 
 log = logging.getLogger("stickslip.previews")
@@ -85,7 +85,7 @@ class Previews(WarmPool):
         InvalidRequestError, JobFailedError
             If it cannot be computed.
         """
-        asked = Asked.of(kind, spec, owner, client=client, most=most)
+        asked = WarmTask.of(kind, spec, owner, client=client, most=most)
         with self._waited_for(asked):
             begun: asyncio.Future[Any] = asyncio.wrap_future(asked.begun)
             outcome: asyncio.Future[Any] = asyncio.wrap_future(asked.outcome)
@@ -99,7 +99,7 @@ class Previews(WarmPool):
                 raise PreviewError(f"the preview took longer than {self._seconds:g} s: submit it as a job")
             return _answer(outcome.result())
 
-    def _admit(self, asked: Asked) -> None:
+    def _admit(self, asked: WarmTask) -> None:
         if self._closed:
             raise PreviewError("the service stops")
         if asked.client:
@@ -110,7 +110,7 @@ class Previews(WarmPool):
         if len(self._waiting) >= MOST_WAITING:
             raise QueueFullError(f"{MOST_WAITING} previews wait already", _RETRY_SECONDS)
 
-    def _next(self) -> Asked | None:
+    def _next(self) -> WarmTask | None:
         """Owners take turns: the first one of the owner whose turn is longest ago."""
         turns = {owner: at for at, owner in enumerate(self._served)}
         found = min(self._waiting, key=lambda asked: turns.get(asked.owner, -1), default=None)
@@ -136,7 +136,7 @@ def _answer(outcome: Outcome) -> bytes:
         raise PreviewError("the service stops")
     failure = outcome.failure
     if failure.kind is FailureKind.MEMORY_LIMIT:
-        raise InvalidRequestError([Issue(pointer="/scene", message=f"`scene`: {failure.detail}")])
+        raise InvalidRequestError.of(("scene",), f"`scene`: {failure.detail}", named=False)
     if failure.kind in (FailureKind.SCENE, FailureKind.SETTING):
-        raise InvalidRequestError(failure.issues or (Issue(pointer="", message=failure.detail),))
+        raise InvalidRequestError(failure.issues or (Issue((), failure.detail, named=False),))
     raise JobFailedError(failure.detail, failure.to_json())

@@ -23,7 +23,7 @@ _SILENT = Pace(progress_seconds=3600.0, checkpoint_seconds=3600.0, checkpoint_by
 
 
 @dataclass(eq=False, slots=True)
-class Asked:
+class WarmTask:
     """A computation somebody waits for.
 
     Attributes
@@ -43,7 +43,7 @@ class Asked:
     outcome: Future[Outcome] = field(default_factory=Future)
 
     @classmethod
-    def of(cls, task: str, spec: dict[str, Any], owner: str, **more: Any) -> Asked:
+    def of(cls, task: str, spec: dict[str, Any], owner: str, **more: Any) -> WarmTask:
         """A task with what it is given."""
         attempt = Attempt(
             job_id=new_id(), kind=task, spec=spec, attempt=1, max_attempts=1, lease_owner="warm"
@@ -87,17 +87,17 @@ class WarmPool(Unwatched, ABC):
         self._grace_seconds = grace_seconds
         self._process_limits = limits
         self._lock = threading.RLock()
-        self._waiting: deque[Asked] = deque()
-        self._running: dict[str, Asked] = {}
+        self._waiting: deque[WarmTask] = deque()
+        self._running: dict[str, WarmTask] = {}
         self._executor: LocalExecutor | None = None
         self._closed = False
 
     @abstractmethod
-    def _admit(self, asked: Asked) -> None:
+    def _admit(self, asked: WarmTask) -> None:
         """Raise an error if it may not wait; the pool's lock is held."""
 
     @abstractmethod
-    def _next(self) -> Asked | None:
+    def _next(self) -> WarmTask | None:
         """The one of those waiting whose turn it is, if one may begin; the pool's lock is held."""
 
     @property
@@ -130,7 +130,7 @@ class WarmPool(Unwatched, ABC):
             executor.close()
 
     @contextmanager
-    def _waited_for(self, asked: Asked) -> Iterator[None]:
+    def _waited_for(self, asked: WarmTask) -> Iterator[None]:
         """Have it computed as long as the block lasts."""
         with self._lock:
             self._admit(asked)
@@ -142,7 +142,7 @@ class WarmPool(Unwatched, ABC):
         finally:
             self._drop(asked)
 
-    def _drop(self, asked: Asked) -> None:
+    def _drop(self, asked: WarmTask) -> None:
         """Nobody waits for it any more."""
         asked.outcome.cancel()
         with self._lock:
@@ -164,7 +164,7 @@ class WarmPool(Unwatched, ABC):
                 asked.settle(outcome)
         self.room()
 
-    def _concluded(self, asked: Asked, outcome: Outcome) -> None:
+    def _concluded(self, asked: WarmTask, outcome: Outcome) -> None:
         """Note how it ended; the pool's lock is held."""
 
     def room(self) -> None:

@@ -26,6 +26,7 @@ from optim.errors import DesignError
 from service.errors import UnknownKindError
 from service.jobs import strict_json
 from service.jobs.checkpoints import Checkpoints, Kept
+from service.jobs.figures import figures
 from service.jobs.outputs import Best, FailureKind, JobFailure, JobOutput, Pace, Piece, Point
 from service.jobs.registry import RunOn, WarmUp
 from service.settings import logs
@@ -261,7 +262,8 @@ def _stopped(kept: Checkpoints) -> Done:
 
 def checked(output: JobOutput) -> JobOutput:
     """The output with its result encoded, so that the service does not have to; TypeError if it cannot be."""
-    return replace(output, result={}, encoded=strict_json.encoded(output.result))
+    told = tuple(figures(output.result))
+    return replace(output, result={}, encoded=strict_json.encoded(output.result), figures=told)
 
 
 def failure_of(task: Task, error: Exception) -> JobFailure:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array, diags_array
 from scipy.sparse.linalg import ArpackNoConvergence, eigsh
 
+from solver.errors import FieldError
 from solver.matrices.load_set import MatrixSet
 from solver.matrices.sectors.elimination import Elimination
 from solver.matrices.validation import ASYMMETRY, one_triangle
@@ -34,59 +35,67 @@ def refuse(found: MatrixSet, *, reduced: bool, gone: Elimination | None = None) 
 
     Raises
     ------
-    ValueError
+    FieldError
         Sizes that differ, matrices that are not symmetric, empty rows, negative or missing masses, negative
-        stiffness on the diagonal.
+        stiffness on the diagonal; a ValueError with the matrix as its subject.
     """
     sizes = {key: matrix.shape[0] for key, matrix in found.matrices.items()}
     if len(set(sizes.values())) > 1:
         told = ", ".join(f"{key} has {size} rows" for key, size in sizes.items())
-        raise ValueError(f"{told}: export all of them from one analysis, with the same boundary conditions")
+        said = f"{told}: export all of them from one analysis, with the same boundary conditions"
+        raise FieldError((), said, named=False)
     for key, matrix in found.matrices.items():
         _symmetric(key, csr_array(matrix), found)
     M, K = (csr_array(found.matrices[key]) for key in "MK")
     if M.nnz and abs(M - K).max() == 0.0:
-        raise ValueError(
-            "`M` and `K` are the same matrix: give the mass and the stiffness, in the order M K C"
+        raise FieldError(
+            ("M",), "and `K` are the same matrix: give the mass and the stiffness, in the order M K C"
         )
     mass, stiffness = M.diagonal(), K.diagonal()
     empty = np.flatnonzero((abs(M).sum(axis=1) == 0.0) & (abs(K).sum(axis=1) == 0.0))
     if empty.size:
-        raise ValueError(
+        raise FieldError(
+            (),
             f"{_rows(found, empty)} empty in M and K: these DOFs belong to no element; take them out of the "
-            "export, or hold them by a boundary condition"
+            "export, or hold them by a boundary condition",
+            named=False,
         )
     if mass.min() < 0.0:
         at = int(mass.argmin())
-        raise ValueError(
-            f"`M` has {mass[at]:g} on the diagonal of {found.name(at)}, where a mass must be: are the "
-            "files in the order M K C?"
+        raise FieldError(
+            ("M",),
+            f"has {mass[at]:g} on the diagonal of {found.name(at)}, where a mass must be: are the "
+            "files in the order M K C?",
         )
     if stiffness.min() < 0.0:
         at = int(stiffness.argmin())
-        raise ValueError(
-            f"`K` has {stiffness[at]:g} on the diagonal of {found.name(at)}: a stiffness must be >= 0 there; "
-            "export K at a state of equilibrium, before it buckles"
+        raise FieldError(
+            ("K",),
+            f"has {stiffness[at]:g} on the diagonal of {found.name(at)}: a stiffness must be >= 0 there; "
+            "export K at a state of equilibrium, before it buckles",
         )
     penalties = np.flatnonzero(stiffness >= _PENALTY)
     if penalties.size:
-        raise ValueError(
-            f"`K` has {stiffness[penalties[0]]:g} on the diagonal, {_rows(found, penalties)} held by a "
-            "penalty: leave such DOFs out of the export (Abaqus: FORMAT=MATRIX INPUT, which tells them)"
+        raise FieldError(
+            ("K",),
+            f"has {stiffness[penalties[0]]:g} on the diagonal, {_rows(found, penalties)} held by a "
+            "penalty: leave such DOFs out of the export (Abaqus: FORMAT=MATRIX INPUT, which tells them)",
         )
     bare = np.flatnonzero(mass == 0.0)
     if gone is not None:
         bare = gone.kept[gone.of(M).own.diagonal() == 0.0]
     if bare.size and not reduced:
-        raise ValueError(
-            f"`M` must be positive definite, but {_rows(found, bare)} without mass: reduce the model "
-            "(--reduce), which condenses such DOFs out, and do not name them"
+        raise FieldError(
+            ("M",),
+            f"must be positive definite, but {_rows(found, bare)} without mass: reduce the model "
+            "onto the DOFs in use, which condenses such DOFs out, and do not name them",
         )
     least = _least(M)
     if least < -_INDEFINITE:
-        raise ValueError(
-            f"`M` must be positive definite, got {least:.3g} as its least eigenvalue when scaled to a unit "
-            "diagonal: is a triangle missing, or the file not M?"
+        raise FieldError(
+            ("M",),
+            f"must be positive definite, got {least:.3g} as its least eigenvalue when scaled to a unit "
+            "diagonal: is a triangle missing, or the file not M?",
         )
 
 
@@ -99,11 +108,12 @@ def _symmetric(key: str, matrix: Any, found: MatrixSet) -> None:
         dense = csr_array(matrix)
         triangle = one_triangle(matrix)
         if triangle is not None:
-            raise ValueError(f"`{key}` must be symmetric: {triangle}")
-        raise ValueError(
-            f"`{key}` must be symmetric to {ASYMMETRY:g} of its largest entry {largest:g}, got "
+            raise FieldError((key,), f"must be symmetric: {triangle}")
+        raise FieldError(
+            (key,),
+            f"must be symmetric to {ASYMMETRY:g} of its largest entry {largest:g}, got "
             f"{dense[i, j]:.10g} in {found.name(i)}, column {j} and {dense[j, i]:.10g} on the other side: "
-            "leave out gyroscopic terms, follower loads and unsymmetric contact before the export"
+            "leave out gyroscopic terms, follower loads and unsymmetric contact before the export",
         )
 
 
@@ -169,7 +179,7 @@ def notes(found: MatrixSet, omega2: FloatArray) -> list[str]:
     if mass is not None and 0.0 < mass[1] < _LIGHT:
         said.append(
             f"the mass is {mass[1]:.3g} kg in {mass[0]}: if that is in tonnes (a model in mm, t, N, s), its "
-            "units are mm (--units mm)"
+            "`units` are mm"
         )
     if mass is not None and mass[1] > _HEAVY:
         said.append(
@@ -182,7 +192,7 @@ def notes(found: MatrixSet, omega2: FloatArray) -> list[str]:
 def _implausible(first: float) -> str:
     return (
         f"the first elastic frequency is {first:.3g} Hz: are M and K in units that go together? K in N/mm "
-        "goes with M in t, units mm (--units mm), K in N/m with M in kg; N/mm with kg is a factor 32 too "
+        "goes with M in t, `units` mm, K in N/m with M in kg; N/mm with kg is a factor 32 too "
         "low, N/m with t a factor 32 too high. Or are M and K swapped?"
     )
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.sparse import coo_array
 
-from solver.errors import Issue, SceneError
+from solver.errors import UNSAID, FieldError, Issue, SceneError, Shown
 from solver.matrices.files import MatrixFileError, read_labelled, read_modes
 from solver.matrices.labels import label
 from solver.matrices.load_set import PART, MatrixSet, in_si, put_together
@@ -46,7 +46,7 @@ def with_files(raw: Mapping[str, object], folder: Path) -> dict[str, object]:
         if isinstance(tables.get("modes"), str):
             tables["modes"] = read_modes(folder / tables["modes"])
     except MatrixFileError as error:
-        raise SceneError([_issue("modes", f"`modes`: {error}")]) from error
+        raise _refusal("modes", f"`modes`: {error}", named=False) from error
     if tables.get("sectors") is not None:
         return {**raw, "structure": sector_with_files(tables, folder, _orders(raw))[0]}
     found = read_matrices(tables, folder)
@@ -100,10 +100,9 @@ def read_matrices(tables: dict[str, Any], folder: Path) -> MatrixSet:
         paths |= {PART + key: folder / name for key, name in parts_given.items() if isinstance(name, str)}
     mapping, units = tables.pop(MAPPING, None), tables.pop(IN_UNITS, "SI")
     if mapping is not None and not isinstance(mapping, str):
-        raise SceneError([_issue(MAPPING, f"`{MAPPING}` must be the name of a file, got {mapping!r}")])
+        raise _refusal(MAPPING, "must be the name of a file", mapping)
     if units not in UNITS:
-        known = ", ".join(UNITS)
-        raise SceneError([_issue(IN_UNITS, f"`{IN_UNITS}` must be one of {known}, got {units!r}")])
+        raise _refusal(IN_UNITS, f"must be one of {', '.join(UNITS)}", units)
     cyclic = tables.get("cyclic")
     own, joined = tables.pop(NODES, None), cyclic.get(NODES) if isinstance(cyclic, dict) else None
     if not paths:
@@ -113,19 +112,19 @@ def read_matrices(tables: dict[str, Any], folder: Path) -> MatrixSet:
         try:
             parts[key] = read_labelled(path, key)
         except MatrixFileError as error:
-            issues.append(_issue(key, f"`{key}`: {error}"))
+            issues.append(Issue(("structure", key), f"`{key}`: {error}", named=False))
     if issues:
         raise SceneError(issues)
     try:
         found = in_si(put_together(parts, paths, None if mapping is None else folder / mapping), units)
     except MatrixFileError as error:
-        raise SceneError([_issue(MAPPING, str(error))]) from error
-    key = NODES if own is not None else f"cyclic/{NODES}"
-    deck = read_nodes(joined if own is None else own, folder, key)
+        raise _refusal(MAPPING, str(error), named=False) from error
+    place = () if own is not None else ("cyclic",)
+    deck = read_nodes(joined if own is None else own, folder, place)
     try:
         found = in_global(found, deck)
     except ValueError as error:
-        raise SceneError([_issue(key, f"`{NODES}`: {error}")]) from error
+        raise SceneError.of(("structure", *place, NODES), f"`{NODES}`: {error}", named=False) from error
     if isinstance(tables.get("dofs"), dict):
         tables["dofs"] = {name: _row(name, row, found) for name, row in tables["dofs"].items()}
     return found
@@ -138,12 +137,14 @@ def _row(name: str, given: object, found: MatrixSet) -> object:
     wanted = label(given)
     row = None if wanted is None else found.row(wanted)
     if row is None:
-        raise SceneError([_issue(f"dofs/{name}", f"`dofs`: {name!r} {found.no_row(given)}")])
+        raise SceneError.of(
+            ("structure", "dofs", name), f"`dofs`: {name!r} {found.no_row(given)}", named=False
+        )
     return row
 
 
-def _issue(key: str, message: str) -> Issue:
-    return Issue(pointer=f"/structure/{key}", message=message)
+def _refusal(key: str, wanted: str, got: object = UNSAID, *, named: bool = True) -> SceneError:
+    return SceneError.of(("structure", key), wanted, got, named=named)
 
 
 def _rows_in_use(tables: dict[str, Any]) -> dict[str, Any]:
@@ -172,20 +173,23 @@ def as_kept(tables: dict[str, Any], sparse: dict[str, coo_array]) -> tuple[dict[
     if keep is None:
         large = next((key for key in sizes if sizes[key] > MOST_DOFS), None)
         if large is not None:
-            raise SceneError([_issue(large, _too_large(large, sizes[large]))])
+            raise _refusal(large, _too_large(sizes[large]))
         return {**tables, **{key: Matrix(matrix.toarray()) for key, matrix in sparse.items()}}, None
     if isinstance(keep, bool) or not isinstance(keep, int) or not 0 <= keep <= MOST_DOFS:
-        message = f"`{KEEP_MODES}` must be a whole number from 0 to {MOST_DOFS}, got {keep!r}"
-        raise SceneError([_issue(KEEP_MODES, message)])
+        raise _refusal(KEEP_MODES, f"must be a whole number from 0 to {MOST_DOFS}", keep)
     if not {"M", "K"} <= set(sparse) or len(set(sizes.values())) != 1:
         what = ", ".join(f"{key} with {size} rows" for key, size in sizes.items()) or "none"
-        message = f"`{KEEP_MODES}` needs M and K (and C) from files, of one size, got {what}"
-        raise SceneError([_issue(KEEP_MODES, message)])
+        raise _refusal(KEEP_MODES, "needs M and K (and C) from files, of one size", Shown(what))
     try:
         dofs = DofTable.read(tables.get("dofs"))
-        found = _reduced(sparse, dofs, keep, symmetric=tables.get("symmetric") is not False)
     except ValueError as error:
-        raise SceneError([_issue("dofs" if "`dofs`" in str(error) else KEEP_MODES, str(error))]) from error
+        raise _refusal("dofs", str(error), named=False) from error
+    try:
+        found = _reduced(sparse, dofs, keep, symmetric=tables.get("symmetric") is not False)
+    except FieldError as error:
+        raise SceneError([error.issue.below("structure")]) from error
+    except ValueError as error:
+        raise _refusal(KEEP_MODES, str(error), named=False) from error
     values = {key: np.asarray(value) for key, value in found.matrices.items() if key not in _SKEW.values()}
     for key, skew in _SKEW.items():
         if skew in found.matrices:
@@ -207,9 +211,9 @@ def _reduced(sparse: dict[str, coo_array], dofs: DofTable, keep: int, *, symmetr
     return craig_bampton(given["M"], given["K"], given.get("C"), dofs, keep, others=others)
 
 
-def _too_large(key: str, size: int) -> str:
+def _too_large(size: int) -> str:
     return (
-        f"`{key}` has {size} rows, {MOST_DOFS} are the most without reduction: `stickslip import --reduce` "
+        f"has {size} rows, {MOST_DOFS} are the most without reduction: `stickslip import --reduce` "
         f"reduces them once onto the DOFs in use and modes of the rest; `{KEEP_MODES}` = 40 (say) in "
         "[structure] does it whenever the scene is loaded"
     )

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.sparse import block_array, coo_array, csc_array, eye_array, kron
+from scipy.sparse import block_array, coo_array, csc_array, csr_array, eye_array, kron
 from scipy.sparse.linalg import SuperLU, splu
 
 from solver.jit.fourier import Complex, Integer, Real, cosine_position
@@ -56,8 +56,10 @@ class Pattern:
     def times(self, entries: Complex, x: Complex) -> Complex:
         """Return the product of each harmonic's matrix, (nk, L), with x (…, nk, N)."""
         found = np.empty(x.shape, np.complex128)
+        starts = np.searchsorted(self.rows, np.arange(self.size + 1))  # entries come row by row
         for i, own in enumerate(entries):
-            found[..., i, :] = (self.matrix(own).tocsr() @ x[..., i, :].reshape(-1, self.size).T).T.reshape(
+            matrix = csr_array((own, self.columns, starts), shape=(self.size, self.size))
+            found[..., i, :] = (matrix @ x[..., i, :].reshape(-1, self.size).T).T.reshape(
                 found[..., i, :].shape
             )
         return found

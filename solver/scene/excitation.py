@@ -10,7 +10,7 @@ from typing import Annotated, Literal, NamedTuple, Self
 from pydantic import BeforeValidator, Field, PlainSerializer, WithJsonSchema, model_validator
 
 from solver.contacts.fields import Angle, DofName, Part, Signed
-from solver.errors import Issue, SceneError, pointer
+from solver.errors import SceneError
 
 Order = Annotated[int, Field(strict=True, ge=0, le=10_000)]
 HarmonicIndex = Annotated[int, Field(strict=True, ge=0, le=1_000)]
@@ -189,10 +189,10 @@ def with_force_files(raw: Mapping[str, object], folder: Path) -> dict[str, objec
 
 
 def _read(path: Path, number: int | None) -> dict[str, list[float]]:
-    where = pointer("excitation", *(() if number is None else (number,)), "forces")
+    place = ("excitation", *(() if number is None else (number,)), "forces")
 
     def refused(why: str) -> SceneError:
-        return SceneError([Issue(pointer=where, message=f"`forces`: {str(path)!r} {why}")])
+        return SceneError.of(place, f"`forces`: {str(path)!r} {why}", named=False)
 
     try:
         text = path.read_text(encoding="utf-8")

@@ -10,6 +10,7 @@ from pydantic import (
     Field,
     ModelWrapValidatorHandler,
     ValidationError,
+    ValidationInfo,
     field_validator,
     model_validator,
 )
@@ -23,7 +24,7 @@ from solver.contacts.laws.friction import FrictionContact
 from solver.contacts.laws.gap import GapSpring
 from solver.contacts.laws.polynomial import PolynomialSpring
 from solver.contacts.laws.registry import on_change
-from solver.errors import Issue, SceneError, SettingError
+from solver.errors import SceneError, SettingError
 from solver.scene import parameter_paths as scene_paths
 from solver.scene.bodies import kinematics
 from solver.scene.bodies.body import Body, Load, Node
@@ -94,6 +95,9 @@ _OPTIONAL = (
     "recovery",
 )  # left out if empty
 _FEW = 6  # contacts that are named where a scene says what it is
+
+
+_CHECKED = "checked"
 
 
 class Scene(Part):
@@ -186,19 +190,21 @@ class Scene(Part):
 
     @model_validator(mode="wrap")
     @classmethod
-    def _report_everything(cls, data: Any, handler: ModelWrapValidatorHandler[Scene]) -> Scene:
+    def _report_everything(
+        cls, data: Any, handler: ModelWrapValidatorHandler[Scene], info: ValidationInfo
+    ) -> Scene:
         if isinstance(data, Scene):
             return data
-        raw = plain(data)
+        checked = info.context is _CHECKED
+        raw = data if checked else plain(data)
         if not isinstance(raw, dict):
-            raise SceneError(
-                [Issue(pointer="", message=f"a scene must be a table, got {type(raw).__name__}")]
-            )
+            raise SceneError.of((), f"a scene must be a table, got {type(raw).__name__}", named=False)
         try:
             scene, issues = handler(data), []
         except ValidationError as error:
             scene, issues = None, field_issues(error, raw)
-        issues = [*issues, *cross_issues(raw), *cyclic_issues(raw), *body_issues(raw), *term_issues(raw)]
+        if not checked:
+            issues += [*cross_issues(raw), *cyclic_issues(raw), *body_issues(raw), *term_issues(raw)]
         if scene is None or issues:
             raise SceneError(issues)
         scene = scene if not scene.dampers else scene.model_copy(update=with_shapes(scene))
@@ -214,6 +220,17 @@ class Scene(Part):
             Lists everything that is wrong.
         """
         return cls.model_validate(obj)
+
+    @classmethod
+    def from_checked(cls, obj: Mapping[str, object]) -> Scene:
+        """Read what `to_dict` of this version wrote: as `from_dict`, but not how its parts fit together.
+
+        Raises
+        ------
+        SceneError
+            A field that is missing, unknown or out of its range.
+        """
+        return cls.model_validate(obj, context=_CHECKED)
 
     def to_dict(self) -> dict[str, object]:
         """The scene as tables and lists for JSON; `from_dict` gives back an equal scene."""
@@ -305,7 +322,7 @@ def _at_its_speed(scene: Scene) -> Scene:
     try:
         there: Scene = at_speed(scene, scene.speed or 0.0)
     except SettingError as error:
-        raise SceneError([Issue(pointer="/with_speed", message=str(error))]) from error
+        raise SceneError([error.issue.at("with_speed")]) from error
     return there
 
 

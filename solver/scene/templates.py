@@ -12,7 +12,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from solver.errors import Issue, SceneError, pointer
+from solver.errors import Issue, SceneError
 from solver.scene.json_schema import plain, words_of
 from solver.scene.scene import Scene
 from solver.scene.validation import field_issues
@@ -395,11 +395,10 @@ def template_tables(name: str, answers: Mapping[str, Any]) -> dict[str, Any]:
     """
     template = TEMPLATES.get(name)
     if template is None:
-        message = f"no template {name!r}: there are {', '.join(TEMPLATES)}"
-        raise SceneError([Issue(pointer="", message=message)])
+        raise SceneError.of((), f"no template {name!r}: there are {', '.join(TEMPLATES)}", named=False)
     questions = ", ".join(template.model_fields)
     unknown = [
-        Issue(pointer=pointer(key), message=f"`{key}` is no question of {name!r}: there are {questions}")
+        Issue((key,), f"is no question of {name!r}: there are {questions}")
         for key in answers
         if key not in template.model_fields
     ]

@@ -12,7 +12,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from solver.errors import Issue, SceneError
+from solver.errors import SceneError
 
 
 @cache
@@ -93,7 +93,7 @@ def _not_found(name: str, error: Exception) -> str:
 
 
 def _refusal(message: str) -> SceneError:
-    return SceneError([Issue(pointer="", message=message)])
+    return SceneError.of((), message, named=False)
 
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+")

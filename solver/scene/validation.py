@@ -16,8 +16,7 @@ from pydantic_core import ErrorDetails
 from solver.contacts.fields import GROUND, parse_end
 from solver.contacts.laws.harmonics import LoadHarmonic
 from solver.contacts.laws.registry import DEFAULT, laws
-from solver.errors import Issue
-from solver.errors import pointer as json_pointer
+from solver.errors import Issue, Place, Shown, pointer
 from solver.scene.bodies.body import Body, Load, Node, body_dofs
 from solver.scene.bodies.shapes import SHAPES, WITH_BODY
 from solver.scene.cyclic.sector_tables import is_cyclic
@@ -144,43 +143,31 @@ def field_issues(error: ValidationError, raw: dict[str, Any]) -> list[Issue]:
 
 def _field_issue(found: ErrorDetails, raw: dict[str, Any]) -> Issue:
     steps, last = _walk(found["loc"], raw)
-    kind, context = found["type"], found.get("ctx", {})
-    key = _key(steps)
-    if kind in _BOUNDS and isinstance(last, dict) and found["loc"][-1] in _table(found["loc"])[1]:
-        # Another key gave the number, as the list of a load gives N0.
-        key, last = str(found["loc"][-1]), found["input"]
-    if kind == "missing" and isinstance(found["loc"][-1], int):
-        message = f"`{key}` has too few entries, got {quoted(last)}"
-    elif kind == "missing":
-        steps, key = [*steps, str(found["loc"][-1])], str(found["loc"][-1])
-        message = f"`{key}` is missing: {_table(found['loc'])[0]} needs it"
-    elif kind == "extra_forbidden":
+    kind, context, name = found["type"], found.get("ctx", {}), found["loc"][-1] if found["loc"] else ""
+    place = tuple(steps)
+    if kind == "missing" and isinstance(name, int):
+        return Issue(place, "has too few entries", Shown(quoted(last)))
+    if kind == "missing":
+        return Issue((*steps, name), f"is missing: {_table(found['loc'])[0]} needs it")
+    if kind == "extra_forbidden":
         table, keys = _table(found["loc"])
-        known = f"known keys: {listing(keys)}{nearest(key, keys)}"
-        message = f"`{key}` = {quoted(last)} is not a key of {table}; {known}"
-    elif kind in ("union_tag_invalid", "union_tag_not_found"):
+        hint = f"known keys: {listing(keys)}{nearest(str(place[-1]), keys)}"
+        return Issue(place, f"= {quoted(last)} is not a key of {table}; {hint}")
+    if kind in ("union_tag_invalid", "union_tag_not_found"):
         tag, tags = _tags(str(steps[0]) if steps else "")
         got = last.get(tag) if isinstance(last, dict) else None
-        steps = [*steps, tag]
         hint = nearest(got, tags) if isinstance(got, str) else ""
-        message = f"`{tag}` must be one of {listing(tags)}, got {quoted(got)}{hint}"
-    elif kind == "value_error":
-        message = str(context["error"])
-    elif kind in _BOUNDS:
+        return Issue((*steps, tag), f"must be one of {listing(tags)}", Shown(quoted(got) + hint))
+    if kind == "value_error":
+        return Issue(tuple(steps), str(context["error"]), named=False)
+    if kind in _BOUNDS:
         sign, bound = _BOUNDS[kind]
-        message = f"`{key}` must be {sign} {context[bound]:g}, got {quoted(last)}"
-    elif kind in _WANTED:
-        message = f"`{key}` {_WANTED[kind]}, got {quoted(last)}"
-    else:
-        message = f"`{key}`: {found['msg']}, got {quoted(last)}"
-    return Issue(pointer=pointer_of(steps), message=message)
-
-
-def _key(steps: Sequence[int | str]) -> str:
-    """The last key, with its index in a list: ``mu``, ``contacts[1]``."""
-    if steps and isinstance(steps[-1], int):
-        return f"{_key(steps[:-1])}[{steps[-1]}]"
-    return str(steps[-1]) if steps else "scene"
+        wanted = f"must be {sign} {context[bound]:g}"
+        if isinstance(last, dict) and name in _table(found["loc"])[1]:
+            # Another key gave the number, as the list of a load gives N0.
+            return Issue(place, f"`{name}` {wanted}", Shown(quoted(found["input"])), named=False)
+        return Issue(place, wanted, Shown(quoted(last)))
+    return Issue(place, _WANTED.get(kind, found["msg"]), Shown(quoted(last)))
 
 
 def _walk(loc: Iterable[int | str], raw: object) -> tuple[list[int | str], object]:
@@ -202,11 +189,6 @@ def _table(loc: tuple[int | str, ...]) -> tuple[str, tuple[str, ...]]:
         if names[: len(known)] == known or (known and without_tag[: len(known)] == known):
             return answer
     return _KEYS[()]
-
-
-def pointer_of(steps: Iterable[int | str]) -> str:
-    """A JSON pointer."""
-    return json_pointer(*steps)
 
 
 def cross_issues(raw: dict[str, Any]) -> list[Issue]:
@@ -255,22 +237,22 @@ def _dof_names(given: object, table: str) -> _Known | None:
 
 def _reserved_dofs(dofs: Iterable[str], table: str, cyclic: bool) -> Iterator[Issue]:
     for dof in dofs:
-        pointer = pointer_of(["structure", table, dof])
+        place = ("structure", table, dof)
         if dof == GROUND:
             what = "mass" if table == "masses" else "DOF"
-            yield Issue(pointer=pointer, message=f"`{GROUND}` is reserved: give the {what} another name")
+            yield Issue(place, f"is reserved: give the {what} another name")
         if cyclic and "@" in dof:
-            yield Issue(pointer=pointer, message=f"`{dof}`: no '@' in a DOF of a cyclic structure")
+            yield Issue(place, f"`{dof}`: no '@' in a DOF of a cyclic structure", named=False)
 
 
-def rows_of(table: dict[str, Any], key: str) -> Iterator[tuple[list[int | str], dict[str, Any]]]:
+def rows_of(table: dict[str, Any], key: str) -> Iterator[tuple[Place, dict[str, Any]]]:
     """The tables under `key`, whether one or a list, with their steps."""
     rows = table.get(key)
     if isinstance(rows, dict):
-        yield [key], rows
+        yield (key,), rows
     for i, row in enumerate(rows if isinstance(rows, list) else []):
         if isinstance(row, dict):
-            yield [key, i], row
+            yield (key, i), row
 
 
 def in_space(contact: dict[str, Any]) -> bool:
@@ -282,42 +264,46 @@ def _end_issues(
     raw: dict[str, Any], structure: dict[str, Any], dofs: _Known | None, cyclic: bool
 ) -> Iterator[Issue]:
     elements = [
-        (["structure", *steps], row)
+        (("structure", *steps), row)
         for key in ("springs", "dampers")
         for steps, row in rows_of(structure, key)
     ]
     contacts = [each for each in rows_of(raw, "contacts") if not in_space(each[1])]
     for steps, row in [*elements, *contacts]:
         for key in between_keys():
-            yield from _pair_issues([*steps, key], row.get(key), dofs, cyclic)
+            yield from _pair_issues((*steps, key), row.get(key), dofs, cyclic)
 
 
-def _pair_issues(steps: list[int | str], pair: object, dofs: _Known | None, cyclic: bool) -> Iterator[Issue]:
+def _pair_issues(steps: Place, pair: object, dofs: _Known | None, cyclic: bool) -> Iterator[Issue]:
     """What is wrong with a pair of ends; its form is pydantic's matter."""
     if not (isinstance(pair, list) and len(pair) == 2 and all(isinstance(end, str) for end in pair)):
         return
-    key = steps[-1]
     if pair[0] == pair[1]:
-        yield Issue(pointer=pointer_of(steps), message=f"`{key}` must join two different ends, got {pair!r}")
+        yield Issue(steps, "must join two different ends", pair)
     elif all(parse_end(end).next for end in pair):
-        message = f"`{key}` must have one end in this sector, got {pair!r}"
-        yield Issue(pointer=pointer_of(steps), message=message)
+        yield Issue(steps, "must have one end in this sector", pair)
     for i, end in enumerate(pair):
-        yield from _one_end([*steps, i], end, dofs, cyclic)
+        yield from _one_end((*steps, i), end, dofs, cyclic)
 
 
-def _one_end(steps: list[int | str], text: str, dofs: _Known | None, cyclic: bool) -> Iterator[Issue]:
+def _one_end(steps: Place, text: str, dofs: _Known | None, cyclic: bool) -> Iterator[Issue]:
     end, key = parse_end(text), str(steps[-2])
     if end.next and not cyclic:
-        message = f"`{key}`: {text!r} needs a cyclic structure; this one has no next sector"
-        yield Issue(pointer=pointer_of(steps), message=message)
+        yield no_sector(steps, key, text)
     if end.dof is not None and dofs is not None and end.dof not in dofs:
-        yield Issue(pointer=pointer_of(steps), message=unknown_dof(key, text, end.dof, [*dofs, GROUND]))
+        yield unknown_dof(steps, key, text, end.dof, [*dofs, GROUND])
 
 
-def unknown_dof(key: str, text: str, dof: str, known: Sequence[str]) -> str:
+def no_sector(place: Place, key: str, text: str) -> Issue:
+    """What to say of an end in the next sector where there is none."""
+    said = f"`{key}`: {text!r} needs a cyclic structure; this one has no next sector"
+    return Issue(place, said, named=False)
+
+
+def unknown_dof(place: Place, key: str, text: str, dof: str, known: Sequence[str]) -> Issue:
     """What to say of a DOF that does not exist."""
-    return f"`{key}`: there is no DOF {quoted(text)}; known: {listing(known)}{nearest(dof, known)}"
+    hint = f"known: {listing(known)}{nearest(dof, known)}"
+    return Issue(place, f"`{key}`: there is no DOF {quoted(text)}; {hint}", named=False)
 
 
 def _dof_issues(raw: dict[str, Any], dofs: _Known | None, sectors: object) -> Iterator[Issue]:
@@ -333,20 +319,20 @@ def _dof_issues(raw: dict[str, Any], dofs: _Known | None, sectors: object) -> It
             if (base in dofs or base in recovered) and sector.isdecimal() and int(sector[:10]) < sectors:
                 continue
         if isinstance(dof, str) and dof not in dofs:
-            yield Issue(pointer=pointer_of([*steps, "dof"]), message=unknown_dof("dof", dof, dof, list(dofs)))
+            yield unknown_dof((*steps, "dof"), "dof", dof, dof, list(dofs))
 
 
-_Named = list[tuple[list[int | str], str]]
+_Named = list[tuple[Place, str]]
 
 
 def _structure_names(structure: dict[str, Any]) -> _Named:
     masses = structure.get("masses")
-    rows: list[tuple[list[int | str], Any]] = [
-        (["masses", dof], mass) for dof, mass in (masses.items() if isinstance(masses, dict) else ())
+    rows: list[tuple[Place, Any]] = [
+        (("masses", dof), mass) for dof, mass in (masses.items() if isinstance(masses, dict) else ())
     ]
     rows += [row for key in ("springs", "dampers") for row in rows_of(structure, key)]
     return [
-        (["structure", *steps, "name"], row["name"])
+        (("structure", *steps, "name"), row["name"])
         for steps, row in rows
         if isinstance(row, dict) and isinstance(row.get("name"), str)
     ]
@@ -356,30 +342,25 @@ def duplicates(named: _Named, what: str) -> Iterator[Issue]:
     """Names that are given twice."""
     seen: dict[str, str] = {}
     for steps, name in named:
-        pointer = pointer_of(steps)
         if name in seen:
-            message = f"`name` = {name!r} is taken by {seen[name]}: names in {what} must differ"
-            yield Issue(pointer=pointer, message=message)
-        seen.setdefault(name, pointer)
+            yield Issue(steps, f"= {name!r} is taken by {seen[name]}: names in {what} must differ")
+        seen.setdefault(name, pointer(*steps))
 
 
 def _contact_name_issues(raw: dict[str, Any], cyclic: bool) -> Iterator[Issue]:
     rows = list(rows_of(raw, "contacts"))
-    names: _Named = [([*s, "name"], row["name"]) for s, row in rows if isinstance(row.get("name"), str)]
-    groups: _Named = [([*s, "group"], row["group"]) for s, row in rows if isinstance(row.get("group"), str)]
+    names: _Named = [((*s, "name"), row["name"]) for s, row in rows if isinstance(row.get("name"), str)]
+    groups: _Named = [((*s, "group"), row["group"]) for s, row in rows if isinstance(row.get("group"), str)]
     yield from duplicates(names, "contacts")
     taken = {name for _, name in names}
     for steps, name in [*names, *groups]:
         key = steps[-1]
         if name in RESERVED_PREFIXES:
-            message = f"`{key}` = {name!r} is reserved in parameter paths: give the contact another {key}"
-            yield Issue(pointer=pointer_of(steps), message=message)
+            yield Issue(steps, f"= {name!r} is reserved in parameter paths: give the contact another {key}")
         if key == "group" and name in taken:
-            yield Issue(
-                pointer=pointer_of(steps), message=f"`group` = {name!r} is also the name of a contact"
-            )
+            yield Issue(steps, f"= {name!r} is also the name of a contact")
         if cyclic and "@" in name:
-            yield Issue(pointer=pointer_of(steps), message=f"`{key}` = {name!r}: no '@' in a cyclic scene")
+            yield Issue(steps, f"= {name!r}: no '@' in a cyclic scene")
 
 
 def _engine_order_issues(raw: dict[str, Any], structure: dict[str, Any]) -> Iterator[Issue]:
@@ -389,13 +370,12 @@ def _engine_order_issues(raw: dict[str, Any], structure: dict[str, Any]) -> Iter
         order = row.get("engine_order")
         if order is None:
             continue
-        pointer = pointer_of([*steps, "engine_order"])
+        place = (*steps, "engine_order")
         if kind in ("lumped", "matrices") and not is_cyclic(structure):
-            needs = f"needs a cyclic structure; remove it from a {kind} one"
-            yield Issue(pointer=pointer, message=f"`engine_order` = {quoted(order)} {needs}")
+            yield Issue(place, f"= {quoted(order)} needs a cyclic structure; remove it from a {kind} one")
         elif first is not None and order != first:
-            message = f"`engine_order` must be the same everywhere, got {quoted(order)} after {quoted(first)}"
-            yield Issue(pointer=pointer, message=message)
+            got = Shown(f"{quoted(order)} after {quoted(first)}")
+            yield Issue(place, "must be the same everywhere", got)
         first = order if first is None else first
 
 
@@ -415,29 +395,30 @@ def _issues(raw: dict[str, Any], structure: dict[str, Any]) -> Iterator[Issue]:
     for steps, row in rows_of(raw, "couplings"):
         yield from _places(steps, row, ("on", "of"), dofs)
         if row.get("offset") and not cyclic:
-            message = f"`offset` = {row['offset']!r} needs a cyclic structure; this one has no other sectors"
-            yield Issue(pointer=pointer_of([*steps, "offset"]), message=message)
+            yield Issue(
+                (*steps, "offset"),
+                f"= {row['offset']!r} needs a cyclic structure; this one has no other sectors",
+            )
         for key in _TURNING:
             if row.get(key) and not _has_speed(raw):
-                yield _needs_speed([*steps, key], key)
+                yield _needs_speed(*steps, key)
     for key in ("G", "K_omega2"):
         if structure.get(key) is not None and not _has_speed(raw):
-            yield _needs_speed(["structure", key], key)
+            yield _needs_speed("structure", key)
     for steps, row in rows_of(raw, "excitation"):
         for key in PLACES[1:]:
             keys = tuple(row[key]) if isinstance(row.get(key), dict) else ()
-            yield from _places([*steps, key], dict(zip(keys, keys, strict=True)), keys, dofs)
+            yield from _places((*steps, key), dict(zip(keys, keys, strict=True)), keys, dofs)
     yield from _base_issues(raw, cyclic)
     yield from _speed_issues(raw)
     yield from _recovery_issues(raw, dofs)
     for steps, row in rows_of(raw, "aerodynamics"):
         yield from _places(steps, row, ("dof",), dofs)
         if not cyclic:
-            message = "`aerodynamics` acts between the blades of a cyclic structure; this one has no sectors"
-            yield Issue(pointer=pointer_of(steps), message=message)
+            yield Issue(steps, "acts between the blades of a cyclic structure; this one has no sectors")
     tables = ("aerodynamics", "bodies", "nodes", "loads", "dampers", "contacts")
     rows = [row for table in tables for row in rows_of(raw, table)]
-    named = [([*steps, "name"], row["name"]) for steps, row in rows if isinstance(row.get("name"), str)]
+    named = [((*steps, "name"), row["name"]) for steps, row in rows if isinstance(row.get("name"), str)]
     mine = [row.get("name") for _, row in rows_of(raw, "aerodynamics")]
     yield from duplicates([(s, name) for s, name in reversed(named) if name in mine], "paths")
 
@@ -449,28 +430,27 @@ def _base_issues(raw: dict[str, Any], cyclic: bool) -> Iterator[Issue]:
         given = [key for key in ("ground", "driven") if row.get(key) is not None]
         if not given:
             continue
-        pointer = pointer_of([*steps, given[0]])
+        place = (*steps, given[0])
         if cyclic:
-            yield Issue(
-                pointer=pointer, message=f"`{given[0]}` moves a base, which a cyclic structure has not"
-            )
+            yield Issue(place, "moves a base, which a cyclic structure has not")
         first = first or given[0]
         if given[0] != first:
-            message = f"`{given[0]}` beside `{first}`: the ground moves or DOFs are driven, not both"
-            yield Issue(pointer=pointer, message=message)
+            yield Issue(place, f"beside `{first}`: the ground moves or DOFs are driven, not both")
     for steps, row in rows_of(raw, "observe"):
         if row.get("relative") and first is None:
-            message = "`relative` = true needs a base that moves (`ground` or `driven` of the excitation)"
-            yield Issue(pointer=pointer_of([*steps, "relative"]), message=message)
+            yield Issue(
+                (*steps, "relative"),
+                "= true needs a base that moves (`ground` or `driven` of the excitation)",
+            )
 
 
 def _places(
-    steps: list[int | str], row: dict[str, Any], keys: tuple[str, ...], dofs: dict[str, None] | None
+    steps: Place, row: dict[str, Any], keys: tuple[str, ...], dofs: dict[str, None] | None
 ) -> Iterator[Issue]:
     for key in keys:
         dof = row.get(key)
         if isinstance(dof, str) and dofs is not None and dof not in dofs:
-            yield Issue(pointer=pointer_of([*steps, key]), message=unknown_dof(key, dof, dof, list(dofs)))
+            yield unknown_dof((*steps, key), key, dof, dof, list(dofs))
 
 
 def _has_speed(raw: dict[str, Any]) -> bool:
@@ -480,51 +460,49 @@ def _has_speed(raw: dict[str, Any]) -> bool:
 def _speed_issues(raw: dict[str, Any]) -> Iterator[Issue]:
     """A speed given twice, and what follows it but cannot."""
     if raw.get("speed") is not None and raw.get("speed_order") is not None:
-        message = "`speed_order` stands in place of `speed`: the speed follows the frequency; remove one"
-        yield Issue(pointer="/speed_order", message=message)
+        yield Issue(
+            ("speed_order",), "stands in place of `speed`: the speed follows the frequency; remove one"
+        )
     named = [row.get(key) for _, row in rows_of(raw, "contacts") for key in ("name", "group")]
     contacts = dict.fromkeys(name for name in named if isinstance(name, str))
     seen: list[object] = []
     for steps, row in rows_of(raw, "with_speed"):
-        path, pointer = row.get("path"), pointer_of([*steps, "path"])
+        path, place = row.get("path"), (*steps, "path")
         if not isinstance(path, str):
             continue
         owner, _, key = path.rpartition(".")
         if path != AMPLITUDE_PATH and not (key == "N0" and owner in contacts):
             known = ", ".join(f"{name}.N0" for name in contacts)
-            message = f"`path` must be `{AMPLITUDE_PATH}` or one of {known or 'no contact'}, got {path!r}"
-            yield Issue(pointer=pointer, message=message)
+            yield Issue(place, f"must be `{AMPLITUDE_PATH}` or one of {known or 'no contact'}", path)
         elif path in seen:
-            yield Issue(pointer=pointer, message=f"`path` = {path!r} follows the speed twice")
+            yield Issue(place, f"= {path!r} follows the speed twice")
         seen.append(path)
         if not _has_speed(raw):
-            yield Issue(pointer=pointer, message=f"{path!r} needs the `speed` of the scene, or `speed_order`")
+            yield Issue(place, f"= {path!r} needs the `speed` of the scene, or `speed_order`")
         forces = [each for _, each in rows_of(raw, "excitation")]
         if path == AMPLITUDE_PATH and any(not each.get("amplitude") for each in forces[:1]):
-            message = "`amplitude` of the first excitation must not be 0: the others are in proportion to it"
-            yield Issue(pointer=pointer, message=message)
+            wanted = "`amplitude` of the first excitation must not be 0: the others are in proportion to it"
+            yield Issue(place, wanted, named=False)
     turning = any(row.get("radius_of_rotation") for _, row in rows_of(raw, "bodies"))
     if raw.get("speed_order") is not None and turning and any(rows_of(raw, "loads")):
-        message = "`speed_order` cannot go with [[loads]] beside bodies that the speed loads"
-        yield Issue(pointer="/speed_order", message=message)
+        yield Issue(("speed_order",), "cannot go with [[loads]] beside bodies that the speed loads")
 
 
 def _recovery_issues(raw: dict[str, Any], dofs: dict[str, None] | None) -> Iterator[Issue]:
     """Recovered quantities of DOFs that do not exist, or with a name that is taken."""
     rows = list(rows_of(raw, "recovery"))
-    named = [([*steps, "name"], row["name"]) for steps, row in rows if isinstance(row.get("name"), str)]
+    named = [((*steps, "name"), row["name"]) for steps, row in rows if isinstance(row.get("name"), str)]
     yield from duplicates(named, "recovery")
     for steps, row in rows if dofs is not None else ():
         terms = row.get("terms")
         for dof in terms if isinstance(terms, dict) else ():
             if dof not in (dofs or ()):
-                message = unknown_dof("terms", dof, dof, list(dofs or ()))
-                yield Issue(pointer=pointer_of([*steps, "terms", dof]), message=message)
+                yield unknown_dof((*steps, "terms", dof), "terms", dof, dof, list(dofs or ()))
         if row.get("name") in list(dofs or ()):
-            message = f"`name` = {row['name']!r} is that of a DOF: give what is recovered another name"
-            yield Issue(pointer=pointer_of([*steps, "name"]), message=message)
+            yield Issue(
+                (*steps, "name"), f"= {row['name']!r} is that of a DOF: give what is recovered another name"
+            )
 
 
-def _needs_speed(steps: list[int | str], key: str) -> Issue:
-    message = f"`{key}` needs the `speed` of rotation [1/min] of the scene"
-    return Issue(pointer=pointer_of(steps), message=message)
+def _needs_speed(*place: int | str) -> Issue:
+    return Issue(place, "needs the `speed` of rotation [1/min] of the scene")

@@ -33,11 +33,12 @@ from service.http.app import create_app
 from service.jobs.common.records import sweep_record
 from service.jobs.common.scenes import FrequencyHz, HarmonicRequest, require, resolve_scene, resolved
 from service.jobs.common.sizes import balance_issues
+from service.jobs.figures import SweepRecord
 from service.jobs.kind_view import KindView, Told
 from service.jobs.kinds import SHIPPED
 from service.jobs.kinds.registry.loading import registry_of
 from service.jobs.kinds.registry.table import with_tables
-from service.jobs.outputs import JobOutput, OnProgress, ShouldStop, SweepRecord
+from service.jobs.outputs import JobOutput, OnProgress, ShouldStop
 from service.jobs.parts import Part, PartOutput, Parts
 from service.jobs.registry import JobKind, Resolved, SceneSource
 from service.queue.core import Service

@@ -150,7 +150,7 @@ def test_what_is_wrong_is_told() -> None:
     wrong = {**SCENE, "contacts": [{**SCENE["contacts"][0], "limit": -1.0, "mu": 0.3}]}
     with pytest.raises(solver.SceneError) as refused:
         solver.Scene.from_dict(wrong)
-    said = {issue.pointer: issue.message for issue in refused.value.issues}
+    said = {issue.pointer: issue.said() for issue in refused.value.issues}
     assert said["/contacts/0/limit"] == "`limit` must be > 0, got -1.0"
     assert "is not a key of a contact with the law `sliders`; known keys:" in said["/contacts/0/mu"]
     with pytest.raises(solver.SettingError, match=r"joint.limit.*must be a number > 0 and <= 1e15 \[N\]"):

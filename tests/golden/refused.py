@@ -17,7 +17,6 @@ from service.http.app import create_app
 from service.jobs import answering
 from service.jobs.kinds import SHIPPED
 from service.jobs.outputs import Silent
-from solver.errors import Issue
 
 LOAD = {"parameter": "damper.N0", "from": 50, "to": 200}
 _DISK = {"scene": "bladed-disk"}
@@ -112,7 +111,7 @@ def application(folder: Path) -> FastAPI:
     async def ask(task: str, spec: dict[str, Any], _owner: str = "", _about: str = "") -> Any:
         told = tasks[task](spec, Silent(), lambda: False, None).result  # type: ignore[arg-type]
         if "issues" in told:
-            raise InvalidRequestError([Issue(pointer=where, message=said) for where, said in told["issues"]])
+            raise InvalidRequestError.from_json(told["issues"])
         return told
 
     service.answers.ask = ask

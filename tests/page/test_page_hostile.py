@@ -41,9 +41,9 @@ def poisoned(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
     with EmbeddedService(load_settings(database=site.database, workers=1, answer_workers=1)) as service:
         assert service.wait(service.submit("sweep", SWEEP)).status is JobState.SUCCESSFUL
     with sqlite3.connect(folder / "jobs.db") as connection:
-        for column in ("scene_name", "parameter", "status", "owner"):
-            connection.execute(f"UPDATE sweep SET {column} = ?", [BAD if column != "owner" else ""])
-        connection.execute("UPDATE sweep_contact SET name = ?", [BAD])
+        connection.execute("UPDATE result SET scene_name = ?, status = ?", [BAD, BAD])
+        connection.execute("UPDATE quantity SET label = ? WHERE name = 'parameter'", [BAD])
+        connection.execute("UPDATE quantity SET label = ? WHERE label = 'damper'", [BAD])
         connection.execute("UPDATE job SET scene_name = ?", [BAD])
     connection.close()
     site.start()

@@ -10,11 +10,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pydantic import Field
+from pydantic import BaseModel, Field
 
 from service.jobs.arrays import encode
 from service.jobs.checkpoints import Checkpoints, RunParts
-from service.jobs.outputs import ContactValues, JobOutput, Progress, ShouldStop, SweepRecord
+from service.jobs.figures import ContactValues, SweepRecord
+from service.jobs.outputs import JobOutput, Progress, ShouldStop
 from service.jobs.registry import JobKind, JobRequest, Registry, Resolved
 from service.jobs.studies import map as maps
 from service.jobs.studies.sweep import Sweep
@@ -30,6 +31,13 @@ class IterationRequest(JobRequest):
     pid_file: str | None = None
     sweeps: int = Field(default=0, strict=True, ge=0, le=10)
     tells: bool = False
+
+
+class IterationResult(BaseModel):
+    """What a power iteration finds."""
+
+    eigenvalue: float = Field(description="The largest [1/s].")
+    steps: int = Field(description="Iterations.")
 
 
 def as_it_is(request: IterationRequest, _source: object) -> Resolved:
@@ -112,7 +120,7 @@ def deaf(spec: Mapping[str, Any], progress: Progress, _should_stop: ShouldStop) 
 
 
 def bad_scene(_spec: Mapping[str, Any], _progress: Progress, _should_stop: ShouldStop) -> JobOutput:
-    raise SceneError([Issue(pointer="/contacts/0/mu", message="`mu` must be >= 0, got -0.1")])
+    raise SceneError([Issue(("contacts", 0, "mu"), "must be >= 0", -0.1)])
 
 
 def bad_setting(_spec: Mapping[str, Any], _progress: Progress, _should_stop: ShouldStop) -> JobOutput:
@@ -212,6 +220,14 @@ PRIVATE = Registry(
     JobKind(name=name, summary=name, request=IterationRequest, resolve=as_it_is, run=run)
     for name, run in _RUNS.items()
 ).extended(
+    JobKind(
+        name="told-iteration",
+        summary="",
+        request=IterationRequest,
+        resolve=as_it_is,
+        run=power_iteration,
+        result=IterationResult,
+    ),
     JobKind(name="confused", summary="", request=IterationRequest, resolve=confused, run=power_iteration),
     *SLOW,
 )

@@ -81,7 +81,7 @@ def test_what_takes_too_much_processor_time_is_ended_and_refused(answers: Answer
     slow, quick = together(answers, ("compute", {}, "eve"), ("turn", {"seconds": 0.0}, "ann"))
     assert isinstance(slow, InvalidRequestError)
     assert slow.issues[0].pointer == "/scene"
-    assert "0.5 s of processor time" in slow.issues[0].message
+    assert "0.5 s of processor time" in slow.issues[0].said()
     assert quick["found"]["pid"]
 
 
@@ -95,7 +95,7 @@ def test_what_takes_too_much_memory_is_refused_and_the_next_goes_on(answers: Ans
         answers, ("allocate", {"megabytes": 200}, "eve"), ("allocate", {"megabytes": 20}, "eve")
     )
     assert isinstance(large, InvalidRequestError)
-    assert "67 MB of memory" in large.issues[0].message
+    assert "67 MB of memory" in large.issues[0].said()
     assert small["found"] == 20 * 1024**2
 
 

@@ -87,7 +87,7 @@ def is_what_it_would_have_been(service: Service, job_id: str, name: str) -> None
     assert timeless(found.result) == timeless(whole.result)
     assert len(found.sweeps) == len(whole.sweeps)
     for row, record in zip(found.sweeps, whole.sweeps, strict=True):
-        stored = service.sweeps.arrays(row.id)
+        stored = service.stored.arrays(row.id)
         assert stored.keys() == record.arrays.keys()
         for array in stored:
             np.testing.assert_array_equal(decode(stored[array]), decode(record.arrays[array]))

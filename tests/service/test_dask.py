@@ -111,7 +111,7 @@ def results_of(service: EmbeddedService, job: str) -> Ended:
     done = service.wait(job, timeout=PATIENCE)
     assert done.status is JobState.SUCCESSFUL, done
     results = service.results(job)
-    arrays = [service._service.sweeps.arrays(sweep.id) for sweep in results.sweeps]
+    arrays = [service._service.stored.arrays(sweep.id) for sweep in results.sweeps]
     return timeless(results.result), [{k: a.sha256 for k, a in each.items()} for each in arrays]
 
 
@@ -304,7 +304,7 @@ def test_a_sweep_goes_on_behind_its_last_checkpoint(
         done = embedded.job(job)
         assert (done.status, done.attempt) == (JobState.SUCCESSFUL, 2)
         (sweep,) = embedded.results(job).sweeps
-        arrays = embedded._service.sweeps.arrays(sweep.id)
+        arrays = embedded._service.stored.arrays(sweep.id)
         result, (whole,) = computed(embedded, "sweep", body)
         assert timeless(embedded.results(job).result) == result
         assert {name: array.sha256 for name, array in arrays.items()} == whole

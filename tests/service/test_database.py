@@ -26,8 +26,9 @@ from service.db.models import NOBODY, Base, Job, JobState
 from service.db.repositories import Attempt, JobRepository, SceneRepository
 from service.errors import DatabaseError, DatabaseInUseError, WrongRevisionError
 from service.jobs.arrays import decode, encode
+from service.jobs.figures import StoredArray
 from service.jobs.ids import new_id
-from service.jobs.outputs import FailureKind, JobFailure, JobOutput, StoredArray
+from service.jobs.outputs import FailureKind, JobFailure, JobOutput
 from service.queue.core import Service
 
 

@@ -24,15 +24,15 @@ from service.db import revisions
 from service.db.clock import utc_now
 from service.db.engine import Database, migrating
 from service.db.models import Base, Job, JobState
-from service.db.repositories import DesignRepository
-from service.db.repositories.stored import insert_design
+from service.db.repositories import ResultRepository
+from service.db.repositories.results import insert_results
 from service.errors import InvalidRequestError
 from service.jobs.common.records import design_record
+from service.jobs.figures import DESIGN, DesignRecord, VariableValues
 from service.jobs.ids import new_id
-from service.jobs.outputs import DesignRecord, VariableValues
 from service.jobs.validation import validated
 from service.schemas.answers import DesignDetail
-from service.schemas.design_queries import DesignQuery, design_page
+from service.schemas.result_queries import DesignQuery, design_page
 from service.settings.settings import load_settings
 
 WAIT = {"Prefer": "wait=60"}
@@ -76,7 +76,7 @@ def fill(database: Database, records: list[DesignRecord]) -> list[str]:
                     max_attempts=1, created=utc_now(), request={}, spec={},
                 )
             )  # fmt: skip
-            insert_design(connection, name, record, utc_now())
+            insert_results(connection, name, [record], utc_now())
     return ids
 
 
@@ -123,7 +123,7 @@ def meets(record: DesignRecord, query: dict[str, Any]) -> bool:
 )
 def test_filters_sorts_and_pages(filled: Filled, query: dict[str, Any]) -> None:
     database, records = filled
-    found = listed(design_page, DesignRepository(database), DesignQuery(**{"limit": 37, **query}))
+    found = listed(design_page, ResultRepository(database), DesignQuery(**{"limit": 37, **query}))
     sort, columns = query.get("sort", "-created"), {"band": "band_hz"}
     wanted = in_order(records, sort, columns, lambda record: meets(record, query))
     assert [item.id for item in found] == wanted
@@ -131,7 +131,7 @@ def test_filters_sorts_and_pages(filled: Filled, query: dict[str, Any]) -> None:
 
 def test_a_design_is_answered_as_it_was_stored(filled: Filled) -> None:
     database, records = filled
-    page = design_page(DesignRepository(database), DesignQuery(limit=50), load_settings())
+    page = design_page(ResultRepository(database), DesignQuery(limit=50), load_settings())
     for item in page.items:
         record = records[item.id]
         assert (item.scene, item.reached, item.band_hz) == (record.scene_name, record.reached, record.band_hz)
@@ -148,7 +148,7 @@ def test_an_unknown_filter_is_refused(bad: dict[str, Any]) -> None:
 
 def test_a_cursor_that_is_none(filled: Filled) -> None:
     with pytest.raises(InvalidRequestError, match="must come from the `next` link"):
-        design_page(DesignRepository(filled[0]), DesignQuery(cursor="W10"), load_settings())
+        design_page(ResultRepository(filled[0]), DesignQuery(cursor="W10"), load_settings())
 
 
 PROBLEM: dict[str, Any] = {
@@ -288,9 +288,9 @@ def test_the_designs_of_an_old_database_are_filled_in_and_can_be_taken_back(url:
             old_job(connection, f"g{number:03d}", "design", spec, OLD, None)
     assert revisions.upgrade(url) == revisions.head_revision()
     database = Database(url)
-    repository = DesignRepository(database)
-    rows = {row.job_id: row for row in repository.page(DesignQuery().to_filter(), 1000)}
-    variables = repository.parts(list(rows))
+    repository = ResultRepository(database)
+    rows = {row.job_id: row for row, _ in repository.page(DesignQuery().to_filter(DESIGN), 1000)}
+    variables = {name: list(row.variables) for name, row in rows.items()}
     database.close()
     assert len(rows) == 4 + 450
     first = rows["a"]
@@ -318,7 +318,7 @@ def test_twenty_thousand_designs_are_listed_within_50_ms(database: Database) -> 
     generator = random.Random(1)
     fill(database, [random_design(generator) for _ in range(20_000)])
     analyse(database)
-    repository, settings = DesignRepository(database), load_settings()
+    repository, settings = ResultRepository(database), load_settings()
     for query in (
         {}, {"scene": "disk", "peak_max": 0.05}, {"variable": "damper.N0", "value_max": 1.0},
         {"variable": "damper.N0", "sort": "peak"}, {"reached": False, "sort": "-work"}, {"peak_min": 1e9},

@@ -36,7 +36,7 @@ from postgresql_cluster import Cluster
 from sqlalchemy import func, select
 
 from service.db.engine import Database
-from service.db.models import Job, JobResult, JobState, Sweep
+from service.db.models import Job, JobResult, JobState, Result
 from service.db.repositories.integrity import check
 
 COMMON: dict[str, Fault] = {
@@ -92,7 +92,11 @@ def check_rows(site: Site) -> Counter[str]:
     with database.reading() as connection:
         states = {row.id: row.state for row in connection.execute(select(Job.id, Job.state))}
         results = connection.execute(select(JobResult.job_id)).scalars().all()
-        counts = select(Sweep.job_id, func.count().label("number")).group_by(Sweep.job_id)
+        counts = (
+            select(Result.job_id, func.count().label("number"))
+            .where(Result.of == "sweep")
+            .group_by(Result.job_id)
+        )
         sweeps = {row.job_id: row.number for row in connection.execute(counts)}
     database.close()
     assert set(site.accepted) <= set(states), "an accepted job was lost"

@@ -69,7 +69,7 @@ def test_a_used_database_and_its_backup_are_sound(used: Path, copy: Path) -> Non
         ("UPDATE job SET state = 'dismissed'", "1 sweeps of jobs that computed none"),
         ("UPDATE job SET finished = NULL", "1 ended jobs without the time"),
         ("DELETE FROM sweep_array", "1 sweeps without their arrays"),
-        ("UPDATE sweep SET job_id = 'nobody'", "a row of `sweep` refers to a row of `job`"),
+        ("UPDATE result SET job_id = 'nobody'", "a row of `result` refers to a row of `job`"),
     ],
 )
 def test_damage_is_found_and_named(

@@ -22,6 +22,7 @@ from service.settings.settings import load_settings
 # design that was found and one that was not, a dismissed and a waiting job, a stored scene.
 OLD = Path(__file__).parent.parent / "data" / "first_revision.db.gz"
 TABLES = ("job", "job_result", "scene", "sweep", "sweep_contact", "sweep_array")
+NOW = ("job", "job_result", "scene", "sweep_array", "result", "quantity", "figure")
 Rows = dict[str, list[dict[str, Any]]]
 
 
@@ -42,12 +43,12 @@ def old(url: str, tmp_path: Path) -> str:
     return url
 
 
-def contents(url: str) -> Rows:
-    """Every row of the first revision's tables, with the columns it has now."""
+def contents(url: str, tables: tuple[str, ...] = TABLES) -> Rows:
+    """Every row of some tables, with the columns it has now."""
     with migrating(url) as connection:
         meta = sa.MetaData()
         found = {}
-        for name in TABLES:
+        for name in tables:
             table = sa.Table(name, meta, autoload_with=connection)
             query = sa.select(table).order_by(*table.primary_key)
             found[name] = [dict(row) for row in connection.execute(query).mappings()]
@@ -67,18 +68,49 @@ def test_up_down_and_up_again_keeps_every_row(old: str) -> None:
         "job": 8, "job_result": 5, "scene": 1, "sweep": 5, "sweep_contact": 5, "sweep_array": 30,
     }  # fmt: skip
     assert revisions.upgrade(old) == revisions.head_revision()
-    above = contents(old)
-    for name, rows in before.items():
-        same = [{key: row[key] for key in first} for first, row in zip(rows, above[name], strict=True)]
-        assert same == rows
+    above = contents(old, NOW)
+    for name in (*TABLES[:3], "sweep_array"):
+        same = [
+            {key: row[key] for key in first} for first, row in zip(before[name], above[name], strict=True)
+        ]
+        assert same == before[name]
     kinds = {row["id"]: row["kind"] for row in above["job"]}
-    on_the_way = {(kinds[row["job_id"]], bool(row["intermediate"])) for row in above["sweep"]}
-    assert on_the_way == {("design", True), ("sweep", False)}
+    held = figures(above)
+    for sweep in before["sweep"]:
+        row = next(one for one in above["result"] if one["id"] == sweep["id"])
+        assert {key: row[key] for key in sweep.keys() & row.keys()} == {
+            key: sweep[key] for key in sweep.keys() & row.keys()
+        }
+        own = {name: value for (of, name, label), value in held[sweep["id"]].items() if not label}
+        wanted = {name: sweep[name] for name in sweep if name not in row and sweep[name] is not None}
+        assert own.pop("intermediate") == (kinds[sweep["job_id"]] == "design")
+        assert held[sweep["id"]]["sweep", "parameter", wanted.pop("parameter")] == 0.0
+        assert own == wanted
+    for contact in before["sweep_contact"]:
+        found = {name: value for (_, name, label), value in held[contact["sweep_id"]].items()
+                 if label == contact["name"]}  # fmt: skip
+        values = {name: value for name, value in contact.items() if isinstance(value, float)}
+        assert found == values | {"contact": contact["position"]}
+    others = {row["id"]: row["of"] for row in above["result"] if row["of"] not in ("sweep", "design")}
+    assert sorted(others.values()) == ["march", "solve"]
+    for job, of in others.items():
+        [result] = [row["body"] for row in above["job_result"] if row["job_id"] == job]
+        assert held[job][of, "max_abs", ""] == result["max_abs"]
     down(old, "0001")
     assert contents(old) == before
     assert revisions.upgrade(old) == revisions.head_revision()
-    assert contents(old) == above
+    assert figures(contents(old, NOW)) == held
     assert check(old).trouble == ()
+
+
+def figures(rows: Rows) -> dict[str, dict[tuple[str, str, str], float]]:
+    """Of each result what its figures are, and their values."""
+    ids = {row["number"]: row["id"] for row in rows["result"]}
+    known = {row["id"]: (row["of"], row["name"], row["label"]) for row in rows["quantity"]}
+    found: dict[str, dict[tuple[str, str, str], float]] = {one: {} for one in ids.values()}
+    for row in rows["figure"]:
+        found[ids[row["result"]]][known[row["quantity"]]] = row["value"]
+    return found
 
 
 def test_a_service_of_today_works_with_what_the_first_one_stored(old: str) -> None:
@@ -98,7 +130,7 @@ def test_a_service_of_today_works_with_what_the_first_one_stored(old: str) -> No
             results = service.results(job.id)
             assert results.result
             for sweep in results.sweeps:
-                arrays = service.sweeps.arrays(sweep.id)
+                arrays = service.stored.arrays(sweep.id)
                 assert decode(arrays["amplitude"]).shape == (sweep.points,)
                 # Nobody knows of a sweep of that version what stands between its points.
                 assert sweep.peaks_known is None

@@ -20,6 +20,8 @@ from service.jobs.studies.design import Design
 from service.jobs.studies.pareto import Pareto
 from service.jobs.study import resolve
 from service.jobs.validation import validated
+from solver.errors import Issue
+from solver.scene.validation import cross_issues
 
 VARIABLES = {"damper.N0": [20, 1000]}
 EVERY_KEY: dict[str, Any] = {
@@ -59,7 +61,7 @@ def pointers(change: dict[str, Any]) -> list[str]:
     body = {"scene": "two-dof", "variables": VARIABLES, **change}
     with pytest.raises(InvalidRequestError) as caught:
         resolve(validated(Design, body), Shipped())
-    assert all(len(issue.message) > 20 for issue in caught.value.issues)
+    assert all(len(issue.said()) > 20 for issue in caught.value.issues)
     return [issue.pointer for issue in caught.value.issues]
 
 
@@ -104,6 +106,43 @@ def test_a_spec_of_the_first_version_is_still_a_problem() -> None:
         "start": None,
     }
     assert Design.asked(spec)[1] == {"variables": VARIABLES, "harmonics": 5}
+
+
+def test_a_problem_is_checked_once_by_one_version(monkeypatch: pytest.MonkeyPatch) -> None:
+    checks: list[object] = []
+
+    def counted(raw: dict[str, Any]) -> list[Issue]:
+        checks.append(raw)
+        return cross_issues(raw)
+
+    monkeypatch.setattr("solver.scene.scene.cross_issues", counted)
+    tables = solver.load_scene("two-dof").to_dict()
+    checks.clear()
+    spec = resolve(validated(Design, {"scene": tables, "variables": VARIABLES}), Shipped()).spec
+    assert len(checks) == 1
+    scene, asked = Design.asked(spec)
+    assert (len(checks), scene, asked["variables"]) == (1, solver.Scene.from_dict(tables), VARIABLES)
+
+
+def test_what_another_version_checked_is_checked_again() -> None:
+    spec = resolve(validated(Design, {"scene": "two-dof", "variables": VARIABLES}), Shipped()).spec
+    spec["checked_by"] = "0.0.1"
+    assert Design.asked(spec)[0] == solver.load_scene("two-dof")
+    spec["scene"]["observe"]["dof"] = "nowhere"
+    with pytest.raises(solver.SceneError, match="submit the job again") as caught:
+        Design.asked(spec)
+    assert [issue.pointer for issue in caught.value.issues] == ["/scene", "/scene/observe/dof"]
+
+
+@pytest.mark.parametrize("version", [None, "0.0.1"])
+def test_what_does_not_fit_this_version_is_refused(version: str | None) -> None:
+    spec = resolve(validated(Design, {"scene": "two-dof", "variables": VARIABLES}), Shipped()).spec
+    spec |= {} if version is None else {"checked_by": version}
+    with pytest.raises(solver.SettingError, match="`colour` is no key of this version: submit the job again"):
+        Design.asked({**spec, "colour": "red"})
+    spec["scene"]["structure"]["colour"] = "red"
+    with pytest.raises(solver.SceneError, match="`colour` = 'red' is not a key"):
+        Design.asked(spec)
 
 
 CASE = {"name": "one"}
@@ -198,7 +237,7 @@ def test_a_front_has_the_keys_of_a_design_but_its_own() -> None:
         assert f"/{key}" in [issue.pointer for issue in caught.value.issues]
         del body[key]
     spec = resolve(validated(Pareto, body), Shipped()).spec
-    assert theirs == {key for key in spec if key != "scene"}
+    assert theirs == spec.keys() - {"scene", "checked_by"}
 
 
 @pytest.mark.long

@@ -19,7 +19,7 @@ from service.client.embedded import EmbeddedService
 from service.db import revisions
 from service.db.clock import utc_now
 from service.db.engine import Database
-from service.db.models import Design, Job, JobResult, JobState, RunTag, Sweep, SweepArray, Upload
+from service.db.models import Job, JobResult, JobState, Result, RunTag, SweepArray, Upload
 from service.db.repositories import JobRepository, UploadRepository
 from service.db.repositories.integrity import check
 from service.db.repositories.owned import Projects
@@ -28,7 +28,8 @@ from service.db.repositories.rows import RunWords
 from service.db.repositories.runs import Runs, Shares
 from service.errors import ConflictError, DatabaseError, StorageFullError
 from service.jobs.arrays import encode
-from service.jobs.outputs import DesignRecord, JobOutput, SweepRecord
+from service.jobs.figures import DesignRecord, SweepRecord
+from service.jobs.outputs import JobOutput
 from service.queue.retention import Retention, prune, prune_database, prune_uploads
 
 DAY = timedelta(days=1)
@@ -74,12 +75,11 @@ def before_a_service(url: str) -> Iterator[Database]:
 
 
 def left(database: Database) -> dict[str, int]:
-    tables = {"jobs": Job, "results": JobResult, "sweeps": Sweep, "arrays": SweepArray, "designs": Design}
+    tables = {"jobs": Job, "results": JobResult, "arrays": SweepArray}
+    counted = {name: select(func.count()).select_from(table) for name, table in tables.items()}
+    counted |= {f"{of}s": select(func.count()).where(Result.of == of) for of in ("sweep", "design")}
     with database.reading() as connection:
-        return {
-            name: connection.execute(select(func.count()).select_from(table)).scalar_one()
-            for name, table in tables.items()
-        }
+        return {name: connection.execute(query).scalar_one() for name, query in counted.items()}
 
 
 def before(days: float) -> datetime:

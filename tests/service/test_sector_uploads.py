@@ -238,7 +238,7 @@ def test_what_another_one_uploaded_is_not_there(shipped: ServedClient) -> None:
     assert {issue.pointer for issue in caught.value.issues} == {
         f"/structure/{key}" for key in ("M", "K", "mapping", "cyclic/nodes")
     }
-    assert all("there is no upload" in issue.message for issue in caught.value.issues)
+    assert all("there is no upload" in issue.said() for issue in caught.value.issues)
     with pytest.raises(NotFoundError):  # answered 404
         uploads.get(theirs["ring.inp"].removeprefix("upload:"), ben)
 

@@ -21,10 +21,10 @@ from service.auth import authenticator
 from service.auth.callers import Scope
 from service.db.clock import utc_now
 from service.db.models import Job, JobResult, JobState
-from service.db.repositories.stored import insert_design
+from service.db.repositories.results import insert_results
 from service.http.routes import page
+from service.jobs.figures import DesignRecord
 from service.jobs.ids import new_id
-from service.jobs.outputs import DesignRecord
 from solver.scene.scene import load_scene
 
 ROLES = ("none", "wrong", "another", "revoked", "expired", "read", "submit", "admin")
@@ -84,6 +84,8 @@ TABLE: dict[str, tuple[tuple[int, ...], Any]] = {
     # Its kind is not among those of these tests, which says so to whoever gets that far.
     "POST /v1/designs": ((401, 401, 422, 401, 401, 403, 422, 422), {}),
     "GET /v1/designs/{design_id}": (OWNED, None),
+    # Of what is not said here: who may ask hears so.
+    "GET /v1/results": ((401, 401, 422, 401, 401, 422, 422, 422), None),
     "GET /v1/sweeps": (LISTED, None),
     "GET /v1/sweeps/{sweep_id}": (OWNED, None),
     "GET /v1/sweeps/{sweep_id}/plot.svg": (OWNED, None),
@@ -207,7 +209,7 @@ def add_design(client: ServedClient, owner: str) -> str:
     with client.service.database.writing() as connection:
         connection.execute(insert(Job).values(**job))
         connection.execute(insert(JobResult).values(job_id=name, body={}))
-        insert_design(connection, name, record, now, owner)
+        insert_results(connection, name, [record], now, owner)
     return name
 
 

@@ -43,7 +43,7 @@ def test_each_number_that_is_none_is_named_by_its_place() -> None:
     body = b'{"a/b": [1, NaN], "c": {"d": -1e999, "e": 1}, "f": ' + b"9" * 400 + b"}"
     with pytest.raises(InvalidRequestError) as raised:
         strict_json.loads(body)
-    assert {issue.pointer: issue.message for issue in raised.value.issues} == {
+    assert {issue.pointer: issue.said() for issue in raised.value.issues} == {
         "/a~1b/1": "`/a~1b/1` must be a finite number, got NaN",
         "/c/d": "`/c/d` must be a finite number, got -1e999",
         "/f": "`/f` must be a finite number, got one of 400 digits",

@@ -242,9 +242,9 @@ def test_a_link_shows_its_run_and_nothing_else(http: ServedClient, monkeypatch: 
     assert http.delete(f"{path}/{link['id']}").status_code == 204
     is_problem(ask(), 404)
     few = http.service.settings.model_copy(update={"requests_per_minute": 5})
-    monkeypatch.setattr(http.application.state.doorkeeper, "_settings", few)
+    monkeypatch.setattr(http.application.state.authenticator, "_settings", few)
     monkeypatch.setattr(
-        http.application.state.doorkeeper, "_links", Buckets()
+        http.application.state.authenticator, "_links", Buckets()
     )  # the tests after it have theirs
     answers = [ask() for _ in range(6)]
     assert "Retry-After" in answers[-1].headers

@@ -40,7 +40,7 @@ def command_of_problem(study: type[ProblemRequest]) -> Callable[..., None]:
         outputs = Outputs.asked(plot, out)
         page = inputs.output_path("--report", report, SUFFIXES)
         scene, given = problem_inputs.posed(told, study)
-        with bar(study.NAME, study.COUNTED) as on_progress:
+        with told.named(), bar(study.NAME, study.COUNTED) as on_progress:
             answer = study.compute(scene, given, Watch(on_progress))
         if page is not None:
             from service.rendering.report.sections import Designed

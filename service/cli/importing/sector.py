@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from service.cli.failures import refused
 from service.cli.importing.files import relative
 from service.cli.options.inputs import output_path
 from service.errors import InputError
@@ -214,7 +215,7 @@ def reduce_disk(
         met = range(of.sectors // 2 + 1) if parts else diameters_met([of.engine_order], of.sectors)
         reduced = reduce_sector(matrices, gone, rows, modes, met, of.sectors, parts)
     except SceneError as error:
-        raise InputError(f"`--mistune`: {error.issues[0].message}") from error
+        raise refused([error.issues[0].at("mistune")], {"mistune": "--mistune"}) from error
     except ValueError as error:
         raise InputError(f"`--reduce`: {error}") from error
     with whole(path) as temporary:
@@ -242,9 +243,7 @@ def checked_boundaries(given: MatrixSet, of: Disk, metres: float = 1.0) -> Any:
         return boundaries(table, given, of.sectors, Path.cwd(), metres)
     except SceneError as error:
         issue = error.issues[0]
-        raise InputError(
-            f"`--{issue.pointer.rpartition('/')[2].replace('_', '-')}`: {issue.message}"
-        ) from error
+        raise InputError(issue.said(f"--{issue.name.replace('_', '-')}")) from error
 
 
 def found_by_position(of: Disk | None) -> list[str]:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -148,18 +148,11 @@ def scene(name: str, texts: Sequence[str] | None) -> Scene:
     """A shipped scene or a file, with the values of ``--set``."""
     import solver
 
-    with path_of("--set"):
-        return solver.load_scene(name).with_values(settings(texts))
-
-
-@contextmanager
-def path_of(option: str) -> Iterator[None]:
-    """Name `option` in the refusal of an unknown parameter path."""
     try:
-        yield
+        return solver.load_scene(name).with_values(settings(texts))
     except SettingError as error:
         if error.name == "path":
-            raise InputError(str(error).replace("`path`", f"`{option}`", 1)) from error
+            raise InputError(error.issue.said("--set")) from error
         raise
 
 

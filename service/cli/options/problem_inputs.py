@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import json
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from optim.criteria.key import Form, Option
+from optim.errors import DesignError
+from service.cli.failures import refused
 from service.cli.options import inputs
 from service.cli.options.problem import OPTIONS, ProblemFlags
 from service.cli.options.scene_files import scene_to_submit
@@ -43,18 +46,15 @@ class Description:
 
     def refusal(self, issues: Sequence[Issue]) -> InputError:
         """What is wrong, with the option or the key of the file that has to change."""
-        return InputError("\nstickslip: ".join(self._told(issue) for issue in issues))
+        return refused(issues, OPTIONS if self.file is None else self.options, self.file)
 
-    def _told(self, issue: Issue) -> str:
-        key = issue.pointer.split("/")[1] if issue.pointer else ""
-        if self.file is not None and key not in self.options:
-            message = issue.message.replace("`path`", f"`{issue.pointer.rpartition('/')[2]}`", 1)
-            return f"{self.file}: {issue.pointer}: {message}"
-        option = self.options.get(key, OPTIONS.get(key, key))
-        for name in (key, "path"):
-            if f"`{name}`" in issue.message:
-                return issue.message.replace(f"`{name}`", f"`{option}`", 1)
-        return f"`{option}`: {issue.message}"
+    @contextmanager
+    def named(self) -> Iterator[None]:
+        """Name options and keys in what is refused inside."""
+        try:
+            yield
+        except (SettingError, DesignError) as error:
+            raise self.refusal([error.issue.at(*(error.place or error.issue.subject))]) from error
 
 
 def description(scene: str | None, flags: ProblemFlags, kind: str, **further: tuple[str, Any]) -> Description:
@@ -143,8 +143,7 @@ def _scene(told: Description) -> Scene:
     except SceneError as error:
         if not isinstance(reference, Mapping):
             raise
-        found = [Issue(pointer=f"/scene{issue.pointer}", message=issue.message) for issue in error.issues]
-        raise told.refusal(found) from error
+        raise told.refusal([issue.below("scene") for issue in error.issues]) from error
 
 
 def _reference(told: Description) -> Any:
@@ -161,7 +160,7 @@ def _with_values(told: Description, scene: Scene, request: ProblemRequest) -> Sc
         try:
             scene = scene.with_values({path: value})
         except SettingError as error:
-            raise told.refusal([Issue(pointer=f"/set/{path}", message=str(error))]) from error
+            raise told.refusal([error.issue.at("set", path)]) from error
     return scene
 
 

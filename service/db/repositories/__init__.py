@@ -2,16 +2,15 @@
 
 from service.db.repositories.jobs import Attempt, JobRepository, JobRow, NewJob, Recovered
 from service.db.repositories.owned import SceneRepository, UploadRepository
-from service.db.repositories.stored import DesignRepository, SweepRepository
+from service.db.repositories.results import ResultRepository
 
 __all__ = [
     "Attempt",
-    "DesignRepository",
     "JobRepository",
     "JobRow",
     "NewJob",
     "Recovered",
+    "ResultRepository",
     "SceneRepository",
-    "SweepRepository",
     "UploadRepository",
 ]

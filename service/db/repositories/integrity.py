@@ -11,18 +11,19 @@ from sqlalchemy import ColumnElement, Connection, Engine, Select, Text, and_, ca
 from sqlalchemy.exc import DBAPIError
 
 from service.db.engine import database_name, database_path, is_sqlite, read_engine
-from service.db.models import Job, JobResult, JobState, Project, Run, Sweep, SweepArray
+from service.db.models import Job, JobResult, JobState, Project, Result, Run, SweepArray
 from service.db.revisions import head_revision, off_head
 from service.errors import DamagedDatabaseError, DatabaseError, WrongRevisionError
 from service.jobs.arrays import decode
-from service.jobs.outputs import StoredArray
+from service.jobs.figures import SWEEP, StoredArray
 
 # A job that ends as `successful` wrote its result with the same transaction, unless it repeats another's.
 # One that failed may have kept what it computed short of its goal.
 _WITHOUT_RESULT = (JobState.ACCEPTED, JobState.RUNNING, JobState.DISMISSED)
 _UNFINISHED = (JobState.ACCEPTED, JobState.RUNNING)
 _WITH_RESULT = exists().where(JobResult.job_id == Job.id)
-_WITH_SWEEPS = exists().where(Sweep.job_id == Job.id)
+_IS_SWEEP = Result.of == SWEEP
+_WITH_SWEEPS = exists().where(Result.job_id == Job.id, _IS_SWEEP)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,8 +59,8 @@ def contradictions(connection: Connection) -> list[str]:
             Job.state.in_([JobState.SUCCESSFUL, JobState.FAILED, JobState.DISMISSED]), Job.finished.is_(None)
         ),
         "sweeps without their arrays": select(func.count())
-        .select_from(Sweep)
-        .where(~exists().where(SweepArray.sweep_id == Sweep.id)),
+        .select_from(Result)
+        .where(_IS_SWEEP, ~exists().where(SweepArray.sweep_id == Result.id)),
         "runs in the bin whose job has not ended": _runs(
             Job.state.in_(_UNFINISHED), Run.deleted.is_not(None)
         ),
@@ -103,7 +104,7 @@ def contents(connection: Connection) -> Contents:
     states = connection.execute(select(Job.state, func.count()).group_by(Job.state)).all()
     return Contents(
         jobs={state.value: count for state, count in states},
-        sweeps=connection.execute(select(func.count()).select_from(Sweep)).scalar_one(),
+        sweeps=connection.execute(select(func.count()).select_from(Result).where(_IS_SWEEP)).scalar_one(),
         arrays=connection.execute(select(func.count()).select_from(SweepArray)).scalar_one(),
     )
 

@@ -28,9 +28,9 @@ from service.db.repositories.attempts import (
     store_pieces,
     with_what_was_kept,
 )
+from service.db.repositories.results import insert_results
 from service.db.repositories.rows import Attempt, JobRow, NewJob, Recovered
 from service.db.repositories.runs import in_the_bin, insert_words, require_project
-from service.db.repositories.stored import insert_design, insert_sweeps
 from service.db.repositories.waiting import Room, Turns, require_share
 from service.errors import IdempotencyError
 from service.jobs.ids import new_id
@@ -394,6 +394,6 @@ class JobRepository:
         text = body.encode()
         written = {"job_id": job_id, "body": body, "sha256": hashlib.sha256(text).hexdigest()}
         connection.execute(job_statements.INSERT_RESULT, written)
-        insert_sweeps(connection, job_id, output.sweeps, created, owner)
-        if output.design is not None:
-            insert_design(connection, job_id, output.design, created, owner)
+        insert_results(connection, job_id, output.sweeps, created, owner)
+        about = connection.execute(job_statements.SCENE, {"job": job_id}).one()
+        insert_results(connection, job_id, output.records(attempt.kind, *about), created, owner)

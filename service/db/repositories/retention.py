@@ -7,21 +7,25 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
 
-from sqlalchemy import ColumnElement, Connection, Text, and_, cast, delete, func, or_, select, update
+from sqlalchemy import ColumnElement, Connection, Text, and_, cast, delete, func, join, or_, select, update
 from sqlalchemy.orm import aliased
 
 from service.db.engine import Database
-from service.db.models import Design, Job, JobState, Project, Run, Share, Sweep, SweepArray, Upload
+from service.db.models import Job, JobState, Project, Result, Run, Share, SweepArray, Upload
 from service.db.repositories.job_statements import ADD_STORED
 from service.jobs.common.scenes import UPLOAD
+from service.jobs.figures import DESIGN, SWEEP
 
 _ENDED = [state for state in JobState if state.finished]
 _NO_ANSWER = ""
 """The spec hash of a job that is no answer any more to who asks for the same."""
 _NAMED = re.compile(re.escape(UPLOAD) + r"([0-9a-f-]+)")
 _later = aliased(Job)
-_HAS_DESIGN = select(Design.job_id).where(Design.job_id == Job.id).correlate(Job).exists()
-_HAS_SWEEPS = select(Sweep.id).where(Sweep.job_id == Job.id).correlate(Job).exists()
+_HAS_DESIGN, _HAS_SWEEPS = (
+    select(Result.id).where(Result.job_id == Job.id, Result.of == of).correlate(Job).exists()
+    for of in (DESIGN, SWEEP)
+)
+_SWEEPS = join(Result, Job, and_(Job.id == Result.job_id, Result.of == SWEEP))
 _IS_AN_ANSWER = select(_later.id).where(_later.result_of == Job.id).correlate(Job).exists()
 
 
@@ -63,7 +67,7 @@ class RetentionRepository:
         binned = _binned(before)
         old, gone = or_(old, binned), or_(gone, binned)
         jobs = select(func.count()).select_from(Job).where(gone)
-        sweeps = select(func.count()).select_from(Sweep).join(Job, Job.id == Sweep.job_id).where(old)
+        sweeps = select(func.count()).select_from(_SWEEPS).where(old)
         projects = select(func.count()).select_from(Project).where(Project.deleted < before)
         with self._db.reading() as connection:
             return Pruned(
@@ -90,12 +94,12 @@ class RetentionRepository:
     def delete_sweeps(self, jobs: Sequence[str], most: int, *, keep_designs: bool) -> int:
         """Delete up to `most` sweeps of these jobs; how many were."""
         free = or_(~_IS_AN_ANSWER, _HAS_DESIGN) if keep_designs else ~_IS_AN_ANSWER
-        query = select(Sweep.id).join(Job, Job.id == Sweep.job_id).where(Job.id.in_(jobs), free).limit(most)
+        query = select(Result.id).select_from(_SWEEPS).where(Job.id.in_(jobs), free).limit(most)
         with self._db.writing() as connection:
             ids = list(connection.execute(query).scalars())
             if ids:
                 _uncount(connection, ids)
-                connection.execute(delete(Sweep).where(Sweep.id.in_(ids)))
+                connection.execute(delete(Result).where(Result.id.in_(ids)))
         return len(ids)
 
     def delete_jobs(self, jobs: Sequence[str], *, keep_designs: bool) -> int:
@@ -151,10 +155,10 @@ class RetentionRepository:
 def _uncount(connection: Connection, sweeps: Sequence[str]) -> None:
     """Take what sweeps store from what their jobs are said to."""
     freed = (
-        select(Sweep.job_id, func.sum(func.length(SweepArray.data)).label("bytes"))
-        .join(SweepArray, SweepArray.sweep_id == Sweep.id)
-        .where(Sweep.id.in_(sweeps))
-        .group_by(Sweep.job_id)
+        select(Result.job_id, func.sum(func.length(SweepArray.data)).label("bytes"))
+        .join(SweepArray, SweepArray.sweep_id == Result.id)
+        .where(Result.id.in_(sweeps))
+        .group_by(Result.job_id)
     )
     for row in connection.execute(freed).all():
         connection.execute(ADD_STORED, {"job": row.job_id, "more": -row.bytes})

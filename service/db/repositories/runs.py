@@ -26,13 +26,14 @@ from sqlalchemy.orm import InstrumentedAttribute
 
 from service.db.clock import Clock
 from service.db.engine import Database
-from service.db.models import ID_LENGTH, NOBODY, Job, JobState, Project, Run, RunTag, Share, Sweep
+from service.db.models import ID_LENGTH, NOBODY, Job, JobState, Project, Result, Run, RunTag, Share
 from service.db.pagination import Condition, met, owner_condition, plain_conditions
 from service.db.repositories.owned import Binned, Rows
 from service.db.repositories.rows import NO_WORDS, JobRow, RunWords
 from service.db.tokens import Made, Tokens, digest_of, matches
 from service.errors import ConflictError, InvalidRequestError, NotFoundError
-from solver.errors import Issue
+from service.jobs.figures import SWEEP
+from solver.errors import Shown
 
 _TABLES = Run.metadata.tables
 _RUN, _TAG = _TABLES["run"], _TABLES["run_tag"]
@@ -65,8 +66,7 @@ def require_project(connection: Connection, project: str | None, owner: str | No
     given = {"project": project[:ID_LENGTH], "owner": owner}
     if len(project) > ID_LENGTH or connection.execute(_PROJECT, given).one_or_none() is None:
         words = "must be the id of a project of the same owner, GET /v1/projects lists them"
-        message = f"`project` {words}, got {project!r:.80}"
-        raise InvalidRequestError([Issue(pointer="/project", message=message)])
+        raise InvalidRequestError.of(("project",), words, Shown(f"{project!r:.80}"))
 
 
 def insert_words(connection: Connection, job_id: str, words: RunWords, now: datetime) -> None:
@@ -276,8 +276,8 @@ def _tags(connection: Connection, jobs: Sequence[str]) -> dict[str, list[str]]:
 
 def _sweeps(connection: Connection, jobs: Sequence[str]) -> dict[str, int]:
     """How many sweeps are stored with each of the jobs."""
-    query = select(Sweep.job_id, func.count()).where(Sweep.job_id.in_(jobs)).group_by(Sweep.job_id)
-    return {row[0]: row[1] for row in connection.execute(query)}
+    query = select(Result.job_id, func.count()).where(Result.job_id.in_(jobs), Result.of == SWEEP)
+    return {row[0]: row[1] for row in connection.execute(query.group_by(Result.job_id))}
 
 
 MOST_SHARES = 20

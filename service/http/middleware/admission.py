@@ -1,4 +1,4 @@
-"""The gate: what every request passes before a route sees it, and what every answer carries.
+"""Admission: what every request passes before a route sees it, and what every answer carries.
 
 It lets through what is listed here and refuses the rest: a new route needs a key without saying so.
 """
@@ -17,7 +17,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.auth import callers
 from service.auth.allowances import AtATime, share
-from service.auth.authenticator import REMEMBERED_SECONDS, Doorkeeper, id_of
+from service.auth.authenticator import REMEMBERED_SECONDS, Authenticator, id_of
 from service.auth.callers import LINK_READERS, Caller
 from service.errors import OriginRefusedError, ServiceError, UnauthorizedError
 from service.http.middleware.connections import KEY, Connection
@@ -28,7 +28,7 @@ _STREAM = re.compile(r"/v1/jobs/[^/]+/events/?")
 _UPLOAD = "/v1/uploads"
 
 
-class Turnstile:
+class ConcurrencyLimits:
     """Counts requests while they are answered.
 
     Parameters
@@ -94,13 +94,13 @@ def by_link(path: str) -> bool:
     return path == _SHARED or path.startswith(f"{_SHARED}/")
 
 
-class Gate:
+class Admission:
     """Finds out who asks and refuses who may not."""
 
-    def __init__(self, app: ASGIApp, doorkeeper: Doorkeeper, turnstile: Turnstile) -> None:
+    def __init__(self, app: ASGIApp, authenticator: Authenticator, concurrency: ConcurrencyLimits) -> None:
         self._app = app
-        self._doorkeeper = doorkeeper
-        self._turnstile = turnstile
+        self._authenticator = authenticator
+        self._concurrency = concurrency
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass the request on with its caller, or answer it with a problem."""
@@ -115,11 +115,11 @@ class Gate:
                 caller = await self._admit(request, token)
                 needed = scope_of(scope["method"], scope["path"])
                 if needed is not None:
-                    self._doorkeeper.require(caller, needed)
-                    held.enter_context(self._turnstile.passed(caller, scope))
+                    self._authenticator.require(caller, needed)
+                    held.enter_context(self._concurrency.passed(caller, scope))
                 elif by_link(scope["path"]):
-                    held.enter_context(self._turnstile.passed(LINK_READERS, scope))
-                self._doorkeeper.count(caller)
+                    held.enter_context(self._concurrency.passed(LINK_READERS, scope))
+                self._authenticator.count(caller)
             except (ServiceError, *AWAY) as error:
                 await answered(request, error)(scope, receive, send)
                 return
@@ -132,14 +132,14 @@ class Gate:
     async def _admit(self, request: Request, token: str | None) -> Caller:
         request.state.key_id = None if token is None else id_of(token)
         address = address_of(request.scope)
-        if self._doorkeeper.known(token):
-            return self._doorkeeper.admit(token, address)
+        if self._authenticator.known(token):
+            return self._authenticator.admit(token, address)
         return await run_in_threadpool(self._look_up, token, address)
 
     def _look_up(self, token: str | None, address: str) -> Caller:
-        caller = self._doorkeeper.admit(token, address)
+        caller = self._authenticator.admit(token, address)
         if token is not None:
-            self._doorkeeper.note_use(token)
+            self._authenticator.note_use(token)
         return caller
 
     async def _serve(self, request: Request, token: str, receive: Receive, send: Send) -> None:

@@ -101,7 +101,7 @@ _NOT_FOUND = 404
 _LONGEST = 300
 
 
-class Seal:
+class HeadersAndAudit:
     """The outermost layer: headers on every answer, a line for every refusal."""
 
     def __init__(self, app: ASGIApp, settings: Settings) -> None:
@@ -109,19 +109,19 @@ class Seal:
         self._settings = settings
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass the request on and seal its answer."""
+        """Pass the request on with headers on its answer."""
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
         state: dict[str, Any] = scope.setdefault("state", {})
 
-        async def sealed(message: Message) -> None:
+        async def with_headers(message: Message) -> None:
             if message["type"] == "http.response.start":
                 self._add_headers(MutableHeaders(scope=message), keyed="key_id" in state and state["key_id"])
                 _audit(scope, state, message["status"])
             await send(message)
 
-        await self._app(scope, receive, sealed)
+        await self._app(scope, receive, with_headers)
 
     def _add_headers(self, headers: MutableHeaders, *, keyed: object) -> None:
         for name, value in _HEADERS.items():

@@ -12,7 +12,7 @@ from service.http.dependencies import InContext, TypedRoute, takes_body
 from service.http.in_lane import computed, prepared
 from service.jobs.answering import PLAN, PREVIEW
 from service.jobs.kinds.previews import PREVIEWS, PreviewRequest
-from service.jobs.kinds.registry.bodies import KIND, any_body, examples
+from service.jobs.kinds.registry.bodies import KIND, any_body, examples, request_of
 from service.jobs.studies.plan import EXAMPLE, Plan, PlanResult
 from service.schemas.preview_answers import LimitsPreview, PointPreview, SensitivitiesPreview, SweepPreview
 
@@ -25,7 +25,7 @@ PlanBody = Annotated[Plan, Body(openapi_examples={"plan": {"value": EXAMPLE}})]
 @plans.post("")
 async def plan(body: PlanBody, context: InContext) -> PlanResult:
     """The effects this scene calls for and those left out, each with the reason; sizes and cost."""
-    return PlanResult.model_validate(await computed(context, PLAN, body.model_dump()))
+    return PlanResult.model_validate(await computed(context, PLAN, {"request": body}))
 
 
 previews = APIRouter(prefix="/v1/previews", tags=["previews"], route_class=TypedRoute)
@@ -44,7 +44,7 @@ async def preview(body: PreviewRequest, context: InContext) -> Response:
     service, caller = context.service, context.caller
     raw = await context.request.json()
     kind = service.previews.registry[raw[KIND]]
-    found = await prepared(context, kind, raw, PREVIEW)
+    found = await prepared(context, kind, request_of(kind, body), raw, PREVIEW)
     asking = f"{caller.owner} {body.client}" if body.client else ""
     most = share(caller, service.settings, "previews")
     spec = json.loads(found.spec)

@@ -71,7 +71,7 @@ class _Story:
         return f"{self._tag}.{self._count}" if self._tag else None
 
 
-class _Bell:
+class _Wakeup:
     """Wakes a stream from the service's threads."""
 
     def __init__(self) -> None:
@@ -81,9 +81,9 @@ class _Bell:
 
     def listen(self, event: Event) -> None:
         """A listener of `Waiters`."""
-        self._loop.call_soon_threadsafe(self._ring, event.ended)
+        self._loop.call_soon_threadsafe(self._wake, event.ended)
 
-    async def rung(self, least: float, patience: float) -> bool:
+    async def news(self, least: float, patience: float) -> bool:
         """Wait for news, at least so long [s] unless the job ended; whether its row has changed."""
         await _within(self._ended, least)
         await _within(self._changed, patience)
@@ -92,7 +92,7 @@ class _Bell:
         self._ended.clear()
         return ended
 
-    def _ring(self, ended: bool) -> None:
+    def _wake(self, ended: bool) -> None:
         self._changed.set()
         if ended:
             self._ended.set()
@@ -165,10 +165,10 @@ async def job_events(
         Of all streams of the service; its own if it is the only one.
     """
     looks = looks or Looks(service)
-    bell, story = _Bell(), _Story(last_event_id)
+    wakeup, story = _Wakeup(), _Story(last_event_id)
     loop = asyncio.get_running_loop()
     heartbeat = service.settings.heartbeat_seconds
-    with service.waiters.listening(job_id, bell.listen):
+    with service.waiters.listening(job_id, wakeup.listen):
         yield ServerSentEvent(comment=f"job {job_id}", retry=_RETRY_MILLISECONDS)
         row = await looks.row(job_id, caller)
         looked = said = loop.time()
@@ -183,7 +183,7 @@ async def job_events(
             elsewhere = live is None and not service.database.exclusive
             look_after = _LOOK_ELSEWHERE_SECONDS if elsewhere else _LOOK_AGAIN_SECONDS
             now = loop.time()
-            changed = await bell.rung(
+            changed = await wakeup.news(
                 looks.least_seconds, max(min(looked + look_after, said + heartbeat) - now, 0.0)
             )
             now = loop.time()
@@ -203,7 +203,7 @@ LastEventId = Annotated[
 ]
 
 
-class _ToldEverything(Exception):  # noqa: N818 - no error: there is nothing more to say
+class _AllSentError(Exception):
     """The client has had the end of this job."""
 
 
@@ -226,7 +226,7 @@ async def _watched(
     request, service, caller = context.request, context.service, context.caller
     row = await service.lanes.reads.run(caller.owner, service.job, job_id, caller)
     if last_event_id == END and row.state.finished:
-        raise _ToldEverything
+        raise _AllSentError
     return _Watched(
         service, request.app.state.looks, caller, job_id, last_event_id, HEADERS_ONLY in request.scope
     )
@@ -263,4 +263,4 @@ def install(app: FastAPI) -> None:
     async def nothing_more(_request: Request, _error: Exception) -> Response:
         return Response(status_code=204)
 
-    app.add_exception_handler(_ToldEverything, nothing_more)
+    app.add_exception_handler(_AllSentError, nothing_more)

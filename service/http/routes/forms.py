@@ -15,7 +15,7 @@ from service.jobs.registry import JobKind
 from service.jobs.strict_json import encoded
 from service.schemas.answers import Answer, KindAnswer, KindList
 from service.schemas.law_answers import LawList, law_list
-from solver.errors import Issue, SceneError
+from solver.errors import SceneError
 from solver.scene.json_schema import plain, scene_schema
 from solver.scene.templates import TEMPLATES, template_schema, template_tables
 
@@ -76,13 +76,11 @@ def list_templates() -> TemplateList:
 async def fill_template(body: FillBody) -> TemplateScene:
     """The scene of a case, made of the answers to its questions; nothing is stored."""
     if body.template not in TEMPLATES:
-        message = f"`template` must be one of {', '.join(TEMPLATES)}, got {body.template!r}"
-        raise InvalidRequestError([Issue(pointer="/template", message=message)])
+        raise InvalidRequestError.of(("template",), f"must be one of {', '.join(TEMPLATES)}", body.template)
     try:
         return TemplateScene(scene=template_tables(body.template, body.answers))
     except SceneError as error:
-        issues = [Issue(pointer=f"/answers{one.pointer}", message=one.message) for one in error.issues]
-        raise InvalidRequestError(issues) from error
+        raise InvalidRequestError([one.below("answers") for one in error.issues]) from error
 
 
 @cache

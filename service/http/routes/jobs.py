@@ -129,30 +129,30 @@ def results_answer(service: Service, job_id: str, caller: Caller) -> Response:
     """What a job computed, to a caller."""
     with service.database.reading():
         found = service.results(job_id, caller)
-        sweeps = SweepAnswer.of_rows(found.sweeps, service.sweeps)
+        sweeps = [SweepAnswer.of(one) for one in found.sweeps]
     about = ResultsHead(job=found.job.id, status=found.job.state)
     body = with_raw(about, result=found.text.encode(), sweeps=raw_list(sweeps))
     return Response(body, media_type="application/json")
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
+class SubmissionHeaders:
     """What the headers of a submission ask for: its idempotency key, and the seconds to wait for the end."""
 
     key: str | None
     seconds: float | None
 
 
-async def asked(context: InContext) -> Asked:
+async def asked(context: InContext) -> SubmissionHeaders:
     """Read the headers of a submission; `idempotency_key` lists the errors."""
     headers = context.request.headers
-    return Asked(
+    return SubmissionHeaders(
         key=idempotency_key(headers),
         seconds=preferred_wait(headers, context.service.settings.max_wait_seconds),
     )
 
 
-AskedDependency = Annotated[Asked, Depends(asked)]
+AskedDependency = Annotated[SubmissionHeaders, Depends(asked)]
 
 
 def submissions(registry: Registry) -> APIRouter:
@@ -175,12 +175,15 @@ def submissions(registry: Registry) -> APIRouter:
     return taking
 
 
-async def _submit(context: Context, asked: Asked, raw: dict[str, Any], body: JobRequest) -> Response:
+async def _submit(
+    context: Context, asked: SubmissionHeaders, raw: dict[str, Any], body: JobRequest
+) -> Response:
     service, caller = context.service, context.caller
     kind = service.registry.get(raw[KIND])
-    found = await prepared(context, kind, raw)
+    request = request_of(kind, body)
+    found = await prepared(context, kind, request, raw)
     row, _ = await service.lanes.writes.run(
-        caller.owner, service.accept, kind, request_of(kind, body), raw, asked.key, caller, found
+        caller.owner, service.accept, kind, request, raw, asked.key, caller, found
     )
     headers = {"Location": f"/v1/jobs/{row.id}"}
     answer = partial(_job_or_result, service, headers)
@@ -199,7 +202,7 @@ def _job_or_result(service: Service, headers: Mapping[str, str], row: JobRow) ->
     with service.database.reading():
         source = row.result_of or row.id
         text = service.jobs.result_text(source)
-        sweeps = SweepAnswer.of_rows(service.sweeps.of_job(source), service.sweeps)
+        sweeps = [SweepAnswer.of(one) for one in service.stored.of_job(source)]
     result = b"null" if text is None else text.encode()
     body = with_raw(JobAnswer.of(row), result=result, sweeps=raw_list(sweeps))
     return Response(body, 200, headers, "application/json")

@@ -14,7 +14,7 @@ from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Body, Depends, Header, Query, Request, Response
 
-from service.auth.authenticator import Doorkeeper
+from service.auth.authenticator import Authenticator
 from service.auth.callers import KEYLESS, LINK_READERS, Caller, Scope
 from service.db.repositories.runs import RunRow
 from service.errors import ConflictError, NotFoundError
@@ -302,8 +302,8 @@ async def _of_link(
     request: Request, token: Annotated[str, Query(max_length=200, description="Of the link.")]
 ) -> Context:
     """The context of a request by a link, while it may be asked: all who have one take turns as one."""
-    doorkeeper: Doorkeeper = request.app.state.doorkeeper
-    doorkeeper.count_link(token, address_of(request.scope))
+    authenticator: Authenticator = request.app.state.authenticator
+    authenticator.count_link(token, address_of(request.scope))
     return Context(request, service_behind(request), LINK_READERS, token)
 
 

@@ -93,14 +93,14 @@ class SceneEdited(BaseModel):
 @texts.post("/read", response_model=SceneRead)
 async def read(body: ReadBody, context: InContext) -> Response:
     """Read the text of a scene file and list everything that is wrong with it; nothing is stored."""
-    found = await computed(context, answering.READ, body.model_dump(), about="/text")
+    found = await computed(context, answering.READ, body.model_dump(), about="text")
     return Response(found, media_type="application/json")
 
 
 @texts.post("/text", response_class=Response, responses={200: media({"application/toml": TEXT})})
 async def text(body: TextBody, context: InContext) -> Response:
     """The TOML of a scene with its values set: the file that reproduces what was computed."""
-    words = {"scene": body.model_dump(exclude={"comments"}), "comments": body.comments}
+    words = {"request": body, "comments": body.comments}
     return Response(await computed(context, answering.TEXT, words), media_type="application/toml")
 
 
@@ -110,7 +110,7 @@ async def edit(body: EditBody, context: InContext) -> Response:
 
     Comments, order and spelling of what stays the same are kept.
     """
-    found = await computed(context, answering.EDIT, body.model_dump(), about="/text")
+    found = await computed(context, answering.EDIT, body.model_dump(), about="text")
     return Response(found, media_type="application/json")
 
 

@@ -1,4 +1,4 @@
-"""``/v1/sweeps`` and ``/v1/designs``: what was computed and designed, to be queried."""
+"""``/v1/results``, ``/v1/sweeps`` and ``/v1/designs``: what was computed, to be queried."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Query, Response
 
-from service.db.models import Sweep
 from service.http.dependencies import (
     BINARY,
     LISTED,
@@ -19,6 +18,7 @@ from service.http.dependencies import (
     tagged,
 )
 from service.http.in_lane import drawing, reading, writing_files
+from service.jobs.figures import SweepRecord
 from service.rendering.representations import (
     BY_FORMAT,
     JSON,
@@ -28,9 +28,15 @@ from service.rendering.representations import (
     sweep_body,
     sweep_picture,
 )
-from service.schemas.answers import DesignDetail, DesignPage, SweepDetail, SweepPage
-from service.schemas.design_queries import DesignQuery, design_detail, design_page
-from service.schemas.sweep_queries import SweepQuery, sweep_page
+from service.schemas.answers import DesignDetail, DesignPage, ResultPage, SweepDetail, SweepPage
+from service.schemas.result_queries import (
+    DesignQuery,
+    ResultQuery,
+    SweepQuery,
+    design_page,
+    result_page,
+    sweep_page,
+)
 
 sweeps = APIRouter(prefix="/v1/sweeps", tags=["sweeps"])
 
@@ -51,7 +57,7 @@ SweepForm = Annotated[
 @reading
 def list_sweeps(context: InContext, query: Annotated[SweepQuery, Query()]) -> Response:
     """Stored sweeps that meet every filter, newest first unless `sort` says otherwise."""
-    return listing(context, sweep_page(context.service.sweeps, query, context.service.settings, context.sees))
+    return listing(context, sweep_page(context.service.stored, query, context.service.settings, context.sees))
 
 
 @sweeps.get("/{sweep_id}", response_model=SweepDetail, responses=SWEEP_FORMS)
@@ -66,7 +72,7 @@ def get_sweep(sweep_id: str, context: InContext, form: SweepForm = None) -> Resp
     return sweep_answer(context.service.sweep(sweep_id, context.caller), form, context)
 
 
-def sweep_answer(sweep: Sweep, form: str | None, context: Context) -> Response:
+def sweep_answer(sweep: SweepRecord, form: str | None, context: Context) -> Response:
     """A stored sweep in the form of `form`, or the one that `Accept` prefers."""
     service, request = context.service, context.request
     accept = request.headers.get("accept") if form is None else BY_FORMAT[form]
@@ -75,7 +81,7 @@ def sweep_answer(sweep: Sweep, form: str | None, context: Context) -> Response:
     if kind in SUFFIXES:
         headers["Content-Disposition"] = f'attachment; filename="sweep-{sweep.id}.{SUFFIXES[kind]}"'
     scene = None if kind == "application/json" else service.jobs.spec(sweep.job_id).get("scene")
-    return tagged(request, sweep_body(sweep, kind, service.sweeps, scene), kind, headers)
+    return tagged(request, sweep_body(sweep, kind, service.stored, scene), kind, headers)
 
 
 @sweeps.get(
@@ -100,8 +106,8 @@ def plot_png(sweep_id: str, context: InContext) -> Response:
     return _picture(context.service.sweep(sweep_id, context.caller), "png", context)
 
 
-def _picture(sweep: Sweep, suffix: str, context: Context) -> Response:
-    picture = sweep_picture(sweep, suffix, context.service.sweeps)
+def _picture(sweep: SweepRecord, suffix: str, context: Context) -> Response:
+    picture = sweep_picture(sweep, suffix, context.service.stored)
     return tagged(context.request, picture, _PICTURE_TYPES[suffix])
 
 
@@ -113,12 +119,29 @@ designs = APIRouter(prefix="/v1/designs", tags=["designs"])
 def list_designs(context: InContext, query: Annotated[DesignQuery, Query()]) -> Response:
     """Stored designs that meet every filter, newest first unless `sort` says otherwise."""
     service = context.service
-    return listing(context, design_page(service.designs, query, service.settings, context.sees))
+    return listing(context, design_page(service.stored, query, service.settings, context.sees))
 
 
 @designs.get("/{design_id}", response_model=DesignDetail, responses=UNCHANGED)
 @reading
 def get_design(design_id: str, context: InContext) -> Response:
     """A stored design with the whole result of its job; its id is that of the job. Has a strong ETag."""
-    answer = design_detail(context.service.design(design_id, context.caller), context.service.designs)
+    answer = DesignDetail.whole(context.service.design(design_id, context.caller))
     return tagged(context.request, answer.model_dump_json().encode())
+
+
+results = APIRouter(prefix="/v1/results", tags=["results"])
+
+
+@results.get("", response_model=ResultPage, responses=LISTED)
+@reading
+def list_results(context: InContext, query: Annotated[ResultQuery, Query()]) -> Response:
+    """Stored results of one kind that meet every filter, newest first unless `sort` says otherwise.
+
+    Every number of the result is a filter, with `_min` and `_max` for a range, both inclusive, and so is
+    every truth and every word: `/v1/results?of=sweep&peak_max=2e-3&completed=true&sort=peak`. `quantities` of
+    the answer names them with their units.
+    """
+    service = context.service
+    page = result_page(service.stored, query, service.registry, service.settings, context.sees)
+    return listing(context, page)

@@ -22,7 +22,6 @@ from service.schemas.matrix_answers import FormatAnswer, FormatsAnswer, Matrices
 from service.schemas.pages import Cursor, Limit, ListQuery, newest
 from service.schemas.upload_answers import NewUpload, UploadAnswer, UploadedArray, UploadPage
 from service.uploads.uploads import Arrived, file_name, format_of
-from solver.errors import Issue
 
 router = APIRouter(prefix="/v1/uploads", tags=["uploads"])
 
@@ -211,15 +210,11 @@ async def look(body: JsonBody, context: InContext) -> MatricesAnswer:
     """
     request = validated(MatricesRequest, body)
     if bool(request.uploads) == (request.structure is not None):
-        raise InvalidRequestError(
-            [Issue(pointer="/uploads", message="one of `uploads` and `structure` is needed")]
-        )
+        raise InvalidRequestError.of(("uploads",), "one of `uploads` and `structure` is needed", named=False)
     asked = request.model_dump()
     if (request.structure or {}).get("dofs"):
         if request.excitation is None:
-            raise InvalidRequestError(
-                [Issue(pointer="/excitation/dof", message="a DOF for the force is needed")]
-            )
+            raise InvalidRequestError.of(("excitation", "dof"), "a DOF for the force is needed", named=False)
         asked["observe"] = asked["observe"] or {"dof": request.excitation.dof}
         if (request.structure or {}).get("sectors") is not None and request.excitation.engine_order is None:
             asked["excitation"]["engine_order"] = _USUAL_ORDER
@@ -297,8 +292,8 @@ async def read_measurements(body: ReadBody, context: InContext) -> Response:
     The first thing that is wrong with each file is told with its line and column.
     """
     words = {
-        "scene": body.model_dump(exclude={"files"}),
+        "request": body,
         "files": [file.model_dump() for file in body.files],
     }
-    found = await computed(context, answering.MEASURED, words, about="/files")
+    found = await computed(context, answering.MEASURED, words, about="files")
     return Response(found, media_type="application/json")

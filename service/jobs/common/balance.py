@@ -39,7 +39,7 @@ def effects_issues(effects: str) -> list[Issue]:
     # Loaded here, as below: the help of a command needs the keys alone.
     from solver.balance.simplifications import Effects
 
-    return check("/effects", partial(Effects.read, effects))
+    return check(partial(Effects.read, effects), "effects")
 
 
 def with_effects(asked: Mapping[str, Any]) -> dict[str, Any]:
@@ -50,9 +50,9 @@ def with_effects(asked: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def solved_issues(
-    where: str, scene: Scene, harmonics: int, effects: str, *, accuracy: float | None = None, points: int = 1
+    key: str, scene: Scene, harmonics: int, effects: str, *, accuracy: float | None = None, points: int = 1
 ) -> list[Issue]:
     """Refuse responses whose balance is too large, or too many of them, as `balance_issues`."""
     every_sector = with_effects({"effects": effects})["effects"].every_sector
     highest = harmonics if accuracy is None else max(harmonics, _FIRST_TRIES)
-    return balance_issues(where, scene, highest, points, every_sector=every_sector)
+    return balance_issues(key, scene, highest, points, every_sector=every_sector)

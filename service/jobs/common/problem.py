@@ -42,7 +42,7 @@ class ProblemRequest(ProblemKeys, Study, HarmonicRequest):
     def sizes(self, scene: Scene) -> list[Issue]:
         """Return what is too large."""
         points, words = POINTS_OF_A_SWEEP * len(self.cases or [1]), "points of one design's responses"
-        return balance_issues("/cases", scene, self.harmonics, points, words)
+        return balance_issues("cases", scene, self.harmonics, points, words)
 
     def spec(self, scene: Scene) -> dict[str, Any]:
         """Return what was given, with the variables that stand for none: a spec says what is chosen."""

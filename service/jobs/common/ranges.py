@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 from pydantic import ConfigDict, Field
 
-from service.jobs.common.scenes import HarmonicRequest, Number, ParameterPath, check, refusal
+from service.jobs.common.scenes import HarmonicRequest, Number, ParameterPath, check
 from service.jobs.registry import Flag
-from solver.errors import Issue
+from solver.errors import Issue, Naming, Shown
 from solver.scene.descriptions import DISK_LOAD
 
 if TYPE_CHECKING:
@@ -36,17 +36,17 @@ def range_issues(request: RangeRequest, scene: Scene) -> list[Issue]:
     from solver.continuation.parameter_scale import scale_of
 
     path = request.parameter
-    unknown = check("/parameter", partial(scene.check_path, path))
+    unknown = check(partial(scene.check_path, path), "parameter")
     if unknown:
         return unknown
     if path == FREQUENCY:
-        return [refusal("/parameter", "`parameter` cannot be the frequency: all of the band is looked at")]
+        return [Issue(("parameter",), "cannot be the frequency: all of the band is looked at")]
     issues: list[Issue] = []
-    for where, value in (("/from", request.start), ("/to", request.stop)):
-        issues += check(where, partial(scene.with_values, {path: value}))
+    for key, value in (("from", request.start), ("to", request.stop)):
+        issues += check(partial(scene.with_values, {path: value}), key)
     if request.start == request.stop:
-        issues.append(refusal("/to", f"`to` must differ from `from`, got {request.stop!r} for both"))
-    return issues or check("/parameter", partial(scale_of, scene, path, request.start, request.stop))
+        issues.append(Issue(("to",), Naming("must differ from {from}"), Shown(f"{request.stop!r} for both")))
+    return issues or check(partial(scale_of, scene, path, request.start, request.stop), "parameter")
 
 
 def band_issues(scene: Scene, start: float | None, stop: float | None) -> list[Issue]:
@@ -54,11 +54,12 @@ def band_issues(scene: Scene, start: float | None, stop: float | None) -> list[I
     low, high = (
         end if given is None else given for end, given in zip(scene.observe.band, (start, stop), strict=True)
     )
-    return [] if low < high else [refusal("/to", f"`to` must be above `from` = {low!r} Hz, got {high!r}")]
+    return [] if low < high else [Issue(("to",), Naming(f"must be above {{from}} = {low!r} Hz"), high)]
 
 
-def law_issues(where: str, scene: Scene) -> list[Issue]:
-    """Refuse contacts whose peaks cannot be tracked, at the pointer `where`."""
+def law_issues(key: str, scene: Scene) -> list[Issue]:
+    """Refuse contacts whose peaks cannot be tracked, as what is wrong with `key`."""
     from solver.studies.peaks.tracker import check_laws
 
-    return check(where, partial(check_laws, scene))
+    found = check(partial(check_laws, scene))
+    return [Issue((key,), issue.message, named=False) for issue in found]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from service.jobs.arrays import encode
-from service.jobs.outputs import ContactValues, DesignRecord, StoredArray, SweepRecord, VariableValues
+from service.jobs.figures import ContactValues, DesignRecord, StoredArray, SweepRecord, VariableValues
 from service.jobs.strict_json import digest
 from solver.results.told import json_number
 from solver.scene.scene import AnyContact, Scene

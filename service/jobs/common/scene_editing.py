@@ -36,7 +36,7 @@ def side_by_side(text: str, scene: Mapping[str, Any] | None, source: SceneSource
     issues = issues_of_scene(held, source)
     lines = text.replace("\r\n", "\n")
     root = places(lines) if issues else None
-    found = [_told(lines, root, issue.pointer, issue.message) for issue in issues]
+    found = [_told(lines, root, issue.pointer, issue.said()) for issue in issues]
     return {"text": text, "scene": held, "issues": found}
 
 

@@ -47,15 +47,12 @@ def _json(text: str) -> object:
     try:
         return strict_json.loads(text.encode())
     except InvalidRequestError as error:
-        raise InvalidRequestError(
-            [Issue(pointer="/text", message=one.message) for one in error.issues]
-        ) from error
+        raise InvalidRequestError([one.at("text") for one in error.issues]) from error
 
 
 def _toml(text: str) -> object:
     if len(text) > MOST_OF_TOML:
-        message = f"`text` in TOML may have {MOST_OF_TOML} characters, got {len(text)}"
-        raise InvalidRequestError([Issue(pointer="/text", message=message)])
+        raise InvalidRequestError.of(("text",), f"in TOML may have {MOST_OF_TOML} characters", len(text))
     too_long = _LONG_KEY.search(text)
     if too_long:
         line = _line(text, too_long.start())

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping
-from functools import lru_cache
+from collections.abc import Callable, Mapping
+from functools import cache, lru_cache
+from importlib.metadata import version
 from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import BeforeValidator, Field, WithJsonSchema
@@ -19,7 +20,7 @@ from optim.criteria.json_types import PositiveNumber as PositiveNumber
 from service.errors import InvalidRequestError
 from service.jobs.registry import Flag, JobRequest, Resolved, SceneSource
 from service.jobs.strict_json import digest
-from solver.errors import Issue, SceneError, SettingError, pointer
+from solver.errors import Issue, SceneError, SettingError
 from solver.scene.descriptions import DAMPER_LOAD
 
 if TYPE_CHECKING:
@@ -33,6 +34,8 @@ FILE_KEYS = ("M", "K", "C", "G", "K_omega2", "modes", "mapping", "diameters", "n
 
 Place = tuple[str, ...]
 """Keys that lead to a value in a structure."""
+SCENE, CHECKED_BY = "scene", "checked_by"
+"""Keys of a spec."""
 
 _SCENE_NAME = re.compile(r"[A-Za-z0-9_-]{1,100}")
 
@@ -103,7 +106,7 @@ def resolve_scene(request: SceneRequest, source: SceneSource) -> Scene:
         try:
             scene = scene.with_values({path: value})
         except SettingError as error:
-            issues.append(Issue(pointer=pointer("set", path), message=str(error)))
+            issues.append(error.issue.at("set", path))
     if issues:
         raise InvalidRequestError(issues)
     return scene
@@ -123,14 +126,13 @@ def _read(reference: object, source: SceneSource) -> Scene:
         return shipped
     body = source.scene_body(reference) if isinstance(reference, str) else reference
     if not isinstance(body, Mapping):
-        message = f"`scene` {reference!r} is neither a shipped scene nor a stored one"
-        raise InvalidRequestError([Issue(pointer=pointer("scene"), message=message)])
+        raise InvalidRequestError.of(("scene",), f"{reference!r} is neither a shipped scene nor a stored one")
     if body is reference and refers_to_uploads(body):
         try:
             body = source.with_uploads(body)
         except InvalidRequestError as error:
-            raise _below_scene(error.issues) from error
-    return read_scene(body, prefix=pointer("scene"))
+            raise InvalidRequestError([issue.below(SCENE) for issue in error.issues]) from error
+    return read_scene(body, SCENE)
 
 
 def refers_to_uploads(body: Mapping[str, object]) -> bool:
@@ -164,18 +166,13 @@ def with_named(structure: Mapping[str, Any], names: Mapping[Place, str]) -> dict
     return changed
 
 
-def _below_scene(issues: Iterable[Issue]) -> InvalidRequestError:
-    found = [Issue(pointer=pointer("scene") + issue.pointer, message=issue.message) for issue in issues]
-    return InvalidRequestError(found)
-
-
-def read_scene(body: Mapping[str, object], prefix: str = "") -> Scene:
+def read_scene(body: Mapping[str, object], *place: str) -> Scene:
     """A scene from a request body.
 
     Raises
     ------
     InvalidRequestError
-        Lists everything that is wrong, with pointers below `prefix`.
+        Lists everything that is wrong, with subjects below `place`.
     """
     # Loaded here: the help of a command needs the keys alone.
     from solver.scene.scene import Scene
@@ -183,31 +180,16 @@ def read_scene(body: Mapping[str, object], prefix: str = "") -> Scene:
     try:
         return Scene.from_dict(body)
     except SceneError as error:
-        issues = [Issue(pointer=prefix + issue.pointer, message=issue.message) for issue in error.issues]
-        raise InvalidRequestError(issues) from error
+        raise InvalidRequestError([issue.below(*place) for issue in error.issues]) from error
 
 
-def check(where: str, attempt: Callable[[], object]) -> list[Issue]:
-    """Nothing if `attempt` goes through; its SettingError as an issue at the pointer `where` otherwise."""
+def check(attempt: Callable[[], object], *place: str | int) -> list[Issue]:
+    """Nothing if `attempt` goes through; its SettingError otherwise, of `place` if one is given."""
     try:
         attempt()
     except SettingError as error:
-        return [Issue(pointer=where, message=str(error))]
+        return [error.issue.at(*place) if place else error.issue]
     return []
-
-
-def check_named(attempt: Callable[[], object]) -> list[Issue]:
-    """As `check`, at the key that the error names."""
-    try:
-        attempt()
-    except SettingError as error:
-        return [Issue(pointer=pointer(error.name), message=str(error))]
-    return []
-
-
-def refusal(where: str, message: str) -> Issue:
-    """Something wrong with the field at the pointer `where`."""
-    return Issue(pointer=where, message=message)
 
 
 def require(issues: list[Issue]) -> None:
@@ -217,6 +199,32 @@ def require(issues: list[Issue]) -> None:
 
 
 def resolved(scene: Scene, **settings: object) -> Resolved:
-    """The spec of a request about `scene`; the settings are JSON."""
+    """The spec of a request about `scene`, which says what version checked it; the settings are JSON."""
     body = scene.to_dict()
-    return Resolved(spec={"scene": body, **settings}, scene_name=scene.name, scene_hash=digest(body))
+    spec = {SCENE: body, CHECKED_BY: installed(), **settings}
+    return Resolved(spec=spec, scene_name=scene.name, scene_hash=digest(body))
+
+
+def stored_scene(spec: Mapping[str, Any]) -> Scene:
+    """The scene of a spec; it is checked again if another version did so.
+
+    Raises
+    ------
+    SceneError
+        It does not fit this version.
+    """
+    from solver.scene.scene import Scene
+
+    if spec.get(CHECKED_BY) == installed():
+        return Scene.from_checked(spec[SCENE])
+    try:
+        return Scene.from_dict(spec[SCENE])
+    except SceneError as error:
+        said = "was stored by another version and does not fit this one: submit the job again"
+        raise SceneError([Issue((SCENE,), said), *(one.below(SCENE) for one in error.issues)]) from error
+
+
+@cache
+def installed() -> str:
+    """The version of the package."""
+    return version("stickslip")

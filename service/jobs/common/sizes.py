@@ -7,8 +7,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import TYPE_CHECKING
 
-from service.jobs.common.scenes import refusal
-from solver.errors import Issue
+from solver.errors import Issue, Shown
 
 if TYPE_CHECKING:
     from solver.scene.scene import Scene
@@ -74,15 +73,15 @@ def _too_much(key: str, needed: int) -> Issue:
     words = f"must need at most {most:.0f} MB for its dense matrices" if key == "scene" else (
         f"must be so few that the dense matrices need at most {most:.0f} MB"
     )  # fmt: skip
-    return refusal(f"/{key}", f"`{key}` {words}, got {needed / 1e6:.0f} MB")
+    return Issue((key,), words, Shown(f"{needed / 1e6:.0f} MB"))
 
 
-def size_issues(where: str, words: str, points: int, harmonics: int, dofs: int) -> list[Issue]:
-    """Refuse what would take longer than a job should, at the pointer `where`.
+def size_issues(key: str, words: str, points: int, harmonics: int, dofs: int) -> list[Issue]:
+    """Refuse what would take longer than a job should, as what is wrong with `key`.
 
     Parameters
     ----------
-    where : of the field that makes it large.
+    key : the field that makes it large.
     words : what is counted, for people.
     points : periodic responses to be solved.
     harmonics : kept in each.
@@ -92,18 +91,18 @@ def size_issues(where: str, words: str, points: int, harmonics: int, dofs: int) 
     most = _most_work.get()
     if work <= most:
         return []
-    return [refusal(where, f"{words} × harmonics × DOFs must be at most {most}, got {work}")]
+    return [Issue((key,), f"{words} × harmonics × DOFs must be at most {most}", work, named=False)]
 
 
 def balance_issues(
-    where: str, scene: Scene, harmonics: int, points: int = 1, words: str = "points", *,
+    key: str, scene: Scene, harmonics: int, points: int = 1, words: str = "points", *,
     every_sector: bool = False,
 ) -> list[Issue]:  # fmt: skip
-    """Refuse responses whose balance is too large, or too many of them, at the pointer `where`.
+    """Refuse responses whose balance is too large, or too many of them, as what is wrong with `key`.
 
     Parameters
     ----------
-    where : of the field that makes it large, if it is not the scene itself.
+    key : the field that makes it large, if it is not the scene itself.
     harmonics : highest one kept.
     points : periodic responses to be solved.
     words : what is counted, for people.
@@ -113,7 +112,7 @@ def balance_issues(
     return (
         _unknown_issues(scene, harmonics, sectors)
         or memory_issues(scene, harmonics, every_sector=every_sector)
-        or size_issues(where, words, points, harmonics, len(scene.dofs) * sectors)
+        or size_issues(key, words, points, harmonics, len(scene.dofs) * sectors)
     )
 
 
@@ -151,12 +150,11 @@ def _unknown_issues(scene: Scene, harmonics: int, sectors: int) -> list[Issue]:
     plain = kept == 2 * harmonics + 1
     of_each = f"(2 × {harmonics} harmonics + 1)" if plain else f"{kept} coefficients"
     fitting = (MOST_UNKNOWNS // motions - 1) // 2
-    got = f"got {motions} motions of contacts × {of_each} = {unknowns}"
+    got = Shown(f"{motions} motions of contacts × {of_each} = {unknowns}")
     if fitting >= 1:
-        words = f"`harmonics` must be at most {fitting} for this scene, {MOST_UNKNOWNS} unknowns"
-        return [refusal("/harmonics", f"{words}, {got}")]
-    words = f"`scene` must have contacts for at most {MOST_UNKNOWNS} unknowns"
-    return [refusal("/scene", f"{words}, {got}")]
+        words = f"must be at most {fitting} for this scene, {MOST_UNKNOWNS} unknowns"
+        return [Issue(("harmonics",), words, got)]
+    return [Issue(("scene",), f"must have contacts for at most {MOST_UNKNOWNS} unknowns", got)]
 
 
 def march_issues(scene: Scene, steps_per_period: int | None, max_periods: int) -> list[Issue]:
@@ -170,9 +168,9 @@ def march_issues(scene: Scene, steps_per_period: int | None, max_periods: int) -
     steps = (steps_per_period or FEWEST_STEPS) * max_periods * dofs
     if steps <= MOST_STEPS:
         return []
-    where = "max_periods" if steps_per_period is None else "steps_per_period"
+    key = "max_periods" if steps_per_period is None else "steps_per_period"
     words = "steps of a period × periods × DOFs"
-    return [refusal(f"/{where}", f"`{where}`: {words} must be at most {MOST_STEPS}, got {steps}")]
+    return [Issue((key,), f"`{key}`: {words} must be at most {MOST_STEPS}", steps, named=False)]
 
 
 def dofs_solved(scene: Scene) -> int:

@@ -16,10 +16,10 @@ from service.jobs.common.scenes import (
     FrequencyHz,
     HarmonicRequest,
     PositiveNumber,
-    refusal,
     require,
     resolve_scene,
     resolved,
+    stored_scene,
 )
 from service.jobs.common.sizes import (
     POINTS_OF_A_SWEEP,
@@ -93,14 +93,20 @@ def _scene(request: PreviewRequest, source: SceneSource, points: int, harmonics:
     scene = resolve_scene(request, source)
     issues: list[Issue] = []
     if request.harmonics > MOST_HARMONICS:
-        message = f"`harmonics` of a preview must be at most {MOST_HARMONICS}, got {request.harmonics}"
-        issues.append(refusal("/harmonics", message))
+        issues.append(
+            Issue(("harmonics",), f"of a preview must be at most {MOST_HARMONICS}", request.harmonics)
+        )
     unknowns = dofs_solved(scene) * (2 * request.harmonics + 1)
     if unknowns > MOST_UNKNOWNS:
         words = "DOFs × coefficients of a preview"
-        message = f"{words} must be at most {MOST_UNKNOWNS}, got {unknowns}: submit a job"
-        issues.append(refusal("/scene", message))
-    require(issues or balance_issues("/harmonics", scene, harmonics, points))
+        issues.append(
+            Issue(
+                ("scene",),
+                f"{words} must be at most {MOST_UNKNOWNS}, got {unknowns}: submit a job",
+                named=False,
+            )
+        )
+    require(issues or balance_issues("harmonics", scene, harmonics, points))
     return scene
 
 
@@ -128,16 +134,14 @@ def resolve_limits(request: LimitsPreviewRequest, source: SceneSource) -> Resolv
     scene = _scene(request, source, 2 * POINTS_OF_A_SWEEP, 1)
     names = [contact.name for contact in scene.contacts]
     if request.contact is not None and request.contact not in names:
-        message = f"`contact` must be one of {', '.join(names)}, got {request.contact!r}"
-        require([refusal("/contact", message)])
+        require([Issue(("contact",), f"must be one of {', '.join(names)}", request.contact)])
     return resolved(scene, harmonics=request.harmonics, contact=request.contact)
 
 
 def resolve_point(request: PointPreviewRequest, source: SceneSource) -> Resolved:
     """Look up the scene, check its size, and choose the harmonics that can be kept in time."""
     if request.frequency_hz < LEAST_HZ:
-        message = f"`frequency_hz` must be at least {LEAST_HZ:g}, got {request.frequency_hz!r}"
-        require([refusal("/frequency_hz", message)])
+        require([Issue(("frequency_hz",), f"must be at least {LEAST_HZ:g}", request.frequency_hz)])
     scene = _scene(request, source, 1, request.harmonics)
     kept = harmonics_in_time(scene, request.harmonics, POINT_UNKNOWNS)
     return resolved(scene, harmonics=kept, frequency_hz=request.frequency_hz)
@@ -145,7 +149,7 @@ def resolve_point(request: PointPreviewRequest, source: SceneSource) -> Resolved
 
 def run_sweep(spec: Mapping[str, Any], _progress: Progress, should_stop: ShouldStop) -> JobOutput:
     """Follow the response over the band; with the state of every contact at the highest peak."""
-    scene = Scene.from_dict(spec["scene"])
+    scene = stored_scene(spec)
     branch = _response(scene, spec["harmonics"], spec["limit"], should_stop)
     found = branch.to_json()
     kept = (
@@ -167,9 +171,7 @@ def run_sensitivities(spec: Mapping[str, Any], _progress: Progress, _should_stop
     """Differentiate the peaks and the band by every parameter of the scene."""
     import optim
 
-    found = optim.sensitivities(
-        Scene.from_dict(spec["scene"]), limit=spec["limit"], harmonics=spec["harmonics"]
-    )
+    found = optim.sensitivities(stored_scene(spec), limit=spec["limit"], harmonics=spec["harmonics"])
     kept = ("peaks", "band_hz", "limit", "left_out", "peak_certificate", "seconds", "reached", "status")
     told = found.to_json()
     of_a_row = ("path", "unit", "value", "peaks_percent", "band_percent")
@@ -182,7 +184,7 @@ def run_sensitivities(spec: Mapping[str, Any], _progress: Progress, _should_stop
 
 def run_limits(spec: Mapping[str, Any], _progress: Progress, should_stop: ShouldStop) -> JobOutput:
     """Follow the response with the contact removed, and with it stuck."""
-    scene = Scene.from_dict(spec["scene"])
+    scene = stored_scene(spec)
     result: dict[str, Any] = {}
     one = spec["contact"]
     freed = [contact.name for contact in scene.contacts] if one is None else [one]
@@ -198,7 +200,7 @@ def run_point(spec: Mapping[str, Any], _progress: Progress, _should_stop: Should
     from service.jobs.common.periods import period_of
 
     solution = solver.solve(
-        Scene.from_dict(spec["scene"]), frequency_hz=spec["frequency_hz"], harmonics=spec["harmonics"]
+        stored_scene(spec), frequency_hz=spec["frequency_hz"], harmonics=spec["harmonics"]
     )
     result = solution.to_json()
     if solution.converged:

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 from pydantic import ConfigDict, Field
 
 from service.jobs.common.results import result_model
-from service.jobs.common.scenes import FrequencyHz, Harmonics, check, refusal
-from service.jobs.outputs import SweepRecord
+from service.jobs.common.scenes import FrequencyHz, Harmonics, check
+from service.jobs.figures import SweepRecord
 from service.jobs.registry import Flag
 from service.jobs.study import Study
-from solver.errors import Issue, pointer
+from solver.errors import Issue
 from solver.studies.accuracy_result import AccuracyStudy
 
 if TYPE_CHECKING:
@@ -62,11 +62,7 @@ class Accuracy(Study):
         from solver.studies.convergence import check_samples
 
         counts = enumerate(self.samples or ())
-        return [
-            issue
-            for i, count in counts
-            for issue in check(pointer("samples", i), partial(check_samples, count))
-        ]
+        return [issue for i, count in counts for issue in check(partial(check_samples, count), "samples", i)]
 
     def sizes(self, _scene: Scene) -> list[Issue]:
         """Return what is too large."""
@@ -79,7 +75,7 @@ class Accuracy(Study):
         if sampled <= _MOST_SAMPLED:
             return []
         words = "repetitions × numbers of harmonics × samples"
-        return [refusal("/repeats", f"{words} must be at most {_MOST_SAMPLED}, got {sampled}")]
+        return [Issue(("repeats",), f"{words} must be at most {_MOST_SAMPLED}", sampled, named=False)]
 
     @classmethod
     def sweeps(cls, found: AccuracyStudy) -> tuple[SweepRecord, ...]:

@@ -11,13 +11,13 @@ from pydantic import ConfigDict, Field
 from optim.criteria.json_types import Pair, PositiveNumber, Ranges
 from optim.studies.crossings import CampbellDiagram
 from service.jobs.common.results import result_model
-from service.jobs.common.scenes import HarmonicRequest, refusal
+from service.jobs.common.scenes import HarmonicRequest
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
+from service.jobs.figures import SweepRecord
 from service.jobs.kind_view import Json, NothingToDrawError, ReadSweep, StoredSweep
-from service.jobs.outputs import SweepRecord
 from service.jobs.registry import Flag
 from service.jobs.study import Study
-from solver.errors import Issue, pointer
+from solver.errors import Issue
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -69,7 +69,7 @@ class Campbell(Study, HarmonicRequest):
     def issues(self, _scene: Scene) -> list[Issue]:
         """Return what is wrong with speeds and band."""
         found = [
-            refusal(pointer("speeds_rpm", i), f"`speeds_rpm[{i}]` {wanted}, got {pair}")
+            Issue(("speeds_rpm", i), wanted, pair)
             for i, pair in enumerate(self.speeds_rpm)
             for wanted, good in (
                 ("must have 0 < low < high [1/min]", 0.0 < pair[0] < pair[1]),
@@ -78,15 +78,13 @@ class Campbell(Study, HarmonicRequest):
             if not good
         ]
         if self.band_hz is not None and not 0.0 < self.band_hz[0] < self.band_hz[1]:
-            found.append(
-                refusal("/band_hz", f"`band_hz` must have 0 < low < high [Hz], got {self.band_hz!r}")
-            )
+            found.append(Issue(("band_hz",), "must have 0 < low < high [Hz]", self.band_hz))
         return found
 
     def sizes(self, scene: Scene) -> list[Issue]:
         """Return what is too large."""
         points = len(self.orders or [1]) * POINTS_OF_A_SWEEP
-        return balance_issues("/orders", scene, self.harmonics, points)
+        return balance_issues("orders", scene, self.harmonics, points)
 
     @classmethod
     def sweeps(cls, found: CampbellDiagram) -> tuple[SweepRecord, ...]:

@@ -10,7 +10,7 @@ from pydantic import ConfigDict, Field
 from optim.criteria.json_types import Name
 from service.jobs.common.ranges import band_issues
 from service.jobs.common.results import Table, result_model
-from service.jobs.common.scenes import HarmonicRequest, PositiveNumber, refusal
+from service.jobs.common.scenes import HarmonicRequest, PositiveNumber
 from service.jobs.common.sizes import balance_issues
 from service.jobs.registry import Flag
 from service.jobs.study import Answer, Study, Watch
@@ -56,17 +56,15 @@ class Controlled(Study, HarmonicRequest):
         """Return what is wrong with range and DOF for the scene."""
         issues = band_issues(scene, self.start, self.stop)
         if self.dof is not None and self.dof not in scene.dofs:
-            words = f"`dof` must be one of {', '.join(scene.dofs)}, got {self.dof!r}"
-            issues.append(refusal("/dof", words))
+            issues.append(Issue(("dof",), f"must be one of {', '.join(scene.dofs)}", self.dof))
         if any(force.harmonic != 1 for force in scene.excitation):
-            issues.append(
-                refusal("/scene", "must have an excitation of harmonic 1 alone: it holds the amplitude")
-            )
+            wanted = "must have an excitation of harmonic 1 alone: it holds the amplitude"
+            issues.append(Issue(("scene",), wanted))
         return issues
 
     def sizes(self, scene: Scene) -> list[Issue]:
         """Return what is too large."""
-        return balance_issues("/harmonics", scene, self.harmonics, _POINTS)
+        return balance_issues("harmonics", scene, self.harmonics, _POINTS)
 
     @classmethod
     def compute(cls, scene: Scene, asked: Mapping[str, Any], watch: Watch) -> Answer:

@@ -12,12 +12,12 @@ import optim
 from optim.problem.keys import ROBUST, NominalAndRobustKeys, of_design
 from service.jobs.common.problem import ProblemRequest, arguments
 from service.jobs.common.results import PeakAt, Table, result_model
-from service.jobs.common.scenes import refusal
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
+from service.jobs.figures import SweepRecord
 from service.jobs.kind_view import Json, ReadSweep, StoredSweep
-from service.jobs.outputs import JobOutput, SweepRecord
+from service.jobs.outputs import JobOutput
 from service.jobs.study import Answer, Watch
-from solver.errors import Issue, pointer
+from solver.errors import Issue
 from solver.scene.descriptions import DISK_LOAD
 
 if TYPE_CHECKING:
@@ -83,9 +83,7 @@ class _Design(NominalAndRobustKeys, ProblemRequest):
         given, robust = arguments(self), self.uncertain is not None
         apart, which = (_NOT_ROBUST, "without") if robust else (ROBUST, "with")
         words = f"is for a design {which} `uncertain` parameters"
-        found = super().issues(scene) + [
-            refusal(pointer(key), f"`{key}` {words}, got {given[key]!r}") for key in apart if key in given
-        ]
+        found = super().issues(scene) + [Issue((key,), words, given[key]) for key in apart if key in given]
         known = {key: value for key, value in given.items() if key not in ROBUST}
         return found + (uncertainty_issues(scene, known, given[UNCERTAIN]) if robust else [])
 
@@ -95,7 +93,7 @@ class _Design(NominalAndRobustKeys, ProblemRequest):
             return super().sizes(scene)
         points = POINTS_OF_A_SWEEP * len(self.cases or [1]) * self.samples
         words = "points of one design's responses"
-        return balance_issues("/samples", scene, self.harmonics, points, words)
+        return balance_issues("samples", scene, self.harmonics, points, words)
 
     @classmethod
     def compute(cls, scene: Scene, asked: Mapping[str, Any], watch: Watch) -> Answer:

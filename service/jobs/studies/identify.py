@@ -13,11 +13,11 @@ from optim.identification.result import Identification
 from optim.problem.keys import MAX_VARIABLES, VariableName
 from optim.problem.words import ScalingWord
 from service.jobs.common.results import Table, result_model
-from service.jobs.common.scenes import HarmonicRequest, Number, ParameterPath, refusal
+from service.jobs.common.scenes import HarmonicRequest, Number, ParameterPath
 from service.jobs.common.sizes import balance_issues
 from service.jobs.registry import Flag
 from service.jobs.study import Answer, Study, Watch
-from solver.errors import Issue, SceneError, SettingError, pointer
+from solver.errors import Issue, SceneError, SettingError
 
 if TYPE_CHECKING:
     from solver.scene.scene import Scene
@@ -128,7 +128,7 @@ class Identify(Study, HarmonicRequest):
         columns = [[v for v in table.values() if isinstance(v, list)] for table in self.data]
         points = sum(max(map(len, lists), default=0) for lists in columns)
         needed, words = EVALUATIONS * max(points, 1), "points of all runs"
-        return balance_issues("/data", scene, self.harmonics, needed, words) or self._read(scene)
+        return balance_issues("data", scene, self.harmonics, needed, words) or self._read(scene)
 
     def _read(self, scene: Scene) -> list[Issue]:
         """Return what is wrong with the whole description, by the pointer of its field."""
@@ -142,9 +142,9 @@ class Identify(Study, HarmonicRequest):
             runs = read_data(scene, self.data, known.paths)
             read_candidates(scene, runs, known, self.candidates)
         except SceneError as error:
-            return [Issue(pointer=pointer("data"), message=issue.message) for issue in error.issues]
+            return [issue.at("data") for issue in error.issues]
         except (DesignError, SettingError) as error:
-            return [refusal(pointer(*(error.place or ("data",))), str(error))]
+            return [error.issue.at(*(error.place or ("data",)))]
         return []
 
     @classmethod

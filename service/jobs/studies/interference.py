@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 from pydantic import ConfigDict, Field
 
 from service.jobs.common.results import result_model
-from service.jobs.common.scenes import PositiveNumber, check_named
+from service.jobs.common.scenes import PositiveNumber, check
 from service.jobs.common.sizes import memory_issues
 from service.jobs.kind_view import Json
 from service.jobs.registry import Flag
@@ -60,7 +60,7 @@ class Interference(Study):
         # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
         from solver.studies.interference import checked_speed
 
-        return check_named(partial(checked_speed, scene, self.speed_rpm, self.orders))
+        return check(partial(checked_speed, scene, self.speed_rpm, self.orders))
 
     def sizes(self, scene: Scene) -> list[Issue]:
         """Return what is too large."""

@@ -10,7 +10,7 @@ from pydantic import ConfigDict, Field
 
 from service.jobs.common.ranges import RangeRequest, law_issues, range_issues
 from service.jobs.common.results import Curve, result_model
-from service.jobs.common.scenes import refusal
+from service.jobs.common.scenes import CHECKED_BY, SCENE, stored_scene
 from service.jobs.common.sizes import MOST_POINTS, balance_issues
 from service.jobs.kind_view import Json
 from service.jobs.outputs import JobOutput, OnProgress, ShouldStop
@@ -56,14 +56,14 @@ class Map(Study, RangeRequest):
 
     def issues(self, scene: Scene) -> list[Issue]:
         """Return what is wrong with the range and, with a ridge, with the laws of the contacts."""
-        return range_issues(self, scene) + (law_issues("/ridge", scene) if self.ridge else [])
+        return range_issues(self, scene) + (law_issues("ridge", scene) if self.ridge else [])
 
     def sizes(self, scene: Scene) -> list[Issue]:
         """Return what is too large."""
         points = self.steps * self.frequencies
         if points > MOST_POINTS:
-            return [refusal("/steps", f"`steps` × `frequencies` must be at most {MOST_POINTS}, got {points}")]
-        return balance_issues("/steps", scene, self.harmonics, points, "`steps` × `frequencies`")
+            return [Issue(("steps",), f"× `frequencies` must be at most {MOST_POINTS}", points)]
+        return balance_issues("steps", scene, self.harmonics, points, "`steps` × `frequencies`")
 
     @classmethod
     def empty(cls, result: Json) -> str:
@@ -133,21 +133,19 @@ def join(spec: Mapping[str, Any], outputs: Mapping[int, PartOutput]) -> JobOutpu
 
 def _grid(spec: Mapping[str, Any]) -> MapGrid:
     # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
-    from solver.scene.scene import Scene
     from solver.studies.response_map import map_grid
 
-    given = {name: value for name, value in spec.items() if name != "scene"}
-    return map_grid(Scene.from_dict(spec["scene"]), **given)
+    given = {name: value for name, value in spec.items() if name not in (SCENE, CHECKED_BY)}
+    return map_grid(stored_scene(spec), **given)
 
 
 def _ridge(spec: Mapping[str, Any], progress: OnProgress, should_stop: ShouldStop) -> PartOutput:
     import solver
     from service.jobs import strict_json
     from service.jobs.common.records import packed, sweep_records
-    from solver.scene.scene import Scene
 
     track = solver.track_peak(
-        Scene.from_dict(spec["scene"]),
+        stored_scene(spec),
         spec["parameter"],
         spec["start"],
         spec["stop"],

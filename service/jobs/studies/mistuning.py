@@ -15,13 +15,13 @@ from optim.criteria.json_types import Name
 from service.jobs.arrays import decode, encode
 from service.jobs.common.ranges import band_issues
 from service.jobs.common.results import EndedResult, KnownResult, Table
-from service.jobs.common.scenes import FrequencyHz, HarmonicRequest, refusal
+from service.jobs.common.scenes import FrequencyHz, HarmonicRequest, stored_scene
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
 from service.jobs.outputs import JobOutput, OnProgress, ShouldStop
 from service.jobs.parts import Part, PartOutput, Parts, PartStoppedError
 from service.jobs.registry import Flag, JobKind
 from service.jobs.study import Study
-from solver.errors import Issue, SceneError, SettingError, pointer
+from solver.errors import Issue, SceneError, SettingError
 from solver.results.known import Known
 
 if TYPE_CHECKING:
@@ -121,12 +121,11 @@ class Mistuning(Study, HarmonicRequest):
     def issues(self, scene: Scene) -> list[Issue]:
         """Return why it is no disk, and what is wrong with DOF and range."""
         if not scene.structure.has_sectors:
-            words = f"`scene` {scene.name!r} must have a cyclic structure to be mistuned"
-            return [refusal("/scene", words)]
+            return [Issue(("scene",), f"{scene.name!r} must have a cyclic structure to be mistuned")]
         found = band_issues(scene, self.start, self.stop)
         if self.dof is not None and self.dof not in scene.dofs:
             words = f"must be a DOF of every sector, one of {', '.join(scene.dofs)}, got {self.dof!r}"
-            found.append(refusal("/dof", f"`dof` {words}"))
+            found.append(Issue(("dof",), words))
         return found
 
     def sizes(self, scene: Scene) -> list[Issue]:
@@ -135,7 +134,7 @@ class Mistuning(Study, HarmonicRequest):
             POINTS_OF_A_SWEEP * self.samples * scene.structure.sector_count,
             "points of all sweeps",
         )
-        large = balance_issues("/samples", scene, self.harmonics, points, words, every_sector=True)
+        large = balance_issues("samples", scene, self.harmonics, points, words, every_sector=True)
         return large or self._drawn(scene)
 
     def _drawn(self, scene: Scene) -> list[Issue]:
@@ -146,12 +145,11 @@ class Mistuning(Study, HarmonicRequest):
         try:
             disk_factors(scene, self.of, self.spread, self.samples, self.seed)
         except SceneError as error:
-            prefix = "/structure/mistuning/of"
-            within = [issue for issue in error.issues if issue.pointer.startswith(prefix)]
-            known = [refusal("/of" + issue.pointer.removeprefix(prefix), issue.message) for issue in within]
-            return known or [refusal("/of", issue.message) for issue in error.issues]
+            of = ("structure", "mistuning", "of")
+            within = [issue.at(*issue.subject[2:]) for issue in error.issues if issue.subject[:3] == of]
+            return within or [issue.at("of") for issue in error.issues]
         except SettingError as error:
-            return [refusal(pointer(error.name), str(error))]
+            return [error.issue]
         return []
 
     @classmethod
@@ -162,9 +160,7 @@ class Mistuning(Study, HarmonicRequest):
 
 def split(spec: Mapping[str, Any]) -> list[Part]:
     """The tuned disk, and then some of the others at a time."""
-    from solver.scene.scene import Scene
-
-    sectors = Scene.from_dict(spec["scene"]).structure.sector_count
+    sectors = stored_scene(spec).structure.sector_count
     a_disk, samples = sectors * max(spec["harmonics"], 1), spec["samples"]
     size = max(math.ceil(_WORK_OF_A_PART / a_disk), math.ceil(samples / _MOST_DIVIDED))
     return [Part(spec={"tuned": True})] + [
@@ -179,10 +175,9 @@ def run_part(
     """Find the peaks of all blades of the tuned disk, or of some others."""
     import solver
     from service.jobs.common.records import packed, sweep_records
-    from solver.scene.scene import Scene
     from solver.studies.mistuning import without_mistuning, worst_branch
 
-    scene, begun = Scene.from_dict(spec["scene"]), time.perf_counter()
+    scene, begun = stored_scene(spec), time.perf_counter()
     tuned = bool(part.get("tuned"))
     disks = range(1) if tuned else range(part["first"], part["last"])
     found: list[BladePeaks] = []
@@ -225,13 +220,12 @@ def run_part(
 def join(spec: Mapping[str, Any], outputs: Mapping[int, PartOutput]) -> JobOutput:
     """The study of all disks; the stored sweeps are those of the tuned disk and of the worst blade of all."""
     from service.jobs.common.records import unpacked
-    from solver.scene.scene import Scene
     from solver.studies.mistuning import joined_study
 
     parts = list(outputs.values())
     [tuned], others = _peaks(parts[0]), parts[1:]
     study = joined_study(
-        Scene.from_dict(spec["scene"]),
+        stored_scene(spec),
         of=spec["of"],
         spread=spec["spread"],
         seed=spec["seed"],

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 from pydantic import ConfigDict, Field, RootModel
 
 from service.jobs.common.results import Table, result_model
-from service.jobs.common.scenes import HarmonicRequest, Number, PositiveNumber, check_named, refusal
+from service.jobs.common.scenes import HarmonicRequest, Number, PositiveNumber, check
 from service.jobs.common.sizes import MOST_MOTIONS, POINTS_OF_A_SWEEP, balance_issues
 from service.jobs.kind_view import Json, ReadSweep, StoredSweep
 from service.jobs.registry import Flag
 from service.jobs.study import Answer, Study, Watch
-from solver.errors import Issue
+from solver.errors import Issue, Naming
 from solver.modes.driven.results import PhaseResonance
 from solver.modes.results import NonlinearMode
 
@@ -97,24 +97,22 @@ class Modes(Study, HarmonicRequest):
         apart = self.phase_resonance and (self.performance or fed)
         words = (
             ("exact_peaks", bool(self.exact_peaks and not self.performance),
-             f"needs `performance`, which is false here, got {self.exact_peaks!r}"),
+             f"needs {{performance}}, which is false here, got {self.exact_peaks!r}"),
             ("from", self.start <= 0.0, f"must be greater than 0, got {self.start!r}"),
             ("to", self.start >= self.stop,
-             f"must be above `from` = {self.start!r} √kg m, got {self.stop!r}"),
+             f"must be above {{from}} = {self.start!r} √kg m, got {self.stop!r}"),
             ("disturbance", self.disturbance is not None and not fed,
-             "needs `aero_damping`: without gas that feeds, every disturbance dies down"),
-            ("mode_alone", self.mode_alone and not fed, "needs `aero_damping`: it says what the gas feeds"),
-            ("phase_resonance", apart, "is a curve of its own: leave `performance` and `aero_damping` out"),
+             "needs {aero_damping}: without gas that feeds, every disturbance dies down"),
+            ("mode_alone", self.mode_alone and not fed, "needs {aero_damping}: it says what the gas feeds"),
+            ("phase_resonance", apart, "is a curve of its own: leave {performance} and {aero_damping} out"),
         )  # fmt: skip
-        wrong = [refusal(f"/{key}", f"`{key}` {said}") for key, bad, said in words if bad]
-        return wrong + check_named(
-            lambda: check_mode(at_nodal_diameter(scene, self.nodal_diameter), self.mode)
-        )
+        wrong = [Issue((key,), Naming(said)) for key, bad, said in words if bad]
+        return wrong + check(lambda: check_mode(at_nodal_diameter(scene, self.nodal_diameter), self.mode))
 
     def sizes(self, scene: Scene) -> list[Issue]:
         """Return what is too large."""
         points = _POINTS + POINTS_OF_A_SWEEP * self.exact_peaks
-        return balance_issues("/harmonics", scene, self.harmonics, points)
+        return balance_issues("harmonics", scene, self.harmonics, points)
 
     @classmethod
     def compute(cls, scene: Scene, asked: Mapping[str, Any], watch: Watch) -> Answer:

@@ -12,7 +12,7 @@ from optim.problem.keys import PointsOfFront, of_front
 from service.jobs.common.problem import ProblemRequest
 from service.jobs.common.results import result_model
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
-from service.jobs.outputs import SweepRecord
+from service.jobs.figures import SweepRecord
 from service.jobs.study import Answer, Watch
 from solver.errors import Issue
 from solver.scene.descriptions import DISK_LOAD
@@ -44,7 +44,7 @@ class _Pareto(PointsOfFront, ProblemRequest):
         """Return what is too large."""
         points = POINTS_OF_A_SWEEP * len(self.cases or [1]) * (self.points or 1)
         words = "points of the responses of a front"
-        return balance_issues("/points", scene, self.harmonics, points, words)
+        return balance_issues("points", scene, self.harmonics, points, words)
 
     @classmethod
     def compute(cls, scene: Scene, asked: Mapping[str, Any], watch: Watch) -> Answer:

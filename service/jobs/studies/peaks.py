@@ -10,8 +10,8 @@ from pydantic import ConfigDict, Field
 from service.jobs.common.ranges import RangeRequest, law_issues, range_issues
 from service.jobs.common.results import result_model
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
+from service.jobs.figures import SweepRecord
 from service.jobs.kind_view import Json, ReadSweep, StoredSweep
-from service.jobs.outputs import SweepRecord
 from service.jobs.registry import Flag
 from service.jobs.study import Study
 from solver.errors import Issue
@@ -49,12 +49,12 @@ class Peaks(Study, RangeRequest):
 
     def issues(self, scene: Scene) -> list[Issue]:
         """Return what is wrong with the range and the laws of the contacts."""
-        return range_issues(self, scene) + law_issues("/scene", scene)
+        return range_issues(self, scene) + law_issues("scene", scene)
 
     def sizes(self, scene: Scene) -> list[Issue]:
         """Return what is too large."""
         points = POINTS_OF_A_SWEEP * (self.checks + 2)
-        return balance_issues("/checks", scene, self.harmonics, points)
+        return balance_issues("checks", scene, self.harmonics, points)
 
     @classmethod
     def sweeps(cls, found: PeakTrack) -> tuple[SweepRecord, ...]:

@@ -58,7 +58,7 @@ class Plan(Study, HarmonicRequest):
 
     def sizes(self, scene: Scene) -> list[Issue]:
         """Return what is too large."""
-        return solved_issues("/harmonics", scene, self.harmonics, self.effects)
+        return solved_issues("harmonics", scene, self.harmonics, self.effects)
 
     @classmethod
     def compute(cls, scene: Scene, asked: Mapping[str, Any], _watch: Watch) -> Answer:

@@ -11,8 +11,8 @@ from optim.studies.sensitivity_result import SensitivityResult
 from service.jobs.common.results import PeakAt, result_model
 from service.jobs.common.scenes import HarmonicRequest, PositiveNumber
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
+from service.jobs.figures import SweepRecord
 from service.jobs.kind_view import Json
-from service.jobs.outputs import SweepRecord
 from service.jobs.registry import Flag
 from service.jobs.study import Answer, Study, Watch
 from solver.errors import Issue
@@ -40,7 +40,7 @@ class Sensitivities(Study, HarmonicRequest):
 
     def sizes(self, scene: Scene) -> list[Issue]:
         """Return what is too large."""
-        return balance_issues("/harmonics", scene, self.harmonics, POINTS_OF_A_SWEEP)
+        return balance_issues("harmonics", scene, self.harmonics, POINTS_OF_A_SWEEP)
 
     @classmethod
     def compute(cls, scene: Scene, asked: Mapping[str, Any], _watch: Watch) -> Answer:

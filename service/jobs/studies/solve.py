@@ -16,10 +16,10 @@ from service.jobs.common.balance import (
     with_effects,
 )
 from service.jobs.common.results import Amplitude, KindResult
-from service.jobs.common.scenes import FrequencyHz, HarmonicRequest, refusal
+from service.jobs.common.scenes import FrequencyHz, HarmonicRequest
 from service.jobs.registry import Flag
 from service.jobs.study import Answer, Study, Watch
-from solver.errors import Issue
+from solver.errors import Issue, Naming, Shown
 from solver.response.stability import MOST_STARTS
 from solver.scene.descriptions import DAMPER_LOAD
 
@@ -109,14 +109,14 @@ class Solve(Study, HarmonicRequest):
         """Return what does not go together, and words of effects that are none."""
         alone = {"accuracy": self.accuracy, "exact": self.exact or None} if self.every else {}
         return effects_issues(self.effects) + [
-            refusal(f"/{key}", f"`{key}` does not go with `all`, got {given!r}: leave one of them out")
+            Issue((key,), Naming("does not go with {all}"), Shown(f"{given!r}: leave one of them out"))
             for key, given in alone.items()
             if given is not None
         ]
 
     def sizes(self, scene: Scene) -> list[Issue]:
         """Return what is too large."""
-        return solved_issues("/harmonics", scene, self.harmonics, self.effects, accuracy=self.accuracy)
+        return solved_issues("harmonics", scene, self.harmonics, self.effects, accuracy=self.accuracy)
 
     @classmethod
     def compute(cls, scene: Scene, asked: Mapping[str, Any], watch: Watch) -> Answer:

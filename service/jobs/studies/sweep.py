@@ -26,14 +26,13 @@ from service.jobs.common.scenes import (
     ParameterPath,
     PositiveNumber,
     check,
-    refusal,
 )
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP
 from service.jobs.kind_view import Json, ReadSweep, StoredSweep
 from service.jobs.outputs import JobOutput, Progress, ShouldStop
 from service.jobs.registry import Flag, JobKind
 from service.jobs.study import Answer, Study, Watch
-from solver.errors import Issue, SettingError
+from solver.errors import Issue, Naming, SettingError, Shown
 from solver.scene.descriptions import DISK_LOAD
 
 if TYPE_CHECKING:
@@ -150,30 +149,30 @@ class Sweep(Study, HarmonicRequest):
         if over_frequency:
             band = zip(ends, scene.observe.band, strict=True)
             ends = [end if given is None else given for given, end in band]
-        if unknown := check("/parameter", partial(scene.check_path, path)):
+        if unknown := check(partial(scene.check_path, path), "parameter"):
             return unknown
         issues = effects_issues(self.effects)
         for name, end in zip(("from", "to"), ends, strict=True):
             if end is None:
-                issues.append(refusal(f"/{name}", f"`{name}` is needed for a sweep of `{path}`"))
+                issues.append(Issue((name,), f"is needed for a sweep of `{path}`"))
             elif not over_frequency:
-                issues += check(f"/{name}", partial(scene.with_values, {path: end}))
+                issues += check(partial(scene.with_values, {path: end}), name)
             elif end <= 0.0:
-                issues.append(refusal(f"/{name}", f"`{name}` must be a frequency > 0 Hz, got {end!r}"))
+                issues.append(Issue((name,), "must be a frequency > 0 Hz", end))
         if ends[0] is not None and ends[0] == ends[1]:
-            issues.append(refusal("/to", f"`to` must differ from `from`, got {ends[1]!r} for both"))
+            issues.append(Issue(("to",), Naming("must differ from {from}"), Shown(f"{ends[1]!r} for both")))
         at = self.frequency_hz
         if over_frequency and at is not None:
-            words = "must be left out when the frequency is swept, from `from` to `to`"
-            issues.append(refusal("/frequency_hz", f"`frequency_hz` {words}, got {at!r}"))
+            words = Naming("must be left out when the frequency is swept, from {from} to {to}")
+            issues.append(Issue(("frequency_hz",), words, at))
         if not over_frequency and at is None:
-            issues.append(refusal("/frequency_hz", f"`frequency_hz` is needed for a sweep of `{path}`"))
+            issues.append(Issue(("frequency_hz",), f"is needed for a sweep of `{path}`"))
         return issues
 
     def sizes(self, scene: Scene) -> list[Issue]:
         """Return what is too large."""
         asked, points = (self.harmonics, self.effects), POINTS_OF_A_SWEEP
-        return solved_issues("/harmonics", scene, *asked, accuracy=self.accuracy, points=points)
+        return solved_issues("harmonics", scene, *asked, accuracy=self.accuracy, points=points)
 
     @classmethod
     def compute(cls, scene: Scene, asked: Mapping[str, Any], watch: Watch) -> Answer:

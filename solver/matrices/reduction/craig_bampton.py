@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csc_array
 
+from solver.errors import FieldError
 from solver.matrices.reduction.fixed_interface_modes import held_modes, interior
 from solver.matrices.reduction.reduction_error import Quality, measured
 from solver.matrices.validation import ASYMMETRY, DofTable, one_triangle
@@ -111,11 +112,12 @@ def craig_bampton(
 def _check(given: dict[str, Any], dofs: DofTable, n: int, keep_modes: int) -> None:
     for name, row in dofs.write().items():
         if row >= n:
-            raise ValueError(f"`dofs`: {name!r} must have a row from 0 to {n - 1}, got {row}")
+            raise FieldError(("dofs",), f"`dofs`: {name!r} must have a row from 0 to {n - 1}, got {row}")
     if len(dofs) + keep_modes > MOST_DOFS:
-        raise ValueError(
-            f"`dofs` names {len(dofs)} DOFs, which with {keep_modes} modes is more than {MOST_DOFS}: "
-            "name those that contacts, forces and the observed amplitude need"
+        raise FieldError(
+            ("dofs",),
+            f"names {len(dofs)} DOFs, which with {keep_modes} modes is more than {MOST_DOFS}: "
+            "name those that contacts, forces and the observed amplitude need",
         )
     for key, matrix in given.items():
         difference = abs(csc_array(matrix) - csc_array(matrix).conj().T)

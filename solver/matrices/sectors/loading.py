@@ -10,7 +10,7 @@ from typing import Any
 
 from scipy.sparse import csr_array
 
-from solver.errors import Issue, SceneError
+from solver.errors import UNSAID, Place, SceneError
 from solver.matrices.load_set import MatrixSet
 from solver.matrices.readers.numbers_in_text import FormatError
 from solver.matrices.readers.reader import MatrixFileError
@@ -78,19 +78,19 @@ def boundaries(
     """
     axis = given.get("axis", DEFAULT_AXIS)
     if not (isinstance(axis, list | tuple) and len(axis) == 3 and _is_direction(axis)):
-        raise _refusal("axis", f"`axis` must be a direction [x, y, z], got {axis!r}")
+        raise _refusal("axis", "must be a direction [x, y, z]", axis)
     pair_by, tolerance = given.get("pair_by", "position"), given.get("tolerance")
     if pair_by not in PAIR_BY:
-        raise _refusal("pair_by", f"`pair_by` must be one of {', '.join(PAIR_BY)}, got {pair_by!r}")
+        raise _refusal("pair_by", f"must be one of {', '.join(PAIR_BY)}", pair_by)
     if tolerance is not None and not (isinstance(tolerance, int | float) and tolerance > 0.0):
-        raise _refusal("tolerance", f"`tolerance` must be a distance > 0, got {tolerance!r}")
+        raise _refusal("tolerance", "must be a distance > 0", tolerance)
     deck = found.deck or read_nodes(given.get("nodes"), folder)
     low, high = (_nodes(key, given.get(key), deck) for key in ("low", "high"))
     try:
         pairs = paired(deck, low, high, axis, sectors, pair_by=pair_by, tolerance=tolerance)
         ours, theirs = groups(pairs, found, rotation(axis, 2.0 * math.pi / sectors))
     except ValueError as error:
-        raise _refusal("low", str(error)) from error
+        raise _refusal("low", str(error), named=False) from error
     return Boundaries(
         low=ours, high=theirs, axis=(float(axis[0]), float(axis[1]), float(axis[2])),
         outline=_outline(deck, pairs, metres),
@@ -103,7 +103,7 @@ def _outline(deck: Deck | None, pairs: Pairs, metres: float) -> SectorOutline | 
     try:
         return outline_of(deck, [one for one, _ in pairs], [other for _, other in pairs], metres)
     except ValueError as error:
-        raise _refusal("nodes", f"`nodes`: {error}") from error
+        raise _refusal("nodes", f"`nodes`: {error}", named=False) from error
 
 
 def _is_direction(given: Sequence[object]) -> bool:
@@ -111,8 +111,8 @@ def _is_direction(given: Sequence[object]) -> bool:
     return len(numbers) == len(given) and 0.0 < math.hypot(*numbers) < math.inf
 
 
-def read_nodes(name: object, folder: Path, pointer: str = "cyclic/nodes") -> Deck | None:
-    """The deck that a key of a scene file names; None without one.
+def read_nodes(name: object, folder: Path, place: Place = ("cyclic",)) -> Deck | None:
+    """The deck that `nodes` at a place of a structure names; None without one.
 
     Raises
     ------
@@ -122,14 +122,13 @@ def read_nodes(name: object, folder: Path, pointer: str = "cyclic/nodes") -> Dec
     if name is None:
         return None
     if not isinstance(name, str):
-        raise _refusal("nodes", f"`nodes` must be the name of a deck, got {name!r}", pointer)
+        raise SceneError.of(("structure", *place, "nodes"), "must be the name of a deck", name)
     try:
         return read_deck(folder / name, elements=True)
-    except FormatError as error:
-        raise _refusal("nodes", f"`nodes`: {name!r}: {error}", pointer) from error
-    except OSError as error:
-        why = error.strerror or error
-        raise _refusal("nodes", f"`nodes`: {name!r} cannot be read: {why}", pointer) from error
+    except (FormatError, OSError) as error:
+        why = f" cannot be read: {error.strerror or error}" if isinstance(error, OSError) else f": {error}"
+        said = f"`nodes`: {name!r}{why}"
+        raise SceneError.of(("structure", *place, "nodes"), said, named=False) from error
 
 
 def _nodes(key: str, given: object, deck: Deck | None) -> list[int] | None:
@@ -139,13 +138,14 @@ def _nodes(key: str, given: object, deck: Deck | None) -> list[int] | None:
     if isinstance(given, list) and given and all(type(node) is int for node in given):
         return list(dict.fromkeys(given))
     if not isinstance(given, str):
-        raise _refusal(key, f"`{key}` must be the name of a set or a list of nodes, got {given!r}")
+        raise _refusal(key, "must be the name of a set or a list of nodes", given)
     if deck is None:
-        raise _refusal("nodes", f"`nodes` is missing: the deck that has the set {given!r}")
+        raise _refusal("nodes", f"is missing: the deck that has the set {given!r}")
     name = given.strip().strip('"').upper()
     if name not in deck.sets:
         known = ", ".join(sorted(deck.sets)[:20]) or "none"
-        raise _refusal(key, f"`{key}`: there is no set {given!r} of nodes in the deck; known: {known}")
+        said = f"`{key}`: there is no set {given!r} of nodes in the deck; known: {known}"
+        raise _refusal(key, said, named=False)
     return list(dict.fromkeys(deck.sets[name]))
 
 
@@ -176,8 +176,10 @@ def sector_kept(
         return tables, None  # what is wrong is said with the rest of the scene
     if isinstance(tables.get("diameters"), str):
         if found.matrices:
-            message = f"`diameters` stands in place of {', '.join(found.matrices)}: remove one or the other"
-            raise SceneError([Issue(pointer="/structure/diameters", message=message)])
+            raise SceneError.of(
+                ("structure", "diameters"),
+                f"stands in place of {', '.join(found.matrices)}: remove one or the other",
+            )
         return _from_file(tables, folder), None
     if not found.matrices:
         return tables, None
@@ -192,9 +194,7 @@ def sector_kept(
     if keep is None:
         return {**tables, **_dense(found), **drawn, "cyclic": {**kept, **ends.table()}}, None
     if isinstance(keep, bool) or not isinstance(keep, int) or not 0 <= keep <= MOST_DOFS:
-        raise _refusal(
-            "keep_modes", f"`keep_modes` must be a whole number from 0 to {MOST_DOFS}, got {keep!r}"
-        )
+        raise _refusal("keep_modes", f"must be a whole number from 0 to {MOST_DOFS}", keep)
     _refuse_unreduced(tables, found)
     matrices = {key: csr_array(matrix) for key, matrix in found.matrices.items()}
     try:
@@ -204,7 +204,7 @@ def sector_kept(
         met = tuple(range(sectors // 2 + 1)) if parts else diameters_met(orders, sectors)
         reduced = reduce_sector(matrices, gone, dofs, keep, met, sectors, parts)
     except ValueError as error:
-        raise SceneError([Issue(pointer="/structure/dofs", message=str(error))]) from error
+        raise SceneError.of(("structure", "dofs"), str(error), named=False) from error
     return {
         **{key: value for key, value in tables.items() if key not in matrices and key != "parts"},
         **drawn,
@@ -232,8 +232,7 @@ def _check_sizes(found: MatrixSet) -> None:
     odd = next((key for key in sizes if sizes[key] != sizes[first]), None)
     if odd is not None:
         rows = f"`{odd}` has {sizes[odd]} rows, {first} has {sizes[first]}"
-        message = f"{rows}: export all matrices from one analysis"
-        raise SceneError([Issue(pointer=f"/structure/{odd}", message=message)])
+        raise SceneError.of(("structure", odd), f"{rows}: export all matrices from one analysis", named=False)
 
 
 def check_part_sizes(found: MatrixSet) -> None:
@@ -241,32 +240,36 @@ def check_part_sizes(found: MatrixSet) -> None:
     rows = next(iter(found.matrices.values())).shape[0]
     for name, matrix in found.parts.items():
         if matrix.shape[0] != rows:
-            message = f"`parts`: {name!r} must have {rows} rows like M and K, got {matrix.shape[0]}"
-            raise SceneError([Issue(pointer=f"/structure/parts/{name}", message=message)])
+            raise SceneError.of(
+                ("structure", "parts", name),
+                f"`parts`: {name!r} must have {rows} rows like M and K, got {matrix.shape[0]}",
+                named=False,
+            )
 
 
 def _refuse_unreduced(tables: Mapping[str, Any], found: MatrixSet) -> None:
     """Refuse what a reduction of a sector does not carry along, and matrices without M or K."""
     missing = next((key for key in "MK" if key not in found.matrices), None)
     if missing is not None:
-        message = f"`{missing}` must come from a file too: `keep_modes` of a sector reduces M and K together"
-        raise SceneError([Issue(pointer=f"/structure/{missing}", message=message)])
+        raise SceneError.of(
+            ("structure", missing),
+            "must come from a file too: `keep_modes` of a sector reduces M and K together",
+        )
     keys: list[str] = [key for key in ("G", "K_omega2") if key in found.matrices]
     keys += ["symmetric"] if tables.get("symmetric") is False else []
     for key in keys[:1]:
-        message = (
-            f"`{key}` does not go with `keep_modes` of a sector, which reduces symmetric M, K and C: leave "
-            "`keep_modes` out, or give such terms as [[couplings]] of the DOFs in use"
+        raise SceneError.of(
+            ("structure", key),
+            "does not go with `keep_modes` of a sector, which reduces symmetric M, K and C: leave "
+            "`keep_modes` out, or give such terms as [[couplings]] of the DOFs in use",
         )
-        raise SceneError([Issue(pointer=f"/structure/{key}", message=message)])
 
 
 def _from_file(tables: dict[str, Any], folder: Path) -> dict[str, Any]:
     try:
         matrices, was, outline = read_sector(folder / tables["diameters"])
     except MatrixFileError as error:
-        message = f"`diameters`: {error}"
-        raise SceneError([Issue(pointer="/structure/diameters", message=message)]) from error
+        raise SceneError.of(("structure", "diameters"), f"`diameters`: {error}", named=False) from error
     drawn = {} if outline is None else {"outline": outline}
     return {**tables, **drawn, "diameters": matrices, "reduction": was}
 
@@ -274,17 +277,17 @@ def _from_file(tables: dict[str, Any], folder: Path) -> dict[str, Any]:
 def _dense(found: MatrixSet) -> dict[str, object]:
     for key, matrix in found.matrices.items():
         if matrix.shape[0] > MOST_DOFS:
-            message = (
-                f"`{key}` has {matrix.shape[0]} rows, {MOST_DOFS} are the most without reduction: `stickslip "
+            raise SceneError.of(
+                ("structure", key),
+                f"has {matrix.shape[0]} rows, {MOST_DOFS} are the most without reduction: `stickslip "
                 "import --sectors … --reduce` reduces them once; `keep_modes` = 40 (say) in "
-                "[structure.cyclic] does it whenever the scene is loaded"
+                "[structure.cyclic] does it whenever the scene is loaded",
             )
-            raise SceneError([Issue(pointer=f"/structure/{key}", message=message)])
     dense: dict[str, object] = {key: Matrix(matrix.toarray()) for key, matrix in found.matrices.items()}
     if found.parts:
         dense["parts"] = {name: Matrix(matrix.toarray()) for name, matrix in found.parts.items()}
     return dense
 
 
-def _refusal(key: str, message: str, pointer: str | None = None) -> SceneError:
-    return SceneError([Issue(pointer=f"/structure/{pointer or f'cyclic/{key}'}", message=message)])
+def _refusal(key: str, wanted: str, got: object = UNSAID, *, named: bool = True) -> SceneError:
+    return SceneError.of(("structure", "cyclic", key), wanted, got, named=named)

@@ -8,7 +8,7 @@ from typing import Any
 
 from solver.contacts.fields import GROUND, parse_end
 from solver.contacts.laws.registry import DEFAULT, laws
-from solver.errors import Issue
+from solver.errors import Issue, Place
 from solver.scene.bodies.shapes import WITH_BODY
 from solver.scene.cyclic.sector_tables import is_cyclic
 from solver.scene.validation import (
@@ -18,13 +18,12 @@ from solver.scene.validation import (
     dofs_of,
     duplicates,
     in_space,
-    pointer_of,
+    no_sector,
     rows_of,
     unknown_dof,
 )
 from solver.wording import listing, nearest, quoted
 
-_Steps = list[int | str]
 _Dofs = dict[str, None] | None
 
 
@@ -45,7 +44,7 @@ def body_issues(raw: dict[str, Any]) -> list[Issue]:
         _load_issues(raw, dofs),
         *(_contact_issues(steps, row, raw, structure, dofs) for steps, row in rows_of(raw, "contacts")),
         *(
-            _end_issues([*steps, "between"], {**row, "normal": True}, structure, _places(raw), dofs)
+            _end_issues((*steps, "between"), {**row, "normal": True}, structure, _places(raw), dofs)
             for at, damper in rows_of(raw, "dampers")
             for steps, row in [(at, damper), *_points_of(at, damper)]
         ),
@@ -53,16 +52,16 @@ def body_issues(raw: dict[str, Any]) -> list[Issue]:
     return list(islice(found, MOST_ISSUES))
 
 
-def _points_of(at: _Steps, damper: dict[str, Any]) -> list[tuple[_Steps, dict[str, Any]]]:
+def _points_of(at: Place, damper: dict[str, Any]) -> list[tuple[Place, dict[str, Any]]]:
     """The points of a patch, which have ends of their own."""
     pairs = damper.get("pairs")
     rows = enumerate(pairs if isinstance(pairs, list | tuple) else ())
-    return [([*at, "pairs", i], row) for i, row in rows if isinstance(row, dict)]
+    return [((*at, "pairs", i), row) for i, row in rows if isinstance(row, dict)]
 
 
-def _named(raw: dict[str, Any], *tables: str) -> list[tuple[_Steps, str]]:
+def _named(raw: dict[str, Any], *tables: str) -> list[tuple[Place, str]]:
     rows = [row for table in tables for row in rows_of(raw, table)]
-    return [([*steps, "name"], row["name"]) for steps, row in rows if isinstance(row.get("name"), str)]
+    return [((*steps, "name"), row["name"]) for steps, row in rows if isinstance(row.get("name"), str)]
 
 
 def _places(raw: dict[str, Any]) -> list[str]:
@@ -78,14 +77,13 @@ def _name_issues(raw: dict[str, Any], cyclic: bool) -> Iterator[Issue]:
     yield from duplicates(named, "bodies, nodes, loads and dampers")
     contacts = [row.get(key) for _, row in rows_of(raw, "contacts") for key in ("name", "group")]
     for steps, name in named:
-        pointer = pointer_of(steps)
         if name in contacts:
-            message = f"`name` = {name!r} is that of a contact or its group: parameter paths need one owner"
-            yield Issue(pointer=pointer, message=message)
+            said = "is that of a contact or its group: parameter paths need one owner"
+            yield Issue(steps, f"= {name!r} {said}")
         if name in (*RESERVED_PREFIXES, GROUND):
-            yield Issue(pointer=pointer, message=f"`name` = {name!r} is reserved: give it another name")
+            yield Issue(steps, f"= {name!r} is reserved: give it another name")
         if cyclic and "@" in name:
-            yield Issue(pointer=pointer, message=f"`name` = {name!r}: no '@' in a cyclic scene")
+            yield Issue(steps, f"= {name!r}: no '@' in a cyclic scene")
 
 
 def _node_issues(raw: dict[str, Any], structure: dict[str, Any]) -> Iterator[Issue]:
@@ -95,8 +93,8 @@ def _node_issues(raw: dict[str, Any], structure: dict[str, Any]) -> Iterator[Iss
         pairs = dofs.items() if isinstance(dofs, dict) else ()
         for component, dof in pairs:
             if own is not None and isinstance(dof, str) and dof not in own:
-                message = unknown_dof(str(component), dof, dof, list(own))
-                yield Issue(pointer=pointer_of([*steps, "dofs", component]), message=message)
+                place = (*steps, "dofs", component)
+                yield unknown_dof(place, str(component), dof, dof, list(own))
 
 
 def _load_issues(raw: dict[str, Any], dofs: _Dofs) -> Iterator[Issue]:
@@ -104,60 +102,56 @@ def _load_issues(raw: dict[str, Any], dofs: _Dofs) -> Iterator[Issue]:
     for steps, row in rows_of(raw, "loads"):
         dof, on = row.get("dof"), row.get("on")
         if isinstance(dof, str) and dofs is not None and dof not in dofs:
-            message = unknown_dof("dof", dof, dof, list(dofs))
-            yield Issue(pointer=pointer_of([*steps, "dof"]), message=message)
+            yield unknown_dof((*steps, "dof"), "dof", dof, dof, list(dofs))
         if isinstance(on, str) and on not in known:
-            yield Issue(pointer=pointer_of([*steps, "on"]), message=_unknown_place("on", on, known, dofs))
+            yield _unknown_place((*steps, "on"), "on", on, known, dofs)
 
 
 def _contact_issues(
-    steps: _Steps, row: dict[str, Any], raw: dict[str, Any], structure: dict[str, Any], dofs: _Dofs
+    steps: Place, row: dict[str, Any], raw: dict[str, Any], structure: dict[str, Any], dofs: _Dofs
 ) -> Iterator[Issue]:
     law = row.get("law")
     if not in_space(row):
         for key in further_ends(law):
             if row.get(key) is None:
-                message = f"`{key}` is missing: a contact with the law `{law}` needs it"
-                yield Issue(pointer=pointer_of([*steps, key]), message=message)
+                yield Issue((*steps, key), f"is missing: a contact with the law `{law}` needs it")
         return
     given = "normal" if row.get("motions") is None else "motions"
     for key in between_keys()[1:]:
         if row.get(key) is not None:
-            message = f"`{key}` and `{given}` exclude each other: `{given}` says how the contact moves"
-            yield Issue(pointer=pointer_of([*steps, key]), message=message)
+            yield Issue(
+                (*steps, key), f"and `{given}` exclude each other: `{given}` says how the contact moves"
+            )
     known = _places(raw)
     if given == "motions":
         yield from _motion_issues(steps, row, is_cyclic(structure), dofs)
         known += list(dofs or ())
-    yield from _end_issues([*steps, "between"], row, structure, known, dofs)
+    yield from _end_issues((*steps, "between"), row, structure, known, dofs)
 
 
 def _end_issues(
-    steps: _Steps, row: dict[str, Any], structure: dict[str, Any], known: list[str], dofs: _Dofs
+    steps: Place, row: dict[str, Any], structure: dict[str, Any], known: list[str], dofs: _Dofs
 ) -> Iterator[Issue]:
     ends = row.get("between")
     if not (isinstance(ends, list) and len(ends) == 2 and all(isinstance(end, str) for end in ends)):
         return
     cyclic = is_cyclic(structure)
     if ends[0] == ends[1]:
-        message = f"`between` must join two different ends, got {ends!r}"
-        yield Issue(pointer=pointer_of(steps), message=message)
+        yield Issue(steps, "must join two different ends", ends)
     elif all(parse_end(end).next for end in ends):
-        message = f"`between` must have one end in this sector, got {ends!r}"
-        yield Issue(pointer=pointer_of(steps), message=message)
+        yield Issue(steps, "must have one end in this sector", ends)
     for i, text in enumerate(ends):
-        end, pointer = parse_end(text), pointer_of([*steps, i])
+        end, place = parse_end(text), (*steps, i)
         if end.dof is not None and end.dof not in known:
-            yield Issue(pointer=pointer, message=_unknown_place("between", end.dof, known, dofs))
+            yield _unknown_place(place, "between", end.dof, known, dofs)
         if end.next and not cyclic:
-            message = f"`between`: {text!r} needs a cyclic structure; this one has no next sector"
-            yield Issue(pointer=pointer, message=message)
+            yield no_sector(place, "between", text)
         elif end.next and row.get("normal") is not None and not _has_axis(structure):
-            message = (
+            sentence = (
                 f"`between`: {text!r} lies in the next sector, which is turned: "
                 "give the direction of the axis as `axis` of the structure (matrices: of [structure.cyclic])"
             )
-            yield Issue(pointer=pointer, message=message)
+            yield Issue(place, sentence, named=False)
 
 
 def _has_axis(structure: dict[str, Any]) -> bool:
@@ -166,23 +160,20 @@ def _has_axis(structure: dict[str, Any]) -> bool:
     return table.get("axis") is not None
 
 
-def _motion_issues(steps: _Steps, row: dict[str, Any], cyclic: bool, dofs: _Dofs) -> Iterator[Issue]:
+def _motion_issues(steps: Place, row: dict[str, Any], cyclic: bool, dofs: _Dofs) -> Iterator[Issue]:
     motions = row.get("motions")
     for i, motion in enumerate(motions if isinstance(motions, list) else []):
         for text in motion if isinstance(motion, dict) else ():
-            pointer, end = pointer_of([*steps, "motions", i, str(text)]), parse_end(str(text))
+            place, end = (*steps, "motions", i, str(text)), parse_end(str(text))
             if dofs is not None and end.dof not in dofs:
-                message = unknown_dof("motions", str(text), str(end.dof), list(dofs))
-                yield Issue(pointer=pointer, message=message)
+                yield unknown_dof(place, "motions", str(text), str(end.dof), list(dofs))
             elif end.next and not cyclic:
-                message = f"`motions`: {text!r} needs a cyclic structure; this one has no next sector"
-                yield Issue(pointer=pointer, message=message)
+                yield no_sector(place, "motions", str(text))
 
 
-def _unknown_place(key: str, name: str, known: list[str], dofs: _Dofs) -> str:
+def _unknown_place(place: Place, key: str, name: str, known: list[str], dofs: _Dofs) -> Issue:
+    said = f"there is no body or node {quoted(name)}; known: {listing(known)}{nearest(name, known)}"
     if dofs is not None and name in dofs:
-        return (
-            f"`{key}`: {quoted(name)} is a DOF and has no position: "
-            "name a body, or a node ([[nodes]] with `at` and `dofs`)"
-        )
-    return f"`{key}`: there is no body or node {quoted(name)}; known: {listing(known)}{nearest(name, known)}"
+        place_of = "name a body, or a node ([[nodes]] with `at` and `dofs`)"
+        said = f"{quoted(name)} is a DOF and has no position: {place_of}"
+    return Issue(place, f"`{key}`: {said}", named=False)

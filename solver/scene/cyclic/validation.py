@@ -8,7 +8,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from solver.errors import Issue
+from solver.errors import Issue, Place, Shown
 from solver.matrices.sectors.parts import WHOLE, PartsAcross
 from solver.scene.cyclic.sector_tables import is_cyclic
 from solver.scene.parts import Mistuning
@@ -36,27 +36,26 @@ def _pattern_issues(excitation: object, structure: dict[str, Any]) -> Iterator[I
         pattern = row.get("pattern") if isinstance(row, dict) else None
         if pattern is None:
             continue
-        pointer = "/excitation/pattern" if one else f"/excitation/{i}/pattern"
+        place = ("excitation", *(() if one else (i,)), "pattern")
         if kind in ("lumped", "matrices") and not is_cyclic(structure):
-            message = f"`pattern` = {quoted(pattern)} needs a cyclic structure; remove it from a {kind} one"
-            yield Issue(pointer=pointer, message=message)
+            yield Issue(place, f"= {quoted(pattern)} needs a cyclic structure; remove it from a {kind} one")
         elif first is not None and pattern != first:
-            message = f"`pattern` must be the same everywhere, got {quoted(pattern)} after {quoted(first)}"
-            yield Issue(pointer=pointer, message=message)
+            got = Shown(f"{quoted(pattern)} after {quoted(first)}")
+            yield Issue(place, "must be the same everywhere", got)
         first = pattern if first is None else first
 
 
-def _parts(structure: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Masses, springs and dashpots that are tables, with their pointers."""
+def _parts(structure: dict[str, Any]) -> Iterator[tuple[Place, dict[str, Any]]]:
+    """Masses, springs and dashpots that are tables, with their places."""
     masses = structure.get("masses")
     for dof, row in masses.items() if isinstance(masses, dict) else ():
         if isinstance(row, dict):
-            yield "/structure/masses/" + str(dof).replace("~", "~0").replace("/", "~1"), row
+            yield ("structure", "masses", str(dof)), row
     for key in ("springs", "dampers"):
         table = structure.get(key)
         for i, row in enumerate(table if isinstance(table, list) else []):
             if isinstance(row, dict):
-                yield f"/structure/{key}/{i}", row
+                yield ("structure", key, i), row
 
 
 def _names(structure: dict[str, Any]) -> list[str]:
@@ -66,19 +65,17 @@ def _names(structure: dict[str, Any]) -> list[str]:
 def _group_issues(structure: dict[str, Any]) -> Iterator[Issue]:
     """Groups named like a part, in a cyclic structure, or of parts of another kind."""
     names, quantities = set(_names(structure)), dict[str, str]()
-    for pointer, row in _parts(structure):
-        group, quantity = row.get("group"), pointer.split("/")[2]
+    for steps, row in _parts(structure):
+        group, quantity = row.get("group"), str(steps[1])
         if not isinstance(group, str):
             continue
-        where = f"{pointer}/group"
+        place = (*steps, "group")
         if structure.get("kind") == "cyclic":
-            message = f"`group` = {quoted(group)}: a named part of a cyclic structure is a group already"
-            yield Issue(pointer=where, message=message)
+            yield Issue(place, f"= {quoted(group)}: a named part of a cyclic structure is a group already")
         elif group in names:
-            yield Issue(pointer=where, message=f"`group` = {quoted(group)} is also the name of a part")
+            yield Issue(place, f"= {quoted(group)} is also the name of a part")
         elif quantities.setdefault(group, quantity) != quantity:
-            message = f"`group` = {quoted(group)} has {quantities[group]} in it already, and no {quantity}"
-            yield Issue(pointer=where, message=message)
+            yield Issue(place, f"= {quoted(group)} has {quantities[group]} in it already, and no {quantity}")
 
 
 def _name_issues(structure: dict[str, Any], mistuning: dict[str, Any]) -> Iterator[Issue]:
@@ -95,15 +92,15 @@ def _name_issues(structure: dict[str, Any], mistuning: dict[str, Any]) -> Iterat
     for i, name in enumerate(named):
         if not isinstance(name, str):
             continue
-        pointer = f"/structure/mistuning/of/{i}"
+        place = ("structure", "mistuning", "of", i)
         if name not in known:
-            message = (
+            sentence = (
                 f"`of`: there is no {what} {quoted(name)}{hint}; "
                 f"known: {listing(known) or 'none'}{nearest(name, known)}"
             )
-            yield Issue(pointer=pointer, message=message)
+            yield Issue(place, sentence, named=False)
         elif name in named[:i]:
-            yield Issue(pointer=pointer, message=f"`of` has {name!r} twice: its factor would count twice")
+            yield Issue(place, f"`of` has {name!r} twice: its factor would count twice", named=False)
 
 
 def _matrix_parts(structure: dict[str, Any]) -> list[str]:
@@ -126,12 +123,15 @@ def _factor_issues(mistuning: dict[str, Any], sectors: object) -> Iterator[Issue
         return
     factors = read.factors(sectors)
     if len(factors) != sectors:
-        message = f"`values` must have one factor for each of the {sectors} sectors, got {len(factors)}"
-        yield Issue(pointer="/structure/mistuning/values", message=message)
+        yield Issue(
+            ("structure", "mistuning", "values"),
+            f"must have one factor for each of the {sectors} sectors",
+            len(factors),
+        )
     bad = next((j for j, factor in enumerate(factors) if not 0.0 < factor < math.inf), None)
     if bad is not None:
-        message = (
-            f"`spread` = {read.spread:g} gives sector {bad} the factor {factors[bad]:.3g}, which must be "
-            "> 0: choose a smaller spread or another `seed`"
+        yield Issue(
+            ("structure", "mistuning", "spread"),
+            f"= {read.spread:g} gives sector {bad} the factor {factors[bad]:.3g}, which must be > "
+            "0: choose a smaller spread or another `seed`",
         )
-        yield Issue(pointer="/structure/mistuning/spread", message=message)

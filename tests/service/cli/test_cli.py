@@ -194,7 +194,7 @@ def test_bad_scenes_are_named(run: Run, tmp_path: Path, command: str, case: str)
         ("design two-dof --weight peak=-1", ["--weight", "-1.0"]),
         ("design two-dof --forbidden 1", ["--forbidden", "LO HI"]),
         ("design two-dof --forbidden 1 2", ["--limit", "must be given"]),
-        ("design two-dof --limit 1 --forbidden 1 2 --forbidden 2 1", ["--forbidden", "forbidden_hz[1]"]),
+        ("design two-dof --limit 1 --forbidden 1 2 --forbidden 2 1", ["`--forbidden`", "got [2.0, 1.0]"]),
         ("design two-dof --limit 1 --speeds 1 few", ["--speeds", "few"]),
         ("design two-dof --max-work bumper=1", ["--max-work", "bumper", "damper"]),
         ("design two-dof --max-work damper=1 --max-work damper=2", ["--max-work", "damper", "twice"]),
@@ -418,3 +418,23 @@ def _read_all(terminal: int) -> str:
             os.close(terminal)
             return seen.decode()
         seen += some
+
+
+def test_each_face_says_by_its_own_name_what_is_wrong(run: Run, tmp_path: Path) -> None:
+    wanted = "must have low < high, got [300.0, 20.0]"
+    with pytest.raises(optim.DesignError) as caught:
+        optim.design(solver.load_scene("two-dof"), variables={"damper.N0": [300.0, 20.0]})
+    assert str(caught.value) == f"`variables.damper.N0` {wanted}"
+    _, _, err = run("design two-dof --variable damper.N0 300 20")
+    assert err == f"stickslip: `--variable damper.N0` {wanted}\n"
+    file = tmp_path / "problem.json"
+    file.write_text(json.dumps({"scene": "two-dof", "variables": {"damper.N0": [300, 20]}}))
+    _, _, err = run(f"design --problem {file}")
+    assert err == f"stickslip: {file}: /variables/damper.N0: `damper.N0` {wanted}\n"
+
+
+def test_an_argument_of_python_is_an_option_of_the_command(run: Run) -> None:
+    assert run("sweep two-dof --from 2 --to 2")[2].startswith("stickslip: `--to` must differ from `--from`")
+    wrong = "map two-dof --parameter damper.N9 --from 1 --to 2"
+    assert "`--parameter` must be one of " in run(wrong)[2]
+    assert "`--set` must be one of " in run("sweep two-dof --set damper.N9=1")[2]

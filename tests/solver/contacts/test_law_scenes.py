@@ -20,7 +20,7 @@ from solver.scene.scene import GapSpring, PolynomialSpring, Scene
 def issues(**contact: Any) -> dict[str, str]:
     with pytest.raises(SceneError) as error:
         scene(contact)
-    return {issue.pointer: issue.message for issue in error.value.issues}
+    return {issue.pointer: issue.said() for issue in error.value.issues}
 
 
 def test_scenes_are_written_and_read_again():

@@ -176,7 +176,7 @@ def test_a_request_never_opens_a_path(tmp_path: Path, monkeypatch: pytest.Monkey
         table = raw["structure"] | {key: f"{tmp_path}/K.npz"}
         with pytest.raises(SceneError) as caught:
             Scene.from_dict({**raw, "structure": table})
-        pointers = {issue.pointer: issue.message for issue in caught.value.issues}
+        pointers = {issue.pointer: issue.said() for issue in caught.value.issues}
         assert "inline" in pointers[f"/structure/{key}"]
 
 
@@ -216,7 +216,7 @@ def test_each_mistake_names_key_and_value(case: str) -> None:
     raw = inline(*beam(2), {"tip": 2, "mid": 0})
     with pytest.raises(SceneError) as caught:
         Scene.from_dict({**raw, "structure": raw["structure"] | change})
-    found = {issue.pointer: issue.message for issue in caught.value.issues}
+    found = {issue.pointer: issue.said() for issue in caught.value.issues}
     assert message in found[pointer]
 
 
@@ -226,7 +226,7 @@ def test_contacts_know_neither_the_next_sector_nor_an_engine_order() -> None:
     raw["excitation"] |= {"engine_order": 1}
     with pytest.raises(SceneError) as caught:
         Scene.from_dict(raw)
-    messages = " ".join(issue.message for issue in caught.value.issues)
+    messages = " ".join(issue.said() for issue in caught.value.issues)
     assert "has no next sector" in messages
     assert "remove it from a matrices one" in messages
 

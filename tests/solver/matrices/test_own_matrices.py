@@ -52,7 +52,7 @@ WRONG = {
     "indefinite mass": ((indefinite(), K), "is a triangle missing, or the file not M?"),
     "sizes": ((M[1:, 1:], K), "M has 5 rows, K has 6 rows: export all of them from one analysis"),
     "the same twice": ((K, K), "are the same matrix: give the mass and the stiffness"),
-    "no mass": ((np.diag([0.0, *np.diag(M)[1:]]), K), "reduce the model (--reduce)"),
+    "no mass": ((np.diag([0.0, *np.diag(M)[1:]]), K), "reduce the model onto the DOFs in use"),
     "not finite": ((M, np.where(K[0, 0] == K, np.nan, K)), "must hold finite numbers, got nan in row 0"),
 }
 
@@ -125,7 +125,7 @@ def test_labels_that_are_not_there_are_told(
 @pytest.mark.parametrize(
     ("mass", "stiffness", "words"),
     [
-        (1e-3, 1e-3, "if that is in tonnes (a model in mm, t, N, s), its units are mm (--units mm)"),
+        (1e-3, 1e-3, "if that is in tonnes (a model in mm, t, N, s), its `units` are mm"),
         (1e-9, 1e6, "are M and K in units that go together?"),
         (1e9, 1e-9, "are M and K in units that go together?"),
         (1e10, 1e9, "is M in kg, and not the stiffness?"),

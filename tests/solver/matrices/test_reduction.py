@@ -282,7 +282,7 @@ def test_rows_of_no_element_and_sizes_that_differ_are_refused(
 NOTES = {
     "free": (lambda: free_beam(6), "2 rigid-body modes: the body is not held"),
     "slow": (lambda: (beam(6)[0] * 1e6, beam(6)[1]), "are M and K in units that go together?"),
-    "light": (lambda: (beam(6)[0] * 1e-9, beam(6)[1] * 1e-9), "its units are mm (--units mm)"),
+    "light": (lambda: (beam(6)[0] * 1e-9, beam(6)[1] * 1e-9), "its `units` are mm"),
     "unstable": (lambda: (beam(6)[0], beam(6)[1] - 200.0 * beam(6)[0]), "semidefinite: 1 negative"),
 }  # fmt: skip
 

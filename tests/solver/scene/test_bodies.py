@@ -239,8 +239,8 @@ def test_mistakes_in_space_are_named(mistake: str) -> None:
     change(raw)
     with pytest.raises(SceneError) as caught:
         Scene.from_dict(raw)
-    found = [issue for issue in caught.value.issues if issue.pointer == pointer and words in issue.message]
-    assert found, [(issue.pointer, issue.message) for issue in caught.value.issues]
+    found = [issue for issue in caught.value.issues if issue.pointer == pointer and words in issue.said()]
+    assert found, [(issue.pointer, issue.said()) for issue in caught.value.issues]
 
 
 def test_contacts_into_the_next_sector_need_an_axis() -> None:

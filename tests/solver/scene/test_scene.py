@@ -64,7 +64,7 @@ def put(raw: Raw, path: str, value: Any) -> Raw:
 def issues(raw: object) -> dict[str, str]:
     with pytest.raises(SceneError) as caught:
         Scene.from_dict(raw)  # type: ignore[arg-type]
-    return {issue.pointer: issue.message for issue in caught.value.issues}
+    return {issue.pointer: issue.said() for issue in caught.value.issues}
 
 
 def test_shipped_scenes_have_the_published_values():

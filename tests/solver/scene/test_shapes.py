@@ -156,8 +156,8 @@ def test_mistakes_in_shapes_are_named(change: dict[str, Any], pointer: str, word
     raw["dampers"][0].update(change)
     with pytest.raises(SceneError) as caught:
         Scene.from_dict(raw)
-    found = [issue for issue in caught.value.issues if issue.pointer == pointer and words in issue.message]
-    assert found, [(issue.pointer, issue.message) for issue in caught.value.issues]
+    found = [issue for issue in caught.value.issues if issue.pointer == pointer and words in issue.said()]
+    assert found, [(issue.pointer, issue.said()) for issue in caught.value.issues]
 
 
 def test_every_shape_is_tried_here() -> None:

@@ -136,7 +136,7 @@ def test_answers_at_the_ends_of_their_ranges_make_a_scene_or_are_named(name: str
         try:
             new_scene(name, **answers)
         except solver.SceneError as refused:
-            words = [issue.message for issue in refused.issues]
+            words = [issue.said() for issue in refused.issues]
         else:
             made += 1
             continue
@@ -169,4 +169,4 @@ def test_wrong_answers_are_named(name: str, answers: dict[str, Any], pointer: st
         new_scene(name, **answers)
     (issue,) = caught.value.issues
     assert issue.pointer == pointer
-    assert words in issue.message
+    assert words in issue.said()
