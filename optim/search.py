@@ -12,18 +12,18 @@ import numpy as np
 
 from optim.criteria.evaluation import evaluate, natural_scales
 from optim.criteria.linearised import conditions, model_of
-from optim.criteria.rows import Evaluation
+from optim.criteria.rows import DesignEvaluation
 from optim.methods.afterwards import looked_after, settled_status
 from optim.methods.eased import Eased
 from optim.methods.enough_harmonics import by_the_better_known, honest, most_harmonics, with_enough
-from optim.methods.evaluator import Search, StoppedError, Tally
+from optim.methods.evaluator import DesignSearch, SearchStoppedError, Tally
 from optim.methods.global_look import WholeRange
 from optim.methods.kkt import FLAT_SLOPE, Local, LocalSearch
 from optim.problem.keys import ROBUST, DesignKeys
 from optim.problem.keywords import keywords
 from optim.problem.problem import Method, Problem, pose
 from optim.problem.typed import Limit, with_limits
-from optim.results.basins import SAME_PLACE, Basin
+from optim.results.basins import SAME_PLACE, LocalOptimum
 from optim.results.best_so_far import OnBest
 from optim.results.design import DesignResult, DesignStatus
 from solver.continuation.branch import BranchStatus
@@ -114,7 +114,7 @@ def _undamped(found: DesignResult, should_stop: ShouldStop) -> bool:
 
 def _with_enough_harmonics(
     found: DesignResult, most: int, tally: Tally, should_stop: ShouldStop, on_best: OnBest
-) -> tuple[DesignResult, list[Evaluation]]:
+) -> tuple[DesignResult, list[DesignEvaluation]]:
     """Search again, by the right measure and with more harmonics, as long as the optimum asks for them.
 
     Each search begins from what the one before has seen. With the result come the evaluations of optima
@@ -157,7 +157,7 @@ def _solved(
         if problem.method is Method.TRACKED or tracked.status is not DesignStatus.NOT_TRACKED:
             return _of_tracked(problem, tracked, time.perf_counter() - begun)
     earlier = () if before is None else (*before.looked_at, *before.history)
-    search = Search(problem, on_progress, should_stop, on_best=on_best, before=earlier)
+    search = DesignSearch(problem, on_progress, should_stop, on_best=on_best, before=earlier)
     eased = Eased.of(search, tracked)
     if eased.proven is not None:
         return _of_tracked(problem, eased.proven, time.perf_counter() - begun)
@@ -169,7 +169,7 @@ def _solved(
     others = () if before is None else [dict(basin.values) for basin in before.basins[1:]]
     try:
         status = _search(whole, found, [*eased.starts, *others])
-    except StoppedError as stop:
+    except SearchStoppedError as stop:
         status = stop.status
         if status is DesignStatus.TOO_MANY and found:
             status = DesignStatus.LOCAL
@@ -213,9 +213,9 @@ def judge(best: Local, *, finished: bool = True) -> DesignStatus:
     return settled_status(best.conditions)
 
 
-def basins_of(search: Search, found: list[Local]) -> tuple[Basin, ...]:
+def basins_of(search: DesignSearch, found: list[Local]) -> tuple[LocalOptimum, ...]:
     """Return the local optima that differ, best first."""
-    basins: list[Basin] = []
+    basins: list[LocalOptimum] = []
     places: list[list[float]] = []
     level: list[float] = []  # what is minimised where it does not change: one plateau is one optimum
     for local in sorted(found, key=lambda local: local.standing):
@@ -229,7 +229,7 @@ def basins_of(search: Search, found: list[Local]) -> tuple[Basin, ...]:
             level.append(height)
         places.append(z)
         basins.append(
-            Basin(
+            LocalOptimum(
                 values=dict(local.evaluation.values), peak=local.evaluation.peaks[0].value,
                 objective=local.evaluation.objective, settled=local.settled, feasible=local.feasible,
                 proven=True,
@@ -238,14 +238,14 @@ def basins_of(search: Search, found: list[Local]) -> tuple[Basin, ...]:
     return tuple(basins)
 
 
-def _is_level(search: Search, local: Local) -> bool:
+def _is_level(search: DesignSearch, local: Local) -> bool:
     """Return whether what is minimised does not change near an end."""
     model = search.model(local.evaluation)
     held = model.heights >= model.heights.max(initial=0.0) * (1.0 - SAME_HEIGHT)
     return bool(np.all(np.abs(model.slopes[held]) <= FLAT_SLOPE))
 
 
-def _result(search: Search, whole: WholeRange, status: DesignStatus, begun: float) -> DesignResult:
+def _result(search: DesignSearch, whole: WholeRange, status: DesignStatus, begun: float) -> DesignResult:
     """Put the result together; after a stop the best design so far stands in it."""
     best = min(whole.found, key=lambda local: local.standing, default=None)
     evaluation = best.evaluation if best else min(search.good(), key=search.merit, default=None)

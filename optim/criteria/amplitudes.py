@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from optim.criteria.criterion import Criterion, Judged, Row
+from optim.criteria.criterion import Criterion, CriterionRow, Judged
 from optim.criteria.response_gradients import Sensitivity
 from optim.problem.variables import Real
 from solver.continuation.peaks import Peak
@@ -15,7 +15,7 @@ COMPETES = 0.6
 
 def maxima(
     judged: Judged, criterion: Criterion, what: str, *, bound: float | None, weight: float = 0.0
-) -> list[Row]:
+) -> list[CriterionRow]:
     """Return a row for every local maximum that competes, as `what` at its frequency.
 
     At a maximum over the frequency ∂a/∂ω = 0: its derivative by a parameter is the partial one there.

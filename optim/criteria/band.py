@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from optim.criteria.criterion import Criterion, Form, Judged, Key, Row
+from optim.criteria.criterion import Criterion, CriterionRow, Form, Judged, Key
 from optim.criteria.json_types import FrequencyHz
 
 if TYPE_CHECKING:
     from optim.problem.variables import Real
 
 
-def _rows(judged: Judged) -> list[Row]:
+def _rows(judged: Judged) -> list[CriterionRow]:
     """The row of the band of a response that has one."""
     import numpy as np
 

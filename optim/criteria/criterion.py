@@ -1,8 +1,8 @@
 """What a criterion of a design says of itself: words, units, values with gradients, and limits.
 
 The methods, problem files, REST bodies, options of the command, results, reports and the docs follow from
-it. What it judges (`Judged`) and what it gives (`Row`) stand here too: each speaks of the others. A module of
-a criterion imports what computes inside its functions: a service that only lists loads none of it.
+it. What it judges (`Judged`) and what it gives (`CriterionRow`) stand here too: each speaks of the others. A
+module of a criterion imports what computes inside its functions: a service that only lists loads none of it.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from solver.results.told import Piece
 
 if TYPE_CHECKING:
     from optim.criteria.response_gradients import Sensitivity
-    from optim.problem.cases import Case
-    from optim.problem.variables import Real, Variable
+    from optim.problem.cases import LoadCase
+    from optim.problem.variables import BoundedVariable, Real
     from solver.continuation.branch import Branch
     from solver.response.wear import WearSensitivity
     from solver.scene.scene import AnyContact, Scene
@@ -30,7 +30,7 @@ Ranges = tuple[tuple[float, float], ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Asked:
+class CriterionContext:
     """What the keys of a criterion are read in.
 
     Attributes
@@ -46,7 +46,7 @@ class Asked:
     """
 
     scene: Scene
-    cases: tuple[Case, ...]
+    cases: tuple[LoadCase, ...]
     limit: float | None
     values: Mapping[str, object]
 
@@ -55,7 +55,7 @@ def _unscaled(_scene: Scene) -> float:
     return 1.0
 
 
-def positive_limit(asked: Asked) -> object:
+def positive_limit(asked: CriterionContext) -> object:
     """Read the one key of a criterion as a number above 0.
 
     Raises
@@ -112,12 +112,12 @@ class Criterion:
     name: str
     unit: str
     help: str
-    rows: Callable[[Judged], list[Row]]
+    rows: Callable[[Judged], list[CriterionRow]]
     smaller_is_better: bool = True
     weight: str = ""
     keys: tuple[Key, ...] = ()
-    read: Callable[[Asked], object] = positive_limit
-    ranges: Callable[[Any, Case], Ranges] | None = None
+    read: Callable[[CriterionContext], object] = positive_limit
+    ranges: Callable[[Any, LoadCase], Ranges] | None = None
     scale: Callable[[Scene], float] = _unscaled
     always: bool = False
     each_blade: bool = False
@@ -136,7 +136,7 @@ class Criterion:
     def __repr__(self) -> str:
         return f"Criterion({self.name})"
 
-    def limit_words(self, row: Row) -> str:
+    def limit_words(self, row: CriterionRow) -> str:
         """Return the limit of a row in words."""
         bound = row.bound if row.bound is None or self.smaller_is_better else 0.0 - row.bound
         where = f" ({row.what})" if self.with_place else ""
@@ -185,7 +185,7 @@ class Goals:
         What must be kept.
     """
 
-    variables: tuple[Variable, ...]
+    variables: tuple[BoundedVariable, ...]
     limit: float | None
     weights: Mapping[Criterion, float]
     limits: Limits
@@ -197,7 +197,7 @@ class Goals:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class Row(Piece):
+class CriterionRow(Piece):
     """One smooth number of a design."""
 
     JSON: ClassVar = (
@@ -250,7 +250,7 @@ class Judged:
     """
 
     problem: Goals
-    case: Case
+    case: LoadCase
     branch: Branch
     gradients: bool
     hertz: tuple[float, float] | None = None
@@ -285,7 +285,7 @@ class Judged:
         self, criterion: Criterion, what: str, value: float, by_paths: Real | None, *,
         at_hz: float = math.nan, bound: float | None = None, weight: float | None = None,
         second: Callable[[], Real] | None = None,
-    ) -> Row:  # fmt: skip
+    ) -> CriterionRow:  # fmt: skip
         """Return a row of a criterion.
 
         Parameters
@@ -309,12 +309,12 @@ class Judged:
         twice = None if second is None else lambda: by_variables_twice(variables, second())
         weight = self.weight(criterion) if weight is None else weight
         if criterion.smaller_is_better:
-            return Row(
+            return CriterionRow(
                 quantity=criterion, case=self.case.name, what=what, value=value, gradient=gradient,
                 at_hz=at_hz, weight=weight, bound=bound, second=twice,
             )  # fmt: skip
         # Kept from above like all rows; 0.0 − 0.0 is 0.0, −0.0 would show its sign.
-        return Row(
+        return CriterionRow(
             quantity=criterion, case=self.case.name, what=f"-{what}", value=0.0 - value,
             gradient=-gradient, at_hz=at_hz, weight=0.0, bound=None if bound is None else 0.0 - bound,
             second=None if twice is None else lambda: -twice(),

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from optim.criteria.criterion import Criterion, Judged, Row
+from optim.criteria.criterion import Criterion, CriterionRow, Judged
 from optim.criteria.registry import criteria
-from optim.criteria.rows import Evaluation, Response
-from optim.problem.cases import Case
+from optim.criteria.rows import CaseResponse, DesignEvaluation
+from optim.problem.cases import LoadCase
 from optim.problem.problem import Problem
 from optim.problem.variables import Real, parameter_values
 from solver.balance.balance import build
@@ -23,8 +23,8 @@ from solver.studies.peaks.seeds import fitted
 
 def evaluate(
     problem: Problem, values: Mapping[str, float], *, gradients: bool = True, errors: bool = True,
-    should_stop: ShouldStop = None, before: Evaluation | None = None,
-) -> Evaluation:  # fmt: skip
+    should_stop: ShouldStop = None, before: DesignEvaluation | None = None,
+) -> DesignEvaluation:  # fmt: skip
     """Compute everything a design is judged by.
 
     Parameters
@@ -41,8 +41,8 @@ def evaluate(
     -------
     The evaluation; without rows if a response does not cover its range, for whatever reason.
     """
-    responses: list[Response] = []
-    rows: list[Row] = []
+    responses: list[CaseResponse] = []
+    rows: list[CriterionRow] = []
     for case in problem.cases:
         known = [response.branch for response in responses if response.case == case.beside]
         earlier = [] if before is None else [one.branch for one in before.responses if one.case == case.name]
@@ -50,14 +50,14 @@ def evaluate(
         responses += found[0]
         rows += found[1]
         if not all(response.branch.reached for response in found[0]):
-            return Evaluation(values=dict(values), responses=tuple(responses), rows=())
-    return Evaluation(values=dict(values), responses=tuple(responses), rows=tuple(rows))
+            return DesignEvaluation(values=dict(values), responses=tuple(responses), rows=())
+    return DesignEvaluation(values=dict(values), responses=tuple(responses), rows=tuple(rows))
 
 
 def _case(
-    problem: Problem, case: Case, values: Mapping[str, float], known: Sequence[Branch],
+    problem: Problem, case: LoadCase, values: Mapping[str, float], known: Sequence[Branch],
     earlier: Sequence[Branch], gradients: bool, errors: bool, should_stop: ShouldStop,
-) -> tuple[list[Response], list[Row]]:  # fmt: skip
+) -> tuple[list[CaseResponse], list[CriterionRow]]:  # fmt: skip
     """Compute the responses and rows of one case.
 
     Parameters
@@ -68,8 +68,8 @@ def _case(
     here = case.scene.with_values(parameter_values(problem.variables, values))
     effects = effects_of(problem, here)
     judge = Judge(problem=problem, case=case, gradients=gradients)
-    responses: list[Response] = []
-    rows: list[Row] = []
+    responses: list[CaseResponse] = []
+    rows: list[CriterionRow] = []
     for i, over in enumerate(ranges_of(problem, case)):
         there = known[i] if known else earlier[i] if i < len(earlier) else None
         shared = there is not None and there.balance.n_harmonics == problem.harmonics
@@ -83,7 +83,7 @@ def _case(
                 effects=effects, errors=errors, should_stop=should_stop,
                 guess=None if there is None else _begin(problem, here, effects, there),
             )  # fmt: skip
-        responses.append(Response(case=case.name, branch=branch, shared=shared))
+        responses.append(CaseResponse(case=case.name, branch=branch, shared=shared))
         rows += judge.rows(branch, over)
     return responses, rows
 
@@ -118,7 +118,7 @@ class Range:
     criteria: tuple[Criterion, ...]
 
 
-def ranges_of(problem: Problem, case: Case) -> tuple[Range, ...]:
+def ranges_of(problem: Problem, case: LoadCase) -> tuple[Range, ...]:
     """Return what responses a case needs: that over the band first, then those beyond it."""
     every, limits = criteria(), problem.limits
     of_band = [
@@ -147,10 +147,10 @@ class Judge:
     """
 
     problem: Problem
-    case: Case
+    case: LoadCase
     gradients: bool
 
-    def rows(self, branch: Branch, over: Range) -> list[Row]:
+    def rows(self, branch: Branch, over: Range) -> list[CriterionRow]:
         """Return the rows of a response over a range; none unless it covers it and has a peak."""
         if not branch.reached or not branch.peaks:
             return []

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from optim.criteria.criterion import Asked, Criterion, Form, Judged, Key, Ranges, Row
+from optim.criteria.criterion import Criterion, CriterionContext, CriterionRow, Form, Judged, Key, Ranges
 from optim.criteria.json_types import Ranges as RangesInBodies
 
 if TYPE_CHECKING:
-    from optim.problem.cases import Case
+    from optim.problem.cases import LoadCase
 
 
-def _rows(judged: Judged) -> list[Row]:
+def _rows(judged: Judged) -> list[CriterionRow]:
     """A row for every local maximum of the response over a forbidden range."""
     from optim.criteria.amplitudes import maxima
 
@@ -23,7 +23,7 @@ def _rows(judged: Judged) -> list[Row]:
     return maxima(judged, FORBIDDEN, what, bound=judged.problem.limit)
 
 
-def _read(asked: Asked) -> Mapping[str, Ranges]:
+def _read(asked: CriterionContext) -> Mapping[str, Ranges]:
     """The forbidden frequencies by case: those given, and those of the speeds by its order."""
     from optim.errors import DesignError
 
@@ -51,7 +51,7 @@ def _ranges(name: str, ranges: object) -> Ranges:
     return found
 
 
-def _of_case(read: Any, case: Case) -> Ranges:
+def _of_case(read: Any, case: LoadCase) -> Ranges:
     found: Ranges = read.get(case.name, ())
     return found
 

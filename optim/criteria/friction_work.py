@@ -11,12 +11,12 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, WithJsonSchema
 
-from optim.criteria.criterion import Asked, Criterion, Form, Judged, Key, Row, of_sector
+from optim.criteria.criterion import Criterion, CriterionContext, CriterionRow, Form, Judged, Key, of_sector
 
 _KEY = "max_friction_work"
 
 
-def _rows(judged: Judged) -> list[Row]:
+def _rows(judged: Judged) -> list[CriterionRow]:
     """A row for every local maximum that competes, of every contact that is limited."""
     from solver.response.worst_wear import Measure, worst_slopes, worst_wear
 
@@ -32,7 +32,7 @@ def _rows(judged: Judged) -> list[Row]:
     ]  # fmt: skip
 
 
-def _read(asked: Asked) -> Mapping[str, float]:
+def _read(asked: CriterionContext) -> Mapping[str, float]:
     """The limit of every contact named; a single number is that of every friction contact."""
     from optim.errors import DesignError
     from optim.problem.numbers import positive

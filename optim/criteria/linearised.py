@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import nnls
 
-from optim.criteria.criterion import Criterion, Row
-from optim.criteria.rows import Evaluation
-from optim.problem.variables import Real, Variable, scaled, slopes
+from optim.criteria.criterion import Criterion, CriterionRow
+from optim.criteria.rows import DesignEvaluation
+from optim.problem.variables import BoundedVariable, Real, scaled, slopes
 
 PENALTY = 1e4  # the largest exact penalty on the largest relative excess over a bound
 ACTIVE = 1e-6  # relative distance from the largest row, or from its bound, within which a row is active
@@ -50,11 +50,11 @@ class Model:
     """
 
     z: Real
-    rows: tuple[Row, ...]
+    rows: tuple[CriterionRow, ...]
     heights: Real
     slopes: Real
     groups: Real
-    limited: tuple[Row, ...]
+    limited: tuple[CriterionRow, ...]
     excess: Real
     excess_slopes: Real
     by_z: Real
@@ -72,7 +72,7 @@ class Model:
         """Return those of the relative excess of limited row `j`."""
         return self._by_z_twice(self.limited[j], 1.0 / self.units[j])
 
-    def _by_z_twice(self, row: Row, factor: float) -> Real | None:
+    def _by_z_twice(self, row: CriterionRow, factor: float) -> Real | None:
         if row.second is None:
             return None
         by_values = row.second()
@@ -107,7 +107,10 @@ class Model:
 
 
 def model_of(
-    evaluation: Evaluation, variables: Sequence[Variable], scale: float, scales: Mapping[Criterion, float]
+    evaluation: DesignEvaluation,
+    variables: Sequence[BoundedVariable],
+    scale: float,
+    scales: Mapping[Criterion, float],
 ) -> Model:
     """Return the model of a good evaluation.
 
@@ -154,13 +157,15 @@ class Conditions:
         Largest relative excess over a bound.
     """
 
-    rows: tuple[tuple[Row, float], ...]
+    rows: tuple[tuple[CriterionRow, float], ...]
     bounds: tuple[tuple[str, str, float], ...]
     residual: float
     violation: float
 
 
-def conditions(model: Model, variables: Sequence[Variable], *, feasibility: bool = False) -> Conditions:
+def conditions(
+    model: Model, variables: Sequence[BoundedVariable], *, feasibility: bool = False
+) -> Conditions:
     """Return the multipliers that leave the least gradient of the Lagrangian.
 
     Non-negative least squares for Σ λᵢ gᵢ + Σ μⱼ gⱼ + bounds = 0 over the active rows, Σ λᵢ = 1 by group.
@@ -169,7 +174,7 @@ def conditions(model: Model, variables: Sequence[Variable], *, feasibility: bool
     ----------
     feasibility : judge the largest excess as what is minimised (for a design that cannot keep its limits).
     """
-    kept: list[tuple[Row, Real, int]] = []
+    kept: list[tuple[CriterionRow, Real, int]] = []
     if feasibility:
         top = model.excess.max(initial=0.0)
         near = np.flatnonzero(model.excess >= top - ACTIVE * max(1.0, abs(top)))
@@ -189,7 +194,7 @@ def conditions(model: Model, variables: Sequence[Variable], *, feasibility: bool
     return _multipliers(kept, held, model)
 
 
-def bounds_held(z: Real, variables: Sequence[Variable]) -> list[tuple[str, str, Real]]:
+def bounds_held(z: Real, variables: Sequence[BoundedVariable]) -> list[tuple[str, str, Real]]:
     """Return the variables on a bound with the outward direction."""
     held = []
     for i, variable in enumerate(variables):
@@ -204,7 +209,7 @@ def bounds_held(z: Real, variables: Sequence[Variable]) -> list[tuple[str, str, 
 
 
 def _multipliers(
-    kept: list[tuple[Row, Real, int]], held: list[tuple[str, str, Real]], model: Model
+    kept: list[tuple[CriterionRow, Real, int]], held: list[tuple[str, str, Real]], model: Model
 ) -> Conditions:
     """Solve for the multipliers of active rows and bounds."""
     columns = [slope for _, slope, _ in kept] + [unit for _, _, unit in held]
@@ -269,7 +274,7 @@ def with_cuts(model: Model, others: Iterable[Model], reach: float) -> Model:
 class _Lines:
     """Rows with their values and slopes at the present design."""
 
-    def __init__(self, rows: tuple[Row, ...], values: Real, slopes: Real) -> None:
+    def __init__(self, rows: tuple[CriterionRow, ...], values: Real, slopes: Real) -> None:
         self.rows, self.values, self.slopes = list(rows), list(values), list(slopes)
         self._own = len(rows)
 
@@ -277,7 +282,7 @@ class _Lines:
         """Return the slopes, (rows, n)."""
         return np.array(self.slopes).reshape(-1, n)
 
-    def take(self, row: Row, value: float, slope: Real, back: Real, top: float) -> bool:
+    def take(self, row: CriterionRow, value: float, slope: Real, back: Real, top: float) -> bool:
         """Add a row seen `back` from here as a cut, unless one of the present design is the same."""
         if self._known(row, value, slope, back):
             return False
@@ -287,7 +292,7 @@ class _Lines:
         self.values.append(float(top - abs(top - (value + slope @ back))))
         return True
 
-    def _known(self, row: Row, value: float, slope: Real, back: Real) -> bool:
+    def _known(self, row: CriterionRow, value: float, slope: Real, back: Real) -> bool:
         """Return whether the trapezoidal rule leads from the row there to one here: they are one."""
         for mine, its, here in zip(
             self.rows[: self._own], self.slopes[: self._own], self.values[: self._own], strict=True

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from optim.criteria.criterion import Criterion, Form, Judged, Key, Row
+from optim.criteria.criterion import Criterion, CriterionRow, Form, Judged, Key
 from optim.criteria.json_types import PositiveNumber
 
 
-def _rows(judged: Judged) -> list[Row]:
+def _rows(judged: Judged) -> list[CriterionRow]:
     """A row for every peak that competes."""
     from optim.criteria.amplitudes import maxima
 

@@ -11,13 +11,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from optim.criteria.band import BAND
-from optim.criteria.criterion import Criterion, Row
+from optim.criteria.criterion import Criterion, CriterionRow
 from optim.criteria.peak import PEAK
 from solver.continuation.branch import Branch
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Response:
+class CaseResponse:
     """A frequency response of a design: its case and the branch, and whether it served something else first.
 
     What was followed for another case, or by another measure, is not computed again.
@@ -29,7 +29,7 @@ class Response:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Evaluation:
+class DesignEvaluation:
     """One design with everything it is judged by.
 
     Attributes
@@ -43,21 +43,21 @@ class Evaluation:
     """
 
     values: Mapping[str, float]
-    responses: tuple[Response, ...]
-    rows: tuple[Row, ...]
+    responses: tuple[CaseResponse, ...]
+    rows: tuple[CriterionRow, ...]
 
     @property
     def good(self) -> bool:
         """Whether every number is known."""
         return bool(self.rows) and all(math.isfinite(row.value) for row in self.rows)
 
-    def of(self, quantity: Criterion) -> tuple[Row, ...]:
+    def of(self, quantity: Criterion) -> tuple[CriterionRow, ...]:
         """Return the rows of one quantity, largest first."""
         return tuple(sorted((r for r in self.rows if r.quantity is quantity), key=lambda row: -row.value))
 
-    def highest(self, within: float) -> list[Row]:
+    def highest(self, within: float) -> list[CriterionRow]:
         """Return, of every quantity that is minimised, the rows as high as its highest but for a share."""
-        found: list[Row] = []
+        found: list[CriterionRow] = []
         for quantity in dict.fromkeys(row.quantity for row in self.rows):
             rows = [row for row in self.of(quantity) if row.weight > 0.0]
             top = max((row.weight * row.value for row in rows), default=0.0)
@@ -65,12 +65,12 @@ class Evaluation:
         return found
 
     @property
-    def peaks(self) -> tuple[Row, ...]:
+    def peaks(self) -> tuple[CriterionRow, ...]:
         """The peaks that compete, highest first."""
         return self.of(PEAK)
 
     @property
-    def band(self) -> Row | None:
+    def band(self) -> CriterionRow | None:
         """The widest resonance band."""
         return next(iter(self.of(BAND)), None)
 
@@ -98,7 +98,7 @@ class Evaluation:
         """The response of the first case."""
         return self.responses[0].branch
 
-    def with_errors(self) -> Evaluation:
+    def with_errors(self) -> DesignEvaluation:
         """Return it with the errors of its peaks estimated, where a search left that out."""
         from solver.continuation.branches.sweep import with_error
 
@@ -110,7 +110,7 @@ class Evaluation:
         return max((row.excess(scales[row.quantity]) for row in self.rows), default=math.inf)
 
 
-def nearest(row: Row, rows: Sequence[Row]) -> int | None:
+def nearest(row: CriterionRow, rows: Sequence[CriterionRow]) -> int | None:
     """Return which of some rows of another design measures the same: quantity, case, nearest frequency."""
     same = [i for i, r in enumerate(rows) if (r.quantity, r.case) == (row.quantity, row.case)]
     same = [i for i in same if math.isnan(row.at_hz) == math.isnan(rows[i].at_hz)]

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field
 
-from optim.criteria.criterion import Asked, Criterion, Form, Judged, Key, Row
+from optim.criteria.criterion import Criterion, CriterionContext, CriterionRow, Form, Judged, Key
 from optim.criteria.json_types import Name
 
 if TYPE_CHECKING:
@@ -21,11 +21,11 @@ NEVER_SEPARATES = "never-separates"
 _KEY = "contact_states"
 
 
-def _rows(judged: Judged) -> list[Row]:
+def _rows(judged: Judged) -> list[CriterionRow]:
     return [row for one in judged.contacts(judged.limit(SEPARATION) or ()) for row in _of(judged, one)]
 
 
-def _of(judged: Judged, contact: AnyContact) -> list[Row]:
+def _of(judged: Judged, contact: AnyContact) -> list[CriterionRow]:
     import numpy as np
 
     from solver.response.worst_wear import Measure, worst_slopes, worst_wear
@@ -55,7 +55,7 @@ def _load_slope(contact: AnyContact, path: str) -> float:
     return contact.least_load_slope(key) if owner in (contact.name, contact.group) else 0.0
 
 
-def _read(asked: Asked) -> tuple[str, ...]:
+def _read(asked: CriterionContext) -> tuple[str, ...]:
     """The contacts that must never separate."""
     from optim.errors import DesignError
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from optim.identification.data.measured import Measured, Predicted
+from optim.identification.data.measured import MeasuredRows, Predicted
 from optim.identification.unknowns import Unknowns
 from optim.problem.variables import Real
 from solver.jit.fourier import Integer
@@ -58,7 +58,9 @@ class Runs:
     harmonics : highest harmonic of the balance.
     """
 
-    def __init__(self, scene: Scene, runs: Sequence[Measured], unknowns: Unknowns, harmonics: int) -> None:
+    def __init__(
+        self, scene: Scene, runs: Sequence[MeasuredRows], unknowns: Unknowns, harmonics: int
+    ) -> None:
         self.scene, self.runs, self.unknowns, self.harmonics = scene, tuple(runs), unknowns, harmonics
         self.models = [run.model(scene, unknowns.paths, harmonics) for run in self.runs]
         self.observations = np.concatenate([run.observations for run in self.runs])

@@ -17,7 +17,7 @@ from typing import Annotated
 import numpy as np
 
 from optim.errors import DesignError
-from optim.identification.data.measured import Measured
+from optim.identification.data.measured import MeasuredRows
 from optim.identification.fit import LocalFit, Runs
 from optim.identification.information import UNIFORM, Information
 from optim.identification.unknowns import Unknowns
@@ -50,7 +50,7 @@ class Candidate(Piece):
 
 
 def read_candidates(
-    scene: Scene, runs: Sequence[Measured], unknowns: Unknowns,
+    scene: Scene, runs: Sequence[MeasuredRows], unknowns: Unknowns,
     given: Mapping[str, Sequence[float]] | None,
 ) -> tuple[dict[str, float], ...]:  # fmt: skip
     """Return the conditions of all candidates: every combination of the values given.
@@ -85,7 +85,7 @@ def read_candidates(
     return tuple({path: float(value) for path, value in one.items()} for one in made if one)
 
 
-def _usual(scene: Scene, runs: Sequence[Measured], unknowns: Unknowns) -> dict[str, list[float]]:
+def _usual(scene: Scene, runs: Sequence[MeasuredRows], unknowns: Unknowns) -> dict[str, list[float]]:
     varied = dict.fromkeys(path for run in runs for path in run.conditions)
     paths = [path for path in (AMPLITUDE, *varied) if path not in unknowns.paths]
     usual: dict[str, list[float]] = {}

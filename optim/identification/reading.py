@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from optim.errors import DataError
-from optim.identification.data.measured import DataKind, Measured, data_kinds
+from optim.identification.data.measured import DataKind, MeasuredRows, data_kinds
 from optim.identification.data.table import Table, check_numbers, runs_of
 from optim.identification.readers.csv_text import FromText
 from optim.identification.readers.registry import Head, read_file, read_head, table_of
@@ -26,7 +26,7 @@ _WITH_HEAD = re.compile(r"^(?P<file>.+?):(?P<pairs>[A-Za-z_][\w.@-]*=[^=,]+(?:,[
 Given = str | Path | Mapping[str, Any] | FromText
 
 
-def read_data(scene: Scene, data: Sequence[Given], unknown: Sequence[str] = ()) -> tuple[Measured, ...]:
+def read_data(scene: Scene, data: Sequence[Given], unknown: Sequence[str] = ()) -> tuple[MeasuredRows, ...]:
     """Read the runs of files and tables.
 
     Parameters
@@ -44,7 +44,7 @@ def read_data(scene: Scene, data: Sequence[Given], unknown: Sequence[str] = ()) 
     if isinstance(data, (str, Path, Mapping)) or not isinstance(data, Sequence) or not data:
         raise DataError("data", data, "must list files or tables, at least one")
     paths = frozenset(scene.parameter_paths())
-    runs: list[Measured] = []
+    runs: list[MeasuredRows] = []
     for index, given in enumerate(data):
         for table in _tables(given, index, paths):
             runs += _runs(scene, table, paths, frozenset(unknown))
@@ -105,7 +105,7 @@ def _numbers(source: str, name: str, values: Any, place: tuple[str | int, ...]) 
     return np.array(values, dtype=np.float64)
 
 
-def _runs(scene: Scene, table: Table, paths: frozenset[str], unknown: frozenset[str]) -> list[Measured]:
+def _runs(scene: Scene, table: Table, paths: frozenset[str], unknown: frozenset[str]) -> list[MeasuredRows]:
     """Read a table as runs of equal conditions."""
     check_numbers(table)
     varied = [name for name in table.columns if name in paths]

@@ -11,8 +11,8 @@ import numpy as np
 from optim.errors import DesignError
 from optim.problem.numbers import is_number
 from optim.problem.variables import (
+    BoundedVariable,
     Real,
-    Variable,
     by_variables,
     check_variables,
     parameter_values,
@@ -46,7 +46,7 @@ class Unknowns:
         Name of a variable to what was known of it.
     """
 
-    variables: tuple[Variable, ...]
+    variables: tuple[BoundedVariable, ...]
     priors: Mapping[str, Prior]
 
     def __len__(self) -> int:
@@ -94,7 +94,7 @@ class Unknowns:
         return np.array([_place(scene, variable) for variable in self.variables])
 
 
-def _place(scene: Scene, variable: Variable) -> float:
+def _place(scene: Scene, variable: BoundedVariable) -> float:
     value = scene.value(variable.paths[0])
     return variable.inside(value) if variable.low <= value <= variable.high else 0.5
 

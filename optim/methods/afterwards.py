@@ -9,13 +9,13 @@ from dataclasses import replace
 
 from optim.criteria.evaluation import evaluate, natural_scales
 from optim.criteria.linearised import Conditions, conditions, model_of
-from optim.criteria.rows import Evaluation
+from optim.criteria.rows import DesignEvaluation
 from optim.methods.enough_harmonics import MOST_HARMONICS
-from optim.methods.evaluator import Search, StoppedError
+from optim.methods.evaluator import DesignSearch, SearchStoppedError
 from optim.methods.kkt import KEPT, KKT_TOLERANCE
-from optim.methods.plateau import Plateau, Tick, nothing, plateau_of
+from optim.methods.plateau import DesignPlateau, Tick, nothing, plateau_of
 from optim.problem.problem import Method
-from optim.results.basins import Basin, Checked
+from optim.results.basins import Checked, LocalOptimum
 from optim.results.design import DesignResult, DesignStatus
 from optim.results.doubts import DOUBTFUL, open_peaks
 from optim.results.json import known_parts
@@ -33,7 +33,7 @@ def settled_status(found: Conditions) -> DesignStatus:
 
 
 def looked_after(
-    result: DesignResult, should_stop: ShouldStop, tick: Tick = nothing, more: Sequence[Evaluation] = ()
+    result: DesignResult, should_stop: ShouldStop, tick: Tick = nothing, more: Sequence[DesignEvaluation] = ()
 ) -> DesignResult:
     """Return a result with its plateau and its check by more harmonics; as far as the caller lets it.
 
@@ -50,7 +50,7 @@ def looked_after(
     if result.evaluation is not None and result.evaluation.good and not stopped:
         try:
             found = _checked(_level(found, should_stop, tick).with_errors(), should_stop, tick, more)
-        except StoppedError:
+        except SearchStoppedError:
             found = replace(found, status=DesignStatus.STOPPED)
     return replace(_proven(found), seconds=result.seconds + time.perf_counter() - begun)
 
@@ -96,14 +96,16 @@ def _level(
     )  # fmt: skip
 
 
-def _improved(result: DesignResult, begin: Evaluation, should_stop: ShouldStop, tick: Tick) -> DesignResult:
+def _improved(
+    result: DesignResult, begin: DesignEvaluation, should_stop: ShouldStop, tick: Tick
+) -> DesignResult:
     """Return a result after a local search from a better design that was met beside a plateau."""
     from optim.methods.minimax import thorough_search
 
-    search = Search(result.problem, lambda _share, _count: tick(), should_stop)
+    search = DesignSearch(result.problem, lambda _share, _count: tick(), should_stop)
     search.keep(begin)
     local = thorough_search(search, search.variables, begin, search.model)
-    basin = Basin(
+    basin = LocalOptimum(
         values=dict(local.evaluation.values), peak=local.evaluation.peaks[0].value,
         objective=local.evaluation.objective, settled=local.settled, feasible=local.feasible, proven=True,
     )  # fmt: skip
@@ -119,10 +121,10 @@ def _improved(result: DesignResult, begin: Evaluation, should_stop: ShouldStop, 
     )  # fmt: skip
 
 
-def _merged(result: DesignResult, plateau: Plateau) -> tuple[Basin, ...]:
+def _merged(result: DesignResult, plateau: DesignPlateau) -> tuple[LocalOptimum, ...]:
     """Return the local optima with those of one plateau as one, at the design chosen."""
     chosen = plateau.evaluation
-    first = Basin(
+    first = LocalOptimum(
         values=dict(chosen.values), peak=chosen.peaks[0].value, objective=chosen.objective, settled=True,
         feasible=all(basin.feasible for basin in result.basins[:1]), proven=True,
     )  # fmt: skip
@@ -134,7 +136,7 @@ def _merged(result: DesignResult, plateau: Plateau) -> tuple[Basin, ...]:
     return (first, *others)
 
 
-def _on(plateau: Plateau, basin: Basin, chosen: Evaluation) -> bool:
+def _on(plateau: DesignPlateau, basin: LocalOptimum, chosen: DesignEvaluation) -> bool:
     """Return whether a basin lies on a plateau: along its variables within it, elsewhere at its place."""
     for name, value in basin.values.items():
         low, high = plateau.intervals.get(name, (chosen.values[name], chosen.values[name]))
@@ -144,7 +146,7 @@ def _on(plateau: Plateau, basin: Basin, chosen: Evaluation) -> bool:
 
 
 def _checked(
-    result: DesignResult, should_stop: ShouldStop, tick: Tick, more: Sequence[Evaluation]
+    result: DesignResult, should_stop: ShouldStop, tick: Tick, more: Sequence[DesignEvaluation]
 ) -> DesignResult:
     """Return a result with its local optima computed again where the harmonics may be too few."""
     few = result.problem.harmonics
@@ -157,7 +159,7 @@ def _checked(
     checked, responses = [], 0
     for values in designs:
         if should_stop is not None and should_stop():
-            raise StoppedError(DesignStatus.STOPPED)
+            raise SearchStoppedError(DesignStatus.STOPPED)
         same = (one for one in more if one.values == values and one.harmonics == problem.harmonics)
         found = next(same, None)
         if found is None:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from optim.criteria.criterion import Limits
-from optim.methods.evaluator import Search, StoppedError
+from optim.methods.evaluator import DesignSearch, SearchStoppedError
 from optim.problem.problem import Method, Problem
 from optim.results.design import DesignStatus
 
@@ -36,7 +36,7 @@ class Eased:
     proven: Tracked | None = None
 
     @classmethod
-    def of(cls, search: Search, plain: Tracked | None = None) -> Eased:
+    def of(cls, search: DesignSearch, plain: Tracked | None = None) -> Eased:
         """Return it; tracking goes on for `search` and is counted by it.
 
         `plain`: what tracking the problem itself came to, where that was tried.
@@ -71,13 +71,13 @@ def _cases(problem: Problem) -> list[Problem]:
     return [one for one in plain if one.why_not_tracked is None]
 
 
-def _kept(search: Search, tracked: Tracked) -> Tracked | None:
+def _kept(search: DesignSearch, tracked: Tracked) -> Tracked | None:
     """Return the tracked optimum with the rows of its limits if it keeps them all."""
     if tracked.evaluation is None:
         return None
     try:
         evaluation = search(tracked.evaluation.values)
-    except StoppedError:
+    except SearchStoppedError:
         return None
     if not evaluation.good or evaluation.violation(search.scales) > 0.0:
         return None

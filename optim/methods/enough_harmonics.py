@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from optim.criteria.evaluation import evaluate
-from optim.criteria.rows import Evaluation
+from optim.criteria.rows import DesignEvaluation
 from optim.problem.problem import Method, Problem
 from optim.results.design import DesignResult, DesignStatus
 from optim.results.doubts import WELL_KNOWN, doubt_of
@@ -32,17 +32,17 @@ NO_MEAN = 1e-6  # share by which max|x| is above half peak to peak where there i
 _FEW = 24  # harmonics that a search may have though it was asked for fewer
 
 
-def well_known(problem: Problem, evaluation: Evaluation) -> bool:
+def well_known(problem: Problem, evaluation: DesignEvaluation) -> bool:
     """Return whether the highest peak of a design is known within 5 %."""
     return doubt_in(problem, evaluation) <= WELL_KNOWN
 
 
-def doubt_in(problem: Problem, evaluation: Evaluation) -> float:
+def doubt_in(problem: Problem, evaluation: DesignEvaluation) -> float:
     """Return the share by which the highest peak of a design may be higher."""
     return doubt_of(known_parts(evaluation), {case.name: case.weight for case in problem.cases})
 
 
-def _doubt_at_peaks(problem: Problem, evaluation: Evaluation) -> float:
+def _doubt_at_peaks(problem: Problem, evaluation: DesignEvaluation) -> float:
     """Return that share with the harmonics of a problem, by the peaks of a response with fewer.
 
     Each is solved for where it stands, without a response: no less is left in doubt of one. 0 where that
@@ -88,7 +88,7 @@ def most_harmonics(asked: int) -> int:
 
 def with_enough(
     result: DesignResult, most: int, should_stop: ShouldStop
-) -> tuple[Problem | None, list[Evaluation]]:
+) -> tuple[Problem | None, list[DesignEvaluation]]:
     """Return the problem to solve instead of one whose end is doubtful, and the evaluations that told so.
 
     A response or two at the optimum tell how many harmonics it needs, up to `most`.
@@ -97,7 +97,7 @@ def with_enough(
     -------
     (problem, evaluations); None where measure and harmonics are right, or more harmonics do not help.
     """
-    evaluation, tried = result.evaluation, list[Evaluation]()
+    evaluation, tried = result.evaluation, list[DesignEvaluation]()
     if result.status not in (*CLAIMS, DesignStatus.INFEASIBLE) or evaluation is None:
         return None, tried
     problem, start = result.problem, dict(result.optimum)
@@ -136,7 +136,7 @@ def by_the_better_known(before: DesignResult, after: DesignResult) -> DesignResu
     return replace(before, problem=replace(before.problem, keeps_measure=True))
 
 
-def _by_its_measure(problem: Problem, evaluation: Evaluation) -> Problem:
+def _by_its_measure(problem: Problem, evaluation: DesignEvaluation) -> Problem:
     """Return the problem with half peak to peak in all cases where the mean of the peak of one is free.
 
     Where the peak has no mean both measures are the same, and the problem stays as it is.

@@ -8,10 +8,10 @@ from dataclasses import replace
 
 from optim.criteria.evaluation import evaluate, natural_scales
 from optim.criteria.linearised import Model, model_of
-from optim.criteria.rows import Evaluation
+from optim.criteria.rows import DesignEvaluation
 from optim.methods.kkt import KEPT
 from optim.problem.problem import Problem
-from optim.problem.variables import Variable
+from optim.problem.variables import BoundedVariable
 from optim.results.best_so_far import FEWER_HARMONICS, PEAKS_OPEN, VERIFIED, BestSoFar, OnBest
 from optim.results.design import DesignStatus
 from optim.results.doubts import open_peaks
@@ -22,7 +22,7 @@ SEARCHED = 0.75  # share of the progress that the search has
 USUAL = 12.0  # evaluations of a usual search; how many are left is not known beforehand
 
 
-class StoppedError(Exception):
+class SearchStoppedError(Exception):
     """The caller asked to stop, or the evaluations are used up."""
 
     def __init__(self, status: DesignStatus) -> None:
@@ -30,16 +30,16 @@ class StoppedError(Exception):
         super().__init__(status.value)
 
 
-class Search:
+class DesignSearch:
     """Evaluates designs, keeps all of them, reports progress and looks whether to stop."""
 
     def __init__(
         self, problem: Problem, on_progress: OnProgress = None, should_stop: ShouldStop = None,
-        most: int = MOST_EVALUATIONS, *, on_best: OnBest = None, above: Search | None = None,
-        before: Iterable[Evaluation] = (),
+        most: int = MOST_EVALUATIONS, *, on_best: OnBest = None, above: DesignSearch | None = None,
+        before: Iterable[DesignEvaluation] = (),
     ) -> None:  # fmt: skip
         self.problem = problem
-        self.history: list[Evaluation] = []
+        self.history: list[DesignEvaluation] = []
         self.scales = natural_scales(problem)
         self.should_stop = should_stop
         self.on_progress, self.on_best = on_progress, on_best
@@ -48,13 +48,13 @@ class Search:
         self._most = most
         self._scale: float | None = None
         self._above = above  # the search with all harmonics, for which this one only ranks designs
-        self._scout: Search | None = None
+        self._scout: DesignSearch | None = None
         self._least = (math.inf, math.inf)
-        self._known: dict[tuple[float, ...], Evaluation] = {}
+        self._known: dict[tuple[float, ...], DesignEvaluation] = {}
         # Of another search: by another measure, or with other harmonics.
         self._earlier = {self._place(one.values): one for one in before}
 
-    def __call__(self, values: Mapping[str, float]) -> Evaluation:
+    def __call__(self, values: Mapping[str, float]) -> DesignEvaluation:
         """Evaluate one design with gradients, each once.
 
         Raises
@@ -67,7 +67,7 @@ class Search:
         if place in self._known:
             return self._known[place]
         if len(self.history) >= self._most:
-            raise StoppedError(DesignStatus.TOO_MANY)
+            raise SearchStoppedError(DesignStatus.TOO_MANY)
         evaluation = evaluate(
             self.problem, values, errors=False, should_stop=self.should_stop, before=self._earlier.get(place)
         )  # fmt: skip
@@ -84,16 +84,16 @@ class Search:
         scout = 0 if self._scout is None else len(self._scout.history)
         return self._before + len(self.history) + scout
 
-    def scout(self, harmonics: int) -> Search:
+    def scout(self, harmonics: int) -> DesignSearch:
         """Return a search of the same problem with fewer harmonics, to be handed to `scouting_done`."""
         fewer = replace(self.problem, harmonics=harmonics)
-        self._scout = Search(
+        self._scout = DesignSearch(
             fewer, self.on_progress, self.should_stop, on_best=self.on_best, above=self,
             before=self._earlier.values(),
         )  # fmt: skip
         return self._scout
 
-    def scouting_done(self, scout: Search) -> None:
+    def scouting_done(self, scout: DesignSearch) -> None:
         """Count what a scout looked at; its numbers are not exact enough to be kept."""
         self._before, self._scout = self._before + len(scout.history), None
         self.scouted += sum(evaluation.computed for evaluation in scout.history)
@@ -111,9 +111,9 @@ class Search:
     def check(self) -> None:
         """Raise StoppedError if the caller asked to stop."""
         if self.should_stop is not None and self.should_stop():
-            raise StoppedError(DesignStatus.STOPPED)
+            raise SearchStoppedError(DesignStatus.STOPPED)
 
-    def keep(self, evaluation: Evaluation) -> None:
+    def keep(self, evaluation: DesignEvaluation) -> None:
         """Add an evaluation to the history and report it."""
         self.history.append(evaluation)
         if self._scale is None and evaluation.good:
@@ -124,7 +124,7 @@ class Search:
             count = (self._above or self).count
             self.on_progress(share_of(count), count)
 
-    def _compare(self, evaluation: Evaluation, on_best: Callable[[BestSoFar], None]) -> None:
+    def _compare(self, evaluation: DesignEvaluation, on_best: Callable[[BestSoFar], None]) -> None:
         """Tell of a design that is better than all before."""
         violation = max(evaluation.violation(self.scales), 0.0)
         standing = (0.0 if violation <= KEPT else violation, evaluation.objective)
@@ -145,19 +145,19 @@ class Search:
         )  # fmt: skip
 
     @property
-    def variables(self) -> tuple[Variable, ...]:
+    def variables(self) -> tuple[BoundedVariable, ...]:
         """What may be chosen."""
         return self.problem.variables
 
-    def good(self) -> list[Evaluation]:
+    def good(self) -> list[DesignEvaluation]:
         """Return every design whose numbers are known."""
         return [evaluation for evaluation in self.history if evaluation.good]
 
-    def model(self, evaluation: Evaluation) -> Model:
+    def model(self, evaluation: DesignEvaluation) -> Model:
         """Return the model of a good evaluation, relative to the first one."""
         return model_of(evaluation, self.variables, self._scale or 1.0, self.scales)
 
-    def merit(self, evaluation: Evaluation) -> float:
+    def merit(self, evaluation: DesignEvaluation) -> float:
         """Return what the search decreases."""
         return self.model(evaluation).merit
 

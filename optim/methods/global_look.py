@@ -16,8 +16,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from optim.criteria.rows import Evaluation
-from optim.methods.evaluator import Search
+from optim.criteria.rows import DesignEvaluation
+from optim.methods.evaluator import DesignSearch
 from optim.methods.kkt import (
     KEPT,
     Evaluate,
@@ -59,7 +59,11 @@ class WholeRange:
     """A search of the whole range of a problem; `seen`: designs of an earlier look with fewer harmonics."""
 
     def __init__(
-        self, search: Search, local_search: LocalSearch, found: list[Local], seen: Sequence[Evaluation] = ()
+        self,
+        search: DesignSearch,
+        local_search: LocalSearch,
+        found: list[Local],
+        seen: Sequence[DesignEvaluation] = (),
     ) -> None:
         self.search, self.found = search, found
         self.finished = False
@@ -71,13 +75,13 @@ class WholeRange:
         self._scout = search if few >= search.problem.harmonics else search.scout(few)
         self._seen = [one for one in seen if one.harmonics == few]
         self._starts: list[Real] = []
-        self._ends: list[tuple[Local, Evaluation]] = []  # with the numbers of the look
+        self._ends: list[tuple[Local, DesignEvaluation]] = []  # with the numbers of the look
         self._apart = APART.get(self._n, APART_MANY)
         self._off = 0.0  # natural logarithm by which the look's harmonics are off
         self._slack = 0.0  # relative excess over limits that they show of designs that keep them
 
     @property
-    def looked_at(self) -> tuple[Evaluation, ...]:
+    def looked_at(self) -> tuple[DesignEvaluation, ...]:
         """Every design of the look, in order."""
         return tuple(self._seen)
 
@@ -127,14 +131,14 @@ class WholeRange:
         if evaluation.good:
             self._seen.append(evaluation)
 
-    def _exact(self, some: Iterable[Evaluation]) -> list[Evaluation]:
+    def _exact(self, some: Iterable[DesignEvaluation]) -> list[DesignEvaluation]:
         """Return designs of the look with all harmonics, those that can be computed."""
         if self._scout is self.search:
             return list(some)
         exact = [self.search(e.values) for e in some]
         return [e for e in exact if e.good]
 
-    def _starts_given(self, begins: list[Evaluation]) -> None:
+    def _starts_given(self, begins: list[DesignEvaluation]) -> None:
         for begin in begins:
             self._descend(begin)
         known = bool(begins) and self._n == 1  # the tracked optima without limits are among them
@@ -173,7 +177,7 @@ class WholeRange:
     def _best(self) -> tuple[float, float]:
         return min((local.standing for local in self.found), default=(math.inf, math.inf))
 
-    def _descend(self, begin: Evaluation) -> None:
+    def _descend(self, begin: DesignEvaluation) -> None:
         """Search locally from a design, for the limits alone where it ends without keeping them."""
         self._starts.append(scaled(self.search.variables, begin.values))
         here, ends = begin, []
@@ -199,7 +203,7 @@ class WholeRange:
                     self._slack = max(self._slack, self._scout.model(there).violation)
             self._seen.append(there)
 
-    def _eased(self, begin: Evaluation) -> Evaluation:
+    def _eased(self, begin: DesignEvaluation) -> DesignEvaluation:
         """Return the end of a search for a design that keeps all limits: the first that does."""
         from optim.methods.minimax import thorough_search
 
@@ -208,12 +212,14 @@ class WholeRange:
             enough=1.0 + KEPT,
         ).evaluation  # fmt: skip
 
-    def _local(self, begin: Evaluation, model_of: ModelOf, evaluate: Evaluate | None = None) -> Evaluation:
+    def _local(
+        self, begin: DesignEvaluation, model_of: ModelOf, evaluate: Evaluate | None = None
+    ) -> DesignEvaluation:
         return self._local_search(
             evaluate or self.search, self.search.variables, begin, model_of
         ).evaluation  # fmt: skip
 
-    def joins(self, here: Evaluation) -> bool:
+    def joins(self, here: DesignEvaluation) -> bool:
         """Return whether what is minimised falls all the way from a design to an end that is known.
 
         Of a design that does not keep its limits it is the largest excess.
@@ -252,7 +258,7 @@ class WholeRange:
         idle = self._distinct() >= self.search.problem.basins and best[1] > WORTH * objective
         return violation == 0.0 and (best[0] > FAR_OFF or idle)
 
-    def _ended(self, there: Evaluation) -> Local:
+    def _ended(self, there: DesignEvaluation) -> Local:
         return ended(there, self.search.model(there), self.search.variables)
 
     def _infeasible(self) -> bool:
@@ -268,7 +274,7 @@ class WholeRange:
             models = [replace(model, excess=model.excess - self._slack) for model in models]
         return [taylor_of(model, feasibility=feasibility) for model in models]
 
-    def _begins(self) -> list[Evaluation]:
+    def _begins(self) -> list[DesignEvaluation]:
         """Return the next design of the look to start from, if any.
 
         No neighbour beats it, and it may lead below the best.
@@ -350,7 +356,7 @@ class _Watched:
     def __init__(self, whole: WholeRange) -> None:
         self._whole, self._best, self._better, self._count = whole, (math.inf, math.inf), 0, 0
 
-    def __call__(self, values: Mapping[str, float]) -> Evaluation:
+    def __call__(self, values: Mapping[str, float]) -> DesignEvaluation:
         """Evaluate a design.
 
         Raises

@@ -22,11 +22,11 @@ from typing import Any
 import casadi
 import numpy as np
 
-from optim.criteria.criterion import Row
+from optim.criteria.criterion import CriterionRow
 from optim.criteria.linearised import Model
-from optim.criteria.rows import Evaluation, nearest
+from optim.criteria.rows import DesignEvaluation, nearest
 from optim.methods.kkt import KKT_TOLERANCE, Evaluate, Local, ModelOf, ended
-from optim.problem.variables import SNAP, Real, Variable, snapped, unscaled
+from optim.problem.variables import SNAP, BoundedVariable, Real, snapped, unscaled
 
 Second = Callable[[], Real | None]
 
@@ -49,7 +49,7 @@ _OPTIONS: dict[str, Any] = {
 
 
 def ipopt_search(
-    evaluate: Evaluate, variables: tuple[Variable, ...], begin: Evaluation, model_of: ModelOf
+    evaluate: Evaluate, variables: tuple[BoundedVariable, ...], begin: DesignEvaluation, model_of: ModelOf
 ) -> Local:
     """Improve a design with IPOPT; the arguments are those of `optim.methods.minimax.minimax_search`.
 
@@ -97,16 +97,16 @@ class _Rows:
     """Evaluates designs for the programme, with every row in its place."""
 
     def __init__(
-        self, evaluate: Evaluate, variables: tuple[Variable, ...], model: Model, model_of: ModelOf
+        self, evaluate: Evaluate, variables: tuple[BoundedVariable, ...], model: Model, model_of: ModelOf
     ) -> None:
         self.groups = model.groups
         self.unique = np.unique(model.groups)
         self._variables = variables
         self._evaluate, self._model_of = evaluate, model_of
-        self._places: list[Row] = list(model.rows)
-        self._limited: list[Row] = list(model.limited)
+        self._places: list[CriterionRow] = list(model.rows)
+        self._limited: list[CriterionRow] = list(model.limited)
         self._known: dict[bytes, _Values] = {}
-        self.best: Evaluation
+        self.best: DesignEvaluation
         self._merit = math.inf
 
     @property
@@ -114,7 +114,7 @@ class _Rows:
         """Numbers of one design."""
         return len(self._places) + len(self._limited)
 
-    def seen(self, evaluation: Evaluation, model: Model) -> None:
+    def seen(self, evaluation: DesignEvaluation, model: Model) -> None:
         """Keep an evaluation, and the best."""
         self._known[model.z.tobytes()] = self._values(model)
         if model.merit < self._merit:
@@ -163,7 +163,12 @@ def _unknown(count: int, n: int) -> _Values:
 
 
 def _fill(
-    places: list[Row], rows: Sequence[Row], values: Real, by_z: Real, numbers: Real, slopes: Real
+    places: list[CriterionRow],
+    rows: Sequence[CriterionRow],
+    values: Real,
+    by_z: Real,
+    numbers: Real,
+    slopes: Real,
 ) -> list[int | None]:
     """Put each row in its place: the nearest in frequency of the same quantity and case; the largest wins.
 

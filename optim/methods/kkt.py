@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from optim.criteria.linearised import Conditions, Model, conditions
-from optim.criteria.rows import Evaluation
-from optim.problem.variables import Variable
+from optim.criteria.rows import DesignEvaluation
+from optim.problem.variables import BoundedVariable
 
-Evaluate = Callable[[Mapping[str, float]], Evaluation]
-ModelOf = Callable[[Evaluation], Model]
+Evaluate = Callable[[Mapping[str, float]], DesignEvaluation]
+ModelOf = Callable[[DesignEvaluation], Model]
 
 KKT_TOLERANCE = 1e-3  # relative objective per scaled variable
 KEPT = 1e-6  # relative excess over a bound up to which it counts as kept
@@ -40,7 +40,7 @@ class Local:
         What designs are compared by; see `standing`.
     """
 
-    evaluation: Evaluation
+    evaluation: DesignEvaluation
     merit: float
     settled: bool
     feasible: bool
@@ -57,7 +57,7 @@ def standing(model: Model) -> tuple[float, float]:
     return (0.0 if violation <= KEPT else violation), model.objective
 
 
-def ended(here: Evaluation, model: Model, variables: Sequence[Variable]) -> Local:
+def ended(here: DesignEvaluation, model: Model, variables: Sequence[BoundedVariable]) -> Local:
     """Return the end of a search at a design."""
     feasible = model.violation <= KEPT
     found = conditions(model, variables, feasibility=not feasible)
@@ -91,4 +91,4 @@ def without_limits(model: Model) -> Model:
     return replace(model, limited=(), excess=none, excess_slopes=np.zeros((0, model.z.size)), units=none)
 
 
-LocalSearch = Callable[[Evaluate, tuple[Variable, ...], Evaluation, ModelOf], Local]
+LocalSearch = Callable[[Evaluate, tuple[BoundedVariable, ...], DesignEvaluation, ModelOf], Local]

@@ -15,13 +15,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from optim.criteria.criterion import Row
+from optim.criteria.criterion import CriterionRow
 from optim.criteria.linearised import PENALTY, Model, with_cuts
-from optim.criteria.rows import Evaluation, nearest
+from optim.criteria.rows import DesignEvaluation, nearest
 from optim.methods.conic import Step
 from optim.methods.kkt import KEPT, Evaluate, Local, ModelOf, ended
 from optim.methods.subproblem import solve_subproblem
-from optim.problem.variables import Real, Variable, snapped, unscaled
+from optim.problem.variables import BoundedVariable, Real, snapped, unscaled
 
 Subproblem = Callable[[Model, Real, float], Step | None]
 
@@ -40,7 +40,7 @@ NOTHING = 1e-9  # multipliers below it are rounding of the conic solver
 
 
 def minimax_search(
-    evaluate: Evaluate, variables: tuple[Variable, ...], begin: Evaluation, model_of: ModelOf, *,
+    evaluate: Evaluate, variables: tuple[BoundedVariable, ...], begin: DesignEvaluation, model_of: ModelOf, *,
     solve: Subproblem | None = None, norm: float = np.inf, remembered: int = REMEMBERED,
     enough: float = -np.inf,
 ) -> Local:  # fmt: skip
@@ -104,7 +104,7 @@ def _too_weak(model: Model, step: Step) -> bool:
 
 
 def thorough_search(
-    evaluate: Evaluate, variables: tuple[Variable, ...], begin: Evaluation, model_of: ModelOf,
+    evaluate: Evaluate, variables: tuple[BoundedVariable, ...], begin: DesignEvaluation, model_of: ModelOf,
     enough: float = -np.inf,
 ) -> Local:  # fmt: skip
     """Improve a design with cuts, and go on without them where that does not settle.
@@ -119,7 +119,7 @@ def thorough_search(
 
 
 def _curvature(
-    model: Model, fresh: Model, pulls: list[tuple[Row, float]], hessian: Real, *, accepted: bool
+    model: Model, fresh: Model, pulls: list[tuple[CriterionRow, float]], hessian: Real, *, accepted: bool
 ) -> Real:
     """Return the Hessian of the Lagrangian for the next step: exact where the solver has it, else updated.
 
@@ -131,7 +131,7 @@ def _curvature(
     return _update(hessian, fresh.z - model.z, _gradient(fresh, pulls) - _gradient(model, pulls))
 
 
-def _exact(model: Model, pulls: list[tuple[Row, float]]) -> Real | None:
+def _exact(model: Model, pulls: list[tuple[CriterionRow, float]]) -> Real | None:
     """Return the Hessian of the Lagrangian whose multipliers belong to rows of another design."""
     total = np.zeros((model.z.size, model.z.size))
     for row, multiplier in pulls:
@@ -151,7 +151,7 @@ def _convex(hessian: Real) -> Real:
     return convex
 
 
-def _gradient(model: Model, pulls: list[tuple[Row, float]]) -> Real:
+def _gradient(model: Model, pulls: list[tuple[CriterionRow, float]]) -> Real:
     """Return the gradient of the Lagrangian whose multipliers belong to rows of another design."""
     total = np.zeros(model.z.size)
     for row, multiplier in pulls:
@@ -161,7 +161,7 @@ def _gradient(model: Model, pulls: list[tuple[Row, float]]) -> Real:
     return total
 
 
-def _pulls(model: Model, step: Step) -> list[tuple[Row, float]]:
+def _pulls(model: Model, step: Step) -> list[tuple[CriterionRow, float]]:
     """Return the rows that hold a step, with their multipliers."""
     found = [(row, float(x)) for row, x in zip(model.rows, step.multipliers, strict=True) if x > NOTHING]
     limits = zip(model.limited, step.limit_multipliers, strict=True)

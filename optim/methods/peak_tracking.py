@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 from optim.criteria.evaluation import Judge, effects_of, evaluate, ranges_of
 from optim.criteria.peak import PEAK
-from optim.criteria.rows import Evaluation, Response
+from optim.criteria.rows import CaseResponse, DesignEvaluation
 from optim.problem.problem import Problem
-from optim.results.basins import Basin
+from optim.results.basins import LocalOptimum
 from optim.results.best_so_far import PEAKS_OPEN, VERIFIED, BestSoFar, OnBest
 from optim.results.design import DesignStatus
 from solver.continuation.branch import Branch
@@ -51,8 +51,8 @@ class Tracked:
     """
 
     status: DesignStatus
-    evaluation: Evaluation | None
-    basins: tuple[Basin, ...]
+    evaluation: DesignEvaluation | None
+    basins: tuple[LocalOptimum, ...]
     sweeps: int
     work: float
 
@@ -82,7 +82,7 @@ def tracked_optimum(
         on_look=None if on_best is None else _Lowest(problem, on_best),
     )  # fmt: skip
     basins = tuple(
-        Basin(
+        LocalOptimum(
             values={variable.name: basin.at}, peak=basin.peak,
             objective=basin.peak * problem.weights[PEAK] * case.weight, settled=basin.solved,
             proven=basin.proven,
@@ -124,7 +124,7 @@ class _Lowest:
         )  # fmt: skip
 
 
-def _evaluation(problem: Problem, found: LeastPeak) -> Evaluation | None:
+def _evaluation(problem: Problem, found: LeastPeak) -> DesignEvaluation | None:
     """Return the rows of the optimum, from the response that proves it where that has the limit asked for."""
     case, variable = problem.cases[0], problem.variables[0]
     if found.branch is None or not found.branch.reached:
@@ -133,5 +133,5 @@ def _evaluation(problem: Problem, found: LeastPeak) -> Evaluation | None:
         return evaluate(problem, {variable.name: found.at})
     judge = Judge(problem=problem, case=case, gradients=True)
     rows = judge.rows(found.branch, ranges_of(problem, case)[0])
-    response = Response(case=case.name, branch=found.branch)
-    return Evaluation(values={variable.name: found.at}, responses=(response,), rows=tuple(rows))
+    response = CaseResponse(case=case.name, branch=found.branch)
+    return DesignEvaluation(values={variable.name: found.at}, responses=(response,), rows=tuple(rows))

@@ -18,11 +18,11 @@ import numpy as np
 from scipy.optimize import minimize, minimize_scalar
 
 from optim.criteria.evaluation import evaluate
-from optim.criteria.rows import Evaluation
-from optim.methods.evaluator import StoppedError
+from optim.criteria.rows import DesignEvaluation
+from optim.methods.evaluator import SearchStoppedError
 from optim.methods.surrogate import quasi_random
 from optim.problem.problem import Problem
-from optim.problem.variables import Real, Variable, by_variables, parameter_values, unscaled
+from optim.problem.variables import BoundedVariable, Real, by_variables, parameter_values, unscaled
 from optim.results.curve_check import CurveCheck
 from optim.results.design import DesignStatus
 from solver.modes.peaks.peak_correction import corrected_peak
@@ -57,7 +57,7 @@ class ByCurve:
     """
 
     status: DesignStatus
-    evaluation: Evaluation | None
+    evaluation: DesignEvaluation | None
     check: CurveCheck | None
 
 
@@ -79,7 +79,7 @@ class _Curves:
     def curve(self, values: Mapping[str, float], factors: tuple[float, float]) -> PerformanceCurve:
         """Return the curve of a design; raises StoppedError if the caller stops it."""
         if self.should_stop is not None and self.should_stop():
-            raise StoppedError(DesignStatus.STOPPED)
+            raise SearchStoppedError(DesignStatus.STOPPED)
         self.count += 1
         if self.on_progress is not None:
             self.on_progress(min(0.9, self.count / 50.0), self.count)
@@ -112,7 +112,7 @@ def curve_optimum(problem: Problem, *, on_progress: OnProgress, should_stop: Sho
     try:
         shared = _shared(curves)
         z, curve = (_own(curves), None) if shared is None else shared
-    except StoppedError as stop:
+    except SearchStoppedError as stop:
         return ByCurve(status=stop.status, evaluation=None, check=None)
     if z is None:
         return ByCurve(status=DesignStatus.NO_CURVE, evaluation=None, check=None)
@@ -145,7 +145,7 @@ def curve_optimum(problem: Problem, *, on_progress: OnProgress, should_stop: Sho
     return ByCurve(status=status, evaluation=evaluation, check=check)
 
 
-def sets_every_load(scene: Scene, variable: Variable) -> bool:
+def sets_every_load(scene: Scene, variable: BoundedVariable) -> bool:
     """Return whether a variable is the mean load of every contact, in proportion to which the load varies."""
     wanted = set()
     for contact in scene.contacts:
@@ -158,7 +158,7 @@ def sets_every_load(scene: Scene, variable: Variable) -> bool:
     return bool(wanted) and set(variable.paths) == wanted
 
 
-def _middle(variable: Variable) -> float:
+def _middle(variable: BoundedVariable) -> float:
     """Return the load that a shared curve is of."""
     return math.sqrt(variable.low * variable.high)
 

@@ -12,14 +12,14 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from optim.criteria.criterion import Row
+from optim.criteria.criterion import CriterionRow
 from optim.criteria.evaluation import evaluate, natural_scales
 from optim.criteria.peak import PEAK
-from optim.criteria.rows import Evaluation
-from optim.methods.evaluator import StoppedError
+from optim.criteria.rows import DesignEvaluation
+from optim.methods.evaluator import SearchStoppedError
 from optim.methods.kkt import KEPT
 from optim.problem.problem import Problem
-from optim.problem.variables import Variable, parameter_values
+from optim.problem.variables import BoundedVariable, parameter_values
 from optim.results.design import DesignStatus
 from solver.response.solve import solve
 from solver.results.watch import ShouldStop
@@ -31,8 +31,8 @@ PLACES = 9  # designs on a plateau that the next criterion is compared at
 PRECISE = 1e-7  # scaled, to which its least place is known
 BROAD = 1e-5  # scaled width from which the next criterion is level too
 
-Along = Callable[[float], Evaluation]
-TieBreak = Callable[[Evaluation], float | None]
+Along = Callable[[float], DesignEvaluation]
+TieBreak = Callable[[DesignEvaluation], float | None]
 Tick = Callable[[], None]
 
 
@@ -41,7 +41,7 @@ def nothing() -> None:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Plateau:
+class DesignPlateau:
     """What is as good as an optimum, and the design chosen of it.
 
     Attributes
@@ -59,15 +59,15 @@ class Plateau:
     """
 
     intervals: Mapping[str, tuple[float, float]]
-    evaluation: Evaluation
+    evaluation: DesignEvaluation
     chosen_by: str
-    better: Evaluation | None
+    better: DesignEvaluation | None
     responses: int
 
 
 def plateau_of(
-    problem: Problem, best: Evaluation, should_stop: ShouldStop, tick: Tick = nothing
-) -> Plateau | None:
+    problem: Problem, best: DesignEvaluation, should_stop: ShouldStop, tick: Tick = nothing
+) -> DesignPlateau | None:
     """Return the plateau an optimum lies on; None if it is sharp in every variable. Every design ticks.
 
     Raises
@@ -88,10 +88,12 @@ def plateau_of(
         return None
     if level.better is not None:
         better = level.exact(level.better.values)
-        return Plateau(intervals={}, evaluation=best, chosen_by="", better=better, responses=level.responses)
+        return DesignPlateau(
+            intervals={}, evaluation=best, chosen_by="", better=better, responses=level.responses
+        )
     intervals = {v.name: level.interval(here, v) for v in problem.variables}
     here = here if here is best else level.exact(here.values)
-    return Plateau(
+    return DesignPlateau(
         intervals={name: found for name, found in intervals.items() if found is not None}, evaluation=here,
         chosen_by=chosen_by, better=None, responses=level.responses,
     )  # fmt: skip
@@ -100,23 +102,23 @@ def plateau_of(
 class _Level:
     """Designs as good as an optimum."""
 
-    def __init__(self, problem: Problem, best: Evaluation, should_stop: ShouldStop, tick: Tick) -> None:
+    def __init__(self, problem: Problem, best: DesignEvaluation, should_stop: ShouldStop, tick: Tick) -> None:
         self._problem, self._should_stop, self._tick = problem, should_stop, tick
         self._scales = natural_scales(problem)
         self._enough = best.objective * (1.0 + LEVEL)
         self._allowed = max(best.violation(self._scales), KEPT)
         self._found: dict[tuple[str, float], tuple[float, float]] = {}
         self._lower = best.objective * (1.0 - LEVEL)
-        self.better: Evaluation | None = None
+        self.better: DesignEvaluation | None = None
         self.responses = 0
 
-    def exact(self, values: Mapping[str, float]) -> Evaluation:
+    def exact(self, values: Mapping[str, float]) -> DesignEvaluation:
         """Return a design with gradients."""
         return self._evaluated(values, gradients=True)
 
-    def _evaluated(self, values: Mapping[str, float], *, gradients: bool = False) -> Evaluation:
+    def _evaluated(self, values: Mapping[str, float], *, gradients: bool = False) -> DesignEvaluation:
         if self._should_stop is not None and self._should_stop():
-            raise StoppedError(DesignStatus.STOPPED)
+            raise SearchStoppedError(DesignStatus.STOPPED)
         found = evaluate(
             self._problem, values, gradients=gradients, errors=False, should_stop=self._should_stop
         )  # fmt: skip
@@ -126,13 +128,13 @@ class _Level:
             self.better, self._lower = found, found.objective
         return found
 
-    def _good(self, there: Evaluation) -> bool:
+    def _good(self, there: DesignEvaluation) -> bool:
         """Return whether a design is as good as the optimum."""
         return (
             there.good and there.objective <= self._enough and there.violation(self._scales) <= self._allowed
         )
 
-    def may_be_level(self, here: Evaluation, variable: Variable) -> bool:
+    def may_be_level(self, here: DesignEvaluation, variable: BoundedVariable) -> bool:
         """Return whether the amplitude at the highest peak stays when a variable moves to a side.
 
         Necessary for a plateau, and one solved frequency instead of a response: most optima end here.
@@ -146,7 +148,9 @@ class _Level:
         ]  # fmt: skip
         return any(self._stays(here, variable, row, side) for row in held for side in (-STEP, STEP))
 
-    def _stays(self, here: Evaluation, variable: Variable, row: Row, side: float) -> bool:
+    def _stays(
+        self, here: DesignEvaluation, variable: BoundedVariable, row: CriterionRow, side: float
+    ) -> bool:
         z = variable.inside(here.values[variable.name]) + side
         if not 0.0 <= z <= 1.0:
             return False
@@ -160,18 +164,18 @@ class _Level:
         amplitude = there.half_peak_to_peak if scene.observe.centred else there.max_abs
         return not abs(amplitude - row.value) > LEVEL * abs(row.value)
 
-    def _along(self, here: Evaluation, variable: Variable) -> Along:
+    def _along(self, here: DesignEvaluation, variable: BoundedVariable) -> Along:
         """Return what evaluates designs along a variable."""
-        known: dict[float, Evaluation] = {variable.inside(here.values[variable.name]): here}
+        known: dict[float, DesignEvaluation] = {variable.inside(here.values[variable.name]): here}
 
-        def along(z: float) -> Evaluation:
+        def along(z: float) -> DesignEvaluation:
             if z not in known:
                 known[z] = self._evaluated({**here.values, variable.name: variable.outside(z)})
             return known[z]
 
         return along
 
-    def interval(self, here: Evaluation, variable: Variable) -> tuple[float, float] | None:
+    def interval(self, here: DesignEvaluation, variable: BoundedVariable) -> tuple[float, float] | None:
         """Return the interval of a variable in which designs are as good; None if it is none."""
         z = variable.inside(here.values[variable.name])
         known = [(low, high) for (name, _), (low, high) in self._found.items() if name == variable.name]
@@ -185,7 +189,9 @@ class _Level:
         self._found[variable.name, z] = found
         return variable.outside(found[0]), variable.outside(found[1])
 
-    def chosen(self, here: Evaluation, variable: Variable) -> tuple[Evaluation, str] | None:
+    def chosen(
+        self, here: DesignEvaluation, variable: BoundedVariable
+    ) -> tuple[DesignEvaluation, str] | None:
         """Return the design chosen on the plateau along a variable, and by what; None if there is none."""
         along, z = self._along(here, variable), variable.inside(here.values[variable.name])
         low, high = _ends(along, self._good, z, (0.0, 1.0))
@@ -208,10 +214,10 @@ class _Level:
         return along(low), f"the least {variable.name}"
 
 
-def _at_most(criterion: TieBreak, enough: float) -> Callable[[Evaluation], bool]:
+def _at_most(criterion: TieBreak, enough: float) -> Callable[[DesignEvaluation], bool]:
     """Return whether a criterion is no larger than what counts as its least."""
 
-    def kept(there: Evaluation) -> bool:
+    def kept(there: DesignEvaluation) -> bool:
         value = criterion(there)
         return value is not None and value <= enough
 
@@ -219,7 +225,7 @@ def _at_most(criterion: TieBreak, enough: float) -> Callable[[Evaluation], bool]
 
 
 def _ends(
-    along: Along, good: Callable[[Evaluation], bool], z: float, within: tuple[float, float]
+    along: Along, good: Callable[[DesignEvaluation], bool], z: float, within: tuple[float, float]
 ) -> tuple[float, float]:
     """Return how far designs are good on both sides of a place, by doubled steps and bisection."""
     ends = []
@@ -260,7 +266,7 @@ def _least(along: Along, criterion: TieBreak, low: float, high: float) -> tuple[
     return best, least + LEVEL * 1e-3 * abs(least)
 
 
-def _next_peak(problem: Problem, there: Evaluation, held: Row) -> float | None:
+def _next_peak(problem: Problem, there: DesignEvaluation, held: CriterionRow) -> float | None:
     """Return the highest weighted peak of all responses besides the one that holds the optimum."""
     weights = {case.name: case.weight for case in problem.cases}
     seen: set[str] = set()

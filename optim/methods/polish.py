@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from optim.criteria.rows import Evaluation
-from optim.methods.evaluator import Search
+from optim.criteria.rows import DesignEvaluation
+from optim.methods.evaluator import DesignSearch
 from optim.methods.kkt import Local, ended, standing
 from optim.problem.variables import Real, scaled, snapped, unscaled
 
@@ -19,7 +19,7 @@ MOST = 40  # designs for each variable
 SMALLER = 0.35
 
 
-def polished(search: Search, local: Local) -> Local:
+def polished(search: DesignSearch, local: Local) -> Local:
     """Return the end of a pattern search from where a local search was stuck."""
     n = len(search.variables)
     rng = np.random.default_rng(0)
@@ -43,7 +43,7 @@ def polished(search: Search, local: Local) -> Local:
     return ended(here, search.model(here), search.variables)
 
 
-def _standing(search: Search, evaluation: Evaluation) -> tuple[float, float]:
+def _standing(search: DesignSearch, evaluation: DesignEvaluation) -> tuple[float, float]:
     return standing(search.model(evaluation))
 
 

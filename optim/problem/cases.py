@@ -14,7 +14,7 @@ _KEYS = ("name", "set", "band", "observe", "engine_order", "order", "weight")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Case:
+class LoadCase:
     """One frequency response a design is judged by: one DOF, one band, one excitation.
 
     Attributes
@@ -54,7 +54,7 @@ def with_engine_order(scene: Scene, engine_order: int) -> Scene:
     return Scene.from_dict(raw)
 
 
-def read_cases(scene: Scene, cases: Sequence[Mapping[str, object]] | None) -> tuple[Case, ...]:
+def read_cases(scene: Scene, cases: Sequence[Mapping[str, object]] | None) -> tuple[LoadCase, ...]:
     """Return the load cases of a problem; without any, the scene as it is.
 
     Parameters
@@ -70,7 +70,7 @@ def read_cases(scene: Scene, cases: Sequence[Mapping[str, object]] | None) -> tu
         What is wrong, with the case's number.
     """
     if cases is None:
-        return (Case(name=scene.name, scene=scene, weight=1.0, order=max(scene.engine_order, 1)),)
+        return (LoadCase(name=scene.name, scene=scene, weight=1.0, order=max(scene.engine_order, 1)),)
     if not isinstance(cases, Sequence) or isinstance(cases, str) or not cases:
         raise DesignError("cases", cases, "must be a list of at least one table")
     read = [case for i, table in enumerate(cases) for case in read_case(scene, i, table)]
@@ -78,7 +78,7 @@ def read_cases(scene: Scene, cases: Sequence[Mapping[str, object]] | None) -> tu
     return tuple(replace(case, beside=_served_by(case, read[:i])) for i, case in enumerate(read))
 
 
-def _served_by(case: Case, earlier: Sequence[Case]) -> str | None:
+def _served_by(case: LoadCase, earlier: Sequence[LoadCase]) -> str | None:
     """Return the name of the first case whose response serves another one; None if there is none.
 
     A DOF of another sector may call for the whole annulus: it gets a response of its own.
@@ -92,7 +92,7 @@ def _served_by(case: Case, earlier: Sequence[Case]) -> str | None:
     return None
 
 
-def check_names(cases: Sequence[Case]) -> None:
+def check_names(cases: Sequence[LoadCase]) -> None:
     """Raise DesignError if two cases have one name."""
     names = [case.name for case in cases]
     for name in names:
@@ -100,7 +100,7 @@ def check_names(cases: Sequence[Case]) -> None:
             raise DesignError("cases", name, "must have names of their own, this one is there twice")
 
 
-def read_case(scene: Scene, index: int, table: object) -> list[Case]:
+def read_case(scene: Scene, index: int, table: object) -> list[LoadCase]:
     """Return the load cases of one table, one for each DOF it observes; raises like `read_cases`."""
     where: Place = ("cases", index)
     if not isinstance(table, Mapping):
@@ -125,7 +125,7 @@ def read_case(scene: Scene, index: int, table: object) -> list[Case]:
         raise DesignError((*where, "observe"), observed, "must be the name of a DOF, or a list of them")
     names = [name if len(dofs) == 1 else f"{name}, {dof}" for dof in dofs]
     return [
-        Case(name=one, scene=_observing(here, where, dof, band), weight=weight, order=order)
+        LoadCase(name=one, scene=_observing(here, where, dof, band), weight=weight, order=order)
         for one, dof in zip(names, dofs, strict=True)
     ]
 

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from typing import Any
 
-from optim.criteria.criterion import Asked
+from optim.criteria.criterion import CriterionContext
 from optim.criteria.registry import criteria
 from optim.errors import DesignError
 from optim.problem.cases import read_case, read_cases
@@ -81,7 +81,9 @@ def _others(scene: Scene, given: Mapping[str, Any], *, sound: bool) -> Iterator[
         if name in owners:
             one, key = owners[name]
             limit = ANY_LIMIT if key.needs_limit else None
-            asked = Asked(scene=scene, cases=read_cases(scene, None), limit=limit, values={name: value})
+            asked = CriterionContext(
+                scene=scene, cases=read_cases(scene, None), limit=limit, values={name: value}
+            )
             yield (name,), partial(one.read, asked)
         elif name in READERS:
             yield (name,), partial(READERS[name], value)

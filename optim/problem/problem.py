@@ -6,14 +6,14 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from optim.criteria.criterion import Asked, Criterion, Goals, Limits
+from optim.criteria.criterion import Criterion, CriterionContext, Goals, Limits
 from optim.criteria.peak import PEAK
 from optim.criteria.registry import by_weight, criteria, limit_keys, weight_words
 from optim.errors import DesignError
-from optim.problem.cases import Case, read_cases
+from optim.problem.cases import LoadCase, read_cases
 from optim.problem.keys import BASINS, HARMONICS, MOST_BASINS, TOLERANCE
 from optim.problem.numbers import is_number, positive
-from optim.problem.variables import Variable, check_variables
+from optim.problem.variables import BoundedVariable, check_variables
 from optim.problem.words import Method as Method
 from solver.balance.balance import check_harmonics
 from solver.contacts.laws.base import without_second
@@ -47,7 +47,7 @@ class Problem(Goals):
     """
 
     scene: Scene
-    cases: tuple[Case, ...]
+    cases: tuple[LoadCase, ...]
     harmonics: int
     start: Mapping[str, float] | None
     method: Method
@@ -161,18 +161,20 @@ def _weights(weights: Mapping[str, float] | None) -> dict[Criterion, float]:
 
 
 def _limits(
-    scene: Scene, cases: tuple[Case, ...], limit: float | None, given: Mapping[str, object]
+    scene: Scene, cases: tuple[LoadCase, ...], limit: float | None, given: Mapping[str, object]
 ) -> Limits:  # fmt: skip
     """Return what the keys of the criteria come to."""
     read: dict[Criterion, Any] = {}
     for one in criteria():
         values = {key.name: given[key.name] for key in one.keys if given.get(key.name) is not None}
         if values:
-            read[one] = one.read(Asked(scene=scene, cases=cases, limit=limit, values=values))
+            read[one] = one.read(CriterionContext(scene=scene, cases=cases, limit=limit, values=values))
     return Limits(read=read)
 
 
-def read_start(variables: tuple[Variable, ...], start: Mapping[str, float] | None) -> dict[str, float] | None:
+def read_start(
+    variables: tuple[BoundedVariable, ...], start: Mapping[str, float] | None
+) -> dict[str, float] | None:
     """Return the start with every variable in it, or None; DesignError if one is out of its bounds."""
     if start is None:
         return None

@@ -10,8 +10,8 @@ from scipy.special import gammaincinv
 
 from optim.errors import DesignError
 from optim.problem.numbers import is_number
-from optim.problem.uncertainty_set import Coordinate, Disk, How, Scenario, Shape, UncertainSet
-from optim.problem.variables import Real, Variable
+from optim.problem.uncertainty_set import Coordinate, Disk, How, Scenario, UncertainSet, UncertaintyShape
+from optim.problem.variables import BoundedVariable, Real
 from solver.balance.parameter import Kind, resolve
 from solver.errors import Place, at
 from solver.scene.scene import Scene
@@ -25,7 +25,7 @@ _WHERE: Place = ("uncertain",)
 _FORM = "must be a table of intervals, a table of an ellipsoid, or a list of samples"
 
 
-def read_uncertain(scene: Scene, variables: Sequence[Variable], uncertain: object) -> UncertainSet:
+def read_uncertain(scene: Scene, variables: Sequence[BoundedVariable], uncertain: object) -> UncertainSet:
     """Return the set of scenarios of a description.
 
     Parameters
@@ -57,7 +57,7 @@ def read_uncertain(scene: Scene, variables: Sequence[Variable], uncertain: objec
         found = (_ellipsoid if ellipsoid else _intervals)(scene, chosen, uncertain, disks)
     elif isinstance(uncertain, Sequence) and not isinstance(uncertain, str) and uncertain:
         listed = tuple(_sample(scene, chosen, i, table) for i, table in enumerate(uncertain))
-        found = UncertainSet(shape=Shape.LIST, listed=listed)
+        found = UncertainSet(shape=UncertaintyShape.LIST, listed=listed)
     else:
         raise DesignError("uncertain", uncertain, _FORM)
     _check_extent(scene, variables, found)
@@ -100,7 +100,7 @@ def _intervals(
         ends.append(both)
     _no_path_twice(coordinates)
     return UncertainSet(
-        shape=Shape.BOX, coordinates=tuple(coordinates),
+        shape=UncertaintyShape.BOX, coordinates=tuple(coordinates),
         centre=tuple(0.5 * (low + high) for low, high in ends),
         axes=_nested(np.diag([0.5 * (high - low) for low, high in ends])), ends=tuple(ends), disks=disks,
     )  # fmt: skip
@@ -156,8 +156,9 @@ def _ellipsoid(
         reach = _confidence(table, len(names))
         axes = reach * _root((*_WHERE, form[0]), table[form[0]], len(names))
     return UncertainSet(
-        shape=Shape.NORMAL if form == ["covariance"] else Shape.BALL, coordinates=coordinates,
-        centre=tuple(centre[name] for name in names), axes=_nested(axes), deviations=reach, disks=disks,
+        shape=UncertaintyShape.NORMAL if form == ["covariance"] else UncertaintyShape.BALL,
+        coordinates=coordinates, centre=tuple(centre[name] for name in names), axes=_nested(axes),
+        deviations=reach, disks=disks,
     )  # fmt: skip
 
 
@@ -283,7 +284,7 @@ def _nested(matrix: Real) -> tuple[tuple[float, ...], ...]:
     return tuple(tuple(row) for row in matrix.tolist())
 
 
-def _check_extent(scene: Scene, variables: Sequence[Variable], found: UncertainSet) -> None:
+def _check_extent(scene: Scene, variables: Sequence[BoundedVariable], found: UncertainSet) -> None:
     """Raise unless every value that may occur is one that its path may have."""
     reach = found.reach() if found.coordinates else np.zeros(0)
     ends = [
@@ -295,7 +296,7 @@ def _check_extent(scene: Scene, variables: Sequence[Variable], found: UncertainS
 
 
 def check_settings(
-    scene: Scene, variables: Sequence[Variable], settings: Sequence[tuple[Coordinate, float]]
+    scene: Scene, variables: Sequence[BoundedVariable], settings: Sequence[tuple[Coordinate, float]]
 ) -> None:
     """Raise unless uncertain values are such as their paths may have, at every design within the bounds.
 

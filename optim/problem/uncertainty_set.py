@@ -150,7 +150,7 @@ class Scenario:
         return answer if self.disk is None else {**answer, "mistuning": self.disk.table()}
 
 
-class Shape(Enum):
+class UncertaintyShape(Enum):
     """Which set ξ comes from, and how it is distributed when it is drawn."""
 
     BOX = "intervals"
@@ -181,7 +181,7 @@ class UncertainSet:
         The samples of a list.
     """
 
-    shape: Shape
+    shape: UncertaintyShape
     coordinates: tuple[Coordinate, ...] = ()
     centre: tuple[float, ...] = ()
     axes: tuple[tuple[float, ...], ...] = ()
@@ -193,11 +193,15 @@ class UncertainSet:
     @property
     def finite(self) -> bool:
         """Whether the scenarios can be counted: a list, or mistuned disks alone."""
-        return self.shape is Shape.LIST or not self.coordinates
+        return self.shape is UncertaintyShape.LIST or not self.coordinates
 
     def all(self) -> tuple[Scenario, ...]:
         """Return every scenario of a finite set."""
-        return self.listed if self.shape is Shape.LIST else tuple(Scenario(disk=disk) for disk in self.disks)
+        return (
+            self.listed
+            if self.shape is UncertaintyShape.LIST
+            else tuple(Scenario(disk=disk) for disk in self.disks)
+        )
 
     def scenario(self, xi: Real | Sequence[float], disk: Disk | None = None) -> Scenario:
         """Return the scenario of a place in the unit box or ball."""
@@ -216,7 +220,7 @@ class UncertainSet:
 
     def inside(self, xi: Real) -> Real:
         """Return the nearest place of the unit box or ball."""
-        if self.shape is Shape.BOX:
+        if self.shape is UncertaintyShape.BOX:
             return np.clip(xi, -1.0, 1.0)
         reach = float(np.linalg.norm(xi))
         return xi / reach if reach > 1.0 else xi
@@ -228,7 +232,7 @@ class UncertainSet:
 
     def extreme(self, slope: Real) -> Real:
         """Return the place ξ at which slopeᵀ ξ is largest."""
-        if self.shape is Shape.BOX:
+        if self.shape is UncertaintyShape.BOX:
             return np.where(slope >= 0.0, 1.0, -1.0)
         reach = float(np.linalg.norm(slope))
         return slope / reach if reach > 0.0 else np.zeros(slope.size)
@@ -249,11 +253,11 @@ class UncertainSet:
         n = len(self.coordinates)
         strata = np.array([rng.permutation(count) for _ in range(n + 1)]).T
         share = (strata + rng.random((count, n + 1))) / count
-        if self.shape is Shape.BOX:
+        if self.shape is UncertaintyShape.BOX:
             places = 2.0 * share[:, :n] - 1.0
         else:
             normal = ndtri(np.clip(share[:, :n], 1e-15, 1.0 - 1e-15))
-            if self.shape is Shape.NORMAL:
+            if self.shape is UncertaintyShape.NORMAL:
                 places = normal / self.deviations
             else:
                 reach = np.linalg.norm(normal, axis=1)
@@ -272,10 +276,10 @@ class UncertainSet:
     def corners(self, most: int) -> tuple[tuple[float, ...], ...]:
         """Return the corners of the box, or the ends of the axes of the ball; none if more than `most`."""
         n = len(self.coordinates)
-        count = 2**n if self.shape is Shape.BOX else 2 * n
+        count = 2**n if self.shape is UncertaintyShape.BOX else 2 * n
         if self.finite or count > most:
             return ()
-        if self.shape is Shape.BOX:
+        if self.shape is UncertaintyShape.BOX:
             return tuple(tuple(1.0 if i >> j & 1 else -1.0 for j in range(n)) for i in range(count))
         return tuple(
             tuple(sign if i == j else 0.0 for i in range(n)) for j in range(n) for sign in (-1.0, 1.0)
@@ -284,7 +288,7 @@ class UncertainSet:
     def reach(self) -> Real:
         """Return the largest |δ − centre| of every coordinate, (n,)."""
         axes = np.abs(np.array(self.axes))
-        if self.shape is Shape.BOX:
+        if self.shape is UncertaintyShape.BOX:
             return np.asarray(axes.sum(axis=1))
         return np.asarray(np.linalg.norm(np.array(self.axes), axis=1))
 

@@ -22,7 +22,7 @@ LOGARITHMIC_FROM = 5.0  # ratio of the bounds from which a variable is scaled lo
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Variable:
+class BoundedVariable:
     """One number to choose, with bounds; several parameter paths may share it.
 
     Attributes
@@ -68,36 +68,36 @@ class Variable:
         return value * math.log(self.high / self.low) ** 2 if self.logarithmic else 0.0
 
 
-def parameter_values(variables: Sequence[Variable], values: Mapping[str, float]) -> dict[str, float]:
+def parameter_values(variables: Sequence[BoundedVariable], values: Mapping[str, float]) -> dict[str, float]:
     """Return the parameter path to value of a design given by the names of the variables."""
     return {path: values[variable.name] for variable in variables for path in variable.paths}
 
 
-def by_variables(variables: Sequence[Variable], by_path: Real) -> Real:
+def by_variables(variables: Sequence[BoundedVariable], by_path: Real) -> Real:
     """Return a gradient by the variables from one by all their paths, (n,)."""
     gathered: Real = _members(variables) @ by_path
     return gathered
 
 
-def by_variables_twice(variables: Sequence[Variable], by_paths: Real) -> Real:
+def by_variables_twice(variables: Sequence[BoundedVariable], by_paths: Real) -> Real:
     """Return second derivatives by the variables from those by all their paths, (n, n)."""
     members = _members(variables)
     gathered: Real = members @ by_paths @ members.T
     return gathered
 
 
-def _members(variables: Sequence[Variable]) -> Real:
+def _members(variables: Sequence[BoundedVariable]) -> Real:
     """Return which variable each path belongs to, (n_variables, n_paths) of 0 and 1."""
     owners = np.repeat(np.arange(len(variables)), [len(variable.paths) for variable in variables])
     return np.asarray(np.arange(len(variables))[:, None] == owners, dtype=np.float64)
 
 
-def scaled(variables: Sequence[Variable], values: Mapping[str, float]) -> Real:
+def scaled(variables: Sequence[BoundedVariable], values: Mapping[str, float]) -> Real:
     """Return the scaled variables of a design, (n,)."""
     return np.array([variable.inside(values[variable.name]) for variable in variables])
 
 
-def unscaled(variables: Sequence[Variable], z: Real | Sequence[float]) -> dict[str, float]:
+def unscaled(variables: Sequence[BoundedVariable], z: Real | Sequence[float]) -> dict[str, float]:
     """Return the design of scaled variables, name to value."""
     return {variable.name: variable.outside(float(x)) for variable, x in zip(variables, z, strict=True)}
 
@@ -110,7 +110,7 @@ def snapped(z: Real) -> Real:
     return inside
 
 
-def slopes(variables: Sequence[Variable], values: Mapping[str, float]) -> Real:
+def slopes(variables: Sequence[BoundedVariable], values: Mapping[str, float]) -> Real:
     """Return d value / d scaled of every variable, (n,)."""
     return np.array([variable.slope(values[variable.name]) for variable in variables])
 
@@ -121,7 +121,7 @@ def check_variables(
     scaling: Mapping[str, str] | None = None,
     *,
     key: str = "variables",
-) -> tuple[Variable, ...]:
+) -> tuple[BoundedVariable, ...]:
     """Return the design variables; without any, the N0 of the first contact whose load N1 is tied to.
 
     Parameters
@@ -160,7 +160,7 @@ def check_variables(
                 raise DesignError(key, path, wanted, place=(key, path))
             taken[path] = name
         how = _scaling(name, scaling.get(name, Scaling.AUTO.value), low, high)
-        checked.append(Variable(name=name, paths=paths, low=low, high=high, logarithmic=how))
+        checked.append(BoundedVariable(name=name, paths=paths, low=low, high=high, logarithmic=how))
     return tuple(checked)
 
 

@@ -12,7 +12,7 @@ SAME_PLACE = 1e-3  # scaled distance within which two optima are one
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class Basin(Piece):
+class LocalOptimum(Piece):
     """A local optimum."""
 
     values: Annotated[Mapping[str, float], "Variable name to value."]

@@ -9,10 +9,10 @@ from enum import Enum
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from optim.criteria.band import BAND
-from optim.criteria.criterion import Row
+from optim.criteria.criterion import CriterionRow
 from optim.criteria.peak import PEAK
 from optim.problem.words import Method
-from optim.results.basins import Basin, Checked
+from optim.results.basins import Checked, LocalOptimum
 from optim.results.curve_check import CurveCheck
 from optim.results.doubts import doubts_of
 from optim.results.json import conditions_json, evaluation_json, known_parts, looked_json
@@ -25,7 +25,7 @@ from solver.results.views import Views
 
 if TYPE_CHECKING:
     from optim.criteria.linearised import Conditions
-    from optim.criteria.rows import Evaluation
+    from optim.criteria.rows import DesignEvaluation
     from optim.problem.problem import Problem
     from solver.continuation.branch import Branch
 
@@ -124,11 +124,11 @@ class DesignResult(MadeOfResponses, Drawn):
     problem: Annotated[Problem, "What was asked."]
     method: Annotated[Method, "How the optimum was found."]
     status: Annotated[DesignStatus, "How the search ended."]
-    evaluation: Annotated[Evaluation | None, "Rows and responses of the optimum."]
+    evaluation: Annotated[DesignEvaluation | None, "Rows and responses of the optimum."]
     conditions: Annotated[Conditions | None, "First-order conditions there."]
-    basins: Annotated[tuple[Basin, ...], "Every local optimum found, best first."]
+    basins: Annotated[tuple[LocalOptimum, ...], "Every local optimum found, best first."]
     looked_at: Annotated[
-        tuple[Evaluation, ...],
+        tuple[DesignEvaluation, ...],
         "The designs of the look over the whole range, in order, some of them with fewer harmonics.",
     ] = ()
     plateau: Annotated[
@@ -144,7 +144,7 @@ class DesignResult(MadeOfResponses, Drawn):
         CurveCheck | None, "Of the method performance-curve: the curve beside the whole response."
     ] = None
     history: Annotated[
-        tuple[Evaluation, ...],
+        tuple[DesignEvaluation, ...],
         "Every design evaluated, in order; the optimum is among them (of a tracked peak the optimum alone).",
     ]
     evaluations: Annotated[int, "Frequency responses computed."]
@@ -174,7 +174,7 @@ class DesignResult(MadeOfResponses, Drawn):
         return DesignPeak(value=self.evaluation.peaks[0].value, at=self.evaluation.peaks[0].at_hz)
 
     @property
-    def held_by(self) -> Row | None:
+    def held_by(self) -> CriterionRow | None:
         """The row that holds what is minimised: the highest weighted peak, or else of another criterion."""
         if self.evaluation is None:
             return None
@@ -231,7 +231,7 @@ class DesignResult(MadeOfResponses, Drawn):
         return None if band is None else band.value
 
     @property
-    def further(self) -> tuple[Row, ...]:
+    def further(self) -> tuple[CriterionRow, ...]:
         """The largest row of each criterion that is minimised besides peak and band."""
         weights = self.problem.weights
         others = [one for one, weight in weights.items() if weight > 0.0 and one not in (PEAK, BAND)]
@@ -272,12 +272,12 @@ class DesignResult(MadeOfResponses, Drawn):
         at_limits = [self._words(limit_words(row), row) for row in self.evaluation.rows if at_limit(row)]
         return (*held, *at_limits)
 
-    def _words(self, what: str, row: Row) -> str:
+    def _words(self, what: str, row: CriterionRow) -> str:
         """Return what a row says, with the name of its case where there are several."""
         return f"{what} of {row.case}" if len(self.problem.cases) > 1 and row.case else what
 
     @property
-    def broken(self) -> tuple[Row, ...]:
+    def broken(self) -> tuple[CriterionRow, ...]:
         """The limited rows that the design does not keep, worst first."""
         if self.evaluation is None:
             return ()
@@ -324,13 +324,13 @@ class DesignResult(MadeOfResponses, Drawn):
         )  # fmt: skip
 
 
-def at_limit(row: Row) -> bool:
+def at_limit(row: CriterionRow) -> bool:
     """Return whether a limited row holds a design in place."""
     if row.bound is None:
         return False
     return row.value >= row.bound - AT_LIMIT * (abs(row.bound) or 1.0)
 
 
-def limit_words(row: Row) -> str:
+def limit_words(row: CriterionRow) -> str:
     """Return the limit of a row in words."""
     return row.quantity.limit_words(row)

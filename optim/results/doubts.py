@@ -12,14 +12,14 @@ from solver.results.known import Known
 from solver.results.notes import flag_words
 
 if TYPE_CHECKING:
-    from optim.criteria.rows import Evaluation
+    from optim.criteria.rows import DesignEvaluation
 
 DOUBTFUL = 0.1  # estimated error of a peak, relative, from which its harmonics are too few
 WELL_KNOWN = 0.05  # relative error of the highest peak up to which a design may be called the best
 
 
 def doubts_of(
-    evaluation: Evaluation | None,
+    evaluation: DesignEvaluation | None,
     *,
     harmonics: int,
     optimum: Mapping[str, float],
@@ -46,7 +46,7 @@ def doubts_of(
     )
 
 
-def open_peaks(evaluation: Evaluation) -> list[str]:
+def open_peaks(evaluation: DesignEvaluation) -> list[str]:
     """For each case of which that is so: why it is not known that no peak hides between points."""
     return [
         f"the response of {one.case} may have a higher peak between its points. {certificate.reason}"
@@ -55,7 +55,7 @@ def open_peaks(evaluation: Evaluation) -> list[str]:
     ]
 
 
-def _few_harmonics(evaluation: Evaluation, harmonics: int) -> list[str]:
+def _few_harmonics(evaluation: DesignEvaluation, harmonics: int) -> list[str]:
     return [
         f"too few harmonics: the estimated error of the peak of {case} is {_share(known)} with {harmonics}: "
         "ask for more harmonics"
@@ -84,7 +84,7 @@ def _checked(checked: Sequence[Checked], optimum: Mapping[str, float], *, feasib
     return found
 
 
-def _flags(evaluation: Evaluation) -> list[str]:
+def _flags(evaluation: DesignEvaluation) -> list[str]:
     """The flags of the responses, each once."""
     own = (flag for one in evaluation.responses for flag in one.branch.flags)
     at_peaks = (flag for _, known in known_parts(evaluation) for flag in known.flags)

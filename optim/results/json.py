@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from optim.criteria.linearised import Conditions
-    from optim.criteria.rows import Evaluation
+    from optim.criteria.rows import DesignEvaluation
     from solver.continuation.branch import Branch
     from solver.results.known import Known
 
 
-def over_bands(evaluation: Evaluation) -> dict[str, Branch]:
+def over_bands(evaluation: DesignEvaluation) -> dict[str, Branch]:
     """Return of each case the response over its band, which is its first."""
     first: dict[str, Branch] = {}
     for response in evaluation.responses:
@@ -19,7 +19,7 @@ def over_bands(evaluation: Evaluation) -> dict[str, Branch]:
     return first
 
 
-def bands_json(evaluation: Evaluation) -> list[dict[str, object]]:
+def bands_json(evaluation: DesignEvaluation) -> list[dict[str, object]]:
     """Return where the resonance band of each case lies."""
     return [
         {
@@ -31,7 +31,7 @@ def bands_json(evaluation: Evaluation) -> list[dict[str, object]]:
     ]  # fmt: skip
 
 
-def evaluation_json(evaluation: Evaluation | None) -> dict[str, object]:
+def evaluation_json(evaluation: DesignEvaluation | None) -> dict[str, object]:
     """Return the rows of a design, its peaks, its bands, and how well each is known."""
     if evaluation is None:
         return {"peaks": [], "bands": [], "objective": None, "rows": [], "errors": []}
@@ -47,12 +47,12 @@ def evaluation_json(evaluation: Evaluation | None) -> dict[str, object]:
     }
 
 
-def known_parts(evaluation: Evaluation) -> list[tuple[str, Known]]:
+def known_parts(evaluation: DesignEvaluation) -> list[tuple[str, Known]]:
     """Return for the response of each case over its band its name and how well its peak is known."""
     return [(case, b.known) for case, b in over_bands(evaluation).items() if b.peak is not None]
 
 
-def looked_json(one: Evaluation) -> dict[str, object]:
+def looked_json(one: DesignEvaluation) -> dict[str, object]:
     """Return a design of the look over the whole range."""
     kept = all(row.bound is None or row.value <= row.bound for row in one.rows)
     return {

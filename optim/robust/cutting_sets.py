@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from optim.criteria.peak import PEAK
-from optim.criteria.rows import Evaluation
+from optim.criteria.rows import DesignEvaluation
 from optim.methods.kkt import Local, is_flat
 from optim.methods.surrogate import quasi_random
 from optim.problem.problem import Problem
@@ -33,7 +33,7 @@ FEW = 8  # samples that the starts of a sampled search are judged by
 
 
 @dataclass(slots=True, kw_only=True)
-class Progress:
+class SearchProgress:
     """What a search knows at any time.
 
     Attributes
@@ -84,7 +84,7 @@ class Progress:
 
 
 def cutting_sets(
-    search: RobustSearch, nominal: DesignResult, drawn: Sequence[Scenario], progress: Progress
+    search: RobustSearch, nominal: DesignResult, drawn: Sequence[Scenario], progress: SearchProgress
 ) -> RobustStatus:
     """Minimise the worst case; `progress` is kept up to date.
 
@@ -124,7 +124,7 @@ def cutting_sets(
 
 
 def _worse(
-    search: RobustSearch, values: Mapping[str, float], progress: Progress, drawn: Sequence[Scenario]
+    search: RobustSearch, values: Mapping[str, float], progress: SearchProgress, drawn: Sequence[Scenario]
 ) -> list[tuple[list[Outcome], float]]:
     """Return for every aspect the scenarios worse than the master's, and by how much the worst of them is."""
     here = search.evaluation(values, progress.scenarios)
@@ -155,7 +155,7 @@ def _distinct(worse: Sequence[Outcome]) -> list[Outcome]:
 
 
 def _checked(
-    search: RobustSearch, values: Mapping[str, float], aspect: Aspect, progress: Progress,
+    search: RobustSearch, values: Mapping[str, float], aspect: Aspect, progress: SearchProgress,
     drawn: Sequence[Scenario],
 ) -> Finding:  # fmt: skip
     """Return the worst scenarios again, looking at the whole set and climbing from the worst drawn ones."""
@@ -176,7 +176,7 @@ def _excess(aspect: Aspect, worst: float, master: float) -> float:
 
 
 def sampled(
-    search: RobustSearch, nominal: DesignResult, drawn: Sequence[Scenario], progress: Progress
+    search: RobustSearch, nominal: DesignResult, drawn: Sequence[Scenario], progress: SearchProgress
 ) -> RobustStatus:
     """Minimise the mean or a quantile over the drawn scenarios; `progress` is kept up to date.
 
@@ -207,7 +207,9 @@ def _first(search: RobustSearch, nominal: DesignResult) -> dict[str, float]:
     return dict(nominal.optimum) if nominal.optimum else _coarse(search.problem)[0]
 
 
-def _starts(search: RobustSearch, nominal: DesignResult, scenarios: Sequence[Scenario]) -> list[Evaluation]:
+def _starts(
+    search: RobustSearch, nominal: DesignResult, scenarios: Sequence[Scenario]
+) -> list[DesignEvaluation]:
     """Return designs over the whole range, evaluated over some scenarios: a coarse stage of its own."""
     given = [dict(basin.values) for basin in nominal.basins] + _coarse(search.problem)
     if nominal.optimum:
@@ -220,7 +222,7 @@ def _starts(search: RobustSearch, nominal: DesignResult, scenarios: Sequence[Sce
     return [evaluation for evaluation in seen if evaluation.good]
 
 
-def _valleys(search: RobustSearch, seen: Sequence[Evaluation], count: int) -> list[Evaluation]:
+def _valleys(search: RobustSearch, seen: Sequence[DesignEvaluation], count: int) -> list[DesignEvaluation]:
     """Return the designs to search from, best first; with one variable only the lowest of each valley."""
     merits = {id(evaluation): search.model(evaluation, count).merit for evaluation in seen}
     kept = list(seen)
@@ -233,7 +235,7 @@ def _valleys(search: RobustSearch, seen: Sequence[Evaluation], count: int) -> li
 
 
 def _locals(
-    search: RobustSearch, starts: Sequence[Evaluation], scenarios: Sequence[Scenario]
+    search: RobustSearch, starts: Sequence[DesignEvaluation], scenarios: Sequence[Scenario]
 ) -> tuple[list[Local], RobustStatus | None]:
     """Return the local optima from the best starts that lie apart; or how the search ends without one."""
     if not starts:

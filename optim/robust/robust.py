@@ -19,11 +19,11 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Unpack
 
 from optim.criteria.band import BAND
-from optim.criteria.criterion import Row
+from optim.criteria.criterion import CriterionRow
 from optim.criteria.peak import PEAK
 from optim.errors import DesignError
 from optim.methods.enough_harmonics import most_harmonics
-from optim.methods.evaluator import StoppedError
+from optim.methods.evaluator import SearchStoppedError
 from optim.methods.kkt import KEPT
 from optim.problem.keys import FEWEST_SAMPLES, QUANTILE, SEED, DesignKeys
 from optim.problem.keywords import keywords
@@ -36,7 +36,7 @@ from optim.problem.words import Aim, Method
 from optim.results.best_so_far import OnBest
 from optim.results.design import DesignResult, DesignStatus
 from optim.results.doubts import WELL_KNOWN
-from optim.robust.cutting_sets import CLOSED, Progress, cutting_sets, sampled
+from optim.robust.cutting_sets import CLOSED, SearchProgress, cutting_sets, sampled
 from optim.robust.result import RobustResult, RobustStatus, Side, Spread
 from optim.robust.scenarios import Outcome, rank_of
 from optim.robust.search import RobustSearch
@@ -115,7 +115,7 @@ def _feasible(
     return max(excess, default=-math.inf) <= KEPT
 
 
-def _excess(search: RobustSearch, rows: Sequence[Row]) -> float:
+def _excess(search: RobustSearch, rows: Sequence[CriterionRow]) -> float:
     return max((row.excess(search.scales[row.quantity]) for row in rows), default=math.inf)
 
 
@@ -205,7 +205,7 @@ class _State:
     """What is known so far, for a result at any time."""
 
     nominal: DesignResult
-    progress: Progress = field(default_factory=Progress)
+    progress: SearchProgress = field(default_factory=SearchProgress)
     sides: dict[str, Side] = field(default_factory=dict)
     unknown: Scenario | None = None
 
@@ -244,7 +244,7 @@ def _ended(search: RobustSearch, drawn: tuple[Scenario, ...], state: _State) -> 
     """Search until it ends or is made to."""
     try:
         return _search(search, drawn, state)
-    except StoppedError as stop:
+    except SearchStoppedError as stop:
         stopped = stop.status is DesignStatus.STOPPED
         return RobustStatus.STOPPED if stopped else RobustStatus.TOO_MANY
     except UnknownScenarioError as unknown:

@@ -8,14 +8,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from optim.criteria.criterion import Criterion, Row
+from optim.criteria.criterion import Criterion, CriterionRow
 from optim.criteria.evaluation import Judge, effects_of, evaluate, ranges_of
 from optim.criteria.linearised import PENALTY, Model, model_of
-from optim.criteria.rows import Evaluation
-from optim.problem.cases import Case
+from optim.criteria.rows import DesignEvaluation
+from optim.problem.cases import LoadCase
 from optim.problem.problem import Problem
 from optim.problem.uncertainty_set import Coordinate, Scenario
-from optim.problem.variables import Real, Variable, parameter_values
+from optim.problem.variables import BoundedVariable, Real, parameter_values
 from optim.problem.words import Aim
 from optim.results.json import over_bands
 from solver.continuation.branches.observation import observing
@@ -43,7 +43,7 @@ class Outcome:
     """
 
     scenario: Scenario
-    rows: tuple[Row, ...]
+    rows: tuple[CriterionRow, ...]
     by_delta: Real
     responses: int
 
@@ -52,7 +52,7 @@ class Outcome:
         """Whether every number is known."""
         return bool(self.rows) and all(np.isfinite(row.value) for row in self.rows)
 
-    def highest(self, quantity: Criterion) -> Row | None:
+    def highest(self, quantity: Criterion) -> CriterionRow | None:
         """Return the largest row of a quantity."""
         return max((r for r in self.rows if r.quantity is quantity), key=lambda r: r.value, default=None)
 
@@ -72,7 +72,7 @@ def outcome(
     should_stop : asked while the responses are computed.
     """
     design = parameter_values(problem.variables, values)
-    rows: list[Row] = []
+    rows: list[CriterionRow] = []
     by_delta: list[Real] = []
     responses = 0
     for case in problem.cases:
@@ -136,7 +136,9 @@ class _Chain:
             values[path] = coordinate.value(self._nominal[path], delta)
         return values
 
-    def rows(self, case: Case, gradients: bool, should_stop: ShouldStop) -> tuple[list[Row], int]:
+    def rows(
+        self, case: LoadCase, gradients: bool, should_stop: ShouldStop
+    ) -> tuple[list[CriterionRow], int]:
         """Return the rows of a case with their gradients by path, and the responses computed."""
         problem, values = self._posed(case), self._values()
         if self._of_every_blade(problem):
@@ -146,7 +148,7 @@ class _Chain:
         )  # fmt: skip
         return list(evaluation.rows), evaluation.computed
 
-    def known(self, case: Case, should_stop: ShouldStop) -> list[Known]:
+    def known(self, case: LoadCase, should_stop: ShouldStop) -> list[Known]:
         """Return how well the peaks of a case are known."""
         problem, values = self._posed(case), self._values()
         if self._of_every_blade(problem):
@@ -158,7 +160,7 @@ class _Chain:
         evaluation = evaluate(problem, values, gradients=False, should_stop=should_stop)
         return [branch.known for branch in over_bands(evaluation).values()]
 
-    def _posed(self, case: Case) -> Problem:
+    def _posed(self, case: LoadCase) -> Problem:
         """Return the problem of one case in the scenario, every path a variable."""
         disk = self._scenario.disk
         here = case if disk is None else replace(case, scene=disk.on(case.scene))
@@ -201,22 +203,23 @@ class _Chain:
         ])  # fmt: skip
 
 
-def _single(values: Mapping[str, float]) -> tuple[Variable, ...]:
+def _single(values: Mapping[str, float]) -> tuple[BoundedVariable, ...]:
     """Return a variable for every path, for their gradients."""
     return tuple(
-        Variable(name=path, paths=(path,), low=-np.inf, high=np.inf, logarithmic=False) for path in values
+        BoundedVariable(name=path, paths=(path,), low=-np.inf, high=np.inf, logarithmic=False)
+        for path in values
     )
 
 
 def _of_all_blades(
-    problem: Problem, case: Case, values: Mapping[str, float], gradients: bool, should_stop: ShouldStop
-) -> tuple[list[Row], int]:
+    problem: Problem, case: LoadCase, values: Mapping[str, float], gradients: bool, should_stop: ShouldStop
+) -> tuple[list[CriterionRow], int]:
     """Return the rows of a mistuned disk: those of the observed DOF in every sector, from one response."""
     here = case.scene.with_values(values)
     effects = effects_of(problem, here)
     sectors, dof = here.structure.sector_count, here.observe.dof
     ranges = ranges_of(problem, case)
-    rows: list[Row] = []
+    rows: list[CriterionRow] = []
     for over in ranges:
         branch = sweep(
             here, start=over.low, stop=over.high, harmonics=problem.harmonics, limit=problem.limit,
@@ -232,22 +235,22 @@ def _of_all_blades(
     return rows, len(ranges)
 
 
-def together(values: Mapping[str, float], outcomes: Sequence[Outcome]) -> Evaluation:
+def together(values: Mapping[str, float], outcomes: Sequence[Outcome]) -> DesignEvaluation:
     """Return an evaluation over several scenarios: the rows of all, each case under its scenario's number.
 
     Without rows if one of the scenarios could not be computed.
     """
     if not all(found.good for found in outcomes):
-        return Evaluation(values=dict(values), responses=(), rows=())
+        return DesignEvaluation(values=dict(values), responses=(), rows=())
     rows = tuple(
         replace(row, case=f"{row.case} [{number}]")
         for number, found in enumerate(outcomes, start=1)
         for row in found.rows
     )
-    return Evaluation(values=dict(values), responses=(), rows=rows)
+    return DesignEvaluation(values=dict(values), responses=(), rows=rows)
 
 
-def number_of(row: Row) -> int:
+def number_of(row: CriterionRow) -> int:
     """Return the number of the scenario a row of `together` belongs to, from 1 on."""
     return int(row.case.rpartition("[")[2].rstrip("]"))
 
@@ -256,8 +259,8 @@ Scales = Mapping[Criterion, float]
 
 
 def aim_model(
-    aim: Aim, quantile: float, count: int, variables: Sequence[Variable], scale: float, scales: Scales
-) -> Callable[[Evaluation], Model]:
+    aim: Aim, quantile: float, count: int, variables: Sequence[BoundedVariable], scale: float, scales: Scales
+) -> Callable[[DesignEvaluation], Model]:
     """Return the model of an aim over `count` scenarios for the minimax search.
 
     - worst case: every row of every scenario competes with all others;
@@ -271,10 +274,10 @@ def aim_model(
     See `optim.criteria.linearised.model_of` for the rest.
     """
 
-    def worst(evaluation: Evaluation) -> Model:
+    def worst(evaluation: DesignEvaluation) -> Model:
         return model_of(evaluation, variables, scale, scales)
 
-    def mean(evaluation: Evaluation) -> Model:
+    def mean(evaluation: DesignEvaluation) -> Model:
         model = worst(evaluation)
         numbers = np.array([number_of(row) for row in model.rows], dtype=np.float64)
         return replace(
@@ -282,7 +285,7 @@ def aim_model(
             groups=numbers * len(scales) + model.groups,
         )  # fmt: skip
 
-    def order_statistic(evaluation: Evaluation) -> Model:
+    def order_statistic(evaluation: DesignEvaluation) -> Model:
         merits = merits_of(evaluation, count, scale, scales)
         kept = set((np.argsort(merits, kind="stable")[: rank_of(quantile, count)] + 1).tolist())
         return worst(replace(evaluation, rows=tuple(r for r in evaluation.rows if number_of(r) in kept)))
@@ -295,7 +298,7 @@ def rank_of(quantile: float, count: int) -> int:
     return min(max(math.ceil(quantile * count - 1e-9), 1), count)
 
 
-def merits_of(evaluation: Evaluation, count: int, scale: float, scales: Scales) -> list[float]:
+def merits_of(evaluation: DesignEvaluation, count: int, scale: float, scales: Scales) -> list[float]:
     """Return the merit of every scenario of an evaluation: its objective and the penalty on its limits."""
     rows: list[list[object]] = [[] for _ in range(count)]
     for row in evaluation.rows:

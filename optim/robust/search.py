@@ -13,14 +13,14 @@ import numpy as np
 
 from optim.criteria.evaluation import natural_scales
 from optim.criteria.linearised import Model
-from optim.criteria.rows import Evaluation
+from optim.criteria.rows import DesignEvaluation
 from optim.methods.conic import Index, Numbers, Programme, Step, duals_of, padded
-from optim.methods.evaluator import StoppedError
+from optim.methods.evaluator import SearchStoppedError
 from optim.methods.kkt import Local
 from optim.methods.minimax import REMEMBERED, minimax_search
 from optim.problem.problem import Problem
 from optim.problem.uncertainty_set import Scenario, UncertainSet
-from optim.problem.variables import Real, Variable
+from optim.problem.variables import BoundedVariable, Real
 from optim.problem.words import Aim
 from optim.results.best_so_far import NOMINAL, BestSoFar, OnBest
 from optim.results.design import DesignStatus
@@ -121,7 +121,7 @@ class RobustSearch:
         self._scale: float | None = None
 
     @property
-    def variables(self) -> tuple[Variable, ...]:
+    def variables(self) -> tuple[BoundedVariable, ...]:
         """What may be chosen."""
         return self.problem.variables
 
@@ -149,12 +149,12 @@ class RobustSearch:
             if (place, scenario, slopes, harmonics) in self._outcomes:
                 return self._outcomes[place, scenario, slopes, harmonics]
         if self._should_stop is not None and self._should_stop():
-            raise StoppedError(DesignStatus.STOPPED)
+            raise SearchStoppedError(DesignStatus.STOPPED)
         if self.responses >= MOST_RESPONSES:
-            raise StoppedError(DesignStatus.TOO_MANY)
+            raise SearchStoppedError(DesignStatus.TOO_MANY)
         found = outcome(self.problem, values, scenario, gradients=gradients, should_stop=self._should_stop)
         if not found.good and self._should_stop is not None and self._should_stop():
-            raise StoppedError(DesignStatus.STOPPED)
+            raise SearchStoppedError(DesignStatus.STOPPED)
         self._outcomes[place, scenario, gradients, harmonics] = found
         self.count(found.responses)
         return found
@@ -171,7 +171,7 @@ class RobustSearch:
         if self._on_progress is not None:
             self._on_progress(self.responses / (self.responses + USUAL), self.responses)
 
-    def evaluation(self, values: Mapping[str, float], scenarios: Sequence[Scenario]) -> Evaluation:
+    def evaluation(self, values: Mapping[str, float], scenarios: Sequence[Scenario]) -> DesignEvaluation:
         """Return a design over several scenarios."""
         found: list[Outcome] = []
         for scenario in scenarios:
@@ -183,7 +183,7 @@ class RobustSearch:
             self._scale = evaluation.objective or 1.0
         return evaluation
 
-    def model(self, evaluation: Evaluation, count: int) -> Model:
+    def model(self, evaluation: DesignEvaluation, count: int) -> Model:
         """Return the model of a good evaluation over `count` scenarios."""
         return aim_model(self.aim, self.quantile, count, self.variables, self.scale, self.scales)(evaluation)
 
@@ -223,7 +223,7 @@ class RobustSearch:
             )
         )  # fmt: skip
 
-    def _searched(self, begin: Evaluation, scenarios: Sequence[Scenario], remembered: int) -> Local:
+    def _searched(self, begin: DesignEvaluation, scenarios: Sequence[Scenario], remembered: int) -> Local:
         """Return the end of the minimax search over scenarios that keeps so many designs' rows as cuts."""
         return minimax_search(
             lambda there: self.evaluation(there, scenarios), self.variables, begin,

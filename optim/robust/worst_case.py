@@ -19,9 +19,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import minimize
 
-from optim.criteria.criterion import Criterion, Row
+from optim.criteria.criterion import Criterion, CriterionRow
 from optim.methods.surrogate import Taylor, candidates, places, promising
-from optim.problem.uncertainty_set import Disk, Scenario, Shape, UncertainSet
+from optim.problem.uncertainty_set import Disk, Scenario, UncertainSet, UncertaintyShape
 from optim.problem.variables import Real
 from optim.robust.scenarios import Outcome
 
@@ -70,7 +70,7 @@ class Aspect:
     unit: float = 1.0
     plain: bool = False
 
-    def of(self, row: Row) -> float:
+    def of(self, row: CriterionRow) -> float:
         """Return the number of a row; −inf if it does not count."""
         if row.quantity is not self.quantity:
             return -math.inf
@@ -80,13 +80,13 @@ class Aspect:
             return row.excess(self.unit)
         return row.weight * row.value if row.weight > 0.0 else -math.inf
 
-    def factor(self, row: Row) -> float:
+    def factor(self, row: CriterionRow) -> float:
         """Return d number / d value of a row."""
         if self.plain:
             return 1.0
         return 1.0 / row.unit_of(self.unit) if self.limited else row.weight
 
-    def worst(self, rows: Iterable[Row]) -> float:
+    def worst(self, rows: Iterable[CriterionRow]) -> float:
         """Return the largest number; −inf without any."""
         return max((self.of(row) for row in rows), default=-math.inf)
 
@@ -296,7 +296,7 @@ class _Ascent:
     def _is_top(self, place: Real, found: Outcome) -> bool:
         """Return whether the highest row falls in every direction into the box from one of its corners."""
         top = max(self._slopes(found), key=lambda pair: pair[0], default=None)
-        if top is None or self._set.shape is not Shape.BOX or np.any(np.abs(place) < 1.0):
+        if top is None or self._set.shape is not UncertaintyShape.BOX or np.any(np.abs(place) < 1.0):
             return False
         return bool(np.all(top[1] * place > OUTWARD * abs(top[0])))
 
@@ -310,7 +310,7 @@ class _Ascent:
             return -value / scale, -slope / scale
 
         inside = {"type": "ineq", "fun": lambda x: 1.0 - float(x @ x), "jac": lambda x: -2.0 * x}
-        box = self._set.shape is Shape.BOX
+        box = self._set.shape is UncertaintyShape.BOX
         minimize(
             fall, begin, jac=True, method="SLSQP", bounds=[(-1.0, 1.0)] * begin.size,
             constraints=[] if box else [inside], options={"maxiter": CLIMB_STEPS, "ftol": 1e-12},

@@ -17,10 +17,10 @@ from optim.criteria.amplitudes import COMPETES
 from optim.criteria.response_gradients import Sensitivity
 from optim.problem.variables import Real
 from optim.studies.sensitivity_result import (
-    LeftOut,
     ParameterSensitivity,
     SensitivityResult,
     SensitivityStatus,
+    WithoutDerivative,
 )
 from solver.balance.parameter import resolve
 from solver.balance.parameter_derivatives import resolved
@@ -79,7 +79,7 @@ def sensitivities(
 
 def _differentiable(
     scene: Scene, branch: Branch, known: tuple[str, ...]
-) -> tuple[list[str], tuple[LeftOut, ...]]:
+) -> tuple[list[str], tuple[WithoutDerivative, ...]]:
     """Return the paths with a value and a derivative, and the others with the reason."""
     paths, left_out = [], []
     for path in known:
@@ -89,7 +89,7 @@ def _differentiable(
                 check_in_annulus(scene, path)
             resolved(branch.balance, [path])
         except SettingError as error:
-            left_out.append(LeftOut(path, str(error)))
+            left_out.append(WithoutDerivative(path, str(error)))
         else:
             paths.append(path)
     return paths, tuple(left_out)

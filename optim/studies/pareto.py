@@ -21,16 +21,16 @@ from scipy.optimize import linprog
 from optim.criteria.band import BAND
 from optim.criteria.linearised import ACTIVE, Model, bounds_held
 from optim.criteria.peak import PEAK
-from optim.criteria.rows import Evaluation
+from optim.criteria.rows import DesignEvaluation
 from optim.errors import DesignError
 from optim.methods.enough_harmonics import honest
-from optim.methods.evaluator import Search, StoppedError
+from optim.methods.evaluator import DesignSearch, SearchStoppedError
 from optim.methods.kkt import Local
 from optim.problem.keys import FEWEST_POINTS, POINTS, FrontKeys
 from optim.problem.keywords import keywords
 from optim.problem.problem import Method, Problem, pose
 from optim.problem.typed import Limit, with_limits
-from optim.problem.variables import Variable, scaled, unscaled
+from optim.problem.variables import BoundedVariable, scaled, unscaled
 from optim.results.design import DesignResult, DesignStatus
 from optim.search import judge, local_search_of, solve_problem
 from optim.studies.pareto_result import ParetoPoint, ParetoResult, ParetoStatus, front_of
@@ -117,7 +117,7 @@ class _Front:
         self.found: list[ParetoPoint] = []
         self.missed: list[float] = []
         self.evaluations = self.reported = 0
-        self._pool: list[Evaluation] = []
+        self._pool: list[DesignEvaluation] = []
         self._on_progress, self._should_stop = on_progress, should_stop
 
     def run(self) -> ParetoStatus:
@@ -148,13 +148,13 @@ class _Front:
         try:
             for _ in range(self.points - 2):
                 self._add(*self._longest())
-        except StoppedError:
+        except SearchStoppedError:
             return ParetoStatus.STOPPED
         return ParetoStatus.PARTIAL if self.missed else ParetoStatus.COMPLETE
 
     def _first_slope(self, least: ParetoPoint) -> float:
         """Return the slope of the front as it leaves the least peak: 0, or steeper where peaks are equal."""
-        search = Search(self.problem)
+        search = DesignSearch(self.problem)
         evaluation = _at_limit(least.design.evaluation, least.band_hz)  # type: ignore[arg-type]
         search.keep(evaluation)
         return -steepest(search.model(evaluation), self.problem.variables) * least.peak / least.band_hz
@@ -167,7 +167,7 @@ class _Front:
             self.reported = max(self.reported, self.evaluations + count)
             self._on_progress(min(done / self.points, 0.99), self.reported)
 
-    def _keep(self, history: Sequence[Evaluation]) -> None:
+    def _keep(self, history: Sequence[DesignEvaluation]) -> None:
         """Add evaluated designs to the pool of starts; what they are judged by is the same at every limit."""
         self.evaluations += len(history)
         weights = {case.name: case.weight for case in self.problem.cases}
@@ -202,7 +202,7 @@ class _Front:
     def _add(self, one: ParetoPoint, other: ParetoPoint, width: float) -> None:
         """Search the least peak with the band at most so wide."""
         limited = replace(self.problem, limits=self.problem.limits.including(BAND, width))
-        search = Search(limited, self._report, self._should_stop, MOST_EVALUATIONS)
+        search = DesignSearch(limited, self._report, self._should_stop, MOST_EVALUATIONS)
         rebound = [_at_limit(evaluation, width) for evaluation in self._pool]
         search.keep(_at_limit(self.ends[0].evaluation or rebound[0], width))
         try:
@@ -221,7 +221,12 @@ class _Front:
         self.found.append(ParetoPoint.of(honest(result), _slope(search, local, width)))
 
     def _searched(
-        self, search: Search, one: ParetoPoint, other: ParetoPoint, width: float, pool: list[Evaluation]
+        self,
+        search: DesignSearch,
+        one: ParetoPoint,
+        other: ParetoPoint,
+        width: float,
+        pool: list[DesignEvaluation],
     ) -> Local:
         """Return the best end of the local searches from the promising starts."""
         share = (one.band_hz - width) / (one.band_hz - other.band_hz)
@@ -251,13 +256,13 @@ def _used(method: Method) -> Method:
     return method if method is Method.IPOPT else Method.MINIMAX
 
 
-def _at_limit(evaluation: Evaluation, width: float) -> Evaluation:
+def _at_limit(evaluation: DesignEvaluation, width: float) -> DesignEvaluation:
     """Return an evaluation judged by another limit on the band."""
     rows = [replace(row, bound=width) if row.quantity is BAND else row for row in evaluation.rows]
     return replace(evaluation, rows=tuple(rows))
 
 
-def steepest(model: Model, variables: Sequence[Variable]) -> float:
+def steepest(model: Model, variables: Sequence[BoundedVariable]) -> float:
     """Return the largest multiplier a limit on the band, just reached, can have; NaN where it has no end.
 
     At a kink the multipliers are not unique; the largest is the slope by which the optimum rises when the
@@ -282,7 +287,7 @@ def steepest(model: Model, variables: Sequence[Variable]) -> float:
     return -float(found.fun) if found.success else math.nan
 
 
-def _slope(search: Search, local: Local, width: float) -> float:
+def _slope(search: DesignSearch, local: Local, width: float) -> float:
     """Return d peak / d band along the front [m/Hz] from the multipliers of the limit on the band."""
     found = [x for row, x in local.conditions.rows if row.quantity is BAND]
     if not local.settled:

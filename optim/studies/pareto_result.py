@@ -85,7 +85,7 @@ class ParetoPoint(Piece):
         return self._json() | self.design.known.to_json()
 
 
-class Ended(NamedTuple):
+class FrontEndStatus(NamedTuple):
     """How the search of an end of the front ended."""
 
     status: DesignStatus
@@ -117,9 +117,9 @@ class ParetoResult(MadeOfResponses, Drawn):
         return self.status in (ParetoStatus.COMPLETE, ParetoStatus.NO_TRADE_OFF)
 
     @property
-    def ended(self) -> tuple[Ended, ...]:
+    def ended(self) -> tuple[FrontEndStatus, ...]:
         """How the searches of both ends ended."""
-        return tuple(Ended(end.status, end.reached) for end in self.ends)
+        return tuple(FrontEndStatus(end.status, end.reached) for end in self.ends)
 
     @property
     def knee(self) -> int | None:

@@ -52,7 +52,7 @@ class ParameterSensitivity(Piece):
     band: Annotated[float, "Derivative of the band's width [Hz per unit]; NaN without a band."]
 
 
-class LeftOut(NamedTuple):
+class WithoutDerivative(NamedTuple):
     """A parameter without a derivative, and why."""
 
     path: str
@@ -80,7 +80,7 @@ class SensitivityResult(MadeOfResponses, Drawn):
         "What matters most for the highest peak first; those without per cents last.",
     ]
     band_by_limit: Annotated[FloatOrNaN, "Of the band's width by the limit [Hz/m], the peaks held."]
-    left_out: Annotated[tuple[LeftOut, ...], "Parameters without a derivative, with the reason."]
+    left_out: Annotated[tuple[WithoutDerivative, ...], "Parameters without a derivative, with the reason."]
     seconds: Annotated[float, "Time in all [s]."]
 
     @property

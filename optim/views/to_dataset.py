@@ -13,9 +13,9 @@ from solver.scene.parameter_paths import parameter_unit
 from solver.views.to_dataset import attributes, column
 
 if TYPE_CHECKING:
-    from optim.criteria.rows import Evaluation
+    from optim.criteria.rows import DesignEvaluation
     from optim.identification.result import Identification
-    from optim.problem.variables import Variable as DesignVariable
+    from optim.problem.variables import BoundedVariable as DesignVariable
     from optim.results.design import DesignResult
     from optim.robust.result import RobustResult
     from optim.studies.crossings import CampbellDiagram
@@ -52,7 +52,7 @@ def design_dataset(result: DesignResult) -> Dataset:
     return Dataset(kind="design", rows=("design",), variables=variables, attributes=notes)
 
 
-def _peaks_of_cases(names: Sequence[str], tried: Sequence[Evaluation]) -> dict[str, Variable]:
+def _peaks_of_cases(names: Sequence[str], tried: Sequence[DesignEvaluation]) -> dict[str, Variable]:
     """The highest peak of every load case, NaN where none of it competes."""
     found: dict[str, Variable] = {}
     for name in names:

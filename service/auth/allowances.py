@@ -11,19 +11,19 @@ from contextlib import contextmanager
 from service.auth.callers import Caller
 from service.db.repositories.owned import StorageRepository
 from service.errors import OverloadedError, StorageFullError, TooManyRequestsError
-from service.settings.settings import Limits
+from service.settings.settings import ClientLimits
 
 _RETRY_SECONDS = 5
 
 
-def share(caller: Caller, settings: Limits, name: str) -> int | None:
+def share(caller: Caller, settings: ClientLimits, name: str) -> int | None:
     """One limit of a caller: that of their key, else `owner_<name>` of the settings; None for no limit."""
     own: int | None = getattr(caller.limits, name)
     most: int = getattr(settings, f"owner_{name}") if own is None else own
     return most or None
 
 
-def highest_priority(caller: Caller, settings: Limits) -> int:
+def highest_priority(caller: Caller, settings: ClientLimits) -> int:
     """The highest priority the caller may give a job."""
     own = caller.limits.priority
     return settings.owner_priority if own is None else own
@@ -100,7 +100,10 @@ class Storage:
     """
 
     def __init__(
-        self, repository: StorageRepository, settings: Limits, steady: Callable[[], float] = time.monotonic
+        self,
+        repository: StorageRepository,
+        settings: ClientLimits,
+        steady: Callable[[], float] = time.monotonic,
     ) -> None:
         self._repository = repository
         self._settings = settings

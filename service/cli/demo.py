@@ -34,7 +34,7 @@ _LOOK_SECONDS = 0.1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Case:
+class DemoCase:
     """What the demonstration designs and draws of a scene.
 
     Attributes
@@ -76,12 +76,12 @@ class Case:
 
 
 CASES = (
-    Case(scene="two-dof", contact="damper", bounds=(20.0, 1000.0), shown=(30.0, 60.0, 200.0, 500.0)),
-    Case(scene="bladed-disk", contact="shroud", bounds=(20.0, 3000.0), shown=(40.0, 90.0, 500.0, 2000.0)),
+    DemoCase(scene="two-dof", contact="damper", bounds=(20.0, 1000.0), shown=(30.0, 60.0, 200.0, 500.0)),
+    DemoCase(scene="bladed-disk", contact="shroud", bounds=(20.0, 3000.0), shown=(40.0, 90.0, 500.0, 2000.0)),
 )
 
 
-def run(folder: Path, cases: Sequence[Case] = CASES) -> list[Path]:
+def run(folder: Path, cases: Sequence[DemoCase] = CASES) -> list[Path]:
     """Design, read back, draw; everything goes into `folder`. Returns the pictures.
 
     Raises
@@ -111,7 +111,7 @@ def run(folder: Path, cases: Sequence[Case] = CASES) -> list[Path]:
     return pictures
 
 
-def _designs(service: EmbeddedService, cases: Sequence[Case]) -> list[JobAnswer]:
+def _designs(service: EmbeddedService, cases: Sequence[DemoCase]) -> list[JobAnswer]:
     """Have the dampers designed, and say what came out."""
     specs = [{"scene": c.scene, "variables": {c.variable: list(c.bounds)}, "fresh": True} for c in cases]
     submitted = [service.submit("design", spec) for spec in specs]
@@ -126,7 +126,7 @@ def _designs(service: EmbeddedService, cases: Sequence[Case]) -> list[JobAnswer]
     return ended
 
 
-def _sweeps(service: EmbeddedService, cases: Sequence[Case]) -> list[list[JobAnswer]]:
+def _sweeps(service: EmbeddedService, cases: Sequence[DemoCase]) -> list[list[JobAnswer]]:
     """Have the other responses of the pictures computed; one that is stored is not computed again."""
     groups = [
         [
@@ -173,7 +173,7 @@ def _read_back(service: EmbeddedService, jobs: Sequence[JobAnswer]) -> list[Swee
     return stored
 
 
-def _draw(folder: Path, case: Case, optimum: float, stored: Sequence[SweepDetail]) -> tuple[Path, Path]:
+def _draw(folder: Path, case: DemoCase, optimum: float, stored: Sequence[SweepDetail]) -> tuple[Path, Path]:
     """Write the two pictures of a case: a family of responses, and the peak against the load."""
     family, peaks = _select(case, optimum, stored)
     curve = peak_figure(
@@ -191,7 +191,7 @@ def _draw(folder: Path, case: Case, optimum: float, stored: Sequence[SweepDetail
 
 
 def _select(
-    case: Case, optimum: float, stored: Sequence[SweepDetail]
+    case: DemoCase, optimum: float, stored: Sequence[SweepDetail]
 ) -> tuple[Family, Mapping[float, float]]:
     """The responses to draw together; the highest peak [m] at every load [N] within the bounds, ascending."""
     loads = [sweep.contacts[case.contact].N0 for sweep in stored]

@@ -18,7 +18,7 @@ STUDY = "study"
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
+class CommandEntry:
     """A command in the table.
 
     Attributes
@@ -56,12 +56,12 @@ class Entry:
 
 
 @dataclass(frozen=True, slots=True)
-class Entries:
+class CommandGroup:
     """A command in the table that only has commands under it."""
 
     name: str
     summary: str
-    entries: Sequence[Entry]
+    entries: Sequence[CommandEntry]
 
     def command(self) -> LazyGroup:
         """Return it with its commands."""
@@ -73,7 +73,7 @@ class Entries:
 class Deferred(TyperCommand):
     """Name and summary of a command whose module is not imported yet."""
 
-    def __init__(self, entry: Entry) -> None:
+    def __init__(self, entry: CommandEntry) -> None:
         super().__init__(entry.name, help=entry.summary, rich_markup_mode=None)
         self.entry = entry
 
@@ -104,7 +104,7 @@ class DeferredGroup(Deferred):
 class LazyGroup(TyperGroup):
     """A group whose commands are loaded when they are looked up to be run or completed."""
 
-    def add(self, heading: str, entries: Iterable[Entry | Entries]) -> None:
+    def add(self, heading: str, entries: Iterable[CommandEntry | CommandGroup]) -> None:
         """Add commands, which help lists below a heading, in their order."""
         for entry in entries:
             self.add_command(entry.command())

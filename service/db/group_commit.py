@@ -21,7 +21,7 @@ _Written = TypeVar("_Written")
 Work = Callable[[Connection], _Written]
 
 
-class _Entry:
+class _Work:
     """A piece of work of one thread, and what became of it."""
 
     __slots__ = ("ended", "error", "result", "taken", "work")
@@ -67,7 +67,7 @@ class GroupedWrites:
         self._seconds = seconds
         self._leading = threading.BoundedSemaphore(leaders)
         self._lock = threading.Lock()
-        self._pending: deque[_Entry] = deque()
+        self._pending: deque[_Work] = deque()
 
     def do(self, work: Work[_Written]) -> _Written:
         """Have `work` done and committed.
@@ -80,7 +80,7 @@ class GroupedWrites:
         DatabaseAwayError
             If it was not its turn in time; nothing was written.
         """
-        entry = _Entry(work)
+        entry = _Work(work)
         with self._lock:
             self._pending.append(entry)
         end = time.monotonic() + self._seconds
@@ -99,7 +99,7 @@ class GroupedWrites:
             raise entry.error
         return cast(_Written, entry.result)
 
-    def _withdrawn(self, entry: _Entry) -> bool:
+    def _withdrawn(self, entry: _Work) -> bool:
         """Take an entry back that waits; False if it is being written."""
         with self._lock:
             if entry.taken:
@@ -107,14 +107,14 @@ class GroupedWrites:
             self._pending.remove(entry)
             return True
 
-    def _take(self) -> list[_Entry]:
+    def _take(self) -> list[_Work]:
         with self._lock:
             batch = [self._pending.popleft() for _ in range(min(len(self._pending), _MOST))]
             for entry in batch:
                 entry.taken = True
         return batch
 
-    def _write(self, batch: list[_Entry]) -> None:
+    def _write(self, batch: list[_Work]) -> None:
         if not batch:
             return
         end = time.monotonic() + self._seconds
@@ -132,7 +132,7 @@ class GroupedWrites:
             for entry in batch:
                 entry.ended.set()
 
-    def _together(self, batch: list[_Entry]) -> Exception | None:
+    def _together(self, batch: list[_Work]) -> Exception | None:
         """Write all in one transaction; the error if that failed and nothing was written."""
         try:
             with self._writing() as connection:
@@ -142,7 +142,7 @@ class GroupedWrites:
             return error
         return None
 
-    def _alone(self, entry: _Entry) -> None:
+    def _alone(self, entry: _Work) -> None:
         """Write one in its own transaction; again if another service wrote the same row meanwhile."""
         for last in (False, True):
             try:

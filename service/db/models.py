@@ -82,7 +82,7 @@ def _values(members: type[enum.Enum]) -> list[str]:
     return [str(member.value) for member in members]
 
 
-class Base(DeclarativeBase):
+class TableBase(DeclarativeBase):
     """Root of the tables."""
 
     metadata = MetaData(naming_convention=NAMING_CONVENTION)
@@ -101,7 +101,7 @@ class Base(DeclarativeBase):
     }
 
 
-class Job(Base):
+class Job(TableBase):
     """A job, and with its state `accepted` the queue."""
 
     __tablename__ = "job"
@@ -148,7 +148,7 @@ class Job(Base):
     )
 
 
-class JobResult(Base):
+class JobResult(TableBase):
     """What a job computed, apart from its sweeps; in a table of its own so that lists of jobs stay light."""
 
     __tablename__ = "job_result"
@@ -160,7 +160,7 @@ class JobResult(Base):
     sha256: Mapped[str | None] = mapped_column(String(64))
 
 
-class Checkpoint(Base):
+class Checkpoint(TableBase):
     """A piece of what an unfinished job has computed; gone when the job ends."""
 
     __tablename__ = "checkpoint"
@@ -175,7 +175,7 @@ class Checkpoint(Base):
     data: Mapped[bytes] = mapped_column(LargeBinary())
 
 
-class ApiKey(Base):
+class ApiKey(TableBase):
     """A key to the REST API; of its secret only a digest is kept."""
 
     __tablename__ = "api_key"
@@ -193,7 +193,7 @@ class ApiKey(Base):
     __table_args__ = (Index(None, "owner", "id"),)
 
 
-class Upload(Base):
+class Upload(TableBase):
     """A file that a client sent, to be referred to by its id."""
 
     __tablename__ = "upload"
@@ -210,7 +210,7 @@ class Upload(Base):
     __table_args__ = (Index(None, "owner", "id"),)
 
 
-class Scene(Base):
+class StoredScene(TableBase):
     """A scene stored under a name; never changed, so that a name means one thing for ever to its owner."""
 
     __tablename__ = "scene"
@@ -230,7 +230,7 @@ class Scene(Base):
         return self.created is None
 
 
-class Result(Base):
+class Result(TableBase):
     """What was computed and can be asked for: a sweep, a design, or the result of a job of another kind.
 
     Its figures are rows of `Figure`. Results are numbered in the order in which they were stored. The id of
@@ -259,7 +259,7 @@ class Result(Base):
     )
 
 
-class Quantity(Base):
+class Quantity(TableBase):
     """What figures are: of what results, and their name. A part has its name for a label, a word itself."""
 
     __tablename__ = "quantity"
@@ -272,7 +272,7 @@ class Quantity(Base):
     __table_args__ = (UniqueConstraint("of", "name", "label"),)
 
 
-class Figure(Base):
+class Figure(TableBase):
     """A figure of a result: a number, a truth as 1 or 0, or 0 for a word or the place of a part."""
 
     __tablename__ = "figure"
@@ -285,7 +285,7 @@ class Figure(Base):
     __table_args__ = (Index(None, "result", "quantity", "value"), {"sqlite_with_rowid": False})
 
 
-class SweepArray(Base):
+class SweepArray(TableBase):
     """One array of a sweep in NumPy's npy format, with the SHA-256 of its bytes."""
 
     __tablename__ = "sweep_array"
@@ -302,7 +302,7 @@ NAME_LENGTH = 200
 TAG_LENGTH = 50
 
 
-class Run(Base):
+class Run(TableBase):
     """What is said of a job: the project it belongs to, its name, its notes, whether it is in the bin.
 
     A job of which nothing was ever said has no row here.
@@ -325,7 +325,7 @@ class Run(Base):
     __table_args__ = (Index(None, "project_id", "job_id"), Index(None, "deleted", "job_id"))
 
 
-class Project(Base):
+class Project(TableBase):
     """A name under which an owner gathers runs.
 
     `revision` counts its changes. `deleted` is when it was put in the bin, NULL outside of it. `runs` counts
@@ -352,7 +352,7 @@ class Project(Base):
     __table_args__ = (Index(None, "owner", "id"), Index(None, "deleted", "id"))
 
 
-class RunTag(Base):
+class RunTag(TableBase):
     """A word that a run is marked with."""
 
     __tablename__ = "run_tag"
@@ -365,7 +365,7 @@ class RunTag(Base):
     __table_args__ = (Index(None, "tag", "job_id"),)
 
 
-class Share(Base):
+class Share(TableBase):
     """A link to a run that needs no key; of its token only a digest is kept."""
 
     __tablename__ = "share"

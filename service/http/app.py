@@ -11,11 +11,11 @@ from starlette.concurrency import run_in_threadpool
 
 from service.auth.authenticator import Authenticator
 from service.http import openapi
-from service.http.dependencies import HostCheck, Turns
-from service.http.metrics import Measured, Metrics
+from service.http.dependencies import BodyTurns, HostCheck
+from service.http.metrics import Metrics, RequestMetrics
 from service.http.middleware.admission import Admission, ConcurrencyLimits
 from service.http.middleware.connections import Connections
-from service.http.middleware.every_answer import Head, HeadersAndAudit, RequestLog
+from service.http.middleware.every_answer import HeadAsGet, HeadersAndAudit, RequestLog
 from service.http.routes import (
     at_once,
     events,
@@ -73,20 +73,20 @@ def create_app(settings: Settings | None = None, registry: Registry | None = Non
     )
     app.state.service = service
     app.state.metrics = Metrics(service)
-    app.state.turns = Turns()
+    app.state.turns = BodyTurns()
     app.state.probe = Probe(service)
     app.state.looks = Looks(service)
     app.state.connections = connections = _connections(service.settings)
     service.lanes.guard(connections.require_taken)
     # The last one added is the outermost.
-    app.add_middleware(Head)
+    app.add_middleware(HeadAsGet)
     authenticator = Authenticator(service.keys, service.settings, service.jobs.now)
     app.state.authenticator = authenticator
     app.add_middleware(
         Admission, authenticator=authenticator, concurrency=ConcurrencyLimits(service.settings)
     )
     app.add_middleware(HostCheck, hosts=service.settings.hosts)
-    app.add_middleware(Measured, metrics=app.state.metrics)
+    app.add_middleware(RequestMetrics, metrics=app.state.metrics)
     app.add_middleware(RequestLog)
     problems.install(app)
     app.add_middleware(HeadersAndAudit, settings=service.settings)

@@ -85,7 +85,7 @@ async def whole(request: Request, limit: int, seconds: float) -> bytes:
     return b"".join([piece async for piece in chunks(request, limit, seconds)])
 
 
-class Turns:
+class BodyTurns:
     """Large bodies take turns once they have arrived: parsed, each takes ten times its length.
 
     One of an owner at a time, a few of all. They are parsed in threads of their own: what a thread has freed
@@ -182,7 +182,7 @@ async def json_body(context: InContext) -> AsyncIterator[dict[str, Any]]:
     if kind != "application/json" and not kind.endswith("+json"):
         raise UnsupportedMediaError(f"`Content-Type` must be application/json, got {kind or 'none'}")
     data = await whole(request, settings.max_body_bytes, settings.body_seconds)
-    turns: Turns = request.app.state.turns
+    turns: BodyTurns = request.app.state.turns
     async with turns.of(context.caller.owner, len(data)):
         value = await turns.parsed(data)
         del data

@@ -22,7 +22,7 @@ class Metrics:
 
     def __init__(self, service: Service) -> None:
         self._registry = CollectorRegistry()
-        self._registry.register(_State(service))
+        self._registry.register(_JobsCollector(service))
         self.requests = Counter(
             "stickslip_http_requests", "Requests answered.", ("method", "route", "status"),
             registry=self._registry,
@@ -37,7 +37,7 @@ class Metrics:
         return generate_latest(self._registry)
 
 
-class _State(Collector):
+class _JobsCollector(Collector):
     """Jobs by state and workers, looked up when a monitor asks."""
 
     def __init__(self, service: Service) -> None:
@@ -75,7 +75,7 @@ class _State(Collector):
         yield pruned
 
 
-class Measured:
+class RequestMetrics:
     """Counts requests and times them, by the route they match and not by their path: ids are not names."""
 
     def __init__(self, app: ASGIApp, metrics: Metrics) -> None:

@@ -19,8 +19,8 @@ from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 from service.jobs.figures import StoredArray
-from service.jobs.outputs import JobOutput, Pace, Piece, Progress, Run, ShouldStop
-from service.jobs.parts import PartOutput, Parts
+from service.jobs.outputs import JobOutput, Pace, Progress, ResultPiece, Run, ShouldStop
+from service.jobs.parts import Division, PartOutput
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -37,7 +37,7 @@ class UnusableError(Exception):
     """What was kept cannot be used: of another version, or not what it should be."""
 
 
-def packed(part: int, arrays: Arrays) -> Piece:
+def packed(part: int, arrays: Arrays) -> ResultPiece:
     """Arrays of numbers as a piece: NumPy's npz format with the version that wrote it, never pickle."""
     # Loaded here, and below: the module of the workers imports nothing heavy.
     import numpy as np
@@ -45,10 +45,10 @@ def packed(part: int, arrays: Arrays) -> Piece:
     buffer = io.BytesIO()
     np.savez(buffer, allow_pickle=False, **{**arrays, _VERSION: np.array(version("stickslip"))})
     data = buffer.getvalue()
-    return Piece(part=part, sha256=hashlib.sha256(data).hexdigest(), data=data)
+    return ResultPiece(part=part, sha256=hashlib.sha256(data).hexdigest(), data=data)
 
 
-def unpacked(piece: Piece) -> Arrays:
+def unpacked(piece: ResultPiece) -> Arrays:
     """The arrays of a piece.
 
     Raises
@@ -72,10 +72,10 @@ def unpacked(piece: Piece) -> Arrays:
 
 
 @dataclass(frozen=True, slots=True)
-class Kept:
+class KeptPieces:
     """From a worker: pieces to be stored; `anew` if they replace all that was kept before."""
 
-    pieces: tuple[Piece, ...]
+    pieces: tuple[ResultPiece, ...]
     anew: bool = False
 
 
@@ -94,13 +94,15 @@ class Checkpoints:
         How often pieces are sent, and how much a job may keep.
     """
 
-    def __init__(self, job_id: str, found: Sequence[Piece], send: Callable[[Kept], None], pace: Pace) -> None:
+    def __init__(
+        self, job_id: str, found: Sequence[ResultPiece], send: Callable[[KeptPieces], None], pace: Pace
+    ) -> None:
         self._job_id = job_id
         self._found = sorted(found, key=lambda piece: piece.part)
         self._send = send
         self._pace = pace
         self._next = time.monotonic() + pace.checkpoint_seconds
-        self._waiting: list[Piece] = []
+        self._waiting: list[ResultPiece] = []
         self._anew = False
         self._size = sum(len(piece.data) for piece in found)
         self._full = pace.checkpoint_bytes <= self._size
@@ -150,7 +152,7 @@ class Checkpoints:
     def flush(self) -> None:
         """Send what waits."""
         if self._waiting:
-            self._send(Kept(tuple(self._waiting), self._anew))
+            self._send(KeptPieces(tuple(self._waiting), self._anew))
             self._waiting, self._anew = [], False
         self._next = time.monotonic() + self._pace.checkpoint_seconds
 
@@ -172,7 +174,7 @@ class FromTheStart:
 class RunParts:
     """The run of a divided kind that keeps the parts it has and computes those that are not known."""
 
-    parts: Parts
+    parts: Division
 
     def __call__(
         self, spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop, checkpoints: Checkpoints

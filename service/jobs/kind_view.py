@@ -71,7 +71,7 @@ class NothingToDrawError(Exception):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Told:
+class PrintedResult:
     """What is printed of a result: a title, and names with their values."""
 
     title: str
@@ -103,5 +103,5 @@ class KindView:
     sweeps: str = ""
     keys: str = ""
     flags: Mapping[str, str] = field(default_factory=dict)
-    tell: Callable[[Json], Told] | None = None
+    tell: Callable[[Json], PrintedResult] | None = None
     draw: Draw | None = None

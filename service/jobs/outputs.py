@@ -28,7 +28,7 @@ OnProgress = Callable[[float, int], None]
 ShouldStop = Callable[[], bool]
 
 
-class Told(NamedTuple):
+class AttemptProgress(NamedTuple):
     """How far an attempt is: share of its path, points computed, the best design so far."""
 
     fraction: float
@@ -63,7 +63,7 @@ class Silent:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Piece:
+class ResultPiece:
     """A piece of what an unfinished job has computed, with the SHA-256 of its bytes in hexadecimal."""
 
     part: int

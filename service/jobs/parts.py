@@ -1,9 +1,9 @@
 """Jobs that are divided into parts, which need nothing of each other.
 
-A kind of job whose work can be divided has a `Parts` beside its `run`. What the parts are depends on the spec
-alone, never on how many workers there are: every executor computes the same parts through the same function
-and joins them through the same function, so that the result is the same bit for bit, wherever and in
-whatever order they were computed. What a part gives back is JSON and arrays, so that it can be kept as a
+A kind of job whose work can be divided has a `Division` beside its `run`. What the parts are depends on the
+spec alone, never on how many workers there are: every executor computes the same parts through the same
+function and joins them through the same function, so that the result is the same bit for bit, wherever and
+in whatever order they were computed. What a part gives back is JSON and arrays, so that it can be kept as a
 checkpoint; a part that is known already is not computed again.
 """
 
@@ -18,7 +18,7 @@ from service.jobs.outputs import JobOutput, OnProgress, ShouldStop
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Part:
+class JobPart:
     """A part of a job; about 0.1 s of work or more, so that sending it somewhere is worth it.
 
     Attributes
@@ -59,7 +59,7 @@ class PartStoppedError(Exception):
     """A part was told to stop: there is no output."""
 
 
-Split = Callable[[Mapping[str, Any]], Sequence[Part]]
+Split = Callable[[Mapping[str, Any]], Sequence[JobPart]]
 RunPart = Callable[[Mapping[str, Any], Mapping[str, Any], OnProgress, ShouldStop], PartOutput]
 Join = Callable[[Mapping[str, Any], Mapping[int, PartOutput]], JobOutput]
 OnPart = Callable[[int, PartOutput], None]
@@ -70,7 +70,7 @@ def _not_kept(_index: int, _output: PartOutput) -> None:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Parts:
+class Division:
     """How a kind of job is divided. All three are functions at the top level of a module, sent by name.
 
     Attributes
@@ -147,7 +147,7 @@ class Account:
     """
 
     def __init__(
-        self, parts: Sequence[Part], outputs: Mapping[int, PartOutput], progress: OnProgress
+        self, parts: Sequence[JobPart], outputs: Mapping[int, PartOutput], progress: OnProgress
     ) -> None:
         total = sum(part.weight for part in parts)
         self._weights = [part.weight / total for part in parts]

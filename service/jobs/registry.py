@@ -2,7 +2,7 @@
 
 A new kind is one module in `service.jobs.kinds` and one entry in its registry, or a module elsewhere that the
 setting `kinds` names; queue, database, HTTP, command and documentation know kinds only through this contract.
-A kind whose work can be divided says so by a `service.jobs.parts.Parts`.
+A kind whose work can be divided says so by a `service.jobs.parts.Division`.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from solver.errors import Shown
 
 if TYPE_CHECKING:
     from service.jobs.checkpoints import Checkpoints
-    from service.jobs.parts import Parts
+    from service.jobs.parts import Division
 
 
 class JobRequest(BaseModel):
@@ -152,7 +152,7 @@ class JobKind:
     request: type[JobRequest]
     resolve: Resolve
     run: Run
-    parts: Parts | None = None
+    parts: Division | None = None
     run_on: RunOn | None = None
     result: type[BaseModel] | None = None
     view: KindView = field(default_factory=KindView)

@@ -51,21 +51,21 @@ class Watch(NamedTuple):
         return Watch(part_of(self.on_progress, begin, end, before), self.should_stop)
 
 
-class Written(Protocol):
+class Writable(Protocol):
     """What can be written as a table."""
 
     def to_dataset(self) -> Dataset:
         """The result as named arrays."""
 
 
-class Drawn(Written, Protocol):
+class Drawable(Writable, Protocol):
     """What can be drawn too."""
 
     def plot(self) -> Figure:
         """The picture of it."""
 
 
-class Found(Drawn, Protocol):
+class StudyResult(Drawable, Protocol):
     """A result of a study."""
 
     @property
@@ -83,14 +83,14 @@ class Found(Drawn, Protocol):
 class Answer(NamedTuple):
     """What a study found: the result that is written, its JSON, how it ended, and what draws it."""
 
-    result: Written | None
+    result: Writable | None
     json: dict[str, Any]
     reached: bool
     status: str
     plot: Callable[[], Figure] | None = None
 
     @classmethod
-    def of(cls, found: Found) -> Answer:
+    def of(cls, found: StudyResult) -> Answer:
         """Return what a result says of itself."""
         return cls(found, found.to_json(), found.reached, str(found.status.value), found.plot)
 
@@ -99,7 +99,7 @@ class Answer(NamedTuple):
         """Return an answer of which there is nothing but its JSON."""
         return cls(None, json, True, "")
 
-    def beside(self, result: Drawn, **further: Any) -> Answer:
+    def beside(self, result: Drawable, **further: Any) -> Answer:
         """Return the answer with further keys, drawn and written as another result."""
         return self._replace(result=result, json={**self.json, **further}, plot=result.plot)
 

@@ -18,7 +18,7 @@ from contextlib import AbstractContextManager
 from datetime import datetime, timedelta
 
 from service.db.repositories import Attempt, JobRepository
-from service.jobs.outputs import Best, FailureKind, JobFailure, JobOutput, Piece, Point, Told
+from service.jobs.outputs import AttemptProgress, Best, FailureKind, JobFailure, JobOutput, Point, ResultPiece
 from service.queue.running import Live, Running, StopReason, Waiters
 from service.settings import logs
 from service.settings.settings import Settings
@@ -110,11 +110,11 @@ class JobQueue:
         if entry is not None:
             self._ask_to_stop(entry, StopReason.CANCEL)
 
-    def live_progress(self, job_id: str) -> Told | None:
+    def live_progress(self, job_id: str) -> AttemptProgress | None:
         """What a job that runs here has told, newer than its row."""
         with self._lock:
             entry = self._running.get(job_id)
-        return None if entry is None else Told(entry.fraction, entry.points, entry.best)
+        return None if entry is None else AttemptProgress(entry.fraction, entry.points, entry.best)
 
     def live(self, job_id: str) -> Live | None:
         """How far a job is that runs here."""
@@ -171,7 +171,7 @@ class JobQueue:
         if entry is not None:
             entry.best, entry.unwritten = found, True
 
-    def kept(self, attempt: Attempt, pieces: Sequence[Piece], *, anew: bool) -> None:
+    def kept(self, attempt: Attempt, pieces: Sequence[ResultPiece], *, anew: bool) -> None:
         """From the executor: store pieces for a later attempt, also while the service stops."""
         entry = self._entry(attempt)
         if entry is None:

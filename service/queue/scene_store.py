@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 from service.auth.callers import KEYLESS, Caller
-from service.db.models import NOBODY, Scene
+from service.db.models import NOBODY, StoredScene
 from service.db.pagination import Position
 from service.db.repositories import SceneRepository
 from service.errors import ConflictError, NotFoundError
@@ -42,7 +42,7 @@ class SceneStore:
         except NotFoundError:
             return None
 
-    def get(self, name: str) -> Scene:
+    def get(self, name: str) -> StoredScene:
         """The shipped scene of this name, or the caller's own; only names are looked up, never paths.
 
         Raises
@@ -58,17 +58,17 @@ class SceneStore:
             raise NotFoundError(f"there is no scene {name!r}: shipped are {known}, GET /v1/scenes lists all")
         return row
 
-    def page(self, limit: int, after: Position | None = None) -> list[Scene]:
+    def page(self, limit: int, after: Position | None = None) -> list[StoredScene]:
         """Stored scenes that the caller may see, by name, without tables, those behind a position."""
         name, _, owner = ("", "", "") if after is None else after[1].partition(_BETWEEN)
         return self.repository.page(self.caller.sees, None if after is None else (name, owner), limit)
 
     @staticmethod
-    def position(scene: Scene) -> Position:
+    def position(scene: StoredScene) -> Position:
         """Where a page that ends with this scene goes on."""
         return None, f"{scene.name}{_BETWEEN}{scene.owner}"
 
-    def add(self, body: Mapping[str, object]) -> tuple[Scene, bool]:
+    def add(self, body: Mapping[str, object]) -> tuple[StoredScene, bool]:
         """Store a scene under its own name; whether it is new.
 
         Raises
@@ -82,7 +82,7 @@ class SceneStore:
         tables = scene.to_dict()
         return self.keep(scene.name, digest(tables), tables)
 
-    def keep(self, name: str, scene_hash: str, tables: dict[str, object]) -> tuple[Scene, bool]:
+    def keep(self, name: str, scene_hash: str, tables: dict[str, object]) -> tuple[StoredScene, bool]:
         """Store a scene that was read and checked; `add` lists the errors."""
         if name in shipped_scenes():
             known, added = _shipped(name), False
@@ -98,12 +98,12 @@ class SceneStore:
         return known, added
 
 
-def shipped() -> list[Scene]:
+def shipped() -> list[StoredScene]:
     """The scenes that come with the package."""
     return [_shipped(name) for name in shipped_scenes()]
 
 
 @cache
-def _shipped(name: str) -> Scene:
+def _shipped(name: str) -> StoredScene:
     body = load_scene(name).to_dict()
-    return Scene(owner=NOBODY, name=name, scene_hash=digest(body), created=None, body=body)
+    return StoredScene(owner=NOBODY, name=name, scene_hash=digest(body), created=None, body=body)

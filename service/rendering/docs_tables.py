@@ -22,7 +22,7 @@ from service.jobs.common.problem import ABOUT_THE_JOB
 from service.jobs.kinds.registry.table import placed
 from service.jobs.studies.design import Design
 from service.jobs.studies.pareto import Pareto
-from service.settings.settings import Limits, Settings
+from service.settings.settings import ClientLimits, Settings
 from solver.contacts.laws.registry import DEFAULT, laws
 from solver.matrices.readers.registry import readers
 
@@ -122,7 +122,7 @@ def settings_table() -> str:
     """The settings with their defaults and what they mean."""
     fields = Settings.model_fields
     # What is inherited comes first there, and last here.
-    ordered = sorted(fields, key=lambda name: name in Limits.model_fields)
+    ordered = sorted(fields, key=lambda name: name in ClientLimits.model_fields)
     return _table("variable | default | ", (_setting(name, fields[name]) for name in ordered))
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from service.jobs.kind_view import Json, Told
+from service.jobs.kind_view import Json, PrintedResult
 from service.jobs.registry import Registry
 from service.rendering.tables.text import print_pairs
 
@@ -27,10 +27,10 @@ def print_result(kind: str, result: Json) -> None:
     print_pairs(view.title, view.pairs)
 
 
-def told(kind: str, result: Json, registry: Registry) -> Told:
+def told(kind: str, result: Json, registry: Registry) -> PrintedResult:
     """What is printed of a result: as its kind says, or by its keys."""
     tell = registry[kind].view.tell if kind in registry else None
-    return tell(result) if tell is not None else Told(title=kind, pairs=list(_pairs(result, "")))
+    return tell(result) if tell is not None else PrintedResult(title=kind, pairs=list(_pairs(result, "")))
 
 
 def _pairs(table: Json, before: str) -> Iterator[tuple[str, str]]:

@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
-from service.db.models import JobState, Scene
+from service.db.models import JobState, StoredScene
 from service.db.repositories import JobRow, ResultRepository
 from service.jobs.arrays import decode
 from service.jobs.figures import DESIGN, SWEEP, DesignRecord, Quantity, Record, SweepRecord
-from service.jobs.outputs import Told
+from service.jobs.outputs import AttemptProgress
 
 if TYPE_CHECKING:
     from service.queue.core import Results, WholeDesign
@@ -29,7 +29,7 @@ BEST = (
 _NONE = object()
 
 
-class Answer(BaseModel):
+class AnswerModel(BaseModel):
     """Root of the answers."""
 
     model_config = ConfigDict(frozen=True)
@@ -41,17 +41,17 @@ class Answer(BaseModel):
         return cls(**{name: value for name, value in same if value is not _NONE}, **more)
 
 
-AnswerT = TypeVar("AnswerT", bound=Answer)
+AnswerT = TypeVar("AnswerT", bound=AnswerModel)
 
 
-class Page(Answer, Generic[AnswerT]):
+class Page(AnswerModel, Generic[AnswerT]):
     """A page of a list."""
 
     items: list[AnswerT]
     next: str | None = Field(description="Link to the next page; null on the last one.")
 
 
-class JobAnswer(Answer):
+class JobAnswer(AnswerModel):
     """A job."""
 
     id: str
@@ -75,7 +75,7 @@ class JobAnswer(Answer):
     links: dict[str, str]
 
     @classmethod
-    def of(cls, row: JobRow, live: Told | None = None, **more: Any) -> Self:
+    def of(cls, row: JobRow, live: AttemptProgress | None = None, **more: Any) -> Self:
         """The answer for a row, with progress that is newer than the row if there is any, and with `more`."""
         progress, points, best = live or (row.progress, row.points, row.best)
         source = row.result_of or row.id
@@ -93,7 +93,7 @@ class JobAnswer(Answer):
         )  # fmt: skip
 
 
-class KindAnswer(Answer):
+class KindAnswer(AnswerModel):
     """A kind of job."""
 
     name: str
@@ -102,7 +102,7 @@ class KindAnswer(Answer):
     result: dict[str, Any] | None = Field(description="JSON Schema of the result; null for any object.")
 
 
-class KindList(Answer):
+class KindList(AnswerModel):
     """All kinds of job."""
 
     items: list[KindAnswer]
@@ -112,14 +112,14 @@ class JobPage(Page[JobAnswer]):
     """A page of jobs, newest first."""
 
 
-class Peak(Answer):
+class Peak(AnswerModel):
     """The largest amplitude of a branch and where it is."""
 
     value: float
     at: float
 
 
-class StoredAnswer(Answer):
+class StoredAnswer(AnswerModel):
     """What the answers for a stored sweep and a stored design share."""
 
     @classmethod
@@ -131,7 +131,7 @@ class StoredAnswer(Answer):
         return cls._from(record, scene=record.scene_name, peak=peak, **more)
 
 
-class ContactAnswer(Answer):
+class ContactAnswer(AnswerModel):
     """Values of a contact during a sweep; null where the value was swept."""
 
     kt: float | None
@@ -204,14 +204,14 @@ class SweepPage(Page[SweepAnswer]):
     """A page of sweeps."""
 
 
-class JobScene(Answer):
+class JobScene(AnswerModel):
     """The scene of a job, as it is computed."""
 
     job: str
     scene: dict[str, Any]
 
 
-class ResultsHead(Answer):
+class ResultsHead(AnswerModel):
     """What a job computed, without it."""
 
     job: str
@@ -231,7 +231,7 @@ class ResultsAnswer(ResultsHead):
         return cls(job=results.job.id, status=results.job.state, result=results.result, sweeps=sweeps)
 
 
-class VariableAnswer(Answer):
+class VariableAnswer(AnswerModel):
     """A variable of a design: its best value, null if no design could be computed, and its bounds."""
 
     value: float | None
@@ -291,14 +291,14 @@ class DesignPage(Page[DesignAnswer]):
     """A page of designs."""
 
 
-class QuantityAnswer(Answer):
+class QuantityAnswer(AnswerModel):
     """What a figure is."""
 
     unit: str = Field(description="Empty if it has none, or one that the result says.")
     description: str
 
 
-class StoredResult(Answer):
+class StoredResult(AnswerModel):
     """A stored result with its figures."""
 
     id: str
@@ -338,7 +338,7 @@ class FinishedJob(JobAnswer):
     sweeps: list[SweepAnswer]
 
 
-class SceneAnswer(Answer):
+class SceneAnswer(AnswerModel):
     """A scene in a list."""
 
     owner: str = Field(description="Whose it is; a shipped scene is everybody's.")
@@ -349,7 +349,7 @@ class SceneAnswer(Answer):
     links: dict[str, str]
 
     @classmethod
-    def of(cls, row: Scene, **more: Any) -> Self:
+    def of(cls, row: StoredScene, **more: Any) -> Self:
         """The answer for a scene."""
         return cls._from(row, links={"self": f"/v1/scenes/{row.name}"}, **more)
 

@@ -10,12 +10,12 @@ from typing import Any
 from pydantic import Field
 
 from service.db.models import JobState
-from service.schemas.answers import BEST, Answer, JobAnswer
+from service.schemas.answers import BEST, AnswerModel, JobAnswer
 
 END, PARTIAL, PROGRESS = "end", "partial", "progress"
 
 
-class JobProgress(Answer):
+class JobProgress(AnswerModel):
     """Data of the event `progress`."""
 
     status: JobState
@@ -25,7 +25,7 @@ class JobProgress(Answer):
     best: dict[str, Any] | None = Field(default=None, description=BEST)
 
 
-class JobPoints(Answer):
+class JobPoints(AnswerModel):
     """Data of the event `partial`."""
 
     attempt: int

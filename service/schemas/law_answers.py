@@ -6,12 +6,12 @@ from dataclasses import asdict
 
 from pydantic import Field
 
-from service.schemas.answers import Answer
+from service.schemas.answers import AnswerModel
 from solver.contacts.laws.registry import DEFAULT, laws
 from solver.scene.json_schema import scene_schema
 
 
-class SpanAnswer(Answer):
+class SpanAnswer(AnswerModel):
     """What a slider of a parameter covers."""
 
     low: float
@@ -22,7 +22,7 @@ class SpanAnswer(Answer):
     logarithmic: bool
 
 
-class LawParameter(Answer):
+class LawParameter(AnswerModel):
     """A parameter of a contact law: `CONTACT.name` is its path in a scene."""
 
     name: str
@@ -35,7 +35,7 @@ class LawParameter(Answer):
     slider: SpanAnswer | None
 
 
-class LawAnswer(Answer):
+class LawAnswer(AnswerModel):
     """A contact law."""
 
     name: str
@@ -43,7 +43,7 @@ class LawAnswer(Answer):
     parameters: list[LawParameter]
 
 
-class LawList(Answer):
+class LawList(AnswerModel):
     """All contact laws."""
 
     items: list[LawAnswer]

@@ -6,10 +6,10 @@ from typing import Any
 
 from pydantic import Field
 
-from service.schemas.answers import Answer
+from service.schemas.answers import AnswerModel
 
 
-class FormatAnswer(Answer):
+class FormatAnswer(AnswerModel):
     """A format of files that can be uploaded."""
 
     name: str
@@ -19,13 +19,13 @@ class FormatAnswer(Answer):
     help: str = Field(description="What the files hold and which program writes them.")
 
 
-class FormatsAnswer(Answer):
+class FormatsAnswer(AnswerModel):
     """The formats that can be uploaded."""
 
     items: list[FormatAnswer]
 
 
-class MatrixAnswer(Answer):
+class MatrixAnswer(AnswerModel):
     """A matrix that was read."""
 
     name: str
@@ -33,7 +33,7 @@ class MatrixAnswer(Answer):
     entries: int
 
 
-class LabelsAnswer(Answer):
+class LabelsAnswer(AnswerModel):
     """What the files call their rows."""
 
     first: list[str] = Field(description="Of the first rows, 400 at most.")
@@ -41,21 +41,21 @@ class LabelsAnswer(Answer):
     nodes: tuple[int, int] = Field(description="The lowest and the highest.")
 
 
-class MassAnswer(Answer):
+class MassAnswer(AnswerModel):
     """The mass that moves in one direction."""
 
     direction: str
     kg: float
 
 
-class SetAnswer(Answer):
+class SetAnswer(AnswerModel):
     """A set of nodes of a deck."""
 
     name: str
     nodes: int = Field(description="How many.")
 
 
-class KeptDiameterAnswer(Answer):
+class KeptDiameterAnswer(AnswerModel):
     """What a reduced sector is at one nodal diameter."""
 
     diameter: int
@@ -63,7 +63,7 @@ class KeptDiameterAnswer(Answer):
     good_to_hz: float = Field(description="Frequencies up to here are estimated exact to 0.1 %.")
 
 
-class KeptAnswer(Answer):
+class KeptAnswer(AnswerModel):
     """What a reduction kept, and what it is good for."""
 
     modes: int
@@ -75,7 +75,7 @@ class KeptAnswer(Answer):
     diameters: list[KeptDiameterAnswer] | None = Field(default=None, description="Of a sector.")
 
 
-class MatricesAnswer(Answer):
+class MatricesAnswer(AnswerModel):
     """What was read, what should be known of it, and the scene."""
 
     structure: dict[str, Any] = Field(description="Which upload is what.")

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from service.schemas.answers import Answer, Peak
+from service.schemas.answers import AnswerModel, Peak
 
 Numbers = list[float | None]
 
 
-class PeakCertificate(Answer):
+class PeakCertificate(AnswerModel):
     """Why no higher peak hides between two points of a response, or that it is not known."""
 
     known: bool
@@ -19,7 +19,7 @@ class PeakCertificate(Answer):
     resonances: int = Field(description="Narrow resonances between points that were solved for.")
 
 
-class SweepPreview(Answer):
+class SweepPreview(AnswerModel):
     """A frequency response over the scene's band."""
 
     parameter: list[float] = Field(description="Frequencies [Hz].")
@@ -47,7 +47,7 @@ class SweepPreview(Answer):
     states: dict[str, str] = Field(description="What every contact does at the highest peak.")
 
 
-class ParameterEffect(Answer):
+class ParameterEffect(AnswerModel):
     """What one per cent more of a parameter does; null where that means nothing or is not known."""
 
     path: str
@@ -57,21 +57,21 @@ class ParameterEffect(Answer):
     band_percent: float | None = Field(description="Of the width of the resonance band [%].")
 
 
-class LeftOut(Answer):
+class LeftOut(AnswerModel):
     """A parameter without a derivative."""
 
     path: str
     reason: str
 
 
-class Summit(Answer):
+class Summit(AnswerModel):
     """A peak that competes to be the highest."""
 
     value: float = Field(description="Amplitude [m].")
     at: float = Field(description="Frequency [Hz].")
 
 
-class SensitivitiesPreview(Answer):
+class SensitivitiesPreview(AnswerModel):
     """Per cent of peaks and band for one per cent of each parameter, what matters most first."""
 
     peaks: list[Summit] = Field(description="Those that compete, highest first.")
@@ -86,7 +86,7 @@ class SensitivitiesPreview(Answer):
     n_harmonics: int = Field(description="Kept; fewer than asked for where a whole disk takes too long.")
 
 
-class LinearResponse(Answer):
+class LinearResponse(AnswerModel):
     """The response with a contact removed, or stuck."""
 
     parameter: list[float]
@@ -97,14 +97,14 @@ class LinearResponse(Answer):
     completed: bool
 
 
-class LimitsPreview(Answer):
+class LimitsPreview(AnswerModel):
     """The linear responses between which friction works."""
 
     free: LinearResponse
     stuck: LinearResponse
 
 
-class Shares(Answer):
+class Shares(AnswerModel):
     """Shares of the period."""
 
     stick: float
@@ -112,7 +112,7 @@ class Shares(Answer):
     separation: float
 
 
-class ContactPeriod(Answer):
+class ContactPeriod(AnswerModel):
     """A contact over one period; the first instant is repeated at the end of `slip`, `force` and `load`."""
 
     name: str
@@ -124,7 +124,7 @@ class ContactPeriod(Answer):
     shares: Shares | None
 
 
-class Period(Answer):
+class Period(AnswerModel):
     """One period."""
 
     time: list[float] = Field(description="Instants [s].")
@@ -132,7 +132,7 @@ class Period(Answer):
     contacts: list[ContactPeriod]
 
 
-class PointPreview(Answer):
+class PointPreview(AnswerModel):
     """A periodic response at one frequency; `period` is left out if there is no solution."""
 
     scene: str

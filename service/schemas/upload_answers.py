@@ -8,10 +8,10 @@ from typing import Any, Self
 from pydantic import Field
 
 from service.db.models import Upload
-from service.schemas.answers import Answer, Page
+from service.schemas.answers import AnswerModel, Page
 
 
-class UploadAnswer(Answer):
+class UploadAnswer(AnswerModel):
     """An uploaded file."""
 
     id: str
@@ -28,7 +28,7 @@ class UploadAnswer(Answer):
         return cls._from(row, links={"self": f"/v1/uploads/{row.id}"}, **more)
 
 
-class UploadedArray(Answer):
+class UploadedArray(AnswerModel):
     """A matrix or the modes in a file."""
 
     name: str | None = Field(description="Its name in the file, null for a file of one matrix.")

@@ -10,8 +10,8 @@ from pydantic import Field
 
 from service.db.models import Project, Share
 from service.db.repositories.runs import RunRow
-from service.jobs.outputs import Told
-from service.schemas.answers import Answer, JobAnswer, Page
+from service.jobs.outputs import AttemptProgress
+from service.schemas.answers import AnswerModel, JobAnswer, Page
 
 _REVISION = "Counts the changes; the `ETag`, for `If-Match` of a change."
 _DELETED = "When it was put in the bin; null outside of it."
@@ -30,7 +30,7 @@ class RunAnswer(JobAnswer):
     deleted: datetime | None = Field(description=_DELETED)
 
     @classmethod
-    def of_run(cls, row: RunRow, live: Told | None = None) -> Self:
+    def of_run(cls, row: RunRow, live: AttemptProgress | None = None) -> Self:
         """The answer for a row, with progress that is newer than the row if there is any."""
         job, about = f"/v1/jobs/{row.job.id}", f"/v1/runs/{row.job.id}"
         said = {name: getattr(row, name) for name in ("sweeps", "revision", "changed", "deleted")}
@@ -42,7 +42,7 @@ class RunPage(Page[RunAnswer]):
     """A page of runs, newest first."""
 
 
-class ProjectAnswer(Answer):
+class ProjectAnswer(AnswerModel):
     """A project."""
 
     id: str
@@ -67,7 +67,7 @@ class ProjectPage(Page[ProjectAnswer]):
     """A page of projects, newest first."""
 
 
-class ShareAnswer(Answer):
+class ShareAnswer(AnswerModel):
     """A link to a run that needs no key, without its token."""
 
     id: str
@@ -88,13 +88,13 @@ class NewShareAnswer(ShareAnswer):
     link: str = Field(description="Of the run, below the address of the service.")
 
 
-class ShareList(Answer):
+class ShareList(AnswerModel):
     """The links to a run, oldest first."""
 
     items: list[ShareAnswer]
 
 
-class SharedRun(Answer):
+class SharedRun(AnswerModel):
     """A run as a link shows it: what was asked and how it ended."""
 
     id: str
@@ -123,7 +123,7 @@ class SharedRun(Answer):
         )  # fmt: skip
 
 
-class InputDifference(Answer):
+class InputDifference(AnswerModel):
     """An input that two runs do not share; null where it is not given."""
 
     path: str = Field(description="`damper.N0` for a value of a contact, else the keys joined by dots.")
@@ -132,7 +132,7 @@ class InputDifference(Answer):
     b: Any
 
 
-class Figure(Answer):
+class Figure(AnswerModel):
     """A figure of the results of two runs; null where a run has none."""
 
     name: str
@@ -140,7 +140,7 @@ class Figure(Answer):
     b: float | str | bool | None
 
 
-class Comparison(Answer):
+class Comparison(AnswerModel):
     """Two runs side by side."""
 
     a: RunAnswer

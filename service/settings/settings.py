@@ -17,7 +17,7 @@ from service.errors import ConfigurationError
 from service.jobs.outputs import Pace
 
 
-class Limits(BaseSettings):
+class ClientLimits(BaseSettings):
     """The part of the settings that limits clients, all together and each owner by default; 0 is no limit.
 
     A key may have limits of its own (`service.auth.callers.KeyLimits`) in place of those that begin with
@@ -126,7 +126,7 @@ def _postgresql_url(parsed: URL) -> str:
     return parsed.set(drivername=DRIVER).render_as_string(hide_password=False)
 
 
-class Settings(Limits):
+class Settings(ClientLimits):
     """The settings of one service; frozen. `STICKSLIP_PORT` in the environment sets `port`, and so on."""
 
     model_config = SettingsConfigDict(

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from service.db.repositories import Attempt
-from service.jobs.outputs import Best, JobFailure, JobOutput, Piece, Point
+from service.jobs.outputs import Best, JobFailure, JobOutput, Point, ResultPiece
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +52,7 @@ class Sink(Protocol):
     def best(self, attempt: Attempt, found: Best) -> None:
         """The attempt's best design so far; said before the progress that goes with it."""
 
-    def kept(self, attempt: Attempt, pieces: Sequence[Piece], *, anew: bool) -> None:
+    def kept(self, attempt: Attempt, pieces: Sequence[ResultPiece], *, anew: bool) -> None:
         """The attempt keeps pieces of its work for a later one; `anew` if they replace all before them."""
 
     def ended(self, attempt: Attempt, outcome: Outcome) -> None:
@@ -74,7 +74,7 @@ class Unwatched:
     def best(self, attempt: Attempt, found: Best) -> None:
         """Nobody watches."""
 
-    def kept(self, attempt: Attempt, pieces: Sequence[Piece], *, anew: bool) -> None:
+    def kept(self, attempt: Attempt, pieces: Sequence[ResultPiece], *, anew: bool) -> None:
         """There is no later attempt."""
 
 

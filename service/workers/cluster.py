@@ -10,7 +10,7 @@ from typing import Any
 
 from distributed import Client, Future, Security
 
-from service.workers.tasks import TOPIC, Answer, Order, compute
+from service.workers.tasks import TOPIC, Order, TaskAnswer, compute
 
 log = logging.getLogger("stickslip.executor")
 
@@ -163,7 +163,7 @@ class Cluster:
         self._on_lost(trouble)
 
 
-def answer_of(future: Future) -> Answer:
+def answer_of(future: Future) -> TaskAnswer:
     """What a worker answered.
 
     Raises
@@ -173,6 +173,6 @@ def answer_of(future: Future) -> Answer:
     """
     # From a worker, which the scheduler trusts; never from a request.
     answer = pickle.loads(future.result(timeout=_ANSWER_SECONDS))
-    if not isinstance(answer, Answer):
+    if not isinstance(answer, TaskAnswer):
         raise TypeError(f"a worker answered {type(answer).__name__}")
     return answer

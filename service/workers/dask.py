@@ -26,7 +26,7 @@ from service.jobs.registry import JobKind, Registry
 from service.workers.base import ExecutorStatus, Failed, Lost, Outcome, Sink, Stopped
 from service.workers.cluster import Cluster, answer_of
 from service.workers.process_limits import UNLIMITED, ProcessLimits
-from service.workers.tasks import Answer, Order
+from service.workers.tasks import Order, TaskAnswer
 from service.workers.work import Flight, Work
 from service.workers.worker import Task, failure_of
 
@@ -205,7 +205,7 @@ class DaskExecutor:
         try:
             answer = answer_of(flight.future)
         except Exception as error:  # noqa: BLE001 - all that may become of a future
-            answer = Answer(retry=self._loss(flight.future, error))
+            answer = TaskAnswer(retry=self._loss(flight.future, error))
         with self._lock:
             if self._flights.pop(token, None) is None:
                 return
@@ -223,7 +223,7 @@ class DaskExecutor:
             return f"the connection to the Dask scheduler at {self._cluster.address} was lost"
         return f"a Dask worker could not do it: {type(error).__name__}: {error}"
 
-    def _deal(self, flight: Flight, answer: Answer) -> None:
+    def _deal(self, flight: Flight, answer: TaskAnswer) -> None:
         """Draw the consequences of an answer."""
         work, index = flight.work, flight.index
         if answer.failure is not None:

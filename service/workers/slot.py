@@ -15,14 +15,14 @@ from multiprocessing.reduction import ForkingPickler
 from typing import Protocol
 
 from service.db.repositories import Attempt
-from service.jobs.checkpoints import Kept
+from service.jobs.checkpoints import KeptPieces
 from service.jobs.outputs import Pace
 from service.jobs.registry import RunOn, WarmUp
 from service.workers.base import Failed, Finished, Lost, Outcome, Sink, Stopped
 from service.workers.child import Child, death, ending_signal
 from service.workers.process_limits import ProcessLimits
 from service.workers.processes import Process
-from service.workers.worker import Done, Ready, Reply, Task
+from service.workers.worker import Done, Reply, Task, WorkerReady
 
 log = logging.getLogger("stickslip.executor")
 
@@ -250,7 +250,7 @@ class Slot(threading.Thread):
                 self._wake_reader.recv_bytes()
             if child.connection in events:
                 try:
-                    if isinstance(child.connection.recv(), Ready):
+                    if isinstance(child.connection.recv(), WorkerReady):
                         return None
                 except (EOFError, OSError):
                     return f"{death(child.process)} before it was ready"
@@ -286,7 +286,7 @@ class Slot(threading.Thread):
             self._conclude(child, reply.token, about)
         elif current is None or current.token != reply.token:
             return
-        elif isinstance(about, Kept):
+        elif isinstance(about, KeptPieces):
             self._executor.sink.kept(current.attempt, about.pieces, anew=about.anew)
         else:
             if about.found:

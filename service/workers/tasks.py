@@ -18,8 +18,8 @@ from typing import Any
 
 from distributed import Status, Worker, get_worker
 
-from service.jobs.checkpoints import Checkpoints, Kept
-from service.jobs.outputs import JobFailure, JobOutput, Pace, Piece
+from service.jobs.checkpoints import Checkpoints, KeptPieces
+from service.jobs.outputs import JobFailure, JobOutput, Pace, ResultPiece
 from service.jobs.parts import PartOutput, RunPart
 from service.jobs.registry import RunOn, WarmUp
 from service.workers.process_limits import ProcessLimits
@@ -70,7 +70,7 @@ class Order:
     run: RunOn | None
     run_part: RunPart | None
     part: Mapping[str, Any] | None
-    saved: tuple[Piece, ...]
+    saved: tuple[ResultPiece, ...]
     told: int
     warm_up: WarmUp
     version: str
@@ -79,13 +79,13 @@ class Order:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Answer:
+class TaskAnswer:
     """From a worker: an output, a failure, a reason to try again, or none of them if it stopped on its way.
 
     What it `kept` then is for the next order.
     """
 
-    kept: tuple[Kept, ...] = ()
+    kept: tuple[KeptPieces, ...] = ()
     output: JobOutput | PartOutput | None = None
     failure: JobFailure | None = None
     retry: str | None = None
@@ -107,7 +107,7 @@ class _Unwanted:
         return self.obeyed
 
 
-class _Stop:
+class _OrderStop:
     """`should_stop` of one order, and the place where its run keeps what it has.
 
     A run that has kept something stops there: its pieces are the answer, and the next order goes on behind
@@ -117,7 +117,7 @@ class _Stop:
 
     def __init__(self, unwanted: _Unwanted) -> None:
         self._unwanted = unwanted
-        self.kept: list[Kept] = []
+        self.kept: list[KeptPieces] = []
         self.obeyed = False
 
     def __call__(self) -> bool:
@@ -135,14 +135,14 @@ def compute(order: Order) -> bytes:
     try:
         return pickle.dumps(answer)
     except (pickle.PicklingError, TypeError, AttributeError) as error:
-        return pickle.dumps(Answer(failure=failure_of(_task(order), error)))
+        return pickle.dumps(TaskAnswer(failure=failure_of(_task(order), error)))
 
 
-def _answer(order: Order) -> Answer:
+def _answer(order: Order) -> TaskAnswer:
     worker = get_worker()
     here = f"{worker.address} (process {os.getpid()})"
     if (mine := version("stickslip")) != order.version:
-        return Answer(retry=f"worker {here} has stickslip {mine}, the service {order.version}")
+        return TaskAnswer(retry=f"worker {here} has stickslip {mine}, the service {order.version}")
 
     def say(**note: Any) -> None:
         worker.log_event(TOPIC, {"token": order.token, "worker": worker.address, **note})
@@ -158,7 +158,7 @@ def _answer(order: Order) -> Answer:
 
     # The time tells a second start of an order from the first one, even in the same process.
     say(begun=time.time_ns(), threads=worker.state.nthreads)
-    stop = _Stop(_Unwanted(worker, worker.get_current_task()))
+    stop = _OrderStop(_Unwanted(worker, worker.get_current_task()))
     try:
         return _computed(order, worker.state.nthreads, Throttle(send, order.pace.progress_seconds), stop)
     finally:
@@ -166,7 +166,7 @@ def _answer(order: Order) -> Answer:
         say(over=True)
 
 
-def _computed(order: Order, threads: int, progress: Throttle, stop: _Stop) -> Answer:
+def _computed(order: Order, threads: int, progress: Throttle, stop: _OrderStop) -> TaskAnswer:
     kept = Checkpoints(order.job_id, order.saved, stop.kept.append, order.pace)
     try:
         _warm(order.warm_up, order.limits.for_threads(threads))
@@ -177,14 +177,14 @@ def _computed(order: Order, threads: int, progress: Throttle, stop: _Stop) -> An
             output = checked(order.run(order.spec, progress, stop, kept))
     except MemoryError as error:
         done = out_of_memory(error, order.limits)
-        return Answer(failure=done.failure, retry=done.retry)
+        return TaskAnswer(failure=done.failure, retry=done.retry)
     except Exception as error:  # noqa: BLE001 - the boundary: whatever it is, the job must hear of it
         if not stop.obeyed:
-            return Answer(failure=failure_of(_task(order), error))
+            return TaskAnswer(failure=failure_of(_task(order), error))
     if not stop.obeyed:
-        return Answer(output=output)
+        return TaskAnswer(output=output)
     kept.flush()
-    return Answer(kept=tuple(stop.kept))
+    return TaskAnswer(kept=tuple(stop.kept))
 
 
 def _task(order: Order) -> Task:

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from distributed import Future
 
 from service.db.repositories import Attempt
-from service.jobs.checkpoints import Checkpoints, Kept, keep_part, known_parts
+from service.jobs.checkpoints import Checkpoints, KeptPieces, keep_part, known_parts
 from service.jobs.outputs import JobOutput, OnProgress, Pace
-from service.jobs.parts import Account, Part, PartOutput, Parts, final_one
+from service.jobs.parts import Account, Division, JobPart, PartOutput, final_one
 from service.workers.base import Finished, Outcome, Sink
 from service.workers.worker import Report, Throttle, checked
 
@@ -26,10 +26,10 @@ class Work:
         self.attempt = attempt
         self.saved = attempt.saved
         self.told = 0  # points of its branch that the queue knows
-        self.parts: list[Part] = []
+        self.parts: list[JobPart] = []
         self.pending: deque[int | None] = deque()
         self.flying = 0
-        self._divided: Parts | None = None
+        self._divided: Division | None = None
         self._outputs: dict[int, PartOutput] = {}
         self._output: JobOutput | None = None
         self._losses: Counter[int] = Counter()
@@ -38,7 +38,7 @@ class Work:
         self._account: Account
         self._checkpoints = Checkpoints.none()
 
-    def divide(self, parts: Parts | None, sink: Sink, pace: Pace) -> None:
+    def divide(self, parts: Division | None, sink: Sink, pace: Pace) -> None:
         """Make the parts, and look which of them earlier attempts kept."""
 
         def send(report: Report) -> None:
@@ -51,7 +51,7 @@ class Work:
             return
         self.parts = list(parts.split(self.attempt.spec))
 
-        def keep(kept: Kept) -> None:
+        def keep(kept: KeptPieces) -> None:
             sink.kept(self.attempt, kept.pieces, anew=kept.anew)
 
         self._checkpoints = Checkpoints(self.attempt.job_id, self.attempt.saved, keep, pace)
@@ -85,7 +85,7 @@ class Work:
             else:
                 raise TypeError(f"a worker answered {type(output).__name__}")
 
-    def go_on(self, index: int | None, kept: Sequence[Kept]) -> None:
+    def go_on(self, index: int | None, kept: Sequence[KeptPieces]) -> None:
         """Order again what stopped on its way, behind what it kept."""
         for one in kept:
             before = () if one.anew else self.saved

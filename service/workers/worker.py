@@ -25,9 +25,9 @@ from typing import Any
 from optim.errors import DesignError
 from service.errors import UnknownKindError
 from service.jobs import strict_json
-from service.jobs.checkpoints import Checkpoints, Kept
+from service.jobs.checkpoints import Checkpoints, KeptPieces
 from service.jobs.figures import figures
-from service.jobs.outputs import Best, FailureKind, JobFailure, JobOutput, Pace, Piece, Point
+from service.jobs.outputs import Best, FailureKind, JobFailure, JobOutput, Pace, Point, ResultPiece
 from service.jobs.registry import RunOn, WarmUp
 from service.settings import logs
 from service.workers.process_limits import ProcessLimits
@@ -60,11 +60,11 @@ class Task:
     job_id: str
     kind: str
     spec: Mapping[str, Any]
-    saved: tuple[Piece, ...] = ()
+    saved: tuple[ResultPiece, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
-class Ready:
+class WorkerReady:
     """From a worker: everything is loaded."""
 
 
@@ -92,7 +92,7 @@ class Reply:
     """From a worker: something about the task with this token."""
 
     token: int
-    about: Report | Kept | Done
+    about: Report | KeptPieces | Done
 
 
 class Orders:
@@ -184,7 +184,7 @@ def main(
     warm_up()
     limits.confine()
     orders = Orders(numbers)
-    connection.send(Ready())
+    connection.send(WorkerReady())
     while True:
         try:
             task = connection.recv()
@@ -208,7 +208,7 @@ def main(
             connection.send(Reply(task.token, Done(failure=failure_of(task, error))))
 
 
-def _replying(connection: Connection, task: Task) -> Callable[[Report | Kept], None]:
+def _replying(connection: Connection, task: Task) -> Callable[[Report | KeptPieces], None]:
     return lambda about: connection.send(Reply(task.token, about))
 
 

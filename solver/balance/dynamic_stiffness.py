@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from solver.balance.parameter_derivatives import Matrices
+from solver.balance.parameter_derivatives import HarmonicMatrices
 from solver.contacts.kernels.system import DENSE, MODES, System
 from solver.jit.fourier import Complex, Real
 
@@ -95,7 +95,7 @@ def times_transposed(matrix: Complex, x: Complex) -> Complex:
 
 
 def whole_motion(
-    system: System, matrices: Matrices | None, dampings: dict[int, Complex], omega: float
+    system: System, matrices: HarmonicMatrices | None, dampings: dict[int, Complex], omega: float
 ) -> WholeMotion:
     """Return the linear part at ω [rad/s].
 
@@ -113,7 +113,7 @@ def whole_motion(
     ks, given = system.ks.astype(np.float64), _levels(system, omega)
     if matrices is None and system.form == DENSE:
         which = system.which
-        matrices = Matrices(
+        matrices = HarmonicMatrices(
             K=system.K[which], C=system.C[which], M=system.M[which], L=system.L[which],
             observe=system.observe, forces=system.forces, by={},
         )  # fmt: skip
@@ -146,7 +146,7 @@ def _levels(system: System, omega: float) -> Real:
     return np.asarray(system.level[rows] @ omega ** np.arange(3))[:, None]
 
 
-def _of_matrices(matrices: Matrices, k: Real, omega: float) -> WholeMotion:
+def _of_matrices(matrices: HarmonicMatrices, k: Real, omega: float) -> WholeMotion:
     """Return the linear part of matrices; `k` (nk, 1, 1)."""
     C, M, speed = matrices.C, matrices.M, k * omega
     by = {

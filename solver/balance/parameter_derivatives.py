@@ -66,7 +66,7 @@ def contact_slopes(balance: Balance, parameters: Sequence[Parameter]) -> tuple[R
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Matrices:
+class HarmonicMatrices:
     """The linear part as matrices, for each kept harmonic, with its derivatives by structural parameters.
 
     Attributes
@@ -113,7 +113,7 @@ def modal_dampings(balance: Balance, parameters: Sequence[Parameter]) -> dict[in
     return {i: values[p.name][system.which] for i, p in enumerate(parameters) if p.kind is Kind.STRUCTURE}
 
 
-def matrices_of_paths(balance: Balance, parameters: Sequence[Parameter]) -> Matrices | None:
+def matrices_of_paths(balance: Balance, parameters: Sequence[Parameter]) -> HarmonicMatrices | None:
     """Return the linear part as matrices where a parameter needs them, one of the structure, else None."""
     structural = {i: p.name for i, p in enumerate(parameters) if p.kind is Kind.STRUCTURE}
     if not structural or modal_dampings(balance, parameters):
@@ -136,7 +136,7 @@ def matrices_of_paths(balance: Balance, parameters: Sequence[Parameter]) -> Matr
             forces_by[i] = term_amplitudes(d.forces, dense.observe.size, ks)
     # The stiffness moved from the contacts into the structure is that of the balance.
     K = dense.K[which] + _stiffness(L, shift - dense.shift, L)
-    return Matrices(
+    return HarmonicMatrices(
         K=K, C=dense.C[which], M=dense.M[which], L=L, observe=dense.observe,
         forces=dense.forces, by=by, forces_by=forces_by, motions_by=motions_by,
     )  # fmt: skip

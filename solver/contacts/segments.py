@@ -17,7 +17,7 @@ from solver.contacts.kernels.stick_slip_events import (
     SLIP,
     segment_capacity,
 )
-from solver.contacts.laws.parts import Motion
+from solver.contacts.laws.parts import ContactMotion
 from solver.jit import fourier
 from solver.jit.fourier import Real
 from solver.jit.trig_polynomial import grid_size, grid_tables
@@ -67,12 +67,12 @@ def shares_of(*found: Segments) -> Shares:
     return Shares(stick=contact - slip, slip=slip, separation=1.0 - contact)
 
 
-def motion_at(found: Segments, tau: Real) -> list[Motion]:
+def motion_at(found: Segments, tau: Real) -> list[ContactMotion]:
     """Return what a slider does at every angle."""
-    motion = np.full(tau.size, Motion.SEPARATION)
+    motion = np.full(tau.size, ContactMotion.SEPARATION)
     for row in found.rows:
         inside = (tau - row[BEGIN]) % _TURN <= row[END] - row[BEGIN]
-        motion[inside] = Motion.SLIP if row[MOTION] == SLIP else Motion.STICK
+        motion[inside] = ContactMotion.SLIP if row[MOTION] == SLIP else ContactMotion.STICK
     return motion.tolist()
 
 

@@ -20,7 +20,7 @@ from solver.jit.fourier import Complex, Flags, Integer, Real
 from solver.linear.assembly import linear_model
 from solver.linear.contact_table import port_stiffnesses
 from solver.linear.leading_ports import every_port, leading_ports
-from solver.linear.modal import Decomposition, Held, decompose, held_alone, held_by, matrices_of
+from solver.linear.modal import Decomposition, HeldMatrices, decompose, held_alone, held_by, matrices_of
 from solver.linear.model import ForceTerm, LinearModel, LinearModelDerivative
 from solver.matrices.normal_modes import hermitian, least_stiffness
 from solver.scene.scene import Scene
@@ -73,7 +73,7 @@ CANCELLED = 1e-3  # a relative residual of 1e-11 of this share of what cancels i
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Reduced:
+class CondensedStructure:
     """The linear part in the form the loops take; see `solver.contacts.kernels.system.System` for the
     sizes. `shapes` the loops do without."""
 
@@ -113,7 +113,7 @@ def reduce_model(
     whole_matrices: bool = False,
     each_port: bool = False,
     poles: bool = True,
-) -> Reduced:
+) -> CondensedStructure:
     """Bring a linear model into the form of the compiled loops.
 
     Parameters
@@ -165,7 +165,7 @@ def reduce_model(
     least = 0.0 if found is None else _least_size(found, L, forces, which)
     seen = (L, L.conj()) if found is None else (modes["contact_modes"], modes["contact_duals"])
     ports = every_port(kt.size) if each_port else leading_ports(*seen)
-    return Reduced(
+    return CondensedStructure(
         which=which.astype(np.int64), shift=shift, loose=loose, least_size=least, **ports._asdict(), **modes,
         **dense,
     )  # fmt: skip
@@ -305,7 +305,7 @@ _DENSE_AXES = {
 
 
 def _dense(
-    held: Held,
+    held: HeldMatrices,
     diameters: Integer,
     moving: Flags,
     L: Complex,

@@ -21,7 +21,7 @@ _INDEPENDENT = 1e-9  # smallest singular value of the modes at the DOFs in use, 
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Equations:
+class FirstOrderEquations:
     """x'' = W f − A x − B x', the DOFs in use among the coordinates x.
 
     Attributes
@@ -38,7 +38,7 @@ class Equations:
     index: dict[str, int]
 
 
-def equations(structure: MatricesStructure, used: Sequence[str], spin: float = 0.0) -> Equations:
+def equations(structure: MatricesStructure, used: Sequence[str], spin: float = 0.0) -> FirstOrderEquations:
     """The equations of motion with the DOFs `used` as coordinates, at a speed of rotation `spin` [rad/s].
 
     Raises
@@ -67,7 +67,7 @@ def equations(structure: MatricesStructure, used: Sequence[str], spin: float = 0
     if structure.K_omega2 is not None:
         K = K + spin**2 * structure.K_omega2.array
     W = linalg.inv(M)
-    return Equations(A=W @ K, B=W @ C, W=W, index={name: rows[name] for name in used})
+    return FirstOrderEquations(A=W @ K, B=W @ C, W=W, index={name: rows[name] for name in used})
 
 
 def modal_damping_root(scaled: FloatArray, ratios: float | Sequence[float]) -> FloatArray:
@@ -78,7 +78,7 @@ def modal_damping_root(scaled: FloatArray, ratios: float | Sequence[float]) -> F
     return np.asarray((vectors * (2.0 * zeta * np.sqrt(np.maximum(values, 0.0)))) @ vectors.T)
 
 
-def _of_modes(structure: MatricesStructure, used: list[str], rows: dict[str, int]) -> Equations:
+def _of_modes(structure: MatricesStructure, used: list[str], rows: dict[str, int]) -> FirstOrderEquations:
     """Coordinates y = S q: the DOFs in use, and what of the modes q is orthogonal to them."""
     modes = structure.modes
     if modes is None:
@@ -103,7 +103,7 @@ def _of_modes(structure: MatricesStructure, used: list[str], rows: dict[str, int
         + structure.stiffness_proportional_damping * modes.omega2
         + structure.mass_proportional_damping
     )
-    return Equations(
+    return FirstOrderEquations(
         A=(S * modes.omega2) @ inverse,
         B=(S * damping) @ inverse,
         W=S @ S.T,

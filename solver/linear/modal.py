@@ -37,7 +37,7 @@ LEAST_POLE = 1e-25  # smallest |1/s| relative to the largest: below is rounding
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Held:
+class HeldMatrices:
     """Matrices at each nodal diameter, (ns, n, n) each, real where all phases are.
 
     Attributes
@@ -52,7 +52,7 @@ class Held:
     key: tuple[object, ...]
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Held) and self.key == other.key
+        return isinstance(other, HeldMatrices) and self.key == other.key
 
     def __hash__(self) -> int:
         return hash(self.key)
@@ -77,7 +77,7 @@ class Decomposition:
     left: NDArray[Any]
 
 
-def matrices_of(model: LinearModel, diameters: Integer, moving: Flags) -> Held:
+def matrices_of(model: LinearModel, diameters: Integer, moving: Flags) -> HeldMatrices:
     """Return the matrices at each nodal diameter, of motions or (False) of what is at rest.
 
     Raises
@@ -107,28 +107,28 @@ class _ByParts:
 
 
 @lru_cache(maxsize=32)
-def _matrices(of: _ByParts, diameters: tuple[int, ...], moving: tuple[bool, ...]) -> Held:
+def _matrices(of: _ByParts, diameters: tuple[int, ...], moving: tuple[bool, ...]) -> HeldMatrices:
     given = np.array(diameters, dtype=np.int64)
     moves = np.array(moving, np.bool_) if moving else np.ones(given.size, np.bool_)
-    return Held(*of.model.at(given, moves), (of.parts, diameters, moving))
+    return HeldMatrices(*of.model.at(given, moves), (of.parts, diameters, moving))
 
 
 @lru_cache(maxsize=32)
-def held_alone(held: Held) -> bool:
+def held_alone(held: HeldMatrices) -> bool:
     """Return whether the static stiffness alone holds every part in place."""
     return held.K.shape[1] == 0 or least_stiffness(held.K[0]) > SINGULAR
 
 
-def held_by(held: Held, L: Complex, kt: Real) -> Held:
+def held_by(held: HeldMatrices, L: Complex, kt: Real) -> HeldMatrices:
     """Return the matrices with the stiffness of the contacts in them."""
     extra: NDArray[Any] = (L.conj() * kt[:, None]).transpose(0, 2, 1) @ L
     if not np.iscomplexobj(held.K) and not np.any(extra.imag):
         extra = extra.real
-    return Held(held.K + extra, held.C, held.M, (held.key, L.tobytes(), kt.tobytes()))
+    return HeldMatrices(held.K + extra, held.C, held.M, (held.key, L.tobytes(), kt.tobytes()))
 
 
 @lru_cache(maxsize=32)
-def decompose(held: Held, *, poles: bool = True) -> Decomposition | None:
+def decompose(held: HeldMatrices, *, poles: bool = True) -> Decomposition | None:
     """Return modes if the damping is classical, else `poles`; None if neither gives Z⁻¹ to rounding."""
     stiffness = list(held.K)
     even = [hermitian(K) for K in stiffness]

@@ -21,7 +21,7 @@ FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
-class Equations:
+class MarchEquations:
     """The equations of a scene, and what its coordinates are.
 
     Attributes
@@ -121,7 +121,7 @@ def _with_couplings(
     return csr_array(A), csr_array(B), W, index
 
 
-def equations_of_motion(scene: Scene, omega: float) -> Equations:
+def equations_of_motion(scene: Scene, omega: float) -> MarchEquations:
     """The equations of a scene in the angle tau = omega t."""
     A, B, W, index = _with_couplings(scene, *_equations(scene))
     seen = [(index[dof], factor) for dof, factor in scene.seen(scene.observe.dof) or ()]
@@ -160,4 +160,4 @@ def equations_of_motion(scene: Scene, omega: float) -> Equations:
         omega=omega,
         **columns(placed, index, A.shape[0]),
     )
-    return Equations(system, observed, index, tuple(seen))
+    return MarchEquations(system, observed, index, tuple(seen))

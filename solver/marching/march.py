@@ -20,7 +20,7 @@ from scipy.sparse import csr_array, diags_array
 from solver.errors import SettingError
 from solver.marching import moreau
 from solver.marching.contacts import rows
-from solver.marching.equations import Equations, equations_of_motion
+from solver.marching.equations import MarchEquations, equations_of_motion
 from solver.marching.kernels import state as kernel
 from solver.marching.kernels import taylor as stepping
 from solver.marching.result import MarchResult, MarchStatus, describe
@@ -167,7 +167,7 @@ def _twice(
 
 
 def _twice_rigid(
-    plan: _Plan, equations: Equations, start: kernel.State, steps: int, names: tuple[str, ...],
+    plan: _Plan, equations: MarchEquations, start: kernel.State, steps: int, names: tuple[str, ...],
     frequency_hz: float,
 ) -> MarchResult:  # fmt: skip
     """The same by Moreau's steps."""

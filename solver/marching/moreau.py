@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from solver.errors import SettingError
-from solver.marching.equations import Equations
+from solver.marching.equations import MarchEquations
 from solver.marching.kernels import moreau as stepping
 from solver.marching.kernels import state as kernel
 from solver.marching.result import MarchStatus
@@ -22,7 +22,7 @@ _LAWS = {kernel.COULOMB: stepping.ELASTIC, kernel.ELASTIC_NORMAL: stepping.ELAST
 _STATUS = {stepping.OPENED: MarchStatus.RIGID_OPENS, stepping.UNSOLVED: MarchStatus.CHATTER}
 
 
-def stepped(equations: Equations, steps: int) -> stepping.Stepped:
+def stepped(equations: MarchEquations, steps: int) -> stepping.Stepped:
     """Return the equations for steps of 2π / steps and their halves.
 
     Raises
@@ -79,7 +79,7 @@ def stepped(equations: Equations, steps: int) -> stepping.Stepped:
 
 
 def run(
-    equations: Equations, x: FloatArray, v: FloatArray, steps: int, tolerance: float, max_periods: int,
+    equations: MarchEquations, x: FloatArray, v: FloatArray, steps: int, tolerance: float, max_periods: int,
     should_stop: Callable[[], bool] | None, on_period: Callable[[float], None] | None,
 ) -> tuple[FloatArray, FloatArray, kernel.Record, MarchStatus, FloatArray]:  # fmt: skip
     """March until the motion repeats; return x, v, the record of one more period, status and the changes."""

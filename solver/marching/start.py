@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from solver.errors import SettingError
-from solver.marching.equations import Equations
+from solver.marching.equations import MarchEquations
 from solver.marching.kernels import state as kernel
 from solver.wording import listing
 
@@ -34,7 +34,9 @@ class MarchStart:
     tractions: Mapping[str, float] = field(default_factory=dict)
 
 
-def state_at(equations: Equations, start: MarchStart, names: tuple[str, ...], omega: float) -> kernel.State:
+def state_at(
+    equations: MarchEquations, start: MarchStart, names: tuple[str, ...], omega: float
+) -> kernel.State:
     """Return the state of a march.
 
     Parameters

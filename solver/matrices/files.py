@@ -15,7 +15,7 @@ from solver.matrices.readers import registry
 from solver.matrices.readers.arrays import MOST_ROWS, Labelled
 from solver.matrices.readers.reader import ROLES, Reader
 from solver.matrices.readers.reader import MatrixFileError as MatrixFileError
-from solver.matrices.values import Modes
+from solver.matrices.values import NormalModes
 
 _LABELS_OF_ONES_OWN = ".dof"
 
@@ -84,7 +84,7 @@ def array_names(path: Path) -> list[str]:
     return names
 
 
-def read_modes(path: Path) -> Modes:
+def read_modes(path: Path) -> NormalModes:
     """Read modes from a file (.npz, .mat) with `modes`, `omega2` or `frequencies_hz`, maybe `damping_ratio`.
 
     Raises
@@ -103,7 +103,7 @@ def read_modes(path: Path) -> Modes:
             + (", ".join(f"`{name}`" for name in arrays) or "none of them")
         )
     try:
-        return Modes.of(arrays)
+        return NormalModes.of(arrays)
     except ValueError as error:
         raise MatrixFileError(f"{str(path)!r}: {error}") from error
 

@@ -18,7 +18,7 @@ from solver.matrices.reduction.craig_bampton import Reduced, craig_bampton
 from solver.matrices.sectors.loading import read_nodes, sector_kept
 from solver.matrices.sectors.reduction import ReducedSector
 from solver.matrices.validation import DofTable
-from solver.matrices.values import METRES, MOST_DOFS, UNITS, Matrix, Modes
+from solver.matrices.values import METRES, MOST_DOFS, UNITS, Matrix, NormalModes
 
 KEEP_MODES = "keep_modes"
 MAPPING, IN_UNITS, NODES = "mapping", "units", "nodes"
@@ -50,7 +50,7 @@ def with_files(raw: Mapping[str, object], folder: Path) -> dict[str, object]:
     if tables.get("sectors") is not None:
         return {**raw, "structure": sector_with_files(tables, folder, _orders(raw))[0]}
     found = read_matrices(tables, folder)
-    if isinstance(tables.get("modes"), Modes):
+    if isinstance(tables.get("modes"), NormalModes):
         tables = _rows_in_use(tables)
     return {**raw, "structure": as_kept(tables, found.matrices)[0]}
 
@@ -153,10 +153,12 @@ def _rows_in_use(tables: dict[str, Any]) -> dict[str, Any]:
         dofs = DofTable.read(tables.get("dofs"))
     except ValueError:
         return tables
-    modes: Modes = tables["modes"]
+    modes: NormalModes = tables["modes"]
     if max(dofs.rows) >= modes.size:
         return tables
-    kept = Modes(omega2=modes.omega2, modes=modes.modes[list(dofs.rows)], damping_ratio=modes.damping_ratio)
+    kept = NormalModes(
+        omega2=modes.omega2, modes=modes.modes[list(dofs.rows)], damping_ratio=modes.damping_ratio
+    )
     return {**tables, "modes": kept, "dofs": {name: row for row, name in enumerate(dofs)}}
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.matrices.values import Matrix, Modes, Named
+from solver.matrices.values import Matrix, Named, NormalModes
 
 ASYMMETRY = 1e-8  # largest difference from the transpose, relative to the largest entry, taken for rounding
 _NAME = re.compile(r"[A-Za-z0-9_-]{1,80}(@[0-9]{1,9})?")
@@ -123,7 +123,7 @@ def check_matrices(
     M: Matrix | None,
     K: Matrix | None,
     C: Matrix | None,
-    modes: Modes | None,
+    modes: NormalModes | None,
     dofs: DofTable,
     others: Mapping[str, Matrix],
     *,

@@ -179,7 +179,7 @@ class Matrix(ByContent):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Modes(ByContent):
+class NormalModes(ByContent):
     """Mass-normalised modes of a structure: q'' + 2 ζ ω q' + ω² q = φᵀ f, x = φ q.
 
     Attributes
@@ -235,9 +235,9 @@ class Modes(ByContent):
         return int(self.modes.shape[0])
 
     @classmethod
-    def read(cls, data: object) -> Modes:
+    def read(cls, data: object) -> NormalModes:
         """Read a table with `omega2` or `frequencies_hz`, `modes` (rows: DOFs) and maybe `damping_ratio`."""
-        if isinstance(data, Modes):
+        if isinstance(data, NormalModes):
             return data
         if isinstance(data, str):
             raise ValueError(f"`modes` {_INLINE}, got the path {data[:80]!r}")
@@ -257,7 +257,7 @@ class Modes(ByContent):
         return cls.of({**arrays, "modes": _rows(data["modes"], "`modes`", MOST_DOFS)})
 
     @classmethod
-    def of(cls, arrays: dict[str, FloatArray]) -> Modes:
+    def of(cls, arrays: dict[str, FloatArray]) -> NormalModes:
         """Modes from the arrays of a file or a table, under the keys of the table."""
         omega2 = arrays["omega2"] if "omega2" in arrays else (2.0 * np.pi * arrays["frequencies_hz"]) ** 2
         if "frequencies_hz" in arrays and np.any(arrays["frequencies_hz"] < 0.0):

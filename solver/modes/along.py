@@ -14,7 +14,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from solver.jit.fourier import Real
-from solver.modes.corrector import Corrected, State, carried_as, correct
+from solver.modes.corrector import Corrected, ModeState, carried_as, correct
 from solver.modes.curve import BENT, border_of, by_shape, is_near, tangent_of
 from solver.modes.equations import Equations
 from solver.modes.results import NonlinearMode
@@ -28,7 +28,7 @@ class _LostError(Exception):
     """A point of a way was not found."""
 
 
-class Way:
+class CurveSegment:
     """The curve from one point to the next."""
 
     def __init__(self, equations: Equations, one: Corrected, other: Corrected) -> None:
@@ -44,7 +44,7 @@ class Way:
     def at(self, share: float) -> Corrected | None:
         """Return the point that share of the way on; None if it was not found."""
         begin = self._one.state
-        guess = State(
+        guess = ModeState(
             y=begin.y + share * self._change[:-1], mode=self._mode, phase=self._phase,
             log_amplitude=begin.log_amplitude + share * float(self._change[-1]),
         )  # fmt: skip
@@ -103,7 +103,7 @@ def with_turns(equations: Equations, points: Sequence[Corrected], level: float) 
         low, high = sorted((zeta_of(one), zeta_of(other)))
         margin = BENT * max(abs(low), abs(high))
         if high + margin >= most or low - margin <= level <= high + margin:
-            way = Way(equations, one, other)
+            way = CurveSegment(equations, one, other)
             middle = [each for each in map(way.at, _SHARES) if each is not None]
             for begin, end in pairwise([one, *middle, other]):
                 found += [begin] * (begin is not one) + _turns(equations, begin, end)
@@ -113,7 +113,7 @@ def with_turns(equations: Equations, points: Sequence[Corrected], level: float) 
 
 def _turns(equations: Equations, one: Corrected, other: Corrected) -> list[Corrected]:
     """Return the point between two at which ζ turns, if it does."""
-    way = Way(equations, one, other)
+    way = CurveSegment(equations, one, other)
     ends = way.slope(one), way.slope(other)
     least = _LEVEL * max(abs(zeta_of(one)), abs(zeta_of(other)))
     if not (min(abs(ends[0]), abs(ends[1])) > least and ends[0] * ends[1] < 0.0):

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from solver.jit.fourier import Integer, Real
-from solver.modes.corrector import Corrected, State, correct
+from solver.modes.corrector import Corrected, ModeState, correct
 from solver.modes.curve import LEAST_SHARE, share_of_first, walk
 from solver.modes.gradient import ModeSensitivities
 from solver.modes.nonlinear_mode import MOST_POINTS, ModeProblem, pose
@@ -41,12 +41,12 @@ class ModePoints:
     by_frequency: Real
     by_damping: Real
     states: Integer
-    points: list[State | None]
+    points: list[ModeState | None]
 
 
 def mode_at_amplitudes(
     scene: Scene, amplitudes: Real, paths: Sequence[str], *, mode: int = 1,
-    nodal_diameter: int | None = None, harmonics: int = 11, guesses: Sequence[State | None] = (),
+    nodal_diameter: int | None = None, harmonics: int = 11, guesses: Sequence[ModeState | None] = (),
 ) -> ModePoints:  # fmt: skip
     """Return frequency and damping ratio of a mode at amplitudes, and their derivatives by parameter paths.
 
@@ -86,7 +86,7 @@ def mode_at_amplitudes(
 
 
 def _from_guesses(
-    problem: ModeProblem, logs: Real, guesses: Sequence[State | None]
+    problem: ModeProblem, logs: Real, guesses: Sequence[ModeState | None]
 ) -> list[Corrected | None]:
     """Return the points from guesses; None where one leads nowhere, or to another mode."""
     equations = problem.equations
@@ -110,7 +110,7 @@ def _along_the_curve(problem: ModeProblem, logs: Real) -> list[Corrected | None]
     first = begin(equations, problem.mode, problem.rest, low, turns=problem.turns)
     if not first.converged:
         return found
-    before: State | None = None
+    before: ModeState | None = None
     high = float(logs.max())
     for each in walk(
         equations, first, high, turns=problem.turns, most_points=MOST_POINTS, ended=lambda _end: None
@@ -124,7 +124,9 @@ def _along_the_curve(problem: ModeProblem, logs: Real) -> list[Corrected | None]
     return found
 
 
-def _between(problem: ModeProblem, one: State, other: State, log_amplitude: float) -> Corrected | None:
+def _between(
+    problem: ModeProblem, one: ModeState, other: ModeState, log_amplitude: float
+) -> Corrected | None:
     """Return the point of an amplitude between two of a curve."""
     rise = other.log_amplitude - one.log_amplitude
     share = (log_amplitude - one.log_amplitude) / rise if rise else 0.0

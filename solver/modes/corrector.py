@@ -20,7 +20,7 @@ _PATIENCE, _HOPE = 8, 0.9  # Newton steps along an arc within which the residual
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class State:
+class ModeState:
     """A point of a nonlinear mode.
 
     Attributes
@@ -47,7 +47,7 @@ class Corrected:
     residual : relative, see `relative_residual`.
     """
 
-    state: State
+    state: ModeState
     at: Evaluated | None
     converged: bool
     iterations: int
@@ -69,7 +69,7 @@ def relative_residual(at: Evaluated, y: Real, a: float, size: int) -> float:
 
 
 def correct(
-    equations: Equations, guess: State, border: Real | None = None, *, most: int = MOST_ITERATIONS,
+    equations: Equations, guess: ModeState, border: Real | None = None, *, most: int = MOST_ITERATIONS,
     fine: float = _FINE, good: float = TOLERANCE,
 ) -> Corrected:  # fmt: skip
     """Solve from a guess: at its amplitude, or along the plane through it whose normal is `border`.
@@ -102,7 +102,7 @@ def correct(
     return Corrected(state=state, at=at, converged=False, iterations=iterations, residual=norm)
 
 
-def _left(at: Evaluated | None, state: State, size: int) -> float:
+def _left(at: Evaluated | None, state: ModeState, size: int) -> float:
     """Return the relative residual; infinite where there is none."""
     if at is None:
         return math.inf
@@ -110,7 +110,7 @@ def _left(at: Evaluated | None, state: State, size: int) -> float:
 
 
 def _newton_step(
-    at: Evaluated, state: State, start: State, border: Real | None, size: int
+    at: Evaluated, state: ModeState, start: ModeState, border: Real | None, size: int
 ) -> tuple[Real, float] | None:
     """Return the Newton step of the unknowns and of ln a."""
     columns, rhs = scales(state.y, size), -at.residual
@@ -124,18 +124,18 @@ def _newton_step(
 
 
 def _damped(
-    equations: Equations, state: State, move: tuple[Real, float], norm: float
-) -> tuple[float, State, Evaluated | None]:
+    equations: Equations, state: ModeState, move: tuple[Real, float], norm: float
+) -> tuple[float, ModeState, Evaluated | None]:
     """Return the point after the largest part of a step that does not make the residual grow much.
 
     At a change of state the residual has a kink, over which a whole step may lead to and fro.
     """
-    best: tuple[float, State, Evaluated | None] = (math.inf, state, None)
+    best: tuple[float, ModeState, Evaluated | None] = (math.inf, state, None)
     part = 1.0
     while part >= _LEAST_PART:
         y = state.y + part * move[0]
         log_amplitude = state.log_amplitude + part * move[1]
-        new = State(y=y, log_amplitude=log_amplitude, mode=state.mode, phase=state.phase)
+        new = ModeState(y=y, log_amplitude=log_amplitude, mode=state.mode, phase=state.phase)
         at = equations.evaluate(y, log_amplitude, state.phase, state.mode)
         if at is not None:
             found = _left(at, new, equations.size)
@@ -163,7 +163,7 @@ def carried_as(equations: Equations, found: Corrected, mode: int) -> Corrected:
     y = state.y.copy()
     q = complex(np.vdot(equations.structure.carried[:, mode], found.at.x[equations.structure.first]))
     y[equations.size], y[equations.size + 1] = q.real, q.imag
-    new = State(y=y, log_amplitude=state.log_amplitude, mode=mode, phase=state.phase)
+    new = ModeState(y=y, log_amplitude=state.log_amplitude, mode=mode, phase=state.phase)
     at = equations.evaluate(y, new.log_amplitude, new.phase, mode)
     if at is None:
         return found

@@ -18,7 +18,7 @@ from enum import Enum
 import numpy as np
 
 from solver.jit.fourier import Real
-from solver.modes.corrector import Corrected, State, carried_anew, correct, scales
+from solver.modes.corrector import Corrected, ModeState, carried_anew, correct, scales
 from solver.modes.equations import Equations
 
 FIRST_STEP, LARGEST_STEP, LEAST_STEP = 0.1, 0.4, 1e-4
@@ -33,7 +33,7 @@ _PURE = 0.99  # share of harmonic 1 in a shape that leaps begin with
 _FARTHEST = 2.0  # ln a below the first amplitude, where a curve that turned back is left
 
 
-class End(Enum):
+class CurveEnd(Enum):
     """How a curve ended."""
 
     REACHED = "reached"
@@ -54,7 +54,7 @@ class Walked:
 
 def walk(
     equations: Equations, first: Corrected, high: float, *, turns: bool, most_points: int,
-    least_share: float = LEAST_SHARE, ended: Callable[[End], None],
+    least_share: float = LEAST_SHARE, ended: Callable[[CurveEnd], None],
 ) -> Iterator[Walked]:  # fmt: skip
     """Yield the points of a curve from a converged first one to ln a = `high`.
 
@@ -70,7 +70,7 @@ def walk(
     tangent, size = tangent_of(equations, point), FIRST_STEP
     for _ in range(most_points):
         if point.state.log_amplitude >= high:
-            ended(End.REACHED)
+            ended(CurveEnd.REACHED)
             return
         here = _with_phase(equations, point) if turns else point
         found, rejected, before = None, 0, tangent
@@ -84,7 +84,7 @@ def walk(
             found, size, before = _leap(equations, back, high, least_share), _RESOLVED, None
         if found is None:
             turned = point.state.log_amplitude <= low - _FARTHEST
-            ended(End.TURNED_BACK if turned else End.STOPPED)
+            ended(CurveEnd.TURNED_BACK if turned else CurveEnd.STOPPED)
             return
         tangent, point = tangent_of(equations, found, before), found
         if point.state.log_amplitude > farthest.state.log_amplitude:
@@ -92,7 +92,7 @@ def walk(
         if share_of_first(equations, point) > _PURE:
             purest = point
         yield Walked(point=point, rejected=rejected)
-    ended(End.REACHED if point.state.log_amplitude >= high else End.TOO_LONG)
+    ended(CurveEnd.REACHED if point.state.log_amplitude >= high else CurveEnd.TOO_LONG)
 
 
 def share_of_first(equations: Equations, found: Corrected) -> float:
@@ -157,7 +157,7 @@ def _leap(
     return None
 
 
-def _bends(guess: State, found: State) -> bool:
+def _bends(guess: ModeState, found: ModeState) -> bool:
     """Return whether damping or frequency left the tangent so far that the step should be a shorter one.
 
     Between points the curve is taken as straight, by `solver.performance_curve` and by the eye.
@@ -167,7 +167,7 @@ def _bends(guess: State, found: State) -> bool:
     return off or abs(omega - float(guess.y[-2])) > 0.2 * BENT * omega
 
 
-def _ahead(state: State, tangent: Real, size: float, equations: Equations) -> State:
+def _ahead(state: ModeState, tangent: Real, size: float, equations: Equations) -> ModeState:
     """Return where a tangent (see `tangent_of`) leads."""
     rise, n = size * tangent[-1], equations.size + 2
     y = state.y.copy()
@@ -176,7 +176,7 @@ def _ahead(state: State, tangent: Real, size: float, equations: Equations) -> St
     return replace(state, y=y, log_amplitude=state.log_amplitude + rise)
 
 
-def border_of(state: State, tangent: Real, size: int) -> Real:
+def border_of(state: ModeState, tangent: Real, size: int) -> Real:
     """Return the row over the unknowns and ln a whose product with a change is the arc along a tangent.
 
     The shape counts: where a short stick begins or ends it may turn round while the others hardly change.
@@ -190,7 +190,7 @@ def border_of(state: State, tangent: Real, size: int) -> Real:
     return row
 
 
-def by_shape(state: State, change: Real, size: int) -> Real:
+def by_shape(state: ModeState, change: Real, size: int) -> Real:
     """Return a change of the unknowns and ln a with motions and q over the amplitude."""
     found = change.copy()
     n = size + 2

@@ -33,7 +33,7 @@ from solver.modes.kernels import steps
 from solver.modes.kernels.assembly import fill_functionals, fill_motions, fill_slopes
 from solver.modes.kernels.dynamics import fill_pushes
 from solver.modes.sparse import Factors, Layout, SparseJacobian
-from solver.modes.structure import Dynamics, Structure, structure_of
+from solver.modes.structure import Dynamics, ModeStructure, structure_of
 from solver.sensitivity.gradient import Amplitudes
 
 BESIDES = 4  # unknowns beside the motions: Re q, Im q, ω, ζ
@@ -109,7 +109,7 @@ class Equations:
 
     def __init__(self, balance: Balance, alone: Complex | None = None) -> None:
         self.balance, self.alone = balance, alone
-        self.structure: Structure = structure_of(balance, alone)
+        self.structure: ModeStructure = structure_of(balance, alone)
         self.amplitudes = Amplitudes(balance)
         system = balance.system
         self._system = by_reference(system)

@@ -11,7 +11,7 @@ from solver.balance.balance import build
 from solver.balance.simplifications import Effects
 from solver.contacts.kernels.system import DENSE
 from solver.jit.fourier import Real
-from solver.modes.corrector import Corrected, State, scales
+from solver.modes.corrector import Corrected, ModeState, scales
 from solver.modes.equations import BESIDES, Equations
 from solver.scene.harmonics import MOST_HARMONICS, spread
 
@@ -29,7 +29,7 @@ class Wider:
         self.equations = equations.over(build(balance.scene, harmonics=harmonics, effects=effects))
         self.has_more = harmonics > balance.n_harmonics
 
-    def spread(self, state: State) -> State:
+    def spread(self, state: ModeState) -> ModeState:
         """Return the same motion, the harmonics it lacks at 0."""
         given = self._given
         w = state.y[: given.size].reshape(given.r, given.n)

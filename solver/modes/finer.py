@@ -17,11 +17,11 @@ import numpy as np
 from solver.errors import SettingError
 from solver.jit.fourier import Complex
 from solver.modes.along import with_turns, zeta_of
-from solver.modes.corrector import Corrected, State, correct
+from solver.modes.corrector import Corrected, ModeState, correct
 from solver.modes.curve import tangent_of, walk
 from solver.modes.equations import Equations
 from solver.modes.error_estimate import Wider
-from solver.modes.records import Record, Recorder
+from solver.modes.records import PointRecord, Recorder
 from solver.response.stability.floquet import scene_monodromy
 from solver.scene.scene import Scene
 
@@ -41,7 +41,7 @@ class Cycle:
 
     point: Corrected
     slope: float
-    record: Record
+    record: PointRecord
 
 
 def slope_of(equations: Equations, point: Corrected) -> float:
@@ -92,7 +92,7 @@ class Ladder:
                 break
         return SAFETY * change
 
-    def _raised(self, i: int, state: State) -> State:
+    def _raised(self, i: int, state: ModeState) -> ModeState:
         """Return a state with the harmonics of rung i."""
         for rung in self._rungs[: i + 1]:
             state = rung.spread(state)
@@ -100,7 +100,7 @@ class Ladder:
 
 
 def _most_damping(
-    equations: Equations, points: Sequence[Corrected], most: int, raised: Callable[[State], State]
+    equations: Equations, points: Sequence[Corrected], most: int, raised: Callable[[ModeState], ModeState]
 ) -> float:
     """Return the largest ζ with more harmonics about point `most`; NaN if unknown."""
     low = points[most].state.log_amplitude - _AROUND
@@ -124,7 +124,9 @@ def _same_cycle(wider: Wider, cycle: Cycle) -> Cycle | None:
     y[-1] = zeta
     row = np.zeros(y.size + 1)
     row[-2] = 1.0
-    start = State(y=y, log_amplitude=here.state.log_amplitude, mode=here.state.mode, phase=here.state.phase)
+    start = ModeState(
+        y=y, log_amplitude=here.state.log_amplitude, mode=here.state.mode, phase=here.state.phase
+    )
     found = correct(equations, start, row, most=40)
     moved = abs(found.state.log_amplitude - cycle.point.state.log_amplitude)
     if not found.converged or moved > _FAR:

@@ -23,7 +23,7 @@ from solver.errors import SettingError
 from solver.jit.fourier import Complex, Real
 from solver.linear.assembly import linear_model, structure_derivative
 from solver.linear.condensation import term_amplitudes
-from solver.modes.corrector import State, scales
+from solver.modes.corrector import ModeState, scales
 from solver.modes.equations import Equations, Evaluated
 from solver.modes.nonlinear_mode import pose
 from solver.modes.results import NonlinearMode
@@ -99,7 +99,7 @@ class ModeSensitivities:
         self._parameters = resolved(balance, paths)
         self._slopes, self._loads = contact_slopes(balance, self._parameters)
 
-    def at(self, state: State) -> tuple[Real, Real]:
+    def at(self, state: ModeState) -> tuple[Real, Real]:
         """Return the derivatives of ω [rad/s] and ζ by the paths at a point."""
         equations, count = self._equations, len(self._parameters)
         at = equations.evaluate(state.y, state.log_amplitude, state.phase, state.mode)
@@ -119,14 +119,14 @@ class ModeSensitivities:
         found = -changes @ adjoint
         return found[:, 0], found[:, 1]
 
-    def changes(self, state: State, at: Evaluated) -> tuple[Real, list[Complex]]:
+    def changes(self, state: ModeState, at: Evaluated) -> tuple[Real, list[Complex]]:
         """Return ∂r/∂p of every path, (n_paths, m), and what it pushes on the coordinates, (nk, N) each."""
         count = len(self._parameters)
         rows = [self._residual(i, state, at) for i in range(count)]
         pushes = [self._change(i, state, at).pushes for i in range(count)]
         return np.array(rows).reshape(count, state.y.size), pushes
 
-    def _residual(self, i: int, state: State, at: Evaluated) -> Real:
+    def _residual(self, i: int, state: ModeState, at: Evaluated) -> Real:
         """Return ∂r/∂p of path i."""
         equations, s = self._equations, self._equations.structure
         hat, size = equations.amplitudes, equations.size
@@ -145,7 +145,7 @@ class ModeSensitivities:
         residual[size + 3] = float(np.vdot(mass, dx).real) / squared + 0.5 * change.amplitude / squared
         return residual
 
-    def _change(self, i: int, state: State, at: Evaluated) -> _Change:
+    def _change(self, i: int, state: ModeState, at: Evaluated) -> _Change:
         """Return what path i changes."""
         parameter, s = self._parameters[i], self._equations.structure
         if parameter.kind is Kind.STRUCTURE:
@@ -164,7 +164,7 @@ class ModeSensitivities:
         dF = equations.lead(self._force_slopes(i, state))
         return _Change(pushes=-(s.back @ hat.of(dF).T[:, :, None])[:, :, 0])
 
-    def _force_slopes(self, i: int, state: State) -> Real:
+    def _force_slopes(self, i: int, state: ModeState) -> Real:
         """Return ∂F/∂p of every port, (nc, n), by path i."""
         equations = self._equations
         system, n, point = equations.balance.system, equations.n, equations.point
@@ -183,7 +183,7 @@ class ModeSensitivities:
             found[begin:end] = point.dF_dp[begin:end]
         return found
 
-    def _of_structure(self, parameter: Parameter, state: State, at: Evaluated) -> _Change:
+    def _of_structure(self, parameter: Parameter, state: ModeState, at: Evaluated) -> _Change:
         """Return what a parameter of the structure, of bodies or of places changes."""
         s, scene, ks = self._equations.structure, self._equations.balance.scene, self._equations.structure.ks
         model, d = linear_model(scene), structure_derivative(scene, parameter.name)

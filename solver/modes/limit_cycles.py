@@ -21,14 +21,14 @@ import numpy as np
 
 from solver.errors import SettingError
 from solver.jit.fourier import Complex, Real
-from solver.modes.along import Way, points_of, with_turns, zeta_of
+from solver.modes.along import CurveSegment, points_of, with_turns, zeta_of
 from solver.modes.corrector import Corrected
 from solver.modes.curve import walk
 from solver.modes.equations import Equations
 from solver.modes.finer import PERIOD, SAFETY, Cycle, Ladder, cycle_at, multipliers_of
 from solver.modes.nonlinear_mode import MOST_POINTS, ModeProblem, pose
 from solver.modes.peaks.performance import grows_together
-from solver.modes.records import Record
+from solver.modes.records import PointRecord
 from solver.modes.results import NonlinearMode
 from solver.modes.start import begin
 from solver.response.stability.floquet import GROWS, growth_of
@@ -63,7 +63,9 @@ class LimitCycle(Piece):
     ]
     frequency_error: Annotated[float, "The same of `frequency_hz` [Hz]."]
     max_abs_error: Annotated[float, "The same of `max_abs` [m]."]
-    record: Annotated[Record, "Motions of contacts and DOFs, and forces, as `solver.NonlinearMode` has them."]
+    record: Annotated[
+        PointRecord, "Motions of contacts and DOFs, and forces, as `solver.NonlinearMode` has them."
+    ]
 
     @property
     def attracts(self) -> bool:
@@ -200,7 +202,7 @@ def limit_cycles(
         surplus = zeta_of(one) + aero_damping, zeta_of(other) + aero_damping
         if surplus[0] != 0.0 and not surplus[0] * surplus[1] < 0.0:
             continue
-        at = Way(equations, one, other).root(lambda point: zeta_of(point) + aero_damping)
+        at = CurveSegment(equations, one, other).root(lambda point: zeta_of(point) + aero_damping)
         if at is None:
             unsolved.append((math.exp(one.state.log_amplitude), math.exp(other.state.log_amplitude)))
         else:

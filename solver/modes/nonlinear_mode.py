@@ -16,7 +16,7 @@ from solver.errors import SettingError
 from solver.jit.fourier import Real
 from solver.linear.assembly import linear_model
 from solver.modes.corrector import Corrected
-from solver.modes.curve import End, walk
+from solver.modes.curve import CurveEnd, walk
 from solver.modes.equations import Equations
 from solver.modes.records import collect
 from solver.modes.results import NonlinearMode, NonlinearModeStatus
@@ -30,9 +30,9 @@ if TYPE_CHECKING:
 LEAST = 1e-100  # amplitude whose square, and that of its inverse, floating-point numbers can tell
 MOST_POINTS = 2000
 STATUS = {
-    End.REACHED: NonlinearModeStatus.COMPLETED, End.NOT_BEGUN: NonlinearModeStatus.NOT_BEGUN,
-    End.STOPPED: NonlinearModeStatus.STOPPED, End.TURNED_BACK: NonlinearModeStatus.TURNED_BACK,
-    End.TOO_LONG: NonlinearModeStatus.TOO_LONG, End.CANCELLED: NonlinearModeStatus.CANCELLED,
+    CurveEnd.REACHED: NonlinearModeStatus.COMPLETED, CurveEnd.NOT_BEGUN: NonlinearModeStatus.NOT_BEGUN,
+    CurveEnd.STOPPED: NonlinearModeStatus.STOPPED, CurveEnd.TURNED_BACK: NonlinearModeStatus.TURNED_BACK,
+    CurveEnd.TOO_LONG: NonlinearModeStatus.TOO_LONG, CurveEnd.CANCELLED: NonlinearModeStatus.CANCELLED,
 }  # fmt: skip
 
 
@@ -93,7 +93,7 @@ def nonlinear_mode(
     equations = problem.equations
     first = begin(equations, problem.mode, problem.rest, low, turns=problem.turns)
     points: list[Corrected] = []
-    rejected, end = 0, [End.NOT_BEGUN]
+    rejected, end = 0, [CurveEnd.NOT_BEGUN]
     if first.converged:
         walked = walk(equations, first, high, turns=problem.turns, most_points=most_points, ended=end.append)
         for each in walked:
@@ -103,7 +103,7 @@ def nonlinear_mode(
                 done = (each.point.state.log_amplitude - low) / (high - low)
                 on_progress(min(max(done, 0.0), 1.0), len(points))
             if should_stop is not None and should_stop():
-                end.append(End.CANCELLED)
+                end.append(CurveEnd.CANCELLED)
                 break
     return collect(
         equations, points, mode=int(mode), turns=problem.turns, errors=errors, status=STATUS[end[-1]],

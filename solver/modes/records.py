@@ -24,7 +24,7 @@ _FAINT = 1e-9  # share of the excitation along a mode below which it gives no ph
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Record:
+class PointRecord:
     """What a point of a curve gives; see `solver.modes.results.NonlinearMode`."""
 
     motions: Real
@@ -51,7 +51,7 @@ class Recorder:
         model = linear_model(equations.balance.scene)
         self._shapes = np.asarray(model.shapes @ equations.structure.shapes, dtype=np.complex128)
 
-    def of(self, point: Corrected) -> Record:
+    def of(self, point: Corrected) -> PointRecord:
         """Return the record of a converged point."""
         equations, s, hat = self._equations, self._equations.structure, self._equations.amplitudes
         if point.at is None:
@@ -69,7 +69,7 @@ class Recorder:
         observed = hat.coefficients(np.einsum("kn,kn->k", s.observe, x))
         high, _, low, _ = extremes(self._system, observed)
         forcing = abs(complex(np.vdot(s.force, x[s.first]))) / math.exp(point.state.log_amplitude)
-        return Record(
+        return PointRecord(
             motions=turned(equations.motions(w)), forces=turned(equations.point.F),
             dofs=to_full(hat.coefficients(moved.T), s.ks, top), max_abs=max(high, -low),
             states=equations.point.states.copy(), forcing=forcing,

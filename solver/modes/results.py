@@ -17,7 +17,7 @@ from solver.scene.scene import Scene
 from solver.wording import listing
 
 if TYPE_CHECKING:
-    from solver.modes.corrector import State
+    from solver.modes.corrector import ModeState
     from solver.response.contact_response import ContactState
 
 
@@ -106,7 +106,7 @@ class NonlinearMode(ModalCurve):
         Real, "|Qᴴ f| of the scene's own excitation and the mass-normalised mode Q_1 / a [N/√kg], (n,)."
     ]
     points: Annotated[
-        tuple[State, ...],
+        tuple[ModeState, ...],
         "The unknowns of every point, for `solver.mode_gradient`; `whole_matrices` says of which equations.",
     ]
     whole_matrices: bool

@@ -11,7 +11,7 @@ from solver.balance.balance import Balance
 from solver.jit.fourier import Complex, Real, cosine_position
 from solver.linear.assembly import linear_model
 from solver.matrices.normal_modes import hermitian, undamped_modes
-from solver.modes.corrector import Corrected, State, carried_anew, correct
+from solver.modes.corrector import Corrected, ModeState, carried_anew, correct
 from solver.modes.equations import Equations, step
 from solver.modes.structure import plain
 
@@ -179,7 +179,7 @@ def coordinates_of(equations: Equations, mode: LinearMode) -> Complex:
 
 def first_state(
     equations: Equations, mode: LinearMode, rest: Real, log_amplitude: float, *, turns: bool,
-) -> State:  # fmt: skip
+) -> ModeState:  # fmt: skip
     """Return a guess at an amplitude: the equilibrium and the linear mode, in the phase of the equations.
 
     Parameters
@@ -203,7 +203,7 @@ def first_state(
     if equations.size:
         w[:, here], w[:, here + 1] = moved.real, -moved.imag
     y = np.concatenate([w.reshape(-1), [q.real, q.imag, mode.omega, mode.zeta]])
-    return State(y=y, log_amplitude=log_amplitude, mode=number, phase=phase / np.linalg.norm(phase))
+    return ModeState(y=y, log_amplitude=log_amplitude, mode=number, phase=phase / np.linalg.norm(phase))
 
 
 def begin(equations: Equations, mode: LinearMode, rest: Real, low: float, *, turns: bool) -> Corrected:
@@ -212,7 +212,7 @@ def begin(equations: Equations, mode: LinearMode, rest: Real, low: float, *, tur
     What another mode has most of is no beginning of the one asked for: it counts as failed.
     """
 
-    def guess(at: float) -> State:
+    def guess(at: float) -> ModeState:
         return first_state(equations, mode, rest, at, turns=turns)
 
     spent = 0

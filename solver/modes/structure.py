@@ -27,7 +27,7 @@ from solver.modes.sparse import Factors, Pattern
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Structure:
+class ModeStructure:
     """What Z_k is made of; N coordinates.
 
     It is in modes (diagonals, (nk, N)), as matrices ((nk, N, N)), or as the entries of a pattern ((nk, L)).
@@ -133,7 +133,7 @@ class Structure:
 class Dynamics:
     """Z of all harmonics at (ω, ζ), with one mode stiffened; see the module."""
 
-    of: Structure
+    of: ModeStructure
     inverse: Complex | Factors
     by_omega: Complex
     by_zeta: Complex
@@ -163,7 +163,7 @@ class Dynamics:
         return np.asarray(self.of.contact @ (self.inverse @ self.of.back))
 
 
-def structure_of(balance: Balance, alone: Complex | None = None) -> Structure:
+def structure_of(balance: Balance, alone: Complex | None = None) -> ModeStructure:
     """Return the linear part of a balance in modes or as matrices (`Effects.whole_matrices`).
 
     Parameters
@@ -208,7 +208,7 @@ def structure_of(balance: Balance, alone: Complex | None = None) -> Structure:
         squares = np.maximum(sizes, 1e-12 * sizes.max(initial=1.0))
     constant = forces[0] if ks[0] == 0 else np.zeros(forces.shape[1], np.complex128)
     row = system.level[1 if system.constant_mean else 0]
-    return Structure(
+    return ModeStructure(
         ks=ks, first=first, moving=moving, turns=np.maximum(ks, 1).astype(np.float64),
         K=np.array(K, np.complex128), C=np.array(C, np.complex128), M=np.array(M, np.complex128),
         mass=np.array(mass, np.complex128), contact=np.ascontiguousarray(contact),

@@ -26,7 +26,7 @@ from solver.jit import fourier
 from solver.jit.fourier import Real
 from solver.linear.kernels.receptance import receptance
 from solver.response.solution import Solution
-from solver.response.wear_measures import Change, Cycle, friction_work, least_load, slip_travel
+from solver.response.wear_measures import Change, ContactCycle, friction_work, least_load, slip_travel
 from solver.results.told import Piece
 from solver.wording import listing
 
@@ -65,7 +65,7 @@ class ContactWear(Piece):
 class WearPoint:
     """The measures of all contacts at one solution."""
 
-    def __init__(self, cycle: Cycle, changes: Sequence[Change]) -> None:
+    def __init__(self, cycle: ContactCycle, changes: Sequence[Change]) -> None:
         self._cycle = cycle
         self._changes = changes
 
@@ -123,7 +123,7 @@ class WearSensitivity:
         system, linear, point = workspace.system, workspace.linear, workspace.point
         receptance(system, omega, linear)
         evaluate(system, linear, u, omega, 0.0, point)
-        cycle = Cycle.of(workspace.balance, u, omega, evaluation_by_value(point))
+        cycle = ContactCycle.of(workspace.balance, u, omega, evaluation_by_value(point))
         good = factorise(system, linear, point, np.empty(u.size), 0.0, 0.0) != 0.0
         changes = [self._change(workspace.balance, system, omega, good=good)]
         # What follows evaluates into the same arrays, but for the factors, which stay.
@@ -194,7 +194,7 @@ def contact_index(balance: Balance, contact: str) -> int:
     return names.index(contact)
 
 
-def period_shares(cycle: Cycle, e: int) -> Shares | None:
+def period_shares(cycle: ContactCycle, e: int) -> Shares | None:
     """Return the shares of the period in stick, slip and separation; None of a law that knows no such."""
     contact, ports = cycle.balance.scene.contacts[e].with_numbers(cycle.table[e]), cycle.ports(e)
     return contact.shares(cycle.full(cycle.U[ports.start : ports.stop]), cycle.normal_load(e))

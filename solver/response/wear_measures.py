@@ -58,7 +58,7 @@ class Change(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Cycle:
+class ContactCycle:
     """All contacts over one period at a solution; copies, so that the workspace may go on.
 
     Attributes
@@ -83,7 +83,7 @@ class Cycle:
     load: Real
 
     @classmethod
-    def of(cls, balance: Balance, u: Real, p: float, point: Evaluation) -> Cycle:
+    def of(cls, balance: Balance, u: Real, p: float, point: Evaluation) -> ContactCycle:
         """Return the cycle at (u, λ = `p`, inside unit), where `point` was evaluated last."""
         table, load, _, _ = contact_values(balance.system, p, 0.0)
         U = u.reshape(balance.n_ports, -1).copy()
@@ -136,7 +136,7 @@ class Cycle:
         return segments_of(slip, self.normal_load(e), row[KT], row[MU])
 
 
-def friction_work(cycle: Cycle, e: int, changes: Sequence[Change]) -> tuple[float, Real]:
+def friction_work(cycle: ContactCycle, e: int, changes: Sequence[Change]) -> tuple[float, Real]:
     """Return the work that friction takes out at contact `e` in one period [J], and its slopes.
 
     Of a rubbing contact it is that of the tangential force: the normal one moves nothing across the surface.
@@ -186,7 +186,7 @@ def _speed(coefficients: Real, ks: Integer) -> Real:
     return result
 
 
-def least_load(cycle: Cycle, e: int, changes: Sequence[Change]) -> tuple[float, Real] | None:
+def least_load(cycle: ContactCycle, e: int, changes: Sequence[Change]) -> tuple[float, Real] | None:
     """Return the least normal load of contact `e` over the period [N], and its slopes.
 
     Below 0 the contact separates: the number is what the load would be if it could pull. None of a law
@@ -206,7 +206,7 @@ def least_load(cycle: Cycle, e: int, changes: Sequence[Change]) -> tuple[float, 
     return float(at @ N), np.array([float(at @ each) for each in dN])
 
 
-def slip_travel(cycle: Cycle, e: int, changes: Sequence[Change]) -> tuple[float, Real] | None:
+def slip_travel(cycle: ContactCycle, e: int, changes: Sequence[Change]) -> tuple[float, Real] | None:
     """Return the distance that contact `e` rubs in one period [m], and its slopes.
 
     None of a law whose slider does not move on a line.

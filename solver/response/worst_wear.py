@@ -37,7 +37,7 @@ from solver.linear.kernels.receptance import receptance
 from solver.response.wear import Measured, WearPoint, WearSensitivity, contact_index
 from solver.response.wear_measures import (
     Change,
-    Cycle,
+    ContactCycle,
     force_change,
     friction_work,
     least_load,
@@ -64,7 +64,7 @@ class Measure(Enum):
     SLIP_TRAVEL = "slip travel"
 
 
-_MEASURES: dict[Measure, Callable[[Cycle, int, Sequence[Change]], tuple[float, Real] | None]] = {
+_MEASURES: dict[Measure, Callable[[ContactCycle, int, Sequence[Change]], tuple[float, Real] | None]] = {
     Measure.FRICTION_WORK: friction_work,
     Measure.LEAST_LOAD: least_load,
     Measure.SLIP_TRAVEL: slip_travel,
@@ -108,7 +108,7 @@ def worst_wear(
     e = contact_index(branch.balance, contact)
     if not len(branch.values):
         raise SettingError("branch", branch.status.value, "must have a point")
-    found = _Search(branch, e, measure).maxima()
+    found = _MaximaSearch(branch, e, measure).maxima()
     if measure is Measure.LEAST_LOAD:
         return tuple(found)
     return tuple(one for one in found if one.value >= COMPETES * found[0].value)
@@ -124,7 +124,7 @@ class _Node:
     slope: float
 
 
-class _Search:
+class _MaximaSearch:
     """Looks for the maxima of one measure of one contact along a branch."""
 
     def __init__(self, branch: Branch, e: int, measure: Measure) -> None:
@@ -278,7 +278,7 @@ class _Search:
         """Measure the contact where the workspace was evaluated last."""
         balance, point, dp = self._workspace.balance, self._point, float(tangent[-1])
         table, load, dtable, dload = self._contacts(float(solution[-1]))
-        cycle = Cycle(
+        cycle = ContactCycle(
             balance=balance, U=solution[:-1].reshape(point.F.shape), F=point.F, dF_dU=point.dF_dU,
             table=table, load=load,
         )  # fmt: skip

@@ -35,7 +35,7 @@ _STRINGS = tuple(
 )  # fmt: skip
 
 
-class Kind(Enum):
+class WritingKind(Enum):
     """How something is written."""
 
     VALUE = "a text, number, truth or date"
@@ -47,7 +47,7 @@ class Kind(Enum):
 
 
 @dataclass(slots=True)
-class Place:
+class TextPlace:
     """Where one part of a text stands.
 
     Attributes
@@ -65,27 +65,27 @@ class Place:
         The lines of its headers, with comments right above them, to where the next one's begin.
     """
 
-    kind: Kind
+    kind: WritingKind
     start: int
     first: int
     last: int
-    keys: dict[str, Place] = field(default_factory=dict)
-    items: list[Place] = field(default_factory=list)
+    keys: dict[str, TextPlace] = field(default_factory=dict)
+    items: list[TextPlace] = field(default_factory=list)
     blocks: list[list[int]] = field(default_factory=list)
 
-    def parts(self) -> Iterator[Place]:
+    def parts(self) -> Iterator[TextPlace]:
         """Itself and everything in it."""
         yield self
         for below in (*self.keys.values(), *self.items):
             yield from below.parts()
 
 
-def places(text: str) -> Place:
+def places(text: str) -> TextPlace:
     """The places of a TOML text whose lines end in a line feed."""
     return _Reader(text).whole()
 
 
-def place_at(root: Place, pointer: str) -> Place:
+def place_at(root: TextPlace, pointer: str) -> TextPlace:
     """The place of an RFC 6901 pointer, or of the nearest part around it that is there."""
     place = root
     for word in pointer.split("/")[1:]:
@@ -106,8 +106,8 @@ class _Reader:
         self._text = text
         self._at = 0
 
-    def whole(self) -> Place:
-        root = Place(Kind.TABLE, 0, 0, 0)
+    def whole(self) -> TextPlace:
+        root = TextPlace(WritingKind.TABLE, 0, 0, 0)
         table = root
         while self._skip(_BLANK) < len(self._text):
             begin = self._at
@@ -124,16 +124,18 @@ class _Reader:
         self._close_blocks(root)
         return root
 
-    def _opened(self, root: Place, path: list[str], begin: int, *, many: bool) -> Place:
+    def _opened(self, root: TextPlace, path: list[str], begin: int, *, many: bool) -> TextPlace:
         """The table that a header opens."""
         above = root
         for word in path[:-1]:
-            above = above.keys.setdefault(word, Place(Kind.TABLE, begin, begin, begin))
-            if above.kind is Kind.TABLES:
+            above = above.keys.setdefault(word, TextPlace(WritingKind.TABLE, begin, begin, begin))
+            if above.kind is WritingKind.TABLES:
                 above = above.items[-1]
-        table = Place(Kind.TABLE, begin, self._at, self._at)
+        table = TextPlace(WritingKind.TABLE, begin, self._at, self._at)
         if many:
-            above.keys.setdefault(path[-1], Place(Kind.TABLES, begin, begin, begin)).items.append(table)
+            above.keys.setdefault(path[-1], TextPlace(WritingKind.TABLES, begin, begin, begin)).items.append(
+                table
+            )
         else:
             # An outer table may come after one that is in it.
             before = above.keys.get(path[-1])
@@ -152,19 +154,19 @@ class _Reader:
         return begin
 
     @staticmethod
-    def _close_blocks(root: Place) -> None:
+    def _close_blocks(root: TextPlace) -> None:
         blocks = sorted(block for place in root.parts() for block in place.blocks)
         for block, following in pairwise(blocks):
             block[1] = following[0]
 
-    def _statement(self, table: Place) -> None:
+    def _statement(self, table: TextPlace) -> None:
         """``key = value`` to the end of its line."""
         begin = self._at
         path = self._key()
         self._at += 1  # the equals sign
         self._skip(_SPACE)
         for word in path[:-1]:
-            table = table.keys.setdefault(word, Place(Kind.DOTTED, begin, begin, begin))
+            table = table.keys.setdefault(word, TextPlace(WritingKind.DOTTED, begin, begin, begin))
         value = self._value()
         value.start = begin
         table.keys[path[-1]] = value
@@ -186,7 +188,7 @@ class _Reader:
                 return words
             self._at += 1
 
-    def _value(self) -> Place:
+    def _value(self) -> TextPlace:
         begin = self._at
         here = self._text[begin]
         if here == "[":
@@ -197,10 +199,10 @@ class _Reader:
             self._string()
         else:
             self._skip(_BARE_VALUE)
-        return Place(Kind.VALUE, begin, begin, self._at)
+        return TextPlace(WritingKind.VALUE, begin, begin, self._at)
 
-    def _list(self) -> Place:
-        found = Place(Kind.LIST, self._at, self._at, self._at)
+    def _list(self) -> TextPlace:
+        found = TextPlace(WritingKind.LIST, self._at, self._at, self._at)
         self._at += 1
         while self._text[self._skip(_BLANK)] != "]":
             found.items.append(self._value())
@@ -210,8 +212,8 @@ class _Reader:
         found.last = self._at
         return found
 
-    def _inline(self) -> Place:
-        found = Place(Kind.INLINE, self._at, self._at, self._at)
+    def _inline(self) -> TextPlace:
+        found = TextPlace(WritingKind.INLINE, self._at, self._at, self._at)
         self._at += 1
         while self._text[self._skip(_BLANK)] != "}":
             begin, table = self._at, found
@@ -219,7 +221,7 @@ class _Reader:
             self._at += 1
             self._skip(_SPACE)
             for word in path[:-1]:
-                table = table.keys.setdefault(word, Place(Kind.DOTTED, begin, begin, begin))
+                table = table.keys.setdefault(word, TextPlace(WritingKind.DOTTED, begin, begin, begin))
             table.keys[path[-1]] = value = self._value()
             value.start = begin
             if self._text[self._skip(_BLANK)] == ",":
@@ -330,7 +332,7 @@ class _Edits:
 
     # Tables under headers
 
-    def _table(self, place: Place, held: Tables, wanted: Tables, path: tuple[str, ...]) -> None:
+    def _table(self, place: TextPlace, held: Tables, wanted: Tables, path: tuple[str, ...]) -> None:
         for key, below in place.keys.items():
             if key not in wanted:
                 self._remove(below)
@@ -354,22 +356,25 @@ class _Edits:
             end = len(self._text)
             self._cuts.append((end, end, "\n" + toml_text(sections)))
 
-    def _change(self, place: Place, held: Any, wanted: Any, path: tuple[str, ...]) -> None:
-        if place.kind in (Kind.TABLE, Kind.DOTTED) and isinstance(wanted, Mapping):
+    def _change(self, place: TextPlace, held: Any, wanted: Any, path: tuple[str, ...]) -> None:
+        if place.kind in (WritingKind.TABLE, WritingKind.DOTTED) and isinstance(wanted, Mapping):
             self._table(place, held, wanted, path)
         elif (
-            place.kind is Kind.TABLES and isinstance(wanted, list) and all(map(_is_table, wanted)) and wanted
+            place.kind is WritingKind.TABLES
+            and isinstance(wanted, list)
+            and all(map(_is_table, wanted))
+            and wanted
         ):
             self._tables(place, held, wanted, path)
-        elif len(path) == 1 and (place.blocks or place.kind is Kind.TABLES or held == []):
+        elif len(path) == 1 and (place.blocks or place.kind is WritingKind.TABLES or held == []):
             self._remove(place)
             self._add({path[0]: wanted})
-        elif place.kind in (Kind.VALUE, Kind.LIST, Kind.INLINE):
+        elif place.kind in (WritingKind.VALUE, WritingKind.LIST, WritingKind.INLINE):
             self._cuts.append((place.first, place.last, self._value(place, held, wanted)))
         else:
             raise _UnwritableError
 
-    def _tables(self, place: Place, held: list[Any], wanted: list[Any], path: tuple[str, ...]) -> None:
+    def _tables(self, place: TextPlace, held: list[Any], wanted: list[Any], path: tuple[str, ...]) -> None:
         """The entries of ``[[path]]``."""
         sources = _paired(held, wanted)
         for i, item in enumerate(place.items):
@@ -392,13 +397,13 @@ class _Edits:
             after = "\n" if where < len(self._text) else ""
             self._cuts.append((where, where, before + "\n".join(texts) + after))
 
-    def _remove(self, place: Place) -> int:
+    def _remove(self, place: TextPlace) -> int:
         """Take out what stands at a place; where it began."""
         blocks = sorted(block for part in place.parts() for block in part.blocks)
         if blocks:
             self._cuts += [(begin, end, "") for begin, end in blocks]
             return blocks[0][0]
-        if place.kind is Kind.DOTTED:
+        if place.kind is WritingKind.DOTTED:
             for below in place.keys.values():
                 self._remove(below)
             return place.start
@@ -409,20 +414,20 @@ class _Edits:
 
     # Values
 
-    def _value(self, place: Place, held: Any, wanted: Any) -> str:
+    def _value(self, place: TextPlace, held: Any, wanted: Any) -> str:
         """The text of a value."""
         if _same(held, wanted):
             return self._text[place.first : place.last]
-        if place.kind is Kind.INLINE and isinstance(wanted, Mapping) and wanted:
+        if place.kind is WritingKind.INLINE and isinstance(wanted, Mapping) and wanted:
             return self._inline(place, held, wanted)
-        if place.kind is Kind.LIST and isinstance(wanted, list) and wanted and held:
+        if place.kind is WritingKind.LIST and isinstance(wanted, list) and wanted and held:
             return self._list(place, held, wanted)
         if isinstance(held, float) and isinstance(wanted, int) and not isinstance(wanted, bool):
             return value_text(float(wanted))
         return value_text(wanted)
 
-    def _inline(self, place: Place, held: Tables, wanted: Tables) -> str:
-        if any(below.kind is Kind.DOTTED for below in place.keys.values()):
+    def _inline(self, place: TextPlace, held: Tables, wanted: Tables) -> str:
+        if any(below.kind is WritingKind.DOTTED for below in place.keys.values()):
             return value_text(wanted)
         pieces = []
         for key, value in wanted.items():
@@ -433,7 +438,7 @@ class _Edits:
                 pieces.append(f"{key_text(key)} = {value_text(value)}")
         return f"{{ {', '.join(pieces)} }}"
 
-    def _list(self, place: Place, held: list[Any], wanted: list[Any]) -> str:
+    def _list(self, place: TextPlace, held: list[Any], wanted: list[Any]) -> str:
         """Entries with what stands around them: comments above and behind, and how far they are moved in."""
         sources = _paired(held, wanted)
         words = [
@@ -455,7 +460,7 @@ class _Edits:
         opening = "\n" if self._text[place.first + 1] == "\n" else ""
         return f"[{opening}{''.join(out)}{rest}]"
 
-    def _around(self, place: Place) -> tuple[list[tuple[str, str]], str]:
+    def _around(self, place: TextPlace) -> tuple[list[tuple[str, str]], str]:
         """What stands before and behind each entry of a list, and what is left behind the last one.
 
         The end of a line belongs to its last entry.

@@ -12,7 +12,7 @@ from solver.matrices.sectors.outline import SectorOutline
 from solver.matrices.sectors.parts import PartMatrices
 from solver.matrices.sectors.validation import check_sector
 from solver.matrices.validation import DofTable, antisymmetric, check_matrices, symmetric
-from solver.matrices.values import MOST_MODES, Matrix, Modes
+from solver.matrices.values import MOST_MODES, Matrix, NormalModes
 from solver.scene.cyclic.sector_tables import CyclicBoundary, Mistuning, Sectors
 
 Ratio = Annotated[float, Field(strict=True, ge=0.0, le=10.0, allow_inf_nan=False)]
@@ -105,7 +105,7 @@ class MatricesStructure(Part):
     C: Matrix | None = None
     G: Matrix | None = None
     K_omega2: Matrix | None = None
-    modes: Modes | None = None
+    modes: NormalModes | None = None
     dofs: DofTable
     damping_ratio: Ratios | None = None
     loss_factor: LossFactor = 0.0

@@ -10,7 +10,7 @@ from pydantic import ValidationError
 
 from solver.contacts.fields import LARGEST, Part
 from solver.contacts.laws.base import AnyContact
-from solver.contacts.laws.parts import Quantity
+from solver.contacts.laws.parts import LawQuantity
 from solver.errors import SettingError
 from solver.results.units import number
 from solver.scene.bodies.kinematics import HasBodies
@@ -115,7 +115,7 @@ def has_parameter(contact: AnyContact, owner: str, key: str) -> bool:
     return owner in (contact.name, contact.group) and key in contact.parameters
 
 
-def changed_quantities(scene: HasParts, path: str) -> tuple[Quantity, ...]:
+def changed_quantities(scene: HasParts, path: str) -> tuple[LawQuantity, ...]:
     """What a path changes in each contact it acts on; nothing of a path that is no contact's."""
     owner, _, key = path.rpartition(".")
     return tuple(c.parameters[key] for c in scene.contacts if has_parameter(c, owner, key))

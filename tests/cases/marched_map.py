@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.contacts.laws.base import AnyContact
-from solver.contacts.pieces.piece import Piece
+from solver.contacts.pieces.piece import StatePiece
 from solver.jit.fourier import basis
 from solver.marching.equations import equations_of_motion
 from solver.marching.kernels import state as kinds
@@ -35,7 +35,7 @@ def _value(coefficients: np.ndarray) -> float:
     return float(basis(np.zeros(1), (coefficients.size - 1) // 2)[0] @ coefficients)
 
 
-def _before(pieces: tuple[Piece, ...]) -> Piece | None:
+def _before(pieces: tuple[StatePiece, ...]) -> StatePiece | None:
     return next((piece for piece in pieces if piece.holds_at(2.0 * math.pi - 1e-9)), None)
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 import solver
-from optim.criteria.criterion import Criterion, Form, Judged, Key, Row
+from optim.criteria.criterion import Criterion, CriterionRow, Form, Judged, Key
 from optim.criteria.json_types import PositiveNumber
 from solver.balance.workspace import Workspace
 
@@ -25,7 +25,7 @@ def frequencies(scene: Scene) -> np.ndarray:
     return 0.5 * (low + high) + 0.5 * (high - low) * NODES
 
 
-def rows(judged: Judged) -> list[Row]:
+def rows(judged: Judged) -> list[CriterionRow]:
     """One row: √(½ Σ wᵢ aᵢ²) with aᵢ at the nodes."""
     workspace = Workspace.of(judged.branch.balance)
     hertz = frequencies(judged.branch.balance.scene)

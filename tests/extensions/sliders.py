@@ -16,7 +16,7 @@ from solver.contacts.kernels import columns
 from solver.contacts.kernels.coulomb.force import contact_force
 from solver.contacts.kernels.stick_slip_events import FAILED, SLIPPING, STUCK, piece_of
 from solver.contacts.laws.base import AnyContact
-from solver.contacts.laws.parts import Held, Quantity, Row
+from solver.contacts.laws.parts import LawQuantity, RestStiffness, Row
 from solver.jit.fourier import Integer
 from solver.jit.lapack import fill_block
 from solver.jit.separate import apart
@@ -71,11 +71,13 @@ class SlidersContact(AnyContact):
     LAW: ClassVar[str] = "sliders"
     FORCE: ClassVar[str] = f"{SLIDERS} springs `k / {SLIDERS}`, each with a slider; all slip at `limit`"
     KERNEL: ClassVar[str] = "sliders:sliders"
-    PARAMETERS: ClassVar[Mapping[str, Quantity]] = {
-        "k": Quantity(column=K, unit="N/m", least=0.0, wanted="must be a number > 0 and <= 1e15 [N/m]"),
-        "limit": Quantity(column=LIMIT, unit="N", least=0.0, wanted="must be a number > 0 and <= 1e15 [N]"),
+    PARAMETERS: ClassVar[Mapping[str, LawQuantity]] = {
+        "k": LawQuantity(column=K, unit="N/m", least=0.0, wanted="must be a number > 0 and <= 1e15 [N/m]"),
+        "limit": LawQuantity(
+            column=LIMIT, unit="N", least=0.0, wanted="must be a number > 0 and <= 1e15 [N]"
+        ),
     }
-    HELD: ClassVar[tuple[Held, ...]] = (Held(K),)
+    HELD: ClassVar[tuple[RestStiffness, ...]] = (RestStiffness(K),)
     RUBBING: ClassVar[tuple[int, ...]] = (0,)
 
     law: Literal["sliders"]

@@ -34,12 +34,12 @@ from service.jobs.common.records import sweep_record
 from service.jobs.common.scenes import FrequencyHz, HarmonicRequest, require, resolve_scene, resolved
 from service.jobs.common.sizes import balance_issues
 from service.jobs.figures import SweepRecord
-from service.jobs.kind_view import KindView, Told
+from service.jobs.kind_view import KindView, PrintedResult
 from service.jobs.kinds import SHIPPED
 from service.jobs.kinds.registry.loading import registry_of
 from service.jobs.kinds.registry.table import with_tables
 from service.jobs.outputs import JobOutput, OnProgress, ShouldStop
-from service.jobs.parts import Part, PartOutput, Parts
+from service.jobs.parts import Division, JobPart, PartOutput
 from service.jobs.registry import JobKind, Resolved, SceneSource
 from service.queue.core import Service
 from service.settings.settings import load_settings
@@ -80,8 +80,8 @@ def resolve(request: DistortionRequest, source: SceneSource) -> Resolved:
     )
 
 
-def split(spec: Mapping[str, Any]) -> list[Part]:
-    return [Part(spec={"frequency_hz": frequency}) for frequency in spec["frequencies_hz"]]
+def split(spec: Mapping[str, Any]) -> list[JobPart]:
+    return [JobPart(spec={"frequency_hz": frequency}) for frequency in spec["frequencies_hz"]]
 
 
 def run_part(
@@ -110,10 +110,10 @@ def join(spec: Mapping[str, Any], outputs: Mapping[int, PartOutput]) -> JobOutpu
     return JobOutput(result=result, sweeps=sweeps)
 
 
-def tell(result: Mapping[str, Any]) -> Told:
+def tell(result: Mapping[str, Any]) -> PrintedResult:
     found = zip(result["frequency_hz"], result["distortion"], strict=True)
     pairs = [(f"{frequency:g} Hz", f"{100.0 * value:.3f} %") for frequency, value in found]
-    return Told(title="Distortion", pairs=pairs)
+    return PrintedResult(title="Distortion", pairs=pairs)
 
 
 def draw(result: Mapping[str, Any], _sweeps: object, _read: object) -> Any:
@@ -124,7 +124,7 @@ def draw(result: Mapping[str, Any], _sweeps: object, _read: object) -> Any:
     return page
 
 
-PARTS = Parts(split=split, run_part=run_part, join=join)
+PARTS = Division(split=split, run_part=run_part, join=join)
 DISTORTION = JobKind(
     name="distortion",
     summary="How much of a response is not in its first harmonic.",

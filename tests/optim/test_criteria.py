@@ -7,7 +7,7 @@ import pytest
 
 import solver
 from optim.criteria.evaluation import evaluate
-from optim.criteria.rows import Evaluation
+from optim.criteria.rows import DesignEvaluation
 from optim.problem.problem import pose
 
 # scene, changed values, design point; the bladed disk in three regimes and with separation.
@@ -29,7 +29,7 @@ CASES = {
 CRITERIA = ("peak", "band", "half power band")
 
 
-def _evaluate(case: str, values: dict[str, float], limit: float | None) -> Evaluation:
+def _evaluate(case: str, values: dict[str, float], limit: float | None) -> DesignEvaluation:
     name, changed, _ = CASES[case]
     scene = solver.load_scene(name).with_values(changed)
     bounds = {

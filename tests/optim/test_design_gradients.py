@@ -11,12 +11,12 @@ import pytest
 
 import solver
 from optim.criteria.band import BAND
-from optim.criteria.criterion import Row
+from optim.criteria.criterion import CriterionRow
 from optim.criteria.evaluation import evaluate
 from optim.criteria.forbidden import FORBIDDEN
 from optim.criteria.friction_work import FRICTION_WORK
 from optim.criteria.peak import PEAK
-from optim.criteria.rows import Evaluation, nearest
+from optim.criteria.rows import DesignEvaluation, nearest
 from optim.criteria.separation import SEPARATION
 from optim.problem.problem import Problem, pose
 
@@ -75,11 +75,11 @@ def problem_of(point: Point) -> Problem:
 
 
 @cache
-def evaluated(name: str) -> Evaluation:
+def evaluated(name: str) -> DesignEvaluation:
     return evaluate(problem_of(POINTS[name]), POINTS[name].values)
 
 
-Moved = Callable[[Row, str, float], Row]
+Moved = Callable[[CriterionRow, str, float], CriterionRow]
 
 
 def stepping(point: Point) -> Moved:
@@ -87,12 +87,12 @@ def stepping(point: Point) -> Moved:
     problem = problem_of(point)
 
     @cache
-    def there(path: str, step: float) -> Evaluation:
+    def there(path: str, step: float) -> DesignEvaluation:
         found = evaluate(problem, {**point.values, path: point.values[path] + step})
         assert found.good
         return found
 
-    def moved(row: Row, path: str, step: float) -> Row:
+    def moved(row: CriterionRow, path: str, step: float) -> CriterionRow:
         rows = there(path, step).rows
         place = nearest(row, rows)
         assert place is not None
@@ -101,7 +101,7 @@ def stepping(point: Point) -> Moved:
     return moved
 
 
-def difference(moved: Moved, row: Row, path: str, step: float) -> tuple[float, float]:
+def difference(moved: Moved, row: CriterionRow, path: str, step: float) -> tuple[float, float]:
     """The derivative by Richardson-extrapolated central differences, and how sure it is."""
 
     def slope(h: float) -> float:

@@ -14,11 +14,11 @@ import pytest
 import optim
 import solver
 from optim.criteria.band import BAND
-from optim.criteria.criterion import Row
+from optim.criteria.criterion import CriterionRow
 from optim.criteria.peak import PEAK
 from optim.problem.problem import pose
 from optim.problem.uncertainty_input import read_uncertain
-from optim.problem.uncertainty_set import Scenario, Shape
+from optim.problem.uncertainty_set import Scenario, UncertaintyShape
 from optim.robust.result import RobustStatus
 from optim.robust.scenarios import Outcome, outcome
 from optim.robust.worst_case import Aspect, UnknownScenarioError, pessimise
@@ -175,17 +175,17 @@ def difference(f: Callable[[float], float], h: float) -> float:
 
 
 def made_up(value: float, slope: np.ndarray, scenario: Scenario) -> Outcome:
-    row = Row(
+    row = CriterionRow(
         quantity=PEAK, case="a", what="peak", value=value, gradient=np.zeros(1), at_hz=1.0,
         weight=1.0, bound=None,
     )  # fmt: skip
     return Outcome(scenario=scenario, rows=(row,), by_delta=slope[None, :], responses=1)
 
 
-@pytest.mark.parametrize("shape", [Shape.BOX, Shape.BALL])
-def test_a_worst_case_inside_the_set_is_found(shape: Shape) -> None:
+@pytest.mark.parametrize("shape", [UncertaintyShape.BOX, UncertaintyShape.BALL])
+def test_a_worst_case_inside_the_set_is_found(shape: UncertaintyShape) -> None:
     given = {"damper.mu": [0.2, 0.4], "damper.kt": [20.0, 40.0]}
-    if shape is Shape.BALL:
+    if shape is UncertaintyShape.BALL:
         given = {
             "centre": {"damper.mu": 0.3, "damper.kt": 30.0},
             "half_axes": {"damper.mu": 0.1, "damper.kt": 10.0},

@@ -10,7 +10,7 @@ import pytest
 import optim
 import solver
 from optim.problem.uncertainty_input import read_uncertain
-from optim.problem.uncertainty_set import Shape, UncertainSet
+from optim.problem.uncertainty_set import UncertainSet, UncertaintyShape
 
 N0 = {"damper.N0": (60.0, 300.0)}
 TWO = solver.load_scene("two-dof")
@@ -57,7 +57,7 @@ def test_a_covariance_reaches_as_far_as_its_confidence_says() -> None:
     over = read_uncertain(
         TWO, (), {"centre": {"damper.mu": 0.3, "damper.kt": 30.0}, "covariance": [[1e-4, 0.0], [0.0, 1.0]]}
     )
-    assert over.shape is Shape.NORMAL
+    assert over.shape is UncertaintyShape.NORMAL
     assert over.reach() == pytest.approx(np.array([0.01, 1.0]) * math.sqrt(5.991464547))
     drawn = np.array([[delta for _, delta in scenario.settings] for scenario in over.draw(2000, 1)])
     assert drawn.mean(axis=0) == pytest.approx([0.3, 30.0], rel=1e-3)
@@ -66,6 +66,6 @@ def test_a_covariance_reaches_as_far_as_its_confidence_says() -> None:
 
 
 def test_the_set_without_numbers_has_one_scenario_for_each_disk() -> None:
-    over = UncertainSet(shape=Shape.BOX)
+    over = UncertainSet(shape=UncertaintyShape.BOX)
     assert over.finite
     assert over.all() == ()

@@ -25,9 +25,9 @@ from service.db.engine import Database
 from service.db.models import Checkpoint, JobState
 from service.db.repositories import Attempt, JobRepository, NewJob
 from service.jobs.arrays import decode
-from service.jobs.checkpoints import Checkpoints, Kept, UnusableError, packed, unpacked
+from service.jobs.checkpoints import Checkpoints, KeptPieces, UnusableError, packed, unpacked
 from service.jobs.kinds import SHIPPED
-from service.jobs.outputs import FailureKind, JobFailure, JobOutput, Pace, Piece, ShouldStop, Silent
+from service.jobs.outputs import FailureKind, JobFailure, JobOutput, Pace, ResultPiece, ShouldStop, Silent
 from service.jobs.parts import PartStoppedError
 from service.queue.core import Service
 
@@ -155,9 +155,9 @@ def run_here(name: str, checkpoints: Checkpoints, should_stop: ShouldStop) -> Jo
     return SHIPPED.runs()[kind.name](spec, Silent(), should_stop, checkpoints)
 
 
-def stopped_midway(name: str) -> list[Piece]:
+def stopped_midway(name: str) -> list[ResultPiece]:
     """What a run keeps that is stopped after some stretches or parts."""
-    sent: list[Kept] = []
+    sent: list[KeptPieces] = []
     calls = iter(range(100))
     with suppress(PartStoppedError):
         run_here(name, Checkpoints("a", [], sent.append, pace()), lambda: next(calls) >= 4)
@@ -168,7 +168,7 @@ def stopped_midway(name: str) -> list[Piece]:
 def test_a_run_goes_on_from_what_another_kept(name: str) -> None:
     kept_before = stopped_midway(name)
     assert len(kept_before) >= 1
-    sent: list[Kept] = []
+    sent: list[KeptPieces] = []
     again = run_here(name, Checkpoints("a", kept_before, sent.append, pace()), lambda: False)
     assert timeless(again.result) == timeless(expected(name).result)
     new = [one.part for message in sent for one in message.pieces]
@@ -181,9 +181,9 @@ def test_a_run_goes_on_from_what_another_kept(name: str) -> None:
 def test_what_cannot_be_used_is_not(name: str, caplog: pytest.LogCaptureFixture) -> None:
     good = stopped_midway(name)
     foreign = packed(0, {"walk": np.zeros(3)})
-    for bad in (foreign, Piece(part=0, sha256="0" * 64, data=good[0].data)):
+    for bad in (foreign, ResultPiece(part=0, sha256="0" * 64, data=good[0].data)):
         caplog.clear()
-        sent: list[Kept] = []
+        sent: list[KeptPieces] = []
         found = [bad, *good[1:]]
         output = run_here(name, Checkpoints("a", found, sent.append, pace()), lambda: False)
         assert timeless(output.result) == timeless(expected(name).result)
@@ -217,7 +217,7 @@ def test_a_checkpoint_damaged_in_the_database_is_replaced(
     again = claimed(jobs)
     assert [one.part for one in again.saved] == [0, 1]
 
-    def keep(message: Kept) -> None:
+    def keep(message: KeptPieces) -> None:
         assert jobs.keep(again, message.pieces, 0.1, 1, later, anew=message.anew)
 
     checkpoints = Checkpoints(again.job_id, again.saved, keep, pace())
@@ -245,7 +245,7 @@ def claimed(jobs: JobRepository, owner: str = "one") -> Attempt:
     return attempt
 
 
-def piece(part: int) -> Piece:
+def piece(part: int) -> ResultPiece:
     return packed(part, {"values": np.arange(part + 3.0)})
 
 
@@ -304,7 +304,7 @@ def pace(**values: Any) -> Pace:
 
 
 def test_a_job_keeps_no_more_than_it_may(caplog: pytest.LogCaptureFixture) -> None:
-    sent: list[Kept] = []
+    sent: list[KeptPieces] = []
     checkpoints = Checkpoints("a", [piece(0)], sent.append, pace(checkpoint_bytes=10_000))
     for part in range(1, 50):
         checkpoints.add(part, {"values": np.zeros(100)})
@@ -318,7 +318,7 @@ def test_a_job_keeps_no_more_than_it_may(caplog: pytest.LogCaptureFixture) -> No
 
 
 def test_pieces_are_sent_when_it_is_time_or_the_run_is_stopped() -> None:
-    sent: list[Kept] = []
+    sent: list[KeptPieces] = []
     checkpoints = Checkpoints("a", [], sent.append, pace(checkpoint_seconds=1000.0))
     checkpoints.add(0, {"values": np.zeros(2)})
     checkpoints.add(1, {"values": np.zeros(2)})
@@ -341,10 +341,10 @@ def test_pieces_are_numbers_of_this_version(monkeypatch: pytest.MonkeyPatch) -> 
     with pytest.raises(ValueError, match="Object arrays cannot be saved"):
         packed(0, {"a": np.array([object()])})
     with pytest.raises(UnusableError, match="piece 3 does not match its checksum"):
-        unpacked(Piece(part=3, sha256="0" * 64, data=one.data))
+        unpacked(ResultPiece(part=3, sha256="0" * 64, data=one.data))
     garbage = b"PK\x03\x04 no archive"
     with pytest.raises(UnusableError, match="cannot be read"):
-        unpacked(Piece(part=0, sha256=sha256(garbage).hexdigest(), data=garbage))
+        unpacked(ResultPiece(part=0, sha256=sha256(garbage).hexdigest(), data=garbage))
     monkeypatch.setattr("service.jobs.checkpoints.version", lambda _name: "99.0")
     with pytest.raises(UnusableError, match="of another version"):
         unpacked(one)

@@ -22,7 +22,7 @@ from service.client.embedded import EmbeddedService
 from service.db import revisions
 from service.db.clock import utc_now
 from service.db.engine import Database, backup, is_sqlite, migrating, sqlite_note, write_engine
-from service.db.models import NOBODY, Base, Job, JobState
+from service.db.models import NOBODY, Job, JobState, TableBase
 from service.db.repositories import Attempt, JobRepository, SceneRepository
 from service.errors import DatabaseError, DatabaseInUseError, WrongRevisionError
 from service.jobs.arrays import decode, encode
@@ -231,10 +231,10 @@ def test_the_first_revision_upgraded_is_the_models(url: str) -> None:
     revisions.upgrade(url)
     with migrating(url) as connection:
         context = MigrationContext.configure(connection, opts={"compare_type": True})
-        assert compare_metadata(context, Base.metadata) == []
+        assert compare_metadata(context, TableBase.metadata) == []
         found = inspect(connection)
-        assert set(found.get_table_names()) == {*Base.metadata.tables, "alembic_version"}
-        for table in Base.metadata.tables.values():
+        assert set(found.get_table_names()) == {*TableBase.metadata.tables, "alembic_version"}
+        for table in TableBase.metadata.tables.values():
             named = {check["name"] for check in found.get_check_constraints(table.name)}
             assert named == {c.name for c in table.constraints if isinstance(c, CheckConstraint)}
 

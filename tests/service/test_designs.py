@@ -23,7 +23,7 @@ from service.client.client import Client
 from service.db import revisions
 from service.db.clock import utc_now
 from service.db.engine import Database, migrating
-from service.db.models import Base, Job, JobState
+from service.db.models import Job, JobState, TableBase
 from service.db.repositories import ResultRepository
 from service.db.repositories.results import insert_results
 from service.errors import InvalidRequestError
@@ -246,10 +246,11 @@ OLD = {
 }  # fmt: skip
 
 
-_result = Base.metadata.tables["job_result"]
+_result = TableBase.metadata.tables["job_result"]
 _LATER = {"owner", "seconds_limit"}  # columns that the first revision had not
 _job = sa.table(
-    "job", *(sa.column(c.name, c.type) for c in Base.metadata.tables["job"].columns if c.name not in _LATER)
+    "job",
+    *(sa.column(c.name, c.type) for c in TableBase.metadata.tables["job"].columns if c.name not in _LATER),
 )
 BEGIN = datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC)
 END = BEGIN + timedelta(seconds=1.5)

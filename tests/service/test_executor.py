@@ -17,7 +17,7 @@ from private_kinds import PRIVATE, IterationRequest, as_it_is
 from service_helpers import PATIENCE, pids, until
 
 from service.db.repositories import Attempt
-from service.jobs.outputs import Piece, Point
+from service.jobs.outputs import Point, ResultPiece
 from service.settings.settings import load_settings
 from service.workers import processes
 from service.workers.base import Finished, Lost, Outcome, Stopped
@@ -41,7 +41,7 @@ class Heard:
     def best(self, attempt: Attempt, found: object) -> None:
         """Nothing is kept."""
 
-    def kept(self, attempt: Attempt, pieces: Sequence[Piece], *, anew: bool) -> None:
+    def kept(self, attempt: Attempt, pieces: Sequence[ResultPiece], *, anew: bool) -> None:
         """Nothing is kept."""
 
     def ended(self, attempt: Attempt, outcome: Outcome) -> None:

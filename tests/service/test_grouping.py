@@ -13,7 +13,7 @@ from sqlalchemy.exc import DBAPIError
 
 from service.db.clock import utc_now
 from service.db.engine import Database
-from service.db.models import Job, JobState, Scene
+from service.db.models import Job, JobState, StoredScene
 from service.db.repositories import JobRepository
 from service.errors import QueueFullError
 from service.jobs.outputs import JobOutput
@@ -21,13 +21,13 @@ from service.jobs.outputs import JobOutput
 
 def scene(connection: Connection, name: str) -> str:
     values = {"name": name, "scene_hash": "", "created": utc_now(), "body": {}}
-    connection.execute(insert(Scene).values(**values))
+    connection.execute(insert(StoredScene).values(**values))
     return name
 
 
 def stored(database: Database) -> list[str]:
     with database.reading() as connection:
-        return list(connection.execute(select(Scene.name).order_by(Scene.name)).scalars())
+        return list(connection.execute(select(StoredScene.name).order_by(StoredScene.name)).scalars())
 
 
 def held_up(database: Database, works: list) -> tuple[list, int]:

@@ -15,7 +15,7 @@ import solver
 from service.jobs.arrays import decode
 from service.jobs.kinds import SHIPPED
 from service.jobs.outputs import JobOutput
-from service.jobs.parts import Account, Part, PartOutput, Parts, PartStoppedError, final_one
+from service.jobs.parts import Account, Division, JobPart, PartOutput, PartStoppedError, final_one
 from service.jobs.registry import JobKind
 
 DISK: dict[str, Any] = dict(solver.load_scene("bladed-disk").to_dict())
@@ -32,7 +32,7 @@ SPECS: dict[str, dict[str, Any]] = {
 }  # fmt: skip
 
 
-def parts_of(name: str) -> Parts:
+def parts_of(name: str) -> Division:
     parts = SHIPPED[name].parts
     assert parts is not None
     return parts
@@ -145,7 +145,7 @@ def test_the_division_stays_reasonable_for_large_jobs() -> None:
 
 def test_progress_is_weighted_and_does_not_fall_back() -> None:
     told: list[tuple[float, int]] = []
-    plan = [Part(spec={}, weight=3.0), Part(spec={}, weight=1.0)]
+    plan = [JobPart(spec={}, weight=3.0), JobPart(spec={}, weight=1.0)]
     account = Account(plan, {}, lambda share, points: told.append((share, points)))
     account.of(0)(0.5, 10)
     account.of(1)(1.0, 4)
@@ -162,6 +162,6 @@ def test_a_final_part_stands_alone() -> None:
         return JobOutput(result={})
 
     outputs = {index: PartOutput(result={}, final=index == 1) for index in (2, 1, 0)}
-    Parts(split=lambda _spec: [], run_part=lambda *_: outputs[0], join=join).joined({}, outputs)
+    Division(split=lambda _spec: [], run_part=lambda *_: outputs[0], join=join).joined({}, outputs)
     assert [list(each) for each in seen] == [[1]]
     assert final_one({0: outputs[0]}) == {}

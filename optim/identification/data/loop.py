@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from optim.errors import DataError
-from optim.identification.data.measured import Column, DataKind, Measured, Model, Predicted
+from optim.identification.data.measured import Column, DataKind, MeasuredRows, Predicted, RunModel
 from optim.identification.data.table import Dimension, Table, check_monotone
 from optim.problem.variables import Real
 from solver.balance.balance import build
@@ -36,7 +36,7 @@ _WORDS = {
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class LoopRun(Measured):
+class LoopRun(MeasuredRows):
     """A hysteresis loop.
 
     Attributes
@@ -87,7 +87,7 @@ class LoopRun(Measured):
         waves = fourier.basis(_angles(256), (values.size) // 2)[:, 1:] @ (values / self.scale)
         return np.full(values.size, float(np.abs(waves).max()))
 
-    def model(self, scene: Scene, paths: Sequence[str], harmonics: int) -> Model:  # noqa: ARG002
+    def model(self, scene: Scene, paths: Sequence[str], harmonics: int) -> RunModel:  # noqa: ARG002
         """As the base says; the harmonics of a loop are its own."""
         return _LoopModel(self, scene, tuple(paths))
 
@@ -114,7 +114,7 @@ class LoopRun(Measured):
         }  # fmt: skip
 
 
-class _LoopModel(Model):
+class _LoopModel(RunModel):
     """The force of the law under the measured motion."""
 
     def __init__(self, run: LoopRun, scene: Scene, paths: tuple[str, ...]) -> None:
@@ -141,7 +141,7 @@ class _LoopModel(Model):
         )  # fmt: skip
 
 
-def read_loop(scene: Scene, table: Table) -> Measured:
+def read_loop(scene: Scene, table: Table) -> MeasuredRows:
     """Read the table of one loop.
 
     Raises

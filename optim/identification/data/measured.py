@@ -41,7 +41,7 @@ class Predicted:
     states: Mapping[str, Integer] = field(default_factory=dict)
 
 
-class Model(ABC):
+class RunModel(ABC):
     """The responses of a run over parameter values; keeps solutions to start the next from."""
 
     @abstractmethod
@@ -56,7 +56,7 @@ class Model(ABC):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Measured(ABC):
+class MeasuredRows(ABC):
     """One run: rows measured under the same conditions.
 
     Attributes
@@ -85,15 +85,15 @@ class Measured(ABC):
         """Return what the noise of each observation is in proportion to, (n,), where `values` are true."""
 
     @abstractmethod
-    def model(self, scene: Scene, paths: Sequence[str], harmonics: int) -> Model:
+    def model(self, scene: Scene, paths: Sequence[str], harmonics: int) -> RunModel:
         """Return its model in a scene, with derivatives by parameter paths."""
 
     @abstractmethod
-    def thinned(self, most: int) -> Measured:
+    def thinned(self, most: int) -> MeasuredRows:
         """Return the run with at most so many points, for a first look."""
 
     @abstractmethod
-    def under(self, conditions: Mapping[str, float], most: int) -> Measured:
+    def under(self, conditions: Mapping[str, float], most: int) -> MeasuredRows:
         """Return a run that could be measured: the same points, at most so many, under other conditions."""
 
     @abstractmethod
@@ -158,7 +158,7 @@ class DataKind:
     columns: tuple[Column, ...]
     marks: tuple[tuple[str, ...], ...]
     words: Mapping[str, str]
-    read: Callable[[Scene, Table], Measured]
+    read: Callable[[Scene, Table], MeasuredRows]
 
 
 SHIPPED = (

@@ -13,12 +13,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from optim.errors import DataError
-from optim.identification.data.measured import Column, DataKind, Measured, Model, Predicted
+from optim.identification.data.measured import Column, DataKind, MeasuredRows, Predicted, RunModel
 from optim.identification.data.table import Dimension, Table, check_monotone, check_sign
 from optim.problem.variables import Real
 from solver.errors import SettingError
 from solver.modes.at_amplitudes import ModePoints, mode_at_amplitudes
-from solver.modes.corrector import State
+from solver.modes.corrector import ModeState
 from solver.modes.nonlinear_mode import at_nodal_diameter, check_mode
 from solver.results.told import json_numbers
 from solver.scene.scene import Scene
@@ -33,7 +33,7 @@ _WORDS = {
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ModeRun(Measured):
+class ModeRun(MeasuredRows):
     """Frequency and damping ratio over the amplitude.
 
     Attributes
@@ -83,7 +83,7 @@ class ModeRun(Measured):
         floor = _FLOOR * float(np.nanmax(damping)) if damping.size else 0.0
         return np.concatenate([SHARPER * np.abs(values[:m]), np.maximum(damping, floor)])
 
-    def model(self, scene: Scene, paths: Sequence[str], harmonics: int) -> Model:
+    def model(self, scene: Scene, paths: Sequence[str], harmonics: int) -> RunModel:
         """As the base says."""
         return _ModeModel(self, scene, tuple(paths), harmonics)
 
@@ -128,12 +128,12 @@ class ModeRun(Measured):
         }  # fmt: skip
 
 
-class _ModeModel(Model):
+class _ModeModel(RunModel):
     """The nonlinear mode of the scene at the amplitudes measured."""
 
     def __init__(self, run: ModeRun, scene: Scene, paths: tuple[str, ...], harmonics: int) -> None:
         self._run, self._scene, self._paths, self._harmonics = run, scene, paths, max(harmonics, 1)
-        self._points: list[State | None] = []
+        self._points: list[ModeState | None] = []
 
     def forget(self) -> None:
         """As the base says."""
@@ -164,7 +164,7 @@ class _ModeModel(Model):
         )  # fmt: skip
 
 
-def read_mode(scene: Scene, table: Table) -> Measured:
+def read_mode(scene: Scene, table: Table) -> MeasuredRows:
     """Read the table of one run.
 
     Raises

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from optim.errors import DataError
-from optim.identification.data.measured import Column, DataKind, Measured, Model, Predicted
+from optim.identification.data.measured import Column, DataKind, MeasuredRows, Predicted, RunModel
 from optim.identification.data.table import Dimension, Table, check_monotone, check_sign
 from optim.problem.variables import Real
 from solver.balance.balance import build
@@ -30,7 +30,7 @@ from solver.sensitivity.observed import TWO_PI, Observed, ObservedSensitivities,
 NOT_REACHED = -1
 
 
-class ResponseModel(Model):
+class ResponseModel(RunModel):
     """A response at given frequencies over parameter values.
 
     Parameters
@@ -133,7 +133,7 @@ _WORDS = {
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ResponseRun(Measured):
+class ResponseRun(MeasuredRows):
     """A response over frequency.
 
     Attributes
@@ -189,7 +189,7 @@ class ResponseRun(Measured):
         sizes = self.sizes(values)
         return np.repeat(np.maximum(sizes, FLOOR * float(np.nanmax(sizes))), self.parts)
 
-    def model(self, scene: Scene, paths: Sequence[str], harmonics: int) -> Model:
+    def model(self, scene: Scene, paths: Sequence[str], harmonics: int) -> RunModel:
         """As the base says."""
         observe = scene.observe.model_copy(update={"dof": self.dof})
         here = scene.model_copy(update={"observe": observe}) if self.dof != scene.observe.dof else scene
@@ -239,7 +239,7 @@ class ResponseRun(Measured):
         return told
 
 
-def read_response(scene: Scene, table: Table) -> Measured:
+def read_response(scene: Scene, table: Table) -> MeasuredRows:
     """Read the table of one run.
 
     Raises

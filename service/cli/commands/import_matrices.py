@@ -53,10 +53,10 @@ from service.cli.importing.options import (
 from service.cli.importing.parts import contacts as contact_tables
 from service.cli.importing.parts import excitation
 from service.cli.importing.patches import Patches
-from service.cli.importing.reduction import Written, reduce, reduced_file
+from service.cli.importing.reduction import ReducedModel, reduce, reduced_file
 from service.cli.importing.scene import band, toml
 from service.cli.importing.sector import (
-    Disk,
+    DiskOptions,
     WrittenSector,
     checked_boundaries,
     disk,
@@ -131,7 +131,7 @@ def import_scene(
         else:
             structure |= _referring(read, keep_modes, target)
         driven = excitation(forces, excite, next(iter(table)))
-        raw = _Parts(
+        raw = _SceneTables(
             read=read, target=target, structure=structure, dofs=table, excitation=driven, observe=observe
         )
         scene, frequencies, said = _made(raw, written, start, stop)
@@ -170,13 +170,13 @@ class _Read:
     found: Sources
     given: MatrixSet | None
     deck: Path | None
-    of: Disk | None
+    of: DiskOptions | None
     table: dict[str, int | str]
     parts: dict[str, list[dict[str, Any]]]
 
 
 def _read(
-    found: Sources, deck: Path | None, of: Disk | None, dofs: Sequence[str] | None,
+    found: Sources, deck: Path | None, of: DiskOptions | None, dofs: Sequence[str] | None,
     patches: Sequence[str] | None, tolerance: float | None, contacts: Sequence[str] | None,
 ) -> _Read:  # fmt: skip
     given = read_sources(found, deck)
@@ -204,7 +204,7 @@ def _referring(read: _Read, keep_modes: int | None, target: Path) -> dict[str, o
 
 
 def _made(
-    raw: _Parts, written: Written | WrittenSector | None, start: float | None, stop: float | None
+    raw: _SceneTables, written: ReducedModel | WrittenSector | None, start: float | None, stop: float | None
 ) -> tuple[Scene, list[float], list[str]]:
     """Write the scene; return it, its natural frequencies [Hz] and what is to be said of it."""
     found, undamped = raw.read.found, not _damped(raw.read.found)
@@ -220,7 +220,7 @@ def _made(
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Parts:
+class _SceneTables:
     """The tables of the scene, but for the band."""
 
     read: _Read
@@ -246,7 +246,7 @@ class _Parts:
 
 def _reduced(
     read: _Read, modes: int | None, up_to: float | None, path: Path
-) -> Written | WrittenSector:  # fmt: skip
+) -> ReducedModel | WrittenSector:  # fmt: skip
     given, of = read.given, read.of
     if given is None:
         raise InputError("`--reduce` is for matrices; modes are reduced already")
@@ -260,7 +260,7 @@ def _reduced(
     return reduce(given, rows_of(read.table, given), modes, up_to, path)
 
 
-def _gone(given: MatrixSet | None, of: Disk) -> Any:
+def _gone(given: MatrixSet | None, of: DiskOptions) -> Any:
     """How the high boundary of a sector follows whose files the scene refers to."""
     if given is None:
         raise InputError("`--sectors` is for matrices, not for modes")
@@ -316,7 +316,7 @@ def _omega2(scene: Scene) -> NDArray[Any]:
 
 
 def _write(
-    target: Path, raw: dict[str, Any], found: Sources, written: Written | WrittenSector | None
+    target: Path, raw: dict[str, Any], found: Sources, written: ReducedModel | WrittenSector | None
 ) -> Scene:
     """Write the scene, whole or not at all, and read it as anyone would."""
     import solver
@@ -334,7 +334,7 @@ def _write(
 
 
 def _report(
-    scene: Scene, target: Path, frequencies: Sequence[float], written: Written | WrittenSector | None,
+    scene: Scene, target: Path, frequencies: Sequence[float], written: ReducedModel | WrittenSector | None,
     given: MatrixSet | None, notes: list[str], as_json: bool,
 ) -> None:  # fmt: skip
     from solver.matrices.diagnostics import total_mass

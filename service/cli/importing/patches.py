@@ -21,7 +21,7 @@ _METRES = {"SI": 1.0, "mm": 1e-3, "in": 0.0254}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Made:
+class PatchTables:
     """What patches add to a scene.
 
     Attributes
@@ -139,7 +139,7 @@ class Patches:
             )
         return [value / size for value in vector]
 
-    def made(self, given: MatrixSet | None, known: Mapping[str, int | str]) -> Made:
+    def made(self, given: MatrixSet | None, known: Mapping[str, int | str]) -> PatchTables:
         """What the patches add to a scene.
 
         Parameters
@@ -168,4 +168,4 @@ class Patches:
             dofs |= {dof: labels[axis] for axis, dof in own.items() if dof not in known}
             at = [value * self._metres for value in self._nodes[node]]
             nodes.append({"name": f"n{node}", "at": at, "dofs": own})
-        return Made(dofs=dofs, tables={"nodes": nodes, "dampers": self._dampers})
+        return PatchTables(dofs=dofs, tables={"nodes": nodes, "dampers": self._dampers})

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Written:
+class ReducedModel:
     """A reduced model in its file."""
 
     path: Path
@@ -86,7 +86,7 @@ def reduced_file(text: str | None, target: Path) -> Path:
 
 def reduce(
     given: MatrixSet, rows: Mapping[str, int], modes: int | None, up_to: float | None, path: Path
-) -> Written:
+) -> ReducedModel:
     """Reduce matrices onto the DOFs in `rows` and write them to `path`."""
     from solver.matrices.diagnostics import refuse
     from solver.matrices.reduction.craig_bampton import craig_bampton, write_reduced
@@ -111,7 +111,7 @@ def reduce(
     seconds = time.perf_counter() - start
     with whole(path) as temporary:
         write_reduced(temporary, found, list(dofs))
-    return Written(
+    return ReducedModel(
         path=path, reduced=found, rows={name: i for i, name in enumerate(dofs)},
         full=int(matrices["M"].shape[0]), seconds=seconds,
     )  # fmt: skip

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Disk:
+class DiskOptions:
     """What the options say of the disk.
 
     Attributes
@@ -71,7 +71,7 @@ def _nodes(text: str) -> str | list[int]:
 def disk(
     sectors: int | None, low: str | None, high: str | None, nodes: Path | None, axis: str | None,
     pair_by: str, tolerance: float | None, engine_order: int | None, *, patches: bool = False,
-) -> Disk | None:  # fmt: skip
+) -> DiskOptions | None:  # fmt: skip
     """What the options say of a disk; None without --sectors.
 
     Parameters
@@ -97,7 +97,7 @@ def disk(
         raise InputError(f"`--sectors` must be >= 1, got {sectors}")
     if (low is None) != (high is None):
         raise InputError("`--low` and `--high` go together, or are both left out (then found by position)")
-    return Disk(
+    return DiskOptions(
         sectors=sectors, low=low, high=high, nodes=nodes, axis=_axis(axis),
         pair_by=pair_by, tolerance=tolerance, engine_order=1 if engine_order is None else engine_order,
     )  # fmt: skip
@@ -183,7 +183,7 @@ class WrittenSector:
 
 
 def reduce_disk(
-    given: MatrixSet, rows: Mapping[str, int], modes: int | None, of: Disk, path: Path,
+    given: MatrixSet, rows: Mapping[str, int], modes: int | None, of: DiskOptions, path: Path,
     mistune: Sequence[str] = (), metres: float = 1.0,
 ) -> WrittenSector:  # fmt: skip
     """Reduce a sector at every nodal diameter its engine order meets, and write it to `path`.
@@ -226,7 +226,7 @@ def reduce_disk(
     )  # fmt: skip
 
 
-def checked_boundaries(given: MatrixSet, of: Disk, metres: float = 1.0) -> Any:
+def checked_boundaries(given: MatrixSet, of: DiskOptions, metres: float = 1.0) -> Any:
     """The boundaries of the sector as rows.
 
     Raises
@@ -246,7 +246,7 @@ def checked_boundaries(given: MatrixSet, of: Disk, metres: float = 1.0) -> Any:
         raise InputError(issue.said(f"--{issue.name.replace('_', '-')}")) from error
 
 
-def found_by_position(of: Disk | None) -> list[str]:
+def found_by_position(of: DiskOptions | None) -> list[str]:
     """What to know of boundaries that were not named."""
     if of is None:
         return []

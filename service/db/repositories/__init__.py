@@ -1,6 +1,6 @@
 """All SQL of the service: each method is one transaction, each change of a job's state is guarded."""
 
-from service.db.repositories.jobs import Attempt, JobRepository, JobRow, NewJob, Recovered
+from service.db.repositories.jobs import Attempt, JobRepository, JobRow, NewJob, RecoveredJobs
 from service.db.repositories.owned import SceneRepository, UploadRepository
 from service.db.repositories.results import ResultRepository
 
@@ -9,7 +9,7 @@ __all__ = [
     "JobRepository",
     "JobRow",
     "NewJob",
-    "Recovered",
+    "RecoveredJobs",
     "ResultRepository",
     "SceneRepository",
     "UploadRepository",

@@ -23,15 +23,15 @@ from sqlalchemy import (
 
 from service.db.engine import Database
 from service.db.models import Checkpoint, Job, JobState
-from service.db.repositories.rows import Attempt, Recovered
-from service.jobs.outputs import FailureKind, JobFailure, Piece
+from service.db.repositories.rows import Attempt, RecoveredJobs
+from service.jobs.outputs import FailureKind, JobFailure, ResultPiece
 
 # Built once: it goes with the end of every job.
 _DROP = delete(Checkpoint).where(Checkpoint.job_id == bindparam("job"))
 
 
 def store_pieces(
-    connection: Connection, attempt: Attempt, pieces: Sequence[Piece], created: datetime, *, anew: bool
+    connection: Connection, attempt: Attempt, pieces: Sequence[ResultPiece], created: datetime, *, anew: bool
 ) -> None:
     """Add pieces to a job's checkpoint, or put them in place of it; its row is guarded by the caller."""
     condition = Checkpoint.job_id == attempt.job_id
@@ -56,11 +56,11 @@ def with_what_was_kept(database: Database, attempt: Attempt) -> Attempt:
     return replace(attempt, saved=saved) if saved else replace(attempt, progress=0.0, points=0)
 
 
-def _pieces_of(connection: Connection, job_id: str) -> tuple[Piece, ...]:
+def _pieces_of(connection: Connection, job_id: str) -> tuple[ResultPiece, ...]:
     """The pieces of a job's checkpoint in their order."""
     query = select(Checkpoint.part, Checkpoint.sha256, Checkpoint.data)
     rows = connection.execute(query.where(Checkpoint.job_id == job_id).order_by(Checkpoint.part))
-    return tuple(Piece(part=row.part, sha256=row.sha256, data=row.data) for row in rows)
+    return tuple(ResultPiece(part=row.part, sha256=row.sha256, data=row.data) for row in rows)
 
 
 def drop_checkpoint(connection: Connection, job_id: str) -> None:
@@ -158,7 +158,7 @@ def recover(
     parameters: Mapping[str, Any] | None = None,
     *,
     skip_locked: bool = False,
-) -> Recovered:
+) -> RecoveredJobs:
     """Running jobs without an owner: dismissed if asked for, failed after the last attempt, else waiting.
 
     PostgreSQL locks the rows as it reads them, so that nobody changes them before they are written.
@@ -180,4 +180,4 @@ def recover(
         if values["state"].finished:
             drop_checkpoint(connection, row.id)
         counts[values["state"].value] += 1
-    return Recovered(**counts)
+    return RecoveredJobs(**counts)

@@ -29,15 +29,15 @@ from service.db.repositories.attempts import (
     with_what_was_kept,
 )
 from service.db.repositories.results import insert_results
-from service.db.repositories.rows import Attempt, JobRow, NewJob, Recovered
+from service.db.repositories.rows import Attempt, JobRow, NewJob, RecoveredJobs
 from service.db.repositories.runs import in_the_bin, insert_words, require_project
 from service.db.repositories.waiting import Room, Turns, require_share
 from service.errors import IdempotencyError
 from service.jobs.ids import new_id
-from service.jobs.outputs import Best, JobFailure, JobOutput, Piece
+from service.jobs.outputs import Best, JobFailure, JobOutput, ResultPiece
 from service.jobs.strict_json import JsonText, encoded
 
-__all__ = ["Attempt", "JobRepository", "JobRow", "NewJob", "Recovered"]
+__all__ = ["Attempt", "JobRepository", "JobRow", "NewJob", "RecoveredJobs"]
 
 _COLUMNS = [getattr(Job, field.name) for field in fields(JobRow)]
 _LISTED = [getattr(Job, field.name) for field in fields(JobRow) if field.name != "request"]
@@ -223,7 +223,7 @@ class JobRepository:
     def keep(
         self,
         attempt: Attempt,
-        pieces: Sequence[Piece],
+        pieces: Sequence[ResultPiece],
         fraction: float,
         points: int,
         lease_until: datetime,
@@ -280,7 +280,7 @@ class JobRepository:
                 self._store(connection, attempt, output, finished)
             return changed
 
-    def lose(self, attempt: Attempt, reason: str) -> Recovered:
+    def lose(self, attempt: Attempt, reason: str) -> RecoveredJobs:
         """The attempt's worker died: the job waits again, or fails after its last attempt."""
         with self._db.writing() as connection:
             return recover(connection, OWNED, reason, self.now(), of_attempt(attempt))
@@ -329,7 +329,7 @@ class JobRepository:
         with self._db.reading() as connection:
             return set(connection.execute(query).scalars())
 
-    def recover_abandoned(self, owner: str) -> Recovered:
+    def recover_abandoned(self, owner: str) -> RecoveredJobs:
         """Take back what a dead owner left running, when `owner` starts.
 
         With SQLite's file locked there is no other service that could run them. On PostgreSQL there may be:
@@ -341,7 +341,7 @@ class JobRepository:
             condition = and_(Job.state == JobState.RUNNING, Job.lease_owner != owner)
             return recover(connection, condition, "the service ended while the job ran", self.now())
 
-    def recover_expired(self, running_here: Iterable[str] = ()) -> Recovered:
+    def recover_expired(self, running_here: Iterable[str] = ()) -> RecoveredJobs:
         """Take back running jobs whose lease ran out; those that another service looks at are left to it.
 
         Those that run here are kept, whatever a clock that was set says of their leases.

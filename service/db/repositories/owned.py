@@ -27,7 +27,7 @@ from sqlalchemy.orm import Session, defer
 
 from service.db.clock import Clock, utc_now
 from service.db.engine import Database
-from service.db.models import ApiKey, Job, Project, Scene, Upload
+from service.db.models import ApiKey, Job, Project, StoredScene, Upload
 from service.db.tokens import Made, Tokens, digest_of
 from service.errors import ChangedMeanwhileError, ConflictError, NotFoundError, StorageFullError
 from service.jobs.ids import new_id
@@ -297,26 +297,26 @@ class Projects(Binned[Project], Rows[Project]):
         return self._newest(limit, before, owner, *holds)
 
 
-class SceneRepository(Rows[Scene]):
+class SceneRepository(Rows[StoredScene]):
     """Scenes of one database, each of an owner and a name; a stored scene never changes."""
 
-    table = Scene
+    table = StoredScene
 
-    def add(self, owner: str, name: str, scene_hash: str, body: dict[str, Any]) -> tuple[Scene, bool]:
+    def add(self, owner: str, name: str, scene_hash: str, body: dict[str, Any]) -> tuple[StoredScene, bool]:
         """Store a scene, or find the one of this owner and name; whether it was stored."""
         text = encoded(body)
 
-        def find_or_add(connection: Connection) -> tuple[Scene, bool]:
+        def find_or_add(connection: Connection) -> tuple[StoredScene, bool]:
             for known in self._read(connection, self._of((owner, name))):
                 return known, False
-            row = Scene(
+            row = StoredScene(
                 owner=owner, name=name, scene_hash=scene_hash, created=self._now(), size=len(text), body=body
             )
             return self._insert(connection, row, body=text), True
 
         return self._db.grouped(find_or_add)
 
-    def page(self, owner: str | None, after: tuple[str, str] | None, limit: int) -> list[Scene]:
+    def page(self, owner: str | None, after: tuple[str, str] | None, limit: int) -> list[StoredScene]:
         """Scenes of an owner, or of everybody (None), by name, without their tables.
 
         Parameters
@@ -324,12 +324,18 @@ class SceneRepository(Rows[Scene]):
         after : name and owner of the last one on the page before.
         limit : most that are listed.
         """
-        query = self._select.options(defer(Scene.body)).order_by(Scene.name, Scene.owner).limit(limit)
+        query = (
+            self._select.options(defer(StoredScene.body))
+            .order_by(StoredScene.name, StoredScene.owner)
+            .limit(limit)
+        )
         if owner is not None:
-            query = query.where(Scene.owner == owner)
+            query = query.where(StoredScene.owner == owner)
         if after is not None:
             name, whose = after
-            query = query.where(or_(Scene.name > name, and_(Scene.name == name, Scene.owner > whose)))
+            query = query.where(
+                or_(StoredScene.name > name, and_(StoredScene.name == name, StoredScene.owner > whose))
+            )
         return self._all(query)
 
 
@@ -377,7 +383,7 @@ class UploadRepository(Rows[Upload]):
 _OWNER: BindParameter[str] = bindparam("owner")
 OF_JOBS = select(func.coalesce(func.sum(Job.stored_bytes), 0)).where(Job.owner == _OWNER)
 _OF_UPLOADS = select(func.coalesce(func.sum(Upload.size), 0)).where(Upload.owner == _OWNER)
-_OF_SCENES = select(func.coalesce(func.sum(Scene.size), 0)).where(Scene.owner == _OWNER)
+_OF_SCENES = select(func.coalesce(func.sum(StoredScene.size), 0)).where(StoredScene.owner == _OWNER)
 
 
 class StorageRepository:

@@ -7,7 +7,7 @@ from datetime import datetime
 from typing import Any
 
 from service.db.models import NOBODY, JobState
-from service.jobs.outputs import Piece
+from service.jobs.outputs import ResultPiece
 from service.jobs.strict_json import JsonText
 
 
@@ -97,11 +97,11 @@ class Attempt:
     seconds_limit: float | None = None
     progress: float = 0.0
     points: int = 0
-    saved: tuple[Piece, ...] = field(default=(), compare=False, repr=False)
+    saved: tuple[ResultPiece, ...] = field(default=(), compare=False, repr=False)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Recovered:
+class RecoveredJobs:
     """What became of running jobs whose owner is gone."""
 
     accepted: int = 0

@@ -24,7 +24,7 @@ HEADERS_ONLY = "stickslip.headers_only"
 """Key of a request's scope: True if nobody reads the body."""
 
 
-class Head:
+class HeadAsGet:
     """Answers HEAD as if it were GET and keeps the body back (RFC 9110, section 9.3.2)."""
 
     def __init__(self, app: ASGIApp) -> None:

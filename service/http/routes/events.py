@@ -208,7 +208,7 @@ class _AllSentError(Exception):
 
 
 @dataclass(frozen=True, slots=True)
-class _Watched:
+class _WatchedJob:
     service: Service
     looks: Looks
     caller: Caller
@@ -221,13 +221,13 @@ async def _watched(
     job_id: str,
     context: InContext,
     last_event_id: LastEventId = None,
-) -> _Watched:
+) -> _WatchedJob:
     """The job to follow; refused here, before the answer begins, if there is none."""
     request, service, caller = context.request, context.service, context.caller
     row = await service.lanes.reads.run(caller.owner, service.job, job_id, caller)
     if last_event_id == END and row.state.finished:
         raise _AllSentError
-    return _Watched(
+    return _WatchedJob(
         service, request.app.state.looks, caller, job_id, last_event_id, HEADERS_ONLY in request.scope
     )
 
@@ -237,7 +237,7 @@ async def _watched(
     response_class=EventSourceResponse,
     responses={204: {"description": "`Last-Event-ID` is that of the end: do not connect again."}},
 )
-async def events(watched: Annotated[_Watched, Depends(_watched)]) -> AsyncIterator[ServerSentEvent]:
+async def events(watched: Annotated[_WatchedJob, Depends(_watched)]) -> AsyncIterator[ServerSentEvent]:
     """Follow a job: events when there is news, ten times a second at most, a comment after a long silence.
 
     `progress` has status, attempt, progress, points; `partial`, for kinds that follow one branch, its new

@@ -13,7 +13,7 @@ from service.http.dependencies import InContext, TypedRoute, tagged
 from service.jobs.kinds.registry.bodies import body_model
 from service.jobs.registry import JobKind
 from service.jobs.strict_json import encoded
-from service.schemas.answers import Answer, KindAnswer, KindList
+from service.schemas.answers import AnswerModel, KindAnswer, KindList
 from service.schemas.law_answers import LawList, law_list
 from solver.errors import SceneError
 from solver.scene.json_schema import plain, scene_schema
@@ -36,7 +36,7 @@ class FillRequest(BaseModel):
 FillBody = Annotated[FillRequest, Body(openapi_examples={"answers": {"value": _ANSWERS}})]
 
 
-class TemplateAnswer(Answer):
+class TemplateAnswer(AnswerModel):
     """A template: a case of which a scene is made.
 
     Attributes
@@ -50,13 +50,13 @@ class TemplateAnswer(Answer):
     questions: dict[str, Any]
 
 
-class TemplateList(Answer):
+class TemplateList(AnswerModel):
     """All templates."""
 
     items: list[TemplateAnswer]
 
 
-class TemplateScene(Answer):
+class TemplateScene(AnswerModel):
     """The tables of a scene."""
 
     scene: dict[str, Any]

@@ -10,12 +10,12 @@ from service.auth.callers import Scope
 from service.http.dependencies import TEXT, InContext, media
 from service.http.metrics import CONTENT_TYPE, Metrics
 from service.queue.health import Health, Probe, Readiness
-from service.schemas.answers import Answer
+from service.schemas.answers import AnswerModel
 
 router = APIRouter(tags=["health"])
 
 
-class Alive(Answer):
+class Alive(AnswerModel):
     """The process answers."""
 
     status: Literal["live"] = "live"

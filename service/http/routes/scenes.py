@@ -8,7 +8,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from fastapi import APIRouter, Body, Query, Response
 from pydantic import BaseModel, ConfigDict, Field
 
-from service.db.models import Scene
+from service.db.models import StoredScene
 from service.http.dependencies import TEXT, Context, InContext, JsonBody, TypedRoute, media
 from service.http.in_lane import computed, reading
 from service.jobs import answering
@@ -155,10 +155,10 @@ async def store_scene(body: JsonBody, context: InContext, response: Response) ->
     return _whole(scene)
 
 
-def _whole(scene: Scene) -> SceneDetail:
+def _whole(scene: StoredScene) -> SceneDetail:
     return SceneDetail.of(scene, scene=dict(scene.body))
 
 
-def _keep(context: Context, found: dict[str, Any]) -> tuple[Scene, bool]:
+def _keep(context: Context, found: dict[str, Any]) -> tuple[StoredScene, bool]:
     tables = json.loads(found["tables"])
     return context.service.scenes.of(context.caller).keep(found["name"], found["scene_hash"], tables)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.contacts.laws.parts import Motion
+from solver.contacts.laws.parts import ContactMotion
 from solver.scene.scene import AnyContact
 
 if TYPE_CHECKING:
@@ -75,7 +75,7 @@ def _contact(given: AnyContact, found: ContactResponse, tau: FloatArray) -> dict
     motion = None if given.is_rigid else given.motion_at(motions, found.load, force, tau[:-1])
     shares = None
     if motion is not None:
-        shares = {each.name.lower(): motion.count(each) / len(motion) for each in Motion}
+        shares = {each.name.lower(): motion.count(each) / len(motion) for each in ContactMotion}
     return {
         "name": found.name,
         "state": found.state.value,

@@ -9,7 +9,7 @@ from typing import Any
 from service.errors import MalformedBodyError
 from service.jobs.common.scene_text import issues_of_scene, read_text
 from service.jobs.registry import SceneSource
-from solver.scene.editing import Place, edited, place_at, places
+from solver.scene.editing import TextPlace, edited, place_at, places
 
 _AT = re.compile(r"\bline (\d+)(?:, column (\d+))?")
 
@@ -55,7 +55,7 @@ def _unreadable(text: str, detail: str) -> Told:
     return {"pointer": "", "detail": detail, "line": line, "column": column}
 
 
-def _told(text: str, root: Place | None, pointer: str, detail: str) -> Told:
+def _told(text: str, root: TextPlace | None, pointer: str, detail: str) -> Told:
     at = place_at(root, pointer).start if root is not None and pointer else 0
     line = text.count("\n", 0, at) + 1
     return {"pointer": pointer, "detail": detail, "line": line, "column": at - text.rfind("\n", 0, at)}

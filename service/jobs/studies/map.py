@@ -14,7 +14,7 @@ from service.jobs.common.scenes import CHECKED_BY, SCENE, stored_scene
 from service.jobs.common.sizes import MOST_POINTS, balance_issues
 from service.jobs.kind_view import Json
 from service.jobs.outputs import JobOutput, OnProgress, ShouldStop
-from service.jobs.parts import Part, PartOutput, Parts, PartStoppedError
+from service.jobs.parts import Division, JobPart, PartOutput, PartStoppedError
 from service.jobs.registry import Flag, JobKind
 from service.jobs.studies.peaks import PeaksResult
 from service.jobs.study import Study
@@ -77,15 +77,15 @@ class Map(Study, RangeRequest):
         return replace(super().as_kind(), run=PARTS.run, parts=PARTS)
 
 
-def split(spec: Mapping[str, Any]) -> list[Part]:
+def split(spec: Mapping[str, Any]) -> list[JobPart]:
     """The ridge, which takes longest, and strips of rows."""
     grid, ridge = _grid(spec), spec["ridge"]
     from solver.studies.response_map import OF_THE_GRID
 
     weight = (OF_THE_GRID if ridge else 1.0) / grid.steps
-    tracked = [Part(spec={"ridge": True}, weight=1.0 - OF_THE_GRID)] if ridge else []
+    tracked = [JobPart(spec={"ridge": True}, weight=1.0 - OF_THE_GRID)] if ridge else []
     return tracked + [
-        Part(spec={"rows": [first, last]}, weight=weight * (last - first)) for first, last in grid.strips
+        JobPart(spec={"rows": [first, last]}, weight=weight * (last - first)) for first, last in grid.strips
     ]
 
 
@@ -159,5 +159,5 @@ def _ridge(spec: Mapping[str, Any], progress: OnProgress, should_stop: ShouldSto
     return PartOutput(result={"ridge": strict_json.finite(track.to_json()), "sweeps": sweeps}, arrays=arrays)
 
 
-PARTS = Parts(split=split, run_part=run_part, join=join)
+PARTS = Division(split=split, run_part=run_part, join=join)
 STUDY = Map

@@ -18,7 +18,7 @@ from service.jobs.common.results import EndedResult, KnownResult, Table
 from service.jobs.common.scenes import FrequencyHz, HarmonicRequest, stored_scene
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
 from service.jobs.outputs import JobOutput, OnProgress, ShouldStop
-from service.jobs.parts import Part, PartOutput, Parts, PartStoppedError
+from service.jobs.parts import Division, JobPart, PartOutput, PartStoppedError
 from service.jobs.registry import Flag, JobKind
 from service.jobs.study import Study
 from solver.errors import Issue, SceneError, SettingError
@@ -158,13 +158,13 @@ class Mistuning(Study, HarmonicRequest):
         return replace(super().as_kind(), run=PARTS.run, parts=PARTS)
 
 
-def split(spec: Mapping[str, Any]) -> list[Part]:
+def split(spec: Mapping[str, Any]) -> list[JobPart]:
     """The tuned disk, and then some of the others at a time."""
     sectors = stored_scene(spec).structure.sector_count
     a_disk, samples = sectors * max(spec["harmonics"], 1), spec["samples"]
     size = max(math.ceil(_WORK_OF_A_PART / a_disk), math.ceil(samples / _MOST_DIVIDED))
-    return [Part(spec={"tuned": True})] + [
-        Part(spec={"first": first, "last": min(first + size, samples)}, weight=min(size, samples - first))
+    return [JobPart(spec={"tuned": True})] + [
+        JobPart(spec={"first": first, "last": min(first + size, samples)}, weight=min(size, samples - first))
         for first in range(0, samples, size)
     ]
 
@@ -258,5 +258,5 @@ def _peaks(part: PartOutput) -> list[BladePeaks]:
     ]  # fmt: skip
 
 
-PARTS = Parts(split=split, run_part=run_part, join=join)
+PARTS = Division(split=split, run_part=run_part, join=join)
 STUDY = Mistuning

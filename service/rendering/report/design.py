@@ -7,7 +7,7 @@ from html import escape
 from typing import Any
 
 import optim
-from service.rendering.report.responses import Line, Sweeps, linear_lines
+from service.rendering.report.responses import ReportLine, Sweeps, linear_lines
 from service.rendering.report.sections import (
     Designed,
     Json,
@@ -52,8 +52,8 @@ def design_report(given: Designed) -> str:
     after = scene.with_values(optimum)
     lines = [
         *linear_lines(after, tuple(optimum)),
-        Line(name="as given", branch=sweeps.of(scene), color=style.BLUE),
-        Line(name="optimum", branch=sweeps.of(after), color=style.VERMILION, width=2.0),
+        ReportLine(name="as given", branch=sweeps.of(scene), color=style.BLUE),
+        ReportLine(name="optimum", branch=sweeps.of(after), color=style.VERMILION, width=2.0),
     ]
     words = f"Amplitude of {scene.observe.dof} over frequency, as given and at the optimum{case.where}"
     parts = [
@@ -87,7 +87,7 @@ def _chosen(result: Json) -> Json:
     return {**point, "optimum": point["values"], "peak": peak, "status": result["status"]}
 
 
-def _figures(given: Designed, chosen: Json, lines: Sequence[Line], where: str) -> str:
+def _figures(given: Designed, chosen: Json, lines: Sequence[ReportLine], where: str) -> str:
     """The optimum, and what it changes."""
     rows: list[list[Any]] = []
     for name, value in chosen["optimum"].items():

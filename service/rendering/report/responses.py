@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import solver
-from optim.problem.cases import Case, read_cases
+from optim.problem.cases import LoadCase, read_cases
 from optim.problem.uncertainty_set import Coordinate, Disk, How
 from service.jobs.common.linear_limits import linear_limit
 from solver.continuation.branch import AnyBranch, Branch
@@ -28,7 +28,7 @@ _DOTTED: Dashes = (0, (1.2, 1.8))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Line:
+class ReportLine:
     """One response of the figure; without a branch it is not drawn."""
 
     name: str
@@ -76,7 +76,7 @@ class Sweeps:
         """The load case whose peak is highest at a design."""
         cases = read_cases(scene, problem.get("cases"))
 
-        def height(case: Case) -> float:
+        def height(case: LoadCase) -> float:
             found = self.of(case.scene.with_values(values))
             return 0.0 if found is None or found.peak is None else found.peak.value
 
@@ -93,7 +93,7 @@ class Governing:
     where: str
 
 
-def linear_lines(scene: Scene, paths: Sequence[str]) -> list[Line]:
+def linear_lines(scene: Scene, paths: Sequence[str]) -> list[ReportLine]:
     """The linear limits: the contacts of these parameters removed, and all stuck; none of other laws."""
     designed = {path.partition(".")[0] for path in paths}
     names = [contact.name for contact in scene.contacts]
@@ -106,7 +106,9 @@ def linear_lines(scene: Scene, paths: Sequence[str]) -> list[Line]:
         ("contacts stuck (linear)", linear_limit(scene, ()), DASHED),
     )
     return [
-        Line(name=name, branch=sweeps.of(limit), color=style.GREY, dashes=dashes, width=1.0, linear=True)
+        ReportLine(
+            name=name, branch=sweeps.of(limit), color=style.GREY, dashes=dashes, width=1.0, linear=True
+        )
         for name, limit, dashes in limits
     ]
 
@@ -131,7 +133,7 @@ def in_scenario(scene: Scene, scenario: Mapping[str, Any]) -> Scene:
     return Disk(**{**table, **{k: tuple(table[k]) for k in ("of", "values") if k in table}}).on(there)
 
 
-def comparison_figure(scene: Scene, lines: Sequence[Line]) -> Figure:
+def comparison_figure(scene: Scene, lines: Sequence[ReportLine]) -> Figure:
     """The responses on a logarithmic scale; at least one has a point."""
     curves = [(line, Response.of_branch(line.branch)) for line in lines if line.branch is not None]
     mine = [curve for line, curve in curves if not line.linear] or [curve for _, curve in curves]

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from optim.views.plots.designs import robust_figure
-from service.rendering.report.responses import DASHED, Line, Sweeps, in_scenario, linear_lines
+from service.rendering.report.responses import DASHED, ReportLine, Sweeps, in_scenario, linear_lines
 from service.rendering.report.sections import (
     Designed,
     Json,
@@ -79,20 +79,22 @@ def _sides(found: Json) -> list[tuple[str, Json]]:
     return [(name, found[name]) for name in ("nominal", "robust") if found[name] is not None]
 
 
-def _lines(scene: Scene, found: Json, sweeps: Sweeps) -> list[Line]:
+def _lines(scene: Scene, found: Json, sweeps: Sweeps) -> list[ReportLine]:
     """As given, and each optimum with nothing uncertain and in its worst scenario."""
-    lines = [Line(name="as given", branch=sweeps.of(scene), color=style.GREEN, width=1.0)]
+    lines = [ReportLine(name="as given", branch=sweeps.of(scene), color=style.GREEN, width=1.0)]
     for name, side in _sides(found):
         here = scene.with_values(by_path(side["values"]))
         color = _COLORS[name]
-        lines.append(Line(name=f"{name} optimum", branch=sweeps.of(here), color=color, width=2.0))
+        lines.append(ReportLine(name=f"{name} optimum", branch=sweeps.of(here), color=color, width=2.0))
         if side["worst"] is not None:
             worst = sweeps.worst(in_scenario(here, side["worst"]["scenario"]))
-            lines.append(Line(name=f"{name} optimum, worst case", branch=worst, color=color, dashes=DASHED))
+            lines.append(
+                ReportLine(name=f"{name} optimum, worst case", branch=worst, color=color, dashes=DASHED)
+            )
     return lines
 
 
-def _shown(lines: Sequence[Line]) -> Line:
+def _shown(lines: Sequence[ReportLine]) -> ReportLine:
     """The last response of one sector: a mistuned disk has a loop in every sector, too many to look at."""
     few = [line for line in lines if line.branch is None or not _written_out(line.branch)]
     return (few or lines)[-1]

@@ -13,7 +13,7 @@ from typing import Any
 import solver
 from service.jobs.registry import ABOUT_THE_RUN
 from service.rendering.report.about import about_section
-from service.rendering.report.responses import Line, comparison_figure
+from service.rendering.report.responses import ReportLine, comparison_figure
 from solver.continuation.branch import AnyBranch
 from solver.results import units
 from solver.results.notes import flag_words
@@ -83,7 +83,7 @@ def bounds_of(given: Designed, name: str) -> str:
     return "" if bounds is None else f"{units.number(bounds[0], 6)} to {parameter(path, bounds[1])}"
 
 
-def branch_table(lines: Sequence[Line]) -> str:
+def branch_table(lines: Sequence[ReportLine]) -> str:
     """Peak, error, place and band of every response that is not a linear limit, and what is doubtful."""
     rows: list[list[Any]] = []
     doubts: list[str] = []
@@ -119,7 +119,7 @@ def motion_section(branch: AnyBranch | None, where: str = "At the peak") -> str:
     return f"<h2>{escape(where)}</h2>{image(solution.plot(), words, words + '.')}{pairs(states)}"
 
 
-def response_section(scene: Scene, lines: Sequence[Line], words: str) -> str:
+def response_section(scene: Scene, lines: Sequence[ReportLine], words: str) -> str:
     """The responses in one picture, or that there are none; `words` end without a full stop."""
     if all(line.branch is None for line in lines):
         return "<p>No response could be computed over the band of the scene.</p>"

@@ -21,7 +21,7 @@ _ROUNDING = 1e-6  # relative excess over a limit up to which it is kept
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Table:
+class PrintedTable:
     """A table to print: heading, column heads, rows, and which columns are aligned right."""
 
     heading: str
@@ -39,7 +39,7 @@ def design(found: Json) -> None:
         print_table(table.heading, table.columns, table.rows, right=table.right)
 
 
-def design_tables(found: Json) -> tuple[Pairs, list[Table]]:
+def design_tables(found: Json) -> tuple[Pairs, list[PrintedTable]]:
     """What a design came to, and its tables: limits, what is active, local optima."""
     tables = (_limits(found), _active(found), _basins(found), _checked(found))
     return _pairs(found), [table for table in tables if table is not None]
@@ -190,7 +190,7 @@ def _errors(found: Json) -> Pairs:
     return pairs + [("warning", words) for words in found.get("warnings", ())]
 
 
-def _checked(found: Json) -> Table | None:
+def _checked(found: Json) -> PrintedTable | None:
     """The local optima again with more harmonics, where the estimated error is large."""
     checked: Sequence[Json] = found.get("checked", ())
     if not checked:
@@ -207,10 +207,10 @@ def _checked(found: Json) -> Table | None:
     ]
     columns = (*names, "harmonics", "peak", "keeps the limits")
     right = "".join(str(i) for i in range(min(len(names) + 2, 10)))
-    return Table(heading="Again with more harmonics", columns=columns, rows=rows, right=right)
+    return PrintedTable(heading="Again with more harmonics", columns=columns, rows=rows, right=right)
 
 
-def _limits(found: Json) -> Table | None:
+def _limits(found: Json) -> PrintedTable | None:
     """Every limit: what was asked, what is reached, and what is left or missing."""
     worst: dict[tuple[str, str, str, float], Json] = {}
     for row in found.get("rows", ()):
@@ -234,10 +234,10 @@ def _limits(found: Json) -> Table | None:
             what = what.removeprefix("-")
             asked, reached = f"≥ {amount(0.0 - row['bound'], unit)}", amount(0.0 - row["value"], unit)
         rows.append((what, asked, reached, holds))
-    return Table(heading="Limits", columns=("limit", "asked", "reached", ""), rows=rows, right="12")
+    return PrintedTable(heading="Limits", columns=("limit", "asked", "reached", ""), rows=rows, right="12")
 
 
-def _active(found: Json) -> Table | None:
+def _active(found: Json) -> PrintedTable | None:
     """The rows and bounds that hold the optimum, with their multipliers."""
     conditions = found.get("conditions")
     if not conditions:
@@ -252,10 +252,12 @@ def _active(found: Json) -> Table | None:
         for bound in conditions["bounds"]
     ]
     rows: list[tuple[str, ...]] = [(what, units.number(x)) for what, x in held if abs(x) > _COUNTS]
-    return Table(heading="Active", columns=("row", "multiplier"), rows=rows, right="1") if rows else None
+    return (
+        PrintedTable(heading="Active", columns=("row", "multiplier"), rows=rows, right="1") if rows else None
+    )
 
 
-def _basins(found: Json) -> Table | None:
+def _basins(found: Json) -> PrintedTable | None:
     """The local optima, if there are several."""
     basins: Sequence[Json] = found.get("basins", ())
     if len(basins) < 2:
@@ -273,4 +275,4 @@ def _basins(found: Json) -> Table | None:
     ]
     columns = (*names, "peak", "settled", "proven", "keeps the limits")
     right = "".join(str(i) for i in range(min(len(names) + 1, 10)))
-    return Table(heading="Local optima", columns=columns, rows=rows, right=right)
+    return PrintedTable(heading="Local optima", columns=columns, rows=rows, right=right)

@@ -18,11 +18,11 @@ from pydantic import model_validator
 
 from solver.contacts.fields import Between, Element, MemberName, Name, Real
 from solver.contacts.frames import NORMAL, TANGENT_1, TANGENT_2, InSpace
-from solver.contacts.laws.parts import Held, Motion, NormalLoad, Quantity, Row, Slider
+from solver.contacts.laws.parts import ContactMotion, LawQuantity, NormalLoad, RestStiffness, Row, Slider
 from solver.errors import SettingError
 
 if TYPE_CHECKING:
-    from solver.contacts.pieces.piece import Part
+    from solver.contacts.pieces.piece import ContactPart
     from solver.contacts.segments import Shares
 
 
@@ -50,7 +50,7 @@ class AnyContact(Element, InSpace):
     """``module:NAME`` of the kernel."""
     SECOND: ClassVar[str | None] = None
     """``module:NAME`` of the kernel of its second derivatives (`solver.contacts.kernels.second_laws`)."""
-    PARAMETERS: ClassVar[Mapping[str, Quantity]] = {}
+    PARAMETERS: ClassVar[Mapping[str, LawQuantity]] = {}
     """Its numbers that are parameter paths."""
     WORDS: ClassVar[Mapping[str, str]] = {}
     """What the schema of scenes says of keys, in place of the docstring's words."""
@@ -60,7 +60,7 @@ class AnyContact(Element, InSpace):
     """Those beside `between` that may not be left out, but in space."""
     DIRECTIONS: ClassVar[tuple[int, ...]] = ()
     """The direction of each of these in space; told by the keys if left out."""
-    HELD: ClassVar[tuple[Held, ...]]
+    HELD: ClassVar[tuple[RestStiffness, ...]]
     """What each port begins with at rest."""
 
     JENKINS: ClassVar[bool] = False
@@ -102,7 +102,7 @@ class AnyContact(Element, InSpace):
         return self.DIRECTIONS or tuple(_ALONG.get(key, TANGENT_1) for key in self.end_keys)
 
     @property
-    def held(self) -> tuple[Held, ...]:
+    def held(self) -> tuple[RestStiffness, ...]:
         """What each of its ports begins with at rest."""
         return self.HELD
 
@@ -124,7 +124,7 @@ class AnyContact(Element, InSpace):
         return tuple(getattr(self, key) for key in self.end_keys)
 
     @property
-    def parameters(self) -> Mapping[str, Quantity]:
+    def parameters(self) -> Mapping[str, LawQuantity]:
         """Its numbers that are parameter paths, with those it has because of its values."""
         return self.PARAMETERS
 
@@ -302,7 +302,7 @@ class AnyContact(Element, InSpace):
         del forces, load
         return 1.0
 
-    def motion_at(self, motions: Real, load: Real, force: Real, tau: Real) -> list[Motion] | None:
+    def motion_at(self, motions: Real, load: Real, force: Real, tau: Real) -> list[ContactMotion] | None:
         """Return what it does at every angle, where its force is `force`; None where it knows no such."""
         del motions, load, force, tau
         return None
@@ -312,7 +312,7 @@ class AnyContact(Element, InSpace):
         del motions, load
         return None
 
-    def perturbed(self, motions: Real, load: Real) -> tuple[Part, ...] | None:
+    def perturbed(self, motions: Real, load: Real) -> tuple[ContactPart, ...] | None:
         """Return how it follows small perturbations of a motion: its parts with their states, for stability.
 
         Parameters

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 
 from solver.contacts.fields import NonNegative, Real, Stiffness
 from solver.contacts.laws.friction import FrictionContact
-from solver.contacts.laws.parts import Motion, Row
+from solver.contacts.laws.parts import ContactMotion, Row
 from solver.errors import SettingError
 
 if TYPE_CHECKING:
-    from solver.contacts.pieces.piece import Part
+    from solver.contacts.pieces.piece import ContactPart
     from solver.contacts.segments import Shares
 
 
@@ -28,17 +28,17 @@ class SlidesOnALine(FrictionContact):
 
         return shares_of(segments_of(motions[0], load, self.kt, self.mu))
 
-    def perturbed(self, motions: Real, load: Real) -> tuple[Part, ...]:
+    def perturbed(self, motions: Real, load: Real) -> tuple[ContactPart, ...]:
         """Return how it follows small perturbations of a motion."""
         from solver.contacts.pieces.line import friction_pieces
-        from solver.contacts.pieces.piece import Part
+        from solver.contacts.pieces.piece import ContactPart
 
         if self.is_rigid:
             wanted = "must be finite here: what is known of the stability of a rigid contact is in the answer"
             raise SettingError(f"{self.name}.kt", self.kt, wanted)
         kn = None if self.normal_port is None else self.stiffnesses[self.normal_port]
         pieces = friction_pieces(motions[0], load, self.kt, self.mu, kn=kn)
-        return (Part(tuple(range(len(motions))), pieces),)
+        return (ContactPart(tuple(range(len(motions))), pieces),)
 
 
 class Contact(SlidesOnALine):
@@ -81,7 +81,7 @@ class Contact(SlidesOnALine):
         """How its force is found, in the words of a plan."""
         return "elastic Coulomb friction under a given load: closed form"
 
-    def motion_at(self, motions: Real, load: Real, force: Real, tau: Real) -> list[Motion]:
+    def motion_at(self, motions: Real, load: Real, force: Real, tau: Real) -> list[ContactMotion]:
         """Return what it does at every angle, by its segments."""
         from solver.contacts.segments import motion_at, segments_of
 

@@ -10,7 +10,7 @@ from pydantic import Field
 
 from solver.contacts.fields import NonNegative, Real
 from solver.contacts.kernels import columns
-from solver.contacts.laws.parts import Held, Row, Slider
+from solver.contacts.laws.parts import RestStiffness, Row, Slider
 from solver.contacts.laws.plane import CIRCLE, CIRCLE_SECOND, SlidesInAPlane
 from solver.errors import SettingError
 
@@ -39,7 +39,7 @@ class PlanarContact(SlidesInAPlane):
     FORCE: ClassVar[str] = "friction in two directions with one limit"
     END_KEYS: ClassVar[tuple[str, ...]] = ("between", "between_second")
     NEEDED_ENDS: ClassVar[tuple[str, ...]] = ("between_second",)
-    HELD: ClassVar[tuple[Held, ...]] = (Held(columns.KT), Held(columns.KT))
+    HELD: ClassVar[tuple[RestStiffness, ...]] = (RestStiffness(columns.KT), RestStiffness(columns.KT))
 
     law: Literal["coulomb-2d"]
     N0: NonNegative

@@ -11,7 +11,7 @@ from pydantic import model_validator
 from solver.contacts.fields import Between, Positive, Real
 from solver.contacts.kernels import columns
 from solver.contacts.laws.friction import FrictionContact
-from solver.contacts.laws.parts import Held, Quantity
+from solver.contacts.laws.parts import LawQuantity, RestStiffness
 from solver.contacts.laws.plane import CIRCLE, CIRCLE_SECOND, SlidesInAPlane
 
 _CLOSED = (columns.N0, 1)
@@ -48,13 +48,13 @@ class SpaceContact(SlidesInAPlane):
         "friction in two directions with one limit, under `N = N0 + N1 cos(ωt + N1_phase) + kn v`; "
         "`max(N, 0)` on the normal pair, if there is one"
     )
-    PARAMETERS: ClassVar[Mapping[str, Quantity]] = {
+    PARAMETERS: ClassVar[Mapping[str, LawQuantity]] = {
         **FrictionContact.PARAMETERS,
-        "kt_second": Quantity(
+        "kt_second": LawQuantity(
             column=columns.KT_SECOND, unit="N/m", least=0.0, wanted="must be a number > 0 and <= 1e15 [N/m]",
             otherwise=("kt",),
         ),
-        "kn": Quantity(
+        "kn": LawQuantity(
             column=columns.KN, unit="N/m", least=0.0, wanted="must be a number > 0 and <= 1e15 [N/m]"
         ),
     }  # fmt: skip
@@ -64,8 +64,9 @@ class SpaceContact(SlidesInAPlane):
     }
     END_KEYS: ClassVar[tuple[str, ...]] = ("between", "between_second", "normal_between")
     NEEDED_ENDS: ClassVar[tuple[str, ...]] = ("between_second",)
-    HELD: ClassVar[tuple[Held, ...]] = (
-        Held(columns.KT, *_CLOSED), Held(columns.KT_SECOND, *_CLOSED), Held(columns.KN, *_CLOSED),
+    HELD: ClassVar[tuple[RestStiffness, ...]] = (
+        RestStiffness(columns.KT, *_CLOSED), RestStiffness(columns.KT_SECOND, *_CLOSED),
+        RestStiffness(columns.KN, *_CLOSED),
     )  # fmt: skip
 
     law: Literal["coulomb-3d"]
@@ -104,12 +105,12 @@ class SpaceContact(SlidesInAPlane):
         return None if self.kn is None else 2
 
     @property
-    def held(self) -> tuple[Held, ...]:
+    def held(self) -> tuple[RestStiffness, ...]:
         """What each of its ports begins with at rest."""
         second = columns.KT if self.kt_second is None else columns.KT_SECOND
         if self.kn is None:
-            return Held(columns.KT), Held(second)
-        return self.HELD[0], Held(second, *_CLOSED), self.HELD[2]
+            return RestStiffness(columns.KT), RestStiffness(second)
+        return self.HELD[0], RestStiffness(second, *_CLOSED), self.HELD[2]
 
     @property
     def stiffnesses(self) -> tuple[float, ...]:

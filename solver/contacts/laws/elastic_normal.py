@@ -9,7 +9,7 @@ from solver.contacts.fields import Between, Real, Stiffness
 from solver.contacts.kernels import columns
 from solver.contacts.laws.coulomb import SlidesOnALine
 from solver.contacts.laws.friction import FrictionContact
-from solver.contacts.laws.parts import Follows, Held, Quantity, Row
+from solver.contacts.laws.parts import Follows, LawQuantity, RestStiffness, Row
 
 _CLOSED = (columns.N0, 1)
 
@@ -39,14 +39,14 @@ class ElasticNormalContact(SlidesOnALine):
     )
     KERNEL: ClassVar[str] = "solver.contacts.kernels.coulomb.elastic_normal:elastic_normal"
     SECOND: ClassVar[str | None] = "solver.contacts.kernels.coulomb.second_law:elastic_normal_second"
-    PARAMETERS: ClassVar[Mapping[str, Quantity]] = {
+    PARAMETERS: ClassVar[Mapping[str, LawQuantity]] = {
         **FrictionContact.PARAMETERS,
         # It may stand apart at rest.
-        "N0": Quantity(
+        "N0": LawQuantity(
             column=columns.N0, unit="N",
             wanted="must be a number >= 0 (from -1e15 with the law elastic-normal) and <= 1e15 [N]",
         ),
-        "kn": Quantity(
+        "kn": LawQuantity(
             column=columns.KN, unit="N/m", least=0.0, wanted="must be a number > 0 and <= 1e15 [N/m], or inf"
         ),
     }  # fmt: skip
@@ -56,7 +56,10 @@ class ElasticNormalContact(SlidesOnALine):
     }
     END_KEYS: ClassVar[tuple[str, ...]] = ("between", "normal_between")
     NEEDED_ENDS: ClassVar[tuple[str, ...]] = ("normal_between",)
-    HELD: ClassVar[tuple[Held, ...]] = (Held(columns.KT, *_CLOSED), Held(columns.KN, *_CLOSED))
+    HELD: ClassVar[tuple[RestStiffness, ...]] = (
+        RestStiffness(columns.KT, *_CLOSED),
+        RestStiffness(columns.KN, *_CLOSED),
+    )
     OPENS: ClassVar[bool] = True
     NORMAL_PORT: ClassVar[int | None] = 1
 

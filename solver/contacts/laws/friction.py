@@ -13,7 +13,7 @@ from solver.contacts.fields import Angle, Friction, Positive, Real, Signed
 from solver.contacts.kernels import columns
 from solver.contacts.laws.base import AnyContact
 from solver.contacts.laws.harmonics import LoadHarmonic, as_harmonics, higher_quantity, named_apart, order_of
-from solver.contacts.laws.parts import Held, NormalLoad, Quantity, Slider, Span
+from solver.contacts.laws.parts import LawQuantity, NormalLoad, RestStiffness, Slider, Span
 from solver.errors import SettingError
 
 _LEAST_FRICTION = 0.1  # in a linear limit: what must stick does so with a load of reason
@@ -34,27 +34,27 @@ class FrictionContact(AnyContact):
 
     model_config = ConfigDict(serialize_by_alias=True)
 
-    PARAMETERS: ClassVar[Mapping[str, Quantity]] = {
-        "N0": Quantity(
+    PARAMETERS: ClassVar[Mapping[str, LawQuantity]] = {
+        "N0": LawQuantity(
             column=columns.N0, unit="N", least=0.0,
             wanted="must be a number >= 0 (from -1e15 with the law elastic-normal) and <= 1e15 [N]",
         ),
-        "N1": Quantity(
+        "N1": LawQuantity(
             column=columns.N1, unit="N", wanted="must be a number from -1e15 to 1e15 [N]",
             unlike_half_waves=_VARIATION, breaks_symmetry=True, varies_load=True,
             otherwise=("N1_ratio", "N0"), covered=Span(low=0.0, high=4.0, of="N0"),
         ),
-        "N1_ratio": Quantity(
+        "N1_ratio": LawQuantity(
             column=columns.RATIO, unit="", unlike_half_waves=_VARIATION, breaks_symmetry=True,
             varies_load=True, by_hand=False,
         ),
-        "N1_phase": Quantity(
+        "N1_phase": LawQuantity(
             column=columns.PHASE, unit="rad", wanted="must be a number from -1e4 to 1e4 [rad]", by_hand=False
         ),
-        "kt": Quantity(
+        "kt": LawQuantity(
             column=columns.KT, unit="N/m", least=0.0, wanted="must be a number > 0 and <= 1e15 [N/m]"
         ),
-        "mu": Quantity(
+        "mu": LawQuantity(
             column=columns.MU, unit="", least=0.0, wanted="must be a number >= 0 and <= 100", symbol="μ",
             covered=Span(low=0.0, high=1.0),
         ),
@@ -69,7 +69,7 @@ class FrictionContact(AnyContact):
         "load": "The normal load as a Fourier list: its mean [N], which may stand as N0 instead, then for "
         "each harmonic amplitude cos(order ωt + phase) a table of `order`, `amplitude` [N], `phase` [rad].",
     }
-    HELD: ClassVar[tuple[Held, ...]] = (Held(columns.KT),)
+    HELD: ClassVar[tuple[RestStiffness, ...]] = (RestStiffness(columns.KT),)
     RUBBING: ClassVar[tuple[int, ...]] = (0,)
 
     kt: Positive
@@ -141,7 +141,7 @@ class FrictionContact(AnyContact):
         )  # fmt: skip
 
     @property
-    def parameters(self) -> Mapping[str, Quantity]:
+    def parameters(self) -> Mapping[str, LawQuantity]:
         """Its numbers that are parameter paths: amplitude and phase of every harmonic of the load too."""
         found = dict(self.PARAMETERS)
         for each in self.higher_load or ():

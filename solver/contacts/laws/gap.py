@@ -11,10 +11,10 @@ from solver.contacts.fields import NonNegative, Real, Signed
 from solver.contacts.frames import NORMAL
 from solver.contacts.kernels import columns
 from solver.contacts.laws.base import AnyContact
-from solver.contacts.laws.parts import Follows, Held, Motion, Quantity, Row
+from solver.contacts.laws.parts import ContactMotion, Follows, LawQuantity, RestStiffness, Row
 
 if TYPE_CHECKING:
-    from solver.contacts.pieces.piece import Part
+    from solver.contacts.pieces.piece import ContactPart
     from solver.contacts.segments import Shares
 
 
@@ -33,14 +33,14 @@ class GapSpring(AnyContact):
     FORCE: ClassVar[str] = "`k max(u - gap, 0)`"
     KERNEL: ClassVar[str] = "solver.contacts.kernels.springs.force:gap_spring"
     SECOND: ClassVar[str | None] = "solver.contacts.kernels.springs.second_law:gap_second"
-    PARAMETERS: ClassVar[Mapping[str, Quantity]] = {
-        "k": Quantity(
+    PARAMETERS: ClassVar[Mapping[str, LawQuantity]] = {
+        "k": LawQuantity(
             column=columns.K_GAP, unit="N/m", least=0.0, wanted="must be a number >= 0 and <= 1e15 [N/m]"
         ),
-        "gap": Quantity(column=columns.GAP, unit="m", wanted="must be a number from -1e15 to 1e15 [m]"),
+        "gap": LawQuantity(column=columns.GAP, unit="m", wanted="must be a number from -1e15 to 1e15 [m]"),
     }
     DIRECTIONS: ClassVar[tuple[int, ...]] = (NORMAL,)
-    HELD: ClassVar[tuple[Held, ...]] = (Held(columns.K_GAP, columns.GAP, -1),)
+    HELD: ClassVar[tuple[RestStiffness, ...]] = (RestStiffness(columns.K_GAP, columns.GAP, -1),)
     OPENS: ClassVar[bool] = True
 
     law: Literal["gap"]
@@ -76,10 +76,10 @@ class GapSpring(AnyContact):
         u = fourier.basis(tau, (motions.shape[1] - 1) // 2) @ motions[0]
         return np.asarray(self.k * np.maximum(u - self.gap, 0.0))
 
-    def motion_at(self, motions: Real, load: Real, force: Real, tau: Real) -> list[Motion]:
+    def motion_at(self, motions: Real, load: Real, force: Real, tau: Real) -> list[ContactMotion]:
         """Return what it does at every angle: it is closed where it pushes."""
         del motions, load, tau
-        return [Motion.SEPARATION if each == 0.0 else Motion.STICK for each in force]
+        return [ContactMotion.SEPARATION if each == 0.0 else ContactMotion.STICK for each in force]
 
     def shares(self, motions: Real, load: Real) -> Shares:
         """Return the shares of the period: u − gap > 0 is the load of a contact that does not slide."""
@@ -90,13 +90,13 @@ class GapSpring(AnyContact):
         opening[0] -= self.gap
         return shares_of(segments_of(np.zeros(opening.size), opening, 1.0, 1.0))
 
-    def perturbed(self, motions: Real, load: Real) -> tuple[Part, ...]:
+    def perturbed(self, motions: Real, load: Real) -> tuple[ContactPart, ...]:
         """Return how it follows small perturbations of a motion."""
-        from solver.contacts.pieces.piece import Part
+        from solver.contacts.pieces.piece import ContactPart
         from solver.contacts.pieces.springs import gap_pieces
 
         del load
-        return (Part((0,), gap_pieces(motions[0], self.k, self.gap)),)
+        return (ContactPart((0,), gap_pieces(motions[0], self.k, self.gap)),)
 
     def rows(self) -> tuple[Row, ...]:
         """Return its row of the time march."""

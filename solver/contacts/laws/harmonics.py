@@ -15,7 +15,7 @@ from pydantic import Field
 
 from solver.contacts.fields import Angle, Part, Signed
 from solver.contacts.kernels.columns import wave_column
-from solver.contacts.laws.parts import Quantity
+from solver.contacts.laws.parts import LawQuantity
 
 MOST_ORDER = 1000
 _PATH = re.compile(r"N([1-9]\d{0,3})(_phase)?")
@@ -70,16 +70,16 @@ def is_of_variation(key: str) -> bool:
     return key in ("N1", "N1_ratio") or is_phase(key) or order_of(key) is not None
 
 
-def higher_quantity(key: str) -> Quantity:
+def higher_quantity(key: str) -> LawQuantity:
     """Return what amplitude or phase of a harmonic from the second on is."""
     order = order_of(key) or 0
     if key.endswith("_phase"):
-        return Quantity(
+        return LawQuantity(
             column=wave_column(order) + 1, unit="rad", wanted="must be a number from -1e4 to 1e4 [rad]",
             by_hand=False,
         )  # fmt: skip
     odd = bool(order % 2)
-    return Quantity(
+    return LawQuantity(
         column=wave_column(order), unit="N", wanted="must be a number from -1e15 to 1e15 [N]",
         unlike_half_waves="changes the variation of a normal load" if odd else "", breaks_symmetry=odd,
         varies_load=True, load_order=order, by_hand=False,

@@ -36,7 +36,7 @@ class Span:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Quantity:
+class LawQuantity:
     """A parameter of a law.
 
     Attributes
@@ -208,7 +208,7 @@ class Slider:
         )
 
 
-class Held(NamedTuple):
+class RestStiffness(NamedTuple):
     """What a port begins with at rest: a stiffness, where a number is above 0 (or always).
 
     Attributes
@@ -284,7 +284,7 @@ class Row:
     numbers: tuple[float, ...] = field(default=())
 
 
-class Motion(Enum):
+class ContactMotion(Enum):
     """What a contact does at an instant; the value is what a client reads."""
 
     STICK = 0

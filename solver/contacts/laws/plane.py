@@ -10,7 +10,7 @@ from solver.contacts.laws.friction import FrictionContact
 from solver.contacts.laws.parts import Follows, Row, Slider
 
 if TYPE_CHECKING:
-    from solver.contacts.pieces.piece import Part
+    from solver.contacts.pieces.piece import ContactPart
     from solver.contacts.segments import Shares
 
 CIRCLE = "solver.contacts.kernels.circle.law:coulomb_circle"
@@ -69,20 +69,20 @@ class SlidesInAPlane(FrictionContact):
 
         return shares_in_space(path_in_space(motions, load, *self.tangential, self.mu))
 
-    def perturbed(self, motions: Real, load: Real) -> tuple[Part, ...]:
+    def perturbed(self, motions: Real, load: Real) -> tuple[ContactPart, ...]:
         """Return how it follows small perturbations of a motion; a sampled limit as the exact one does."""
         from solver.contacts.pieces.circle import circle_pieces
         from solver.contacts.pieces.line import friction_pieces
-        from solver.contacts.pieces.piece import Part
+        from solver.contacts.pieces.piece import ContactPart
         from solver.contacts.space_path import path_in_space
 
         kn = None if self.normal_port is None else self.stiffnesses[self.normal_port]
         if not self.limits_apart:
             path = path_in_space(motions, load, *self.tangential, self.mu)
-            return (Part(tuple(range(len(motions))), circle_pieces(path, kn)),)
+            return (ContactPart(tuple(range(len(motions))), circle_pieces(path, kn)),)
         behind = () if self.normal_port is None else (self.normal_port,)
         return tuple(
-            Part(
+            ContactPart(
                 (port, *behind),
                 friction_pieces(motions[port], load, kt, self.mu, kn=kn, presses=port == 0),
             )

@@ -12,14 +12,14 @@ from solver.contacts.fields import Real, Signed
 from solver.contacts.frames import NORMAL
 from solver.contacts.kernels import columns
 from solver.contacts.laws.base import AnyContact
-from solver.contacts.laws.parts import Follows, Held, Quantity, Row
+from solver.contacts.laws.parts import Follows, LawQuantity, RestStiffness, Row
 
 if TYPE_CHECKING:
-    from solver.contacts.pieces.piece import Part
+    from solver.contacts.pieces.piece import ContactPart
 
 
-def _coefficient(power: int) -> Quantity:
-    return Quantity(
+def _coefficient(power: int) -> LawQuantity:
+    return LawQuantity(
         column=columns.A_1 + power - 1, unit="N/m" if power == 1 else f"N/m^{power}",
         unlike_half_waves="changes a power of the motion", breaks_symmetry=power % 2 == 0,
     )  # fmt: skip
@@ -32,14 +32,14 @@ class PolynomialSpring(AnyContact):
     FORCE: ClassVar[str] = "`a1 u + a2 u² + … + a9 u⁹`"
     KERNEL: ClassVar[str] = "solver.contacts.kernels.springs.force:polynomial_spring"
     SECOND: ClassVar[str | None] = "solver.contacts.kernels.springs.second_law:polynomial_second"
-    PARAMETERS: ClassVar[Mapping[str, Quantity]] = {
+    PARAMETERS: ClassVar[Mapping[str, LawQuantity]] = {
         f"a{j}": _coefficient(j) for j in range(1, columns.MOST_DEGREE + 1)
     }
     WORDS: ClassVar[Mapping[str, str]] = {
         f"a{j}": f"Coefficient of u^{j} [N/m^{j}]." for j in range(1, columns.MOST_DEGREE + 1)
     }
     DIRECTIONS: ClassVar[tuple[int, ...]] = (NORMAL,)
-    HELD: ClassVar[tuple[Held, ...]] = (Held(columns.A_1),)
+    HELD: ClassVar[tuple[RestStiffness, ...]] = (RestStiffness(columns.A_1),)
 
     law: Literal["polynomial"]
     a1: Signed | None = None
@@ -115,13 +115,13 @@ class PolynomialSpring(AnyContact):
         u = fourier.basis(tau, (motions.shape[1] - 1) // 2) @ motions[0]
         return np.asarray(np.polyval([*self.coefficients[::-1], 0.0], u))
 
-    def perturbed(self, motions: Real, load: Real) -> tuple[Part, ...]:
+    def perturbed(self, motions: Real, load: Real) -> tuple[ContactPart, ...]:
         """Return how it follows small perturbations of a motion."""
-        from solver.contacts.pieces.piece import Part
+        from solver.contacts.pieces.piece import ContactPart
         from solver.contacts.pieces.springs import polynomial_pieces
 
         del load
-        return (Part((0,), polynomial_pieces(motions[0], self.coefficients)),)
+        return (ContactPart((0,), polynomial_pieces(motions[0], self.coefficients)),)
 
     def rows(self) -> tuple[Row, ...]:
         """Return its row of the time march."""

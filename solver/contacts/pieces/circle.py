@@ -35,7 +35,7 @@ from solver.contacts.kernels.circle.path import (
 )
 from solver.contacts.kernels.circle.radau import between
 from solver.contacts.kernels.stick_slip_events import SLIP
-from solver.contacts.pieces.piece import SHORTEST, TURN, Entry, Piece, Rates, spring, steady
+from solver.contacts.pieces.piece import SHORTEST, TURN, Rates, StateEntry, StatePiece, spring, steady
 from solver.contacts.space_path import SpacePath
 from solver.jit import fourier
 
@@ -72,7 +72,7 @@ class _Motion:
         return float(between(panel[START], np.ascontiguousarray(panel[START + 1 : PANEL_COLUMNS]), place))
 
 
-def circle_pieces(path: SpacePath, kn: float | None) -> tuple[Piece, ...]:
+def circle_pieces(path: SpacePath, kn: float | None) -> tuple[StatePiece, ...]:
     """Return the states of a contact in space with two or, where the load moves, three motions."""
     if path.mu == 0.0 or not len(path.pieces):
         return _without_friction(path, kn)
@@ -94,7 +94,7 @@ def circle_pieces(path: SpacePath, kn: float | None) -> tuple[Piece, ...]:
     return tuple(pieces)
 
 
-def _without_friction(path: SpacePath, kn: float | None) -> tuple[Piece, ...]:
+def _without_friction(path: SpacePath, kn: float | None) -> tuple[StatePiece, ...]:
     """Return when the normal load alone acts."""
     from solver.contacts.pieces.springs import gap_pieces
 
@@ -119,15 +119,17 @@ def _tangent(block: Real, kn: float | None, column: Real) -> Real:
     return np.concatenate([rows, np.broadcast_to([0.0, 0.0, kn], (*rows.shape[:-2], 1, 3))], axis=-2)
 
 
-def _stick(path: SpacePath, kn: float | None, begin: float, end: float, entry: Entry | None) -> Piece:
+def _stick(
+    path: SpacePath, kn: float | None, begin: float, end: float, entry: StateEntry | None
+) -> StatePiece:
     K = np.diag(path.kt)
     grip = -K if kn is None else np.vstack([-K, np.zeros(2)])
     carried = _padded(np.eye(2), kn)
     rates = steady(_tangent(K, kn, np.zeros(2)), grip)
-    return Piece(begin=begin, end=end, rates=rates, entry=entry, carried=carried)
+    return StatePiece(begin=begin, end=end, rates=rates, entry=entry, carried=carried)
 
 
-def _entry(motion: _Motion, kn: float | None, row: Real, before: Real | None) -> Entry:
+def _entry(motion: _Motion, kn: float | None, row: Real, before: Real | None) -> StateEntry:
     """Return what is remembered where a state begins, after another or after separation."""
     path, begin = motion.path, float(row[BEGIN])
     K, by_load = np.diag(path.kt), path.mu * (kn or 0.0)
@@ -136,22 +138,22 @@ def _entry(motion: _Motion, kn: float | None, row: Real, before: Real | None) ->
     slips = row[MOTION] == SLIP
     if before is None:
         if slips:
-            return Entry(np.zeros((1, m)), None)
-        return Entry(_padded(np.eye(2), kn, -rate[0] * by_load / limit_rate[0] if kn else None), None)
+            return StateEntry(np.zeros((1, m)), None)
+        return StateEntry(_padded(np.eye(2), kn, -rate[0] * by_load / limit_rate[0] if kn else None), None)
     slipped = before[MOTION] == SLIP
     if slipped and slips:
-        return Entry(np.zeros((1, m)), np.eye(1))
+        return StateEntry(np.zeros((1, m)), np.eye(1))
     if not slipped and not slips:
-        return Entry(np.zeros((2, m)), np.eye(2))
+        return StateEntry(np.zeros((2, m)), np.eye(2))
     n, m_way = _ways(motion.direction(row if slips else before, begin if slips else float(before[END])))
     if slips:
         along = float(m_way @ K @ n) / float(n @ K @ n)
         onto = (m_way - along * n) / path.kt[0]
-        return Entry(
+        return StateEntry(
             _padded((onto @ K)[None, :], kn, np.array([along * by_load / path.kt[0]])), -(onto @ K)[None, :]
         )
     F = np.linalg.inv(K)
-    return Entry(_padded(np.eye(2), kn, -F @ n * by_load), -path.kt[0] * (F @ m_way)[:, None])
+    return StateEntry(_padded(np.eye(2), kn, -F @ n * by_load), -path.kt[0] * (F @ m_way)[:, None])
 
 
 def _ways(theta: float | Real) -> tuple[Real, Real]:
@@ -159,13 +161,13 @@ def _ways(theta: float | Real) -> tuple[Real, Real]:
     return np.stack([c, s], axis=-1), np.stack([-s, c], axis=-1)
 
 
-def _slip(motion: _Motion, kn: float | None, row: Real, entry: Entry) -> Piece:
+def _slip(motion: _Motion, kn: float | None, row: Real, entry: StateEntry) -> StatePiece:
     path = motion.path
     begin, end = float(row[BEGIN]), float(row[END])
     panels = path.panels[int(row[FIRST]) : int(row[FIRST]) + int(row[COUNT])]
     edges = tuple(float(edge) for edge in panels[:-1, TO])
     size = 2 if kn is None else 3
-    return Piece(
+    return StatePiece(
         begin=begin, end=end, rates=_slip_rates(motion, kn, row), entry=entry, carried=np.zeros((1, size)),
         edges=edges,
     )  # fmt: skip

@@ -30,7 +30,7 @@ from solver.contacts.kernels.stick_slip_events import (
     MOTION,
     STICK,
 )
-from solver.contacts.pieces.piece import SHORTEST, TURN, Entry, Piece, spring, steady
+from solver.contacts.pieces.piece import SHORTEST, TURN, StateEntry, StatePiece, spring, steady
 from solver.contacts.segments import segments_of
 from solver.errors import SettingError
 from solver.jit import fourier
@@ -38,7 +38,7 @@ from solver.jit import fourier
 
 def friction_pieces(
     slip: Real, load: Real, kt: float, mu: float, *, kn: float | None = None, presses: bool = True
-) -> tuple[Piece, ...]:
+) -> tuple[StatePiece, ...]:
     """Return the states of friction in one direction.
 
     Parameters
@@ -73,9 +73,9 @@ def friction_pieces(
         if row[BEGAN] != AFTER_SLIP and by_load > 0.0 and end - begin < TURN - SHORTEST:
             follows = -_slope(slip, begin) * by_load / _slope(load, begin)
         always = end - begin >= TURN - SHORTEST
-        entry = None if always else Entry(np.array([[1.0, follows]])[:, :m], None)
+        entry = None if always else StateEntry(np.array([[1.0, follows]])[:, :m], None)
         rates = steady(tangent[:m, :m], np.array([[-kt], [0.0]])[:m])
-        pieces.append(Piece(begin=begin, end=end, rates=rates, entry=entry, carried=np.eye(1, m)))
+        pieces.append(StatePiece(begin=begin, end=end, rates=rates, entry=entry, carried=np.eye(1, m)))
     return tuple(pieces)
 
 

@@ -37,7 +37,7 @@ class Rates(NamedTuple):
     own: Real
 
 
-class Entry(NamedTuple):
+class StateEntry(NamedTuple):
     """What is remembered where a state begins; `from_memory` None: nothing was before.
 
     from_motion (s, m), from_memory (s, s⁻).
@@ -48,7 +48,7 @@ class Entry(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Piece:
+class StatePiece:
     """One state of a contact with m motions.
 
     Attributes
@@ -68,7 +68,7 @@ class Piece:
     begin: float
     end: float
     rates: Rates | Callable[[Real], Rates]
-    entry: Entry | None = None
+    entry: StateEntry | None = None
     carried: Real
     edges: tuple[float, ...] = ()
 
@@ -102,7 +102,7 @@ class Piece:
         """Whether it lasts at `tau`."""
         return (tau - self.begin) % TURN < self.lasts or self.lasts >= TURN
 
-    def earlier(self, turn: float) -> Piece:
+    def earlier(self, turn: float) -> StatePiece:
         """Return the same state a part of a period earlier [rad]."""
         rates = self.rates
         moved = rates if isinstance(rates, Rates) else lambda tau: rates(tau + turn)
@@ -110,14 +110,14 @@ class Piece:
         return replace(self, begin=self.begin - turn, end=self.end - turn, rates=moved, edges=edges)
 
 
-class Part(NamedTuple):
+class ContactPart(NamedTuple):
     """What pulls along some of the motions of a contact: those, and its states one after the other.
 
     Where no state lasts it exerts no force (separation).
     """
 
     ports: tuple[int, ...]
-    pieces: tuple[Piece, ...]
+    pieces: tuple[StatePiece, ...]
 
 
 def steady(tangent: Real, grip: Real | None = None) -> Rates:
@@ -128,6 +128,6 @@ def steady(tangent: Real, grip: Real | None = None) -> Rates:
     return Rates(tangent, grip, np.zeros((s, m)), np.zeros((s, m)), np.zeros((s, s)))
 
 
-def spring(begin: float, end: float, tangent: Real) -> Piece:
+def spring(begin: float, end: float, tangent: Real) -> StatePiece:
     """Return a state that is a spring."""
-    return Piece(begin=begin, end=end, rates=steady(tangent), carried=np.zeros((0, tangent.shape[0])))
+    return StatePiece(begin=begin, end=end, rates=steady(tangent), carried=np.zeros((0, tangent.shape[0])))

@@ -6,12 +6,12 @@ import numpy as np
 
 from solver.contacts.fields import Real
 from solver.contacts.kernels.stick_slip_events import BEGIN, END
-from solver.contacts.pieces.piece import SHORTEST, TURN, Piece, Rates, spring
+from solver.contacts.pieces.piece import SHORTEST, TURN, Rates, StatePiece, spring
 from solver.contacts.segments import segments_of
 from solver.jit import fourier
 
 
-def gap_pieces(motion: Real, stiffness: float, gap: float) -> tuple[Piece, ...]:
+def gap_pieces(motion: Real, stiffness: float, gap: float) -> tuple[StatePiece, ...]:
     """Return when a spring on one side is closed; the force is continuous, so that nothing jumps."""
     opening = motion.copy()
     opening[0] -= gap
@@ -20,7 +20,7 @@ def gap_pieces(motion: Real, stiffness: float, gap: float) -> tuple[Piece, ...]:
     return tuple(spring(*when, np.array([[stiffness]])) for when in closed if when[1] - when[0] > SHORTEST)
 
 
-def polynomial_pieces(motion: Real, powers: tuple[float, ...]) -> tuple[Piece, ...]:
+def polynomial_pieces(motion: Real, powers: tuple[float, ...]) -> tuple[StatePiece, ...]:
     """Return the one state of a spring with the force Σ a_j u^j, its stiffness Σ j a_j u^(j−1)."""
     slopes = [j * a for j, a in enumerate(powers, start=1)]
     if not any(slopes[1:]):
@@ -34,4 +34,4 @@ def polynomial_pieces(motion: Real, powers: tuple[float, ...]) -> tuple[Piece, .
         return Rates(stiffness[:, None, None], none.swapaxes(1, 2), none, none, none[:, :, :0])
 
     edges = tuple(k * TURN / 8.0 for k in range(1, 8))
-    return (Piece(begin=0.0, end=TURN, rates=rates, carried=np.zeros((0, 1)), edges=edges),)
+    return (StatePiece(begin=0.0, end=TURN, rates=rates, carried=np.zeros((0, 1)), edges=edges),)

@@ -18,7 +18,7 @@ from solver.contacts.kernels.system import DENSE
 from solver.continuation.branch import Branch
 from solver.continuation.branches.sweep import surveyed, with_error, with_points
 from solver.continuation.extrema.extrema import Survey
-from solver.continuation.extrema.nodes import Node, NodeSolver, Points, numbers_of
+from solver.continuation.extrema.nodes import NodeSolver, PointRow, Points, numbers_of
 from solver.continuation.peaks import Peak
 from solver.jit.fourier import Real
 from solver.linear.kernels.receptance import observer_receptance, receptance
@@ -125,7 +125,7 @@ class _Observers:
         self._x = np.empty((len(workspaces), 0, table.observed.shape[1]))
         self._measures = np.empty((len(workspaces), 0, table.measures.shape[1]))
 
-    def seen_by(self, j: int, nodes: Sequence[Node]) -> list[Node]:
+    def seen_by(self, j: int, nodes: Sequence[PointRow]) -> list[PointRow]:
         """Return the nodes as DOF number j sees them."""
         rows, table = numbers_of(nodes), self._solver.table
         more = len(table.measures) - self._known.size

@@ -22,7 +22,7 @@ from solver.balance.balance import Balance
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.system import DENSE, MODES
 from solver.continuation.branch import BranchStatus
-from solver.continuation.extrema.nodes import Node, NodeSolver
+from solver.continuation.extrema.nodes import NodeSolver, PointRow
 from solver.continuation.loose_parts import ending
 from solver.continuation.segment import Stretch
 from solver.jit.fourier import Real
@@ -78,8 +78,8 @@ def walk_by_points(
     solver = NodeSolver(workspace)
     onward = float(np.sign(stop - before.solutions[-1, -1])) or 1.0
     at, step = float(before.solutions[-1, -1]), FIRST * span
-    last: Node | None = solver.at(at, [before.solutions[-1, :-1]], onward)
-    nodes: list[Node] = []
+    last: PointRow | None = solver.at(at, [before.solutions[-1, :-1]], onward)
+    nodes: list[PointRow] = []
     status: BranchStatus | None = None if last is not None else BranchStatus.STALLED
     rejected = 0
     while status is None and last is not None:
@@ -125,7 +125,7 @@ def _moved(balance: Balance, u: Real) -> float:
 
 
 def _stretch(
-    before: Stretch, nodes: list[Node], status: BranchStatus | None, solver: NodeSolver, rejected: int,
+    before: Stretch, nodes: list[PointRow], status: BranchStatus | None, solver: NodeSolver, rejected: int,
     begun: float,
 ) -> Stretch:  # fmt: skip
     """Return nodes as points behind others; without the state of a continuation, since there is none."""

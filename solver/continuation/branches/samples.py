@@ -22,7 +22,7 @@ from solver.continuation.branches.point_by_point import is_unique
 from solver.continuation.branches.sweep import check_range, points_of, walk
 from solver.continuation.branches.symmetry_breaking import branch_flags
 from solver.continuation.certificate import uncertain
-from solver.continuation.extrema.nodes import Node, NodeSolver
+from solver.continuation.extrema.nodes import NodeSolver, PointRow
 from solver.continuation.segment import joined
 from solver.continuation.settings import ContinuationSettings
 from solver.jit.fourier import to_full
@@ -75,7 +75,7 @@ def sampled(
     )  # fmt: skip
 
 
-def _until(solver: NodeSolver, last: Node, p: float, intervals: int) -> list[Node]:
+def _until(solver: NodeSolver, last: PointRow, p: float, intervals: int) -> list[PointRow]:
     """Return the node at the next of so many λ, or those of the arc there where Newton's method fails.
 
     None where the arc does not lead there either.

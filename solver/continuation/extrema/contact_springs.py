@@ -11,7 +11,7 @@ from solver.balance.kernels.linearised_contacts import forces_at, linearise
 from solver.jit.fourier import Complex, Integer, Real, cosine_position
 
 if TYPE_CHECKING:
-    from solver.continuation.extrema.nodes import Node, NodeSolver
+    from solver.continuation.extrema.nodes import NodeSolver, PointRow
 
 _UNKNOWN = -2  # row of a node whose stiffness was not asked for
 
@@ -83,7 +83,7 @@ class LocalModel:
             self.stiffness = np.concatenate([self.stiffness, stiffness]) if first else stiffness
         return self._rows[numbers]
 
-    def at(self, node: Node) -> Springs | None:
+    def at(self, node: PointRow) -> Springs | None:
         """Return the contacts at a node; None at a fold."""
         if node.tangent[-1] == 0.0:
             return None
@@ -99,7 +99,7 @@ class LocalModel:
             self._springs[node.number] = Springs(motions[0], motions[1], motions[2], motions[3], stiffness)
         return self._springs[node.number]
 
-    def adds(self, left: Node, right: Node, one: Resonance) -> tuple[float, float]:
+    def adds(self, left: PointRow, right: PointRow, one: Resonance) -> tuple[float, float]:
         """Return what a resonance adds to what its neighbours suggest.
 
         Returns
@@ -119,12 +119,12 @@ class LocalModel:
         whole = np.maximum(np.abs(a.u).max(axis=0), np.abs(b.u).max(axis=0))
         return height, float(np.max(moved / np.maximum(whole, max(self._solver.least, 1e-300))))
 
-    def _observed(self, node: Node, i: int) -> complex:
+    def _observed(self, node: PointRow, i: int) -> complex:
         """Return the complex amplitude of harmonic number i of the observed DOF [m]."""
         here = int(cosine_position(self._system.ks, i))
         return complex(node.observed[here], -node.observed[here + 1])
 
-    def predicted(self, left: Node, right: Node, at: float) -> tuple[Complex, Complex] | None:
+    def predicted(self, left: PointRow, right: PointRow, at: float) -> tuple[Complex, Complex] | None:
         """Return contact motions (nk, nc) and observed motion (nk,) predicted between two nodes."""
         a, b = self.at(left), self.at(right)
         if a is None or b is None or left.tangent[-1] * right.tangent[-1] <= 0.0:

@@ -26,7 +26,7 @@ from solver.balance.workspace import Workspace
 from solver.continuation.certificate import PeakCertificate, certified, uncertain
 from solver.continuation.extrema.intervals import CURVES, highest_share, lowest_share, may_cross
 from solver.continuation.extrema.kernels.intervals import IS_BENT, WAVES, WORTH_POLISHING
-from solver.continuation.extrema.nodes import Node, NodeSolver, Points, numbers_of
+from solver.continuation.extrema.nodes import NodeSolver, PointRow, Points, numbers_of
 from solver.continuation.extrema.resonance_search import ResonanceSearch, Search
 from solver.continuation.extrema.state_changes import ChangeSearch
 from solver.continuation.folds import fold_between, motion_scales
@@ -65,7 +65,7 @@ class Survey:
         may stand alone, and the nodes may be as far apart as those of `solver.continuation.branches.samples`.
     """
 
-    def __init__(self, solver: NodeSolver, nodes: list[Node], *, highest_alone: bool = False) -> None:
+    def __init__(self, solver: NodeSolver, nodes: list[PointRow], *, highest_alone: bool = False) -> None:
         self._workspace, self._highest_alone = solver.workspace, highest_alone
         # Share of the highest point below which nothing stands that is looked for.
         self._worth = COMPETES_FOR_HIGHEST if highest_alone else WORTH_POLISHING
@@ -102,7 +102,7 @@ class Survey:
         return tuple(sorted(self._peaks, key=lambda peak: -peak.value))
 
     @property
-    def nodes(self) -> list[Node]:
+    def nodes(self) -> list[PointRow]:
         """The branch with everything that was solved for between its points, peaks included."""
         return self._nodes
 
@@ -192,7 +192,7 @@ class Survey:
             if not waving.any():
                 break
             dense, _, _ = self._solver.halved(dense, waving)
-        self._least, refined, begun = self._worth * top, list[Node](), 0
+        self._least, refined, begun = self._worth * top, list[PointRow](), 0
         for j, inside in sorted(self._maxima(dense, top).items()):
             refined += [*dense[begun : j + 1], *inside]
             begun = j + 1
@@ -203,7 +203,7 @@ class Survey:
         if len(self._nodes) > 1 and _slope(last) >= 0.0:
             self._peaks.append(self._peak(last, interior=False))
 
-    def _maxima(self, nodes: list[Node], top: float) -> dict[int, list[Node]]:
+    def _maxima(self, nodes: list[PointRow], top: float) -> dict[int, list[PointRow]]:
         """Collect the maxima between nodes, where the highest may stand first; return them by interval."""
         if len(nodes) < 2:
             return {}
@@ -212,7 +212,9 @@ class Survey:
         places = sorted(np.flatnonzero(falls).tolist(), key=lambda j: -float(seen.reach[j]))
         return {j: self._peaks_between(nodes[j], nodes[j + 1], seen.slopes[j].tolist(), top) for j in places}
 
-    def _peaks_between(self, left: Node, right: Node, slopes: list[list[float]], top: float) -> list[Node]:
+    def _peaks_between(
+        self, left: PointRow, right: PointRow, slopes: list[list[float]], top: float
+    ) -> list[PointRow]:
         """Collect the maxima of max|x| between two nodes; return the nodes that come between for them.
 
         `slopes` are those of max x and −min x by the share, at the left and at the right.
@@ -231,8 +233,13 @@ class Survey:
         return [node for node in found if node is not left and node is not right]
 
     def _peak_between(
-        self, left: Node, right: Node, curve: tuple[int, int, int], ends: tuple[float, float], top: float
-    ) -> Node:
+        self,
+        left: PointRow,
+        right: PointRow,
+        curve: tuple[int, int, int],
+        ends: tuple[float, float],
+        top: float,
+    ) -> PointRow:
         """Return the maximum of one curve between two nodes; where polishing fails, the higher of the two."""
         value, _, what = curve
         higher = left if left.measures[value] > right.measures[value] else right
@@ -253,7 +260,7 @@ class Survey:
             self._least = max(self._least, node.measures[value] - PREDICTED * top)
         return node
 
-    def _sharpened(self, node: Node) -> Node:
+    def _sharpened(self, node: PointRow) -> PointRow:
         """Return a node that was accepted with a residual near what may be, solved again for its λ.
 
         With contacts far stiffer than the structure the residual left moves their forces, and with them the
@@ -268,7 +275,7 @@ class Survey:
         near = abs(again.measures[MAX_ABS] - node.measures[MAX_ABS]) <= NEAR_BY * node.measures[MAX_ABS]
         return again if near else node
 
-    def _peak(self, node: Node, *, interior: bool) -> Peak:
+    def _peak(self, node: PointRow, *, interior: bool) -> Peak:
         at = float(self._workspace.balance.parameter.outside(node.at))
         return Peak(
             value=float(node.measures[MAX_ABS]), at=at, solution=node.solution[:-1].copy(), interior=interior
@@ -316,13 +323,13 @@ class Survey:
         width = float(sum(high - low for low, high in merged))
         return Band(limit=limit, width=width, intervals=tuple(merged), edges=tuple(edges), known=known)
 
-    def _with_folds(self, limit: float) -> tuple[list[Node], list[tuple[Node, bool]]]:
+    def _with_folds(self, limit: float) -> tuple[list[PointRow], list[tuple[PointRow, bool]]]:
         """Return the nodes with the folds above the limit among them, and these (and whether smooth)."""
         onward = self._solver.table.tangents[numbers_of(self._nodes), -1]
         turns = onward[1:] * onward[:-1] < 0.0
         if not turns.any():
             return self._nodes, []
-        nodes: list[Node] = [self._nodes[0]]
+        nodes: list[PointRow] = [self._nodes[0]]
         folds = []
         for (left, right), turned in zip(pairwise(self._nodes), turns.tolist(), strict=True):
             if turned and max(left.measures[MAX_ABS], right.measures[MAX_ABS]) > limit:
@@ -336,7 +343,9 @@ class Survey:
             nodes.append(right)
         return nodes, folds
 
-    def _dipped(self, left: Node, right: Node, limit: float, depth: int) -> tuple[list[Node], bool]:
+    def _dipped(
+        self, left: PointRow, right: PointRow, limit: float, depth: int
+    ) -> tuple[list[PointRow], bool]:
         """Return nodes where the amplitude crosses the limit and comes back between two, if it does.
 
         Returns
@@ -360,7 +369,7 @@ class Survey:
         after, sure_too = self._dipped(middle, right, limit, depth - 1)
         return [*before, middle, *after], sure and sure_too
 
-    def _edge(self, left: Node, right: Node, limit: float, gaps: tuple[float, float]) -> Real:
+    def _edge(self, left: PointRow, right: PointRow, limit: float, gaps: tuple[float, float]) -> Real:
         """Return the point where the amplitude equals the limit."""
         node = self._solver.refine(left, right, EDGE, limit, gaps, SHARP)
         if node is not None:
@@ -378,13 +387,13 @@ def band_limit(limit: float | None, peaks: tuple[Peak, ...], kind: Kind) -> floa
     return limit if limit is not None else peaks[0].value * HALF_POWER
 
 
-def _slope(node: Node) -> float:
+def _slope(node: PointRow) -> float:
     """Return the slope of max|x| along the node's tangent."""
     higher = HIGH_SLOPE if node.measures[HIGH] >= node.measures[LOW] else LOW_SLOPE
     return node.measures[higher]
 
 
-def _distinct(nodes: list[Node]) -> list[Node]:
+def _distinct(nodes: list[PointRow]) -> list[PointRow]:
     """Return the nodes without a second one at the same place (both curves agree in a symmetric motion)."""
     if len(nodes) == 2:
         first, second = (node.solution[-1] for node in nodes)

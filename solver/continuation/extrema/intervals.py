@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 
 from solver.balance.kernels.locate import HIGH_PEAK, LOW_PEAK
 from solver.balance.kernels.output import HIGH, HIGH_SLOPE, LOW, LOW_SLOPE, MAX_ABS
-from solver.continuation.extrema.nodes import Between, Node
+from solver.continuation.extrema.nodes import Between, PointRow
 from solver.jit.hermite import extreme
 
 CURVES = ((HIGH, HIGH_SLOPE, HIGH_PEAK), (LOW, LOW_SLOPE, LOW_PEAK))
 
 
-def may_cross(nodes: Sequence[Node], between: Between, limit: float) -> NDArray[np.bool_]:
+def may_cross(nodes: Sequence[PointRow], between: Between, limit: float) -> NDArray[np.bool_]:
     """Return where max|x| might cross the limit and come back between nodes, (P − 1,)."""
     above = np.array([node.measures[MAX_ABS] for node in nodes]) > limit
     slopes = between.slopes
@@ -25,7 +25,9 @@ def may_cross(nodes: Sequence[Node], between: Between, limit: float) -> NDArray[
     return np.asarray((above[:-1] & above[1:] & falls) | (~above[:-1] & ~above[1:] & rises))
 
 
-def highest_share(left: Node, right: Node, by_share: tuple[float, float], limit: float) -> float | None:
+def highest_share(
+    left: PointRow, right: PointRow, by_share: tuple[float, float], limit: float
+) -> float | None:
     """Return the share where max|x| may be above the limit between two nodes below it, or None."""
     for value, slope, _ in CURVES:
         a, b = left.measures[value], right.measures[value]
@@ -35,7 +37,9 @@ def highest_share(left: Node, right: Node, by_share: tuple[float, float], limit:
     return None
 
 
-def lowest_share(left: Node, right: Node, by_share: tuple[float, float], limit: float) -> float | None:
+def lowest_share(
+    left: PointRow, right: PointRow, by_share: tuple[float, float], limit: float
+) -> float | None:
     """Return the share where max|x| may be below the limit between two nodes above it, or None.
 
     It is below only where both curves are; the tangents at the ends bound a curve that is bent upward, such

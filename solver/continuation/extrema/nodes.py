@@ -55,7 +55,7 @@ class Points:
     states: Integer
 
 
-class Node(NamedTuple):
+class PointRow(NamedTuple):
     """One row of `Points`; the tangent points onward along the branch, and slopes are along it.
 
     A tuple, because hundreds are made of every branch; nodes are told apart by identity.
@@ -107,7 +107,7 @@ class NodeSolver:
         balance = workspace.balance
         self._one_solution = all(contact.keeps_together for contact in balance.scene.contacts)
         self.table = NodeTable(balance.n_unknowns, balance.n_coefficients, MEASURES, balance.system.laws.size)
-        self._last: tuple[Sequence[Node], float, Between] | tuple[None, float, None] = None, 0.0, None
+        self._last: tuple[Sequence[PointRow], float, Between] | tuple[None, float, None] = None, 0.0, None
 
     @cached_property
     def model(self) -> LocalModel:
@@ -115,8 +115,8 @@ class NodeSolver:
         return LocalModel(self)
 
     def observe(
-        self, workspace: Workspace, nodes: Sequence[Node], observed: Real, measures: Real
-    ) -> list[Node]:
+        self, workspace: Workspace, nodes: Sequence[PointRow], observed: Real, measures: Real
+    ) -> list[PointRow]:
         """Return the nodes as another DOF sees them.
 
         Parameters
@@ -130,11 +130,11 @@ class NodeSolver:
         seen = zip(nodes, measures.tolist(), observed, strict=True)
         return [node._replace(measures=values, observed=x) for node, values, x in seen]
 
-    def nodes_of(self, points: Points) -> list[Node]:
+    def nodes_of(self, points: Points) -> list[PointRow]:
         """Return the rows of a branch as nodes."""
         return self._added(points.solutions, points.tangents, points.measures, points.observed, points.states)
 
-    def points_of(self, nodes: Sequence[Node]) -> Points:
+    def points_of(self, nodes: Sequence[PointRow]) -> Points:
         """Return nodes as the rows of a branch."""
         rows, table = numbers_of(nodes), self.table
         return Points(
@@ -144,14 +144,14 @@ class NodeSolver:
 
     def _added(
         self, solutions: Real, tangents: Real, measures: Real, observed: Real, states: Integer
-    ) -> list[Node]:
+    ) -> list[PointRow]:
         """Return rows as nodes, which stand in the table from then on."""
         first = self.table.add(solutions, tangents, measures, observed, states)
         numbers = range(first, first + len(solutions))
         rows = zip(solutions, tangents, measures.tolist(), observed, states, numbers, strict=True)
-        return [Node._make(row) for row in rows]
+        return [PointRow._make(row) for row in rows]
 
-    def look(self, nodes: Sequence[Node], top: float) -> Between:
+    def look(self, nodes: Sequence[PointRow], top: float) -> Between:
         """Return what may stand between neighbouring nodes, at least two; that of the last list is kept."""
         known = self._last[2]
         if known is not None and nodes is self._last[0] and top == self._last[1]:
@@ -168,15 +168,17 @@ class NodeSolver:
         self._last = nodes, top, found
         return found
 
-    def scales(self, left: Node, right: Node) -> tuple[float, float]:
+    def scales(self, left: PointRow, right: PointRow) -> tuple[float, float]:
         """Return `share_scales` between two nodes."""
         return share_scales(left, right, self.least)
 
-    def between(self, left: Node, right: Node, share: float) -> Node | None:
+    def between(self, left: PointRow, right: PointRow, share: float) -> PointRow | None:
         """Return the node at a share of the way between two, or None if there is no solution there."""
         return self.between_pairs([left, right], share)[0][0]
 
-    def between_pairs(self, ends: Sequence[Node], share: float = 0.5) -> tuple[list[Node | None], Real]:
+    def between_pairs(
+        self, ends: Sequence[PointRow], share: float = 0.5
+    ) -> tuple[list[PointRow | None], Real]:
         """Return the nodes at a share of the way between pairs of nodes.
 
         Parameters
@@ -200,13 +202,15 @@ class NodeSolver:
             states, off,
         )  # fmt: skip
         good = np.isfinite(off) & np.isfinite(out).all(axis=1)
-        nodes: list[Node | None] = list(self._added(found, ways, out, x, states))
+        nodes: list[PointRow | None] = list(self._added(found, ways, out, x, states))
         for i in np.flatnonzero(~good).tolist():
             left, right = ends[2 * i], ends[2 * i + 1]
             nodes[i] = self._aside(left, right, left.at + share * (right.at - left.at))
         return nodes, np.where(good, off, np.inf)
 
-    def halved(self, nodes: list[Node], wanted: NDArray[np.bool_]) -> tuple[list[Node], Real, list[float]]:
+    def halved(
+        self, nodes: list[PointRow], wanted: NDArray[np.bool_]
+    ) -> tuple[list[PointRow], Real, list[float]]:
         """Return the nodes with those in the middle of the intervals wanted.
 
         Returns
@@ -216,7 +220,7 @@ class NodeSolver:
         """
         places = np.flatnonzero(wanted).tolist()
         middles, off = self.between_pairs([nodes[k] for j in places for k in (j, j + 1)])
-        grown: list[Node] = []
+        grown: list[PointRow] = []
         missed: list[float] = []
         lost: list[float] = []
         begun = 0
@@ -235,8 +239,14 @@ class NodeSolver:
         return grown, np.array(missed), lost
 
     def refine(
-        self, left: Node, right: Node, what: int, level: float, ends: tuple[float, float], close: float
-    ) -> Node | None:
+        self,
+        left: PointRow,
+        right: PointRow,
+        what: int,
+        level: float,
+        ends: tuple[float, float],
+        close: float,
+    ) -> PointRow | None:
         """Return the peak or edge between two nodes, or None if there is no solution on the way.
 
         Parameters
@@ -258,7 +268,7 @@ class NodeSolver:
         self.spent += int(iterations)
         return self._node(*rows) if good else self._bracketed(left, right, what, level, close)
 
-    def change(self, left: Node, right: Node, allowed: float) -> list[Node]:
+    def change(self, left: PointRow, right: PointRow, allowed: float) -> list[PointRow]:
         """Return the nodes nearest to the first change of state between two, of those before and behind it.
 
         `allowed` is the height of a maximum between both that does not matter [m].
@@ -281,7 +291,7 @@ class NodeSolver:
         near = sides > 0
         return self._added(found[near], ways[near], measures[near], x[near], states[near])
 
-    def middle(self, left: Node, right: Node) -> Node | None:
+    def middle(self, left: PointRow, right: PointRow) -> PointRow | None:
         """Return the node at the λ between two far apart, from the cubic through them or from each."""
         if left.tangent[-1] * right.tangent[-1] <= 0.0:
             return None
@@ -290,7 +300,7 @@ class NodeSolver:
         cubic = 0.5 * (a + b) + 0.125 * length * bend
         return self.at(p, [cubic[:-1], a[:-1], b[:-1]], math.copysign(1.0, length))
 
-    def _aside(self, left: Node, right: Node, p: float) -> Node | None:
+    def _aside(self, left: PointRow, right: PointRow, p: float) -> PointRow | None:
         """Return the node at λ = `p` between two, or None if the branch turns there or has no solution.
 
         Where a contact changes its state the arc between two nodes bends so sharply that the plane across
@@ -307,10 +317,12 @@ class NodeSolver:
             self._lost.add((left.at, right.at, p))
         return found
 
-    def _bracketed(self, left: Node, right: Node, what: int, level: float, close: float) -> Node | None:
+    def _bracketed(
+        self, left: PointRow, right: PointRow, what: int, level: float, close: float
+    ) -> PointRow | None:
         """Return the peak or edge between two nodes by solving at values of λ (Illinois), else None."""
 
-        def off(node: Node) -> float:
+        def off(node: PointRow) -> float:
             if what == EDGE:
                 return node.measures[MAX_ABS] - level
             slope = node.measures[HIGH_SLOPE if what == HIGH_PEAK else LOW_SLOPE]
@@ -339,7 +351,7 @@ class NodeSolver:
 
     def at(
         self, p: float, guesses: Sequence[Real], onward: float, *, from_nothing: bool = True
-    ) -> Node | None:
+    ) -> PointRow | None:
         """Return the node at λ = `p`, or None if no solution is found there.
 
         Parameters
@@ -375,16 +387,16 @@ class NodeSolver:
         solution, tangent = np.append(found.u, p), onward * np.append(slope, 1.0)
         return self._node(solution, tangent, observed, values)
 
-    def _rows(self, like: Node) -> tuple[Real, Real, Real, Real]:
+    def _rows(self, like: PointRow) -> tuple[Real, Real, Real, Real]:
         size = like.solution.size
         n = self.workspace.balance.n_coefficients
         return np.zeros(size), np.zeros(size), np.zeros(n), np.zeros(MEASURES)
 
-    def _node(self, solution: Real, tangent: Real, observed: Real, values: Real) -> Node | None:
+    def _node(self, solution: Real, tangent: Real, observed: Real, values: Real) -> PointRow | None:
         if not np.all(np.isfinite(values)):
             return None
         states = evaluation_by_value(self.workspace.point).states.copy()
-        return Node(
+        return PointRow(
             solution=solution, tangent=tangent, measures=values.tolist(), observed=observed,
             states=states, number=self.table.add(solution, tangent, values, observed, states),
         )  # fmt: skip
@@ -401,6 +413,6 @@ def share_scales(left: OnBranch, right: OnBranch, least: float) -> tuple[float, 
     return scales
 
 
-def numbers_of(nodes: Sequence[Node]) -> Integer:
+def numbers_of(nodes: Sequence[PointRow]) -> Integer:
     """Return the rows of nodes in the table of their solver."""
     return np.array([node.number for node in nodes], np.int64)

@@ -22,7 +22,7 @@ from solver.balance.kernels.output import HIGH, HIGH_SLOPE, LOW, LOW_SLOPE, MAX_
 from solver.continuation.extrema.contact_springs import Resonance, unknowns
 from solver.continuation.extrema.kernels.suspects import find_suspects
 from solver.continuation.extrema.node_table import NodeTable
-from solver.continuation.extrema.nodes import Node, NodeSolver, numbers_of
+from solver.continuation.extrema.nodes import NodeSolver, PointRow, numbers_of
 from solver.jit.fourier import Complex, Flags, Integer, Real
 
 # What a resonance adds to the amplitude, relative to what stands there, from which it is solved for. What
@@ -63,7 +63,7 @@ class Search:
         Highest amplitude predicted at the resonances that do not matter [m].
     """
 
-    nodes: list[Node]
+    nodes: list[PointRow]
     solved: int = 0
     left: list[tuple[float, str]] = field(default_factory=list)
     unseen: float = 0.0
@@ -96,7 +96,7 @@ class _Intervals:
     length: Real
 
     @classmethod
-    def of(cls, nodes: list[Node], begin: Integer, table: NodeTable) -> _Intervals:
+    def of(cls, nodes: list[PointRow], begin: Integer, table: NodeTable) -> _Intervals:
         rows = numbers_of(nodes)
         solutions = table.solutions[rows]
         at = solutions[:, -1]
@@ -122,7 +122,7 @@ class ResonanceSearch:
         self._model = solver.model
         self._added = 0
 
-    def run(self, nodes: list[Node]) -> Search:
+    def run(self, nodes: list[PointRow]) -> Search:
         """Search between all neighbours; the list is not changed."""
         found = Search(nodes=list(nodes))
         fresh = {id(node) for node in nodes[:-1]}
@@ -135,7 +135,7 @@ class ResonanceSearch:
             if not wanted:
                 break
             fresh = set()
-            grown: list[Node] = []
+            grown: list[PointRow] = []
             for left, right in pairwise(found.nodes):
                 grown.append(left)
                 inside = self._ladders(left, right, wanted.get(id(left), ()), top, found)
@@ -267,8 +267,8 @@ class ResonanceSearch:
         return flags
 
     def _ladders(
-        self, left: Node, right: Node, wanted: list[Resonance] | tuple[()], top: float, found: Search
-    ) -> list[Node]:
+        self, left: PointRow, right: PointRow, wanted: list[Resonance] | tuple[()], top: float, found: Search
+    ) -> list[PointRow]:
         """Return nodes on ladders round resonances between two nodes, and between the rungs."""
         if not wanted:
             return []
@@ -281,7 +281,7 @@ class ResonanceSearch:
             taken.append(one)
             rungs |= {at for at in _ladder(one, low, high) if low < at < high}
         onward = 1.0 if right.at > left.at else -1.0
-        inside: list[Node] = []
+        inside: list[PointRow] = []
         for at in sorted(rungs, reverse=onward < 0.0):
             node = self._solve(left, right, at, onward)
             if node is None:
@@ -290,12 +290,12 @@ class ResonanceSearch:
                 inside.append(node)
         found.solved += len(taken)
         chain = [left, *inside, right]
-        dense: list[Node] = []
+        dense: list[PointRow] = []
         for a, b in pairwise(chain):
             dense += [a, *self._halved(a, b, top, MOST_HALVINGS, found)]
         return dense[1:]
 
-    def _solve(self, left: Node, right: Node, at: float, onward: float) -> Node | None:
+    def _solve(self, left: PointRow, right: PointRow, at: float, onward: float) -> PointRow | None:
         """Solve at λ = `at` from what is predicted there, then from what is interpolated."""
         self._added += 1
         if self._added > MOST_NODES:
@@ -308,7 +308,9 @@ class ResonanceSearch:
             guesses.insert(0, unknowns(predicted[0], self._loop.system.ks))
         return self._solver.at(at, guesses, onward)
 
-    def _halved(self, left: Node, right: Node, top: float, depth: int, found: Search) -> list[Node]:
+    def _halved(
+        self, left: PointRow, right: PointRow, top: float, depth: int, found: Search
+    ) -> list[PointRow]:
         """Return nodes between two until the cubics of the amplitude predict what lies between."""
         highest = max(left.measures[MAX_ABS], right.measures[MAX_ABS])
         allowed = max(PREDICTED * highest, PREDICTED_OF_TOP * top)

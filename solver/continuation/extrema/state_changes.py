@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from solver.balance.kernels.output import HIGH, LOW, MAX_ABS, PIECE
 from solver.continuation.extrema.kernels.intervals import BENT, MATTERS, STEEP, WORTH_POLISHING
-from solver.continuation.extrema.nodes import Node, NodeSolver
+from solver.continuation.extrema.nodes import NodeSolver, PointRow
 from solver.jit.fourier import Integer, Real
 
 # Up to these departures from what the points beside an interval foretell a change in it hides no maximum:
@@ -38,13 +38,13 @@ class ChangeSearch:
         self._solver, self._worth = solver, worth
         self.left: list[tuple[float, str]] = []  # λ where a change was not settled, and why
 
-    def run(self, nodes: list[Node]) -> list[Node]:
+    def run(self, nodes: list[PointRow]) -> list[PointRow]:
         """Return the nodes with those added."""
         top = max(node.measures[MAX_ABS] for node in nodes)
         wanted = self._wanted(nodes, top)
         if not wanted.any():
             return nodes
-        grown: list[Node] = []
+        grown: list[PointRow] = []
         kinds: list[int] = []
         begun = 0
         for j in np.flatnonzero(wanted).tolist():
@@ -59,7 +59,7 @@ class ChangeSearch:
         kinds += [_APART] * (len(nodes) - 1 - begun)
         return self._checked(grown, np.array(kinds), top)
 
-    def _wanted(self, nodes: list[Node], top: float) -> NDArray[np.bool_]:
+    def _wanted(self, nodes: list[PointRow], top: float) -> NDArray[np.bool_]:
         """Return in which intervals a change may hide a maximum, (P − 1,)."""
         seen = self._solver.look(nodes, top)
         stands = np.maximum(seen.measures[1:, MAX_ABS], seen.measures[:-1, MAX_ABS])
@@ -70,7 +70,7 @@ class ChangeSearch:
             wanted &= self._departs(nodes, top, FORETOLD).any(axis=0)
         return np.asarray(wanted, dtype=bool)
 
-    def _departs(self, nodes: list[Node], top: float, allowed: float) -> NDArray[np.bool_]:
+    def _departs(self, nodes: list[PointRow], top: float, allowed: float) -> NDArray[np.bool_]:
         """Return where a maximum may hide by what the points before, and behind, foretell, (2, P − 1)."""
         seen = self._solver.look(nodes, top)
         stands = np.maximum(seen.measures[1:, MAX_ABS], seen.measures[:-1, MAX_ABS])
@@ -84,8 +84,8 @@ class ChangeSearch:
         return np.asarray(departs.any(axis=2), dtype=bool)
 
     def _inside(
-        self, left: Node, right: Node, *, left_is_change: bool = False, more: int = MOST_CHANGES
-    ) -> tuple[list[Node], list[int]]:
+        self, left: PointRow, right: PointRow, *, left_is_change: bool = False, more: int = MOST_CHANGES
+    ) -> tuple[list[PointRow], list[int]]:
         """Return nodes on both sides of the changes between two, and what the intervals between are."""
         if left.measures[PIECE] == right.measures[PIECE]:
             return [], [_BEHIND if left_is_change else _APART]
@@ -106,7 +106,7 @@ class ChangeSearch:
         inside, behind = self._inside(middle, right, more=more // 2)
         return [*before, middle, *inside], [*kinds, *behind]
 
-    def _checked(self, nodes: list[Node], kinds: Integer, top: float) -> list[Node]:
+    def _checked(self, nodes: list[PointRow], kinds: Integer, top: float) -> list[PointRow]:
         """Return the nodes with those in the middle of intervals beside changes, until cubics foretell these.
 
         Of the two neighbours of such an interval only the one that is not the change foretells anything.

@@ -10,7 +10,7 @@ import re
 
 import numpy as np
 
-from solver.matrices.decks.coordinates import GLOBAL, Kind, System, ansys_axes
+from solver.matrices.decks.coordinates import GLOBAL, CoordinateKind, CoordinateSystem, ansys_axes
 from solver.matrices.decks.deck import Deck, DeckFile, real
 from solver.matrices.readers.numbers_in_text import FormatError
 
@@ -19,7 +19,7 @@ _OTHERS = {
     "NGEN", "NSYM", "FILL", "NROT", "NMOD", "NANG", "NORA", "NSCA", "NUMM", "NUMC", "NREA", "NMES", "TRAN",
     "CDRE", "/INP", "*USE", "AMES", "VMES", "LMES", "VSWE", "NDEL",
 }  # fmt: skip
-_KINDS = {0: Kind.RECTANGULAR, 1: Kind.CYLINDRICAL}
+_KINDS = {0: CoordinateKind.RECTANGULAR, 1: CoordinateKind.CYLINDRICAL}
 
 
 class AnsysDeck:
@@ -27,10 +27,10 @@ class AnsysDeck:
 
     def __init__(self, file: DeckFile, deck: Deck) -> None:
         self._lines, self._deck = file.lines(), deck
-        cylinder = System(Kind.CYLINDRICAL, GLOBAL.origin, GLOBAL.axes)
-        self._known: dict[int, System] = {0: GLOBAL, 1: cylinder}
+        cylinder = CoordinateSystem(CoordinateKind.CYLINDRICAL, GLOBAL.origin, GLOBAL.axes)
+        self._known: dict[int, CoordinateSystem] = {0: GLOBAL, 1: cylinder}
         self._active = 0
-        self._turned: dict[tuple[float, ...], System] = {}
+        self._turned: dict[tuple[float, ...], CoordinateSystem] = {}
 
     def read(self) -> None:
         """Read all of it.
@@ -90,7 +90,7 @@ class AnsysDeck:
         self._deck.nodes[node] = (x, y, z)
         self._turn(node, [0.0, 0.0, 0.0] if written else numbers[3:])
 
-    def _system(self, number: int) -> System:
+    def _system(self, number: int) -> CoordinateSystem:
         if number not in self._known:
             raise FormatError(
                 f"a node is placed in the coordinate system {number}, which is not read: known are 0, 1 and "
@@ -113,7 +113,9 @@ class AnsysDeck:
         if kind not in _KINDS or any(ratio not in (0.0, 1.0) for ratio in numbers[6:8]):
             self._known.pop(number, None)
         else:
-            self._known[number] = System(_KINDS[kind], origin, ansys_axes(angles[0], angles[1], angles[2]))
+            self._known[number] = CoordinateSystem(
+                _KINDS[kind], origin, ansys_axes(angles[0], angles[1], angles[2])
+            )
         self._active = self._active if written else number
 
     def _turn(self, node: int, angles: list[float]) -> None:
@@ -122,7 +124,7 @@ class AnsysDeck:
             self._deck.systems.pop(node, None)
             return
         if key not in self._turned:
-            self._turned[key] = System(Kind.RECTANGULAR, np.zeros(3), ansys_axes(*key))
+            self._turned[key] = CoordinateSystem(CoordinateKind.RECTANGULAR, np.zeros(3), ansys_axes(*key))
         self._deck.systems[node] = self._turned[key]
 
     def _form(self, at: int, pattern: str, name: str, example: str) -> tuple[int, ...]:

@@ -20,7 +20,7 @@ Vector = Sequence[float] | NDArray[Any]
 _NONE = 1e-9  # share of a length that counts as none
 
 
-class Kind(Enum):
+class CoordinateKind(Enum):
     """How three numbers tell a place."""
 
     RECTANGULAR = "rectangular"  # x, y, z
@@ -29,7 +29,7 @@ class Kind(Enum):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class System:
+class CoordinateSystem:
     """A coordinate system.
 
     Attributes
@@ -41,17 +41,17 @@ class System:
         Directions of x, y and z as columns, orthonormal and right-handed.
     """
 
-    kind: Kind
+    kind: CoordinateKind
     origin: FloatArray
     axes: FloatArray
 
     def places(self, given: FloatArray) -> FloatArray:
         """Places (n, 3) in the global system of the numbers (n, 3) that tell them in this one."""
         local = given
-        if self.kind is Kind.CYLINDRICAL:
+        if self.kind is CoordinateKind.CYLINDRICAL:
             r, angle = given[:, 0], np.radians(given[:, 1])
             local = np.stack([r * np.cos(angle), r * np.sin(angle), given[:, 2]], axis=1)
-        elif self.kind is Kind.SPHERICAL:
+        elif self.kind is CoordinateKind.SPHERICAL:
             r, polar, angle = given[:, 0], np.radians(given[:, 1]), np.radians(given[:, 2])
             across = r * np.sin(polar)
             local = np.stack([across * np.cos(angle), across * np.sin(angle), r * np.cos(polar)], axis=1)
@@ -62,7 +62,7 @@ class System:
 
         On the axis of a cylinder, and of a sphere, a radius has no direction.
         """
-        if self.kind is Kind.RECTANGULAR:
+        if self.kind is CoordinateKind.RECTANGULAR:
             return np.broadcast_to(self.axes, (len(places), 3, 3)).copy()
         local = (places - self.origin) @ self.axes
         across = np.hypot(local[:, 0], local[:, 1])
@@ -71,7 +71,7 @@ class System:
             c, s = np.where(across > _NONE * size, local[:, :2].T / across, np.nan)
         zero, one = np.zeros_like(c), np.ones_like(c)
         about = [-s, c, zero]
-        if self.kind is Kind.CYLINDRICAL:
+        if self.kind is CoordinateKind.CYLINDRICAL:
             columns = [[c, s, zero], about, [zero, zero, one]]
         else:
             radius = np.linalg.norm(local, axis=1)
@@ -79,12 +79,12 @@ class System:
             columns = [[sin * c, sin * s, cos], [cos * c, cos * s, -sin], about]
         return np.asarray(self.axes @ np.array(columns).transpose(2, 1, 0))
 
-    def moved(self, turn: FloatArray, shift: FloatArray) -> System:
+    def moved(self, turn: FloatArray, shift: FloatArray) -> CoordinateSystem:
         """The system after a rotation (3, 3) of the whole space about the origin and then a shift (3,)."""
-        return System(self.kind, turn @ self.origin + shift, turn @ self.axes)
+        return CoordinateSystem(self.kind, turn @ self.origin + shift, turn @ self.axes)
 
 
-GLOBAL = System(Kind.RECTANGULAR, np.zeros(3), np.eye(3))
+GLOBAL = CoordinateSystem(CoordinateKind.RECTANGULAR, np.zeros(3), np.eye(3))
 
 
 def axes_by(first: int, along: Vector, second: int, beside: Vector) -> FloatArray:

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from solver.matrices.decks.coordinates import FloatArray, System
+from solver.matrices.decks.coordinates import CoordinateSystem, FloatArray
 from solver.matrices.readers.numbers_in_text import FormatError, fortran_real
-from solver.matrices.sectors.elements import Integer, Shape
+from solver.matrices.sectors.elements import ElementShape, Integer
 
 _DEEPEST = 10  # files that include each other
 
@@ -77,8 +77,8 @@ class Deck:
 
     nodes: dict[int, tuple[float, float, float]] = field(default_factory=dict)
     sets: dict[str, list[int]] = field(default_factory=dict)
-    elements: list[tuple[Shape, Integer]] = field(default_factory=list)
-    systems: dict[int, System] = field(default_factory=dict)
+    elements: list[tuple[ElementShape, Integer]] = field(default_factory=list)
+    systems: dict[int, CoordinateSystem] = field(default_factory=dict)
 
 
 def positions(deck: Deck, nodes: Sequence[int]) -> FloatArray:

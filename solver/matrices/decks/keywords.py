@@ -14,7 +14,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from solver.matrices.decks.coordinates import GLOBAL, Kind, System, around, axes_by, rotation
+from solver.matrices.decks.coordinates import (
+    GLOBAL,
+    CoordinateKind,
+    CoordinateSystem,
+    around,
+    axes_by,
+    rotation,
+)
 from solver.matrices.decks.deck import Deck, DeckFile, real
 from solver.matrices.readers.numbers_in_text import FormatError
 from solver.matrices.sectors.elements import elements_of, shape_of
@@ -85,7 +92,7 @@ class KeywordDeck:
         self._turn_nodes()
 
     def _node(self, block: _Block) -> None:
-        kind = {"R": Kind.RECTANGULAR, "C": Kind.CYLINDRICAL}.get(block.letter("SYSTEM"))
+        kind = {"R": CoordinateKind.RECTANGULAR, "C": CoordinateKind.CYLINDRICAL}.get(block.letter("SYSTEM"))
         if kind is None:
             raise block.refusal(
                 f"has SYSTEM={block.options['SYSTEM']}, which is not read: give SYSTEM=R (x, y, z) or C"
@@ -94,7 +101,7 @@ class KeywordDeck:
         if not found:
             return
         given = np.array([place for _, place in found])
-        places = self._system.places(System(kind, GLOBAL.origin, GLOBAL.axes).places(given))
+        places = self._system.places(CoordinateSystem(kind, GLOBAL.origin, GLOBAL.axes).places(given))
         nodes = [node for node, _ in found]
         if self._any_instance and self._here is self._whole:
             both = set(nodes) & set(self._whole.nodes)
@@ -125,7 +132,7 @@ class KeywordDeck:
         first += [0.0] * (3 - len(first))
         origin = np.array(first[:3])
         if not any(first[3:]):
-            self._system = System(Kind.RECTANGULAR, origin, np.eye(3))
+            self._system = CoordinateSystem(CoordinateKind.RECTANGULAR, origin, np.eye(3))
             return
         along = np.array([*first[3:], 0.0, 0.0][:3]) - origin
         try:
@@ -135,7 +142,7 @@ class KeywordDeck:
                 axes = axes_by(2, (0.0, 0.0, 1.0), 0, along)
         except ValueError as error:
             raise block.refusal(f"is none: {error}") from error
-        self._system = System(Kind.RECTANGULAR, origin, axes)
+        self._system = CoordinateSystem(CoordinateKind.RECTANGULAR, origin, axes)
 
     def _turn_nodes(self) -> None:
         """The systems of *TRANSFORM, when all sets are known."""
@@ -203,35 +210,35 @@ class KeywordDeck:
         self._here, self._instance = whole, None
 
 
-def _transform(block: _Block) -> System:
+def _transform(block: _Block) -> CoordinateSystem:
     """R: a on x, b on the side of y; C and S: a line or pole from a to b. The first axis is the radius."""
     numbers = block.numbers(0)
     a, b = (np.array([*numbers[i : i + 3], 0.0, 0.0, 0.0][:3]) for i in (0, 3))
     letter = block.letter("TYPE")
     try:
         if letter == "R":
-            return System(Kind.RECTANGULAR, np.zeros(3), axes_by(0, a, 1, b))
+            return CoordinateSystem(CoordinateKind.RECTANGULAR, np.zeros(3), axes_by(0, a, 1, b))
         if letter == "C":
-            return System(Kind.CYLINDRICAL, a, around(b - a))
+            return CoordinateSystem(CoordinateKind.CYLINDRICAL, a, around(b - a))
         if letter == "S":
             # Abaqus' third axis goes towards the pole: radius, along the parallel, along the meridian.
-            return _Meridians(Kind.SPHERICAL, a, around(b - a))
+            return _Meridians(CoordinateKind.SPHERICAL, a, around(b - a))
     except ValueError as error:
         raise block.refusal(f"is none: {error}") from error
     raise block.refusal(f"must have TYPE=R, C or S, got {block.options['TYPE']!r}")
 
 
-class _Meridians(System):
+class _Meridians(CoordinateSystem):
     """A spherical system whose second axis goes along the parallel and whose third one to the pole."""
 
     __slots__ = ()
 
     def frames(self, places: np.ndarray) -> np.ndarray:
         """Radius, parallel, towards the pole: (r, φ, −θ)."""
-        found = System.frames(self, places)
+        found = CoordinateSystem.frames(self, places)
         return np.stack([found[..., 0], found[..., 2], -found[..., 1]], axis=-1)
 
-    def moved(self, turn: np.ndarray, shift: np.ndarray) -> System:
+    def moved(self, turn: np.ndarray, shift: np.ndarray) -> CoordinateSystem:
         """As of every system."""
         return _Meridians(self.kind, turn @ self.origin + shift, turn @ self.axes)
 

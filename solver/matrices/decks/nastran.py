@@ -12,11 +12,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from solver.matrices.decks.coordinates import GLOBAL, FloatArray, Kind, System, axes_by
+from solver.matrices.decks.coordinates import GLOBAL, CoordinateKind, CoordinateSystem, FloatArray, axes_by
 from solver.matrices.decks.deck import Deck, DeckFile, real
 from solver.matrices.readers.numbers_in_text import FormatError
 
-_KINDS = {"R": Kind.RECTANGULAR, "C": Kind.CYLINDRICAL, "S": Kind.SPHERICAL}
+_KINDS = {"R": CoordinateKind.RECTANGULAR, "C": CoordinateKind.CYLINDRICAL, "S": CoordinateKind.SPHERICAL}
 _CORD = re.compile(r"CORD([12])([RCS])")
 _BASIC, _FLUID = 0, -1
 
@@ -41,10 +41,10 @@ class _Bulk:
 
     grids: dict[int, tuple[int, FloatArray, int]] = field(default_factory=dict)  # CP, numbers, CD
     cords: dict[int, _Entry] = field(default_factory=dict)
-    known: dict[int, System] = field(default_factory=lambda: {_BASIC: GLOBAL})
+    known: dict[int, CoordinateSystem] = field(default_factory=lambda: {_BASIC: GLOBAL})
     open: list[int] = field(default_factory=list)  # systems that are being looked up
 
-    def system(self, number: int) -> System:
+    def system(self, number: int) -> CoordinateSystem:
         """The system of a number."""
         if number not in self.known:
             if number not in self.cords:
@@ -62,7 +62,7 @@ class _Bulk:
         cp, numbers, _ = self.grids[node]
         return np.asarray(self.system(cp).places(numbers[None, :])[0])
 
-    def _made(self, number: int) -> System:
+    def _made(self, number: int) -> CoordinateSystem:
         """By three points: the origin, one on z, one on the side of x in the plane of x and z."""
         entry = self.cords[number]
         found = _CORD.fullmatch(entry.name)
@@ -78,7 +78,7 @@ class _Bulk:
             axes = axes_by(2, points[1] - points[0], 0, points[2] - points[0])
         except ValueError as error:
             raise FormatError(f"coordinate system {number} is none: {error}") from error
-        return System(_KINDS[found[2]], points[0], axes)
+        return CoordinateSystem(_KINDS[found[2]], points[0], axes)
 
 
 def read_nastran(file: DeckFile, deck: Deck) -> None:

@@ -26,7 +26,7 @@ _MIDDLE = (0.35, 0.65)  # where a cut may be, as shares of the rows
 
 
 @dataclass(frozen=True, slots=True)
-class _Front:
+class _FrontalBlock:
     """One block of rows: `first` to `last` of the order, and the later rows `beyond` that it meets.
 
     `own` is the lower triangular factor of the block, `below` the part of the factor in the rows beyond.
@@ -86,7 +86,7 @@ class Cholesky:
         return solved.reshape(forces.shape)
 
 
-def _factorised(lower: csc_array, ends: Rows, dtype: Any) -> list[_Front]:
+def _factorised(lower: csc_array, ends: Rows, dtype: Any) -> list[_FrontalBlock]:
     """Return the fronts of a permuted lower triangle, block after block."""
     blas = get_blas_funcs(("trsm", "syrk" if dtype.kind == "f" else "herk"), dtype=dtype)
     (potrf,) = get_lapack_funcs(("potrf",), dtype=dtype)
@@ -100,7 +100,7 @@ def _factorised(lower: csc_array, ends: Rows, dtype: Any) -> list[_Front]:
         if info:
             raise np.linalg.LinAlgError(f"the matrix is not positive definite ({info} in block {k})")
         below = blas[0](1.0, own, block[last - first :], side=1, lower=1, trans_a=2)
-        fronts.append(_Front(first, last, beyond, own, below))
+        fronts.append(_FrontalBlock(first, last, beyond, own, below))
         if beyond.size:
             passed = blas[1](-1.0, below, beta=1.0, c=rest, lower=1, overwrite_c=1)
             left[int(np.searchsorted(ends, beyond[0], side="right"))].append((beyond, passed))

@@ -25,7 +25,7 @@ _BENT = math.radians(25.0)  # between the normals of two faces
 
 
 @dataclass(frozen=True, slots=True)
-class Shape:
+class ElementShape:
     """A kind of element: how many nodes it has, and the faces between its corners.
 
     Attributes
@@ -48,17 +48,17 @@ _SOLIDS = {4: _TETRAHEDRON, 10: _TETRAHEDRON, 6: _WEDGE, 15: _WEDGE, 8: _BRICK, 
 _SHELLS = {3: _TRIANGLE, 6: _TRIANGLE, 4: _QUADRANGLE, 8: _QUADRANGLE}
 
 
-def shape_of(kind: str) -> Shape | None:
+def shape_of(kind: str) -> ElementShape | None:
     """The shape of a type of element such as C3D20R or S4; None for one that is not drawn."""
     found = _KIND.fullmatch(kind.strip().upper())
     if found is None:
         return None
     known = _SOLIDS if found["solid"] else _SHELLS
     count = int(found["solid"] or found["shell"])
-    return Shape(count, known[count]) if count in known else None
+    return ElementShape(count, known[count]) if count in known else None
 
 
-def elements_of(shape: Shape, numbers: Sequence[int], line: int) -> Integer:
+def elements_of(shape: ElementShape, numbers: Sequence[int], line: int) -> Integer:
     """The nodes of elements, (n, nodes), of numbers as a deck lists them: each behind that of its element.
 
     Raises
@@ -73,7 +73,7 @@ def elements_of(shape: Shape, numbers: Sequence[int], line: int) -> Integer:
 
 
 def drawn_edges(
-    blocks: Sequence[tuple[Shape, Integer]], places: Mapping[int, tuple[float, float, float]]
+    blocks: Sequence[tuple[ElementShape, Integer]], places: Mapping[int, tuple[float, float, float]]
 ) -> Integer:
     """The edges to be drawn, (n, 2) nodes: where the surface of a mesh ends or is bent.
 
@@ -103,7 +103,7 @@ def drawn_edges(
     return np.asarray(known[edges[drawn]], np.int64)
 
 
-def _surface(blocks: Sequence[tuple[Shape, Integer]]) -> Integer:
+def _surface(blocks: Sequence[tuple[ElementShape, Integer]]) -> Integer:
     """The faces that one element alone has, (n, 4) nodes, the fourth -1 of a triangle."""
     found = []
     for shape, elements in blocks:

@@ -11,7 +11,7 @@ from solver.matrices.sectors.diameters import DiameterMatrices
 from solver.matrices.sectors.elimination import Elimination, elimination
 from solver.matrices.sectors.parts import PartMatrices
 from solver.matrices.validation import DofTable, check_definite
-from solver.matrices.values import Matrix, Modes
+from solver.matrices.values import Matrix, NormalModes
 
 _REAL = 1e-9  # imaginary part, relative to the largest entry, that counts as none
 
@@ -39,7 +39,7 @@ class Sector(Protocol):
         """Whether K and C are symmetric."""
 
     @property
-    def modes(self) -> Modes | None:
+    def modes(self) -> NormalModes | None:
         """Modes in place of the matrices."""
 
     @property

@@ -13,13 +13,13 @@ from solver.balance.speed_line import check_no_line
 from solver.errors import SettingError
 from solver.jit.fourier import Real
 from solver.modes.corrector import Corrected
-from solver.modes.curve import End, walk
+from solver.modes.curve import CurveEnd, walk
 from solver.modes.driven.held_amplitude import Held, first_held, least_force
 from solver.modes.driven.results import HeldAmplitude, HeldStatus, LeastForce
 from solver.modes.error_estimate import Wider
 from solver.modes.limit_cycles import stability_left_out
 from solver.modes.nonlinear_mode import LEAST, MOST_POINTS, pose
-from solver.modes.records import Record, Recorder
+from solver.modes.records import PointRecord, Recorder
 from solver.response.stability.floquet import motions_stability
 
 if TYPE_CHECKING:
@@ -31,9 +31,9 @@ _SAME = 1e-9  # relative distance of an end of the range within which a point is
 
 
 _STATUS = {
-    End.REACHED: HeldStatus.COMPLETED, End.NOT_BEGUN: HeldStatus.NOT_BEGUN, End.STOPPED: HeldStatus.STOPPED,
-    End.TURNED_BACK: HeldStatus.TURNED_BACK, End.TOO_LONG: HeldStatus.TOO_LONG,
-    End.CANCELLED: HeldStatus.CANCELLED,
+    CurveEnd.REACHED: HeldStatus.COMPLETED, CurveEnd.NOT_BEGUN: HeldStatus.NOT_BEGUN,
+    CurveEnd.STOPPED: HeldStatus.STOPPED, CurveEnd.TURNED_BACK: HeldStatus.TURNED_BACK,
+    CurveEnd.TOO_LONG: HeldStatus.TOO_LONG, CurveEnd.CANCELLED: HeldStatus.CANCELLED,
 }  # fmt: skip
 
 
@@ -76,7 +76,7 @@ def held_amplitude(
     _check_moves(equations, scene, 2.0 * math.pi * low)
     first = first_held(equations, problem.rest, 2.0 * math.pi * low)
     points: list[Corrected] = []
-    end = [End.NOT_BEGUN]
+    end = [CurveEnd.NOT_BEGUN]
     if first.converged:
         last = math.log(2.0 * math.pi * high)
         for each in walk(
@@ -84,13 +84,13 @@ def held_amplitude(
         ):
             here = math.exp(each.point.state.log_amplitude) / (2.0 * math.pi)
             if here < low * (1.0 - _SAME):
-                end.append(End.TURNED_BACK)
+                end.append(CurveEnd.TURNED_BACK)
                 break
             points.append(each.point)
             if on_progress is not None:
                 on_progress(min(max((here - low) / (high - low), 0.0), 1.0), len(points))
             if should_stop is not None and should_stop():
-                end.append(End.CANCELLED)
+                end.append(CurveEnd.CANCELLED)
                 break
     return _collect(
         equations, points, _STATUS[end[-1]], errors=errors, unknown=stability_left_out(scene, stability),
@@ -175,7 +175,7 @@ def _force_of(equations: Held, point: Corrected | None) -> LeastForce:
 
 
 def _stable(
-    equations: Held, y: Real, rows: list[Record], unknown: str
+    equations: Held, y: Real, rows: list[PointRecord], unknown: str
 ) -> tuple[tuple[bool | None, ...], str]:
     """Return whether each point is stable while its force is held, and why that is not known."""
     if unknown:

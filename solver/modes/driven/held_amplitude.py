@@ -26,7 +26,7 @@ from solver.balance.balance import Balance
 from solver.balance.kernels.output import extremes
 from solver.contacts.kernels.system import System, by_reference
 from solver.jit.fourier import Complex, Real, cosine_position
-from solver.modes.corrector import Corrected, State, correct
+from solver.modes.corrector import Corrected, ModeState, correct
 from solver.modes.equations import Equations, Evaluated
 from solver.modes.start import slopes_at_rest
 from solver.modes.structure import Dynamics
@@ -167,7 +167,7 @@ def first_held(equations: Held, rest: Real, omega: float) -> Corrected:
     return replace(found, iterations=spent)
 
 
-def _solved(equations: Held, guess: State) -> Corrected:
+def _solved(equations: Held, guess: ModeState) -> Corrected:
     """Return the solution from a guess; converged only with a force in its own phase, z > 0."""
     found = correct(equations, guess, most=_MOST_AT_FIRST)
     return found if found.state.y[-1] > 0.0 else replace(found, converged=False)
@@ -201,7 +201,7 @@ def least_force(equations: Held, points: Sequence[Corrected]) -> Corrected | Non
     return min(tried, key=lambda each: float(each.state.y[-1]))
 
 
-def _linear(equations: Held, rest: Real, omega: float) -> State:
+def _linear(equations: Held, rest: Real, omega: float) -> ModeState:
     """Return a guess: the response with the contacts as they are at rest, in the amplitude asked for."""
     s, first = equations.structure, equations.structure.first
     number = s.nearest(omega, 0.0)
@@ -221,10 +221,12 @@ def _linear(equations: Held, rest: Real, omega: float) -> State:
         w[:, here], w[:, here + 1] = moved.real, -moved.imag
     q = complex(np.vdot(s.carried[:, number], x))
     y = np.concatenate([w.reshape(-1), [q.real, q.imag, omega, 1.0]])
-    return State(y=y, log_amplitude=math.log(omega), mode=number, phase=np.zeros(s.force.size, np.complex128))
+    return ModeState(
+        y=y, log_amplitude=math.log(omega), mode=number, phase=np.zeros(s.force.size, np.complex128)
+    )
 
 
-def _scaled(equations: Held, state: State, rest: Real, factor: float) -> State:
+def _scaled(equations: Held, state: ModeState, rest: Real, factor: float) -> ModeState:
     """Return a guess with what moves, and the force, times a factor."""
     size, still, y = equations.size, rest.reshape(-1), state.y.copy()
     y[:size] = still + factor * (y[:size] - still)

@@ -23,7 +23,7 @@ from solver.balance.speed_line import check_no_line
 from solver.errors import SettingError
 from solver.jit.fourier import Complex, Real
 from solver.modes.corrector import Corrected
-from solver.modes.curve import End, walk
+from solver.modes.curve import CurveEnd, walk
 from solver.modes.driven.results import PhaseResonance
 from solver.modes.equations import Equations, Evaluated
 from solver.modes.nonlinear_mode import MOST_POINTS, STATUS, check_amplitudes, pose
@@ -110,7 +110,7 @@ def phase_resonance(
     equations.unit = 2.0 * problem.mode.omega**2 / along
     first = begin(equations, problem.mode, problem.rest, low, turns=False)
     points: list[Corrected] = []
-    end = [End.NOT_BEGUN]
+    end = [CurveEnd.NOT_BEGUN]
     if first.converged:
         walked = walk(equations, first, high, turns=False, most_points=most_points, ended=end.append)
         for each in walked:
@@ -119,7 +119,7 @@ def phase_resonance(
                 done = (each.point.state.log_amplitude - low) / (high - low)
                 on_progress(min(max(done, 0.0), 1.0), len(points))
             if should_stop is not None and should_stop():
-                end.append(End.CANCELLED)
+                end.append(CurveEnd.CANCELLED)
                 break
     return _collect(equations, points, mode=int(mode), status=STATUS[end[-1]], begun=begun)
 

@@ -20,7 +20,7 @@ from scipy.optimize import minimize_scalar
 
 from solver.errors import SettingError
 from solver.jit.fourier import Complex
-from solver.modes.corrector import Corrected, State, correct
+from solver.modes.corrector import Corrected, ModeState, correct
 from solver.modes.driven.held_amplitude import Held
 from solver.modes.nonlinear_mode import pose
 from solver.modes.records import Recorder
@@ -125,7 +125,7 @@ class _Neighbourhood:
         rise = math.log(self._curve.excitation[j + 1] / self._curve.excitation[j - 1])
         return math.log(self._curve.peak[j + 1] / self._curve.peak[j - 1]) / rise if rise else 1.0
 
-    def _synthesised(self, i: int) -> State:
+    def _synthesised(self, i: int) -> ModeState:
         """Return the motion of point i turned as its force turns it: (ω² − Ω² + 2iζωΩ) a = Qᴴ f."""
         mode, held, curve = self._mode, self.equations, self._curve
         point, s = self._found.points[i], held.structure
@@ -147,9 +147,9 @@ class _Neighbourhood:
         self.width = damped * math.sqrt(1.0 - damped**2)
         held.unit, held.target = float(curve.excitation[i]), float(curve.peak[i])
         y = np.concatenate([w.reshape(-1), [q.real, q.imag, at, 1.0]])
-        return State(y=y, log_amplitude=math.log(at), mode=point.mode, phase=np.zeros_like(s.force))
+        return ModeState(y=y, log_amplitude=math.log(at), mode=point.mode, phase=np.zeros_like(s.force))
 
-    def _at(self, near: State, log_omega: float, depth: int = 0) -> Corrected | None:
+    def _at(self, near: ModeState, log_omega: float, depth: int = 0) -> Corrected | None:
         """Return the response at ln Ω from one nearby, in smaller steps where it must; None if not found."""
         y = near.y.copy()
         y[-2] = math.exp(log_omega)
@@ -163,7 +163,7 @@ class _Neighbourhood:
         half = self._at(near, 0.5 * (near.log_amplitude + log_omega), depth + 1)
         return None if half is None else self._at(half.state, log_omega, depth + 1)
 
-    def _scaled_to(self, state: State, amplitude: float, depth: int = 0) -> Corrected | None:
+    def _scaled_to(self, state: ModeState, amplitude: float, depth: int = 0) -> Corrected | None:
         """Return the response of an amplitude at the same Ω, in smaller steps where it must."""
         held, before = self.equations, self.equations.target
         y, ratio = state.y.copy(), amplitude / before
@@ -176,7 +176,7 @@ class _Neighbourhood:
         half = self._scaled_to(state, math.sqrt(before * amplitude), depth + 1)
         return None if half is None else self._scaled_to(half.state, amplitude, depth + 1)
 
-    def _least_force(self, state: State, amplitude: float) -> Corrected | None:
+    def _least_force(self, state: ModeState, amplitude: float) -> Corrected | None:
         """Return the response of an amplitude with the least force, from one near it."""
         centre = self._scaled_to(state, amplitude)
         if centre is None:

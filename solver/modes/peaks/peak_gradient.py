@@ -21,7 +21,7 @@ import numpy as np
 from solver.balance.kernels.output import extremes
 from solver.contacts.kernels.system import System, by_reference
 from solver.jit.fourier import Complex, Real
-from solver.modes.corrector import Corrected, State, correct, scales
+from solver.modes.corrector import Corrected, ModeState, correct, scales
 from solver.modes.equations import Evaluated
 from solver.modes.gradient import ModeSensitivities
 from solver.modes.nonlinear_mode import pose
@@ -195,7 +195,7 @@ class _Solver:
             forces.append(force)
         return np.array(tops), np.array(forces)
 
-    def _moved(self, state: State, at: Evaluated, dy: Real, pushes: Complex | None) -> Complex:
+    def _moved(self, state: ModeState, at: Evaluated, dy: Real, pushes: Complex | None) -> Complex:
         """Return the change of the motion (nk, N) for a change of the unknowns and of a parameter."""
         equations, s, size = self._equations, self._equations.structure, self._equations.size
         hat, dynamics = equations.amplitudes, at.dynamics
@@ -211,17 +211,17 @@ class _Solver:
         return dynamics.solve(phi if pushes is None else phi + pushes)
 
 
-def _raised(state: State, to: float, size: int) -> State:
+def _raised(state: ModeState, to: float, size: int) -> ModeState:
     """Return a guess at another amplitude of the same shape."""
     y = state.y.copy()
     y[: size + 2] *= math.exp(to - state.log_amplitude)
     return replace(state, y=y, log_amplitude=to)
 
 
-def _between(found: NonlinearMode, i: int, share: float) -> State:
+def _between(found: NonlinearMode, i: int, share: float) -> ModeState:
     """Return a guess between points i and i + 1."""
     one, other = found.points[i], found.points[i + 1]
     # q is of one mode alone.
     y = one.y + share * (other.y - one.y) if one.mode == other.mode else one.y.copy()
     log_amplitude = one.log_amplitude + share * (other.log_amplitude - one.log_amplitude)
-    return State(y=y, log_amplitude=log_amplitude, mode=one.mode, phase=one.phase)
+    return ModeState(y=y, log_amplitude=log_amplitude, mode=one.mode, phase=one.phase)

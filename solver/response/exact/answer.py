@@ -17,7 +17,7 @@ from solver.jit.fourier import Real
 from solver.response.contact_response import OPENS, ContactResponse, ContactState
 from solver.response.exact.flow import LiftsError, NoMotionError, exponential, first_root, steps_of, taylor
 from solver.response.exact.orbit import PERIOD, ROUNDING, Ended, Orbit, find, follow, grazed
-from solver.response.exact.piecewise import STICK, Mode, Piecewise, State
+from solver.response.exact.piecewise import STICK, MemberState, Mode, Piecewise
 from solver.response.solution import HISTORY_DEPENDENT, MEAN_UNDETERMINED, Solution, SolutionStatus
 from solver.response.stability.floquet import Stability, growth_of
 from solver.response.stability.verdict import verdict_of
@@ -42,7 +42,7 @@ class Panels:
     weights: Real
     w: Real
     modes: list[Mode]
-    states: list[State]
+    states: list[MemberState]
     series: Real
     starts: Real
     widths: Real

@@ -28,9 +28,9 @@ from solver.response.exact.piecewise import (
     TO_OPEN,
     TO_REST,
     TO_SLIP,
+    MemberState,
     Mode,
     Piecewise,
-    State,
 )
 
 DEGREE = 22  # of a Taylor series over a step, in which the fastest motion turns by TURN
@@ -67,14 +67,14 @@ class _Steps:
 
 
 @dataclass(slots=True)
-class Piece:
+class FlowPiece:
     """A stretch of one mode: from `tau` on for `length` from the state `w`; `phi` as in `Flow`."""
 
     tau: float
     length: float
     w: Real
     mode: Mode
-    state: State
+    state: MemberState
     phi: Real | None
 
 
@@ -84,10 +84,10 @@ class Flow:
 
     system: Piecewise
     w: Real
-    state: State
+    state: MemberState
     tau: float
     phi: Real | None = None
-    pieces: list[Piece] = field(default_factory=list)
+    pieces: list[FlowPiece] = field(default_factory=list)
 
     def run(self, length: float) -> None:
         """Go on for an angle; the pieces of the way are in `pieces`.
@@ -103,7 +103,7 @@ class Flow:
             begun, w, phi = self.tau, self.w, self.phi
             ended = self._piece(mode, end - self.tau)
             if self.tau > begun:
-                self.pieces.append(Piece(begun, self.tau - begun, w, mode, self.state.copy(), phi))
+                self.pieces.append(FlowPiece(begun, self.tau - begun, w, mode, self.state.copy(), phi))
                 at_once = 0
             if ended is None:
                 self.tau = end
@@ -205,7 +205,7 @@ class Flow:
                 self.phi = resets @ self.phi
         self.w, self.state = moved, state
 
-    def _closed(self, mode: Mode, state: State, resets: Real, which: int) -> State:
+    def _closed(self, mode: Mode, state: MemberState, resets: Real, which: int) -> MemberState:
         """Decide what a slider does when a contact of it has closed; its load begins at 0."""
         system, slider = self.system, self.system.members[which].slider
         if state.sliders[slider] != FREE:
@@ -221,7 +221,7 @@ class Flow:
         state.sliders[slider] = (1 if rate > 0.0 else -1) if slips else STICK
         return state
 
-    def _decided(self, state: State, which: list[int]) -> State:
+    def _decided(self, state: MemberState, which: list[int]) -> MemberState:
         """Decide what rigid sliders at rest do: stick within the limit, or slip the way they are sped up."""
         system = self.system
         resting = which + [i for i, xi in enumerate(state.sliders) if xi == STICK and system.rigid[i]]
@@ -239,7 +239,7 @@ class Flow:
                     return state
         raise NoMotionError
 
-    def _inconsistent(self, state: State, resting: list[int]) -> tuple[int, int] | None:
+    def _inconsistent(self, state: MemberState, resting: list[int]) -> tuple[int, int] | None:
         """Return the slider at rest whose state is least consistent, with a better one; None if all are."""
         mode, worst, found = self.system.mode(state), _TIE, None
         for i in resting:

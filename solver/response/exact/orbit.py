@@ -14,8 +14,8 @@ from enum import Enum
 import numpy as np
 
 from solver.jit.fourier import Complex, Flags, Real
-from solver.response.exact.flow import Flow, LiftsError, NoMotionError, Piece
-from solver.response.exact.piecewise import FREE, STICK, Piecewise, State
+from solver.response.exact.flow import Flow, FlowPiece, LiftsError, NoMotionError
+from solver.response.exact.piecewise import FREE, STICK, MemberState, Piecewise
 
 PERIOD = 2.0 * np.pi
 CLOSED = 1e-11  # distance after a period, of the largest number of the state, from which on it is polished
@@ -50,7 +50,7 @@ class Orbit:
     periods, steps : marched, and of Newton's method.
     """
 
-    pieces: list[Piece]
+    pieces: list[FlowPiece]
     residual: float
     error: float
     multipliers: Complex
@@ -60,7 +60,7 @@ class Orbit:
 
 
 def find(
-    system: Piecewise, w: Real, state: State, *, tau: float = 0.0, most_periods: int = MOST_PERIODS
+    system: Piecewise, w: Real, state: MemberState, *, tau: float = 0.0, most_periods: int = MOST_PERIODS
 ) -> Orbit | Ended:
     """Find the periodic motion that a start leads to, at an angle.
 
@@ -180,7 +180,7 @@ def _newton(system: Piecewise, march: Flow, periods: int) -> Orbit | None:
     return None if best is None else best[1]
 
 
-def _lasting(system: Piecewise, state: State) -> Flags:
+def _lasting(system: Piecewise, state: MemberState) -> Flags:
     """Return which numbers of w last: positions of elastic sliders do where they stick."""
     kept = np.ones(system.nd, np.bool_)
     for i, xi in enumerate(state.sliders):
@@ -189,7 +189,9 @@ def _lasting(system: Piecewise, state: State) -> Flags:
     return kept
 
 
-def _solved(system: Piecewise, phi: Real | None, state: State, away: Real) -> tuple[Real, Real, Complex]:
+def _solved(
+    system: Piecewise, phi: Real | None, state: MemberState, away: Real
+) -> tuple[Real, Real, Complex]:
     """Return Newton's change of w, the directions it leaves open, and the Floquet multipliers."""
     if phi is None:
         raise NoMotionError
@@ -205,7 +207,7 @@ def _solved(system: Piecewise, phi: Real | None, state: State, away: Real) -> tu
     return change, directions, np.asarray(np.linalg.eigvals(reduced), dtype=np.complex128)
 
 
-def _tangent(system: Piecewise, state: State) -> Real:
+def _tangent(system: Piecewise, state: MemberState) -> Real:
     """Return an orthonormal basis (nd, ·) of the changes of w that constraints and sliders allow."""
     n, nd = system.n, system.nd
     held = [system.d[i] for i, xi in enumerate(state.sliders) if xi == STICK and system.rigid[i]]

@@ -61,7 +61,7 @@ class Member:
 
 
 @dataclass(slots=True)
-class State:
+class MemberState:
     """What sliders, members and gaps do; each a small whole number."""
 
     sliders: Integer
@@ -73,9 +73,9 @@ class State:
         """It as a key of a table."""
         return self.sliders.tobytes() + self.closed.tobytes() + self.pressed.tobytes()
 
-    def copy(self) -> State:
+    def copy(self) -> MemberState:
         """A copy that may change."""
-        return State(self.sliders.copy(), self.closed.copy(), self.pressed.copy())
+        return MemberState(self.sliders.copy(), self.closed.copy(), self.pressed.copy())
 
 
 @dataclass(slots=True)
@@ -232,7 +232,7 @@ class Piecewise:
 
     # Modes
 
-    def mode(self, state: State) -> Mode:
+    def mode(self, state: MemberState) -> Mode:
         """Return the linear system of a state."""
         key = state.key
         found = self.modes.get(key)
@@ -240,7 +240,7 @@ class Piecewise:
             found = self.modes[key] = self._made(state)
         return found
 
-    def _made(self, state: State) -> Mode:
+    def _made(self, state: MemberState) -> Mode:
         loads = np.array([each.given for each in self.members]).reshape(-1, self.nw)
         limits = np.zeros((len(self.kt), self.nw))
         for i in np.flatnonzero(state.closed).tolist():
@@ -279,7 +279,7 @@ class Piecewise:
         """Return how much of a member's load counts in the limit of its slider."""
         return abs(self.members[i].factor) * self.members[i].mu
 
-    def _pushed(self, state: State) -> Real:
+    def _pushed(self, state: MemberState) -> Real:
         """Return the forces on the coordinates without friction and multipliers, (n, nw)."""
         push = self.base.copy()
         for i, member in enumerate(self.members):
@@ -312,7 +312,7 @@ class Piecewise:
         return found
 
     def _conditions(
-        self, state: State, A: Real, forces: Real, limits: Real, loads: Real
+        self, state: MemberState, A: Real, forces: Real, limits: Real, loads: Real
     ) -> tuple[Real, list[tuple[int, int, int]]]:
         """Return the rows that must stay positive, and (what ends there, of which, direction)."""
         rows: list[Real] = []
@@ -337,7 +337,7 @@ class Piecewise:
             ends.append((AT_GAP, at, 0))
         return np.array(rows).reshape(-1, self.nw), ends
 
-    def at_rest(self) -> tuple[Real, State]:
+    def at_rest(self) -> tuple[Real, MemberState]:
         """Return w at rest at the angle 0, contacts without force, and what they do; sliders stick."""
         w = np.zeros(self.nw)
         w[self.nd :] = self.harmonics_at(0.0)
@@ -345,7 +345,7 @@ class Piecewise:
         sliders = np.array(
             [STICK if any(closed[i] for i in own) else FREE for own in self.of_slider], np.int64
         )
-        return w, State(sliders, closed, np.array([gap < 0.0 for *_, gap in self.gaps], np.bool_))
+        return w, MemberState(sliders, closed, np.array([gap < 0.0 for *_, gap in self.gaps], np.bool_))
 
 
 def _slider_of(row: Real, kt: float, rows: list[Real], stiffnesses: list[float]) -> tuple[int, float]:

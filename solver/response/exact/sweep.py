@@ -28,7 +28,7 @@ from solver.errors import SettingError
 from solver.jit.fourier import Real
 from solver.response.contact_response import code_of
 from solver.response.exact.branch import ExactBranch, Orbits, Point
-from solver.response.exact.piecewise import FREE, STICK, Piecewise, State
+from solver.response.exact.piecewise import FREE, STICK, MemberState, Piecewise
 from solver.response.solution import HISTORY_DEPENDENT, MEAN_UNDETERMINED, Solution, SolutionStatus
 from solver.results.default_bar import shows_progress
 from solver.scene.scene import Scene
@@ -84,7 +84,7 @@ def sweep_exactly(
         stop = scene.observe.band[1] if stop is None else stop
     first, last = check_range(orbits.parameter, start, stop)
     check_limit(limit)
-    walk = Walk(orbits, first, last, (settings or ContinuationSettings()).most_points)
+    walk = OrbitWalk(orbits, first, last, (settings or ContinuationSettings()).most_points)
     for point in walk.points():
         if on_points is not None:
             on_points(np.array([point.value]), np.array([point.height]))
@@ -99,7 +99,7 @@ def sweep_exactly(
     return branch
 
 
-class Walk:
+class OrbitWalk:
     """The points of a sweep as they are found, in their order.
 
     Attributes
@@ -200,7 +200,7 @@ def _resonances(orbits: Orbits, first: float, last: float) -> tuple[list[float],
     stops: list[float] = []
     undamped: list[float] = []
     for does in (STICK, FREE):
-        state = State(np.full(len(system.kt), does, np.int64), closed, pressed)
+        state = MemberState(np.full(len(system.kt), does, np.int64), closed, pressed)
         poles = np.linalg.eigvals(system.mode(state).A[: 2 * system.n, : 2 * system.n]).astype(np.complex128)
         for pole in poles[poles.imag > 0.0].tolist():
             natural, width = abs(pole) * first, -pole.real * first
@@ -213,7 +213,7 @@ def _resonances(orbits: Orbits, first: float, last: float) -> tuple[list[float],
     return (inside[::-1] if last > first else inside), undamped
 
 
-def _finished(walk: Walk, limit: float | None, begun: float) -> ExactBranch:
+def _finished(walk: OrbitWalk, limit: float | None, begun: float) -> ExactBranch:
     """Refine the peaks, measure the band, and put all together."""
     orbits = walk.orbits
     points = sorted(
@@ -251,7 +251,7 @@ def _finished(walk: Walk, limit: float | None, begun: float) -> ExactBranch:
     )  # fmt: skip
 
 
-def _summits(walk: Walk) -> Iterator[Point]:
+def _summits(walk: OrbitWalk) -> Iterator[Point]:
     """Yield the maxima between points, polished by Brent's method (golden section and parabolas)."""
     points = walk.found
     heights = [each.height for each in points]

@@ -23,7 +23,7 @@ from solver.response.solve import describe
 from solver.response.stability import MOST_STARTS
 from solver.response.stability.floquet import Stability, stability
 from solver.response.stability.residual_forces import AmplitudeRange, amplitude_range
-from solver.response.stability.search import Search
+from solver.response.stability.search import SolutionSearch
 from solver.response.stability.uniqueness import Uniqueness, uniqueness
 from solver.response.stability.verdict import verdict_of
 from solver.results.default_bar import shows_progress
@@ -144,7 +144,7 @@ def solve_all(
     if not only.proven:
         effects = replace(effects, even_harmonics=True)
     balance = build(scene, harmonics=harmonics, effects=effects)
-    search = Search(balance, 2.0 * math.pi * frequency_hz)
+    search = SolutionSearch(balance, 2.0 * math.pi * frequency_hz)
     search.keep(solve_from_nothing(search.workspace, search.omega), "solve")
     stopped = False
     if not only.proven:
@@ -157,7 +157,7 @@ def solve_all(
     )  # fmt: skip
 
 
-def _described(search: Search, frequency_hz: float) -> list[FoundSolution]:
+def _described(search: SolutionSearch, frequency_hz: float) -> list[FoundSolution]:
     """Return what is known as solutions."""
     found = []
     for each in search.known:

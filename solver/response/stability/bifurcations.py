@@ -24,7 +24,7 @@ from solver.balance.kernels.output import MAX_ABS
 from solver.balance.workspace import Workspace
 from solver.continuation.branch import AnyBranch, Branch, BranchStatus
 from solver.continuation.branches.point_by_point import is_unique
-from solver.continuation.extrema.nodes import Node, NodeSolver, Points
+from solver.continuation.extrema.nodes import NodeSolver, PointRow, Points
 from solver.continuation.folds import fold_between, motion_scales
 from solver.continuation.marks import Bifurcations, Mark, MarkKind
 from solver.jit.fourier import Real
@@ -112,7 +112,7 @@ class Along:
             self._signs = np.array([self.sign(node) for node in self.nodes])
         return self._signs
 
-    def sign(self, node: Node) -> float:
+    def sign(self, node: PointRow) -> float:
         """The sign of the determinant at a node."""
         workspace = self.workspace
         workspace.forces(np.ascontiguousarray(node.solution[:-1]), node.at)
@@ -131,10 +131,10 @@ class Along:
                 marks.append(self.mark(MarkKind.BRANCH_POINT, node, i))
         return tuple(marks)
 
-    def _has_sign(self, sign: float, node: Node) -> bool:
+    def _has_sign(self, sign: float, node: PointRow) -> bool:
         return self.sign(node) == sign
 
-    def _fold(self, i: int, left: Node, right: Node) -> Mark:
+    def _fold(self, i: int, left: PointRow, right: PointRow) -> Mark:
         by_share = motion_scales(left, right)
         ends = float(left.tangent[-1] * by_share[0]), float(right.tangent[-1] * by_share[1])
         found = fold_between(partial(self.solver.between, left, right), *ends)
@@ -143,7 +143,7 @@ class Along:
         node, smooth = found
         return self.mark(MarkKind.FOLD, node, i, corner=not smooth)
 
-    def halved(self, i: int, like_the_left: Callable[[Node], bool], most: int) -> Node:
+    def halved(self, i: int, like_the_left: Callable[[PointRow], bool], most: int) -> PointRow:
         """The last node behind point i that is like it, by halving."""
         left, right = self.nodes[i], self.nodes[i + 1]
         for _ in range(most):
@@ -155,7 +155,9 @@ class Along:
                 break
         return left
 
-    def mark(self, kind: MarkKind, node: Node, after: int, *, corner: bool = False, why: str = "") -> Mark:
+    def mark(
+        self, kind: MarkKind, node: PointRow, after: int, *, corner: bool = False, why: str = ""
+    ) -> Mark:
         """A mark at a node behind a point."""
         outside = self.balance.parameter.outside
         return Mark(
@@ -170,7 +172,7 @@ def _by_multipliers(branch: Branch, along: Along) -> tuple[NDArray[np.bool_], tu
     marks = list(along.by_determinant())
     taken = {mark.after for mark in marks}
 
-    def like(stable: bool, node: Node) -> bool:
+    def like(stable: bool, node: PointRow) -> bool:
         values = branch.balance.parameter.all_outside(np.array([node.at]))
         point = replace(branch, values=values, solutions=node.solution[None, :])
         return branch_stability(point)[0].stable == stable

@@ -10,7 +10,7 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
-from solver.contacts.pieces.piece import Part
+from solver.contacts.pieces.piece import ContactPart
 from solver.continuation.branch import Branch
 from solver.errors import SettingError
 from solver.jit import fourier
@@ -18,7 +18,7 @@ from solver.jit.fourier import Complex, Real
 from solver.linear.assembly import linear_model
 from solver.linear.contact_table import port_counts
 from solver.response.solution import Solution
-from solver.response.stability.monodromy import PERIOD, Element, Monodromy, Structure, monodromy
+from solver.response.stability.monodromy import PERIOD, LinearPart, Monodromy, PeriodElement, monodromy
 from solver.results.base import Drawn
 from solver.results.default_bar import shows_progress
 from solver.results.views import Views
@@ -191,7 +191,7 @@ def scene_monodromy(
     free = model.free
     parts, ends = _parts(scene, motions), np.cumsum(port_counts(whole))[:-1]
     elements = tuple(
-        Element(ports=ports[list(part.ports)][:, free], pieces=part.pieces)
+        PeriodElement(ports=ports[list(part.ports)][:, free], pieces=part.pieces)
         for ports, contact in zip(np.split(model.contact_here, ends), whole.contacts, strict=True)
         for part in parts[contact.name]
     )
@@ -205,7 +205,7 @@ def scene_monodromy(
     fed = M.real
     if alone is not None:
         fed = np.outer(M @ alone, (M @ alone).conj()).real
-    structure = Structure(M=M, C=C.real + mass_damping * fed, K=K.real)
+    structure = LinearPart(M=M, C=C.real + mass_damping * fed, K=K.real)
     sectors = scene.structure.sector_count if scene.structure.has_sectors else 1
     return monodromy(
         structure, elements, PERIOD * frequency_hz, sectors=sectors, order=scene.engine_order,
@@ -213,9 +213,9 @@ def scene_monodromy(
     )  # fmt: skip
 
 
-def _parts(scene: Scene, motions: Motions) -> dict[str, tuple[Part, ...]]:
+def _parts(scene: Scene, motions: Motions) -> dict[str, tuple[ContactPart, ...]]:
     """The states of every contact; those of the next sector are the same a part of a period earlier."""
-    own: dict[str, tuple[Part, ...]] = {}
+    own: dict[str, tuple[ContactPart, ...]] = {}
     for contact, moved in zip(scene.contacts, motions, strict=True):
         parts = contact.perturbed(moved, contact.normal_load(moved))
         if parts is None:
@@ -233,5 +233,5 @@ def _parts(scene: Scene, motions: Motions) -> dict[str, tuple[Part, ...]]:
     }
 
 
-def _earlier(part: Part, turn: float) -> Part:
+def _earlier(part: ContactPart, turn: float) -> ContactPart:
     return part._replace(pieces=tuple(piece.earlier(turn) for piece in part.pieces))

@@ -2,7 +2,7 @@
 
 Between two changes of state of any contact the equations are linear, and the changes themselves are the exact
 ones of the motion. With τ = ωt, x the motion, u = P x of a contact and w what it remembers (the places its
-sliders are held at), a contact in one state (`solver.contacts.pieces.piece.Piece`) has
+sliders are held at), a contact in one state (`solver.contacts.pieces.piece.StatePiece`) has
 
     δf = tangent δu + grip δw,      δw' = by_motion δu + by_rate δu' + own δw,
 
@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag, expm
 
-from solver.contacts.pieces.piece import SHORTEST, Piece
+from solver.contacts.pieces.piece import SHORTEST, StatePiece
 from solver.errors import StoppedError
 from solver.jit.fourier import Real
 from solver.response.stability.collocation import GAUSS, ContactStep, StructureStep, blocks_of, stepped
@@ -42,7 +42,7 @@ LEAST_STEP = 1e-6  # rad: where a force goes to 0 its direction turns ever faste
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Element:
+class PeriodElement:
     """A contact, or a part of one, over the period; where no piece lasts it exerts no force (separation).
 
     Attributes
@@ -54,7 +54,7 @@ class Element:
     """
 
     ports: Real
-    pieces: tuple[Piece, ...]
+    pieces: tuple[StatePiece, ...]
 
     @property
     def held(self) -> bool:
@@ -72,7 +72,7 @@ class Element:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Structure:
+class LinearPart:
     """The linear part: M, C, K (n, n each) in SI units."""
 
     M: Real
@@ -105,8 +105,8 @@ class Monodromy:
 
 
 def monodromy(
-    structure: Structure, elements: tuple[Element, ...], omega: float, *, sectors: int = 1, order: int = 0,
-    on_progress: OnProgress = None, should_stop: ShouldStop = None,
+    structure: LinearPart, elements: tuple[PeriodElement, ...], omega: float, *, sectors: int = 1,
+    order: int = 0, on_progress: OnProgress = None, should_stop: ShouldStop = None,
 ) -> Monodromy:  # fmt: skip
     """Return the monodromy matrix of a periodic motion from its contacts' states.
 
@@ -157,7 +157,7 @@ class _Wave(NamedTuple):
     parts: int = 1
 
 
-def _wave(structure: Structure, elements: tuple[Element, ...], sectors: int, order: int) -> _Wave:
+def _wave(structure: LinearPart, elements: tuple[PeriodElement, ...], sectors: int, order: int) -> _Wave:
     """Return by how much of a period sectors follow each other, if they are alike.
 
     With x_j(τ) that of sector j and s order = g modulo n, g the greatest divisor they share, what the sector
@@ -179,7 +179,7 @@ def _wave(structure: Structure, elements: tuple[Element, ...], sectors: int, ord
     return _Wave(sectors, ahead, sectors // joint)
 
 
-def _instants(elements: tuple[Element, ...], last: float) -> list[float]:
+def _instants(elements: tuple[PeriodElement, ...], last: float) -> list[float]:
     """Every instant up to a last one at which a state changes; 0 and the last are among them."""
     changes = {0.0}
     for element in elements:
@@ -199,7 +199,7 @@ class _Flow:
     """The perturbation's equations: of y and y' of the structure and of what elements may remember."""
 
     def __init__(
-        self, structure: Structure, elements: tuple[Element, ...], omega: float, instants: list[float]
+        self, structure: LinearPart, elements: tuple[PeriodElement, ...], omega: float, instants: list[float]
     ) -> None:
         self.n, self.elements, self.steps = structure.M.shape[0], elements, 0
         ports = [element.ports for element in elements]
@@ -269,7 +269,7 @@ class _Flow:
         return state
 
     @staticmethod
-    def _way(element: Element, old: int, new: int) -> list[int]:
+    def _way(element: PeriodElement, old: int, new: int) -> list[int]:
         """Return the pieces entered from one to another, those too short to be seen between among them."""
         if new in (old, -1):
             return []
@@ -311,7 +311,7 @@ class _Flow:
         return state
 
     def _stepped(
-        self, structure: StructureStep, low: float, now: list[tuple[int, Piece]], state: Real
+        self, structure: StructureStep, low: float, now: list[tuple[int, StatePiece]], state: Real
     ) -> tuple[Real, Real]:
         """Return the state after a step, and the forces at its stages."""
         n, h, contacts, begin = self.n, structure.h, [], 0
@@ -324,13 +324,13 @@ class _Flow:
         q, v, w, forces = stepped(structure, contacts, state[:n], state[n : 2 * n], state[2 * n :])
         return np.vstack([q, v, w]), forces
 
-    def _fastest(self, now: list[tuple[int, Piece]], ports: list[int], tau: float) -> float:
+    def _fastest(self, now: list[tuple[int, StatePiece]], ports: list[int], tau: float) -> float:
         """Return a bound of what is fastest with the contacts in their states, in units of ω."""
         tangents = block_diag(*(piece.at(np.array([tau])).tangent[0] for _, piece in now))
         added = np.linalg.norm(tangents @ self._joined[np.ix_(ports, ports)], 2) if ports else 0.0
         return math.sqrt(self._blocks.fastest**2 + float(added))
 
-    def _generator(self, now: list[tuple[int, Piece]]) -> Real:
+    def _generator(self, now: list[tuple[int, StatePiece]]) -> Real:
         """Return the matrix of the equations in states that are constant."""
         n, A = self.n, np.zeros((self.size, self.size))
         stiffness, damping = self._blocks.whole
@@ -347,7 +347,7 @@ class _Flow:
 
 
 def _without_neutral(
-    structure: Structure, elements: tuple[Element, ...], flow: _Flow, matrix: Real
+    structure: LinearPart, elements: tuple[PeriodElement, ...], flow: _Flow, matrix: Real
 ) -> tuple[Real, int]:
     """Take the multipliers that are 1 by construction out of the map, exactly.
 
@@ -370,7 +370,7 @@ def _without_neutral(
     return reduced, matrix.shape[0] - len(kept) + loose.shape[1]
 
 
-def _displacements_nothing_resists(structure: Structure, elements: tuple[Element, ...]) -> Real:
+def _displacements_nothing_resists(structure: LinearPart, elements: tuple[PeriodElement, ...]) -> Real:
     """Orthonormal displacements (n, d) that change no force of structure or contact."""
     rows = [structure.K]
     for element in elements:

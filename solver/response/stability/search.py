@@ -41,7 +41,7 @@ _MOST_POINTS, _MOST_FOLLOWED, _MOST_SWITCHED = 400, 12, 8
 
 
 @dataclass(slots=True)
-class Known:
+class KnownSolution:
     """A solution with what led to it."""
 
     point: PointSolution
@@ -49,13 +49,13 @@ class Known:
     times: int = 1
 
 
-class Search:
+class SolutionSearch:
     """The solutions of a balance at one frequency, as far as they are known."""
 
     def __init__(self, balance: Balance, omega: float) -> None:
         self.balance, self.omega = balance, omega
         self.workspace = Workspace.of(balance)
-        self.known: list[Known] = []
+        self.known: list[KnownSolution] = []
         self.starts = self.switched = 0
 
     def keep(self, found: PointSolution, by: str) -> None:
@@ -67,7 +67,7 @@ class Search:
             if self._size(found.u - each.point.u) <= SAME * size:
                 each.times += 1
                 return
-        self.known.append(Known(found, by))
+        self.known.append(KnownSolution(found, by))
 
     def _size(self, u: Real) -> float:
         """Return the largest coefficient, but for the means where they are a gauge."""
@@ -103,7 +103,7 @@ class Search:
                 on_progress((i + 1) / starts, len(self.known))
         return False
 
-    def _mirror(self, known: Known) -> None:
+    def _mirror(self, known: KnownSolution) -> None:
         """Keep the mirror image half a period later, where that is a response too."""
         ks, balance = self.balance.system.ks, self.balance
         if breaks_symmetry(balance.scene, ("frequency",)) or ks[0] != 0:

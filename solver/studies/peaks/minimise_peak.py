@@ -25,7 +25,7 @@ from solver.studies.peaks.refine_tracks import tighten
 from solver.studies.peaks.results import ChosenBy, LeastPeak, TrackStatus
 from solver.studies.peaks.secondary_minima import NEAR, with_further
 from solver.studies.peaks.survey import OnLook
-from solver.studies.peaks.track import Pace
+from solver.studies.peaks.track import TrackingPace
 from solver.studies.peaks.tracker import Tracker
 from solver.studies.peaks.work_limit import RESPONSES, Allowance, HaltedError
 
@@ -40,7 +40,7 @@ REOPENED = 5  # times a proven optimum is given up because of what lies beside i
 SHORT = 5e-3  # share of the range: a line in a gap that is shorter is followed again with shorter steps
 THOROUGHLY = 3.0  # times the work allowed, where other basins are looked for thoroughly
 _STARTS = (0.5, 0.25, 0.75, 0.0, 1.0)  # shares of the range where the first sweep is tried
-_PACE = Pace(
+_PACE = TrackingPace(
     first_step=0.02, largest_step=0.25, smallest_step=1e-3, height_error=6e-3, omega_error=2e-3, above=1.005,
     slack=0.2, climb_from=4e-3,
 )  # fmt: skip

@@ -55,14 +55,14 @@ class Seed:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Crossing:
+class BandEndCrossing:
     """Where a peak meets an end of the band."""
 
     z: float
     edge: float
     sign: float
 
-    def same(self, other: Crossing, near: float) -> bool:
+    def same(self, other: BandEndCrossing, near: float) -> bool:
         """Return whether another is the same; `near`: distance in z."""
         return self.edge == other.edge and self.sign == other.sign and abs(self.z - other.z) <= near
 
@@ -91,9 +91,9 @@ def leavings(line: Line, band: tuple[float, float]) -> list[Seed]:
     return found
 
 
-def crossings(line: Line, band: tuple[float, float]) -> list[Crossing]:
+def crossings(line: Line, band: tuple[float, float]) -> list[BandEndCrossing]:
     """Return where a line leaves the band."""
-    return [Crossing(z=seed.z, edge=seed.omega, sign=seed.sign) for seed in leavings(line, band)]
+    return [BandEndCrossing(z=seed.z, edge=seed.omega, sign=seed.sign) for seed in leavings(line, band)]
 
 
 def entries(line: Line, band: tuple[float, float], solves: Solves, closest: float) -> list[Seed]:

@@ -18,7 +18,7 @@ from solver.continuation.peaks import Peak
 from solver.jit.fourier import Real
 from solver.scene.scene import Scene
 from solver.studies.peaks.results import TrackStatus
-from solver.studies.peaks.track import Glance, Line, Look, Pace, glance_at, sweep_within
+from solver.studies.peaks.track import Glance, Line, Look, TrackingPace, glance_at, sweep_within
 from solver.studies.peaks.work_limit import Allowance, HaltedError
 
 SAME = (
@@ -40,7 +40,7 @@ class Looking(ABC):
 
     def __init__(
         self, scene: Scene, parameter: str, start: float, stop: float, harmonics: int,
-        effects: Effects | None, pace: Pace, allowance: Allowance | None = None,
+        effects: Effects | None, pace: TrackingPace, allowance: Allowance | None = None,
     ) -> None:  # fmt: skip
         self.scale = scale_of(scene, parameter, start, stop)
         self.balance = build(

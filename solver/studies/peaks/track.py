@@ -29,7 +29,7 @@ from solver.studies.peaks.work_limit import Allowance, HaltedError
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Pace:
+class TrackingPace:
     """How closely peaks are followed.
 
     Attributes
@@ -57,7 +57,7 @@ class Pace:
     climb_from: float
 
 
-EVERYWHERE = Pace(
+EVERYWHERE = TrackingPace(
     first_step=0.02, largest_step=0.125, smallest_step=1e-4, height_error=3e-3, omega_error=1e-3,
     above=math.inf, slack=0.0, climb_from=math.inf,
 )  # fmt: skip

@@ -48,7 +48,7 @@ from solver.linear.contact_table import second_numbers
 from solver.scene.scene import Scene
 from solver.studies.peaks.seeds import (
     CROSSING,
-    Crossing,
+    BandEndCrossing,
     Seed,
     crossings,
     entries,
@@ -58,7 +58,7 @@ from solver.studies.peaks.seeds import (
     passes,
 )
 from solver.studies.peaks.survey import SAME, Looking
-from solver.studies.peaks.track import EVERYWHERE, Glance, Line, LineEnd, Look, Pace
+from solver.studies.peaks.track import EVERYWHERE, Glance, Line, LineEnd, Look, TrackingPace
 from solver.studies.peaks.work_limit import Allowance
 
 Place = tuple[Real, Real, Real]  # row (COLUMNS,), solution and tangent (n_unknowns,) of a line at one z
@@ -102,7 +102,7 @@ class Tracker(Looking):
 
     def __init__(
         self, scene: Scene, parameter: str, start: float, stop: float, harmonics: int,
-        effects: Effects | None, pace: Pace = EVERYWHERE, allowance: Allowance | None = None,
+        effects: Effects | None, pace: TrackingPace = EVERYWHERE, allowance: Allowance | None = None,
     ) -> None:  # fmt: skip
         check_no_line(scene)
         super().__init__(scene, parameter, start, stop, harmonics, effects, pace, allowance)
@@ -113,7 +113,7 @@ class Tracker(Looking):
         self._system: System = by_reference(self.balance.system)
         self._summit: Summit = new_summit(self._system)
         summit_seconds(self._summit)[:] = second_numbers(self.balance.scene)
-        self._crossings: list[Crossing] = []
+        self._crossings: list[BandEndCrossing] = []
         self._at_once = _FIRST_AT_ONCE
         self._asked_at: Counter[float] = Counter()
 
@@ -304,7 +304,7 @@ class Tracker(Looking):
         """Return whether what follows from a line was followed already; it is then."""
         if seed.fixed:
             return passes(self.lines, seed, EXACTLY, SAME)
-        one = Crossing(z=seed.z, edge=nearest(self._band, seed.omega), sign=seed.sign)
+        one = BandEndCrossing(z=seed.z, edge=nearest(self._band, seed.omega), sign=seed.sign)
         near = CROSSING * self._pace.smallest_step * self.scale.span
         known = any(one.same(other, near) for other in self._crossings)
         self._crossings.append(one)

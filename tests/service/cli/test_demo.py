@@ -9,12 +9,12 @@ import pytest
 
 import solver
 from service.cli import main
-from service.cli.demo import CASES, REMOVED, STUCK, Case, run
+from service.cli.demo import CASES, REMOVED, STUCK, DemoCase, run
 from service.cli.failures import ShortfallError
 from service.client.embedded import EmbeddedService
 from service.settings.settings import load_settings
 
-SMALL = Case(scene="two-dof", contact="damper", bounds=(80.0, 130.0), shown=(90.0, 120.0), steps=3)
+SMALL = DemoCase(scene="two-dof", contact="damper", bounds=(80.0, 130.0), shown=(90.0, 120.0), steps=3)
 
 
 def test_the_demonstration_end_to_end(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -64,7 +64,7 @@ def test_the_limits_are_linear() -> None:
 
 def test_a_design_that_falls_short_ends_the_demonstration(tmp_path: Path) -> None:
     # At these loads the contact never slips: the peak does not depend on them.
-    hopeless = Case(scene="two-dof", contact="damper", bounds=(1e8, 1e9), shown=(), steps=2)
+    hopeless = DemoCase(scene="two-dof", contact="damper", bounds=(1e8, 1e9), shown=(), steps=2)
     with pytest.raises(ShortfallError, match="two-dof is failed"):
         run(tmp_path, [hopeless])
 

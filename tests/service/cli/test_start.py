@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from service.cli.lazy import Deferred, Entries, Entry
+from service.cli.lazy import CommandEntry, CommandGroup, Deferred
 from service.cli.table import TOP
 
 SERVICE = {"fastapi", "sqlalchemy", "alembic", "httpx", "uvicorn", "pydantic_settings", "prometheus_client"}
@@ -58,13 +58,13 @@ def test_solve_loads_what_it_computes_with(scene: str) -> None:
 ENTRIES = [
     one
     for entry in TOP.values()
-    for one in (entry.entries if isinstance(entry, Entries) else [entry])
+    for one in (entry.entries if isinstance(entry, CommandGroup) else [entry])
     if not one.group
 ]
 
 
 @pytest.mark.parametrize("entry", ENTRIES, ids=lambda entry: f"{entry.home} {entry.name}")
-def test_the_table_says_what_the_commands_say(entry: Entry) -> None:
+def test_the_table_says_what_the_commands_say(entry: CommandEntry) -> None:
     """The summary in the list of commands is the first line of the command's own help."""
     text = inspect.getdoc(entry.function())
     assert text is not None

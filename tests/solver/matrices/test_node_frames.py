@@ -18,7 +18,7 @@ from sector_files import SECTORS, sector_files
 import solver
 from service.cli import main
 from solver.errors import SceneError
-from solver.matrices.decks.coordinates import GLOBAL, Kind, System
+from solver.matrices.decks.coordinates import GLOBAL, CoordinateKind, CoordinateSystem
 from solver.matrices.decks.deck import Deck, frames
 from solver.matrices.labels import Label
 from solver.matrices.load_set import MatrixSet
@@ -219,7 +219,7 @@ def test_what_cannot_be_read_is_named(text: str, said: str, tmp_path: Path) -> N
 
 
 def test_a_node_on_the_axis_of_its_cylinder_is_refused() -> None:
-    cylinder_z = System(Kind.CYLINDRICAL, GLOBAL.origin, GLOBAL.axes)
+    cylinder_z = CoordinateSystem(CoordinateKind.CYLINDRICAL, GLOBAL.origin, GLOBAL.axes)
     deck = Deck(nodes={1: (0.0, 0.0, 3.0)}, systems={1: cylinder_z})
     with pytest.raises(ValueError, match="node 1 moves along the axes of a cylindrical system"):
         frames(deck, [1])

@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 import solver
-from solver.modes.corrector import State, correct
+from solver.modes.corrector import ModeState, correct
 from solver.modes.nonlinear_mode import pose
 from solver.modes.start import begin, phase_of
 from tests.cases.matrix_cases import chain_raw
 from tests.cases.random_scenes import random_scene
 
 
-def _along(path: str, state: State, found: solver.NonlinearMode, step: float) -> np.ndarray:
+def _along(path: str, state: ModeState, found: solver.NonlinearMode, step: float) -> np.ndarray:
     """Central differences of (frequency, ζ), each solved at the amplitude of a point."""
     value = found.scene.value(path)
     step *= abs(value) or 1.0

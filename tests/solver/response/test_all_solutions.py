@@ -26,7 +26,7 @@ from solver import (
 )
 from solver.balance.balance import build
 from solver.balance.simplifications import Effects
-from solver.response.stability.search import Search
+from solver.response.stability.search import SolutionSearch
 
 
 def duffing(a3: float = 1.0, band: tuple[float, float] = (0.2, 0.35)) -> Scene:
@@ -105,7 +105,7 @@ def test_one_response_under_given_loads_is_complete():
 
 def solutions_by_search(scene: Scene, frequency_hz: float, seed: int) -> int:
     balance = build(scene, harmonics=5, effects=Effects(even_harmonics=True))
-    search = Search(balance, 2.0 * math.pi * frequency_hz)
+    search = SolutionSearch(balance, 2.0 * math.pi * frequency_hz)
     search.keep(search.workspace.solve(search.omega), "solve")
     search.everywhere(10, np.random.default_rng(seed), None, None)
     return len(search.known)
@@ -116,7 +116,7 @@ def test_where_one_response_is_proven_random_starts_find_no_other(seed: int):
     scene, frequency_hz = moving_scene(seed)
     found = uniqueness(scene, 4.0 * frequency_hz)
     assert found.proven
-    search = Search(
+    search = SolutionSearch(
         build(scene, harmonics=5, effects=Effects(even_harmonics=True)), 8.0 * math.pi * frequency_hz
     )
     search.keep(search.workspace.solve(search.omega), "solve")

@@ -27,7 +27,7 @@ from solver import (
 )
 from solver.balance.balance import Balance, build
 from solver.balance.workspace import Workspace
-from solver.contacts.pieces.piece import Piece, spring
+from solver.contacts.pieces.piece import StatePiece, spring
 from solver.continuation.branches.sweep import walk
 from solver.jit.fourier import to_full
 from solver.linear.assembly import linear_model
@@ -35,7 +35,7 @@ from solver.marching.equations import equations_of_motion
 from solver.marching.kernels import taylor as kernel
 from solver.response.solution import Solution
 from solver.response.stability.floquet import Growth, growth_of, scene_monodromy
-from solver.response.stability.monodromy import PERIOD, Element, Monodromy, Structure, monodromy
+from solver.response.stability.monodromy import PERIOD, LinearPart, Monodromy, PeriodElement, monodromy
 
 UNSTABLE = oscillator({"kt": 0.5, "mu": 0.3, "N0": 5.0}, k=1.0, c=0.05)
 
@@ -124,7 +124,7 @@ def with_damping(damping: float, harmonics: int) -> Balance:
     return replace(balance, system=balance.system._replace(dampings=dampings))
 
 
-def states_of(slip: np.ndarray) -> tuple[Piece, ...]:
+def states_of(slip: np.ndarray) -> tuple[StatePiece, ...]:
     (contact,) = UNSTABLE.contacts
     motions = slip[None, :]
     (part,) = contact.perturbed(motions, contact.normal_load(motions)) or ()
@@ -133,8 +133,8 @@ def states_of(slip: np.ndarray) -> tuple[Piece, ...]:
 
 def negative_map(damping: float, frequency_hz: float, slip: np.ndarray) -> Monodromy:
     model = linear_model(UNSTABLE)
-    structure = Structure(M=model.M, C=np.array([[damping]]), K=model.K0)
-    element = Element(ports=model.contact_here, pieces=states_of(slip))
+    structure = LinearPart(M=model.M, C=np.array([[damping]]), K=model.K0)
+    element = PeriodElement(ports=model.contact_here, pieces=states_of(slip))
     return monodromy(structure, (element,), PERIOD * frequency_hz)
 
 
@@ -353,8 +353,8 @@ def test_a_preloaded_stop_changes_the_stiffness_only():
     """A contact without a slider: its multipliers are those of two springs in turn."""
     M, C, K = np.eye(1), np.array([[0.1]]), np.array([[1.0]])
     stop = spring(1.0, 3.0, np.array([[2.0]]))
-    element = Element(ports=np.eye(1), pieces=(stop,))
-    found = monodromy(Structure(M=M, C=C, K=K), (element,), 1.0)
+    element = PeriodElement(ports=np.eye(1), pieces=(stop,))
+    found = monodromy(LinearPart(M=M, C=C, K=K), (element,), 1.0)
 
     def over(angle: float, k: float) -> np.ndarray:
         values, vectors = np.linalg.eig(np.array([[0.0, 1.0], [-k, -0.1]]))
@@ -364,7 +364,7 @@ def test_a_preloaded_stop_changes_the_stiffness_only():
     np.testing.assert_allclose(found.matrix, expected, atol=1e-13)
     assert found.neutral == 0
     turned = stop.earlier(2.5)
-    again = monodromy(Structure(M=M, C=C, K=K), (replace(element, pieces=(turned,)),), 1.0)
+    again = monodromy(LinearPart(M=M, C=C, K=K), (replace(element, pieces=(turned,)),), 1.0)
     np.testing.assert_allclose(
         np.sort_complex(np.linalg.eigvals(again.matrix)),
         np.sort_complex(np.linalg.eigvals(expected)),

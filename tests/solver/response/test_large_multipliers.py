@@ -13,13 +13,13 @@ from moving_scenes import moving_scene
 from scipy.integrate import solve_ivp
 
 from solver import Scene, StoppedError, annulus, load_scene, plan, solve, stability
-from solver.contacts.pieces.piece import Entry, Piece, Rates, steady
+from solver.contacts.pieces.piece import Rates, StateEntry, StatePiece, steady
 from solver.jit.fourier import Real
 from solver.response.stability import monodromy as module
 from solver.response.stability.collocation import blocks_of
 from solver.response.stability.cost import forecast
 from solver.response.stability.floquet import scene_monodromy
-from solver.response.stability.monodromy import PERIOD, Element, Structure, monodromy
+from solver.response.stability.monodromy import PERIOD, LinearPart, PeriodElement, monodromy
 
 
 def maps(scene: Scene, frequency_hz: float, harmonics: int) -> tuple[Real, Real]:
@@ -78,7 +78,7 @@ def test_a_share_of_a_wave_gives_the_map_of_the_whole_period(order: int, sectors
     np.testing.assert_allclose(found, expected, atol=1e-8 * np.abs(expected).max())
 
 
-def structure_of(rng: np.random.Generator, n: int, kind: str) -> Structure:
+def structure_of(rng: np.random.Generator, n: int, kind: str) -> LinearPart:
     """Random matrices: modal damping, dashpots anywhere, one rigid motion, or stiffness of no energy."""
     root, stiff = rng.normal(size=(n, n)), rng.normal(size=(n, n))
     M, K = root @ root.T + n * np.eye(n), stiff @ stiff.T + np.eye(n)
@@ -91,17 +91,17 @@ def structure_of(rng: np.random.Generator, n: int, kind: str) -> Structure:
         C = C + np.diag(rng.uniform(0.0, 1.0, n))
     if kind == "follower":
         K = K + 0.3 * (stiff - stiff.T)
-    return Structure(M=M, C=C, K=K)
+    return LinearPart(M=M, C=C, K=K)
 
 
-def elements_of(rng: np.random.Generator, n: int, *, constant: bool) -> tuple[Element, ...]:
+def elements_of(rng: np.random.Generator, n: int, *, constant: bool) -> tuple[PeriodElement, ...]:
     """Contacts that stick and slip, or whose stiffness and memory change all the time."""
     found = []
     for _ in range(2):
         edges = np.sort(rng.uniform(0.0, PERIOD, 3))
-        stuck = Piece(
+        stuck = StatePiece(
             begin=edges[0], end=edges[1], rates=steady(np.eye(1) * 2.0, -np.eye(1) * 2.0),
-            entry=Entry(np.eye(1), None), carried=np.eye(1),
+            entry=StateEntry(np.eye(1), None), carried=np.eye(1),
         )  # fmt: skip
         a, b, c = rng.uniform(0.3, 1.0, 3)
 
@@ -110,10 +110,10 @@ def elements_of(rng: np.random.Generator, n: int, *, constant: bool) -> tuple[El
             turn = np.cos(tau)[:, None, None]
             return Rates((2.0 + turn) * one, b * turn * one, c * one, a * turn * one, -(b + turn) * one)
 
-        slips = Piece(begin=edges[1], end=edges[2], rates=rates, entry=Entry(np.eye(1), np.eye(1)),
+        slips = StatePiece(begin=edges[1], end=edges[2], rates=rates, entry=StateEntry(np.eye(1), np.eye(1)),
                       carried=np.zeros((1, 1)))  # fmt: skip
         pieces = (stuck,) if constant else (stuck, slips)
-        found.append(Element(ports=rng.normal(size=(1, n)), pieces=pieces))
+        found.append(PeriodElement(ports=rng.normal(size=(1, n)), pieces=pieces))
     return tuple(found)
 
 
@@ -130,7 +130,7 @@ def test_collocation_gives_what_exponentials_give(kind: str, monkeypatch: pytest
     assert len(blocks.stiffness) == (6 if kind in ("modal", "rigid") else 1)
 
 
-def integrated(structure: Structure, elements: tuple[Element, ...], omega: float) -> Real:
+def integrated(structure: LinearPart, elements: tuple[PeriodElement, ...], omega: float) -> Real:
     """The map of displacements and velocities, by an integrator that shares nothing but the rates."""
     n, found = len(structure.M), []
     edges = {0.0, PERIOD, *(edge for e in elements for p in e.pieces for edge in (p.begin, p.end))}

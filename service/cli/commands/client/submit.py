@@ -10,7 +10,7 @@ import typer
 
 from optim.problem.keys import options as key_options_of
 from service.cli.commands.client.jobs import hand_in, scene_of
-from service.cli.lazy import Entry
+from service.cli.lazy import CommandEntry
 from service.cli.options import problem_inputs
 from service.cli.options import shared as options
 from service.cli.options.key_options import (
@@ -42,7 +42,7 @@ def command_of(kind: JobKind) -> Any:
 def _local(name: str) -> Command | None:
     """The command that computes here what a kind computes on a service, if there is one."""
     entry = TOP.get(name)
-    return entry.function() if isinstance(entry, Entry) else None
+    return entry.function() if isinstance(entry, CommandEntry) else None
 
 
 def submission(kind: JobKind, local: Command | None) -> Command:

@@ -10,7 +10,7 @@ from service.errors import InputError
 from service.rendering.tables.text import print_json, print_table, say
 
 if TYPE_CHECKING:
-    from service.schemas.answers import Answer
+    from service.schemas.answers import AnswerModel
 
 MOST = 50
 _T = TypeVar("_T")
@@ -31,7 +31,7 @@ def listed(ask: Callable[..., Iterator[_T]], count: int | None, **filters: Any) 
 
 
 def tell_list(
-    found: Sequence[Answer], title: str, columns: Sequence[str], rows: Iterable[Sequence[str]],
+    found: Sequence[AnswerModel], title: str, columns: Sequence[str], rows: Iterable[Sequence[str]],
     *, right: str, as_json: bool,
 ) -> None:  # fmt: skip
     """Print a list: one JSON object, or a table as of `print_table`."""
@@ -41,7 +41,7 @@ def tell_list(
         print_table(title, columns, rows, right=right)
 
 
-def tell(answer: Answer, words: str, *, as_json: bool) -> None:
+def tell(answer: AnswerModel, words: str, *, as_json: bool) -> None:
     """Print one JSON object, or `words`."""
     if as_json:
         print_json(answer.model_dump(mode="json"))

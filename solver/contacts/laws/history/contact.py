@@ -13,7 +13,7 @@ from solver.contacts.fields import Real
 from solver.contacts.kernels import columns
 from solver.contacts.laws.base import AnyContact
 from solver.contacts.laws.history.definition import LEAST_SAMPLES, MOST_SAMPLES, HistoryLaw
-from solver.contacts.laws.parts import Follows, Held, Row
+from solver.contacts.laws.parts import Follows, RestStiffness, Row
 from solver.errors import SettingError
 
 NODES_A_HARMONIC, BETWEEN_REVERSALS = 32, 16
@@ -35,7 +35,7 @@ class HistoryContact(AnyContact):
 
     DEFINITION: ClassVar[HistoryLaw]
     KERNEL: ClassVar[str] = "solver.contacts.kernels.history.law:history_law"
-    HELD: ClassVar[tuple[Held, ...]] = (Held(columns.KT),)
+    HELD: ClassVar[tuple[RestStiffness, ...]] = (RestStiffness(columns.KT),)
     WORDS: ClassVar[Mapping[str, str]] = {}
 
     samples: Samples | None = None

@@ -11,7 +11,7 @@ from typing import Any
 
 from solver.contacts.fields import LARGEST
 from solver.contacts.kernels.columns import MOST_OWN, OWN
-from solver.contacts.laws.parts import Quantity
+from solver.contacts.laws.parts import LawQuantity
 from solver.errors import SettingError
 
 MOST_STATES = 200
@@ -72,9 +72,9 @@ class LawParameter:
         low = value > self.least if self.above else value >= self.least
         return math.isfinite(value) and low and (value < self.most if self.below else value <= self.most)
 
-    def quantity(self, column: int) -> Quantity:
+    def quantity(self, column: int) -> LawQuantity:
         """Return it as a column of the contact table."""
-        return Quantity(
+        return LawQuantity(
             column=column, unit=self.unit, wanted=self.wanted, least=self.least, symbol=self.symbol
         )  # fmt: skip
 

@@ -11,7 +11,7 @@ import solver
 from optim.methods.afterwards import looked_after
 from optim.results.design import DesignStatus
 from service.cli import main
-from service.rendering.report.responses import Line
+from service.rendering.report.responses import ReportLine
 from service.rendering.report.sections import branch_table
 from service.rendering.tables import campbell as campbell_reports
 from service.rendering.tables import design as design_reports
@@ -56,10 +56,10 @@ def test_a_sweep_of_an_earlier_version_is_read(branch, capsys):
 
 
 def test_the_report_says_it(branch):
-    told = branch_table([Line(name="as given", branch=doubtful(branch), color="black")])
+    told = branch_table([ReportLine(name="as given", branch=doubtful(branch), color="black")])
     assert "not known" in told
     assert WHY in told
-    assert WHY not in branch_table([Line(name="as given", branch=branch, color="black")])
+    assert WHY not in branch_table([ReportLine(name="as given", branch=branch, color="black")])
 
 
 def test_flags_are_told_in_words(branch, capsys):
