@@ -125,13 +125,15 @@ class StoppedError(SolverError):
 class SettingError(SolverError):
     """A bad argument of a computation (a frequency, a number of harmonics, a parameter path).
 
-    The message is "`name` wanted, got value", followed by `hint`.
+    The message is "`name` wanted, got value", followed by `hint`; `name` is the argument, or the keys and
+    indices that lead to a part of it.
     """
 
-    def __init__(self, name: str, value: object, wanted: str, hint: str = "") -> None:
-        self.name = name
+    def __init__(self, name: str | Place, value: object, wanted: str, hint: str = "") -> None:
+        place = (name,) if isinstance(name, str) else name
+        self.name = written(place)
         self.value = value
-        self.issue = Issue((name,), wanted, Shown(f"{value!r}{hint}") if hint else value)
+        self.issue = Issue(place, wanted, Shown(f"{value!r}{hint}") if hint else value)
         super().__init__(self.issue.said())
 
 
@@ -158,9 +160,12 @@ def pointer(*steps: object) -> str:
     return "".join("/" + str(step).replace("~", "~0").replace("/", "~1") for step in steps)
 
 
+_LONGEST = 200  # characters of a key that somebody made up
+
+
 def written(place: Place) -> str:
-    """Return a place as text, ``cases[0].band``."""
-    steps = "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in place)
+    """Return a place as text, ``cases[0].band``; keys are cut where they are too long to be read."""
+    steps = "".join(f"[{step}]" if isinstance(step, int) else f".{step[:_LONGEST]}" for step in place)
     return steps.removeprefix(".")
 
 

@@ -23,6 +23,7 @@ from solver.continuation.branch import Branch
 from solver.continuation.branches.sweep import sweep
 from solver.continuation.extrema.error_estimate import ErrorEstimator
 from solver.continuation.peaks import Peak
+from solver.errors import Place
 from solver.jit.fourier import Real
 from solver.results.default_bar import shows_progress
 from solver.results.watch import OnProgress, ShouldStop, part_of
@@ -242,10 +243,10 @@ def _orders(scene: Scene, orders: object) -> tuple[int, ...]:
         raise DesignError("orders", orders, "must be a list of at least one whole number >= 1")
     if len(orders) > _MOST_ORDERS:
         raise DesignError("orders", len(orders), f"must be at most {_MOST_ORDERS} numbers")
-    return tuple(sorted({_order(f"orders[{i}]", order) for i, order in enumerate(orders)}))
+    return tuple(sorted({_order(("orders", i), order) for i, order in enumerate(orders)}))
 
 
-def _order(name: str, order: object) -> int:
+def _order(name: str | Place, order: object) -> int:
     if isinstance(order, bool) or not isinstance(order, int) or order < 1:
         raise DesignError(name, order, "must be a whole number >= 1, the excitations a revolution")
     return order

@@ -140,7 +140,7 @@ def _check_orders(orders: Any) -> None:
         raise SettingError("orders", orders, f"must be a list of 1 to {MOST_ORDERS} whole numbers >= 1")
     for i, order in enumerate(orders):
         if not _whole(order) or order < 1:
-            raise SettingError(f"orders[{i}]", order, "must be a whole number >= 1")
+            raise SettingError(("orders", i), order, "must be a whole number >= 1")
 
 
 def _check(families: int, up_to_hz: float | None, within: float) -> None:
