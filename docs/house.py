@@ -217,13 +217,14 @@ def report(house: House) -> list[tuple[str, str]]:
     entries = house.entries()
     largest = sorted(entries, key=lambda name: -entries[name])[:5]
     every = ("at once", "late", "for types")
+    classes, modules = house.twice()
     return [
         ("modules", str(len(house.files))),
         ("source lines", house.lines()),
         ("lines of the page's scripts", str(house.lines_below("service/page/js", end="js"))),
         ("lines of the tests", str(house.lines_below("tests"))),
-        ("names of classes twice", str(house.twice()[0])),
-        ("names of modules twice", str(house.twice()[1])),
+        ("names of classes twice", str(classes)),
+        ("names of modules twice", str(modules)),
         (f"functions with {PARAMETERS} parameters", ", ".join(house.with_many_parameters()) or "none"),
         ("most entries in a folder", ", ".join(f"{name} {entries[name]}" for name in largest)),
         ("longest chain of imports", str(house.depth())),

@@ -87,9 +87,9 @@ def upgrade() -> None:
 def downgrade() -> None:
     """Back to the one before; the results of the jobs stay."""
     _create_sweep()
-    _create_contact()
+    _create_parts("sweep", "id", "contact", 200, _CONTACT, _CONTACT, "N0")
     _create_design()
-    _create_variable()
+    _create_parts("design", "job_id", "variable", 500, _VARIABLE, ("value",), "value")
     columns = {name: _value("sweep", name, kind) for name, kind in _SWEEP.items()}
     columns |= {name: _result.c[name] for name in ("id", "position", *_SHARED)}
     _put_back("sweep", _sweep, columns)
@@ -254,9 +254,8 @@ def _create_results() -> None:
         sa.PrimaryKeyConstraint("number", name="pk_result"),
         sa.UniqueConstraint("id", name="uq_result_id"),
     )
-    for names in (["job_id", "of"], ["of", "number"], *(
-        ["of", name, "number"] for name in ("owner", "scene_name", "scene_hash"))):  # fmt: skip
-        op.create_index(f"ix_result_{'_'.join(names)}", "result", names)
+    alone = ("owner", "scene_name", "scene_hash")
+    _index("result", ("job_id", "of"), ("of", "number"), *(("of", name, "number") for name in alone))
     op.create_table(
         "quantity",
         sa.Column("id", sa.Integer(), nullable=False),
@@ -309,28 +308,11 @@ def _create_sweep() -> None:
         sa.ForeignKeyConstraint(["job_id"], ["job.id"], name="fk_sweep_job_id_job", ondelete="CASCADE"),
         sa.PrimaryKeyConstraint("id", name="pk_sweep"),
     )
-    for name in (
-        "job_id", "owner", "scene_name_peak", "scene_name", "scene_hash", "completed", "intermediate",
+    alone = (
+        "job_id", "owner", "scene_name", "scene_hash", "completed", "intermediate",
         "parameter", "peak", "peak_at", "band_hz", "points", "seconds", "harmonics",
-    ):  # fmt: skip
-        names = ["scene_name", "peak"] if name == "scene_name_peak" else [name]
-        op.create_index(f"ix_sweep_{name}_id", "sweep", [*names, "id"])
-
-
-def _create_contact() -> None:
-    op.create_table(
-        "sweep_contact",
-        sa.Column("sweep_id", sa.String(length=36), nullable=False),
-        sa.Column("name", sa.String(length=200), nullable=False),
-        sa.Column("position", sa.Integer(), nullable=False),
-        *(sa.Column(name, sa.Double(), nullable=True) for name in _CONTACT),
-        sa.ForeignKeyConstraint(
-            ["sweep_id"], ["sweep.id"], name="fk_sweep_contact_sweep_id_sweep", ondelete="CASCADE"
-        ),
-        sa.PrimaryKeyConstraint("sweep_id", "name", name="pk_sweep_contact"),
-    )
-    for names in (["N0", "name", "sweep_id"], ["name", "N0", "sweep_id"]):
-        op.create_index(f"ix_sweep_contact_{'_'.join(names)}", "sweep_contact", names)
+    )  # fmt: skip
+    _index("sweep", ("scene_name", "peak", "id"), *((name, "id") for name in alone))
 
 
 def _create_design() -> None:
@@ -341,25 +323,38 @@ def _create_design() -> None:
         sa.ForeignKeyConstraint(["job_id"], ["job.id"], name="fk_design_job_id_job", ondelete="CASCADE"),
         sa.PrimaryKeyConstraint("job_id", name="pk_design"),
     )
-    for name in (
-        "owner", "scene_name_peak", "scene_name", "scene_hash", "method", "robust", "reached", "feasible",
+    alone = (
+        "owner", "scene_name", "scene_hash", "method", "robust", "reached", "feasible",
         "objective", "peak", "peak_at", "band_hz", "work", "seconds",
-    ):  # fmt: skip
-        names = ["scene_name", "peak"] if name == "scene_name_peak" else [name]
-        op.create_index(f"ix_design_{name}_job_id", "design", [*names, "job_id"])
+    )  # fmt: skip
+    _index("design", ("scene_name", "peak", "job_id"), *((name, "job_id") for name in alone))
 
 
-def _create_variable() -> None:
+def _create_parts(
+    of: str,
+    key: str,
+    part: str,
+    longest: int,
+    columns: tuple[str, ...],
+    may_be_null: tuple[str, ...],
+    by: str,
+) -> None:
+    """Create the table of the parts of sweeps or designs, with indices by name and by one of the columns."""
+    table, owner = f"{of}_{part}", f"{of}_id"
     op.create_table(
-        "design_variable",
-        sa.Column("design_id", sa.String(length=36), nullable=False),
-        sa.Column("name", sa.String(length=500), nullable=False),
+        table,
+        sa.Column(owner, sa.String(length=36), nullable=False),
+        sa.Column("name", sa.String(length=longest), nullable=False),
         sa.Column("position", sa.Integer(), nullable=False),
-        *(sa.Column(name, sa.Double(), nullable=name == "value") for name in _VARIABLE),
+        *(sa.Column(name, sa.Double(), nullable=name in may_be_null) for name in columns),
         sa.ForeignKeyConstraint(
-            ["design_id"], ["design.job_id"], name="fk_design_variable_design_id_design", ondelete="CASCADE"
+            [owner], [f"{of}.{key}"], name=f"fk_{table}_{owner}_{of}", ondelete="CASCADE"
         ),
-        sa.PrimaryKeyConstraint("design_id", "name", name="pk_design_variable"),
+        sa.PrimaryKeyConstraint(owner, "name", name=f"pk_{table}"),
     )
-    for names in (["name", "value", "design_id"], ["value", "name", "design_id"]):
-        op.create_index(f"ix_design_variable_{'_'.join(names)}", "design_variable", names)
+    _index(table, (by, "name", owner), ("name", by, owner))
+
+
+def _index(table: str, *columns: tuple[str, ...]) -> None:
+    for names in columns:
+        op.create_index(f"ix_{table}_{'_'.join(names)}", table, list(names))
