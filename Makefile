@@ -11,6 +11,8 @@ STAMP := .venv/.up-to-date
 DEV := .venv/.for-development
 # What pytest gets in addition, for example: make test PYTEST="-k march -x"
 PYTEST ?=
+# Which part of the long tests, such as 3/10, the third tenth of each.
+PART ?= 1/1
 # Which benchmarks: all when empty; `python -m benchmarks --help` lists them.
 BENCH ?=
 .DEFAULT_GOAL := help
@@ -21,7 +23,7 @@ help:
 	@echo "make dev        add to it what tests, checks, benchmarks and the reference need"
 	@echo "make demo       run the main job end to end; pictures go to demo-output/"
 	@echo "make test       check the code and run every test but the long ones"
-	@echo "make test-long  run the long studies, hours of them; some: make test-long PYTEST=tests/solver/response"
+	@echo "make test-long  run the long studies, ten hours of them; a tenth of each: make test-long PART=3/10""
 	@echo "make lint       check the code: ruff, mypy, import-linter"
 	@echo "make bench      measure the solver and print tables; some of them: make bench BENCH='case-a chains'"
 	@echo "make docs       build the documentation site, reference and gallery too; it goes to site/"
@@ -70,7 +72,7 @@ test: lint
 	PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n 4 --dist worksteal $(PYTEST)
 
 test-long: dev
-	$(BIN)/python -m pytest -m long $(PYTEST)
+	$(BIN)/python -m pytest -m long --part $(PART) $(PYTEST)
 
 lint: dev
 	$(BIN)/ruff check
