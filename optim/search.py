@@ -83,12 +83,12 @@ def solve_problem(
     on_best: OnBest = None,
 ) -> DesignResult:
     """Search the best design of a problem; see `design`."""
-    if problem.method is Method.PERFORMANCE_CURVE:
-        return _by_curve(problem, on_progress, should_stop)
     tally = Tally(on_progress)
     found = _solved(problem, tally.searching, should_stop, on_best)
     most = most_harmonics(problem.harmonics)
     found, more = _with_enough_harmonics(found, most, tally, should_stop, on_best)
+    if problem.method is Method.PERFORMANCE_CURVE:
+        return honest(found)  # it stands for no other design
     chosen = looked_after(found, should_stop, tally.further, more)
     if chosen.optimum != found.optimum:
         # What is chosen of a plateau may be known less well than what was found on it.
@@ -147,6 +147,8 @@ def _solved(
     before: DesignResult | None = None,
 ) -> DesignResult:  # fmt: skip
     """Search the best design of a problem by its method; `before`: of a search before with less known."""
+    if problem.method is Method.PERFORMANCE_CURVE:
+        return _by_curve(problem, on_progress, should_stop)
     begun = time.perf_counter()
     tracked = None
     trackable = problem.method in (Method.AUTO, Method.TRACKED) and problem.why_not_tracked is None
@@ -269,14 +271,13 @@ def _by_curve(problem: Problem, on_progress: OnProgress, should_stop: ShouldStop
     if evaluation is not None and evaluation.good:
         model = model_of(evaluation, problem.variables, evaluation.objective, natural_scales(problem))
         found = conditions(model, problem.variables)
-    result = DesignResult(
+    return DesignResult(
         problem=problem, method=Method.PERFORMANCE_CURVE, status=by_curve.status, evaluation=evaluation,
         conditions=found, basins=(), curve=by_curve.check,
         history=() if evaluation is None else (evaluation,),
         evaluations=0 if evaluation is None else 1, work=0.0 if evaluation is None else 1.0,
         seconds=time.perf_counter() - begun,
     )  # fmt: skip
-    return honest(result)
 
 
 def _of_tracked(problem: Problem, tracked: Tracked, seconds: float) -> DesignResult:

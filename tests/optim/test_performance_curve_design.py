@@ -74,11 +74,16 @@ def test_a_curve_for_each_design_has_two_variables() -> None:
 def test_one_load_of_the_contacts_of_a_finite_element_disk() -> None:
     wanted = {"lower.N0,upper.N0": (10.0, 500.0)}
     scene = solver.load_scene("fe-disk")
-    found = optim.design(scene, variables=wanted, method="performance-curve", harmonics=5)
+    # With five harmonics the response lacks the peak that is highest with ten, from which the curve of one mode
+    # is 6 % off.
+    off = optim.design(scene, variables=wanted, method="performance-curve", harmonics=5)
+    assert off.status is optim.DesignStatus.CURVE_OFF
+    assert off.problem.harmonics == 10
+    found = optim.design(scene, variables=wanted, method="performance-curve", tolerance=0.1, harmonics=5)
     assert found.curve is not None
     assert found.curve.shared
     assert found.reached
-    assert abs(found.curve.error) < TOLERANCE
+    assert TOLERANCE < abs(found.curve.error) < 0.1
     assert found.curve.estimate == pytest.approx(found.curve.error, abs=2e-3)
     assert math.isfinite(found.curve.seconds_saved)
     exact = optim.design(scene, variables=wanted, harmonics=5)
