@@ -74,8 +74,8 @@ def test_a_curve_for_each_design_has_two_variables() -> None:
 def test_one_load_of_the_contacts_of_a_finite_element_disk() -> None:
     wanted = {"lower.N0,upper.N0": (10.0, 500.0)}
     scene = solver.load_scene("fe-disk")
-    # With five harmonics the response lacks the peak that is highest with ten, from which the curve of one mode
-    # is 6 % off.
+    # With five harmonics the response lacks the peak that is highest with ten, from which the curve of one
+    # mode is 6 % off.
     off = optim.design(scene, variables=wanted, method="performance-curve", harmonics=5)
     assert off.status is optim.DesignStatus.CURVE_OFF
     assert off.problem.harmonics == 10
