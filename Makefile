@@ -16,7 +16,7 @@ PART ?= 1/1
 # Which benchmarks: all when empty; `python -m benchmarks --help` lists them.
 BENCH ?=
 .DEFAULT_GOAL := help
-.PHONY: help setup dev demo test test-long lint bench docs serve clean
+.PHONY: help setup dev demo test test-long style lint bench docs serve clean
 
 help:
 	@echo "make setup      set up .venv; the command is then $(BIN)/stickslip"
@@ -67,18 +67,23 @@ demo: $(PACKAGES)
 
 # The kernels are compiled before, so that not every process does it. Four processes for two cores: tests of the
 # service also wait. They may write bytecode: what is read again by hundreds of processes, and the tests themselves.
-test: lint
+# Types are checked meanwhile: mypy keeps one core busy for most of a minute.
+test: style
 	$(BIN)/python -m service.warm_up
-	PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n 4 --dist worksteal $(PYTEST)
+	$(BIN)/mypy & types=$$!; \
+	  PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n 4 --dist worksteal $(PYTEST); tests=$$?; \
+	  wait $$types && exit $$tests
 
 test-long: dev
 	$(BIN)/python -m pytest -m long --part $(PART) $(PYTEST)
 
-lint: dev
+style: dev
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
-	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+lint: style
+	$(BIN)/mypy
 
 bench: dev
 	$(BIN)/python -m benchmarks $(BENCH)
