@@ -31,7 +31,9 @@ def is_watched() -> bool:
     said = os.environ.get(SETTING, "")
     if said in ("0", "1"):
         return said == "1"
-    return "ipykernel" in sys.modules or bool(sys.stderr is not None and sys.stderr.isatty())
+    kernels = sys.modules.get("ipykernel.kernelapp")
+    in_kernel = kernels is not None and kernels.IPKernelApp.initialized()
+    return in_kernel or bool(sys.stderr is not None and sys.stderr.isatty())
 
 
 class Bar:

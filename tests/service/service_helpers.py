@@ -163,8 +163,9 @@ def pids(file: Path) -> list[int]:
 
 def pdf_objects(pdf: bytes) -> bytes:
     """What stands in the compressed streams of a PDF."""
-    streams = re.findall(rb"stream\r?\n(.*?)\r?\nendstream", pdf, re.DOTALL)
-    return b"\n".join(zlib.decompress(one) for one in streams if one.startswith(b"x"))
+    streams = re.findall(rb"stream\r?\n(.*?)\nendstream", pdf, re.DOTALL)
+    # What is behind a stream may be the first half of a line end.
+    return b"\n".join(zlib.decompressobj().decompress(one) for one in streams if one.startswith(b"x"))
 
 
 def within(value: float | None, query: dict[str, Any], name: str) -> bool:
