@@ -9,10 +9,7 @@ from __future__ import annotations
 import json
 import os
 import re
-import socket
-import subprocess
-import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -20,7 +17,7 @@ import httpx
 import numpy as np
 import pytest
 from jsonschema import Draft202012Validator
-from launch import COMMAND
+from launch import served
 from pydantic import BaseModel, ConfigDict, Field
 
 import solver
@@ -148,38 +145,10 @@ DISTORTION = JobKind(
 @pytest.fixture(scope="module")
 def url(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     """A service with the kind, as whoever runs it starts it: by its environment."""
-    folder = tmp_path_factory.mktemp("kind")
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
     paths = [str(ROOT), str(ROOT / "tests" / "cases"), str(Path(__file__).parent)]
     environment = {**os.environ, "STICKSLIP_KINDS": json.dumps([ENTRY]), "PYTHONPATH": os.pathsep.join(paths)}
-    words = ("serve", "--port", str(port), "--database", f"sqlite:///{folder}/jobs.db", "--workers", "1")
-    with (folder / "log").open("w") as log:
-        process = subprocess.Popen([*COMMAND, *words], stderr=log, stdout=log, env=environment)
-        try:
-            address = f"http://127.0.0.1:{port}"
-            until(lambda: ready(address, process))
-            yield address
-        finally:
-            process.terminate()
-            status = process.wait(timeout=30)
-    assert status == 0, (folder / "log").read_text()
-
-
-def until(condition: Callable[[], bool], seconds: float = 120.0) -> None:
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end, "it did not come true"
-        time.sleep(0.05)
-
-
-def ready(address: str, process: subprocess.Popen[bytes]) -> bool:
-    assert process.poll() is None, "the service ended"
-    try:
-        return httpx.get(f"{address}/health/ready").status_code == 200
-    except httpx.TransportError:
-        return False
+    with served(tmp_path_factory.mktemp("kind"), environment) as url:
+        yield url
 
 
 @pytest.fixture
@@ -221,7 +190,7 @@ def test_rest_computes_stores_and_lists_it(url: str) -> None:
 def test_a_refusal_names_field_value_and_what_is_right(
     url: str, change: dict[str, Any], pointer: str, words: list[str]
 ) -> None:
-    answer = httpx.post(f"{url}/v1/jobs", json={"kind": "distortion", **BODY, **change})
+    answer = httpx.post(f"{url}/v1/jobs", json={"kind": "distortion", **BODY, **change}, timeout=60.0)
     assert answer.status_code == 422
     [error] = answer.json()["errors"]
     assert error["pointer"] == pointer
@@ -309,7 +278,7 @@ def test_the_description_of_the_api_has_body_and_result(url: str) -> None:
 
 
 def test_every_kind_is_listed_with_its_schemas(url: str) -> None:
-    kinds = {one["name"]: one for one in httpx.get(f"{url}/v1/kinds").json()["items"]}
+    kinds = {one["name"]: one for one in httpx.get(f"{url}/v1/kinds", timeout=60.0).json()["items"]}
     assert list(kinds) == [*(kind.name for kind in SHIPPED), "distortion"]
     mine = kinds["distortion"]
     assert mine["summary"] == DISTORTION.summary
