@@ -74,7 +74,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 
 def _together(item: pytest.Item) -> str:
-    """The tests that one of several processes runs: those that share a service, a browser or computed truths."""
+    """What one of several processes runs whole: tests that share a service, a browser, computed truths."""
     path = item.path.relative_to(item.config.rootpath / "tests")
     return next((name for name in SHARING if path.is_relative_to(name)), str(path))
 

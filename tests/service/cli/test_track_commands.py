@@ -102,7 +102,7 @@ def test_contacts_without_second_derivatives_are_mapped_but_not_tracked(
     text = (Path(solver.__file__).parent / "scene" / "shipped" / "two-dof.toml").read_text()
     plane = (
         '[[contacts]]\nname = "plane"\nlaw = "coulomb-2d"\nbetween = ["m1", "ground"]\n'
-        'between_second = ["m2", "ground"]\nkt = 10.0\nmu = 0.3\nN0 = 50.0\nsamples = 256\n\n'
+        'between_second = ["m2", "ground"]\nkt = 10.0\nmu = 0.3\nN0 = 50.0\nsamples = 64\n\n'
     )
     scene = tmp_path / "plane.toml"
     scene.write_text(text.replace("[excitation]", f"{plane}[excitation]"))
