@@ -25,8 +25,8 @@ MODULES = ("stickslip", *SUBJECTS, "service.client", "service.schemas.answers")
 _SECTION = re.compile(r"^## (.+)$")
 _ENTRY = re.compile(r"^- \[(?P<title>[^]]+)\]\((?P<page>[\w-]+\.md)\)")
 OUTSIDE = (
-    "README.md", "CONTRIBUTING.md", "CHANGELOG.md", "LICENSE", "CITATION.cff", "deploy/stickslip.service",
-    "deploy/stickslip.env.example", "deploy/compose.yaml",
+    "README.md", "CONTRIBUTING.md", "CHANGELOG.md", "LICENSE", "CITATION.cff", "tests/README.md",
+    "deploy/stickslip.service", "deploy/stickslip.env.example", "deploy/compose.yaml",
 )  # fmt: skip
 _PICTURE = re.compile(r"!\[(?P<words>[^]]*)\]\((?P<path>img/[\w./-]+\.(?:png|svg))\)")
 # pdoc takes what stands behind a colon for a type. Here it is one where a sentence follows on the next line,
@@ -36,7 +36,7 @@ _ITEM = re.compile(r"^( - \*\*.+?\*\*) \((.*)\):\n(?:   (?![A-Z|‖]))?(?!   [A-
 
 def on_config(config: MkDocsConfig) -> MkDocsConfig:
     """Take the navigation from index.md, and put overview, gallery and reference beside it."""
-    sections: list[Any] = [{"Overview": "readme.md"}, {"Gallery": "gallery.md"}]
+    sections: list[Any] = [{"Overview": "index.md"}, {"Gallery": "gallery.md"}]
     entries: list[dict[str, str]] = []
     for line in (ROOT / "docs" / "index.md").read_text(encoding="utf-8").splitlines():
         if (title := _SECTION.match(line)) is not None:
@@ -52,6 +52,8 @@ def on_config(config: MkDocsConfig) -> MkDocsConfig:
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
     """Add the pages that are made here."""
+    if (listed := files.get_file_from_path("index.md")) is not None:
+        files.remove(listed)  # the navigation says what it lists; a site begins with the overview
     for name, text in made().items():
         files.append(File.generated(config, name, content=text))
     return files
@@ -59,20 +61,28 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 def on_page_markdown(markdown: str, **_: object) -> str:
     """Point links out of docs/ at what the site has of them."""
-    return markdown.replace("](../README.md", "](readme.md").replace("](../", "](")
+    return markdown.replace("](../README.md", "](index.md").replace("](../", "](")
 
 
 def made() -> dict[str, str]:
     """Return what is made here or stands outside docs/, by name."""
     found = {name: (ROOT / name).read_text(encoding="utf-8") for name in OUTSIDE}
-    found["readme.md"] = found.pop("README.md")
-    for name in ("readme.md", "CONTRIBUTING.md", "CHANGELOG.md"):
-        found[name] = found[name].replace("](docs/", "](")
-    found |= {"gallery.md": gallery(), "index.md": FRONT}
+    found["index.md"] = found.pop("README.md")
+    for name in ("index.md", "CONTRIBUTING.md", "CHANGELOG.md"):
+        found[name] = _from_docs(found[name])
+    found["gallery.md"] = gallery()
     return found | {_page(module): reference(module) for module in MODULES}
 
 
-FRONT = '<meta http-equiv="refresh" content="0; url=readme.html">\n\n# stickslip\n\n[Overview](readme.md)\n'
+def _from_docs(text: str) -> str:
+    """Point links of a page beside docs/ at what the site has; those of HTML are not rewritten by MkDocs."""
+    text = re.sub(r'(src|href)="docs/([^"#]+?)(?:\.md)?(?=[#"])', _in_site, text)
+    return text.replace("](docs/index.md", "](index.md").replace("](docs/", "](")
+
+
+def _in_site(link: re.Match[str]) -> str:
+    name = link[2] if Path(link[2]).suffix else f"{link[2]}.html"
+    return f'{link[1]}="{name}'
 
 
 def gallery() -> str:

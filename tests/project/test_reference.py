@@ -5,10 +5,12 @@ from __future__ import annotations
 import inspect
 import os
 import re
+import shutil
 import subprocess
 import sys
 from importlib import import_module
 from pathlib import Path
+from urllib.parse import unquote, urlsplit
 
 import pytest
 
@@ -75,9 +77,30 @@ def test_the_site_has_every_page_and_picture_and_can_be_searched(site: Path) -> 
         assert words in index
 
 
+def test_every_page_opens_with_its_pictures_and_links(site: Path) -> None:
+    """In a real Chromium, from the front on: nothing that a page shows or links is missing."""
+    api = pytest.importorskip("playwright.sync_api", reason="the package playwright is not installed")
+    program = shutil.which("chromium")
+    if program is None:
+        pytest.skip("chromium is not installed (Debian's package `chromium`)")
+    pages = sorted(site.rglob("*.html"))
+    with api.sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=program, args=["--no-sandbox"])
+        page = browser.new_page(java_script_enabled=False)
+        for path in pages:
+            page.goto(path.as_uri(), wait_until="load")
+            broken = "images => images.filter(one => !one.naturalWidth).map(one => one.src)"
+            assert page.eval_on_selector_all("img", broken) == [], path.name
+            for link in page.eval_on_selector_all("a[href]", "links => links.map(one => one.href)"):
+                if link.startswith("file:") and path.name != "404.html":
+                    assert Path(unquote(urlsplit(link).path)).exists(), (path.name, link)
+        browser.close()
+    assert {"index.html", "gallery.html", "design.html"} <= {path.name for path in pages}
+
+
 def test_the_site_needs_nothing_from_elsewhere(site: Path) -> None:
     """No fonts, styles or scripts of another server."""
-    page = (site / "readme.html").read_text(encoding="utf-8")
+    page = (site / "index.html").read_text(encoding="utf-8")
     loaded = re.findall(r'<(?:script|link|img)[^>]*(?:src|href)="([^"]+)"', page)
     assert loaded
     assert [path for path in loaded if "://" in path] == []
