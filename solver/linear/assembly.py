@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,44 +13,34 @@ from numpy.typing import NDArray
 from solver.errors import SettingError
 from solver.linear.extra_terms import (
     Coordinates,
-    ExtraTerms,
-    depends_on_speed,
+    extra_slopes,
     extra_terms,
-    hysteretic,
     own_terms,
-    terms_by_gas,
-    terms_by_loss,
-    terms_by_speed,
     terms_of_line,
 )
 from solver.linear.lumped_matrices import (
     Matrices,
-    derivative_by_number,
+    derivative_by_numbers,
     matrices_of_numbers,
     numbers_of,
     topology_of,
 )
-from solver.linear.matrix_model import mass_derivative, matrices_with_bodies
+from solver.linear.matrix_model import mass_of_bodies, matrices_with_bodies
 from solver.linear.model import ForceTerm, Identity, LinearModel, LinearModelDerivative
 from solver.linear.moving_base import base_motions, derivative_with_base, with_base
 from solver.linear.sector_matrices import ProportionalDamping, sector_matrices
 from solver.matrices.values import frozen
-from solver.scene.bodies.body import MOMENTS, Body
-from solver.scene.bodies.kinematics import Form, force_derivatives
-from solver.scene.bodies.paths import is_body_path
-from solver.scene.bodies.shape_parts import motion_derivatives
+from solver.scene.bodies.body import Body
+from solver.scene.bodies.kinematics import Form
 from solver.scene.cyclic.annulus import written_out
 from solver.scene.matrices_structure import Ratios
-from solver.scene.parameter_paths import PROPORTIONAL, is_gas_path, is_loss, share, structure_names
+from solver.scene.parameter_paths import parameter_of
 from solver.scene.scene import (
     CyclicStructure,
-    Damper,
     Excitation,
     LumpedStructure,
-    Mass,
     MatricesStructure,
     Scene,
-    Spring,
     Structure,
 )
 from solver.wording import listing, nearest
@@ -74,18 +64,17 @@ def _linear_model(of: Identity[Scene]) -> LinearModel:
     return with_base(model, scene, base) if base else model
 
 
-def structure_derivative(scene: Scene, name: str) -> LinearModelDerivative:
-    """Derivatives of the matrices by the structural parameter `name` (without ``structure.``).
+def structure_derivative(scene: Scene, path: str) -> LinearModelDerivative:
+    """Derivatives of the matrices, constant forces and motions of contacts by a parameter of the scene.
 
-    By the value of a group they are the sum of those by its members, times their factors. Of a body, a load
-    or the speed the name is the path, and the forces have derivatives too.
+    By the value of a group they are the sum of those by its members, times their factors.
 
     Raises
     ------
     SettingError
-        The structure has no parameter of that name.
+        The scene has no parameter of that path.
     """
-    found, base = _derivative_by(scene, name), base_motions(scene)
+    found, base = _derivative_by(scene, path), base_motions(scene)
     return derivative_with_base(found, _without_base(scene), base) if base else found
 
 
@@ -202,46 +191,23 @@ def _identity(n: int) -> FloatArray:
     return frozen(np.eye(n))
 
 
-def _derivative_by(scene: Scene, name: str) -> LinearModelDerivative:
+def _derivative_by(scene: Scene, path: str) -> LinearModelDerivative:
     """Derivatives of what `_without_base` gives."""
-    structure = scene.structure
-    slopes = motion_derivatives(scene, name)
-    if slopes is not None:
-        return _of_motions(scene, slopes)
-    if is_body_path(scene, name):
-        return _of_bodies(scene, name)
-    if is_gas_path(scene, name):
-        gas = terms_by_gas(scene, name.rpartition(".")[0], _coordinates_of(scene))
-        return replace(_of_nothing(gas.K.shape[1]), extra=gas)
-    if is_loss(structure, name):
-        here = _coordinates_of(scene)
-        nothing = _of_nothing(here.shapes.shape[1])
-        return replace(nothing, by_loss_factor=True, extra=terms_by_loss(here))
+    slope, structure, here = parameter_of(scene, path).slope(), scene.structure, _coordinates_of(scene)
     if isinstance(structure, MatricesStructure):
-        return _proportional(structure, scene.bodies, name)
-    parts: tuple[Mass | Spring | Damper, ...] = (*structure.masses, *structure.springs, *structure.dampers)
-    shares = [(i, weight) for i, part in enumerate(parts) if name and (weight := share(part, name))]
-    if not shares:
-        raise _unknown(name, structure_names(structure))
-    topology, numbers = topology_of(structure, scene.bodies), numbers_of(structure, scene.bodies)
-    behind = len(topology.dofs) - len(
-        structure.dofs
-    )  # places of the bodies' DOFs, between masses and springs
-    shares = [(i if i < len(structure.masses) else i + behind, weight) for i, weight in shares]
-    own, ratios = len(structure.dofs), _modal_ratios(structure)
-    members = [(derivative_by_number(topology, numbers, i, own, ratios), weight) for i, weight in shares]
-
-    def total(key: str) -> FloatArray:
-        return frozen(
-            sum((weight * getattr(d, key) for d, weight in members), np.zeros(members[0][0].dM.shape))
-        )
-
-    dK0, dKp = total("dK0"), total("dKp")
-    lossy = structure.loss_factor and (np.any(dK0) or np.any(dKp))
-    return LinearModelDerivative(
-        dM=total("dM"), dC0=total("dC0"), dCp=total("dCp"), dK0=dK0, dKp=dKp,
-        affine=all(d.affine for d, _ in members),
-        extra=hysteretic(len(dK0), structure.loss_factor) if lossy else None,
+        found = _proportional(structure, scene.bodies, here.shapes.shape[1], slope.damping)
+    else:
+        found = derivative_by_numbers(
+            topology_of(structure, scene.bodies), numbers_of(structure, scene.bodies), slope.parts,
+            len(structure.dofs), _modal_ratios(structure),
+        )  # fmt: skip
+    lossy = structure.loss_factor if np.any(found.dK0) or np.any(found.dKp) else 0.0
+    first, second = extra_slopes(scene, slope, here, lossy)
+    dofs, shapes = scene.dofs, _shapes(scene)
+    return replace(
+        found, dM=found.dM if not slope.masses else mass_of_bodies(len(found.dM), scene.bodies, slope.masses),
+        extra=first, second_extra=second, by_loss_factor=slope.loss, **_moved_contacts(scene, slope.motions),
+        forces=_terms(slope.forces, dofs, shapes), second_forces=_terms(slope.second_forces, dofs, shapes),
     )  # fmt: skip
 
 
@@ -256,20 +222,16 @@ def _coordinates(structure: Structure, shapes: FloatArray) -> Coordinates:
     return Coordinates(shapes=shapes, own=own)
 
 
-def _of_nothing(n: int) -> LinearModelDerivative:
-    """Derivatives of 0, of n coordinates."""
-    nothing = _nothing(n)
-    return LinearModelDerivative(dM=nothing, dC0=nothing, dCp=nothing, dK0=nothing, dKp=nothing, affine=True)
-
-
-def _of_motions(scene: Scene, slopes: Mapping[str, tuple[Form, ...]]) -> LinearModelDerivative:
-    """Derivatives where contacts are moved: of their motions alone."""
-    dofs, shapes = scene.dofs, _shapes(scene)
-    forms = [slopes.get(c.name, ((),) * len(c.directions)) for c in scene.contacts]
-    here, beyond = _contact_selection(dofs, tuple(form for each in forms for form in each))
+def _moved_contacts(scene: Scene, motions: Mapping[str, tuple[Form, ...]] | None) -> dict[str, Any]:
+    """Derivatives where contacts are moved: of their motions."""
+    if motions is None:
+        return {}
+    shapes = _shapes(scene)
+    forms = [motions.get(c.name, ((),) * len(c.directions)) for c in scene.contacts]
+    here, beyond = _contact_selection(scene.dofs, tuple(form for each in forms for form in each))
     if shapes is not None:
         here, beyond = frozen(here @ shapes), frozen(beyond @ shapes)
-    return replace(_of_nothing(here.shape[1]), affine=False, contact_here=here, contact_next=beyond)
+    return {"affine": False, "contact_here": here, "contact_next": beyond}
 
 
 def _shapes(scene: Scene) -> FloatArray | None:
@@ -281,44 +243,23 @@ def _shapes(scene: Scene) -> FloatArray | None:
     return matrices_with_bodies(scene.structure, scene.bodies).shapes
 
 
-def _of_bodies(scene: Scene, path: str) -> LinearModelDerivative:
-    """Derivatives by a number of bodies or loads, or by the speed: of the mass, and of constant forces."""
-    dofs, shapes = scene.dofs, _shapes(scene)
-    n = len(dofs) if shapes is None else shapes.shape[1]
-    owner, _, key = path.rpartition(".")
-    behind = sum(len(body.dofs) for body in scene.bodies)
-    massive = key == "mass" or key in MOMENTS
-    first, second = force_derivatives(scene, path)
-    extra: tuple[ExtraTerms | None, ExtraTerms | None] = (None, None)
-    if not owner and depends_on_speed(scene):
-        extra = terms_by_speed(scene, _coordinates_of(scene))
-    return replace(
-        _of_nothing(n),
-        dM=mass_derivative(n - behind, scene.bodies, owner, key) if massive else _nothing(n),
-        forces=_terms(first, dofs, shapes), second_forces=_terms(second, dofs, shapes),
-        extra=extra[0], second_extra=extra[1] if extra[1] is not None and np.any(extra[1].K) else None,
-    )  # fmt: skip
-
-
-def _proportional(structure: MatricesStructure, bodies: tuple[Body, ...], name: str) -> LinearModelDerivative:
-    """Derivatives by the proportional damping, the only parameter of a structure given by its matrices."""
-    if name not in PROPORTIONAL:
-        raise _unknown(name, PROPORTIONAL)
+def _proportional(
+    structure: MatricesStructure, bodies: tuple[Body, ...], n: int, which: Literal["K", "M"] | None
+) -> LinearModelDerivative:
+    """Derivatives by the proportional damping, the only one of a structure's own given by its matrices."""
+    nothing = _nothing(n)
+    found = LinearModelDerivative(dM=nothing, dC0=nothing, dCp=nothing, dK0=nothing, dKp=nothing, affine=True)
+    if which is None:
+        return found
     if structure.has_sectors:
         sector = sector_matrices(structure, bodies)
-        damping = ProportionalDamping(sector=sector, which="K" if name == PROPORTIONAL[0] else "M")
-        return replace(_of_nothing(sector.shapes.shape[1]), damping=damping)
-    found = matrices_with_bodies(structure, bodies)
-    dC = found.K if name == PROPORTIONAL[0] else found.M  # the symmetric part of K
+        return replace(found, damping=ProportionalDamping(sector=sector, which=which))
+    dC = getattr(matrices_with_bodies(structure, bodies), which)  # the symmetric part of K
     if bodies:  # which have no such damping
         dC = dC.copy()
         dC[-sum(len(body.dofs) for body in bodies) :] = 0.0
         dC = frozen(dC)
-    return replace(_of_nothing(len(dC)), dC0=dC)
-
-
-def _unknown(name: str, known: Sequence[str]) -> SettingError:
-    return SettingError("name", name, f"must be one of {listing(known)}", nearest(str(name), known))
+    return replace(found, dC0=dC)
 
 
 @lru_cache(maxsize=256)

@@ -23,6 +23,7 @@ from solver.matrices.values import frozen
 from solver.scene.bodies.body import REVOLUTIONS
 from solver.scene.linear_terms import Entry
 from solver.scene.scene import MatricesStructure, Scene
+from solver.scene.scene_parameter import Slope
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -190,28 +191,27 @@ def _terms(
     return total.terms(loss)
 
 
-def hysteretic(n: int, loss_factor: float) -> ExtraTerms:
-    """Return structural damping alone, of n coordinates."""
-    return _Sum(np.eye(n), ()).terms(loss_factor)
+def extra_slopes(
+    scene: Scene, slope: Slope, coordinates: Coordinates, loss_factor: float
+) -> tuple[ExtraTerms | None, ExtraTerms | None]:
+    """Return the first and second derivatives of the extra terms by a parameter; None where they are 0.
 
-
-def terms_by_loss(coordinates: Coordinates) -> ExtraTerms | None:
-    """Return the derivative by the loss factor of what K has beside its symmetric part; None: nothing."""
-    if coordinates.own is None or not coordinates.own.skew[0]:
-        return None
-    total = _Sum(coordinates.shapes, ())
-    total.add_own(coordinates.own.skew[0], (), 1j)
-    return total.terms()
-
-
-def terms_by_gas(scene: Scene, name: str, coordinates: Coordinates) -> ExtraTerms:
-    """Return their derivative by the factor of aerodynamic influence of that name."""
-    total = _Sum(coordinates.shapes, scene.dofs)
-    for gas in scene.aerodynamics:
-        if gas.name == name:
-            for entry in gas.model_copy(update={"factor": 1.0}).entries(scene.structure.sector_count):
-                total.add(entry, entry.k, entry.c)
-    return total.terms()
+    `loss_factor` is that of what the symmetric stiffness gains.
+    """
+    own, spinning = coordinates.own, slope.speed and depends_on_speed(scene)
+    skew = own.skew[0] if own is not None and slope.loss else ()
+    if not (slope.entries or loss_factor or spinning or skew):
+        return None, None
+    first, second = (_Sum(coordinates.shapes, scene.dofs) for _ in range(2))
+    for entry in slope.entries:
+        first.add(entry, entry.k, entry.c)
+    first.add_own(skew, (), 1j)
+    if spinning:
+        spin = (scene.speed or 0.0) * REVOLUTIONS
+        first.add_turning(scene, own, 2.0 * spin * REVOLUTIONS, REVOLUTIONS)
+        second.add_turning(scene, own, 2.0 * REVOLUTIONS**2, 0.0)
+    bent = second.terms()
+    return first.terms(loss_factor), bent if np.any(bent.K) else None
 
 
 def terms_of_line(scene: Scene, coordinates: Coordinates) -> ExtraTerms | None:
@@ -219,25 +219,8 @@ def terms_of_line(scene: Scene, coordinates: Coordinates) -> ExtraTerms | None:
     if not depends_on_speed(scene):
         return None
     total = _Sum(coordinates.shapes, scene.dofs)
-    for entry in _entries(scene):
-        total.add(entry, entry.k_omega2, entry.g)
-    if coordinates.own is not None:
-        total.add_own(coordinates.own.K_omega2, coordinates.own.G)
+    total.add_turning(scene, coordinates.own, 1.0, 1.0)
     return total.terms()
-
-
-def terms_by_speed(scene: Scene, coordinates: Coordinates) -> tuple[ExtraTerms, ExtraTerms]:
-    """Return their first and second derivative by the speed in 1/min."""
-    spin = (scene.speed or 0.0) * REVOLUTIONS
-    first, second = (_Sum(coordinates.shapes, scene.dofs) for _ in range(2))
-    for entry in _entries(scene):
-        first.add(entry, 2.0 * spin * REVOLUTIONS * entry.k_omega2, REVOLUTIONS * entry.g)
-        second.add(entry, 2.0 * REVOLUTIONS**2 * entry.k_omega2, 0.0)
-    own = coordinates.own
-    if own is not None:
-        first.add_own(own.K_omega2, own.G, 2.0 * spin * REVOLUTIONS, REVOLUTIONS)
-        second.add_own(own.K_omega2, (), 2.0 * REVOLUTIONS**2)
-    return first.terms(), second.terms()
 
 
 def depends_on_speed(scene: Scene) -> bool:
@@ -268,6 +251,13 @@ class _Sum:
             for offset, matrix in blocks:
                 size = len(matrix)
                 self._at(to, offset)[:size, :size] += factor * matrix
+
+    def add_turning(self, scene: Scene, own: OwnTerms | None, square: float, spin: float) -> None:
+        """Add what goes with the squared speed and with the speed, times these factors."""
+        for entry in _entries(scene):
+            self.add(entry, square * entry.k_omega2, spin * entry.g)
+        if own is not None:
+            self.add_own(own.K_omega2, own.G, square, spin)
 
     def terms(self, loss_factor: float = 0.0) -> ExtraTerms:
         """Return what was added, with structural damping."""

@@ -1,13 +1,9 @@
-"""The matrices of masses, springs and dashpots, and their derivatives: one CasADi expression carries both.
-
-The expression of a scene's structure is symbolic in every mass, stiffness and dashpot, so a named parameter
-has its derivative from the same lines that give the value.
-"""
+"""The matrices of masses, springs and dashpots, and their derivatives from the same lines."""
 
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,13 +39,6 @@ class Matrices(NamedTuple):
     Kp: FloatArray
 
 
-class _Expression(NamedTuple):
-    """The matrices side by side, M | C0 | Cp | K0 | Kp, as an expression in all parameters."""
-
-    parameters: Any
-    stacked: Any
-
-
 def topology_of(structure: Assembled, bodies: tuple[Body, ...]) -> Topology:
     """Return what joins what in a structure with bodies."""
     springs = tuple(spring.ends for spring in structure.springs)
@@ -72,20 +61,10 @@ def numbers_of(structure: Assembled, bodies: tuple[Body, ...]) -> tuple[float, .
     )
 
 
-@lru_cache(maxsize=64)
-def _expression(topology: Topology) -> _Expression:
-    """The matrices in symbols, in the order of `_numbers`, for their derivatives."""
-    import casadi  # the values of the matrices need no symbols
-
-    n = len(topology.dofs)
-    q = casadi.SX.sym("q", n + 2 * len(topology.springs) + len(topology.dampers) + 1)
-    return _Expression(q, casadi.horzcat(*_assembled(topology, q, casadi.SX(n, n))))
-
-
-def _assembled(topology: Topology, q: Any, zero: Any) -> tuple[Any, ...]:
-    """Return M, C0, Cp, K0, Kp in floats or in symbols, as the parameters `q` and the (n, n) `zero` are."""
+def _assembled(topology: Topology, q: tuple[float, ...]) -> Matrices:
+    """Return the matrices of the numbers `q`, in the order of `numbers_of`."""
     n, n_springs, n_dampers = len(topology.dofs), len(topology.springs), len(topology.dampers)
-    M, C0, Cp, K0, Kp = (zero + 0.0 for _ in range(5))
+    M, C0, Cp, K0, Kp = (np.zeros((n, n)) for _ in range(5))
     k, c, c_spring = n, n + n_springs, n + n_springs + n_dampers
     beta = q[c_spring + n_springs]
     index = {dof: i for i, dof in enumerate(topology.dofs)}
@@ -96,10 +75,10 @@ def _assembled(topology: Topology, q: Any, zero: Any) -> tuple[Any, ...]:
         _join(C0, Cp, ends, q[c_spring + i] + beta * q[k + i], index)
     for i, ends in enumerate(topology.dampers):
         _join(C0, Cp, ends, q[c + i], index)
-    return M, C0, Cp, K0, Kp
+    return Matrices(M, C0, Cp, K0, Kp)
 
 
-def _join(X0: Any, Xp: Any, ends: _Ends, value: Any, index: dict[str, int]) -> None:
+def _join(X0: FloatArray, Xp: FloatArray, ends: _Ends, value: float, index: dict[str, int]) -> None:
     """Add one spring or dashpot between two ends to X0 + Xp e^{j theta} + Xp^T e^{-j theta}."""
     here = [index[end.dof] for end in ends if end.dof is not None]
     for i in here:
@@ -123,7 +102,7 @@ def matrices_of_numbers(
     """Return the matrices of a topology with these numbers, bodies and modal damping; read-only."""
     n = len(topology.dofs)
     own = n - sum(len(body.dofs) for body in bodies)
-    found = Matrices(*_assembled(topology, numbers, np.zeros((n, n))))
+    found = _assembled(topology, numbers)
     if ratios is not None:
         found.C0[:own, :own] += modal_damping(found.M[:own, :own], found.K0[:own, :own], ratios)
     if bodies:
@@ -132,34 +111,26 @@ def matrices_of_numbers(
 
 
 @lru_cache(maxsize=256)
-def derivative_by_number(
-    topology: Topology, numbers: tuple[float, ...], i: int, own: int, ratios: Ratios | None
-) -> LinearModelDerivative:
-    """Return their derivative by number i; the first `own` DOFs are the structure's."""
-    import casadi
+def derivative_by_numbers(
+    topology: Topology, numbers: tuple[float, ...], parts: tuple[tuple[int, float], ...], own: int,
+    ratios: Ratios | None,
+) -> LinearModelDerivative:  # fmt: skip
+    """Return their derivative where masses, springs and dashpots, counted in this order, gain so much.
 
-    expression = _expression(topology)
-    derivative, affine = _derivative_function(topology, i)
-    stacked = casadi.reshape(derivative(np.asarray(numbers)), *expression.stacked.shape)
-    dense = np.asarray(casadi.DM(stacked).full(), dtype=np.float64)
-    n = dense.shape[0]
-    d = Matrices(*(dense[:, i * n : (i + 1) * n].copy() for i in range(5)))
+    The first `own` DOFs are the structure's. All but modal damping is linear in these numbers.
+    """
+    behind = len(topology.dofs) - own  # places of the bodies' DOFs, between masses and springs
+    gained = [0.0] * (len(numbers) - 1) + [numbers[-1]]
+    for i, weight in parts:
+        gained[i if i < own else i + behind] += weight
+    d = _assembled(topology, tuple(gained))
+    moved = bool(np.any(d.M) or np.any(d.K0))
     if ratios is not None:
         at = matrices_of_numbers(topology, numbers, (), None)
         d.C0[:own, :own] += modal_damping_derivative(
             at.M[:own, :own], at.K0[:own, :own], ratios, d.M[:own, :own], d.K0[:own, :own]
         )
-        affine = affine and not (np.any(d.M) or np.any(d.K0))
     d = Matrices(*map(frozen, d))
-    return LinearModelDerivative(dM=d.M, dC0=d.C0, dCp=d.Cp, dK0=d.K0, dKp=d.Kp, affine=affine)
-
-
-@lru_cache(maxsize=256)
-def _derivative_function(topology: Topology, i: int) -> tuple[Any, bool]:
-    """Derivative of the stacked matrices by parameter i as a function of all, and whether it is constant."""
-    import casadi
-
-    q, stacked = _expression(topology)
-    vector = casadi.vec(stacked)
-    jacobian = casadi.jacobian(vector, q[i])
-    return casadi.Function("derivative", [q], [jacobian]), bool(casadi.is_linear(vector, q[i]))
+    return LinearModelDerivative(
+        dM=d.M, dC0=d.C0, dCp=d.Cp, dK0=d.K0, dKp=d.Kp, affine=ratios is None or not moved
+    )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -136,13 +137,11 @@ def bodies_mass(n: int, bodies: tuple[Body, ...]) -> FloatArray:
     return frozen(block_diag(np.zeros((n, n)), *(body.mass_matrix() for body in bodies)))
 
 
-def mass_derivative(n: int, bodies: tuple[Body, ...], owner: str, key: str) -> FloatArray:
-    """Derivative of `bodies_mass` by a number of the bodies of that name or group; read-only."""
-    blocks = [
-        body.mass_derivative(key) if owner in (body.name, body.group) else np.zeros((len(body.dofs),) * 2)
-        for body in bodies
-    ]
-    return frozen(block_diag(np.zeros((n, n)), *blocks))
+def mass_of_bodies(n: int, bodies: tuple[Body, ...], masses: Mapping[str, FloatArray]) -> FloatArray:
+    """Mass matrices of bodies by their names as one of `n` coordinates, theirs the last; read-only."""
+    blocks = [masses.get(body.name, np.zeros((len(body.dofs),) * 2)) for body in bodies]
+    own = n - sum(map(len, blocks))
+    return frozen(block_diag(np.zeros((own, own)), *blocks))
 
 
 def matrices_with_bodies(structure: MatricesStructure, bodies: tuple[Body, ...]) -> MatrixModel:

@@ -230,41 +230,24 @@ def static_forces(scene: HasBodies) -> tuple[Excitation, ...]:
     """The constant forces of loads and of rotation as forces on DOFs; along a line those at 1 rad/s."""
     if not scene.loads and scene.speed is None and scene.speed_order is None:
         return ()
-    found = [part for load in scene.loads for part in _of_load(scene, load, load.force)]
-    spin = _spin(scene)
+    found = [part for load in scene.loads for part in towards(scene, load, load.force)]
     for body in scene.bodies:
-        found += _outward(body, body.mass * (body.radius_of_rotation or 0.0) * spin**2)
-    return _static(found)
+        found += outward(body, body.mass * (body.radius_of_rotation or 0.0) * spin_of(scene) ** 2)
+    return static(found)
 
 
-def _spin(scene: HasBodies) -> float:
+def spin_of(scene: HasBodies) -> float:
     """Speed of rotation [rad/s]; 1 along a line, where it follows the frequency."""
     return (scene.speed or 0.0) * REVOLUTIONS if scene.speed_order is None else 1.0
 
 
-def force_derivatives(scene: HasBodies, path: str) -> tuple[tuple[Excitation, ...], tuple[Excitation, ...]]:
-    """First and second derivatives of `static_forces` by a path of bodies or loads, or by the speed."""
-    owner, _, key = path.rpartition(".")
-    first = [part for x in scene.loads if owner and x.name == owner for part in _of_load(scene, x, 1.0)]
-    second: list[tuple[str, float]] = []
-    spin = _spin(scene)
-    for body in scene.bodies:
-        radius = body.radius_of_rotation or 0.0
-        if not owner:
-            first += _outward(body, 2.0 * body.mass * radius * spin * REVOLUTIONS)
-            second += _outward(body, 2.0 * body.mass * radius * REVOLUTIONS**2)
-        elif owner in (body.name, body.group) and key == "mass":
-            first += _outward(body, radius * spin**2)
-        elif owner in (body.name, body.group) and key == "radius_of_rotation":
-            first += _outward(body, body.mass * spin**2)
-    return _static(first), _static(second)
-
-
-def _static(parts: list[tuple[str, float]]) -> tuple[Excitation, ...]:
+def static(parts: list[tuple[str, float]]) -> tuple[Excitation, ...]:
+    """Constant forces on DOFs."""
     return tuple(Excitation(dof=dof, amplitude=force, harmonic=0) for dof, force in parts)
 
 
-def _of_load(scene: HasBodies, load: Load, force: float) -> list[tuple[str, float]]:
+def towards(scene: HasBodies, load: Load, force: float) -> list[tuple[str, float]]:
+    """A force where a load acts, by DOFs."""
     if load.dof is not None:
         return [(load.dof, force)]
     if load.on is None or load.direction is None:
@@ -272,7 +255,8 @@ def _of_load(scene: HasBodies, load: Load, force: float) -> list[tuple[str, floa
     return _along(places(scene.bodies, scene.nodes)[load.on], load.direction, force)
 
 
-def _outward(body: Body, force: float) -> list[tuple[str, float]]:
+def outward(body: Body, force: float) -> list[tuple[str, float]]:
+    """A force on a body away from the axis of rotation, by DOFs."""
     return [] if body.out is None or force == 0.0 else _along(body.place, body.out, force)
 
 

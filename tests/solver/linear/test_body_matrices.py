@@ -26,7 +26,7 @@ def test_springs_join_bodies_and_masses() -> None:
     at, damper = given.dofs.index("ax"), given.dofs.index("damper.x")
     assert K[at, damper] == -7e3
     assert K[damper, damper] == 7e3
-    derivative = structure_derivative(given, "tie").dK0
+    derivative = structure_derivative(given, "structure.tie").dK0
     assert derivative[damper, damper] == 1.0
     assert np.count_nonzero(derivative) == 4
 

@@ -40,5 +40,5 @@ def test_its_derivative_by_the_loss_factor_has_the_antisymmetric_part_too() -> N
     given = scene(0.3)
     diameters, moving = np.zeros(1, np.int64), np.ones(1, np.bool_)
     model = linear_model(given)
-    dK = structure_derivative(given, "loss_factor").at(model, diameters, moving)[0][0]
+    dK = structure_derivative(given, "structure.loss_factor").at(model, diameters, moving)[0][0]
     np.testing.assert_allclose(dK, 1j * K, atol=1e-9)
