@@ -134,7 +134,7 @@ def matrices_of_paths(balance: Balance, parameters: Sequence[Parameter]) -> Harm
     by, forces_by, motions_by = {}, {}, {}
     for i, path in structural.items():
         d = structure_derivative(scene, path)
-        dK, dC, dM = d.at(model, diameters, moving)
+        dK, dC, dM = (each + 0j for each in d.at(diameters, moving))
         if d.contact_here is not None and d.contact_next is not None:
             dL = motions_by[i] = d.contact_here + d.contact_next * turn
             dK = dK + _stiffness(dL, shift, L) + _stiffness(L, shift, dL)

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
 from functools import lru_cache
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,17 +19,16 @@ from solver.linear.extra_terms import (
 )
 from solver.linear.lumped_matrices import (
     Matrices,
-    derivative_by_numbers,
     matrices_of_numbers,
     numbers_of,
+    slopes_by_numbers,
     topology_of,
 )
-from solver.linear.matrix_model import mass_of_bodies, matrices_with_bodies
+from solver.linear.matrix_model import mass_of_bodies
 from solver.linear.model import ForceTerm, Identity, LinearModel, LinearModelDerivative
 from solver.linear.moving_base import base_motions, derivative_with_base, with_base
 from solver.linear.sector_matrices import ProportionalDamping, sector_matrices
 from solver.matrices.values import frozen
-from solver.scene.bodies.body import Body
 from solver.scene.bodies.kinematics import Form
 from solver.scene.cyclic.annulus import written_out
 from solver.scene.matrices_structure import Ratios
@@ -41,7 +39,6 @@ from solver.scene.scene import (
     LumpedStructure,
     MatricesStructure,
     Scene,
-    Structure,
 )
 from solver.wording import listing, nearest
 
@@ -80,53 +77,50 @@ def structure_derivative(scene: Scene, path: str) -> LinearModelDerivative:
 
 def _without_base(scene: Scene) -> LinearModel:
     """The same with forces alone."""
-    structure = scene.structure
-    if isinstance(structure, MatricesStructure) and structure.has_sectors:
-        sector = sector_matrices(structure, scene.bodies)
-        return replace(_model(scene, Matrices(*(_nothing(0),) * 5), sector.shapes), sector=sector)
+    structure, dofs, here = scene.structure, scene.dofs, _coordinates(scene)
+    terms: dict[str, Any] = {}
     if isinstance(structure, MatricesStructure):
-        found = matrices_with_bodies(structure, scene.bodies)
-        nothing = _nothing(found.M.shape[0])
-        return _model(scene, Matrices(found.M, found.C, nothing, found.K, nothing), found.shapes)
-    topology = topology_of(structure, scene.bodies)
-    numbers = numbers_of(structure, scene.bodies)
-    matrices = matrices_of_numbers(topology, numbers, scene.bodies, _modal_ratios(structure))
-    return _model(scene, matrices, _identity(len(topology.dofs)))
+        sector = sector_matrices(structure, scene.bodies)
+        terms["every_diameter"] = sector.every_diameter
+        if structure.has_sectors:
+            terms |= _in_matrices(*(_nothing(0),) * 3) | {"sector": sector}
+        else:
+            terms |= _in_matrices(*sector.at(0))
+    else:
+        topology, numbers = topology_of(structure, scene.bodies), numbers_of(structure, scene.bodies)
+        terms |= matrices_of_numbers(topology, numbers, scene.bodies, _modal_ratios(structure))._asdict()
+    motions, beyond = _motions(scene, scene.forms)
+    return LinearModel(
+        **terms, dofs=dofs, shapes=here.shapes, contact_here=motions, contact_next=beyond,
+        forces=_force_terms(scene, scene.forces),
+        observe=_rows(scene, row_of(scene, scene.observe.dof)), engine_order=scene.engine_order,
+        sectors=structure.sector_count, extra=extra_terms(scene, here),
+        line=None if scene.speed_order is None else terms_of_line(scene, here),
+        line_order=scene.speed_order or 1.0,
+    )  # fmt: skip
+
+
+def _in_matrices(K: FloatArray, C: FloatArray, M: FloatArray) -> dict[str, FloatArray]:
+    """Matrices that join no sectors."""
+    nothing = _nothing(len(M))
+    return Matrices(M, C, nothing, K, nothing)._asdict()
 
 
 def _modal_ratios(structure: LumpedStructure | CyclicStructure) -> Ratios | None:
     return structure.damping_ratio if isinstance(structure, LumpedStructure) else None
 
 
-def _model(scene: Scene, matrices: Matrices, shapes: FloatArray) -> LinearModel:
-    """Add contacts and forces to the matrices."""
-    structure = scene.structure
-    dofs = scene.dofs
-    here, beyond = _contact_selection(dofs, tuple(form for forms in scene.forms for form in forms))
-    whole = isinstance(structure, MatricesStructure)
-    coordinates = _coordinates(structure, shapes)
+def _rows(scene: Scene, selected: NDArray[Any]) -> NDArray[Any]:
+    """Rows over the DOFs in the coordinates of the matrices: those of a lumped structure are its DOFs."""
+    if not isinstance(scene.structure, MatricesStructure):
+        return selected
+    return frozen(selected @ sector_matrices(scene.structure, scene.bodies).shapes)
 
-    def rows(selected: FloatArray) -> FloatArray:
-        return frozen(selected @ shapes) if whole else selected
 
-    return LinearModel(
-        dofs=dofs,
-        shapes=shapes,
-        M=matrices.M,
-        C0=matrices.C0,
-        Cp=matrices.Cp,
-        K0=matrices.K0,
-        Kp=matrices.Kp,
-        contact_here=rows(here),
-        contact_next=rows(beyond),
-        forces=_terms(scene.forces, dofs, shapes if whole else None),
-        observe=rows(row_of(scene, scene.observe.dof)),
-        engine_order=scene.engine_order,
-        sectors=structure.sector_count,
-        extra=extra_terms(scene, coordinates),
-        line=None if scene.speed_order is None else terms_of_line(scene, coordinates),
-        line_order=scene.speed_order or 1.0,
-    )
+def _motions(scene: Scene, forms: Sequence[tuple[Form, ...]]) -> tuple[FloatArray, FloatArray]:
+    """Motions of all contacts as rows, of this sector and of the next."""
+    here, beyond = _contact_selection(scene.dofs, tuple(form for each in forms for form in each))
+    return _rows(scene, here), _rows(scene, beyond)
 
 
 def row_of(scene: Scene, name: str) -> FloatArray:
@@ -154,14 +148,14 @@ def _sum_of(dofs: tuple[str, ...], terms: tuple[tuple[str, float], ...]) -> Floa
     return frozen(found)
 
 
-def _terms(
-    forces: tuple[Excitation, ...], dofs: tuple[str, ...], shapes: FloatArray | None
-) -> tuple[ForceTerm, ...]:
+def _force_terms(scene: Scene, forces: tuple[Excitation, ...]) -> tuple[ForceTerm, ...]:
     """Forces on DOFs in the coordinates of the matrices."""
+    dofs = scene.dofs
 
     def vector(force: Excitation) -> NDArray[Any]:
-        found = _pattern(dofs, force.forces or ()) if force.dof is None else _unit(dofs, force.dof)
-        return found if shapes is None else frozen(found @ shapes)
+        return _rows(
+            scene, _pattern(dofs, force.forces or ()) if force.dof is None else _unit(dofs, force.dof)
+        )
 
     return tuple(
         ForceTerm(vector=vector(e), amplitude=e.amplitude, phase=e.phase, harmonic=e.harmonic)
@@ -193,73 +187,39 @@ def _identity(n: int) -> FloatArray:
 
 def _derivative_by(scene: Scene, path: str) -> LinearModelDerivative:
     """Derivatives of what `_without_base` gives."""
-    slope, structure, here = parameter_of(scene, path).slope(), scene.structure, _coordinates_of(scene)
-    if isinstance(structure, MatricesStructure):
-        found = _proportional(structure, scene.bodies, here.shapes.shape[1], slope.damping)
-    else:
-        found = derivative_by_numbers(
-            topology_of(structure, scene.bodies), numbers_of(structure, scene.bodies), slope.parts,
-            len(structure.dofs), _modal_ratios(structure),
-        )  # fmt: skip
-    lossy = structure.loss_factor if np.any(found.dK0) or np.any(found.dKp) else 0.0
-    first, second = extra_slopes(scene, slope, here, lossy)
-    dofs, shapes = scene.dofs, _shapes(scene)
-    return replace(
-        found, dM=found.dM if not slope.masses else mass_of_bodies(len(found.dM), scene.bodies, slope.masses),
-        extra=first, second_extra=second, by_loss_factor=slope.loss, **_moved_contacts(scene, slope.motions),
-        forces=_terms(slope.forces, dofs, shapes), second_forces=_terms(slope.second_forces, dofs, shapes),
+    slope, structure, here = parameter_of(scene, path).slope(), scene.structure, _coordinates(scene)
+    n = here.shapes.shape[1]
+    terms: dict[str, Any] = _in_matrices(*(_nothing(n),) * 3)
+    if slope.damping is not None and isinstance(structure, MatricesStructure):
+        sector = sector_matrices(structure, scene.bodies)
+        terms["sector"] = ProportionalDamping(sector=sector, which=slope.damping)
+    if slope.parts and not isinstance(structure, MatricesStructure):
+        topology, numbers = topology_of(structure, scene.bodies), numbers_of(structure, scene.bodies)
+        found, terms["affine"] = slopes_by_numbers(
+            topology, numbers, slope.parts, len(structure.dofs), _modal_ratios(structure)
+        )
+        terms |= found._asdict()
+    if slope.masses:
+        terms["M"] = mass_of_bodies(n, scene.bodies, slope.masses)
+    if slope.motions is not None:
+        moved = [slope.motions.get(c.name, ((),) * len(c.directions)) for c in scene.contacts]
+        terms["contact_here"], terms["contact_next"] = _motions(scene, moved)
+        terms["affine"] = False
+    gains = structure.loss_factor if np.any(terms["K0"]) or np.any(terms["Kp"]) else 0.0
+    lossy = _without_base(scene) if slope.loss else None
+    first, second = extra_slopes(scene, slope, here, gains if lossy is None else 1.0, lossy)
+    return LinearModelDerivative(
+        **terms, sectors=structure.sector_count, extra=first, second_extra=second,
+        forces=_force_terms(scene, slope.forces), second_forces=_force_terms(scene, slope.second_forces),
     )  # fmt: skip
 
 
-def _coordinates_of(scene: Scene) -> Coordinates:
-    """What the extra terms of a scene are written in."""
-    shapes = _shapes(scene)
-    return _coordinates(scene.structure, _identity(len(scene.dofs)) if shapes is None else shapes)
-
-
-def _coordinates(structure: Structure, shapes: FloatArray) -> Coordinates:
-    own = own_terms(structure) if isinstance(structure, MatricesStructure) else None
-    return Coordinates(shapes=shapes, own=own)
-
-
-def _moved_contacts(scene: Scene, motions: Mapping[str, tuple[Form, ...]] | None) -> dict[str, Any]:
-    """Derivatives where contacts are moved: of their motions."""
-    if motions is None:
-        return {}
-    shapes = _shapes(scene)
-    forms = [motions.get(c.name, ((),) * len(c.directions)) for c in scene.contacts]
-    here, beyond = _contact_selection(scene.dofs, tuple(form for each in forms for form in each))
-    if shapes is not None:
-        here, beyond = frozen(here @ shapes), frozen(beyond @ shapes)
-    return {"affine": False, "contact_here": here, "contact_next": beyond}
-
-
-def _shapes(scene: Scene) -> FloatArray | None:
-    """The DOFs in the coordinates of the matrices; None where they are the coordinates."""
-    if not isinstance(scene.structure, MatricesStructure):
-        return None
-    if scene.structure.has_sectors:
-        return sector_matrices(scene.structure, scene.bodies).shapes
-    return matrices_with_bodies(scene.structure, scene.bodies).shapes
-
-
-def _proportional(
-    structure: MatricesStructure, bodies: tuple[Body, ...], n: int, which: Literal["K", "M"] | None
-) -> LinearModelDerivative:
-    """Derivatives by the proportional damping, the only one of a structure's own given by its matrices."""
-    nothing = _nothing(n)
-    found = LinearModelDerivative(dM=nothing, dC0=nothing, dCp=nothing, dK0=nothing, dKp=nothing, affine=True)
-    if which is None:
-        return found
-    if structure.has_sectors:
-        sector = sector_matrices(structure, bodies)
-        return replace(found, damping=ProportionalDamping(sector=sector, which=which))
-    dC = getattr(matrices_with_bodies(structure, bodies), which)  # the symmetric part of K
-    if bodies:  # which have no such damping
-        dC = dC.copy()
-        dC[-sum(len(body.dofs) for body in bodies) :] = 0.0
-        dC = frozen(dC)
-    return replace(found, dC0=dC)
+def _coordinates(scene: Scene) -> Coordinates:
+    """What the terms of a scene are written in."""
+    structure = scene.structure
+    if not isinstance(structure, MatricesStructure):
+        return Coordinates(shapes=_identity(len(scene.dofs)))
+    return Coordinates(shapes=sector_matrices(structure, scene.bodies).shapes, own=own_terms(structure))
 
 
 @lru_cache(maxsize=256)

@@ -11,9 +11,10 @@ that is known.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,9 @@ from solver.scene.bodies.body import REVOLUTIONS
 from solver.scene.linear_terms import Entry
 from solver.scene.scene import MatricesStructure, Scene
 from solver.scene.scene_parameter import Slope
+
+if TYPE_CHECKING:
+    from solver.linear.model import Terms
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -44,6 +48,8 @@ class ExtraTerms:
         Stiffness of the mean alone [N/m].
     loss_factor : float
         The symmetric stiffness times i and this belongs to it too.
+    lossy : Terms or None
+        Those whose stiffness it is; None: of the terms beside which these stand.
     """
 
     offsets: tuple[int, ...]
@@ -51,6 +57,7 @@ class ExtraTerms:
     C: Complex
     still: Real | None = None
     loss_factor: float = 0.0
+    lossy: Terms | None = None
 
     @property
     def is_real(self) -> bool:
@@ -69,11 +76,11 @@ class ExtraTerms:
         )
 
     def at(
-        self, turns: Complex, moving: NDArray[np.bool_], stiffness: NDArray[Any]
+        self, turns: Complex, moving: NDArray[np.bool_], stiffness: Callable[[], NDArray[Any]]
     ) -> tuple[Complex, Complex]:
         """Return what it adds to K and C, (ns, n, n), at e^{jθ} of structures that move or are at rest.
 
-        `stiffness` (ns, n, n) is the symmetric one, with which structural damping goes.
+        `stiffness` gives the symmetric one (ns, n, n), with which structural damping goes.
         """
         powers = turns[:, None] ** np.array(self.offsets)
         K = np.einsum("sm,mij->sij", powers, self.K)
@@ -83,7 +90,7 @@ class ExtraTerms:
         if self.still is not None:
             K = K + np.where(moving, 0.0, 1.0)[:, None, None] * self.still
         if self.loss_factor:
-            K = K + np.where(moving, 1j * self.loss_factor, 0.0)[:, None, None] * stiffness
+            K = K + np.where(moving, 1j * self.loss_factor, 0.0)[:, None, None] * stiffness()
         return K, np.einsum("sm,mij->sij", powers, self.C)
 
 
@@ -192,26 +199,26 @@ def _terms(
 
 
 def extra_slopes(
-    scene: Scene, slope: Slope, coordinates: Coordinates, loss_factor: float
+    scene: Scene, slope: Slope, coordinates: Coordinates, loss_factor: float, lossy: Terms | None
 ) -> tuple[ExtraTerms | None, ExtraTerms | None]:
     """Return the first and second derivatives of the extra terms by a parameter; None where they are 0.
 
-    `loss_factor` is that of what the symmetric stiffness gains.
+    `loss_factor` is that of what the symmetric stiffness gains, or 1 of the stiffness of `lossy`.
     """
     own, spinning = coordinates.own, slope.speed and depends_on_speed(scene)
-    skew = own.skew[0] if own is not None and slope.loss else ()
-    if not (slope.entries or loss_factor or spinning or skew):
+    if not (slope.entries or loss_factor or spinning):
         return None, None
     first, second = (_Sum(coordinates.shapes, scene.dofs) for _ in range(2))
     for entry in slope.entries:
         first.add(entry, entry.k, entry.c)
-    first.add_own(skew, (), 1j)
+    if own is not None and slope.loss:
+        first.add_own(own.skew[0], (), 1j)
     if spinning:
         spin = (scene.speed or 0.0) * REVOLUTIONS
         first.add_turning(scene, own, 2.0 * spin * REVOLUTIONS, REVOLUTIONS)
         second.add_turning(scene, own, 2.0 * REVOLUTIONS**2, 0.0)
     bent = second.terms()
-    return first.terms(loss_factor), bent if np.any(bent.K) else None
+    return first.terms(loss_factor, lossy), bent if np.any(bent.K) else None
 
 
 def terms_of_line(scene: Scene, coordinates: Coordinates) -> ExtraTerms | None:
@@ -259,11 +266,11 @@ class _Sum:
         if own is not None:
             self.add_own(own.K_omega2, own.G, square, spin)
 
-    def terms(self, loss_factor: float = 0.0) -> ExtraTerms:
+    def terms(self, loss_factor: float = 0.0, lossy: Terms | None = None) -> ExtraTerms:
         """Return what was added, with structural damping."""
         offsets = tuple(sorted({0, *self._K, *self._C}))
         K, C = (frozen(np.array([self._at(part, m) for m in offsets])) for part in (self._K, self._C))
-        return ExtraTerms(offsets=offsets, K=K, C=C, loss_factor=loss_factor)
+        return ExtraTerms(offsets=offsets, K=K, C=C, loss_factor=loss_factor, lossy=lossy)
 
     def _at(self, part: dict[int, Complex], offset: int) -> Complex:
         return part.setdefault(offset, np.zeros((self._n, self._n), np.complex128))

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.linear.matrix_model import bodies_mass, modal_damping, modal_damping_derivative
-from solver.linear.model import LinearModelDerivative
 from solver.matrices.values import frozen
 from solver.scene.bodies.body import Body
 from solver.scene.bodies.kinematics import dof_names
@@ -111,26 +110,24 @@ def matrices_of_numbers(
 
 
 @lru_cache(maxsize=256)
-def derivative_by_numbers(
+def slopes_by_numbers(
     topology: Topology, numbers: tuple[float, ...], parts: tuple[tuple[int, float], ...], own: int,
     ratios: Ratios | None,
-) -> LinearModelDerivative:  # fmt: skip
-    """Return their derivative where masses, springs and dashpots, counted in this order, gain so much.
+) -> tuple[Matrices, bool]:  # fmt: skip
+    """Return their slopes where masses, springs and dashpots, counted in this order, gain so much.
 
-    The first `own` DOFs are the structure's. All but modal damping is linear in these numbers.
+    The first `own` DOFs are the structure's. All but modal damping is linear in these numbers, so the slopes
+    are constant: that is told too.
     """
     behind = len(topology.dofs) - own  # places of the bodies' DOFs, between masses and springs
     gained = [0.0] * (len(numbers) - 1) + [numbers[-1]]
     for i, weight in parts:
         gained[i if i < own else i + behind] += weight
-    d = _assembled(topology, tuple(gained))
-    moved = bool(np.any(d.M) or np.any(d.K0))
+    found = _assembled(topology, tuple(gained))
+    affine = ratios is None or not (np.any(found.M) or np.any(found.K0))
     if ratios is not None:
-        at = matrices_of_numbers(topology, numbers, (), None)
-        d.C0[:own, :own] += modal_damping_derivative(
-            at.M[:own, :own], at.K0[:own, :own], ratios, d.M[:own, :own], d.K0[:own, :own]
+        at, inner = matrices_of_numbers(topology, numbers, (), None), np.s_[:own, :own]
+        found.C0[inner] += modal_damping_derivative(
+            at.M[inner], at.K0[inner], ratios, found.M[inner], found.K0[inner]
         )
-    d = Matrices(*map(frozen, d))
-    return LinearModelDerivative(
-        dM=d.M, dC0=d.C0, dCp=d.Cp, dK0=d.K0, dKp=d.Kp, affine=ratios is None or not moved
-    )
+    return Matrices(*map(frozen, found)), affine

@@ -188,7 +188,7 @@ class ModeSensitivities:
         s, scene, ks = self._equations.structure, self._equations.balance.scene, self._equations.structure.ks
         model, d = linear_model(scene), structure_derivative(scene, parameter.path)
         diameters = model.diameters(ks)
-        dK, dC, dM = d.at(model, diameters, s.moving)
+        dK, dC, dM = d.at(diameters, s.moving)
         omega, zeta = float(state.y[-2]), float(state.y[-1])
         k = ks.astype(np.float64)[:, None, None]
         x = (s.shapes @ at.x[:, :, None])[:, :, 0]

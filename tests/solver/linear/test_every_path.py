@@ -111,7 +111,7 @@ def slopes(scene: Scene, parameter: Parameter) -> dict[str, Any]:
     diameters, found = model.diameters(KS), {key: np.zeros_like(each) for key, each in here.items()}
     if parameter.kind is Kind.STRUCTURE:
         d = structure_derivative(scene, parameter.path)
-        found["K"], found["C"], found["M"] = d.at(model, diameters, KS > 0)
+        found["K"], found["C"], found["M"] = d.at(diameters, KS > 0)
         found["f"] = term_amplitudes(d.forces, model.observe.size, KS)
         if d.contact_here is not None and d.contact_next is not None:
             found["L"] = d.contact_here + d.contact_next * model.turns(diameters)[:, None, None]

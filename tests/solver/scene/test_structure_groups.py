@@ -51,11 +51,11 @@ def test_derivatives_by_a_group(scene: Scene, name: str):
     here = scene.value(path)
     step = 0.25 * here
     up, down = (linear_model(scene.with_values({path: here + sign * step})) for sign in (1, -1))
-    for derivative, matrix in ((found.dM, "M"), (found.dC0, "C0"), (found.dK0, "K0")):
+    for derivative, matrix in ((found.M, "M"), (found.C0, "C0"), (found.K0, "K0")):
         expected = (getattr(up, matrix) - getattr(down, matrix)) / (2.0 * step)
         np.testing.assert_allclose(derivative, expected, atol=1e-9)
     assert found.affine
-    assert any(np.abs(d).max() > 0.5 for d in (found.dM, found.dC0, found.dK0))
+    assert any(np.abs(d).max() > 0.5 for d in (found.M, found.C0, found.K0))
 
 
 @pytest.mark.parametrize(
