@@ -77,7 +77,7 @@ def structure_derivative(scene: Scene, path: str) -> LinearModelDerivative:
 
 def _without_base(scene: Scene) -> LinearModel:
     """The same with forces alone."""
-    structure, dofs, here = scene.structure, scene.dofs, _coordinates(scene)
+    structure, here = scene.structure, _coordinates(scene)
     terms: dict[str, Any] = {}
     if isinstance(structure, MatricesStructure):
         sector = sector_matrices(structure, scene.bodies)
@@ -89,11 +89,11 @@ def _without_base(scene: Scene) -> LinearModel:
     else:
         topology, numbers = topology_of(structure, scene.bodies), numbers_of(structure, scene.bodies)
         terms |= matrices_of_numbers(topology, numbers, scene.bodies, _modal_ratios(structure))._asdict()
-    motions, beyond = _motions(scene, scene.forms)
+    motions, beyond = _motions(here, scene.forms)
     return LinearModel(
-        **terms, dofs=dofs, shapes=here.shapes, contact_here=motions, contact_next=beyond,
-        forces=_force_terms(scene, scene.forces),
-        observe=_rows(scene, row_of(scene, scene.observe.dof)), engine_order=scene.engine_order,
+        **terms, dofs=here.dofs, shapes=here.shapes, contact_here=motions, contact_next=beyond,
+        forces=_force_terms(here, scene.forces),
+        observe=here.rows(row_of(scene, scene.observe.dof)), engine_order=scene.engine_order,
         sectors=structure.sector_count, extra=extra_terms(scene, here),
         line=None if scene.speed_order is None else terms_of_line(scene, here),
         line_order=scene.speed_order or 1.0,
@@ -110,17 +110,10 @@ def _modal_ratios(structure: LumpedStructure | CyclicStructure) -> Ratios | None
     return structure.damping_ratio if isinstance(structure, LumpedStructure) else None
 
 
-def _rows(scene: Scene, selected: NDArray[Any]) -> NDArray[Any]:
-    """Rows over the DOFs in the coordinates of the matrices: those of a lumped structure are its DOFs."""
-    if not isinstance(scene.structure, MatricesStructure):
-        return selected
-    return frozen(selected @ sector_matrices(scene.structure, scene.bodies).shapes)
-
-
-def _motions(scene: Scene, forms: Sequence[tuple[Form, ...]]) -> tuple[FloatArray, FloatArray]:
+def _motions(coordinates: Coordinates, forms: Sequence[tuple[Form, ...]]) -> tuple[FloatArray, FloatArray]:
     """Motions of all contacts as rows, of this sector and of the next."""
-    here, beyond = _contact_selection(scene.dofs, tuple(form for each in forms for form in each))
-    return _rows(scene, here), _rows(scene, beyond)
+    here, beyond = _contact_selection(coordinates.dofs, tuple(form for each in forms for form in each))
+    return coordinates.rows(here), coordinates.rows(beyond)
 
 
 def row_of(scene: Scene, name: str) -> FloatArray:
@@ -148,14 +141,13 @@ def _sum_of(dofs: tuple[str, ...], terms: tuple[tuple[str, float], ...]) -> Floa
     return frozen(found)
 
 
-def _force_terms(scene: Scene, forces: tuple[Excitation, ...]) -> tuple[ForceTerm, ...]:
+def _force_terms(coordinates: Coordinates, forces: tuple[Excitation, ...]) -> tuple[ForceTerm, ...]:
     """Forces on DOFs in the coordinates of the matrices."""
-    dofs = scene.dofs
+    dofs = coordinates.dofs
 
     def vector(force: Excitation) -> NDArray[Any]:
-        return _rows(
-            scene, _pattern(dofs, force.forces or ()) if force.dof is None else _unit(dofs, force.dof)
-        )
+        along = _pattern(dofs, force.forces or ()) if force.dof is None else _unit(dofs, force.dof)
+        return coordinates.rows(along)
 
     return tuple(
         ForceTerm(vector=vector(e), amplitude=e.amplitude, phase=e.phase, harmonic=e.harmonic)
@@ -203,23 +195,24 @@ def _derivative_by(scene: Scene, path: str) -> LinearModelDerivative:
         terms["M"] = mass_of_bodies(n, scene.bodies, slope.masses)
     if slope.motions is not None:
         moved = [slope.motions.get(c.name, ((),) * len(c.directions)) for c in scene.contacts]
-        terms["contact_here"], terms["contact_next"] = _motions(scene, moved)
+        terms["contact_here"], terms["contact_next"] = _motions(here, moved)
         terms["affine"] = False
     gains = structure.loss_factor if np.any(terms["K0"]) or np.any(terms["Kp"]) else 0.0
     lossy = _without_base(scene) if slope.loss else None
     first, second = extra_slopes(scene, slope, here, gains if lossy is None else 1.0, lossy)
     return LinearModelDerivative(
         **terms, sectors=structure.sector_count, extra=first, second_extra=second,
-        forces=_force_terms(scene, slope.forces), second_forces=_force_terms(scene, slope.second_forces),
+        forces=_force_terms(here, slope.forces), second_forces=_force_terms(here, slope.second_forces),
     )  # fmt: skip
 
 
 def _coordinates(scene: Scene) -> Coordinates:
     """What the terms of a scene are written in."""
-    structure = scene.structure
+    structure, dofs = scene.structure, scene.dofs
     if not isinstance(structure, MatricesStructure):
-        return Coordinates(shapes=_identity(len(scene.dofs)))
-    return Coordinates(shapes=sector_matrices(structure, scene.bodies).shapes, own=own_terms(structure))
+        return Coordinates(dofs=dofs, shapes=_identity(len(dofs)), direct=True)
+    shapes = sector_matrices(structure, scene.bodies).shapes
+    return Coordinates(dofs=dofs, shapes=shapes, own=own_terms(structure))
 
 
 @lru_cache(maxsize=256)

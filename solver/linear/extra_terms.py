@@ -117,19 +117,29 @@ class Coordinates:
 
     Attributes
     ----------
+    dofs : tuple of str
+        Names of the DOFs.
     shapes : (n_dofs, n) array
         The DOFs in the coordinates of the matrices.
+    direct : bool
+        Whether they are these coordinates themselves, as of a lumped structure.
     own : OwnTerms or None
         What the structure's own coordinates, in front of those of bodies, have beside symmetric matrices.
     """
 
+    dofs: tuple[str, ...]
     shapes: Real
+    direct: bool = False
     own: OwnTerms | None = None
 
+    def rows(self, selected: NDArray[Any]) -> NDArray[Any]:
+        """Return rows over the DOFs as rows over the coordinates; read-only."""
+        return selected if self.direct else frozen(selected @ self.shapes)
+
     @property
-    def key(self) -> tuple[int, int]:
+    def key(self) -> tuple[object, ...]:
         """Tells equal ones apart from others: the objects are the same as long as the structure is."""
-        return id(self.shapes), id(self.own)
+        return id(self.shapes), id(self.own), self.dofs
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Coordinates) and self.key == other.key
@@ -181,14 +191,12 @@ def extra_terms(scene: Scene, coordinates: Coordinates) -> ExtraTerms | None:
     if not (scene.couplings or scene.aerodynamics or loss or coordinates.own):
         return None
     spin = (scene.speed or 0.0) * REVOLUTIONS
-    return _terms(_entries(scene), scene.dofs, loss, spin, coordinates)
+    return _terms(_entries(scene), loss, spin, coordinates)
 
 
 @lru_cache(maxsize=64)
-def _terms(
-    entries: tuple[Entry, ...], dofs: tuple[str, ...], loss: float, spin: float, coordinates: Coordinates
-) -> ExtraTerms:
-    total = _Sum(coordinates.shapes, dofs)
+def _terms(entries: tuple[Entry, ...], loss: float, spin: float, coordinates: Coordinates) -> ExtraTerms:
+    total = _Sum(coordinates)
     for entry in entries:
         total.add(entry, entry.k + spin**2 * entry.k_omega2, entry.c + spin * entry.g)
     own = coordinates.own
@@ -208,7 +216,7 @@ def extra_slopes(
     own, spinning = coordinates.own, slope.speed and depends_on_speed(scene)
     if not (slope.entries or loss_factor or spinning):
         return None, None
-    first, second = (_Sum(coordinates.shapes, scene.dofs) for _ in range(2))
+    first, second = (_Sum(coordinates) for _ in range(2))
     for entry in slope.entries:
         first.add(entry, entry.k, entry.c)
     if own is not None and slope.loss:
@@ -225,7 +233,7 @@ def terms_of_line(scene: Scene, coordinates: Coordinates) -> ExtraTerms | None:
     """Return what K gains per squared speed and C per speed [rad/s]; None where nothing depends on it."""
     if not depends_on_speed(scene):
         return None
-    total = _Sum(coordinates.shapes, scene.dofs)
+    total = _Sum(coordinates)
     total.add_turning(scene, coordinates.own, 1.0, 1.0)
     return total.terms()
 
@@ -240,9 +248,9 @@ def depends_on_speed(scene: Scene) -> bool:
 class _Sum:
     """Adds entries up in the coordinates of the matrices."""
 
-    def __init__(self, shapes: Real, dofs: tuple[str, ...]) -> None:
-        self._shapes, self._dofs = shapes, dofs
-        self._n = shapes.shape[1]
+    def __init__(self, coordinates: Coordinates) -> None:
+        self._shapes, self._dofs = coordinates.shapes, coordinates.dofs
+        self._n = self._shapes.shape[1]
         self._K: dict[int, Complex] = {}
         self._C: dict[int, Complex] = {}
 

@@ -117,7 +117,7 @@ def parameter_paths(scene: HasParts) -> tuple[str, ...]:
 
 def find_parameter(scene: HasBodies, path: object) -> SceneParameter | None:
     """Return what a path is in a scene; None of what is none, and of the frequency."""
-    if not isinstance(path, str):
+    if not isinstance(path, str) or path == FREQUENCY:
         return None
     return next((found for _, make in OWNERS if (found := make(scene, path)) is not None), None)
 
