@@ -22,7 +22,7 @@ from solver.contacts.fields import DofName, Name, NonNegative, Part, Signed
 from solver.scene.scene_parameter import SceneParameter, Slope, changed
 
 if TYPE_CHECKING:
-    from solver.scene.bodies.kinematics import HasBodies
+    from solver.scene.bodies.kinematics import HasParts
 
 Offset = Annotated[int, Field(strict=True, ge=-10_000, le=10_000)]
 _FACTOR = "factor"  # of aerodynamic influence
@@ -192,12 +192,12 @@ class Aerodynamics(Part):
         )
 
 
-def gas_paths(scene: HasBodies) -> tuple[str, ...]:
+def gas_paths(scene: HasParts) -> tuple[str, ...]:
     """Return the paths of the factors of aerodynamic influence."""
     return tuple(f"{each.name}.{_FACTOR}" for each in scene.aerodynamics if each.name is not None)
 
 
-def gas_parameter(scene: HasBodies, path: str) -> SceneParameter | None:
+def gas_parameter(scene: HasParts, path: str) -> SceneParameter | None:
     """Return what the factor of aerodynamic influence is, if the path is one."""
     owner, _, key = path.rpartition(".")
     members = [each for each in scene.aerodynamics if owner and each.name == owner and key == _FACTOR]

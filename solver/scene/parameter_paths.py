@@ -8,20 +8,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping
-from typing import Any, Protocol, Self, TypeVar, cast
+from typing import Any, TypeVar, cast
 
 from solver.contacts.laws.base import AnyContact
 from solver.contacts.laws.parts import LawQuantity
 from solver.errors import SettingError
 from solver.results.units import number
 from solver.scene.bodies import paths as of_bodies
-from solver.scene.bodies.kinematics import HasBodies
+from solver.scene.bodies.kinematics import HasParts
 from solver.scene.bodies.shape_parts import own_parts, shape_parameter, shape_paths
-from solver.scene.bodies.shapes import AnyShape
 from solver.scene.excitation import AMPLITUDE as AMPLITUDE
 from solver.scene.excitation import PHASE as PHASE
-from solver.scene.excitation import Excitation, excitation_parameter
-from solver.scene.linear_terms import SpeedDependence, at_speed, gas_parameter, gas_paths
+from solver.scene.excitation import excitation_parameter
+from solver.scene.linear_terms import at_speed, gas_parameter, gas_paths
 from solver.scene.scene_parameter import ActsOn, SceneParameter, changed
 from solver.scene.structure_parameters import structure_parameter, structure_paths
 from solver.wording import listing, nearest
@@ -30,29 +29,6 @@ FREQUENCY = "frequency"
 
 
 _SceneT = TypeVar("_SceneT", bound="HasParts")
-
-
-class HasParts(HasBodies, Protocol):
-    """What a scene holds, as far as parameter paths go; see `solver.scene.scene.Scene`."""
-
-    @property
-    def contacts(self) -> tuple[AnyContact, ...]:
-        """Every contact."""
-
-    @property
-    def excitation(self) -> tuple[Excitation, ...]:
-        """Every force."""
-
-    @property
-    def with_speed(self) -> tuple[SpeedDependence, ...]:
-        """What follows the speed."""
-
-    @property
-    def dampers(self) -> tuple[AnyShape, ...]:
-        """Every damper given by its shape."""
-
-    def model_copy(self, *, update: Mapping[str, Any] | None = None) -> Self:
-        """Return a copy with other parts."""
 
 
 def contact_paths(scene: HasParts) -> tuple[str, ...]:
@@ -115,7 +91,7 @@ def parameter_paths(scene: HasParts) -> tuple[str, ...]:
     return tuple(dict.fromkeys(path for listed, _ in OWNERS for path in listed(scene)))
 
 
-def find_parameter(scene: HasBodies, path: object) -> SceneParameter | None:
+def find_parameter(scene: HasParts, path: object) -> SceneParameter | None:
     """Return what a path is in a scene; None of what is none, and of the frequency."""
     if not isinstance(path, str) or path == FREQUENCY:
         return None

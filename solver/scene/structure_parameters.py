@@ -6,7 +6,7 @@ from typing import Any, cast
 
 from solver.contacts.fields import LARGEST
 from solver.errors import SettingError
-from solver.scene.bodies.kinematics import HasBodies
+from solver.scene.bodies.kinematics import HasParts
 from solver.scene.parts import Damper, Mass, MatricesStructure, Spring, Structure
 from solver.scene.scene_parameter import SceneParameter, Slope, changed
 
@@ -19,7 +19,7 @@ _UNITS = {"m": "kg", "k": "N/m", "c": "N s/m"}
 _Named = Mass | Spring | Damper
 
 
-def structure_paths(scene: HasBodies) -> tuple[str, ...]:
+def structure_paths(scene: HasParts) -> tuple[str, ...]:
     """Return the paths of groups, then of masses, springs and dashpots, as in the tables.
 
     Of a structure given by its matrices, the proportional damping is what can be changed.
@@ -35,7 +35,7 @@ def structure_paths(scene: HasBodies) -> tuple[str, ...]:
     return tuple(STRUCTURE + name for name in dict.fromkeys(names))
 
 
-def structure_parameter(scene: HasBodies, path: str) -> SceneParameter | None:
+def structure_parameter(scene: HasParts, path: str) -> SceneParameter | None:
     """Return what a path of the structure is, if it is one."""
     if not path.startswith(STRUCTURE):
         return None
