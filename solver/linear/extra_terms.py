@@ -197,12 +197,10 @@ def extra_terms(scene: Scene, coordinates: Coordinates) -> ExtraTerms | None:
 @lru_cache(maxsize=64)
 def _terms(entries: tuple[Entry, ...], loss: float, spin: float, coordinates: Coordinates) -> ExtraTerms:
     total = _Sum(coordinates)
-    for entry in entries:
-        total.add(entry, entry.k + spin**2 * entry.k_omega2, entry.c + spin * entry.g)
-    own = coordinates.own
-    if own is not None:
-        total.add_own(*own.skew, 1.0 + 1j * loss)
-        total.add_own(own.K_omega2, own.G, spin**2, spin)
+    total.add_entries(entries)
+    if coordinates.own is not None:
+        total.add_own(*coordinates.own.skew, 1.0 + 1j * loss)
+    total.add_turning(entries, spin**2, spin)
     return total.terms(loss)
 
 
@@ -213,18 +211,17 @@ def extra_slopes(
 
     `loss_factor` is that of what the symmetric stiffness gains, or 1 of the stiffness of `lossy`.
     """
-    own, spinning = coordinates.own, slope.speed and depends_on_speed(scene)
+    spinning = slope.speed and depends_on_speed(scene)
     if not (slope.entries or loss_factor or spinning):
         return None, None
     first, second = (_Sum(coordinates) for _ in range(2))
-    for entry in slope.entries:
-        first.add(entry, entry.k, entry.c)
-    if own is not None and slope.loss:
-        first.add_own(own.skew[0], (), 1j)
+    first.add_entries(slope.entries)
+    if coordinates.own is not None and slope.loss:
+        first.add_own(coordinates.own.skew[0], (), 1j)
     if spinning:
-        spin = (scene.speed or 0.0) * REVOLUTIONS
-        first.add_turning(scene, own, 2.0 * spin * REVOLUTIONS, REVOLUTIONS)
-        second.add_turning(scene, own, 2.0 * REVOLUTIONS**2, 0.0)
+        spin, entries = (scene.speed or 0.0) * REVOLUTIONS, _entries(scene)
+        first.add_turning(entries, 2.0 * spin * REVOLUTIONS, REVOLUTIONS)
+        second.add_turning(entries, 2.0 * REVOLUTIONS**2, 0.0)
     bent = second.terms()
     return first.terms(loss_factor, lossy), bent if np.any(bent.K) else None
 
@@ -234,7 +231,7 @@ def terms_of_line(scene: Scene, coordinates: Coordinates) -> ExtraTerms | None:
     if not depends_on_speed(scene):
         return None
     total = _Sum(coordinates)
-    total.add_turning(scene, coordinates.own, 1.0, 1.0)
+    total.add_turning(_entries(scene), 1.0, 1.0)
     return total.terms()
 
 
@@ -249,14 +246,19 @@ class _Sum:
     """Adds entries up in the coordinates of the matrices."""
 
     def __init__(self, coordinates: Coordinates) -> None:
-        self._shapes, self._dofs = coordinates.shapes, coordinates.dofs
-        self._n = self._shapes.shape[1]
+        self._in = coordinates
+        self._n = coordinates.shapes.shape[1]
         self._K: dict[int, Complex] = {}
         self._C: dict[int, Complex] = {}
 
-    def add(self, entry: Entry, k: complex, c: complex) -> None:
+    def add_entries(self, entries: tuple[Entry, ...]) -> None:
+        """Add what does not depend on the speed."""
+        for entry in entries:
+            self._add(entry, entry.k, entry.c)
+
+    def _add(self, entry: Entry, k: complex, c: complex) -> None:
         """Add k and c in the row of one DOF and the column of another."""
-        on, of = (self._shapes[self._dofs.index(dof)] for dof in (entry.on, entry.of))
+        on, of = (self._in.shapes[self._in.dofs.index(dof)] for dof in (entry.on, entry.of))
         self._at(self._K, entry.offset)[:] += k * np.outer(on, of)
         self._at(self._C, entry.offset)[:] += c * np.outer(on, of)
 
@@ -267,12 +269,12 @@ class _Sum:
                 size = len(matrix)
                 self._at(to, offset)[:size, :size] += factor * matrix
 
-    def add_turning(self, scene: Scene, own: OwnTerms | None, square: float, spin: float) -> None:
+    def add_turning(self, entries: tuple[Entry, ...], square: float, spin: float) -> None:
         """Add what goes with the squared speed and with the speed, times these factors."""
-        for entry in _entries(scene):
-            self.add(entry, square * entry.k_omega2, spin * entry.g)
-        if own is not None:
-            self.add_own(own.K_omega2, own.G, square, spin)
+        for entry in entries:
+            self._add(entry, square * entry.k_omega2, spin * entry.g)
+        if self._in.own is not None:
+            self.add_own(self._in.own.K_omega2, self._in.own.G, square, spin)
 
     def terms(self, loss_factor: float = 0.0, lossy: Terms | None = None) -> ExtraTerms:
         """Return what was added, with structural damping."""
