@@ -19,10 +19,9 @@ from solver.linear.extra_terms import (
 )
 from solver.linear.lumped_matrices import (
     Matrices,
-    matrices_of_numbers,
-    numbers_of,
-    slopes_by_numbers,
-    topology_of,
+    elements_of,
+    matrices_of_elements,
+    slopes_of_elements,
 )
 from solver.linear.matrix_model import mass_of_bodies
 from solver.linear.model import ForceTerm, Identity, LinearModel, LinearModelDerivative
@@ -31,12 +30,9 @@ from solver.linear.sector_matrices import ProportionalDamping, sector_matrices
 from solver.matrices.values import frozen
 from solver.scene.bodies.kinematics import Form
 from solver.scene.cyclic.annulus import written_out
-from solver.scene.matrices_structure import Ratios
 from solver.scene.parameter_paths import parameter_of
 from solver.scene.scene import (
-    CyclicStructure,
     Excitation,
-    LumpedStructure,
     MatricesStructure,
     Scene,
 )
@@ -87,8 +83,7 @@ def _without_base(scene: Scene) -> LinearModel:
         else:
             terms |= _in_matrices(*sector.at(0))
     else:
-        topology, numbers = topology_of(structure, scene.bodies), numbers_of(structure, scene.bodies)
-        terms |= matrices_of_numbers(topology, numbers, scene.bodies, _modal_ratios(structure))._asdict()
+        terms |= matrices_of_elements(elements_of(structure, scene.bodies), scene.bodies)._asdict()
     motions, beyond = _motions(here, scene.forms)
     return LinearModel(
         **terms, dofs=here.dofs, shapes=here.shapes, contact_here=motions, contact_next=beyond,
@@ -104,10 +99,6 @@ def _in_matrices(K: FloatArray, C: FloatArray, M: FloatArray) -> dict[str, Float
     """Matrices that join no sectors."""
     nothing = _nothing(len(M))
     return Matrices(M, C, nothing, K, nothing)._asdict()
-
-
-def _modal_ratios(structure: LumpedStructure | CyclicStructure) -> Ratios | None:
-    return structure.damping_ratio if isinstance(structure, LumpedStructure) else None
 
 
 def _motions(coordinates: Coordinates, forms: Sequence[tuple[Form, ...]]) -> tuple[FloatArray, FloatArray]:
@@ -186,10 +177,8 @@ def _derivative_by(scene: Scene, path: str) -> LinearModelDerivative:
         sector = sector_matrices(structure, scene.bodies)
         terms["sector"] = ProportionalDamping(sector=sector, which=slope.damping)
     if slope.parts and not isinstance(structure, MatricesStructure):
-        topology, numbers = topology_of(structure, scene.bodies), numbers_of(structure, scene.bodies)
-        found, terms["affine"] = slopes_by_numbers(
-            topology, numbers, slope.parts, len(structure.dofs), _modal_ratios(structure)
-        )
+        elements = elements_of(structure, scene.bodies)
+        found, terms["affine"] = slopes_of_elements(elements, slope.parts)
         terms |= found._asdict()
     if slope.masses:
         terms["M"] = mass_of_bodies(n, scene.bodies, slope.masses)

@@ -17,15 +17,17 @@ from solver.scene.scene import CyclicStructure, End, LumpedStructure
 
 FloatArray = NDArray[np.float64]
 _Ends = tuple[End, End]
-Assembled = LumpedStructure | CyclicStructure
 
 
-class Topology(NamedTuple):
-    """What joins what: everything of a structure but its numbers."""
+class Elements(NamedTuple):
+    """The masses, springs and dashpots of a structure: everything its matrices follow from but bodies."""
 
     dofs: tuple[str, ...]
-    springs: tuple[_Ends, ...]
-    dampers: tuple[_Ends, ...]
+    masses: tuple[float, ...]  # of the first DOFs; the mass of a body is no point mass and stands apart
+    springs: tuple[tuple[_Ends, float, float], ...]  # with stiffness and dashpot
+    dampers: tuple[tuple[_Ends, float], ...]
+    beta: float
+    ratios: Ratios | None
 
 
 class Matrices(NamedTuple):
@@ -38,42 +40,29 @@ class Matrices(NamedTuple):
     Kp: FloatArray
 
 
-def topology_of(structure: Assembled, bodies: tuple[Body, ...]) -> Topology:
-    """Return what joins what in a structure with bodies."""
-    springs = tuple(spring.ends for spring in structure.springs)
-    dampers = tuple(damper.ends for damper in structure.dampers)
-    return Topology(dof_names(structure, bodies), springs, dampers)
+def elements_of(structure: LumpedStructure | CyclicStructure, bodies: tuple[Body, ...]) -> Elements:
+    """Return what a structure with bodies consists of."""
+    return Elements(
+        dofs=dof_names(structure, bodies), masses=tuple(mass.m for mass in structure.masses),
+        springs=tuple((spring.ends, spring.k, spring.c) for spring in structure.springs),
+        dampers=tuple((damper.ends, damper.c) for damper in structure.dampers),
+        beta=structure.stiffness_proportional_damping,
+        ratios=structure.damping_ratio if isinstance(structure, LumpedStructure) else None,
+    )  # fmt: skip
 
 
-def numbers_of(structure: Assembled, bodies: tuple[Body, ...]) -> tuple[float, ...]:
-    """All numbers: masses, stiffnesses, dashpots, dashpots of springs, proportional damping.
-
-    The mass of a body is no point mass and stands apart: 0 here.
-    """
-    return (
-        *(mass.m for mass in structure.masses),
-        *(0.0 for body in bodies for _ in body.dofs),
-        *(spring.k for spring in structure.springs),
-        *(damper.c for damper in structure.dampers),
-        *(spring.c for spring in structure.springs),
-        structure.stiffness_proportional_damping,
-    )
-
-
-def _assembled(topology: Topology, q: tuple[float, ...]) -> Matrices:
-    """Return the matrices of the numbers `q`, in the order of `numbers_of`."""
-    n, n_springs, n_dampers = len(topology.dofs), len(topology.springs), len(topology.dampers)
+def _assembled(elements: Elements) -> Matrices:
+    """Return the matrices without modal damping."""
+    n = len(elements.dofs)
     M, C0, Cp, K0, Kp = (np.zeros((n, n)) for _ in range(5))
-    k, c, c_spring = n, n + n_springs, n + n_springs + n_dampers
-    beta = q[c_spring + n_springs]
-    index = {dof: i for i, dof in enumerate(topology.dofs)}
-    for i in range(n):
-        M[i, i] = q[i]
-    for i, ends in enumerate(topology.springs):
-        _join(K0, Kp, ends, q[k + i], index)
-        _join(C0, Cp, ends, q[c_spring + i] + beta * q[k + i], index)
-    for i, ends in enumerate(topology.dampers):
-        _join(C0, Cp, ends, q[c + i], index)
+    index = {dof: i for i, dof in enumerate(elements.dofs)}
+    for i, mass in enumerate(elements.masses):
+        M[i, i] = mass
+    for ends, k, c in elements.springs:
+        _join(K0, Kp, ends, k, index)
+        _join(C0, Cp, ends, c + elements.beta * k, index)
+    for ends, c in elements.dampers:
+        _join(C0, Cp, ends, c, index)
     return Matrices(M, C0, Cp, K0, Kp)
 
 
@@ -95,39 +84,34 @@ def _join(X0: FloatArray, Xp: FloatArray, ends: _Ends, value: float, index: dict
 
 
 @lru_cache(maxsize=256)
-def matrices_of_numbers(
-    topology: Topology, numbers: tuple[float, ...], bodies: tuple[Body, ...], ratios: Ratios | None
-) -> Matrices:
-    """Return the matrices of a topology with these numbers, bodies and modal damping; read-only."""
-    n = len(topology.dofs)
-    own = n - sum(len(body.dofs) for body in bodies)
-    found = _assembled(topology, numbers)
-    if ratios is not None:
-        found.C0[:own, :own] += modal_damping(found.M[:own, :own], found.K0[:own, :own], ratios)
+def matrices_of_elements(elements: Elements, bodies: tuple[Body, ...]) -> Matrices:
+    """Return the matrices with modal damping and bodies; read-only."""
+    found, own = _assembled(elements), len(elements.masses)
+    if elements.ratios is not None:
+        inner = np.s_[:own, :own]
+        found.C0[inner] += modal_damping(found.M[inner], found.K0[inner], elements.ratios)
     if bodies:
         found.M[:] += bodies_mass(own, bodies)
     return Matrices(*map(frozen, found))
 
 
 @lru_cache(maxsize=256)
-def slopes_by_numbers(
-    topology: Topology, numbers: tuple[float, ...], parts: tuple[tuple[int, float], ...], own: int,
-    ratios: Ratios | None,
-) -> tuple[Matrices, bool]:  # fmt: skip
+def slopes_of_elements(elements: Elements, gains: tuple[tuple[int, float], ...]) -> tuple[Matrices, bool]:
     """Return their slopes where masses, springs and dashpots, counted in this order, gain so much.
 
-    The first `own` DOFs are the structure's. All but modal damping is linear in these numbers, so the slopes
-    are constant: that is told too.
+    All but modal damping is linear in these numbers, so the slopes are constant: that is told too.
     """
-    behind = len(topology.dofs) - own  # places of the bodies' DOFs, between masses and springs
-    gained = [0.0] * (len(numbers) - 1) + [numbers[-1]]
-    for i, weight in parts:
-        gained[i if i < own else i + behind] += weight
-    found = _assembled(topology, tuple(gained))
-    affine = ratios is None or not (np.any(found.M) or np.any(found.K0))
-    if ratios is not None:
-        at, inner = matrices_of_numbers(topology, numbers, (), None), np.s_[:own, :own]
+    by, first = dict(gains), len(elements.masses)
+    last = first + len(elements.springs)
+    found = _assembled(elements._replace(
+        masses=tuple(by.get(i, 0.0) for i in range(first)),
+        springs=tuple((ends, by.get(i, 0.0), 0.0) for i, (ends, *_) in enumerate(elements.springs, first)),
+        dampers=tuple((ends, by.get(i, 0.0)) for i, (ends, _) in enumerate(elements.dampers, last)),
+    ))  # fmt: skip
+    moved = bool(np.any(found.M) or np.any(found.K0))
+    if elements.ratios is not None:
+        at, inner = _assembled(elements), np.s_[:first, :first]
         found.C0[inner] += modal_damping_derivative(
-            at.M[inner], at.K0[inner], ratios, found.M[inner], found.K0[inner]
+            at.M[inner], at.K0[inner], elements.ratios, found.M[inner], found.K0[inner]
         )
-    return Matrices(*map(frozen, found)), affine
+    return Matrices(*map(frozen, found)), elements.ratios is None or not moved
