@@ -17,7 +17,7 @@ from optim.problem.variables import BoundedVariable, check_variables
 from optim.problem.words import Method as Method
 from solver.balance.balance import check_harmonics
 from solver.contacts.laws.base import without_second
-from solver.scene.bodies.shape_parts import moves_contacts
+from solver.scene.parameter_paths import parameter_of
 from solver.scene.scene import Scene
 
 
@@ -78,7 +78,7 @@ class Problem(Goals):
             )
         if self.cases[0].scene.observe.centred:
             return "tracked follows max|x|, and half peak to peak is observed"
-        if moves_contacts(self.scene, self.paths[0]):
+        if parameter_of(self.scene, self.paths[0]).moves_contacts:
             return f"tracked follows no geometry: `{self.paths[0]}` moves the contacts"
         others = without_second(self.scene.contacts)
         if others:

@@ -17,7 +17,7 @@ from service.jobs.strict_json import digest
 from service.schemas.answers import SweepDetail
 from solver.results.csv import csv_text
 from solver.results.dataset import Dataset
-from solver.scene.parameter_paths import parameter_unit, structure_unit
+from solver.scene.parameter_paths import find_parameter, parameter_unit
 from solver.scene.scene import Scene
 from solver.views.io import written
 from solver.views.to_dataset import attributes, point_variables
@@ -169,10 +169,8 @@ _COLUMNS = ("parameter", "amplitude", "half_peak_to_peak", "mean", "residual")
 
 def _unit(path: str, scene: Scene | None) -> str:
     """The unit of the parameter swept; a part of the structure has one only where the scene is known."""
-    owner, _, name = path.partition(".")
-    if owner != "structure":
-        return parameter_unit(path)
-    return "" if scene is None else structure_unit(scene.structure, name)
+    found = None if scene is None else find_parameter(scene, path)
+    return parameter_unit(path) if found is None else found.unit
 
 
 def sweep_dataset(

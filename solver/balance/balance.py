@@ -231,7 +231,7 @@ def _system(
 ) -> System:  # fmt: skip
     """Put the arrays of the compiled loops together."""
     model = linear_model(scene)
-    derivative = structure_derivative(scene, parameter.name) if parameter.kind is Kind.STRUCTURE else None
+    derivative = structure_derivative(scene, parameter.path) if parameter.kind is Kind.STRUCTURE else None
     if derivative is not None and derivative.contact_here is not None:
         wanted = "moves the contacts, which are followed in gradients and designs, not continued in"
         raise SettingError("parameter", parameter.path, wanted)

@@ -12,16 +12,8 @@ from solver.contacts.kernels import columns
 from solver.contacts.kernels import system as kernel
 from solver.errors import SettingError
 from solver.jit.fourier import Real
-from solver.scene.bodies.paths import SPEED, is_body_path, least_value, unit_of
-from solver.scene.bodies.shape_parts import contact_shares, least_shape_value, shape_of, shape_unit
-from solver.scene.bodies.shapes import POINTS
-from solver.scene.parameter_paths import (
-    changed_quantities,
-    follows_speed,
-    has_parameter,
-    is_gas_path,
-    structure_unit,
-)
+from solver.scene.bodies.paths import SPEED
+from solver.scene.parameter_paths import FREQUENCY, follows_speed, parameter_of
 from solver.scene.scene import Scene
 
 
@@ -38,9 +30,6 @@ class Kind(IntEnum):
     CONTACTS = columns.COLUMN_KIND
 
 
-_UNITS = {"frequency": "Hz", "excitation.amplitude": "N", "excitation.phase": "rad"}
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Parameter:
     """A parameter path resolved against a scene.
@@ -55,8 +44,6 @@ class Parameter:
         Its share in the number of each contact it acts on (1.0 but for faces with several points), else 0.0.
     column : int
         Of the contact table, if it is a parameter of contacts.
-    name : str
-        Name of the structural parameter, else empty.
     unit : str
         Unit of the values at the user boundary.
     least : float
@@ -66,7 +53,6 @@ class Parameter:
     path: str
     kind: Kind
     active: Real
-    name: str
     unit: str
     least: float
     column: int = 0
@@ -118,64 +104,23 @@ def resolve(scene: Scene, path: str) -> Parameter:
         The scene has no such parameter; the message lists those it has.
     """
     scene.check_path(path)
-    nobody = np.zeros(len(scene.contacts))
+    active = np.zeros(len(scene.contacts))
     followed = follows_speed(scene, path)
     if followed is not None:
         raise SettingError("path", path, f"cannot be continued in: {followed} follows the speed")
     if path == SPEED and (scene.speed_order is not None or scene.with_speed):
         wanted = "is swept along an engine-order line (`speed_order`) alone where loads follow it"
         raise SettingError("path", path, wanted)
-    if path == "frequency":
-        return _parameter(path, Kind.FREQUENCY, nobody)
-    shape = shape_of(scene, path)
-    if shape is not None:
-        return _of_shape(scene, path, shape[1])
-    if is_body_path(scene, path):
-        return Parameter(
-            path=path, kind=Kind.STRUCTURE, active=nobody, name=path, unit=unit_of(path),
-            least=least_value(path),
-        )  # fmt: skip
-    if is_gas_path(scene, path):
-        return Parameter(
-            path=path, kind=Kind.STRUCTURE, active=nobody, name=path, unit="1", least=-math.inf
-        )  # fmt: skip
-    owner, _, key = path.rpartition(".")
-    if owner == "excitation":
-        return _parameter(path, Kind.LEVEL if key == "amplitude" else Kind.FORCE_PHASE, nobody)
-    if owner == "structure":
-        return Parameter(
-            path=path, kind=Kind.STRUCTURE, active=nobody, name=key,
-            unit=structure_unit(scene.structure, key), least=0.0,
-        )  # fmt: skip
-    acts = [has_parameter(contact, owner, key) for contact in scene.contacts]
-    members = changed_quantities(scene, path)
-    if len({member.column for member in members}) > 1:
-        raise SettingError("path", path, "must be of contacts whose laws mean the same by it")
-    return Parameter(
-        path=path, kind=Kind.CONTACTS, active=np.array(acts, dtype=np.float64), name="", unit=members[0].unit,
-        least=max(member.least for member in members), column=members[0].column,
-    )  # fmt: skip
-
-
-def _of_shape(scene: Scene, path: str, key: str) -> Parameter:
-    """Return what a path of a damper given by its shape means: its contacts' numbers, or its structure."""
-    if key == POINTS:
+    if path == FREQUENCY:
+        return Parameter(path=path, kind=Kind.FREQUENCY, active=active, unit="Hz", least=-math.inf)
+    found = parameter_of(scene, path)
+    if found.in_steps:
         raise SettingError("path", path, "must be a number that changes without steps: set it in the scene")
-    shares = contact_shares(scene, path)
-    if shares is None:
-        nobody = np.zeros(len(scene.contacts))
-        return Parameter(
-            path=path, kind=Kind.STRUCTURE, active=nobody, name=path, unit=shape_unit(key),
-            least=least_shape_value(key),
-        )  # fmt: skip
-    quantity = next(c.PARAMETERS[key] for c in scene.contacts if c.name in shares)
+    columns_set = {quantity.column for quantity in found.quantities} or {0}
+    if len(columns_set) > 1:
+        raise SettingError("path", path, "must be of contacts whose laws mean the same by it")
+    active[list(found.contacts)] = list(found.contacts.values())
     return Parameter(
-        path=path, kind=Kind.CONTACTS, active=np.array([shares.get(c.name, 0.0) for c in scene.contacts]),
-        name="", unit=quantity.unit, least=quantity.least, column=quantity.column,
+        path=path, kind=Kind[found.acts_on.name], active=active, unit=found.unit, least=found.least,
+        column=columns_set.pop(),
     )  # fmt: skip
-
-
-def _parameter(path: str, kind: Kind, active: Real) -> Parameter:
-    """A parameter of the run or the forces; an amplitude means nothing below 0."""
-    least = 0.0 if kind is Kind.LEVEL else -math.inf
-    return Parameter(path=path, kind=kind, active=active, name="", unit=_UNITS[path], least=least)

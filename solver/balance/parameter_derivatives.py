@@ -18,8 +18,9 @@ from solver.jit.fourier import Complex, Real
 from solver.linear.assembly import linear_model, structure_derivative
 from solver.linear.condensation import reduce_model, term_amplitudes
 from solver.linear.contact_table import port_stiffnesses
+from solver.linear.model import LinearModelDerivative
 from solver.scene.bodies.paths import FORCE
-from solver.scene.parameter_paths import PROPORTIONAL, is_loss
+from solver.scene.parameter_paths import parameter_of
 from solver.scene.scene import MatricesStructure, Scene
 
 
@@ -108,14 +109,20 @@ def modal_dampings(balance: Balance, parameters: Sequence[Parameter]) -> dict[in
         return {}
     if balance.scene.bodies or linear_model(balance.scene).extra is not None:  # which have no such damping
         return {}
-    stiffness, mass = PROPORTIONAL
-    values = {stiffness: system.eigenvalues, mass: np.ones_like(system.eigenvalues)}
-    return {i: values[p.name][system.which] for i, p in enumerate(parameters) if p.kind is Kind.STRUCTURE}
+    of = {
+        i: parameter_of(balance.scene, p.path).slope().damping
+        for i, p in enumerate(parameters)
+        if p.kind is Kind.STRUCTURE
+    }
+    if None in of.values():
+        return {}
+    values = {"K": system.eigenvalues, "M": np.ones_like(system.eigenvalues)}
+    return {i: values[which][system.which] for i, which in of.items() if which is not None}
 
 
 def matrices_of_paths(balance: Balance, parameters: Sequence[Parameter]) -> HarmonicMatrices | None:
     """Return the linear part as matrices where a parameter needs them, one of the structure, else None."""
-    structural = {i: p.name for i, p in enumerate(parameters) if p.kind is Kind.STRUCTURE}
+    structural = {i: p.path for i, p in enumerate(parameters) if p.kind is Kind.STRUCTURE}
     if not structural or modal_dampings(balance, parameters):
         return None
     scene, ks = balance.scene, balance.system.ks
@@ -125,9 +132,9 @@ def matrices_of_paths(balance: Balance, parameters: Sequence[Parameter]) -> Harm
     moves, turn = moving[:, None, None], model.turns(diameters)[:, None, None]
     L, shift = dense.L[which], balance.system.shift
     by, forces_by, motions_by = {}, {}, {}
-    for i, name in structural.items():
-        d = structure_derivative(scene, name)
-        dK, dC, dM = d.at(model, diameters, moving)
+    for i, path in structural.items():
+        d = structure_derivative(scene, path)
+        dK, dC, dM = (each + 0j for each in d.at(diameters, moving))
         if d.contact_here is not None and d.contact_next is not None:
             dL = motions_by[i] = d.contact_here + d.contact_next * turn
             dK = dK + _stiffness(dL, shift, L) + _stiffness(L, shift, dL)
@@ -147,22 +154,20 @@ def check_smooth_structure(scene: Scene, parameters: Sequence[Parameter]) -> Non
 
     By the speed and by a radius of rotation the centrifugal load has: they are for gradients.
     """
-    structural = [p for p in parameters if p.kind is Kind.STRUCTURE]
-    bent = [p.path for p in structural if _is_bent(scene, p.name)]
-    by = {p.path: structure_derivative(scene, p.name) for p in structural}
+    by = {p.path: structure_derivative(scene, p.path) for p in parameters if p.kind is Kind.STRUCTURE}
+    bent = [path for path, d in by.items() if _is_bent(d)]
     lossy = [path for path, d in by.items() if d.extra is not None or d.by_loss_factor]
-    if len(lossy) > 1 and any(is_loss(scene.structure, p.name) for p in structural):
+    if len(lossy) > 1 and any(d.by_loss_factor for d in by.values()):
         wanted = "must not have the loss factor beside a stiffness, whose product it is in: only gradients"
         raise SettingError("paths", lossy, wanted)
-    pulling = [p.path for p in structural if structure_derivative(scene, p.name).forces]
+    pulling = [path for path, d in by.items() if d.forces]
     if bent or len([path for path in pulling if not path.endswith(f".{FORCE}")]) > 1:
         raise SettingError(
             "paths", bent or pulling, "must not change loads or places together: only gradients"
         )
 
 
-def _is_bent(scene: Scene, name: str) -> bool:
-    found = structure_derivative(scene, name)
+def _is_bent(found: LinearModelDerivative) -> bool:
     bends = bool(found.second_forces) or found.second_extra is not None
     return bends or found.contact_here is not None or not found.affine
 

@@ -14,8 +14,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, fields
 
 from solver.errors import SettingError
-from solver.scene.bodies.paths import changes_loads
-from solver.scene.parameter_paths import changed_quantities
+from solver.scene.parameter_paths import changed_quantities, changes_loads
 from solver.scene.scene import Scene
 
 

@@ -11,7 +11,7 @@ from solver.contacts.laws.harmonics import is_of_variation
 from solver.errors import SettingError
 from solver.jit.fourier import Integer, Real
 from solver.scene.bodies.body import REVOLUTIONS
-from solver.scene.parameter_paths import AMPLITUDE, follows_speed, has_parameter
+from solver.scene.parameter_paths import AMPLITUDE, follows_speed, parameter_of
 from solver.scene.scene import Scene
 
 
@@ -48,10 +48,8 @@ def speed_line(scene: Scene) -> SpeedLine:
             if each.path == AMPLITUDE:
                 level[0] = found / scene.excitation[0].amplitude
                 continue
-            owner, _, key = each.path.rpartition(".")
-            for i, contact in enumerate(scene.contacts):
-                if has_parameter(contact, owner, key):
-                    values[i], rise[:, i] = float(found[0]), found[1:]
+            for i in parameter_of(scene, each.path).contacts:
+                values[i], rise[:, i] = float(found[0]), found[1:]
         if any(body.radius_of_rotation for body in scene.bodies):
             level[1] = [0.0, 0.0, scene.speed_order**-2.0]
     return SpeedLine(

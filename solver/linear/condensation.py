@@ -320,9 +320,9 @@ def _dense(
     dK = dC = dM = np.zeros(held.K.shape, np.complex128)
     ddK = np.zeros((0, 0, 0), np.complex128)
     if derivative is not None:
-        dK, dC, dM = derivative.at(model, diameters, moving)
+        dK, dC, dM = derivative.at(diameters, moving)
         if derivative.second_extra is not None:
-            ddK = _contiguous(derivative.second_extra.at(model.turns(diameters), moving, ddK)[0])
+            ddK = _contiguous(derivative.second_extra.at(model.turns(diameters), moving, lambda: dK)[0])
     moves = moving[:, None, None]
     return {
         "K": _contiguous(held.K), "C": _contiguous(moves * held.C), "M": _contiguous(moves * held.M),

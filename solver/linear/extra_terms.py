@@ -11,9 +11,10 @@ that is known.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,10 @@ from solver.matrices.values import frozen
 from solver.scene.bodies.body import REVOLUTIONS
 from solver.scene.linear_terms import Entry
 from solver.scene.scene import MatricesStructure, Scene
+from solver.scene.scene_parameter import Slope
+
+if TYPE_CHECKING:
+    from solver.linear.model import Terms
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -43,6 +48,8 @@ class ExtraTerms:
         Stiffness of the mean alone [N/m].
     loss_factor : float
         The symmetric stiffness times i and this belongs to it too.
+    lossy : Terms or None
+        Those whose stiffness it is; None: of the terms beside which these stand.
     """
 
     offsets: tuple[int, ...]
@@ -50,6 +57,7 @@ class ExtraTerms:
     C: Complex
     still: Real | None = None
     loss_factor: float = 0.0
+    lossy: Terms | None = None
 
     @property
     def is_real(self) -> bool:
@@ -68,11 +76,11 @@ class ExtraTerms:
         )
 
     def at(
-        self, turns: Complex, moving: NDArray[np.bool_], stiffness: NDArray[Any]
+        self, turns: Complex, moving: NDArray[np.bool_], stiffness: Callable[[], NDArray[Any]]
     ) -> tuple[Complex, Complex]:
         """Return what it adds to K and C, (ns, n, n), at e^{jθ} of structures that move or are at rest.
 
-        `stiffness` (ns, n, n) is the symmetric one, with which structural damping goes.
+        `stiffness` gives the symmetric one (ns, n, n), with which structural damping goes.
         """
         powers = turns[:, None] ** np.array(self.offsets)
         K = np.einsum("sm,mij->sij", powers, self.K)
@@ -82,7 +90,7 @@ class ExtraTerms:
         if self.still is not None:
             K = K + np.where(moving, 0.0, 1.0)[:, None, None] * self.still
         if self.loss_factor:
-            K = K + np.where(moving, 1j * self.loss_factor, 0.0)[:, None, None] * stiffness
+            K = K + np.where(moving, 1j * self.loss_factor, 0.0)[:, None, None] * stiffness()
         return K, np.einsum("sm,mij->sij", powers, self.C)
 
 
@@ -109,19 +117,29 @@ class Coordinates:
 
     Attributes
     ----------
+    dofs : tuple of str
+        Names of the DOFs.
     shapes : (n_dofs, n) array
         The DOFs in the coordinates of the matrices.
+    direct : bool
+        Whether they are these coordinates themselves, as of a lumped structure.
     own : OwnTerms or None
         What the structure's own coordinates, in front of those of bodies, have beside symmetric matrices.
     """
 
+    dofs: tuple[str, ...]
     shapes: Real
+    direct: bool = False
     own: OwnTerms | None = None
 
+    def rows(self, selected: NDArray[Any]) -> NDArray[Any]:
+        """Return rows over the DOFs as rows over the coordinates; read-only."""
+        return selected if self.direct else frozen(selected @ self.shapes)
+
     @property
-    def key(self) -> tuple[int, int]:
+    def key(self) -> tuple[object, ...]:
         """Tells equal ones apart from others: the objects are the same as long as the structure is."""
-        return id(self.shapes), id(self.own)
+        return id(self.shapes), id(self.own), self.dofs
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Coordinates) and self.key == other.key
@@ -173,71 +191,48 @@ def extra_terms(scene: Scene, coordinates: Coordinates) -> ExtraTerms | None:
     if not (scene.couplings or scene.aerodynamics or loss or coordinates.own):
         return None
     spin = (scene.speed or 0.0) * REVOLUTIONS
-    return _terms(_entries(scene), scene.dofs, loss, spin, coordinates)
+    return _terms(_entries(scene), loss, spin, coordinates)
 
 
 @lru_cache(maxsize=64)
-def _terms(
-    entries: tuple[Entry, ...], dofs: tuple[str, ...], loss: float, spin: float, coordinates: Coordinates
-) -> ExtraTerms:
-    total = _Sum(coordinates.shapes, dofs)
-    for entry in entries:
-        total.add(entry, entry.k + spin**2 * entry.k_omega2, entry.c + spin * entry.g)
-    own = coordinates.own
-    if own is not None:
-        total.add_own(*own.skew, 1.0 + 1j * loss)
-        total.add_own(own.K_omega2, own.G, spin**2, spin)
+def _terms(entries: tuple[Entry, ...], loss: float, spin: float, coordinates: Coordinates) -> ExtraTerms:
+    total = _Sum(coordinates)
+    total.add_entries(entries)
+    if coordinates.own is not None:
+        total.add_own(*coordinates.own.skew, 1.0 + 1j * loss)
+    total.add_turning(entries, spin**2, spin)
     return total.terms(loss)
 
 
-def hysteretic(n: int, loss_factor: float) -> ExtraTerms:
-    """Return structural damping alone, of n coordinates."""
-    return _Sum(np.eye(n), ()).terms(loss_factor)
+def extra_slopes(
+    scene: Scene, slope: Slope, coordinates: Coordinates, loss_factor: float, lossy: Terms | None
+) -> tuple[ExtraTerms | None, ExtraTerms | None]:
+    """Return the first and second derivatives of the extra terms by a parameter; None where they are 0.
 
-
-def terms_by_loss(coordinates: Coordinates) -> ExtraTerms | None:
-    """Return the derivative by the loss factor of what K has beside its symmetric part; None: nothing."""
-    if coordinates.own is None or not coordinates.own.skew[0]:
-        return None
-    total = _Sum(coordinates.shapes, ())
-    total.add_own(coordinates.own.skew[0], (), 1j)
-    return total.terms()
-
-
-def terms_by_gas(scene: Scene, name: str, coordinates: Coordinates) -> ExtraTerms:
-    """Return their derivative by the factor of aerodynamic influence of that name."""
-    total = _Sum(coordinates.shapes, scene.dofs)
-    for gas in scene.aerodynamics:
-        if gas.name == name:
-            for entry in gas.model_copy(update={"factor": 1.0}).entries(scene.structure.sector_count):
-                total.add(entry, entry.k, entry.c)
-    return total.terms()
+    `loss_factor` is that of what the symmetric stiffness gains, or 1 of the stiffness of `lossy`.
+    """
+    spinning = slope.speed and depends_on_speed(scene)
+    if not (slope.entries or loss_factor or spinning):
+        return None, None
+    first, second = (_Sum(coordinates) for _ in range(2))
+    first.add_entries(slope.entries)
+    if coordinates.own is not None and slope.loss:
+        first.add_own(coordinates.own.skew[0], (), 1j)
+    if spinning:
+        spin, entries = (scene.speed or 0.0) * REVOLUTIONS, _entries(scene)
+        first.add_turning(entries, 2.0 * spin * REVOLUTIONS, REVOLUTIONS)
+        second.add_turning(entries, 2.0 * REVOLUTIONS**2, 0.0)
+    bent = second.terms()
+    return first.terms(loss_factor, lossy), bent if np.any(bent.K) else None
 
 
 def terms_of_line(scene: Scene, coordinates: Coordinates) -> ExtraTerms | None:
     """Return what K gains per squared speed and C per speed [rad/s]; None where nothing depends on it."""
     if not depends_on_speed(scene):
         return None
-    total = _Sum(coordinates.shapes, scene.dofs)
-    for entry in _entries(scene):
-        total.add(entry, entry.k_omega2, entry.g)
-    if coordinates.own is not None:
-        total.add_own(coordinates.own.K_omega2, coordinates.own.G)
+    total = _Sum(coordinates)
+    total.add_turning(_entries(scene), 1.0, 1.0)
     return total.terms()
-
-
-def terms_by_speed(scene: Scene, coordinates: Coordinates) -> tuple[ExtraTerms, ExtraTerms]:
-    """Return their first and second derivative by the speed in 1/min."""
-    spin = (scene.speed or 0.0) * REVOLUTIONS
-    first, second = (_Sum(coordinates.shapes, scene.dofs) for _ in range(2))
-    for entry in _entries(scene):
-        first.add(entry, 2.0 * spin * REVOLUTIONS * entry.k_omega2, REVOLUTIONS * entry.g)
-        second.add(entry, 2.0 * REVOLUTIONS**2 * entry.k_omega2, 0.0)
-    own = coordinates.own
-    if own is not None:
-        first.add_own(own.K_omega2, own.G, 2.0 * spin * REVOLUTIONS, REVOLUTIONS)
-        second.add_own(own.K_omega2, (), 2.0 * REVOLUTIONS**2)
-    return first.terms(), second.terms()
 
 
 def depends_on_speed(scene: Scene) -> bool:
@@ -250,15 +245,20 @@ def depends_on_speed(scene: Scene) -> bool:
 class _Sum:
     """Adds entries up in the coordinates of the matrices."""
 
-    def __init__(self, shapes: Real, dofs: tuple[str, ...]) -> None:
-        self._shapes, self._dofs = shapes, dofs
-        self._n = shapes.shape[1]
+    def __init__(self, coordinates: Coordinates) -> None:
+        self._in = coordinates
+        self._n = coordinates.shapes.shape[1]
         self._K: dict[int, Complex] = {}
         self._C: dict[int, Complex] = {}
 
-    def add(self, entry: Entry, k: complex, c: complex) -> None:
+    def add_entries(self, entries: tuple[Entry, ...]) -> None:
+        """Add what does not depend on the speed."""
+        for entry in entries:
+            self._add(entry, entry.k, entry.c)
+
+    def _add(self, entry: Entry, k: complex, c: complex) -> None:
         """Add k and c in the row of one DOF and the column of another."""
-        on, of = (self._shapes[self._dofs.index(dof)] for dof in (entry.on, entry.of))
+        on, of = (self._in.shapes[self._in.dofs.index(dof)] for dof in (entry.on, entry.of))
         self._at(self._K, entry.offset)[:] += k * np.outer(on, of)
         self._at(self._C, entry.offset)[:] += c * np.outer(on, of)
 
@@ -269,11 +269,18 @@ class _Sum:
                 size = len(matrix)
                 self._at(to, offset)[:size, :size] += factor * matrix
 
-    def terms(self, loss_factor: float = 0.0) -> ExtraTerms:
+    def add_turning(self, entries: tuple[Entry, ...], square: float, spin: float) -> None:
+        """Add what goes with the squared speed and with the speed, times these factors."""
+        for entry in entries:
+            self._add(entry, square * entry.k_omega2, spin * entry.g)
+        if self._in.own is not None:
+            self.add_own(self._in.own.K_omega2, self._in.own.G, square, spin)
+
+    def terms(self, loss_factor: float = 0.0, lossy: Terms | None = None) -> ExtraTerms:
         """Return what was added, with structural damping."""
         offsets = tuple(sorted({0, *self._K, *self._C}))
         K, C = (frozen(np.array([self._at(part, m) for m in offsets])) for part in (self._K, self._C))
-        return ExtraTerms(offsets=offsets, K=K, C=C, loss_factor=loss_factor)
+        return ExtraTerms(offsets=offsets, K=K, C=C, loss_factor=loss_factor, lossy=lossy)
 
     def _at(self, part: dict[int, Complex], offset: int) -> Complex:
         return part.setdefault(offset, np.zeros((self._n, self._n), np.complex128))

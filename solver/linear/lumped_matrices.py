@@ -1,19 +1,14 @@
-"""The matrices of masses, springs and dashpots, and their derivatives: one CasADi expression carries both.
-
-The expression of a scene's structure is symbolic in every mass, stiffness and dashpot, so a named parameter
-has its derivative from the same lines that give the value.
-"""
+"""The matrices of masses, springs and dashpots, and their derivatives from the same lines."""
 
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from solver.linear.matrix_model import bodies_mass, modal_damping, modal_damping_derivative
-from solver.linear.model import LinearModelDerivative
 from solver.matrices.values import frozen
 from solver.scene.bodies.body import Body
 from solver.scene.bodies.kinematics import dof_names
@@ -22,15 +17,17 @@ from solver.scene.scene import CyclicStructure, End, LumpedStructure
 
 FloatArray = NDArray[np.float64]
 _Ends = tuple[End, End]
-Assembled = LumpedStructure | CyclicStructure
 
 
-class Topology(NamedTuple):
-    """What joins what: everything of a structure but its numbers."""
+class Elements(NamedTuple):
+    """The masses, springs and dashpots of a structure: everything its matrices follow from but bodies."""
 
     dofs: tuple[str, ...]
-    springs: tuple[_Ends, ...]
-    dampers: tuple[_Ends, ...]
+    masses: tuple[float, ...]  # of the first DOFs; the mass of a body is no point mass and stands apart
+    springs: tuple[tuple[_Ends, float, float], ...]  # with stiffness and dashpot
+    dampers: tuple[tuple[_Ends, float], ...]
+    beta: float
+    ratios: Ratios | None
 
 
 class Matrices(NamedTuple):
@@ -43,63 +40,33 @@ class Matrices(NamedTuple):
     Kp: FloatArray
 
 
-class _Expression(NamedTuple):
-    """The matrices side by side, M | C0 | Cp | K0 | Kp, as an expression in all parameters."""
-
-    parameters: Any
-    stacked: Any
-
-
-def topology_of(structure: Assembled, bodies: tuple[Body, ...]) -> Topology:
-    """Return what joins what in a structure with bodies."""
-    springs = tuple(spring.ends for spring in structure.springs)
-    dampers = tuple(damper.ends for damper in structure.dampers)
-    return Topology(dof_names(structure, bodies), springs, dampers)
+def elements_of(structure: LumpedStructure | CyclicStructure, bodies: tuple[Body, ...]) -> Elements:
+    """Return what a structure with bodies consists of."""
+    return Elements(
+        dofs=dof_names(structure, bodies), masses=tuple(mass.m for mass in structure.masses),
+        springs=tuple((spring.ends, spring.k, spring.c) for spring in structure.springs),
+        dampers=tuple((damper.ends, damper.c) for damper in structure.dampers),
+        beta=structure.stiffness_proportional_damping,
+        ratios=structure.damping_ratio if isinstance(structure, LumpedStructure) else None,
+    )  # fmt: skip
 
 
-def numbers_of(structure: Assembled, bodies: tuple[Body, ...]) -> tuple[float, ...]:
-    """All numbers: masses, stiffnesses, dashpots, dashpots of springs, proportional damping.
-
-    The mass of a body is no point mass and stands apart: 0 here.
-    """
-    return (
-        *(mass.m for mass in structure.masses),
-        *(0.0 for body in bodies for _ in body.dofs),
-        *(spring.k for spring in structure.springs),
-        *(damper.c for damper in structure.dampers),
-        *(spring.c for spring in structure.springs),
-        structure.stiffness_proportional_damping,
-    )
-
-
-@lru_cache(maxsize=64)
-def _expression(topology: Topology) -> _Expression:
-    """The matrices in symbols, in the order of `_numbers`, for their derivatives."""
-    import casadi  # the values of the matrices need no symbols
-
-    n = len(topology.dofs)
-    q = casadi.SX.sym("q", n + 2 * len(topology.springs) + len(topology.dampers) + 1)
-    return _Expression(q, casadi.horzcat(*_assembled(topology, q, casadi.SX(n, n))))
+def _assembled(elements: Elements) -> Matrices:
+    """Return the matrices without modal damping."""
+    n = len(elements.dofs)
+    M, C0, Cp, K0, Kp = (np.zeros((n, n)) for _ in range(5))
+    index = {dof: i for i, dof in enumerate(elements.dofs)}
+    for i, mass in enumerate(elements.masses):
+        M[i, i] = mass
+    for ends, k, c in elements.springs:
+        _join(K0, Kp, ends, k, index)
+        _join(C0, Cp, ends, c + elements.beta * k, index)
+    for ends, c in elements.dampers:
+        _join(C0, Cp, ends, c, index)
+    return Matrices(M, C0, Cp, K0, Kp)
 
 
-def _assembled(topology: Topology, q: Any, zero: Any) -> tuple[Any, ...]:
-    """Return M, C0, Cp, K0, Kp in floats or in symbols, as the parameters `q` and the (n, n) `zero` are."""
-    n, n_springs, n_dampers = len(topology.dofs), len(topology.springs), len(topology.dampers)
-    M, C0, Cp, K0, Kp = (zero + 0.0 for _ in range(5))
-    k, c, c_spring = n, n + n_springs, n + n_springs + n_dampers
-    beta = q[c_spring + n_springs]
-    index = {dof: i for i, dof in enumerate(topology.dofs)}
-    for i in range(n):
-        M[i, i] = q[i]
-    for i, ends in enumerate(topology.springs):
-        _join(K0, Kp, ends, q[k + i], index)
-        _join(C0, Cp, ends, q[c_spring + i] + beta * q[k + i], index)
-    for i, ends in enumerate(topology.dampers):
-        _join(C0, Cp, ends, q[c + i], index)
-    return M, C0, Cp, K0, Kp
-
-
-def _join(X0: Any, Xp: Any, ends: _Ends, value: Any, index: dict[str, int]) -> None:
+def _join(X0: FloatArray, Xp: FloatArray, ends: _Ends, value: float, index: dict[str, int]) -> None:
     """Add one spring or dashpot between two ends to X0 + Xp e^{j theta} + Xp^T e^{-j theta}."""
     here = [index[end.dof] for end in ends if end.dof is not None]
     for i in here:
@@ -117,49 +84,34 @@ def _join(X0: Any, Xp: Any, ends: _Ends, value: Any, index: dict[str, int]) -> N
 
 
 @lru_cache(maxsize=256)
-def matrices_of_numbers(
-    topology: Topology, numbers: tuple[float, ...], bodies: tuple[Body, ...], ratios: Ratios | None
-) -> Matrices:
-    """Return the matrices of a topology with these numbers, bodies and modal damping; read-only."""
-    n = len(topology.dofs)
-    own = n - sum(len(body.dofs) for body in bodies)
-    found = Matrices(*_assembled(topology, numbers, np.zeros((n, n))))
-    if ratios is not None:
-        found.C0[:own, :own] += modal_damping(found.M[:own, :own], found.K0[:own, :own], ratios)
+def matrices_of_elements(elements: Elements, bodies: tuple[Body, ...]) -> Matrices:
+    """Return the matrices with modal damping and bodies; read-only."""
+    found, own = _assembled(elements), len(elements.masses)
+    if elements.ratios is not None:
+        inner = np.s_[:own, :own]
+        found.C0[inner] += modal_damping(found.M[inner], found.K0[inner], elements.ratios)
     if bodies:
         found.M[:] += bodies_mass(own, bodies)
     return Matrices(*map(frozen, found))
 
 
 @lru_cache(maxsize=256)
-def derivative_by_number(
-    topology: Topology, numbers: tuple[float, ...], i: int, own: int, ratios: Ratios | None
-) -> LinearModelDerivative:
-    """Return their derivative by number i; the first `own` DOFs are the structure's."""
-    import casadi
+def slopes_of_elements(elements: Elements, gains: tuple[tuple[int, float], ...]) -> tuple[Matrices, bool]:
+    """Return their slopes where masses, springs and dashpots, counted in this order, gain so much.
 
-    expression = _expression(topology)
-    derivative, affine = _derivative_function(topology, i)
-    stacked = casadi.reshape(derivative(np.asarray(numbers)), *expression.stacked.shape)
-    dense = np.asarray(casadi.DM(stacked).full(), dtype=np.float64)
-    n = dense.shape[0]
-    d = Matrices(*(dense[:, i * n : (i + 1) * n].copy() for i in range(5)))
-    if ratios is not None:
-        at = matrices_of_numbers(topology, numbers, (), None)
-        d.C0[:own, :own] += modal_damping_derivative(
-            at.M[:own, :own], at.K0[:own, :own], ratios, d.M[:own, :own], d.K0[:own, :own]
+    All but modal damping is linear in these numbers, so the slopes are constant: that is told too.
+    """
+    by, first = dict(gains), len(elements.masses)
+    last = first + len(elements.springs)
+    found = _assembled(elements._replace(
+        masses=tuple(by.get(i, 0.0) for i in range(first)),
+        springs=tuple((ends, by.get(i, 0.0), 0.0) for i, (ends, *_) in enumerate(elements.springs, first)),
+        dampers=tuple((ends, by.get(i, 0.0)) for i, (ends, _) in enumerate(elements.dampers, last)),
+    ))  # fmt: skip
+    moved = bool(np.any(found.M) or np.any(found.K0))
+    if elements.ratios is not None:
+        at, inner = _assembled(elements), np.s_[:first, :first]
+        found.C0[inner] += modal_damping_derivative(
+            at.M[inner], at.K0[inner], elements.ratios, found.M[inner], found.K0[inner]
         )
-        affine = affine and not (np.any(d.M) or np.any(d.K0))
-    d = Matrices(*map(frozen, d))
-    return LinearModelDerivative(dM=d.M, dC0=d.C0, dCp=d.Cp, dK0=d.K0, dKp=d.Kp, affine=affine)
-
-
-@lru_cache(maxsize=256)
-def _derivative_function(topology: Topology, i: int) -> tuple[Any, bool]:
-    """Derivative of the stacked matrices by parameter i as a function of all, and whether it is constant."""
-    import casadi
-
-    q, stacked = _expression(topology)
-    vector = casadi.vec(stacked)
-    jacobian = casadi.jacobian(vector, q[i])
-    return casadi.Function("derivative", [q], [jacobian]), bool(casadi.is_linear(vector, q[i]))
+    return Matrices(*map(frozen, found)), elements.ratios is None or not moved

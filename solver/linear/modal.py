@@ -86,7 +86,7 @@ def matrices_of(model: LinearModel, diameters: Integer, moving: Flags) -> HeldMa
         A reduced sector was not built for one of them.
     """
     arrays = (model.K0, model.Kp, model.C0, model.Cp, model.M)
-    parts: tuple[object, ...] = (model.sector,) if model.sector else tuple(Identity(a) for a in arrays)
+    parts: tuple[object, ...] = (model.sector,) if model.sector else tuple(map(Identity, arrays))
     # Without extra terms what is at rest has the matrices of what moves.
     still = () if model.extra is None else tuple(moving.tolist())
     return _matrices(_ByParts(model, (*parts, model.sectors, model.extra)), tuple(diameters.tolist()), still)

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from solver.linear.extra_terms import ExtraTerms
-from solver.linear.sector_matrices import ProportionalDamping, SectorMatrices
 
 FloatArray = NDArray[np.float64]
 Integer = NDArray[np.int64]
@@ -55,9 +54,16 @@ class ForceTerm:
     harmonic: int
 
 
+class Source(Protocol):
+    """Matrices that are not sums over a few offsets between sectors."""
+
+    def at(self, diameter: int) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
+        """Return K, C and M at a nodal diameter, Hermitian."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
-class LinearModel:
-    """The structure without its contacts: one sector of a tuned disk, or the whole structure.
+class Terms:
+    """K, C and M of one sector of a tuned disk, or of the whole structure, or derivatives of them.
 
     Harmonic k of engine order i sees the nodal diameter n = k i: the neighbour of x in the next sector is
     x e^{j theta} with theta = 2 pi n / sectors. There a matrix is X0 + Xp e^{j theta} + Xp^T e^{-j theta}, or
@@ -65,91 +71,28 @@ class LinearModel:
 
     Attributes
     ----------
-    dofs : tuple of str
-        Names of the DOFs.
-    shapes : (n_dofs, n) array
-        The DOFs in the coordinates of the matrices: the identity, or what a structure given by matrices or
-        modes names.
+    sectors : int
+        Number of sectors, 1 if lumped.
     M : (n, n) array
         Mass [kg].
     C0, Cp : (n, n) array
         Damping [N s/m]; `Cp` couples to the next sector, 0 if lumped.
     K0, Kp : (n, n) array
         Stiffness [N/m]; `Kp` couples to the next sector, 0 if lumped.
-    contact_here, contact_next : (n_ports, n) array
-        L(theta) = contact_here + contact_next e^{j theta}; relative motions u = L x, x the coordinates.
-    forces : tuple of ForceTerm
-        The excitation.
-    observe : (n,) array
-        Selects the observed DOF.
-    engine_order : int
-        Engine order of the excitation, 0 if lumped.
-    sectors : int
-        Number of sectors, 1 if lumped.
-    sector : SectorMatrices or None
-        What the matrices of a sector given by them are at each nodal diameter; M, C0, Cp, K0 and Kp are then
-        empty, (0, 0).
+    sector : Source or None
+        What the matrices are at each nodal diameter, in place of these.
     extra : ExtraTerms or None
         Terms that are not symmetric, not real or not of springs and dashpots; see `at`.
-    prescribed : int
-        So many coordinates, the last, are motions of a base; see `solver.linear.moving_base`.
-    line : ExtraTerms or None
-        What K gains per squared speed and C per speed where the speed follows the frequency, Ω = ω / order.
-    line_order : float
-        That order.
     """
 
-    dofs: tuple[str, ...]
-    shapes: FloatArray
+    sectors: int
     M: FloatArray
     C0: FloatArray
     Cp: FloatArray
     K0: FloatArray
     Kp: FloatArray
-    contact_here: FloatArray
-    contact_next: FloatArray
-    forces: tuple[ForceTerm, ...]
-    observe: FloatArray
-    engine_order: int
-    sectors: int
-    sector: SectorMatrices | None = None
+    sector: Source | None = None
     extra: ExtraTerms | None = None
-    prescribed: int = 0
-    line: ExtraTerms | None = None
-    line_order: float = 1.0
-
-    @property
-    def n_coordinates(self) -> int:
-        """Number of coordinates of the matrices."""
-        return int(self.shapes.shape[1])
-
-    @property
-    def interblade_phase(self) -> float:
-        """Phase of harmonic 1 from one sector to the next [rad]."""
-        return 2.0 * math.pi * self.engine_order / self.sectors
-
-    @property
-    def free(self) -> Flags:
-        """The coordinates that move freely, (n,): not the base nor what it drives, which have no inertia."""
-        if not self.prescribed:
-            return np.ones(self.n_coordinates, np.bool_)
-        moves: Flags = np.any(self.M, axis=1)
-        moves[-self.prescribed :] = False
-        return moves
-
-    @property
-    def is_symmetric(self) -> bool:
-        """Whether energy is kept but for dashpots: nothing beside springs, dashpots and gyroscopic terms."""
-        return not self.prescribed and (self.extra is None or self.extra.keeps_energy)
-
-    @property
-    def every_diameter(self) -> bool:
-        """Whether the matrices of all nodal diameters are known."""
-        return self.sector is None or self.sector.every_diameter
-
-    def diameters(self, ks: Integer) -> Integer:
-        """Return the nodal diameters that harmonics see, from 0 to sectors - 1."""
-        return (ks * self.engine_order) % self.sectors
 
     def turns(self, diameters: Integer) -> Complex:
         """Return e^{j theta} at nodal diameters, (nd,); without rounding where it is real."""
@@ -182,6 +125,13 @@ class LinearModel:
         M = np.broadcast_to(self.M, (len(turn), *self.M.shape))
         return turned(self.K0, self.Kp), turned(self.C0, self.Cp), M
 
+    def beside(self, diameters: Integer, moving: Flags) -> tuple[Complex, Complex] | None:
+        """Return what the extra terms add to K and C, (nd, n, n) each; None: there are none."""
+        if self.extra is None:
+            return None
+        of = self if self.extra.lossy is None else self.extra.lossy
+        return self.extra.at(self.turns(diameters), moving, lambda: of.plain(diameters)[0])
+
     def at(self, diameters: Integer, moving: Flags) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
         """Return K, C and M, (nd, n, n) each, at nodal diameters, of motions or (False) of what is at rest.
 
@@ -193,12 +143,82 @@ class LinearModel:
             A reduced sector was not built for one of them.
         """
         K, C, M = self.plain(diameters)
-        if self.extra is not None:
-            more, further = self.extra.at(self.turns(diameters), moving, K)
-            K, C = K + more, C + further
+        more = self.beside(diameters, moving)
+        if more is not None:
+            K, C = K + more[0], C + more[1]
             if not (np.any(K.imag) or np.any(C.imag)):
                 K, C = K.real, C.real
         return K, C, M
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LinearModel(Terms):
+    """The structure without its contacts: its terms, and what acts on it, joins it and is seen of it.
+
+    Attributes
+    ----------
+    dofs : tuple of str
+        Names of the DOFs.
+    shapes : (n_dofs, n) array
+        The DOFs in the coordinates of the matrices: the identity, or what a structure given by matrices or
+        modes names.
+    contact_here, contact_next : (n_ports, n) array
+        L(theta) = contact_here + contact_next e^{j theta}; relative motions u = L x, x the coordinates.
+    forces : tuple of ForceTerm
+        The excitation.
+    observe : (n,) array
+        Selects the observed DOF.
+    engine_order : int
+        Engine order of the excitation, 0 if lumped.
+    every_diameter : bool
+        Whether the matrices of all nodal diameters are known.
+    prescribed : int
+        So many coordinates, the last, are motions of a base; see `solver.linear.moving_base`.
+    line : ExtraTerms or None
+        What K gains per squared speed and C per speed where the speed follows the frequency, Ω = ω / order.
+    line_order : float
+        That order.
+    """
+
+    dofs: tuple[str, ...]
+    shapes: FloatArray
+    contact_here: FloatArray
+    contact_next: FloatArray
+    forces: tuple[ForceTerm, ...]
+    observe: FloatArray
+    engine_order: int
+    every_diameter: bool = True
+    prescribed: int = 0
+    line: ExtraTerms | None = None
+    line_order: float = 1.0
+
+    @property
+    def n_coordinates(self) -> int:
+        """Number of coordinates of the matrices."""
+        return int(self.shapes.shape[1])
+
+    @property
+    def interblade_phase(self) -> float:
+        """Phase of harmonic 1 from one sector to the next [rad]."""
+        return 2.0 * math.pi * self.engine_order / self.sectors
+
+    @property
+    def free(self) -> Flags:
+        """The coordinates that move freely, (n,): not the base nor what it drives, which have no inertia."""
+        if not self.prescribed:
+            return np.ones(self.n_coordinates, np.bool_)
+        moves: Flags = np.any(self.M, axis=1)
+        moves[-self.prescribed :] = False
+        return moves
+
+    @property
+    def is_symmetric(self) -> bool:
+        """Whether energy is kept but for dashpots: nothing beside springs, dashpots and gyroscopic terms."""
+        return not self.prescribed and (self.extra is None or self.extra.keeps_energy)
+
+    def diameters(self, ks: Integer) -> Integer:
+        """Return the nodal diameters that harmonics see, from 0 to sectors - 1."""
+        return (ks * self.engine_order) % self.sectors
 
     def inertia(self, diameters: Integer, ks: Integer) -> NDArray[Any]:
         """Return M of harmonics ks at their nodal diameters, (ns, n, n), with what follows the speed.
@@ -209,7 +229,7 @@ class LinearModel:
         K, _, whole = self.plain(diameters)
         if self.line is None:
             return whole
-        K2, G = self.line.at(self.turns(diameters), np.ones(len(ks), np.bool_), K)
+        K2, G = self.line.at(self.turns(diameters), np.ones(len(ks), np.bool_), lambda: K)
         moving, k = (ks > 0)[:, None, None], np.maximum(ks, 1)[:, None, None]
         per = 1.0 / (k * self.line_order)
         return np.asarray(np.where(moving, whole - 1j * per * G, 0.0) - per**2 * K2)
@@ -220,53 +240,29 @@ class LinearModel:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class LinearModelDerivative:
-    """Derivatives of a `LinearModel` by one structural parameter, in units per unit of the parameter.
+class LinearModelDerivative(Terms):
+    """Derivatives of a `LinearModel` by one parameter: its terms in units per unit of the parameter.
 
     Attributes
     ----------
-    dM, dC0, dCp, dK0, dKp : (n, n) array
-        Derivatives of the matrices; read-only.
-    damping : ProportionalDamping or None
-        Of a sector given by its matrices: what dC has beside dC0 and dCp at each nodal diameter.
-    by_loss_factor : bool
-        The parameter is the loss factor: dK is i times the stiffness of the model.
     affine : bool
         The matrices are affine in this parameter, so these derivatives are constant.
     contact_here, contact_next : (n_ports, n) array or None
         Derivatives of the relative motions; None where they do not depend on it.
     forces, second_forces : tuple of ForceTerm
         First and second derivatives of the forces [N per unit, and per unit squared].
-    extra, second_extra : ExtraTerms or None
-        First and second derivatives of the extra terms.
+    second_extra : ExtraTerms or None
+        Second derivatives of the extra terms.
     """
 
-    dM: FloatArray
-    dC0: FloatArray
-    dCp: FloatArray
-    dK0: FloatArray
-    dKp: FloatArray
-    affine: bool
+    affine: bool = True
     contact_here: FloatArray | None = None
     contact_next: FloatArray | None = None
     forces: tuple[ForceTerm, ...] = ()
     second_forces: tuple[ForceTerm, ...] = ()
-    extra: ExtraTerms | None = None
     second_extra: ExtraTerms | None = None
-    damping: ProportionalDamping | None = None
-    by_loss_factor: bool = False
 
-    def at(self, model: LinearModel, diameters: Integer, moving: Flags) -> tuple[Complex, Complex, Complex]:
-        """Return the derivatives of K, C and M of `model`, (nd, n, n) each, as `LinearModel.at`."""
-        turns = model.turns(diameters)
-        turn = turns[:, None, None]
-        dK = self.dK0 + self.dKp * turn + self.dKp.T * turn.conj()
-        dC = self.dC0 + self.dCp * turn + self.dCp.T * turn.conj()
-        if self.damping is not None:
-            dC = dC + np.array([self.damping.at(int(n)) for n in diameters])
-        if self.extra is not None:
-            more, further = self.extra.at(turns, moving, dK)
-            dK, dC = dK + more, dC + further
-        if self.by_loss_factor:
-            dK = dK + np.where(moving[:, None, None], 1j * model.plain(diameters)[0], 0.0)
-        return dK, dC, self.dM + 0.0 * turn
+    @property
+    def by_loss_factor(self) -> bool:
+        """Whether the parameter is the loss factor, so that dK is i times the stiffness of the model."""
+        return self.extra is not None and self.extra.lossy is not None

@@ -20,13 +20,14 @@ from numpy.typing import NDArray
 
 from solver.errors import SettingError
 from solver.linear.extra_terms import ExtraTerms
-from solver.linear.model import ForceTerm, LinearModel, LinearModelDerivative
+from solver.linear.model import ForceTerm, LinearModel, LinearModelDerivative, Terms
 from solver.matrices.values import frozen
 from solver.scene.excitation import Motion
 from solver.scene.scene import Scene
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+Integer = NDArray[np.int64]
 _WHOLE, _MOVING = np.zeros(1, np.int64), np.ones(1, np.bool_)  # a structure without sectors, in motion
 _RIGID = 1e20  # stiffness of what drives a DOF, relative to the largest of the structure
 
@@ -80,37 +81,44 @@ def with_base(model: LinearModel, scene: Scene, base: BaseMotions) -> LinearMode
     """
     n, m = model.M.shape[0], len(base)
     shares, driven = _shares(model, base), _driven(model, base)
-    M, K, C = (
-        np.pad(model.M, (0, m)),
-        np.zeros((n + m, n + m), np.complex128),
-        np.zeros((n + m, n + m), np.complex128),
-    )
-    if model.extra is not None:
-        (K[:n, :n],), (C[:n, :n],) = model.extra.at(model.turns(_WHOLE), _MOVING, model.K0[None])
-    K0, C0 = np.pad(model.K0, (0, m)), np.pad(model.C0, (0, m))
-    still = np.zeros((n + m, n + m))
+    terms, K, C = _widened(model, shares, driven)
+    M, still = terms["M"], np.zeros((n + m, n + m))
     stiffness = _RIGID * float(np.abs(model.K0).max())
-    for matrix, own in ((K, K0), (C, C0)):
-        matrix[driven] = -own[driven]
-    M[driven] = 0.0
     K[driven, driven] += stiffness
     for at, (one, part) in enumerate(zip(base, shares.T, strict=True), start=n):
-        if one.ground:
-            M[:n, at] = model.M @ part
-        else:
+        if not one.ground:
             K[driven, at] -= stiffness * part[driven]
         row = {"displacement": K, "velocity": C, "acceleration": M}[one.motion]
         row[at, at] = 1.0
         if one.motion != "displacement":
             still[at, at] = 1.0
-    M, K0, C0, K, C, still = map(frozen, (M, K0, C0, K, C, still))
+    frozen(M)
+    extra = ExtraTerms(offsets=(0,), K=frozen(K)[None], C=frozen(C)[None], still=frozen(still))
     return replace(
-        model, M=M, K0=K0, Kp=_zeros(n + m), C0=C0, Cp=_zeros(n + m), prescribed=m,
+        model, **terms, extra=extra, prescribed=m,
         shapes=_seen(model.shapes, scene, base, shares), observe=_seen(model.observe, scene, base, shares),
         contact_here=_wide(model.contact_here, m), contact_next=_wide(model.contact_next, m),
-        extra=ExtraTerms(offsets=(0,), K=K[None], C=C[None], still=still),
         forces=(*_wider(model.forces, m), *_motions(base, n)),
     )  # fmt: skip
+
+
+def _widened(terms: Terms, shares: Real, driven: Integer) -> tuple[dict[str, Any], Complex, Complex]:
+    """Return the symmetric terms with those of a base behind them, and what K and C have beside.
+
+    Driven DOFs have no equation of motion, and the ground moves the structure by its inertia.
+    """
+    n, m = shares.shape
+    (K0,), (C0,), (own,) = terms.plain(_WHOLE)
+    more = terms.beside(_WHOLE, _MOVING)
+    K, C = (
+        np.pad(part + 0j, (0, m))
+        for part in ((0.0 * K0, 0.0 * C0) if more is None else (more[0][0], more[1][0]))
+    )
+    M, K0, C0 = (np.pad(part, (0, m)) for part in (own, K0, C0))
+    M[:n, n:] = 0.0 if driven.size else own @ shares
+    M[driven], K[driven], C[driven] = 0.0, -K0[driven], -C0[driven]
+    nothing = frozen(np.zeros((n + m, n + m)))
+    return {"M": M, "K0": frozen(K0), "Kp": nothing, "C0": frozen(C0), "Cp": nothing}, K, C
 
 
 def derivative_with_base(
@@ -118,26 +126,16 @@ def derivative_with_base(
 ) -> LinearModelDerivative:
     """Return a derivative of `model` (without its base) as one of the model with it."""
     m, driven = len(base), _driven(model, base)
-
-    def wide(matrix: NDArray[Any]) -> NDArray[Any]:
-        found = np.pad(matrix, (0, m))
-        found[driven] = 0.0
-        return found
-
-    dM = wide(d.dM)
-    if not driven.size:  # the ground moves
-        dM[:-m, -m:] = d.dM @ _shares(model, base)
-    # Rows of driven DOFs are of no symmetric part: the whole derivative stands with the extra terms.
-    (dK,), (dC,), _ = d.at(model, _WHOLE, _MOVING)
-    own = ExtraTerms(offsets=(0,), K=wide(dK)[None], C=wide(dC)[None])
+    terms, K, C = _widened(d, _shares(model, base), driven)
+    frozen(terms["M"])
+    own = ExtraTerms(offsets=(0,), K=frozen(K)[None], C=frozen(C)[None])
     second = d.second_extra
     if second is not None:
-        K, C = (np.array([wide(each) for each in part]) for part in (second.K, second.C))
+        K, C = (np.pad(part, ((0, 0), (0, m), (0, m))) for part in (second.K, second.C))
+        K[:, driven], C[:, driven] = 0.0, 0.0
         second = replace(second, K=K, C=C)
-    nothing = _zeros(len(dM))
     return replace(
-        d, dM=dM, dK0=nothing, dKp=nothing, dC0=nothing, dCp=nothing, by_loss_factor=False,
-        extra=own, second_extra=second,
+        d, **terms, sector=None, extra=own, second_extra=second,
         contact_here=None if d.contact_here is None else _wide(d.contact_here, m),
         contact_next=None if d.contact_next is None else _wide(d.contact_next, m),
         forces=_wider(d.forces, m), second_forces=_wider(d.second_forces, m),
@@ -153,7 +151,7 @@ def _shares(model: LinearModel, base: BaseMotions) -> Real:
     return found
 
 
-def _driven(model: LinearModel, base: BaseMotions) -> NDArray[np.int64]:
+def _driven(model: LinearModel, base: BaseMotions) -> Integer:
     """The coordinates that are driven; none where the ground moves."""
     at = {_coordinate(model, dof) for one in base if not one.ground for dof, _ in one.shares}
     return np.array(sorted(at), np.int64)
@@ -191,7 +189,3 @@ def _wider(terms: tuple[ForceTerm, ...], m: int) -> tuple[ForceTerm, ...]:
 
 def _wide(rows: Real, m: int) -> Real:
     return frozen(np.pad(rows, ((0, 0), (0, m))))
-
-
-def _zeros(n: int) -> Real:
-    return frozen(np.zeros((n, n)))

@@ -1,7 +1,8 @@
-"""One sector of a disk given by matrices: what it is at each nodal diameter, made when it is first used.
+"""A structure given by its matrices or modes: what it is at each nodal diameter, made when it is first used.
 
 A full sector has its high boundary eliminated (`solver.matrices.sectors.elimination`), a reduced one brings
-the matrices of each nodal diameter. That of n is the complex conjugate of that of sectors − n.
+the matrices of each nodal diameter. That of n is the complex conjugate of that of sectors − n. A structure
+without sectors has the nodal diameter 0 alone.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.linear.matrix_model import NO_PROPORTIONAL, block_diag, bodies_mass, modal_damping
+from solver.linear.matrix_model import block_diag, bodies_mass, modal_damping, ratio_of_modes
 from solver.matrices.normal_modes import hermitian
 from solver.matrices.sectors.blocks import at_diameter, full_elimination
 from solver.matrices.values import frozen
@@ -21,18 +22,19 @@ from solver.scene.bodies.body import Body
 from solver.scene.parts import MatricesStructure
 
 Matrices = tuple[NDArray[Any], NDArray[Any], NDArray[Any]]
+_NO_PROPORTIONAL = {"stiffness_proportional_damping": 0.0, "mass_proportional_damping": 0.0}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SectorMatrices:
-    """The matrices of a sector with its bodies behind its coordinates.
+    """The matrices of a structure with its bodies behind its coordinates.
 
     Attributes
     ----------
     structure : MatricesStructure
-        With `sectors`.
+        One sector, or the whole.
     bodies : tuple of Body
-        Of one sector.
+        Of it.
     shapes : (n_dofs, n) array
         The DOFs of structure and bodies in the coordinates.
     """
@@ -50,6 +52,8 @@ class SectorMatrices:
     def at(self, diameter: int) -> Matrices:
         """K, C and M at a nodal diameter, their Hermitian parts, real where the phase is; read-only.
 
+        They are the same arrays each time, so that what follows from them can be kept.
+
         Raises
         ------
         SettingError
@@ -59,43 +63,41 @@ class SectorMatrices:
         found = _with_damping(self.structure, self.bodies, min(n, count - n))
         return found if 2 * n <= count else (found[0].conj(), found[1].conj(), found[2].conj())
 
-    def own(self, diameter: int, which: Literal["K", "M"]) -> NDArray[Any]:
-        """K or M without what bodies add, in the rows of the structure, zero elsewhere."""
-        matrix = self.at(diameter)[0 if which == "K" else 2].copy()
-        behind = sum(len(body.dofs) for body in self.bodies)
-        if behind:
-            matrix[-behind:] = 0.0
-        return matrix
-
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ProportionalDamping:
-    """The derivative of C by a proportional damping: K or M of the structure at each nodal diameter."""
+    """The derivatives by a proportional damping: C gains K or M of the structure, without its bodies."""
 
     sector: SectorMatrices
     which: Literal["K", "M"]
 
-    def at(self, diameter: int) -> NDArray[Any]:
-        """dC at a nodal diameter."""
-        return self.sector.own(diameter, self.which)
+    def at(self, diameter: int) -> Matrices:
+        """Derivatives of K, C and M at a nodal diameter."""
+        found = self.sector.at(diameter)[0 if self.which == "K" else 2].copy()
+        found[len(found) - sum(len(body.dofs) for body in self.sector.bodies) :] = 0.0
+        nothing = np.zeros_like(found)
+        return nothing, found, nothing
 
 
 @lru_cache(maxsize=16)
 def sector_matrices(structure: MatricesStructure, bodies: tuple[Body, ...]) -> SectorMatrices:
-    """The matrices of a sector; the same object each time, so that what follows from them can be kept."""
+    """The matrices of a structure; the same object each time, so that what follows from them can be kept."""
     rows = list(structure.dofs.rows)
-    if structure.diameters is None:
-        eliminated = full_elimination(structure)
-        rows = [eliminated.row(row) for row in rows]
-    own = np.zeros((len(rows), structure.n_coordinates))
-    own[np.arange(len(rows)), rows] = 1.0
+    if structure.modes is not None:
+        own = structure.modes.modes[rows]
+    else:
+        if structure.has_sectors and structure.diameters is None:
+            eliminated = full_elimination(structure)
+            rows = [eliminated.row(row) for row in rows]
+        own = np.zeros((len(rows), structure.n_coordinates))
+        own[np.arange(len(rows)), rows] = 1.0
     shapes = frozen(block_diag(own, np.eye(sum(len(body.dofs) for body in bodies))))
     return SectorMatrices(structure=structure, bodies=bodies, shapes=shapes)
 
 
 @lru_cache(maxsize=128)
 def _with_damping(structure: MatricesStructure, bodies: tuple[Body, ...], n: int) -> Matrices:
-    own = structure.model_copy(update=NO_PROPORTIONAL)
+    own = structure.model_copy(update=_NO_PROPORTIONAL)
     K, C, M = _at(own, bodies, n)
     behind = sum(len(body.dofs) for body in bodies)
     inner = slice(0, K.shape[0] - behind)
@@ -109,11 +111,21 @@ def _with_damping(structure: MatricesStructure, bodies: tuple[Body, ...], n: int
 @lru_cache(maxsize=128)
 def _at(structure: MatricesStructure, bodies: tuple[Body, ...], n: int) -> Matrices:
     """K, C and M without proportional damping."""
-    # What is unsymmetric is among the extra terms; rounding must not look like it.
-    K, C, M = (hermitian(matrix).copy() for matrix in at_diameter(structure, n))
-    if structure.damping_ratio is not None:
-        C = C + modal_damping(M, K, structure.damping_ratio)
+    K, C, M = _own(structure, n)
     if bodies:
         behind = np.zeros((sum(len(body.dofs) for body in bodies),) * 2)
         K, C, M = block_diag(K, behind), block_diag(C, behind), block_diag(M, bodies_mass(0, bodies))
     return frozen(K), frozen(C), frozen(M)
+
+
+def _own(structure: MatricesStructure, n: int) -> Matrices:
+    """K, C and M of the structure alone, with its damping ratios."""
+    modes, ratio = structure.modes, structure.damping_ratio
+    if modes is not None:
+        ratios = modes.damping_ratio
+        if ratios is None:
+            ratios = ratio_of_modes(0.0 if ratio is None else ratio, modes.omega2.size)
+        return np.diag(modes.omega2), np.diag(2.0 * ratios * np.sqrt(modes.omega2)), np.eye(modes.omega2.size)
+    # What is unsymmetric is among the extra terms; rounding must not look like it.
+    K, C, M = (hermitian(matrix).copy() for matrix in at_diameter(structure, n))
+    return K, C if ratio is None else C + modal_damping(M, K, ratio), M

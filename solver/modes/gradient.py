@@ -186,9 +186,9 @@ class ModeSensitivities:
     def _of_structure(self, parameter: Parameter, state: ModeState, at: Evaluated) -> _Change:
         """Return what a parameter of the structure, of bodies or of places changes."""
         s, scene, ks = self._equations.structure, self._equations.balance.scene, self._equations.structure.ks
-        model, d = linear_model(scene), structure_derivative(scene, parameter.name)
+        model, d = linear_model(scene), structure_derivative(scene, parameter.path)
         diameters = model.diameters(ks)
-        dK, dC, dM = d.at(model, diameters, s.moving)
+        dK, dC, dM = d.at(diameters, s.moving)
         omega, zeta = float(state.y[-2]), float(state.y[-1])
         k = ks.astype(np.float64)[:, None, None]
         x = (s.shapes @ at.x[:, :, None])[:, :, 0]
@@ -209,7 +209,7 @@ class ModeSensitivities:
         equations, s = self._equations, self._equations.structure
         balance = equations.balance
         model = linear_model(balance.scene)
-        d = structure_derivative(balance.scene, parameter.name)
+        d = structure_derivative(balance.scene, parameter.path)
         here, beyond = cast(Real, d.contact_here), cast(Real, d.contact_next)
         turn = model.turns(model.diameters(s.ks))[:, None, None]
         dL = here + beyond * turn

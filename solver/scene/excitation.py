@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import csv
+import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Literal, NamedTuple, Self
+from typing import Annotated, Any, Literal, NamedTuple, Protocol, Self
 
 from pydantic import BeforeValidator, Field, PlainSerializer, WithJsonSchema, model_validator
 
 from solver.contacts.fields import Angle, DofName, Part, Signed
-from solver.errors import SceneError
+from solver.errors import SceneError, SettingError
+from solver.scene.scene_parameter import ActsOn, SceneParameter, changed
 
 Order = Annotated[int, Field(strict=True, ge=0, le=10_000)]
 HarmonicIndex = Annotated[int, Field(strict=True, ge=0, le=1_000)]
@@ -154,6 +156,62 @@ class Excitation(Part):
         if self.base is not None:
             return "the ground" if self.base.ground else listed(dof for dof, *_ in self.base.shares)
         return listed(dof for dof, *_ in self.parts)
+
+
+AMPLITUDE = "excitation.amplitude"
+PHASE = "excitation.phase"
+
+
+class HasExcitation(Protocol):
+    """What a scene holds, as far as the parameters of its forces go."""
+
+    @property
+    def excitation(self) -> tuple[Excitation, ...]:
+        """Every force."""
+
+
+def excitation_parameter(scene: HasExcitation, path: str) -> SceneParameter | None:
+    """Return what the amplitude or the phase of all forces is, if the path is one of them."""
+    forces = scene.excitation
+    if path == AMPLITUDE:
+        return SceneParameter(
+            get=lambda: forces[0].amplitude, with_value=lambda new: _scaled(forces, new), unit="N",
+            acts_on=ActsOn.LEVEL,
+        )  # fmt: skip
+    if path == PHASE:
+        return SceneParameter(
+            get=lambda: next((force.phase for force in forces if force.harmonic), 0.0),
+            with_value=lambda new: _shifted(forces, new), unit="rad", least=-math.inf,
+            acts_on=ActsOn.FORCE_PHASE,
+        )  # fmt: skip
+    return None
+
+
+def _scaled(forces: tuple[Excitation, ...], new: float) -> dict[str, Any]:
+    """Every force, scaled so that the first has the amplitude `new`."""
+    first = forces[0].amplitude
+    if first == 0.0 and len(forces) > 1:
+        raise SettingError(AMPLITUDE, new, "scales all forces by one factor, but the first one is 0")
+    scaled = [new, *(force.amplitude * (new / first) for force in forces[1:])]
+    wanted = "must be a number from -1e15 to 1e15 [N]"
+    pairs = zip(forces, scaled, strict=True)
+    return {
+        "excitation": tuple(changed(force, {"amplitude": a}, AMPLITUDE, new, wanted) for force, a in pairs)
+    }
+
+
+def _shifted(forces: tuple[Excitation, ...], new: float) -> dict[str, Any]:
+    """Every force but static ones, shifted so that the first has the phase `new`."""
+    moving = [force for force in forces if force.harmonic]
+    if not moving:
+        raise SettingError(PHASE, new, "has no meaning: every force of this scene is static")
+    shift, wanted = new - moving[0].phase, "must be a number from -1e4 to 1e4 [rad]"
+    phases = {id(force): force.phase + shift for force in moving} | {id(moving[0]): new}
+    shifted = (
+        changed(force, {"phase": phases[id(force)]}, PHASE, new, wanted) if force.harmonic else force
+        for force in forces
+    )
+    return {"excitation": tuple(shifted)}
 
 
 _UNITS = {"displacement": "m", "velocity": "m/s", "acceleration": "m/s²"}

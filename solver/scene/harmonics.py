@@ -8,8 +8,7 @@ from functools import lru_cache
 import numpy as np
 
 from solver.jit.fourier import Flags, Integer, Real
-from solver.scene.bodies.paths import changes_loads
-from solver.scene.parameter_paths import changed_quantities
+from solver.scene.parameter_paths import changed_quantities, changes_loads
 from solver.scene.scene import Scene
 
 MOST_HARMONICS = 1000

@@ -13,14 +13,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Annotated, Any, NamedTuple, Self
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
 from solver.contacts.fields import DofName, Name, NonNegative, Part, Signed
+from solver.scene.scene_parameter import SceneParameter, Slope, changed
+
+if TYPE_CHECKING:
+    from solver.scene.bodies.kinematics import HasParts
 
 Offset = Annotated[int, Field(strict=True, ge=-10_000, le=10_000)]
+_FACTOR = "factor"  # of aerodynamic influence
 _ROUNDING = 1e-14  # of the largest coefficient: less is what a Fourier transform leaves
 
 
@@ -185,6 +190,35 @@ class Aerodynamics(Part):
             Entry(self.dof, self.dof, offset, self.factor * k, self.factor * c, 0.0, 0.0)
             for offset, k, c in (each if isinstance(each, tuple) else _of_blade(each) for each in given)
         )
+
+
+def gas_paths(scene: HasParts) -> tuple[str, ...]:
+    """Return the paths of the factors of aerodynamic influence."""
+    return tuple(f"{each.name}.{_FACTOR}" for each in scene.aerodynamics if each.name is not None)
+
+
+def gas_parameter(scene: HasParts, path: str) -> SceneParameter | None:
+    """Return what the factor of aerodynamic influence is, if the path is one."""
+    owner, _, key = path.rpartition(".")
+    members = [each for each in scene.aerodynamics if owner and each.name == owner and key == _FACTOR]
+    if not members:
+        return None
+
+    def with_value(new: float) -> dict[str, Any]:
+        wanted = "must be a number from -1e15 to 1e15"
+        gas = tuple(
+            changed(each, {_FACTOR: new}, path, new, wanted) if each in members else each
+            for each in scene.aerodynamics
+        )
+        return {"aerodynamics": gas}
+
+    def slope() -> Slope:
+        unit = (each.model_copy(update={_FACTOR: 1.0}) for each in members)
+        return Slope(entries=tuple(e for each in unit for e in each.entries(scene.structure.sector_count)))
+
+    return SceneParameter(
+        get=lambda: members[0].factor, with_value=with_value, unit="1", least=-math.inf, slope=slope
+    )
 
 
 def _of_blade(given: Influence) -> tuple[int, complex, complex]:

@@ -34,7 +34,7 @@ def natural_frequencies(scene: Scene, *, stuck: bool) -> Real:
         return _along_line(K, model)
     if model.extra is not None:
         n = model.diameters(np.ones(1, np.int64))
-        C = model.extra.at(model.turns(n), np.ones(1, np.bool_), model.plain(n)[0])[1][0]
+        C = model.extra.at(model.turns(n), np.ones(1, np.bool_), lambda: model.plain(n)[0])[1][0]
         free = model.free
         return _of_poles(K[free][:, free], C[free][:, free], M[free][:, free])
     modes = undamped_modes(K if np.any(K.imag) or np.any(M.imag) else K.real, M)

@@ -30,16 +30,26 @@ def full_elimination(sector: Sector) -> Elimination:
 @lru_cache(maxsize=16)
 def _circulants(sector: Sector) -> tuple[Circulant, Circulant, Circulant]:
     """K, C and M of a full sector, its high boundary eliminated."""
-    if sector.M is None or sector.K is None:
-        raise ValueError("a full sector needs M and K")
-    C = np.zeros_like(sector.M.array) if sector.C is None else sector.C.array
     eliminated = full_elimination(sector)
-    K, damping, M = (eliminated.of(matrix) for matrix in (sector.K.array, C, sector.M.array))
-    return K, damping, M
+    K, C, M = (eliminated.of(matrix) for matrix in _given(sector))
+    return K, C, M
+
+
+def _given(sector: Sector) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """K, C and M as they stand in the scene; no damping is 0."""
+    if sector.M is None or sector.K is None:
+        raise ValueError("a structure given by its matrices needs M and K")
+    return (
+        sector.K.array,
+        np.zeros_like(sector.M.array) if sector.C is None else sector.C.array,
+        sector.M.array,
+    )
 
 
 def at_diameter(sector: Sector, n: int) -> Matrices:
     """K, C and M of a sector at nodal diameter n, from 0 to half the sectors, as they are given.
+
+    What has no sectors is as it is at 0.
 
     Raises
     ------
@@ -49,6 +59,8 @@ def at_diameter(sector: Sector, n: int) -> Matrices:
     count = sector.sectors or 1
     if sector.diameters is not None:
         return sector.diameters.at(n, count)
+    if sector.sectors is None:
+        return _given(sector)
     K, C, M = (part.at(n, count) for part in _circulants(sector))
     return K, C, M
 

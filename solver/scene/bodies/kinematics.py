@@ -14,14 +14,16 @@ take these forms from here.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, Self
 
 from solver.contacts.fields import NEXT, Between, Vector, parse_end
 from solver.contacts.frames import Axes, cross, unit
+from solver.contacts.laws.base import AnyContact
 from solver.scene.bodies.body import REVOLUTIONS, Body, Load, Node, Place
-from solver.scene.linear_terms import Aerodynamics
+from solver.scene.bodies.shapes import AnyShape
+from solver.scene.linear_terms import Aerodynamics, SpeedDependence
 from solver.scene.parts import Excitation, LumpedStructure, Structure
 
 
@@ -64,15 +66,15 @@ class InContact(Protocol):
         """The ends of each relative motion, of one without a place."""
 
 
-class HasBodies(Protocol):
-    """What a scene holds, as far as kinematics go; see `solver.scene.scene.Scene`."""
+class HasParts(Protocol):
+    """What a scene holds, as far as motions and parameters go; see `solver.scene.scene.Scene`."""
 
     @property
     def structure(self) -> Structure:
         """The linear part."""
 
     @property
-    def contacts(self) -> Sequence[Any]:
+    def contacts(self) -> tuple[AnyContact, ...]:
         """Every contact."""
 
     @property
@@ -99,6 +101,21 @@ class HasBodies(Protocol):
     def speed(self) -> float | None:
         """Speed of rotation [1/min]."""
 
+    @property
+    def with_speed(self) -> tuple[SpeedDependence, ...]:
+        """What follows the speed."""
+
+    @property
+    def excitation(self) -> tuple[Excitation, ...]:
+        """Every force."""
+
+    @property
+    def dampers(self) -> tuple[AnyShape, ...]:
+        """Every damper given by its shape."""
+
+    def model_copy(self, *, update: Mapping[str, Any] | None = None) -> Self:
+        """Return a copy with other parts."""
+
 
 def dof_names(structure: Structure, bodies: tuple[Body, ...]) -> tuple[str, ...]:
     """Names of all degrees of freedom: of the structure, then of the bodies."""
@@ -106,12 +123,12 @@ def dof_names(structure: Structure, bodies: tuple[Body, ...]) -> tuple[str, ...]
     return own if not bodies else (*own, *(dof for body in bodies for dof in body.dofs))
 
 
-def contact_forms(scene: HasBodies) -> tuple[tuple[Form, ...], ...]:
+def contact_forms(scene: HasParts) -> tuple[tuple[Form, ...], ...]:
     """The relative motions of every contact."""
     return tuple(forms_of(scene, contact) for contact in scene.contacts)
 
 
-def forms_of(scene: HasBodies, contact: InContact) -> tuple[Form, ...]:
+def forms_of(scene: HasParts, contact: InContact) -> tuple[Form, ...]:
     """The relative motions of one contact, in the order its law has them."""
     if contact.motions is not None:
         return tuple(_written(motion) for motion in contact.motions)
@@ -122,7 +139,7 @@ def forms_of(scene: HasBodies, contact: InContact) -> tuple[Form, ...]:
 
 
 def placed_forms(
-    scene: HasBodies, between: Between, at: Sequence[Any], directions: Sequence[Sequence[Any]]
+    scene: HasParts, between: Between, at: Sequence[Any], directions: Sequence[Sequence[Any]]
 ) -> tuple[Form, ...]:
     """The motions of the first end against the second along directions at a point.
 
@@ -170,7 +187,7 @@ def _turned_back(vector: Sequence[Any], turn: _Turn) -> Sequence[Any]:
     return tuple(c * vector[i] + s * across[i] + along * k[i] for i in range(3))
 
 
-def _end(scene: HasBodies, text: str) -> _Located:
+def _end(scene: HasParts, text: str) -> _Located:
     end = parse_end(text)
     if end.dof is None:
         return _Located(None, _STILL, False)
@@ -226,45 +243,28 @@ def written_form(form: Form) -> tuple[tuple[str, float], ...]:
     return tuple((f"{t.dof}@{NEXT}" if t.next else t.dof, t.factor) for t in form)
 
 
-def static_forces(scene: HasBodies) -> tuple[Excitation, ...]:
+def static_forces(scene: HasParts) -> tuple[Excitation, ...]:
     """The constant forces of loads and of rotation as forces on DOFs; along a line those at 1 rad/s."""
     if not scene.loads and scene.speed is None and scene.speed_order is None:
         return ()
-    found = [part for load in scene.loads for part in _of_load(scene, load, load.force)]
-    spin = _spin(scene)
+    found = [part for load in scene.loads for part in towards(scene, load, load.force)]
     for body in scene.bodies:
-        found += _outward(body, body.mass * (body.radius_of_rotation or 0.0) * spin**2)
-    return _static(found)
+        found += outward(body, body.mass * (body.radius_of_rotation or 0.0) * spin_of(scene) ** 2)
+    return static(found)
 
 
-def _spin(scene: HasBodies) -> float:
+def spin_of(scene: HasParts) -> float:
     """Speed of rotation [rad/s]; 1 along a line, where it follows the frequency."""
     return (scene.speed or 0.0) * REVOLUTIONS if scene.speed_order is None else 1.0
 
 
-def force_derivatives(scene: HasBodies, path: str) -> tuple[tuple[Excitation, ...], tuple[Excitation, ...]]:
-    """First and second derivatives of `static_forces` by a path of bodies or loads, or by the speed."""
-    owner, _, key = path.rpartition(".")
-    first = [part for x in scene.loads if owner and x.name == owner for part in _of_load(scene, x, 1.0)]
-    second: list[tuple[str, float]] = []
-    spin = _spin(scene)
-    for body in scene.bodies:
-        radius = body.radius_of_rotation or 0.0
-        if not owner:
-            first += _outward(body, 2.0 * body.mass * radius * spin * REVOLUTIONS)
-            second += _outward(body, 2.0 * body.mass * radius * REVOLUTIONS**2)
-        elif owner in (body.name, body.group) and key == "mass":
-            first += _outward(body, radius * spin**2)
-        elif owner in (body.name, body.group) and key == "radius_of_rotation":
-            first += _outward(body, body.mass * spin**2)
-    return _static(first), _static(second)
-
-
-def _static(parts: list[tuple[str, float]]) -> tuple[Excitation, ...]:
+def static(parts: list[tuple[str, float]]) -> tuple[Excitation, ...]:
+    """Constant forces on DOFs."""
     return tuple(Excitation(dof=dof, amplitude=force, harmonic=0) for dof, force in parts)
 
 
-def _of_load(scene: HasBodies, load: Load, force: float) -> list[tuple[str, float]]:
+def towards(scene: HasParts, load: Load, force: float) -> list[tuple[str, float]]:
+    """A force where a load acts, by DOFs."""
     if load.dof is not None:
         return [(load.dof, force)]
     if load.on is None or load.direction is None:
@@ -272,7 +272,8 @@ def _of_load(scene: HasBodies, load: Load, force: float) -> list[tuple[str, floa
     return _along(places(scene.bodies, scene.nodes)[load.on], load.direction, force)
 
 
-def _outward(body: Body, force: float) -> list[tuple[str, float]]:
+def outward(body: Body, force: float) -> list[tuple[str, float]]:
+    """A force on a body away from the axis of rotation, by DOFs."""
     return [] if body.out is None or force == 0.0 else _along(body.place, body.out, force)
 
 

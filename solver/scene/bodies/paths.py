@@ -1,98 +1,114 @@
-"""Parameter paths of bodies, loads and the speed: ``damper.mass``, ``pull.force``, ``speed``."""
+"""Parameters of bodies, loads and the speed: ``damper.mass``, ``pull.force``, ``speed``."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from typing import Any
-
-from pydantic import ValidationError
 
 from solver.contacts.fields import LARGEST
 from solver.errors import SettingError
-from solver.scene.bodies.body import Body, Load
-from solver.scene.bodies.kinematics import HasBodies, force_derivatives
+from solver.scene.bodies.body import MOMENTS, REVOLUTIONS, Body
+from solver.scene.bodies.kinematics import HasParts, outward, spin_of, static, towards
+from solver.scene.scene_parameter import SceneParameter, Slope, changed
 
 SPEED = "speed"
 FORCE = "force"
-UNITS: Mapping[str, str] = {
-    "mass": "kg", "Ixx": "kg m^2", "Iyy": "kg m^2", "Izz": "kg m^2", "radius_of_rotation": "m",
-    FORCE: "N", SPEED: "1/min",
+BODY_UNITS = {
+    "mass": "kg", **dict.fromkeys(MOMENTS, "kg m^2"), "radius_of_rotation": "m",
 }  # fmt: skip
 
 
-def body_paths(scene: HasBodies) -> tuple[str, ...]:
-    """Every path of bodies and their groups, of named loads, and the speed."""
+def body_paths(scene: HasParts) -> tuple[str, ...]:
+    """Return every path of bodies and their groups."""
     grouped = dict.fromkeys(f"{b.group}.{key}" for b in scene.bodies if b.group for key in b.parameters)
-    own = dict.fromkeys(f"{body.name}.{key}" for body in scene.bodies for key in body.parameters)
-    forces = dict.fromkeys(f"{load.name}.{FORCE}" for load in scene.loads if load.name is not None)
-    return (*(grouped | own | forces), *((SPEED,) if scene.speed is not None else ()))
+    return (*grouped, *(f"{body.name}.{key}" for body in scene.bodies for key in body.parameters))
 
 
-def is_body_path(scene: HasBodies, path: str) -> bool:
-    """Whether a path is one of these."""
+def body_parameter(scene: HasParts, path: str) -> SceneParameter | None:
+    """Return what a path of a body or of a group of them is, if it is one."""
     owner, _, key = path.rpartition(".")
-    if not owner:
-        return key == SPEED and scene.speed is not None
-    return bool(_bodies(scene, owner, key) or (key == FORCE and _loads(scene, owner)))
+    members = [b for b in scene.bodies if owner in (b.name, b.group) and key in b.parameters]
+    if not members:
+        return None
+    unit = BODY_UNITS[key]
+
+    def with_value(new: float) -> dict[str, Any]:
+        _check(path, new, unit, positive=key == "mass")
+        bodies = tuple(set_in(b, path, key, new, unit) if b in members else b for b in scene.bodies)
+        return {"bodies": bodies}
+
+    return SceneParameter(
+        get=lambda: members[0].value_of(key), with_value=with_value, unit=unit,
+        slope=lambda: _slope(scene, members, key),
+    )  # fmt: skip
 
 
-def changes_loads(scene: HasBodies, path: str) -> bool:
-    """Whether constant forces depend on a path."""
-    return is_body_path(scene, path) and any(force_derivatives(scene, path))
+def set_in(body: Body, path: str, key: str, new: float, unit: str) -> Body:
+    """Return a body with another value of one of its parameters."""
+    wanted = f"must leave the inertia of `{body.name}` positive definite [{unit}]"
+    return changed(body, body.changed_by(key, new), path, new, wanted)
 
 
-def least_value(path: str) -> float:
-    """Smallest value that means something."""
-    return -math.inf if path.endswith("." + FORCE) else 0.0
+def _slope(scene: HasParts, members: list[Body], key: str) -> Slope:
+    """Return what it adds: inertia, and the load of rotation m r Ω²."""
+    if key in MOMENTS:
+        return Slope(masses={body.name: body.mass_derivative(key) for body in members})
+    square, forces = spin_of(scene) ** 2, []
+    for body in members:
+        forces += outward(body, square * (body.mass if key != "mass" else body.radius_of_rotation or 0.0))
+    masses = {body.name: body.mass_derivative(key) for body in members} if key == "mass" else {}
+    return Slope(masses=masses, forces=static(forces))
 
 
-def unit_of(path: str) -> str:
-    """Unit of the values of a path."""
-    return UNITS[path.rpartition(".")[2]]
+def load_paths(scene: HasParts) -> tuple[str, ...]:
+    """Return the paths of named loads."""
+    return tuple(f"{load.name}.{FORCE}" for load in scene.loads if load.name is not None)
 
 
-def body_value(scene: HasBodies, path: str) -> float:
-    """Value of a path; of a group, its first member's."""
+def load_parameter(scene: HasParts, path: str) -> SceneParameter | None:
+    """Return what a path of a load is, if it is one."""
     owner, _, key = path.rpartition(".")
-    if not owner:
-        return scene.speed or 0.0
-    bodies = _bodies(scene, owner, key)
-    return bodies[0].value_of(key) if bodies else _loads(scene, owner)[0].force
+    load = next((each for each in scene.loads if owner and each.name == owner and key == FORCE), None)
+    if load is None:
+        return None
+
+    def with_value(new: float) -> dict[str, Any]:
+        if not -LARGEST <= new <= LARGEST:
+            raise SettingError(path, new, "must be a number from -1e15 to 1e15 [N]")
+        return {"loads": tuple(x.model_copy(update={FORCE: new}) if x is load else x for x in scene.loads)}
+
+    return SceneParameter(
+        get=lambda: load.force, with_value=with_value, unit="N", least=-math.inf,
+        slope=lambda: Slope(forces=static(towards(scene, load, 1.0))),
+    )  # fmt: skip
 
 
-def changed_bodies(scene: HasBodies, path: str, new: float) -> dict[str, Any]:
-    """The fields of a scene that change where a path is set.
+def speed_paths(scene: HasParts) -> tuple[str, ...]:
+    """Return the speed of a scene that has one."""
+    return () if scene.speed is None else (SPEED,)
 
-    Raises
-    ------
-    SettingError
-        The value is out of its range.
-    """
-    owner, _, key = path.rpartition(".")
-    least = least_value(path)
-    if not max(least, -LARGEST) <= new <= LARGEST or (key == "mass" and new == 0.0):
-        bound = "from -1e15" if least < 0.0 else "> 0 and" if key == "mass" else ">= 0 and"
-        raise SettingError(path, new, f"must be a number {bound} <= 1e15 [{unit_of(path)}]")
-    if not owner:
+
+def speed_parameter(scene: HasParts, path: str) -> SceneParameter | None:
+    """Return what the speed is, if the path is that of a scene that has one."""
+    if path != SPEED or scene.speed is None:
+        return None
+    speed = scene.speed
+
+    def with_value(new: float) -> dict[str, Any]:
+        _check(path, new, "1/min")
         return {SPEED: new}
-    bodies, loads = _bodies(scene, owner, key), _loads(scene, owner)
-    if bodies:
-        return {"bodies": tuple(_changed(b, path, key, new) if b in bodies else b for b in scene.bodies)}
-    return {"loads": tuple(x.model_copy(update={FORCE: new}) if x in loads else x for x in scene.loads)}
+
+    def slope() -> Slope:
+        first, second = list[tuple[str, float]](), list[tuple[str, float]]()
+        for body in scene.bodies:
+            twice = 2.0 * body.mass * (body.radius_of_rotation or 0.0) * REVOLUTIONS
+            first += outward(body, twice * spin_of(scene))
+            second += outward(body, twice * REVOLUTIONS)
+        return Slope(forces=static(first), second_forces=static(second), speed=True)
+
+    return SceneParameter(get=lambda: speed, with_value=with_value, unit="1/min", slope=slope)
 
 
-def _changed(body: Body, path: str, key: str, new: float) -> Body:
-    try:
-        return Body.model_validate({**body.__dict__, **body.changed_by(key, new)})
-    except ValidationError as error:
-        wanted = f"must leave the inertia of `{body.name}` positive definite [{unit_of(path)}]"
-        raise SettingError(path, new, wanted) from error
-
-
-def _bodies(scene: HasBodies, owner: str, key: str) -> tuple[Body, ...]:
-    return tuple(b for b in scene.bodies if owner in (b.name, b.group) and key in b.parameters)
-
-
-def _loads(scene: HasBodies, owner: str) -> tuple[Load, ...]:
-    return tuple(load for load in scene.loads if load.name == owner)
+def _check(path: str, new: float, unit: str, *, positive: bool = False) -> None:
+    if not 0.0 <= new <= LARGEST or (positive and new == 0.0):
+        raise SettingError(path, new, f"must be a number {'>' if positive else '>='} 0 and <= 1e15 [{unit}]")

@@ -209,7 +209,7 @@ def test_derivatives_by_the_proportional_damping() -> None:
     for name in ("stiffness_proportional_damping", "mass_proportional_damping"):
         value, step = scene.value(f"structure.{name}"), 1e-3 * scene.value(f"structure.{name}")
         up, down = (linear_model(scene.with_values({f"structure.{name}": value + s})) for s in (step, -step))
-        dC = structure_derivative(scene, name).at(up, diameters, moving)[1]
+        dC = structure_derivative(scene, f"structure.{name}").at(diameters, moving)[1]
         expected = (up.at(diameters, moving)[1] - down.at(diameters, moving)[1]) / (2.0 * step)
         np.testing.assert_allclose(dC, expected, atol=1e-6 * np.abs(expected).max())
 

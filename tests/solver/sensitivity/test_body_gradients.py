@@ -156,3 +156,13 @@ def test_hessians_by_the_speed_are_refused() -> None:
     found = Workspace.of(balance).solve(TWO_PI * 300.0)
     with pytest.raises(SettingError, match="only gradients"):
         Sensitivities(balance, ["speed"]).hessian(found.u, 300.0)
+
+
+def test_gradients_by_a_damping_beside_a_load_are_those_of_differences() -> None:
+    """Of a structure given by its matrices, whose modes carry the damping alone."""
+    raw = load_scene("fe-disk").to_dict()
+    loads = [{"name": "pull", "dof": raw["observe"]["dof"], "force": 1.0}]  # type: ignore[index]
+    paths = ["structure.stiffness_proportional_damping", "pull.force"]
+    low, high = load_scene("fe-disk").observe.band
+    scene = Scene.from_dict({**raw, "loads": loads}).with_values({paths[0]: 1e-6})
+    _check(scene, paths, 0.5 * (low + high), rel=1e-4)

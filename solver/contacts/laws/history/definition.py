@@ -83,7 +83,7 @@ class LawParameter:
 class HistoryLaw:
     """A law given by functions, see `solver.contacts.laws.history.register.register_law`."""
 
-    name: str
+    name: str = field(kw_only=False)
     parameters: Mapping[str, LawParameter]
     force: Callable[..., Any] | None = None
     rate: Callable[..., Any] | None = None
@@ -102,6 +102,7 @@ class HistoryLaw:
     columns: Mapping[str, int] = field(init=False, default_factory=dict)
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "parameters", dict(self.parameters))
         _check_names(self)
         _check_functions(self)
         object.__setattr__(self, "columns", {key: OWN + i for i, key in enumerate(self.parameters)})

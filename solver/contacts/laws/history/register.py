@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import Annotated, Any, Literal
+import inspect
+from collections.abc import Callable
+from typing import Annotated, Any, Literal, ParamSpec, TypeVar
 
 from pydantic import Field, create_model
 
@@ -12,6 +13,8 @@ from solver.contacts.laws.base import AnyContact
 from solver.contacts.laws.history.contact import HistoryContact
 from solver.contacts.laws.history.definition import HistoryLaw, LawParameter
 
+_P = ParamSpec("_P")
+_T = TypeVar("_T")
 _FORMULA = "a function of the motion and its history"
 
 
@@ -49,24 +52,19 @@ def _described(parameter: LawParameter) -> str:
     return f"{words}{unit}{default}."
 
 
-def register_law(
-    name: str,
-    *,
-    parameters: Mapping[str, LawParameter],
-    force: Callable[..., Any] | None = None,
-    rate: Callable[..., Any] | None = None,
-    step: Callable[..., Any] | None = None,
-    states: int = 0,
-    slopes: Callable[..., Any] | None = None,
-    samples: int | None = None,
-    reversals: bool = False,
-    independent: bool = False,
-    odd: bool = False,
-    monotone: bool = False,
-    rubs: bool = True,
-    formula: str = "",
-    words: str = "",
-) -> type[AnyContact]:
+def _takes(definition: Callable[_P, HistoryLaw]) -> Callable[[Callable[..., _T]], Callable[_P, _T]]:
+    """Give a function the arguments of a definition, for those who ask and those who check."""
+
+    def with_arguments(function: Callable[..., _T]) -> Callable[_P, _T]:
+        given, own = inspect.signature(definition), inspect.signature(function)
+        function.__signature__ = given.replace(return_annotation=own.return_annotation)  # type: ignore[attr-defined]
+        return function
+
+    return with_arguments
+
+
+@_takes(HistoryLaw)
+def register_law(*name: str, **given: Any) -> type[AnyContact]:
     """Add a law in this process, given by functions of the motion and its history.
 
     The law is either in rate form, `force(u, v, state, p) → float` and, with states, `rate(u, v, state, p,
@@ -98,6 +96,8 @@ def register_law(
         in samples the rows (states, force) by (u, v, du, dt, states before, parameters). An entry that is
         never set is 0. Without it derivatives are found by a complex step if the functions are found to allow
         it, else by central differences; the plan says which.
+    derivatives : solver.contacts.laws.history.definition.Derivatives, optional
+        How they are found, in place of trying.
     samples : int, optional
         Nodes of a period; 32 a harmonic if left out, 16 with `reversals`. A contact may set its own
         `samples`.
@@ -127,9 +127,4 @@ def register_law(
     ValueError
         There is a law of this name.
     """
-    law = HistoryLaw(
-        name=name, parameters=dict(parameters), force=force, rate=rate, step=step, states=states,
-        slopes=slopes, samples=samples, reversals=reversals, independent=independent, odd=odd,
-        monotone=monotone, rubs=rubs, formula=formula, words=words,
-    )  # fmt: skip
-    return registry.register(law_class(law))
+    return registry.register(law_class(HistoryLaw(*name, **given)))

@@ -1,0 +1,136 @@
+"""A parameter of a scene as an object that the owner of the number makes; and what a unit of it changes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
+
+from pydantic import ValidationError
+
+from solver.contacts.fields import Part, Real
+from solver.contacts.laws.parts import LawQuantity
+from solver.errors import SettingError
+
+if TYPE_CHECKING:
+    from solver.scene.bodies.kinematics import Form
+    from solver.scene.excitation import Excitation
+    from solver.scene.linear_terms import Entry
+
+_PartT = TypeVar("_PartT", bound=Part)
+
+
+class ActsOn(Enum):
+    """What of a scene a parameter changes; of the names of `solver.balance.parameter.Kind`."""
+
+    LEVEL = "the amplitude of the excitation"
+    FORCE_PHASE = "its phase"
+    CONTACTS = "numbers of contacts"
+    STRUCTURE = "matrices, constant forces or places of contacts"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Slope:
+    """What a unit of a parameter adds to the linear equations of a scene.
+
+    Attributes
+    ----------
+    parts : tuple of (int, float)
+        Masses, springs and dashpots, counted in this order, and what each gains.
+    masses : mapping
+        Mass matrix of bodies, by their names.
+    forces, second_forces : tuple of Excitation
+        Constant forces, and by the unit squared.
+    motions : mapping
+        Relative motions of contacts, by their names.
+    entries : tuple of Entry
+        Entries of K and C.
+    damping : "K", "M" or None
+        C gains the stiffness or the mass of a structure given by its matrices.
+    loss : bool
+        K gains i times the stiffness of what moves.
+    speed : bool
+        The matrices are those of a speed higher by 1/min.
+    """
+
+    parts: tuple[tuple[int, float], ...] = ()
+    masses: Mapping[str, Real] = field(default_factory=dict)
+    forces: tuple[Excitation, ...] = ()
+    second_forces: tuple[Excitation, ...] = ()
+    motions: Mapping[str, tuple[Form, ...]] | None = None
+    entries: tuple[Entry, ...] = ()
+    damping: Literal["K", "M"] | None = None
+    loss: bool = False
+    speed: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SceneParameter:
+    """A parameter path resolved against a scene.
+
+    Attributes
+    ----------
+    get : callable
+        Gives its value; of a group, its first member's. Raises SettingError where it has none.
+    with_value : callable
+        Gives the fields of the scene that change where it is set. Raises SettingError for a bad value.
+    unit : str
+        Of its values.
+    least : float
+        Smallest value that means something.
+    acts_on : ActsOn
+        What it changes:
+    slope : callable
+        what a unit of it adds to the linear equations; or
+    contacts : mapping
+        by the place of each contact in the scene the share of a unit that its number gains, and
+    quantities : tuple of LawQuantity
+        what that number is in each of them.
+    listed : bool
+        Whether it may be set: numbers of contacts that a shape makes are set by those of the shape.
+    in_steps : bool
+        Whether it is a whole number.
+    moves_contacts : bool
+        Whether it is of the geometry that places contacts.
+    """
+
+    get: Callable[[], float]
+    with_value: Callable[[float], Mapping[str, Any]]
+    unit: str
+    least: float = 0.0
+    acts_on: ActsOn = ActsOn.STRUCTURE
+    slope: Callable[[], Slope] = Slope
+    contacts: Mapping[int, float] = field(default_factory=dict)
+    quantities: tuple[LawQuantity, ...] = ()
+    listed: bool = True
+    in_steps: bool = False
+    moves_contacts: bool = False
+
+    @property
+    def pulls(self) -> bool:
+        """Whether constant forces depend on it."""
+        return self.acts_on is ActsOn.STRUCTURE and bool(self.slope().forces)
+
+    def sets_with(self, other: SceneParameter) -> bool:
+        """Whether it sets the same number of some contact as another parameter of the scene does."""
+        return not self._numbers.isdisjoint(other._numbers)
+
+    @property
+    def _numbers(self) -> set[tuple[int, int]]:
+        """The rows and columns of the contact table that it sets."""
+        return {(i, quantity.column) for i, quantity in zip(self.contacts, self.quantities, strict=True)}
+
+
+def changed(part: _PartT, update: Mapping[str, object], path: str, new: float, wanted: str) -> _PartT:
+    """Return the part with other fields.
+
+    Raises
+    ------
+    SettingError
+        It may not have them; the message says what is `wanted`.
+    """
+    try:
+        return type(part).model_validate({**part.__dict__, **update}, by_name=True)
+    except ValidationError as error:
+        raise SettingError(path, new, wanted) from error
