@@ -6,8 +6,9 @@ import base64
 import binascii
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from operator import itemgetter
 from typing import Any
 from urllib.parse import urlencode
 
@@ -102,7 +103,7 @@ def met(
     sqlite = connection.dialect.name == "sqlite"
     plan_with_values(connection)
     asked = (one for one in conditions if sqlite or one.apart)
-    lead = next((one for one in asked if is_few(connection, one)), None)
+    lead = fewest(connection, asked)
     for condition in conditions:
         holds = condition.holds
         if condition is lead:
@@ -147,10 +148,17 @@ def unindexed(column: Any) -> UnaryExpression[Any]:
     return UnaryExpression(column, operator=custom_op("+"), type_=column.type)
 
 
-def is_few(connection: Connection, condition: Condition) -> bool:
-    """Whether no more rows than its `few` meet a condition."""
+def fewest(connection: Connection, conditions: Iterable[Condition]) -> Condition | None:
+    """The condition that the fewest rows meet, of those that no more rows than their `few` meet."""
+    counted = [(count_up_to_few(connection, one), one) for one in conditions]
+    few = [(count, one) for count, one in counted if count <= one.few]
+    return min(few, key=itemgetter(0))[1] if few else None
+
+
+def count_up_to_few(connection: Connection, condition: Condition) -> int:
+    """How many rows meet a condition; one more than its `few` stands for more."""
     bounded = condition.ids.limit(condition.few + 1).subquery()
-    return connection.execute(select(func.count()).select_from(bounded)).scalar_one() <= condition.few
+    return connection.execute(select(func.count()).select_from(bounded)).scalar_one()
 
 
 def within(column: InstrumentedAttribute[Any], bounds: Range) -> list[ColumnElement[bool]]:
