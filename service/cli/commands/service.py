@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from service.cli.options import shared as options
-from service.cli.options.numeric import count
+from service.cli.options.inputs import count
 from service.errors import InputError
 from service.rendering.tables.text import say
 

@@ -5,9 +5,7 @@ Not from an option: every user of a machine sees the options of its processes.
 
 from __future__ import annotations
 
-import inspect
 import os
-from collections.abc import Callable
 from contextvars import ContextVar
 from functools import wraps
 from pathlib import Path
@@ -15,6 +13,7 @@ from typing import Annotated
 
 import typer
 
+from service.cli.options.parameters import Command, keyword, parameters_of, with_parameters
 from service.errors import InputError
 
 KEY_VARIABLE = "STICKSLIP_KEY"
@@ -32,10 +31,8 @@ KeyFile = Annotated[
 _file: ContextVar[str | None] = ContextVar("key file", default=None)
 
 
-def keyed(command: Callable[..., None]) -> Callable[..., None]:
+def keyed(command: Command) -> Command:
     """The command with the option ``--key-file``; `given_key` reads it."""
-    signature = inspect.signature(command, eval_str=True)
-    option = inspect.Parameter("key_file", inspect.Parameter.KEYWORD_ONLY, default=None, annotation=KeyFile)
 
     @wraps(command)
     def with_key(*args: object, key_file: str | None = None, **kwargs: object) -> None:
@@ -45,10 +42,7 @@ def keyed(command: Callable[..., None]) -> Callable[..., None]:
         finally:
             _file.reset(token)
 
-    parameters = [*signature.parameters.values(), option]
-    with_key.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
-    with_key.__annotations__ = {**command.__annotations__, "key_file": KeyFile}
-    return with_key
+    return with_parameters(with_key, [*parameters_of(command), keyword("key_file", KeyFile, None)])
 
 
 def given_key() -> str | None:
