@@ -8,7 +8,6 @@ import json
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from operator import itemgetter
 from typing import Any
 from urllib.parse import urlencode
 
@@ -150,15 +149,15 @@ def unindexed(column: Any) -> UnaryExpression[Any]:
 
 def fewest(connection: Connection, conditions: Iterable[Condition]) -> Condition | None:
     """The condition that the fewest rows meet, of those that no more rows than their `few` meet."""
-    counted = [(count_up_to_few(connection, one), one) for one in conditions]
-    few = [(count, one) for count, one in counted if count <= one.few]
-    return min(few, key=itemgetter(0))[1] if few else None
-
-
-def count_up_to_few(connection: Connection, condition: Condition) -> int:
-    """How many rows meet a condition; one more than its `few` stands for more."""
-    bounded = condition.ids.limit(condition.few + 1).subquery()
-    return connection.execute(select(func.count()).select_from(bounded)).scalar_one()
+    found: Condition | None = None
+    least = math.inf
+    for one in conditions:
+        most = int(min(one.few, least - 1))
+        bounded = one.ids.limit(most + 1).subquery()
+        count = connection.execute(select(func.count()).select_from(bounded)).scalar_one()
+        if count <= most:
+            found, least = one, count
+    return found
 
 
 def within(column: InstrumentedAttribute[Any], bounds: Range) -> list[ColumnElement[bool]]:

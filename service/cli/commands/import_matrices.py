@@ -20,11 +20,10 @@ from service.cli.importing.files import (
     sources,
 )
 from service.cli.importing.options import ImportOptions
-from service.cli.importing.parts import contacts as contact_tables
-from service.cli.importing.parts import excitation
 from service.cli.importing.patches import Patches
 from service.cli.importing.reduction import ReducedModel, reduce, reduced_file
-from service.cli.importing.scene import band, toml
+from service.cli.importing.scene import band, excitation, toml
+from service.cli.importing.scene import contacts as contact_tables
 from service.cli.importing.sector import (
     DiskOptions,
     WrittenSector,

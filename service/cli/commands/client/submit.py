@@ -18,8 +18,7 @@ from service.cli.options.key_options import (
     key_options,
     options_of,
 )
-from service.cli.options.keyed import keyed
-from service.cli.options.parameters import Command, keyword, with_parameters
+from service.cli.options.parameters import Command, keyed, keyword, with_parameters
 from service.cli.options.problem import FLAGS, ProblemFlags, takes_problem
 from service.cli.table import TOP
 from service.jobs.registry import ABOUT_THE_RUN, JobKind
