@@ -25,6 +25,7 @@ Position = tuple[float | None, str]
 
 FEW = 2000
 _FEW_OF_AN_OWNER = 5000
+_FAR_FEWER = 4.0
 _PLANNING = (
     "SELECT set_config('plan_cache_mode', 'force_custom_plan', true), "
     "set_config('max_parallel_workers_per_gather', '0', true)"
@@ -148,11 +149,14 @@ def unindexed(column: Any) -> UnaryExpression[Any]:
 
 
 def fewest(connection: Connection, conditions: Iterable[Condition]) -> Condition | None:
-    """The condition that the fewest rows meet, of those that no more rows than their `few` meet."""
+    """The first condition that no more rows than its `few` meet, or a later one that far fewer do.
+
+    Counting costs a part of what reading does: after the first, no more rows are counted than pay.
+    """
     found: Condition | None = None
     least = math.inf
     for one in conditions:
-        most = int(min(one.few, least - 1))
+        most = int(min(one.few, least / _FAR_FEWER))
         bounded = one.ids.limit(most + 1).subquery()
         count = connection.execute(select(func.count()).select_from(bounded)).scalar_one()
         if count <= most:
