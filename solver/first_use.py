@@ -13,7 +13,12 @@ from importlib import import_module
 
 def names_of(package: str, file: str) -> dict[str, str]:
     """The module of every public name of a package, from the stub beside its ``__init__``."""
-    with open(f"{file.rpartition('.')[0]}.pyi", encoding="utf-8") as stub:
+    return names_in(f"{file.rpartition('.')[0]}.pyi", package)
+
+
+def names_in(file: str, package: str) -> dict[str, str]:
+    """The module of every name that a file of such statements passes on; the file itself is not imported."""
+    with open(file, encoding="utf-8") as stub:
         statements = [part.partition(" import ") for part in f"\n{stub.read()}".split("\nfrom ")[1:]]
     return {
         name.split()[0]: f"{package}{module}" if module.startswith(".") else module

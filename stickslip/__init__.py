@@ -9,7 +9,7 @@ What a script asks stands here; what goes further, by subject: `stickslip.modes`
 Every name is the very object of `solver` or `optim`, loaded on first use, so that importing costs nothing.
 """
 
-from solver.first_use import names_of, on_first_use
+from solver.first_use import names_in, names_of, on_first_use
 
 _homes = names_of(__name__, __file__)
 _SUBJECTS = sorted(name for name, home in _homes.items() if home == f"{__name__}.")
@@ -29,11 +29,10 @@ def __getattr__(name: str) -> object:
     if name in _homes or name.startswith("_"):
         return _load(name)
     for subject in _SUBJECTS:
-        module = import_module(f"{__name__}.{subject}")
-        if name in vars(module):
+        if name in names_in(f"{__path__[0]}/{subject}.py", __name__):
             import warnings
 
             told = f"stickslip.{name} is stickslip.{subject}.{name} now; the short form goes with 0.2"
             warnings.warn(told, DeprecationWarning, stacklevel=2)
-            return getattr(module, name)
+            return getattr(import_module(f"{__name__}.{subject}"), name)
     return _load(name)

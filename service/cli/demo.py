@@ -18,8 +18,8 @@ from service.cli.progress import Reporter, bars, patience
 from service.client.embedded import EmbeddedService
 from service.db.models import JobState
 from service.errors import InputError
+from service.jobs.drawing import response_of
 from service.jobs.kinds import warm_up
-from service.jobs.stored_curves import response_of
 from service.rendering.tables import design as design_reports
 from service.rendering.tables.text import say
 from service.schemas.answers import JobAnswer, SweepDetail

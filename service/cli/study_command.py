@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -18,6 +17,7 @@ from service.cli.failures import end, refused
 from service.cli.options import inputs
 from service.cli.options import shared as options
 from service.cli.options.key_options import KeyOption, key_options
+from service.cli.options.parameters import keyword, with_parameters
 from service.cli.output_files import Outputs
 from service.cli.progress import bar
 from service.errors import InputError
@@ -90,21 +90,19 @@ class Keys:
         """Return a function as a command: scene, what comes `before`, keys, what comes `behind`."""
         drawn = {"plot": options.Plot} if self.study.drawn() else {}
         listed = [
-            _keyword("name", options.Scene),
-            *(_keyword(name, annotation) for name, annotation in before.items()),
+            keyword("name", options.Scene),
+            *(keyword(name, annotation) for name, annotation in before.items()),
             *(one.parameter for one in self.made.values()),
-            _keyword("values", options.Values, None),
-            *(_keyword(name, one, None) for name, one in {**behind, **drawn, "out": options.Out}.items()),
-            _keyword("as_json", options.Json, False),
+            keyword("values", options.Values, None),
+            *(keyword(name, one, None) for name, one in {**behind, **drawn, "out": options.Out}.items()),
+            keyword("as_json", options.Json, False),
         ]
 
         def command(**given: Any) -> None:
             function(**given)
 
         command.__doc__ = doc
-        command.__signature__ = inspect.Signature(listed)  # type: ignore[attr-defined]
-        command.__annotations__ = {one.name: one.annotation for one in listed}
-        return command
+        return with_parameters(command, listed)
 
 
 def command_of(study: type[Study]) -> Callable[..., None]:
@@ -136,7 +134,3 @@ def give(study: type[Study], answer: Answer, outputs: Outputs, scene: Scene, *, 
         raise InputError(f"`--out`: what `{study.NAME}` finds is no table, take --json")
     show(answer.json, partial(print_result, study.NAME), as_json=as_json)
     end(answer.reached, answer.status)
-
-
-def _keyword(name: str, annotation: Any, default: Any = inspect.Parameter.empty) -> inspect.Parameter:
-    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)

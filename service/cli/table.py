@@ -7,13 +7,13 @@ from service.cli.lazy import STUDY, CommandEntry, CommandGroup
 DATABASE = (
     CommandEntry("upgrade", "commands.service.upgrade", "Bring a database to this version's revision."),
     CommandEntry(
-        "backup", "commands.database.backup", "Copy a database to a file, also while a service uses it."
+        "backup", "commands.service.backup", "Copy a database to a file, also while a service uses it."
     ),
     CommandEntry(
-        "check", "commands.database.check", "Read a database from end to end and say what is wrong with it."
+        "check", "commands.service.check", "Read a database from end to end and say what is wrong with it."
     ),
     CommandEntry(
-        "prune", "commands.database.prune", "Delete old jobs with their results and sweeps, and old uploads."
+        "prune", "commands.service.prune", "Delete old jobs with their results and sweeps, and old uploads."
     ),
 )  # fmt: skip
 
@@ -100,7 +100,7 @@ COMMANDS = {
             "import", "commands.import_matrices.import_scene", "Make a scene of matrices or modes in files.",
         ),
         CommandEntry(
-            "schema", "commands.schema.schema",
+            "schema", "commands.scenes.schema",
             "Print the JSON Schema of scene files, design problems or jobs, for editors.",
         ),
         CommandEntry(
@@ -112,7 +112,7 @@ COMMANDS = {
     "Service": (
         CommandEntry("serve", "commands.service.serve", "Serve the REST API and work off its queue."),
         CommandEntry("worker", "commands.service.worker", "Work off a queue without HTTP."),
-        CommandEntry("submit", "submit_group.SubmitGroup", "Hand a job to a running service.", group=True),
+        CommandEntry("submit", "lazy.SubmitGroup", "Hand a job to a running service.", group=True),
         CommandEntry("watch", "commands.client.jobs.watch", "Follow a job until it has ended.", keyed=True),
         CommandEntry(
             "results", "commands.client.jobs.results",

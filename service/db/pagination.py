@@ -6,7 +6,7 @@ import base64
 import binascii
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 from urllib.parse import urlencode
@@ -25,6 +25,7 @@ Position = tuple[float | None, str]
 
 FEW = 2000
 _FEW_OF_AN_OWNER = 5000
+_FAR_FEWER = 4.0
 _PLANNING = (
     "SELECT set_config('plan_cache_mode', 'force_custom_plan', true), "
     "set_config('max_parallel_workers_per_gather', '0', true)"
@@ -102,7 +103,7 @@ def met(
     sqlite = connection.dialect.name == "sqlite"
     plan_with_values(connection)
     asked = (one for one in conditions if sqlite or one.apart)
-    lead = next((one for one in asked if is_few(connection, one)), None)
+    lead = fewest(connection, asked)
     for condition in conditions:
         holds = condition.holds
         if condition is lead:
@@ -147,10 +148,20 @@ def unindexed(column: Any) -> UnaryExpression[Any]:
     return UnaryExpression(column, operator=custom_op("+"), type_=column.type)
 
 
-def is_few(connection: Connection, condition: Condition) -> bool:
-    """Whether no more rows than its `few` meet a condition."""
-    bounded = condition.ids.limit(condition.few + 1).subquery()
-    return connection.execute(select(func.count()).select_from(bounded)).scalar_one() <= condition.few
+def fewest(connection: Connection, conditions: Iterable[Condition]) -> Condition | None:
+    """The first condition that no more rows than its `few` meet, or a later one that far fewer do.
+
+    Counting costs a part of what reading does: after the first, no more rows are counted than pay.
+    """
+    found: Condition | None = None
+    least = math.inf
+    for one in conditions:
+        most = int(min(one.few, least / _FAR_FEWER))
+        bounded = one.ids.limit(most + 1).subquery()
+        count = connection.execute(select(func.count()).select_from(bounded)).scalar_one()
+        if count <= most:
+            found, least = one, count
+    return found
 
 
 def within(column: InstrumentedAttribute[Any], bounds: Range) -> list[ColumnElement[bool]]:

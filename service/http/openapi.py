@@ -7,10 +7,11 @@ from typing import Any
 from fastapi import FastAPI
 from pydantic import BaseModel
 
+from service import errors
 from service.http.middleware.admission import OPEN
 from service.http.routes.uploads import upload_media
 from service.jobs.registry import Registry
-from service.schemas.problems import MEDIA_TYPE
+from service.schemas.problems import MEDIA_TYPE, STATUS
 from solver.scene.scene import Scene, load_scene
 
 _REFERENCE = "#/components/schemas/{model}"
@@ -136,46 +137,46 @@ def _schema(model: type[BaseModel], schemas: dict[str, Any]) -> dict[str, Any]:
 _BAD = [{"pointer": "/contacts/0/mu", "detail": "`mu` must be >= 0, got -0.1"}]
 _BAD_QUERY = [{"pointer": "/limit", "detail": "`limit` must be >= 1, got 0", "in": "query"}]
 
-# Status, slug, title, detail, errors; the name of each is that of a response in `components`.
-_ERRORS: dict[str, tuple[int, str, str, str, list[dict[str, str]]]] = {
-    "MalformedBody": (400, "malformed-body", "The body cannot be read",
-                      "the body is not JSON: Expecting value in line 1, column 10", []),
-    "Unauthorized": (401, "unauthorized", "A key is needed",
-                     "this needs a key: send it as `Authorization: Bearer …`", []),
-    "Forbidden": (403, "forbidden", "The key does not allow this",
-                  "this needs a key with the scope submit, this one has read", []),
-    "TooManyRequests": (429, "too-many-requests", "Too many requests",
-                        "the key may make 1200 requests a minute", []),
-    "NotFound": (404, "not-found", "Not found", "there is no job '01a2'", []),
-    "NotAcceptable": (406, "not-acceptable", "Not available in a form you accept",
-                      "there is application/json, text/csv here, `Accept` takes none of it: 'image/gif'", []),
-    "BodyTooSlow": (408, "body-too-slow", "The body did not arrive in time",
-                    "the body did not arrive within 30 s", []),
-    "Conflict": (409, "conflict", "The request does not fit the present state",
-                 "job 01a2 is running, it has no results yet", []),
-    "Overtaken": (409, "conflict", "The request does not fit the present state",
-                  "a newer preview of the same client took its place", []),
-    "ChangedMeanwhile": (412, "changed-meanwhile", "It was changed meanwhile",
-                         "run 01a2 was changed meanwhile: get it again, and change that", []),
-    "JobFailed": (409, "job-failed", "The job failed", "job 01a2 failed: `mu` must be >= 0, got -0.1", _BAD),
-    "BodyTooLarge": (413, "body-too-large", "The body is too large",
-                     "the body may have 4194304 bytes, this one has more", []),
-    "UnsupportedMedia": (415, "unsupported-media-type", "A body of this kind is not read here",
-                         "`Content-Type` must be application/json, got text/plain", []),
-    "InvalidRequest": (422, "invalid-request", "The request is not valid", "`mu` must be >= 0, got -0.1",
-                       _BAD),
-    "InvalidQuery": (422, "invalid-request", "The request is not valid", "`limit` must be >= 1, got 0",
-                     _BAD_QUERY),
-    "UnreadableUpload": (422, "unreadable-upload", "The file cannot be used",
-                         "'upload.npz' must hold a square matrix, got 3 x 4", []),
-    "StorageFull": (507, "storage-full", "No more may be stored",
-                    "an owner may have 1000 projects, with those in the bin", []),
-    "QueueFull": (503, "queue-full", "The queue is full",
-                  "1000 jobs wait already, the queue takes 1000: try again later", []),
-    "Preview": (503, "preview", "The preview was not finished",
-                "the preview took longer than 3 s: submit it as a job", []),
-    "DatabaseAway": (503, "database-away", "The database does not answer",
-                     "the database does not answer at present; nothing was written, try again later", []),
+# Error, detail, errors; the name of each is that of a response in `components`.
+_ERRORS: dict[str, tuple[type[errors.ServiceError], str, list[dict[str, str]]]] = {
+    "MalformedBody": (
+        errors.MalformedBodyError,
+        "the body is not JSON: Expecting value in line 1, column 10", [],
+    ),
+    "Unauthorized": (errors.UnauthorizedError, "this needs a key: send it as `Authorization: Bearer …`", []),
+    "Forbidden": (errors.ForbiddenError, "this needs a key with the scope submit, this one has read", []),
+    "TooManyRequests": (errors.TooManyRequestsError, "the key may make 1200 requests a minute", []),
+    "NotFound": (errors.NotFoundError, "there is no job '01a2'", []),
+    "NotAcceptable": (
+        errors.NotAcceptableError,
+        "there is application/json, text/csv here, `Accept` takes none of it: 'image/gif'", [],
+    ),
+    "BodyTooSlow": (errors.SlowBodyError, "the body did not arrive within 30 s", []),
+    "Conflict": (errors.ConflictError, "job 01a2 is running, it has no results yet", []),
+    "Overtaken": (errors.ConflictError, "a newer preview of the same client took its place", []),
+    "ChangedMeanwhile": (
+        errors.ChangedMeanwhileError,
+        "run 01a2 was changed meanwhile: get it again, and change that", [],
+    ),
+    "JobFailed": (errors.JobFailedError, "job 01a2 failed: `mu` must be >= 0, got -0.1", _BAD),
+    "BodyTooLarge": (errors.BodyTooLargeError, "the body may have 4194304 bytes, this one has more", []),
+    "UnsupportedMedia": (
+        errors.UnsupportedMediaError,
+        "`Content-Type` must be application/json, got text/plain", [],
+    ),
+    "InvalidRequest": (errors.InvalidRequestError, "`mu` must be >= 0, got -0.1", _BAD),
+    "InvalidQuery": (errors.InvalidRequestError, "`limit` must be >= 1, got 0", _BAD_QUERY),
+    "UnreadableUpload": (
+        errors.UnreadableUploadError,
+        "'upload.npz' must hold a square matrix, got 3 x 4", [],
+    ),
+    "StorageFull": (errors.StorageFullError, "an owner may have 1000 projects, with those in the bin", []),
+    "QueueFull": (errors.QueueFullError, "1000 jobs wait already, the queue takes 1000: try again later", []),
+    "Preview": (errors.PreviewError, "the preview took longer than 3 s: submit it as a job", []),
+    "DatabaseAway": (
+        errors.DatabaseAwayError,
+        "the database does not answer at present; nothing was written, try again later", [],
+    ),
 }  # fmt: skip
 _BODY = ("MalformedBody", "BodyTooSlow", "BodyTooLarge", "UnsupportedMedia", "InvalidRequest")
 _KEYED = ("Unauthorized", "Forbidden", "TooManyRequests")
@@ -240,7 +241,8 @@ def describe(description: dict[str, Any], problem: dict[str, Any]) -> None:
             responses = operation["responses"]
             responses.pop("422", None)
             for name in names:
-                _add(responses, str(_ERRORS[name][0]), _ERRORS[name][2], name)
+                status, _, title = STATUS[_ERRORS[name][0]]
+                _add(responses, str(status), title, name)
             _add(responses, "default", "Any other problem.", "DatabaseAway")
 
 
@@ -252,7 +254,8 @@ def _add(responses: dict[str, Any], status: str, title: str, name: str) -> None:
 
 
 def _example(name: str) -> dict[str, Any]:
-    status, slug, title, detail, issues = _ERRORS[name]
+    error, detail, issues = _ERRORS[name]
+    status, slug, title = STATUS[error]
     return {
         "type": f"urn:stickslip:problem:{slug}",
         "title": title,

@@ -13,8 +13,7 @@ from typing import Any
 
 from service.errors import BodyTooLargeError, InvalidRequestError, MalformedBodyError, issues_to_json
 from service.jobs.common.measurements import read_measurements
-from service.jobs.common.scene_editing import side_by_side
-from service.jobs.common.scene_text import issues_of_scene, read_text
+from service.jobs.common.scene_text import issues_of_scene, read_text, side_by_side
 from service.jobs.common.scenes import (
     read_scene,
     refers_to_uploads,
@@ -22,7 +21,7 @@ from service.jobs.common.scenes import (
     resolve_scene,
 )
 from service.jobs.common.sizes import memory_limited, work_limited
-from service.jobs.kinds.registry.bodies import KIND as KIND
+from service.jobs.kinds.bodies import KIND as KIND
 from service.jobs.outputs import JobOutput, Progress, ShouldStop
 from service.jobs.registry import JobRequest, Registry, Resolve, RunOn, SceneSource
 from service.jobs.strict_json import JsonText, digest, encoded

@@ -8,14 +8,34 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from service.jobs.kind_view import Json, NothingToDrawError, ReadSweep, StoredSweep
-from service.jobs.stored_curves import response_of
+from service.jobs.kind_view import Json, NothingToDrawError, ReadSweep, StoredCurve, StoredSweep
 from solver.jit.fourier import Real
+from solver.views.plots.curves import Response, above, with_peak
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from solver.studies.peaks.results import PeakTrack
+
+
+def response_of(sweep: StoredCurve) -> Response:
+    """The curve of a stored sweep with at least one point; its band is that of the polyline."""
+    peak = None if sweep.peak is None else (sweep.peak.at, sweep.peak.value)
+    values = np.asarray(sweep.arrays["parameter"], dtype=np.float64)
+    amplitude = np.asarray(sweep.arrays["amplitude"], dtype=np.float64)
+    unstable = np.asarray(sweep.arrays.get("unstable", np.zeros(values.size)), dtype=np.bool_)
+    values, amplitude, unstable = with_peak(values, amplitude, peak, unstable)
+    limit = sweep.limit
+    return Response(
+        scene=sweep.scene,
+        parameter=sweep.parameter,
+        values=values,
+        amplitude=amplitude,
+        peak=peak,
+        limit=limit,
+        intervals=() if limit is None else above(values, amplitude, limit),
+        unstable=unstable,
+    )
 
 
 def best_sweep_figure(result: Json, sweeps: Sequence[StoredSweep], read: ReadSweep) -> Figure:

@@ -35,8 +35,7 @@ from service.errors import ConflictError, InvalidRequestError, JobFailedError, N
 from service.jobs import answering
 from service.jobs.answering import Prepared, prepared
 from service.jobs.figures import DESIGN, SWEEP, DesignRecord, SweepRecord
-from service.jobs.kinds.registry.bodies import KIND
-from service.jobs.kinds.registry.loading import registry_of
+from service.jobs.kinds.bodies import KIND
 from service.jobs.outputs import OnProgress
 from service.jobs.registry import ABOUT_THE_RUN, JobKind, JobRequest, Registry
 from service.jobs.validation import validated
@@ -45,6 +44,7 @@ from service.queue.queue import JobQueue
 from service.queue.retention import Retention
 from service.queue.running import Event, Waiters
 from service.queue.scene_store import SceneStore
+from service.settings.kinds import registry_of
 from service.settings.settings import Settings
 from service.uploads.uploads import Uploads
 from service.workers.answers import AnswerLimits, Answers

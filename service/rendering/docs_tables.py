@@ -19,7 +19,7 @@ from optim.identification.readers.registry import data_formats
 from optim.problem.keys import CaseRequest, options
 from optim.problem.keyword_source import keyword_source
 from service.jobs.common.problem import ABOUT_THE_JOB
-from service.jobs.kinds.registry.table import placed
+from service.jobs.kinds.table import placed
 from service.jobs.studies.design import Design
 from service.jobs.studies.pareto import Pareto
 from service.settings.settings import ClientLimits, Settings

@@ -130,7 +130,7 @@ def sweep_body(
 
 def sweep_picture(row: SweepRecord, suffix: str, repository: ResultRepository) -> bytes:
     """The curve of a stored sweep as `svg` or `png`; its peak is marked, its band shaded."""
-    from service.jobs.stored_curves import response_of
+    from service.jobs.drawing import response_of
     from solver.views.plots import style
     from solver.views.plots.responses import response_figure
 

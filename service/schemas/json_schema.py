@@ -45,7 +45,7 @@ def _scene_of_a_file(scene: dict[str, Any]) -> dict[str, Any]:
 
 def _job() -> dict[str, Any]:
     """Of the body of ``POST /v1/jobs``."""
-    from service.jobs.kinds.registry.bodies import body_model
+    from service.jobs.kinds.bodies import body_model
     from service.settings.kinds import registry_here
 
     kinds, definitions = [], {}

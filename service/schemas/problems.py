@@ -32,7 +32,7 @@ _METHODS = ("GET", "HEAD", "POST", "PUT", "PATCH", "DELETE")
 _EXPECTED = frozenset({"queue-full", "overloaded", "storage-full"})
 _CHALLENGE = 'Bearer realm="stickslip"'
 
-_STATUS: dict[type[errors.ServiceError], tuple[int, str, str]] = {
+STATUS: dict[type[errors.ServiceError], tuple[int, str, str]] = {
     errors.InvalidRequestError: (422, "invalid-request", "The request is not valid"),
     errors.MalformedBodyError: (400, "malformed-body", "The body cannot be read"),
     errors.UnsupportedMediaError: (415, "unsupported-media-type", "A body of this kind is not read here"),
@@ -100,7 +100,7 @@ def install(app: FastAPI) -> None:
 
 def service_problem(request: Request, error: errors.ServiceError) -> JSONResponse:
     """The problem document of one of the service's own errors."""
-    known = next((_STATUS[kind] for kind in type(error).__mro__ if kind in _STATUS), None)
+    known = next((STATUS[kind] for kind in type(error).__mro__ if kind in STATUS), None)
     if known is None:
         return _unexpected(request, error)
     status, slug, title = known
@@ -157,7 +157,7 @@ async def _gone(request: Request, _error: Exception) -> JSONResponse:
 async def _unstorable(request: Request, error: Exception) -> JSONResponse:
     """A value that no row can hold, such as a text with a zero character in PostgreSQL."""
     log.warning("%s %s holds what the database refuses: %s", request.method, request.url.path, error)
-    status, slug, title = _STATUS[errors.InvalidRequestError]
+    status, slug, title = STATUS[errors.InvalidRequestError]
     detail = "the request holds a character or a number that cannot be stored or looked for"
     return problem(request, status, slug, title, detail)
 
@@ -184,7 +184,7 @@ async def _validation_error(request: Request, error: Exception) -> JSONResponse:
         issue = issues_of([{**item, "loc": rest}])[0]
         entries.append(_entry(issue, str(source)))
     detail = "; ".join(entry["detail"] for entry in entries)
-    status, slug, title = _STATUS[errors.InvalidRequestError]
+    status, slug, title = STATUS[errors.InvalidRequestError]
     return problem(request, status, slug, title, detail, entries)
 
 

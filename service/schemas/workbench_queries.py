@@ -8,7 +8,7 @@ from pydantic import AwareDatetime, BaseModel, ConfigDict, Field
 
 from service.db.models import JobState
 from service.db.repositories.runs import RunFilter
-from service.jobs.run_words import LONGEST_TAG, MOST_TAGS, Notes, ProjectName, RunName, Tags
+from service.jobs.registry import LONGEST_TAG, MOST_TAGS, Notes, ProjectName, RunName, Tags
 from service.schemas.pages import Cursor, Limit, ListQuery
 
 _CHANGES = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)

@@ -16,7 +16,7 @@ from service.jobs.ids import new_id
 from service.jobs.outputs import Pace
 from service.jobs.registry import RunOn, WarmUp
 from service.workers.base import Outcome, Stopped, Unwatched
-from service.workers.local import LocalExecutor
+from service.workers.executors import LocalExecutor
 from service.workers.process_limits import ProcessLimits
 
 _SILENT = Pace(progress_seconds=3600.0, checkpoint_seconds=3600.0, checkpoint_bytes=0)

@@ -33,12 +33,12 @@ from service.jobs.common.sizes import balance_issues
 from service.jobs.figures import SweepRecord
 from service.jobs.kind_view import KindView, PrintedResult
 from service.jobs.kinds import SHIPPED
-from service.jobs.kinds.registry.loading import registry_of
-from service.jobs.kinds.registry.table import with_tables
+from service.jobs.kinds.table import with_tables
 from service.jobs.outputs import JobOutput, OnProgress, ShouldStop
 from service.jobs.parts import Division, JobPart, PartOutput
 from service.jobs.registry import JobKind, Resolved, SceneSource
 from service.queue.core import Service
+from service.settings.kinds import registry_of
 from service.settings.settings import load_settings
 from solver.scene.scene import Scene
 

@@ -13,8 +13,8 @@ from service.cli import main
 from service.client.embedded import EmbeddedService
 from service.db.models import JobState
 from service.errors import InvalidRequestError
-from service.jobs.kinds.registry.loading import registry_of
-from service.jobs.kinds.registry.table import kinds_table
+from service.jobs.kinds.table import kinds_table
+from service.settings.kinds import registry_of
 from service.settings.settings import load_settings
 from solver.studies.natural_frequencies import natural_frequencies
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from service.jobs.kinds import SHIPPED
-from service.jobs.kinds.registry.table import interrupted_table, kinds_table
+from service.jobs.kinds.table import interrupted_table, kinds_table
 from service.jobs.strict_json import digest
 from service.rendering.docs_tables import SOURCES, TABLES
 from tests.golden.faces import Studies, helped, paths

@@ -71,6 +71,17 @@ def test_what_is_not_there_is_said() -> None:
         from stickslip import solv  # type: ignore[attr-defined]  # noqa: F401
 
 
+def test_a_name_that_is_not_there_loads_nothing() -> None:
+    code = (
+        "import sys, stickslip; "
+        "print(hasattr(stickslip, 'solv'), 'solver.scene' in sys.modules, *sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    found, scenes, *loaded = done.stdout.split()
+    assert (found, scenes) == ("False", "False")
+    assert [name for name in loaded if name.startswith(("stickslip.", "optim", "numpy"))] == []
+
+
 def test_the_version_is_that_of_the_project() -> None:
     assert f'version = "{stickslip.__version__}"' in (ROOT / "pyproject.toml").read_text("utf-8")
 

@@ -14,7 +14,7 @@ from service.cli.options.key_options import key_options, options_of
 from service.cli.table import TOP
 from service.jobs.common.problem import ProblemRequest
 from service.jobs.kinds import SHIPPED, studies
-from service.jobs.kinds.registry.bodies import KIND, body_model
+from service.jobs.kinds.bodies import KIND, body_model
 from service.jobs.registry import JobRequest
 from service.jobs.study import Study
 from solver.results.views import on_demand

@@ -5,12 +5,13 @@ from __future__ import annotations
 import random
 import time
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 import pytest
 from private_kinds import A_SWEEP
-from service_helpers import analyse, in_order, listed, within
+from service_helpers import analyse, in_order, listed, promptly, within
 
 from service.db.clock import utc_now
 from service.db.engine import Database
@@ -180,15 +181,13 @@ def test_a_hundred_thousand_sweeps_are_listed_within_50_ms(database: Database) -
     analyse(database)
     for owner in (*OWNERS, "nothing", None):
         for query in QUERIES:
-            assert listing_milliseconds(database, owner, query) < 50.0, (owner, query)
+            promptly(partial(listing_seconds, database, owner, query), 0.05, tries=20)
 
 
-def listing_milliseconds(database: Database, owner: str | None, query: dict[str, Any]) -> float:
-    """The least of five times, which other work on the machine disturbs least."""
-    repository, settings, times = ResultRepository(database), load_settings(), []
-    for _ in range(5):
-        begin = time.perf_counter()
-        found = sweep_page(repository, SweepQuery(**query), settings, owner)
-        times.append(time.perf_counter() - begin)
-        assert owner is None or all(one.owner == owner for one in found.items)
-    return 1e3 * min(times)
+def listing_seconds(database: Database, owner: str | None, query: dict[str, Any]) -> float:
+    repository, settings = ResultRepository(database), load_settings()
+    begin = time.perf_counter()
+    found = sweep_page(repository, SweepQuery(**query), settings, owner)
+    took = time.perf_counter() - begin
+    assert owner is None or all(one.owner == owner for one in found.items)
+    return took

@@ -8,53 +8,22 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
-
-import typer
+from typing import TYPE_CHECKING, Any
 
 from service.cli.importing.files import (
     Sources,
-    deck_file,
     dof_table,
+    existing_file,
     read_sources,
     relative,
     rows_of,
     sources,
 )
-from service.cli.importing.options import (
-    Axis,
-    Contacts,
-    Deck,
-    Dofs,
-    EngineOrder,
-    Excite,
-    Files,
-    Forces,
-    Formats,
-    From,
-    High,
-    Keep,
-    Low,
-    Mapping,
-    Mistune,
-    ModesKept,
-    Observed,
-    Out,
-    PairBy,
-    PatchTexts,
-    Reduce,
-    ReducedFile,
-    SectorCount,
-    To,
-    Tolerance,
-    Units,
-    UpTo,
-)
-from service.cli.importing.parts import contacts as contact_tables
-from service.cli.importing.parts import excitation
+from service.cli.importing.options import ImportOptions
 from service.cli.importing.patches import Patches
 from service.cli.importing.reduction import ReducedModel, reduce, reduced_file
-from service.cli.importing.scene import band, toml
+from service.cli.importing.scene import band, excitation, toml
+from service.cli.importing.scene import contacts as contact_tables
 from service.cli.importing.sector import (
     DiskOptions,
     WrittenSector,
@@ -62,9 +31,9 @@ from service.cli.importing.sector import (
     disk,
     found_by_position,
     reduce_disk,
-    sector_file,
 )
-from service.cli.options.inputs import output_path
+from service.cli.options.inputs import new_file
+from service.cli.options.parameters import taking
 from service.errors import InputError
 from service.rendering.tables.text import print_json, print_pairs
 from solver.results.files import whole
@@ -78,77 +47,43 @@ if TYPE_CHECKING:
 _RATIO = 0.001  # of a structure whose files hold no damping, which would have no bound at resonance
 
 
-def import_scene(
-    files: Files,
-    out: Out,
-    dofs: Dofs = None,
-    excite: Excite = None,
-    observe: Observed = None,
-    start: From = None,
-    stop: To = None,
-    keep_modes: Keep = None,
-    reduce_once: Reduce = False,
-    modes: ModesKept = None,
-    up_to: UpTo = None,
-    reduced: ReducedFile = None,
-    units: Units = "SI",
-    mapping: Mapping = None,
-    sectors: SectorCount = None,
-    low: Low = None,
-    high: High = None,
-    nodes: Deck = None,
-    axis: Axis = None,
-    pair_by: PairBy = "position",
-    tolerance: Tolerance = None,
-    engine_order: EngineOrder = None,
-    contacts: Contacts = None,
-    forces: Forces = None,
-    patches: PatchTexts = None,
-    mistune: Mistune = None,
-    _formats: Formats = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
-) -> None:
+@taking(ImportOptions)
+def import_scene(asked: ImportOptions) -> None:
     """Make a scene of matrices or modes in files.
 
     The files are read and checked first. The scene refers to them or, with --reduce, to the reduced model,
     which is written beside it. Without --contact or --patch a template of a contact stands in the scene. With
     --sectors the matrices are of one sector of a disk, reduced at every nodal diameter that is met.
     """
-    target = output_path("--out", out, (".toml",))
-    if target is None or target.exists():
-        raise InputError(f"`--out`: {out!r} exists already; give another name or remove it")
-    _check_reduction(reduce_once, keep_modes, (modes, up_to, reduced), mistune, sectors)
-    deck = deck_file(nodes)
-    of = disk(sectors, low, high, deck, axis, pair_by, tolerance, engine_order, patches=bool(patches))
-    read = _read(sources(files, mapping, units, mistune), deck, of, dofs, patches, tolerance, contacts)
+    target = new_file("--out", asked.out, (".toml",))
+    _check_reduction(asked)
+    read = _read(asked)
     with ExitStack() as undo:
         structure, table, written = read.found.table(target), read.table, None
-        if reduce_once:
-            path = reduced_file(reduced, target) if of is None else sector_file(reduced, target)
+        if asked.reduce_once:
+            path = reduced_file(asked, target)
             undo.callback(path.unlink, missing_ok=True)
-            written = _reduced(read, modes, up_to, path)
+            written = _reduced(read, asked, path)
             structure, table = written.table(target), dict(written.rows)
         else:
-            structure |= _referring(read, keep_modes, target)
-        driven = excitation(forces, excite, next(iter(table)))
+            structure |= _referring(read, asked.keep_modes, target)
         raw = _SceneTables(
-            read=read, target=target, structure=structure, dofs=table, excitation=driven, observe=observe
-        )
-        scene, frequencies, said = _made(raw, written, start, stop)
+            read=read, target=target, structure=structure, dofs=table, observe=asked.observe,
+            excitation=excitation(asked.forces, asked.excite, next(iter(table))),
+        )  # fmt: skip
+        scene, frequencies, said = _made(raw, written, asked.start, asked.stop)
         undo.pop_all()
-    _report(scene, target, frequencies, written, read.given, said, as_json)
+    _report(scene, target, frequencies, written, read.given, said, asked.as_json)
 
 
-def _check_reduction(
-    reduce_once: bool, keep_modes: int | None, of_reduced: Sequence[object], mistune: Sequence[str] | None,
-    sectors: int | None,
-) -> None:  # fmt: skip
+def _check_reduction(asked: ImportOptions) -> None:
     """Refuse options that go with --reduce without it, or not with it."""
-    if not reduce_once and any(each is not None for each in of_reduced):
+    of_reduced = (asked.modes, asked.up_to, asked.reduced)
+    if not asked.reduce_once and any(each is not None for each in of_reduced):
         raise InputError("`--modes`, `--up-to` and `--reduced` go with --reduce")
-    if reduce_once and keep_modes is not None:
+    if asked.reduce_once and asked.keep_modes is not None:
         raise InputError("`--keep-modes` reduces on every load, --reduce once: keep one of them")
-    if mistune and not (reduce_once and sectors is not None):
+    if asked.mistune and not (asked.reduce_once and asked.sectors is not None):
         raise InputError(
             "`--mistune` goes with --sectors and --reduce; a scene that refers to its files names parts in "
             "[structure.parts]"
@@ -175,18 +110,18 @@ class _Read:
     parts: dict[str, list[dict[str, Any]]]
 
 
-def _read(
-    found: Sources, deck: Path | None, of: DiskOptions | None, dofs: Sequence[str] | None,
-    patches: Sequence[str] | None, tolerance: float | None, contacts: Sequence[str] | None,
-) -> _Read:  # fmt: skip
+def _read(asked: ImportOptions) -> _Read:
+    deck = existing_file("--nodes", asked.nodes)
+    of = disk(asked, deck)
+    found = sources(asked)
     given = read_sources(found, deck)
     positions, turn = None if given is None else given.deck, None if of is None else (of.sectors, of.axis)
-    faces = Patches(patches, positions, found.units, turn, tolerance)
-    table = dof_table(dofs, found, given, patches=bool(patches))
+    faces = Patches(asked.patches, positions, found.units, turn, asked.tolerance)
+    table = dof_table(asked.dofs, found, given, patches=bool(asked.patches))
     made = faces.made(given, table)
     return _Read(
         found=found, given=given, deck=deck, of=of, table=table | made.dofs,
-        parts=made.tables | {"contacts": contact_tables(contacts)},
+        parts=made.tables | {"contacts": contact_tables(asked.contacts)},
     )  # fmt: skip
 
 
@@ -244,20 +179,18 @@ class _SceneTables:
         }
 
 
-def _reduced(
-    read: _Read, modes: int | None, up_to: float | None, path: Path
-) -> ReducedModel | WrittenSector:  # fmt: skip
+def _reduced(read: _Read, asked: ImportOptions, path: Path) -> ReducedModel | WrittenSector:
     given, of = read.given, read.of
     if given is None:
         raise InputError("`--reduce` is for matrices; modes are reduced already")
-    if of is not None and up_to is not None:
+    rows = rows_of(read.table, given)
+    if of is None:
+        return reduce(given, rows, asked.modes, asked.up_to, path)
+    if asked.up_to is not None:
         raise InputError("`--up-to` is not for a sector: give --modes N, as many at each nodal diameter")
-    if of is not None:
-        from solver.matrices.values import METRES
+    from solver.matrices.values import METRES
 
-        mistune, metres = tuple(read.found.parts), METRES[read.found.units]
-        return reduce_disk(given, rows_of(read.table, given), modes, of, path, mistune, metres)
-    return reduce(given, rows_of(read.table, given), modes, up_to, path)
+    return reduce_disk(given, rows, asked.modes, of, path, tuple(read.found.parts), METRES[read.found.units])
 
 
 def _gone(given: MatrixSet | None, of: DiskOptions) -> Any:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from service.errors import InputError
 
 if TYPE_CHECKING:
+    from service.cli.importing.options import ImportOptions
     from solver.matrices.load_set import MatrixSet
 
 MOST_UNNAMED = 200
@@ -54,28 +55,24 @@ def relative(path: Path, target: Path) -> str:
     return Path(os.path.relpath(path.absolute(), target.absolute().parent)).as_posix()
 
 
-def sources(
-    files: Sequence[str], mapping: str | None, units: str, mistune: Sequence[str] | None = None
-) -> Sources:
+def sources(asked: ImportOptions) -> Sources:
     """Sort the files given by what they are."""
     from solver.matrices.files import MAPPING, MatrixFileError, sorted_files
     from solver.matrices.values import UNITS
 
-    if units not in UNITS:
+    if asked.units not in UNITS:
         raise InputError(
             f"`--units` must be one of {', '.join(UNITS)} (mm: mm, t, N, s; in: in, lbf s²/in, lbf, s), "
-            f"got {units!r}"
+            f"got {asked.units!r}"
         )
-    for name in [*files, *([mapping] if mapping else [])]:
-        if not Path(name).is_file():
-            raise InputError(f"`FILES`: there is no file {name!r}")
-    given = [Path(name) for name in files]
+    given = [path for name in asked.files if (path := existing_file("FILES", name)) is not None]
+    mapping = existing_file("FILES", asked.mapping or None)
     try:
-        roles = sorted_files(given, None if mapping is None else Path(mapping))
+        roles = sorted_files(given, mapping)
     except MatrixFileError as error:
         raise InputError(f"`FILES`: {error}") from error
     rows = roles.pop(MAPPING, None)
-    return Sources(roles=roles, mapping=rows, units=units, parts=_parts(mistune))
+    return Sources(roles=roles, mapping=rows, units=asked.units, parts=_parts(asked.mistune))
 
 
 def _parts(texts: Sequence[str] | None) -> dict[str, Path | None]:
@@ -121,8 +118,8 @@ def read_sources(found: Sources, deck: Path | None) -> MatrixSet | None:
         raise InputError(f"`--nodes`: {error}") from error
 
 
-def deck_file(text: str | None) -> Path | None:
-    """The input deck with nodes and sets.
+def existing_file(option: str, text: str | None) -> Path | None:
+    """A file that is to be read; None if none was named.
 
     Raises
     ------
@@ -130,7 +127,7 @@ def deck_file(text: str | None) -> Path | None:
         There is no such file.
     """
     if text is not None and not Path(text).is_file():
-        raise InputError(f"`--nodes`: there is no file {text!r}")
+        raise InputError(f"`{option}`: there is no file {text!r}")
     return None if text is None else Path(text)
 
 

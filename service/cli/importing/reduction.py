@@ -9,11 +9,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from service.cli.importing.files import relative
-from service.cli.options.inputs import output_path
+from service.cli.options.inputs import new_file
 from service.errors import InputError
 from solver.results.files import whole
 
 if TYPE_CHECKING:
+    from service.cli.importing.options import ImportOptions
     from solver.matrices.load_set import MatrixSet
     from solver.matrices.reduction.craig_bampton import Reduced
 
@@ -73,15 +74,12 @@ class ReducedModel:
         return pairs
 
 
-def reduced_file(text: str | None, target: Path) -> Path:
-    """Where the reduced model goes, which must not exist."""
+def reduced_file(asked: ImportOptions, target: Path) -> Path:
+    """Where the reduced model, or the reduced sector, goes, which must not exist."""
     from solver.matrices.reduction.craig_bampton import WRITTEN
 
-    name = text or str(target.with_name(f"{target.stem}-reduced.npz"))
-    path = output_path("--reduced", name, WRITTEN)
-    if path is None or path.exists():
-        raise InputError(f"`--reduced`: {name!r} exists already; give another name or remove it")
-    return path
+    name = asked.reduced or str(target.with_name(f"{target.stem}-reduced.npz"))
+    return new_file("--reduced", name, WRITTEN if asked.sectors is None else (".npz",))
 
 
 def reduce(

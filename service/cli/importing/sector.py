@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 from service.cli.failures import refused
 from service.cli.importing.files import relative
-from service.cli.options.inputs import output_path
 from service.errors import InputError
 from solver.results.files import whole
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from service.cli.importing.options import ImportOptions
     from solver.matrices.load_set import MatrixSet
     from solver.matrices.sectors.reduction import ReducedSector
 
@@ -68,38 +68,33 @@ def _nodes(text: str) -> str | list[int]:
     return [int(part) for part in parts] if all(part.isdecimal() for part in parts) else text
 
 
-def disk(
-    sectors: int | None, low: str | None, high: str | None, nodes: Path | None, axis: str | None,
-    pair_by: str, tolerance: float | None, engine_order: int | None, *, patches: bool = False,
-) -> DiskOptions | None:  # fmt: skip
+def disk(asked: ImportOptions, deck: Path | None) -> DiskOptions | None:
     """What the options say of a disk; None without --sectors.
-
-    Parameters
-    ----------
-    patches : whether there are patches, which take --tolerance too.
 
     Raises
     ------
     InputError
         Options of a disk without --sectors, or values that are none.
     """
-    others: dict[str, object] = {
-        "--low": low, "--high": high, "--axis": axis, "--engine-order": engine_order,
-    }  # fmt: skip
-    if not patches:
-        others |= {"--tolerance": tolerance}
-    if sectors is None:
+    if asked.sectors is None:
+        others: dict[str, object] = {
+            "--low": asked.low, "--high": asked.high, "--axis": asked.axis,
+            "--engine-order": asked.engine_order,
+        }  # fmt: skip
+        if not asked.patches:  # which take it too
+            others["--tolerance"] = asked.tolerance
         given = next((name for name, value in others.items() if value is not None), None)
         if given is not None:
             raise InputError(f"`{given}` is of a sector of a disk: give --sectors N too")
         return None
-    if sectors < 1:
-        raise InputError(f"`--sectors` must be >= 1, got {sectors}")
-    if (low is None) != (high is None):
+    if asked.sectors < 1:
+        raise InputError(f"`--sectors` must be >= 1, got {asked.sectors}")
+    if (asked.low is None) != (asked.high is None):
         raise InputError("`--low` and `--high` go together, or are both left out (then found by position)")
     return DiskOptions(
-        sectors=sectors, low=low, high=high, nodes=nodes, axis=_axis(axis),
-        pair_by=pair_by, tolerance=tolerance, engine_order=1 if engine_order is None else engine_order,
+        sectors=asked.sectors, low=asked.low, high=asked.high, nodes=deck, axis=_axis(asked.axis),
+        pair_by=asked.pair_by, tolerance=asked.tolerance,
+        engine_order=1 if asked.engine_order is None else asked.engine_order,
     )  # fmt: skip
 
 
@@ -202,8 +197,6 @@ def reduce_disk(
 
     if modes is None or modes < 0:
         raise InputError("`--reduce` of a sector takes --modes N: as many at each nodal diameter")
-    if path.suffix.lower() != ".npz":
-        raise InputError(f"`--reduced` of a sector must end in .npz, got {path.name!r}")
     begun = time.perf_counter()
     matrices: dict[str, Any] = {key: csr_array(matrix) for key, matrix in given.matrices.items()}
     try:
@@ -261,12 +254,3 @@ def found_by_position(of: DiskOptions | None) -> list[str]:
         "the boundaries were found by position: faces that only touch the next sector, as of shrouds, lie "
         "there too and are joined with it; where there are any, name the sets with --low and --high"
     ]
-
-
-def sector_file(text: str | None, target: Path) -> Path:
-    """Where the reduced sector goes, which must not exist."""
-    name = text or str(target.with_name(f"{target.stem}-reduced.npz"))
-    path = output_path("--reduced", name, (".npz",))
-    if path is None or path.exists():
-        raise InputError(f"`--reduced`: {name!r} exists already; give another name or remove it")
-    return path

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import typer
 
@@ -33,6 +33,21 @@ def whole_number(text: str) -> int:
         return int(text)
     except ValueError:
         raise typer.BadParameter(f"must be a whole number, got {text!r}") from None
+
+
+def amount(flag: str, metavar: str, words: str) -> Any:
+    """An option that takes a real number, with the words of its help."""
+    return typer.Option(flag, metavar=metavar, parser=number, help=words)
+
+
+def count(flag: str, metavar: str, words: str) -> Any:
+    """An option that takes a whole number, with the words of its help."""
+    return typer.Option(flag, metavar=metavar, parser=whole_number, help=words)
+
+
+def text(flag: str, metavar: str, words: str) -> Any:
+    """An option that takes a text, with the words of its help."""
+    return typer.Option(flag, metavar=metavar, help=words)
 
 
 _UNITS = {"d": 86400.0, "h": 3600.0, "min": 60.0, "s": 1.0}
@@ -167,6 +182,14 @@ def output_path(option: str, text: str | None, suffixes: Sequence[str] = ()) -> 
         raise InputError(f"`{option}` must be a file, but {text!r} is a folder")
     if not path.absolute().parent.is_dir():
         raise InputError(f"`{option}`: there is no folder {str(path.absolute().parent)!r} for {text!r}")
+    return path
+
+
+def new_file(option: str, text: str, suffixes: Sequence[str]) -> Path:
+    """As `output_path`, of a file that must not exist yet."""
+    path = output_path(option, text, suffixes)
+    if path is None or path.exists():
+        raise InputError(f"`{option}`: {text!r} exists already; give another name or remove it")
     return path
 
 

@@ -17,14 +17,15 @@ from service.cli import completion
 from service.cli.options import inputs
 from service.cli.options import shared as options
 from service.cli.options.inputs import number, whole_number
+from service.cli.options.parameters import Command, keyword, parameters_of
 from service.errors import InputError
 from service.jobs.registry import Flag, JobKind
 
 SCENE = "scene"
 Schema = Mapping[str, Any]
-Command = Callable[..., None]
 
 _PAIR, _PATH = "LO HI", "PATH"
+_KEY = "key"
 _TAKEN = ("--wait", "--json", "--url", "--key-file", "--help")
 _SCALARS: dict[str, tuple[Any, Callable[[str], Any] | None, str]] = {
     "number": (float, number, "X"),
@@ -131,8 +132,9 @@ def key_options(kind: JobKind, local: Command | None) -> list[KeyOption]:
 
 def options_of(command: Command) -> dict[str, inspect.Parameter]:
     """The options of a command by how they are written."""
-    parameters = inspect.signature(command, eval_str=True).parameters.values()
-    return {flag: parameter for parameter in parameters for flag in flags_of(parameter.annotation)}
+    return {
+        flag: parameter for parameter in parameters_of(command) for flag in flags_of(parameter.annotation)
+    }
 
 
 def flags_of(annotation: Any) -> list[str]:
@@ -167,14 +169,14 @@ def _made(
 ) -> inspect.Parameter:
     """An option of the schema of its key."""
     if flag == "--set":
-        return _parameter(options.Values, None)
+        return keyword(_KEY, options.Values, None)
     kind, default = schema.get("type"), whole.get("default")
     if kind == "boolean" and needed:
         both = f"{flag}/--no-{flag.removeprefix('--')}"
-        return _parameter(Annotated[bool, typer.Option(both, help=words)], inspect.Parameter.empty)
+        return keyword(_KEY, Annotated[bool, typer.Option(both, help=words)], inspect.Parameter.empty)
     if kind == "boolean":
         words = f"Switch off: {words}" if default is True else words
-        return _parameter(Annotated[bool, typer.Option(flag, help=words)], False)
+        return keyword(_KEY, Annotated[bool, typer.Option(flag, help=words)], False)
     type_, parser, shown = _read_as(schema)
     if said.metavar and kind == "object":  # told by the metavariable
         type_, parser = list[str], None
@@ -187,9 +189,9 @@ def _made(
         flag, metavar=said.metavar or shown, parser=parser, help=words, autocompletion=offered
     )
     if needed:
-        return _parameter(Annotated[type_, told], inspect.Parameter.empty)
-    return _parameter(
-        Annotated[type_ | None, told], default if isinstance(default, (int, float, str)) else None
+        return keyword(_KEY, Annotated[type_, told], inspect.Parameter.empty)
+    return keyword(
+        _KEY, Annotated[type_ | None, told], default if isinstance(default, (int, float, str)) else None
     )
 
 
@@ -208,10 +210,6 @@ def _read_as(schema: Schema) -> tuple[Any, Callable[[str], Any] | None, str]:
     if kind == "object" and _of_numbers(schema):
         return list[str], None, "NAME=VALUE"
     return str, None, "JSON"
-
-
-def _parameter(annotation: Any, default: Any) -> inspect.Parameter:
-    return inspect.Parameter("key", inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
 
 
 def _without_null(schema: Schema) -> Schema:

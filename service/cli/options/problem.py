@@ -7,9 +7,9 @@ file, whole.
 from __future__ import annotations
 
 import functools
-import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from itertools import chain
 from typing import Annotated, Any
 
 import typer
@@ -19,6 +19,7 @@ from optim.problem.keys import DesignKeys, FrontKeys, options
 from service.cli import completion
 from service.cli.options import shared
 from service.cli.options.inputs import number, whole_number
+from service.cli.options.parameters import Command, keyword, parameters_of, with_parameters
 
 FLAGS = "flags"
 KEYS = dict.fromkeys((*DesignKeys.model_fields, *FrontKeys.model_fields))
@@ -57,7 +58,6 @@ class ProblemFlags:
     keys: Mapping[str, tuple[Option, Any]] = field(default_factory=dict)
 
 
-Command = Callable[..., None]
 _OFFERED: dict[Form, Callable[..., list[str]]] = {
     Form.BOUNDS: completion.paths, Form.NUMBERS_BY_PATH: completion.settings,
     Form.WORDS_BY_PATH: completion.settings, Form.NAMES: completion.contacts,
@@ -86,10 +86,7 @@ def takes_problem(keys: Mapping[str, Option]) -> Callable[[Command], Command]:
     given_as: dict[str, Any] = {
         "problem": File, **{name: _option(one) for name, one in keys.items()}, "values": shared.Values,
     }  # fmt: skip
-    parameters = [
-        inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=annotation)
-        for name, annotation in given_as.items()
-    ]
+    own = [keyword(name, annotation, None) for name, annotation in given_as.items()]
 
     def taking(command: Command) -> Command:
         @functools.wraps(command)
@@ -100,12 +97,7 @@ def takes_problem(keys: Mapping[str, Option]) -> Callable[[Command], Command]:
             )
             command(**given, **{FLAGS: flags})
 
-        listed: list[inspect.Parameter] = []
-        for parameter in inspect.signature(command, eval_str=True).parameters.values():
-            keyword = parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY)
-            listed += parameters if parameter.name == FLAGS else [keyword]
-        wrapped.__signature__ = inspect.Signature(listed)  # type: ignore[attr-defined]
-        wrapped.__annotations__ = {parameter.name: parameter.annotation for parameter in listed}
-        return wrapped
+        listed = [own if one.name == FLAGS else [one] for one in parameters_of(command)]
+        return with_parameters(wrapped, chain.from_iterable(listed))
 
     return taking

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from service.cli import completion
-from service.cli.options.numeric import count
+from service.cli.options.inputs import count
 from solver.scene.descriptions import DISK_LOAD
 
 Scene = Annotated[

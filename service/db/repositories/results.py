@@ -6,6 +6,7 @@ from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
+from functools import partial
 from typing import Any
 from weakref import WeakKeyDictionary, WeakSet
 
@@ -35,7 +36,7 @@ from service.db.pagination import (
     Range,
     aside,
     encode,
-    is_few,
+    fewest,
     ordered,
     owner_condition,
     plain_conditions,
@@ -55,7 +56,7 @@ Name = tuple[str, str]
 CREATED = "created"
 _ANY: Range = (None, None)
 # Of 100 000 results: so many are read and sorted in the time in which a page of more is found in order.
-_FEW = 5000
+_FEW = {"sqlite": 5000, "postgresql": 8000}
 _NEVER_LEADS = -1
 _MOST_DIGITS = 18
 _NONE = 0
@@ -199,8 +200,9 @@ def _query(connection: Connection, wanted: Filter, limit: int, after: Position |
     known = _known(connection, wanted, _record(wanted.of).PART)
     along: Any = None if wanted.sort == CREATED else aliased(Figure)
     number = Result.number if along is None else along.result
-    conditions = _columns(connection, wanted) + _figures(wanted, known, along or Result, number)
-    lead = next((one for one in conditions if is_few(connection, one)), None)
+    conditions = _columns(connection, wanted)
+    conditions += _figures(wanted, known, along or Result, number, dialect=connection.dialect.name)
+    lead = fewest(connection, conditions)
     held = [one.holds for one in conditions if one is not lead]
     query, keys = _SELECT, [number]
     if along is None:
@@ -224,16 +226,19 @@ def _query(connection: Connection, wanted: Filter, limit: int, after: Position |
     return ordered(query.where(*held), keys, descending=wanted.descending, after=place).limit(limit)
 
 
-def _figures(wanted: Filter, known: Mapping[Name, int], source: Any, number: Any) -> list[Condition]:
+def _figures(
+    wanted: Filter, known: Mapping[Name, int], source: Any, number: Any, *, dialect: str
+) -> list[Condition]:
     """The conditions on figures of the results of a number."""
     asked = [(_ids(known, name, ""), bounds) for name, bounds in wanted.ranges.items()]
     asked += [(_ids(known, name, word), _ANY) for name, word in wanted.words.items()]
     ranges = wanted.part_ranges or ({} if wanted.part is None else {_record(wanted.of).PART: _ANY})
     inside = [(_ids(known, name, wanted.part), bounds) for name, bounds in ranges.items()]
-    conditions = [_condition([one], source, number) for one in [*asked, *inside]]
+    made = partial(_condition, source=source, number=number, dialect=dialect)
+    conditions = [made([one]) for one in [*asked, *inside]]
     if wanted.part is None and len(inside) > 1:
         # Of all ranges in one part it takes as long to count the results as the first range is wide.
-        conditions.append(replace(_condition(inside, source, number), few=_NEVER_LEADS))
+        conditions.append(replace(made(inside), few=_NEVER_LEADS))
     return conditions
 
 
@@ -258,12 +263,15 @@ def _columns(connection: Connection, wanted: Filter) -> list[Condition]:
         found.append(Result.job_id == source.scalar_subquery())
     conditions = plain_conditions(Result.number, found)
     conditions += owner_condition(connection, Result.number, Result.owner, wanted.owner, leads=not found)
+    few = _FEW[connection.dialect.name]
     return [
-        Condition(ids=one.ids.where(Result.of == wanted.of), holds=one.holds, few=_FEW) for one in conditions
+        Condition(ids=one.ids.where(Result.of == wanted.of), holds=one.holds, few=few) for one in conditions
     ]
 
 
-def _condition(asked: Sequence[tuple[Sequence[int], Range]], source: Any, number: Any) -> Condition:
+def _condition(
+    asked: Sequence[tuple[Sequence[int], Range]], source: Any, number: Any, *, dialect: str
+) -> Condition:
     """The condition that a result has a figure in each range; of several all are of one part.
 
     Parameters
@@ -283,8 +291,12 @@ def _condition(asked: Sequence[tuple[Sequence[int], Range]], source: Any, number
             same = and_(of_figure.id == figure.quantity, of_figure.label == of_begun.label)
             ids = ids.join(of_figure, same)
         ids = ids.where(figure.quantity.in_(quantities), *within(figure.value, bounds))
-    holds = ids.where(begun.result == number).correlate(source).exists()
-    return Condition(ids=ids, holds=holds, few=_FEW)
+    of_one = ids.where(begun.result == number)
+    if dialect != "sqlite":
+        # Else it is planned as a join, and all of a wide range are read before the first is sorted.
+        of_one = of_one.offset(0)
+    holds = of_one.correlate(source).exists()
+    return Condition(ids=ids, holds=holds, few=_FEW[dialect])
 
 
 def _place(after: Position | None, keys: int) -> list[Any] | None:

@@ -11,8 +11,8 @@ from service.auth.allowances import share
 from service.http.dependencies import InContext, TypedRoute, takes_body
 from service.http.in_lane import computed, prepared
 from service.jobs.answering import PLAN, PREVIEW
+from service.jobs.kinds.bodies import KIND, any_body, examples, request_of
 from service.jobs.kinds.previews import PREVIEWS, PreviewRequest
-from service.jobs.kinds.registry.bodies import KIND, any_body, examples, request_of
 from service.jobs.studies.plan import EXAMPLE, Plan, PlanResult
 from service.schemas.preview_answers import LimitsPreview, PointPreview, SensitivitiesPreview, SweepPreview
 

@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from service.errors import InvalidRequestError
 from service.http.dependencies import InContext, TypedRoute, tagged
-from service.jobs.kinds.registry.bodies import body_model
+from service.jobs.kinds.bodies import body_model
 from service.jobs.registry import JobKind
 from service.jobs.strict_json import encoded
 from service.schemas.answers import AnswerModel, KindAnswer, KindList

@@ -28,7 +28,7 @@ from service.http.dependencies import (
     with_raw,
 )
 from service.http.in_lane import prepared, reading
-from service.jobs.kinds.registry.bodies import (
+from service.jobs.kinds.bodies import (
     DESIGN,
     KIND,
     any_body,

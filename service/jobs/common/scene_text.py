@@ -1,4 +1,4 @@
-"""Scenes as text: read from TOML or JSON with everything wrong in them."""
+"""Scenes as text: read with everything wrong in them; what text and tables become when either is changed."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from service.jobs.common.scenes import read_scene
 from service.jobs.registry import SceneSource
 from service.jobs.strict_json import MOST_DEPTH
 from solver.errors import Issue
+from solver.scene.editing import TextPlace, edited, place_at, places
 
 MOST_OF_TOML = 1_200_000
 """Characters of a text in TOML: a sector of finite elements with the matrices of its nodal diameters has a
@@ -91,3 +92,53 @@ def issues_of_scene(raw: Mapping[str, Any], source: SceneSource) -> list[Issue]:
     except InvalidRequestError as error:
         found += [issue for issue in error.issues if issue.pointer not in known]
     return found
+
+
+_AT = re.compile(r"\bline (\d+)(?:, column (\d+))?")
+
+Told = dict[str, Any]
+
+
+def side_by_side(text: str, scene: Mapping[str, Any] | None, source: SceneSource) -> Told:
+    """The text, the tables in it, and what is wrong with its line and column.
+
+    Parameters
+    ----------
+    text : TOML.
+    scene : the tables it is to hold; None: those it holds, None too where it cannot be read.
+    """
+    try:
+        held = read_text(text, "toml")
+    except MalformedBodyError as error:
+        if scene is None:
+            return {"text": text, "scene": None, "issues": [_unreadable(text, error.detail)]}
+        text, held = "", {}
+    if scene is not None:
+        held = _without_null(scene)
+        text = edited(text, held, lambda changed: read_text(changed, "toml"))
+    issues = issues_of_scene(held, source)
+    lines = text.replace("\r\n", "\n")
+    root = places(lines) if issues else None
+    found = [_told(lines, root, issue.pointer, issue.said()) for issue in issues]
+    return {"text": text, "scene": held, "issues": found}
+
+
+def _without_null(value: Any) -> Any:
+    """A table without its keys that have no value: TOML has no null."""
+    if isinstance(value, Mapping):
+        return {key: _without_null(one) for key, one in value.items() if one is not None}
+    return [_without_null(one) for one in value] if isinstance(value, list) else value
+
+
+def _unreadable(text: str, detail: str) -> Told:
+    """Where a text is no TOML; its end if the reader names no line."""
+    found = _AT.search(detail)
+    line = int(found[1]) if found else max(text.count("\n") + (not text.endswith("\n")), 1)
+    column = int(found[2]) if found and found[2] else None
+    return {"pointer": "", "detail": detail, "line": line, "column": column}
+
+
+def _told(text: str, root: TextPlace | None, pointer: str, detail: str) -> Told:
+    at = place_at(root, pointer).start if root is not None and pointer else 0
+    line = text.count("\n", 0, at) + 1
+    return {"pointer": pointer, "detail": detail, "line": line, "column": at - text.rfind("\n", 0, at)}

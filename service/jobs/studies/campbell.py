@@ -97,7 +97,7 @@ class Campbell(Study, HarmonicRequest):
     def figure(cls, result: Json, sweeps: Sequence[StoredSweep], read: ReadSweep) -> Figure:
         """Return each order with the stored response whose highest peak is its own."""
         from optim.views.plots.campbell import campbell_figure
-        from service.jobs.stored_curves import response_of
+        from service.jobs.drawing import response_of
 
         curves = [response_of(read(sweep.id)) for sweep in sweeps if sweep.points]
         if not curves:

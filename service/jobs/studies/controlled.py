@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 from pydantic import ConfigDict, Field
 
 from optim.criteria.json_types import Name
-from service.jobs.common.ranges import band_issues
 from service.jobs.common.results import Table, result_model
 from service.jobs.common.scenes import HarmonicRequest, PositiveNumber
 from service.jobs.common.sizes import balance_issues
+from service.jobs.common.study_keys import band_issues
 from service.jobs.registry import Flag
 from service.jobs.study import Answer, Study, Watch
 from solver.errors import Issue

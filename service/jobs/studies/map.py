@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import ConfigDict, Field
 
-from service.jobs.common.ranges import RangeRequest, law_issues, range_issues
 from service.jobs.common.results import Curve, result_model
 from service.jobs.common.scenes import CHECKED_BY, SCENE, stored_scene
 from service.jobs.common.sizes import MOST_POINTS, balance_issues
+from service.jobs.common.study_keys import RangeRequest, law_issues, range_issues
 from service.jobs.kind_view import Json
 from service.jobs.outputs import JobOutput, OnProgress, ShouldStop
 from service.jobs.parts import Division, JobPart, PartOutput, PartStoppedError

@@ -13,10 +13,10 @@ from pydantic import BeforeValidator, ConfigDict, Field, WithJsonSchema
 
 from optim.criteria.json_types import Name
 from service.jobs.arrays import decode, encode
-from service.jobs.common.ranges import band_issues
 from service.jobs.common.results import EndedResult, KnownResult, Table
 from service.jobs.common.scenes import FrequencyHz, HarmonicRequest, stored_scene
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
+from service.jobs.common.study_keys import band_issues
 from service.jobs.outputs import JobOutput, OnProgress, ShouldStop
 from service.jobs.parts import Division, JobPart, PartOutput, PartStoppedError
 from service.jobs.registry import Flag, JobKind

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 from pydantic import ConfigDict, Field
 
-from service.jobs.common.ranges import RangeRequest, law_issues, range_issues
 from service.jobs.common.results import result_model
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
+from service.jobs.common.study_keys import RangeRequest, law_issues, range_issues
 from service.jobs.figures import SweepRecord
 from service.jobs.kind_view import Json, ReadSweep, StoredSweep
 from service.jobs.registry import Flag

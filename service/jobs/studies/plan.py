@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import BaseModel, ConfigDict
 
-from service.jobs.common.balance import AUTO, EffectsWord, effects_issues, solved_issues, with_effects
 from service.jobs.common.results import KindResult
 from service.jobs.common.scenes import HarmonicRequest
+from service.jobs.common.study_keys import AUTO, EffectsWord, effects_issues, solved_issues, with_effects
 from service.jobs.study import Answer, Study, Watch
 from solver.errors import Issue
 from solver.scene.descriptions import DISK_LOAD

@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import ConfigDict, Field
 
-from service.jobs.common.balance import (
+from service.jobs.common.results import Amplitude, KindResult
+from service.jobs.common.scenes import FrequencyHz, HarmonicRequest
+from service.jobs.common.study_keys import (
     AUTO,
     Accuracy,
     EffectsWord,
@@ -15,8 +17,6 @@ from service.jobs.common.balance import (
     solved_issues,
     with_effects,
 )
-from service.jobs.common.results import Amplitude, KindResult
-from service.jobs.common.scenes import FrequencyHz, HarmonicRequest
 from service.jobs.registry import Flag
 from service.jobs.study import Answer, Study, Watch
 from solver.errors import Issue, Naming, Shown

@@ -10,14 +10,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 from pydantic import ConfigDict, Field
 
 from service.jobs.checkpoints import Checkpoints
-from service.jobs.common.balance import (
-    AUTO,
-    Accuracy,
-    EffectsWord,
-    effects_issues,
-    solved_issues,
-    with_effects,
-)
 from service.jobs.common.results import Amplitude, Curve, EndedResult, PeakAt, Table
 from service.jobs.common.scenes import (
     FrequencyHz,
@@ -28,6 +20,14 @@ from service.jobs.common.scenes import (
     check,
 )
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP
+from service.jobs.common.study_keys import (
+    AUTO,
+    Accuracy,
+    EffectsWord,
+    effects_issues,
+    solved_issues,
+    with_effects,
+)
 from service.jobs.kind_view import Json, ReadSweep, StoredSweep
 from service.jobs.outputs import JobOutput, Progress, ShouldStop
 from service.jobs.registry import Flag, JobKind

@@ -226,10 +226,10 @@ def design(found: Json) -> None:
 _HOMES = {
     "solve": "results.solution", "sweep": "results.branch", "design": "results.design",
     "pareto": "design.front", "march": "results.march", "map": "track.response_map",
-    "peaks": "track.track", "accuracy": "results.accuracy", "campbell": "campbell.diagram",
-    "interference": "interference.diagram",
-    "mistuning": "mistuning.report", "identify": "identify.report", "modes": "modes.report",
-    "controlled": "modes.held", "sensitivities": "sensitivities.shares", "plan": "results.plan",
+    "peaks": "track.track", "accuracy": "results.accuracy", "campbell": "disks.campbell",
+    "interference": "disks.interference",
+    "mistuning": "disks.mistuning", "identify": "identify.report", "modes": "modes.report",
+    "controlled": "modes.held", "sensitivities": "track.shares", "plan": "results.plan",
 }  # fmt: skip
 
 

@@ -12,7 +12,7 @@ from launch import COMMAND
 
 import solver
 from optim.problem.problem import Method
-from service.jobs.common.balance import WORDS
+from service.jobs.common.study_keys import WORDS
 from solver.scene.parameter_paths import parameter_paths
 
 ROOT = Path(__file__).resolve().parent.parent.parent.parent

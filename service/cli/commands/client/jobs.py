@@ -13,7 +13,7 @@ from service.cli.commands.client import stored_designs
 from service.cli.failures import BAD_INPUT, FELL_SHORT
 from service.cli.options import inputs, problem_inputs
 from service.cli.options import shared as options
-from service.cli.options.keyed import given_key
+from service.cli.options.parameters import given_key
 from service.cli.options.scene_files import scene_to_submit, uploaded
 from service.cli.progress import bar
 from service.errors import InputError

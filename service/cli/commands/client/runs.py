@@ -9,7 +9,7 @@ import typer
 from service.cli.commands.client.jobs import client_of
 from service.cli.commands.client.told import MOST, listed, tell, tell_list
 from service.cli.options import shared as options
-from service.cli.options.numeric import amount, count
+from service.cli.options.inputs import amount, count
 from service.errors import InputError
 from service.rendering.tables.text import print_json, print_table, say
 

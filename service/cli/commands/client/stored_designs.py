@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from service.cli.commands.client import told
-from service.cli.options.numeric import amount, count
+from service.cli.options.inputs import amount, count
 from service.errors import InputError
 from service.rendering.tables.text import print_json, print_table
 from solver.results import units

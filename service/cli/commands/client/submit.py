@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Container, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -15,17 +14,18 @@ from service.cli.options import problem_inputs
 from service.cli.options import shared as options
 from service.cli.options.key_options import (
     SCENE,
-    Command,
     KeyOption,
     key_options,
     options_of,
 )
-from service.cli.options.keyed import keyed
+from service.cli.options.parameters import Command, keyed, keyword, with_parameters
 from service.cli.options.problem import FLAGS, ProblemFlags, takes_problem
 from service.cli.table import TOP
 from service.jobs.registry import ABOUT_THE_RUN, JobKind
 
 if TYPE_CHECKING:
+    import inspect
+
     from service.jobs.common.problem import ProblemRequest
 
 _OF_ALL = ("fresh", "priority", "max_seconds", *ABOUT_THE_RUN)
@@ -69,7 +69,7 @@ def submission(kind: JobKind, local: Command | None) -> Command:
         told = {key: value for key, value in body.items() if value is not None}
         hand_in(url, {"kind": kind.name, **scene, **told}, wait=wait, as_json=as_json)
 
-    about_scene = [_keyword("name", options.Scene)] if SCENE in kind.request.model_fields else []
+    about_scene = [keyword("name", options.Scene)] if SCENE in kind.request.model_fields else []
     return _with_options(submit, [*about_scene, *(one.parameter for one in made)])
 
 
@@ -101,8 +101,8 @@ def _of_a_problem(kind: JobKind, model: type[ProblemRequest], own: Sequence[KeyO
         hand_in(url, body, wait=wait, as_json=as_json)
 
     parameters = [
-        _keyword(FLAGS, ProblemFlags),
-        _keyword("name", options.AnyScene, None),
+        keyword(FLAGS, ProblemFlags),
+        keyword("name", options.AnyScene, None),
         *(one.parameter for one in beside),
     ]
     return takes_problem(keys)(_with_options(submit, parameters))
@@ -111,15 +111,8 @@ def _of_a_problem(kind: JobKind, model: type[ProblemRequest], own: Sequence[KeyO
 def _with_options(command: Command, parameters: Sequence[inspect.Parameter]) -> Command:
     """The command with these parameters, and those that every submission has."""
     ending = [
-        _keyword("wait", options.Wait, False),
-        _keyword("as_json", options.Json, False),
-        _keyword("url", options.Url, options.DEFAULT_URL),
+        keyword("wait", options.Wait, False),
+        keyword("as_json", options.Json, False),
+        keyword("url", options.Url, options.DEFAULT_URL),
     ]
-    listed = [*parameters, *ending]
-    command.__signature__ = inspect.Signature(listed)  # type: ignore[attr-defined]
-    command.__annotations__ = {one.name: one.annotation for one in listed}
-    return command
-
-
-def _keyword(name: str, annotation: Any, default: Any = inspect.Parameter.empty) -> inspect.Parameter:
-    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
+    return with_parameters(command, [*parameters, *ending])

@@ -13,10 +13,9 @@ from optim.results.design import DesignStatus
 from service.cli import main
 from service.rendering.report.responses import ReportLine
 from service.rendering.report.sections import branch_table
-from service.rendering.tables import campbell as campbell_reports
 from service.rendering.tables import design as design_reports
+from service.rendering.tables import disks as disk_reports
 from service.rendering.tables import results as reports
-from service.rendering.tables import sensitivities as sensitivity_table
 from service.rendering.tables import track as track_reports
 from solver.continuation.certificate import uncertain
 from solver.results.notes import FLAGS, NONE_HIGHER, flag_words
@@ -97,7 +96,7 @@ def test_a_diagram_is_clear_only_if_that_is_known(capsys):
     open_ended = replace(diagram, orders=orders)
     assert open_ended.clear is None
     assert WHY in str(open_ended.summary())
-    campbell_reports.diagram(open_ended.to_json())
+    disk_reports.campbell(open_ended.to_json())
     assert WHY in " ".join(capsys.readouterr().out.split())
 
 
@@ -109,7 +108,7 @@ def test_tracks_and_sensitivities_warn(capsys):
     track_reports.track(track.to_json())
     assert WHY in " ".join(capsys.readouterr().out.split())
     shares = optim.sensitivities(solver.load_scene("two-dof"), harmonics=1)
-    sensitivity_table.shares(replace(shares, branch=doubtful(shares.branch)).to_json())
+    track_reports.shares(replace(shares, branch=doubtful(shares.branch)).to_json())
     assert WHY in " ".join(capsys.readouterr().out.split())
 
 

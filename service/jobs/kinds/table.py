@@ -1,4 +1,4 @@
-"""The tables of the kinds of job in a page: ``python -m service.jobs.kinds.registry.table docs/jobs.md``."""
+"""The tables of the kinds of job in a page: ``python -m service.jobs.kinds.table docs/jobs.md``."""
 
 from __future__ import annotations
 
