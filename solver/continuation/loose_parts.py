@@ -1,8 +1,9 @@
 """The part of a branch that obeys mechanics.
 
 The residual of a branch is one of displacements, and relative: of a part far away it is small whatever the
-forces are, which then are rounding. Every point is held against powers and forces themselves
-(`solver.balance.kernels.mechanics`), and one that fails is none of the branch.
+forces are, which then are rounding. The walk measures at every point by what share powers and mean forces
+themselves do not balance (`solver.balance.kernels.mechanics`), and a point that loses too much is none of the
+branch.
 """
 
 from __future__ import annotations
@@ -24,11 +25,6 @@ def balanced_part(workspace: Workspace, stretch: Stretch) -> Stretch:
     What is cut ends as `ending` says of a solution from nothing there.
     """
     wrong = ~(stretch.measures[:, LOST] <= ALLOWED)
-    if len(workspace.balance.system.loose):  # far away, the place itself is what is lost in rounding
-        other = Workspace.of(workspace.balance)  # the continuation goes on from the last point of `workspace`
-        for i, row in enumerate(stretch.solutions):
-            other.forces(u := row[:-1].copy(), float(row[-1]))
-            wrong[i] |= not other.obeys(u)
     if not wrong.any():
         return stretch
     first = int(np.argmax(wrong))

@@ -37,7 +37,7 @@ _JUMPS = 0.5
 _MET = 1e-11  # of a peak, to which both tangents have foretold it
 _PAST, _FARTHER = 0.02, 10.0  # share of the nearer side a trial goes past a corner; times that if in vain
 # Up to this share of a peak that is polished to the last digits, and of another, one trial may be too low.
-_TOO_LOW, _LOW = 1e-16, 1e-9
+_TOO_LOW, MAY_BE_LOW = 1e-16, 1e-9
 _ASTRAY = 0.4  # share of the chord: a cubic that strays further from it is no guess
 _ROUNDED = 1e-14  # relative residual that no further step makes smaller
 
@@ -209,7 +209,8 @@ def refine(
     (found, Newton iterations). Every trial is a converged solution on the arc: where the cubic has its peak,
     then by secants, an edge by its slope; by bracketed secants (Illinois) where these lead out of the
     bracket. At a corner, where a contact changes its state, the tangents of both sides meet: trials go a
-    little past that place, towards the side that is farther from it.
+    little past that place, towards the side that is farther from it, and where two were in vain the next one
+    halves what is left.
     """
     n = left.size
     folds = left_slope[n - 1] * right_slope[n - 1] < 0.0
@@ -219,8 +220,8 @@ def refine(
     copy_to(ends[1], right)
     copy_to(ways[0], left_slope)
     copy_to(ways[1], right_slope)
-    lo, hi, g_lo, g_hi = 0.0, 1.0, g_left, g_right
-    scale, low = max(abs(g_left), abs(g_right)), _TOO_LOW if close < _LOW else _LOW
+    lo, hi, g_lo, g_hi, sharp = 0.0, 1.0, g_left, g_right, close < MAY_BE_LOW
+    scale, low = max(abs(g_left), abs(g_right)), _TOO_LOW if sharp else MAY_BE_LOW
     total, side, corner, past, top = 0, 0, False, _PAST, math.inf
     last, g_last, share, g = 0.0, g_left, 1.0, g_right
     for trial in range(40):
@@ -238,12 +239,12 @@ def refine(
             ahead = share - g / out[SLOPE]
         if not lo < ahead < hi:
             ahead = lo + width * g_lo / (g_lo - g_hi) if g_lo != g_hi else 0.5 * (lo + hi)
-        if not lo < ahead < hi or trial % 8 == 7:
+        if not lo < ahead < hi or trial % 8 == 7 or past > 1.0:
             ahead = 0.5 * (lo + hi)
         last, g_last, share = share, g, ahead
         cubic_between(ends[0], ways[0], ends[1], ways[1], width, (share - lo) / width, found)
         good, iterations = _on_plane(
-            system, linear, point, left, right, folds, share, most, True, found, tangent, x, out
+            system, linear, point, left, right, folds, share, most, sharp, found, tangent, x, out
         )
         total += iterations
         if not good:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.balance.kernels.jacobian import factorise, step_back
-from solver.balance.kernels.locate import EDGE, HIGH_PEAK, LOW_PEAK, refine
+from solver.balance.kernels.locate import EDGE, HIGH_PEAK, LOW_PEAK, MAY_BE_LOW, refine
 from solver.balance.kernels.output import (
     HIGH,
     HIGH_SLOPE,
@@ -342,6 +342,9 @@ class NodeSolver:
             g = off(node)
             best = node if what == EDGE else max((best, node), key=lambda one: one.measures[value])
             if abs(g) <= close * scale or abs(high.at - low.at) <= NARROW * abs(node.at):
+                return best
+            left_over = abs(g * ((high if g > 0.0 else low).at - node.at))
+            if what != EDGE and close >= MAY_BE_LOW and left_over <= MAY_BE_LOW * node.measures[value]:
                 return best
             if (g > 0.0) == (g_low > 0.0):
                 low, g_low, g_high, side = node, g, g_high * (0.5 if side < 0 else 1.0), -1

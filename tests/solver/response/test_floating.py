@@ -20,6 +20,8 @@ from solver import (
     sweep,
 )
 from solver.balance.balance import build
+from solver.balance.kernels.mechanics import unaccounted
+from solver.balance.kernels.output import LOST
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.system import UNHELD
 from solver.continuation.branches.point_by_point import walk_by_points
@@ -265,9 +267,16 @@ def test_a_branch_ends_before_a_mean_force_drives_a_part():
     workspace = Workspace.of(build(scene, harmonics=5))
     found = next(walk(workspace, 250.0, 300.0, ContinuationSettings()))
     assert balanced_part(workspace, found) is found
+    told = found.measures[:7, LOST].copy()
     # Far away, the contacts' mean forces are lost in the rounding of where the part stands.
     n = workspace.balance.n_coefficients
     found.solutions[7:, :-1:n] += 1e9 * workspace.balance.system.loose[0]
+    other = Workspace.of(workspace.balance)
+    for row, measures in zip(found.solutions, found.measures, strict=True):
+        other.forces(u := row[:-1].copy(), float(row[-1]))
+        # As the walk measures every point; where nothing was moved, to the last digit.
+        measures[LOST] = unaccounted(other.system, other.linear, u, other.point)
+    assert np.array_equal(found.measures[:7, LOST], told)
     cut = balanced_part(workspace, found)
     assert len(cut.solutions) == 7
     assert cut.status is BranchStatus.STALLED
