@@ -29,7 +29,7 @@ from service.jobs.studies.plan import Plan
 from service.jobs.study import Watch
 
 PLAN, READ, TEXT, STORE, RESOLVE, PREVIEW = "plan", "read", "text", "store", "resolve", "preview"
-MEASURED, EDIT = "measured", "edit"
+MEASURED, EDIT, PARAMETERS = "measured", "edit", "parameters"
 
 Words = Mapping[str, Any]
 Answer = Callable[[Words, SceneSource], Any]
@@ -168,6 +168,12 @@ def _text(words: Words, source: SceneSource) -> str:
     return toml_text(scene.to_dict(), tuple(words["comments"]))
 
 
+def _parameters(words: Words, source: SceneSource) -> JsonText:
+    from service.schemas.scene_parameters import scene_parameters
+
+    return encoded(scene_parameters(resolve_scene(words["request"], source)).model_dump())
+
+
 def _measured(words: Words, source: SceneSource) -> JsonText:
     scene = resolve_scene(words["request"], source)
     return encoded(read_measurements(scene, words["files"]))
@@ -210,6 +216,7 @@ def runs(jobs: Registry, previews: Registry) -> dict[str, RunOn]:
     """The functions of the processes, by the names of the tasks."""
     tasks: dict[str, Answer] = {
         PLAN: _plan, READ: _read, TEXT: _text, EDIT: _edit, STORE: _store, MEASURED: _measured,
+        PARAMETERS: _parameters,
         RESOLVE: _Resolving.of(jobs),
         PREVIEW: _Resolving.of(previews),
     }  # fmt: skip

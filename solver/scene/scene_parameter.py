@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeVar
 from pydantic import ValidationError
 
 from solver.contacts.fields import Part, Real
-from solver.contacts.laws.parts import LawQuantity
+from solver.contacts.laws.parts import LawQuantity, Span, usual_span
 from solver.errors import SettingError
 
 if TYPE_CHECKING:
@@ -93,6 +93,8 @@ class SceneParameter:
         Whether it is a whole number.
     moves_contacts : bool
         Whether it is of the geometry that places contacts.
+    by_hand : bool
+        Whether it is worth a slider.
     """
 
     get: Callable[[], float]
@@ -106,6 +108,17 @@ class SceneParameter:
     listed: bool = True
     in_steps: bool = False
     moves_contacts: bool = False
+    by_hand: bool = True
+
+    def span(self, key: str) -> Span | None:
+        """Return what its slider covers, as the parameter `key` of its owner; None without a slider."""
+        if self.quantities:
+            return self.quantities[0].span(key)
+        if self.in_steps or not self.by_hand:
+            return None
+        if self.moves_contacts:  # a shape of another size is another damper
+            return Span(low=0.3, high=3.0, of=key)
+        return usual_span(key, self.least)
 
     @property
     def pulls(self) -> bool:

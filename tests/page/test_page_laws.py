@@ -123,3 +123,22 @@ def test_what_is_left_out_follows_what_it_is_taken_from(page_of: Any) -> None:
     page.fill("#slide-pad-kt >> xpath=../span/input", "6")
     page.press("#slide-pad-kt >> xpath=../span/input", "Tab")
     assert page.input_value("#slide-pad-kt_second >> xpath=../span/input") == "6"
+
+
+def test_a_damper_between_blades_is_drawn_varied_and_designed(page_of: Any) -> None:
+    """The wedge of a shipped scene: sliders of its mass, friction and angle, which the response follows."""
+    page = page_of("platform-wedge")
+    assert {"mass of wedge", "μ of wedge", "angle of wedge"} <= set(sliders(page))
+    expect(page.get_by_role("img", name=re.compile("springs; wedge"))).to_be_visible()
+    expect(page.locator("#structure-states")).to_contain_text("wedge")
+    expect(page.locator("#structure-states")).not_to_contain_text("linear")
+    assert {"wedge.mass", "wedge.mu", "wedge.kn", "speed"} <= set(variables(page))
+    expect(page.locator("#study")).to_be_enabled()
+    page.locator("#variable").select_option("wedge.mass")
+    expect(page.locator("#variable-unit")).to_have_text("kg")
+    page.fill("#slide-wedge-mass >> xpath=../span/input", "0.008")
+    page.press("#slide-wedge-mass >> xpath=../span/input", "Tab")
+    expect(page).to_have_url(re.compile(r"set=wedge\.mass:0\.008"))
+    expect(page.locator("#live-status")).to_contain_text("peak")
+    page.locator("#contact").select_option("speed")
+    assert sliders(page)[0] == "speed"

@@ -113,6 +113,7 @@ TABLE: dict[str, tuple[tuple[int, ...], Any]] = {
         {"kind": "point", "scene": "two-dof", "frequency_hz": 1.0, "harmonics": 1},
     ),
     # A scene's name is one owner's.
+    "POST /v1/scenes/parameters": ((401, 401, 422, 401, 401, 403, 200, 422), {"scene": "mine"}),
     "POST /v1/scenes/text": ((401, 401, 422, 401, 401, 403, 200, 422), {"scene": "mine"}),
     "POST /v1/scenes/read": (PLANNED, {"text": "name = 'mine'"}),
     "POST /v1/scenes/edit": (PLANNED, {"text": "name = 'mine'"}),

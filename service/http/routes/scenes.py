@@ -17,6 +17,7 @@ from service.jobs.common.scenes import SceneRequest
 from service.queue.scene_store import shipped
 from service.schemas.answers import SceneAnswer, SceneDetail, SceneList
 from service.schemas.pages import Cursor, Limit, ListQuery, page_of
+from service.schemas.scene_parameters import SceneParameterList
 from solver.scene.descriptions import DAMPER_LOAD
 
 texts = APIRouter(prefix="/v1/scenes", tags=["scenes"], route_class=TypedRoute)
@@ -25,6 +26,7 @@ router = APIRouter(prefix="/v1/scenes", tags=["scenes"])
 _FILE: dict[str, Any] = {"text": 'name = "half a scene"', "form": "toml"}
 _EDIT: dict[str, Any] = {"text": 'name = "a" # mine', "scene": {"name": "b"}}
 _SCENE: dict[str, Any] = {"scene": "two-dof", "set": {DAMPER_LOAD: 80}, "comments": ["as set"]}
+_WEDGE: dict[str, Any] = {"scene": "platform-wedge"}
 MOST_CHARACTERS = 4_000_000
 
 
@@ -56,8 +58,7 @@ class EditRequest(BaseModel):
 
 ReadBody = Annotated[ReadRequest, Body(openapi_examples={"read": {"value": _FILE}})]
 TextBody = Annotated[TextRequest, Body(openapi_examples={"text": {"value": _SCENE}})]
-
-
+ParametersBody = Annotated[SceneRequest, Body(openapi_examples={"wedge": {"value": _WEDGE}})]
 EditBody = Annotated[EditRequest, Body(openapi_examples={"edit": {"value": _EDIT}})]
 
 
@@ -102,6 +103,13 @@ async def text(body: TextBody, context: InContext) -> Response:
     """The TOML of a scene with its values set: the file that reproduces what was computed."""
     words = {"request": body, "comments": body.comments}
     return Response(await computed(context, answering.TEXT, words), media_type="application/toml")
+
+
+@texts.post("/parameters", response_model=SceneParameterList)
+async def parameters(body: ParametersBody, context: InContext) -> Response:
+    """The parameters of a scene's contacts, dampers, bodies and loads, with unit, value and range of each."""
+    found = await computed(context, answering.PARAMETERS, {"request": body})
+    return Response(found, media_type="application/json")
 
 
 @texts.post("/edit", response_model=SceneEdited)

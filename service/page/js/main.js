@@ -23,7 +23,7 @@ import { offerOthers, startOthers } from "./views/others.js";
 import { startPoint } from "./views/point.js";
 import { startRenewal } from "./views/renewal.js";
 import { startResponse, sweepView } from "./views/response.js";
-import { asked, current, listScenes, loadScene, shownScene, variedContacts } from "./scene/scenes.js";
+import { asked, current, listScenes, loadScene, shownScene, variedParts } from "./scene/scenes.js";
 import { fillSettings, startSettings } from "./scene/settings.js";
 import { contactTable, drawStructure } from "./scene/structure.js";
 import { startSensitivities } from "./views/sensitivities.js";
@@ -75,7 +75,7 @@ async function choose(name) {
 
 async function open() {
   await loadScene(state.scene);
-  const names = variedContacts().map((c) => c.name);
+  const names = variedParts();
   if (!names.includes(state.contact)) Object.assign(state, { contact: names[0] ?? "", variable: "" });
   fillSettings();
   write();
@@ -115,7 +115,7 @@ async function openRun({ id, kind, request }) {
   const [path] = Object.keys(request.variables ?? {});
   const varied = path ?? (request.from === undefined ? "" : request.parameter);
   if (varied && !varied.includes(",") && Object.keys(request.variables ?? {}).length < 2) {
-    [state.contact, state.variable] = varied.split(".");
+    [state.contact, state.variable = ""] = varied.split(".");
     state.range = range ?? [request.from, request.to];
   }
   if (kind === "march") state.at = request.frequency_hz;

@@ -35,6 +35,13 @@ class Span:
     logarithmic: bool = False
 
 
+def usual_span(key: str, least: float) -> Span:
+    """Return what a slider of a parameter covers that has no span of its own: values of the size it has."""
+    if least >= 0.0:
+        return Span(low=1.0 / _AROUND, high=_AROUND, of=key, logarithmic=True)
+    return Span(low=-_BOTH_WAYS, high=_BOTH_WAYS, of=key)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LawQuantity:
     """A parameter of a law.
@@ -82,11 +89,9 @@ class LawQuantity:
 
     def span(self, key: str) -> Span | None:
         """Return what its slider covers as the parameter `key`; None without a slider."""
-        if not self.by_hand or self.covered is not None:
-            return self.covered if self.by_hand else None
-        if self.least >= 0.0:
-            return Span(low=1.0 / _AROUND, high=_AROUND, of=key, logarithmic=True)
-        return Span(low=-_BOTH_WAYS, high=_BOTH_WAYS, of=key)
+        if not self.by_hand:
+            return None
+        return usual_span(key, self.least) if self.covered is None else self.covered
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

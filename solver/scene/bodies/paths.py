@@ -39,7 +39,7 @@ def body_parameter(scene: HasParts, path: str) -> SceneParameter | None:
 
     return SceneParameter(
         get=lambda: members[0].value_of(key), with_value=with_value, unit=unit,
-        slope=lambda: _slope(scene, members, key),
+        slope=lambda: _slope(scene, members, key), by_hand=key not in MOMENTS,
     )  # fmt: skip
 
 

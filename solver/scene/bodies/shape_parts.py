@@ -78,7 +78,7 @@ def shape_parameter(scene: HasParts, path: str) -> SceneParameter | None:
     if key in shape.GEOMETRY:
         return replace(whole, moves_contacts=True, slope=lambda: Slope(motions=_moved(scene, shape, key)))
     body = body_parameter(scene, path)
-    return whole if body is None else replace(whole, slope=body.slope)
+    return whole if body is None else replace(whole, slope=body.slope, by_hand=body.by_hand)
 
 
 def _with_shape(scene: HasParts, shape: AnyShape, key: str, path: str, new: float) -> dict[str, Any]:

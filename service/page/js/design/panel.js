@@ -4,7 +4,7 @@ import { state } from "../base/address.js";
 import { byId, el, say, show } from "../base/dom.js";
 import { on } from "../base/events.js";
 import { run } from "../network/jobs.js";
-import { asked, chooseVariable, current, defaultRange, ranges, value, variable, variables, variedContacts } from "../scene/scenes.js";
+import { asked, chooseVariable, current, defaultRange, ranges, value, variable, variables, variedParts } from "../scene/scenes.js";
 import { fillSettings, readSettings } from "../scene/settings.js";
 import { VIEWS } from "../views.js";
 import { Unreadable, bodyOf, fieldsOf } from "./body.js";
@@ -24,7 +24,7 @@ let lists = null;
 let given = null;
 
 export function startPanel() {
-  const paths = () => [...variables(), ...variedContacts().flatMap(({ name }) => ranges(name).map(({ path }) => path))].filter((path, i, all) => all.indexOf(path) === i);
+  const paths = () => [...variables(), ...variedParts().flatMap(ranges).map(({ path }) => path)].filter((path, i, all) => all.indexOf(path) === i);
   lists = {
     variables: rowsOf(byId("problem-variables"), { id: "problem-variables", one: "variable", least: 1, columns: [
       { key: "path", label: "Variable", type: "select", options: paths }, { key: "low", label: "from" }, { key: "high", label: "to" },

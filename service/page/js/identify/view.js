@@ -8,7 +8,7 @@ import { number, percent, quantity, seconds } from "../base/format.js";
 import { chart } from "../charts/chart.js";
 import { rowsOf } from "../design/rows.js";
 import { run } from "../network/jobs.js";
-import { asked, ranges, value, variables, variedContacts } from "../scene/scenes.js";
+import { asked, ranges, value, variables, variedParts } from "../scene/scenes.js";
 import { putAll } from "../views/live.js";
 import { clearData, fillData, list, runsRead, sourceNames, startData, tables } from "./data.js";
 import { candidatesTable, correlationTable, estimatesTable, loopsChart, phasesChart, responsesChart } from "./fit.js";
@@ -21,7 +21,7 @@ let plots = null;
 let last = null;
 
 export function startIdentify() {
-  const paths = () => [...new Set([...variables(), ...variedContacts().flatMap(({ name }) => ranges(name).map(({ path }) => path)), "excitation.amplitude"])];
+  const paths = () => [...new Set([...variables(), ...variedParts().flatMap(ranges).map(({ path }) => path), "excitation.amplitude"])];
   rows = rowsOf(byId("identify-unknowns"), { id: "identify-unknowns", one: "parameter", least: 1, columns: [
     { key: "path", label: "Parameter", type: "select", options: paths }, { key: "low", label: "from" }, { key: "high", label: "to" },
     { key: "mean", label: "Known before: mean", hint: "none" }, { key: "sd", label: "± standard deviation", hint: "none" },
@@ -63,7 +63,7 @@ function bounds(row) {
 }
 
 function fillUnknowns({ unknowns, priors, scaling, noise, robust, starts }) {
-  const own = variedContacts()[0]?.name;
+  const own = variedParts()[0];
   const first = own ? ranges(own).map(({ path }) => path).filter((path) => /\.(kt|mu)$/.test(path)) : [];
   const given = Object.entries(unknowns ?? {});
   rows.fill(given.length

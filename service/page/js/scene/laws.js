@@ -16,10 +16,3 @@ export async function loadLaws() {
 export const parametersOf = (contact) => laws.get(contact.law ?? usual) ?? [];
 
 export const parameterOf = (contact, key) => parametersOf(contact).find(({ name }) => name === key);
-
-// The value that a scene gives a parameter; what it leaves out follows from others, which `read` knows, or is not there.
-export function givenValue(contact, key, read) {
-  if (typeof contact[key] === "number") return contact[key];
-  const others = parameterOf(contact, key)?.otherwise;
-  return others ? others.reduce((product, other) => product * (read(other) ?? 0), 1) : null;
-}

@@ -2,9 +2,10 @@
 
 import { request } from "../network/api.js";
 import { state } from "../base/address.js";
-import { givenValue, parameterOf, parametersOf } from "./laws.js";
+import { learnUnits } from "../base/format.js";
 
-export const current = { body: null };
+// Its parameters as the service tells them, by path.
+export const current = { body: null, parameters: new Map() };
 
 export async function listScenes() {
   const items = [];
@@ -17,17 +18,22 @@ export async function listScenes() {
 }
 
 export async function loadScene(name) {
-  current.body = (await request(`/v1/scenes/${encodeURIComponent(name)}`)).scene;
+  const [{ scene }, { items }] = await Promise.all([
+    request(`/v1/scenes/${encodeURIComponent(name)}`),
+    request("/v1/scenes/parameters", { method: "POST", body: { scene: name } }),
+  ]);
+  current.body = scene;
+  current.parameters = new Map(items.map((parameter) => [parameter.path, parameter]));
+  learnUnits(items.map(({ name: own, unit }) => [own, unit]));
   return current.body;
 }
 
-const contactOf = (path) => (current.body?.contacts ?? []).find(({ name }) => name === path.split(".")[0]);
+// The contacts, dampers, bodies and loads that have something to vary by hand.
+export const variedParts = () =>
+  [...new Set([...current.parameters.values()].filter(({ slider }) => slider).map(({ part }) => part))];
 
-// The paths of a contact that are varied by hand.
-const pathsOf = (contact) =>
-  parametersOf(contact).filter(({ slider }) => slider).map(({ name }) => `${contact.name}.${name}`).filter((path) => ownValue(path) !== null);
-
-export const variedContacts = () => (current.body?.contacts ?? []).filter((contact) => pathsOf(contact).length);
+// The contact that is looked at, if the part is one.
+export const chosenContact = () => (current.body?.contacts ?? []).find(({ name }) => name === state.contact)?.name ?? null;
 
 export const firstForce = () => {
   const { excitation } = current.body;
@@ -37,63 +43,53 @@ export const firstForce = () => {
 // The value that the scene itself writes down; none where it follows from others.
 export function givenByScene(path) {
   if (path === "excitation.amplitude") return firstForce().amplitude;
-  const value = contactOf(path)?.[path.split(".")[1]];
-  return typeof value === "number" ? value : undefined;
+  const known = current.parameters.get(path);
+  return known && !known.otherwise ? known.value : undefined;
 }
 
-// The value of a path as the scene has it, before anything is set.
+// The value of a path as the scene has it, before anything is set; what it leaves out follows from others.
 export function ownValue(path) {
   if (path === "excitation.amplitude") return firstForce().amplitude;
-  const [name, keyName] = path.split(".");
-  const contact = contactOf(path);
-  return contact ? givenValue(contact, keyName, (other) => value(`${name}.${other}`)) : null;
+  const known = current.parameters.get(path);
+  return known?.otherwise ? known.otherwise.reduce((product, other) => product * (value(other) ?? 0), 1) : known?.value ?? null;
 }
 
 export const value = (path) => state.set[path] ?? ownValue(path);
 
-// What the sliders of a contact cover: a path, its words, its ends.
-export function ranges(name) {
-  const contact = contactOf(name);
-  return contact ? pathsOf(contact).map((path) => range(contact, path)) : [];
-}
-
-function range(contact, path) {
-  const { name, symbol, words, slider } = parameterOf(contact, path.split(".")[1]);
-  const size = slider.of === null ? 1 : Math.abs(ownValue(`${contact.name}.${slider.of}`)) || 1;
-  const negative = ownValue(path) < 0;
-  const [low, high] = [negative ? -slider.high : slider.low, slider.high].map((end) => end * size);
-  return { path, low, high, log: slider.logarithmic && !negative, text: `${symbol} of ${contact.name}`, words: words || name };
-}
+// What the sliders of a part cover: a path, its words, its ends.
+export const ranges = (name) =>
+  [...current.parameters.values()].filter(({ part, slider }) => slider && part === name).map(({ path, symbol, words, slider, ...own }) => ({
+    path, low: slider.low, high: slider.high, log: slider.logarithmic, text: path === name ? symbol : `${symbol} of ${name}`, words: words || own.name,
+  }));
 
 // What may be designed: what is positive, or may be.
 export const variables = () =>
-  variedContacts().flatMap(({ name }) => ranges(name)).filter(({ path, log }) => log || ownValue(path) > 0).map(({ path }) => path);
+  variedParts().flatMap(ranges).filter(({ path, log }) => log || ownValue(path) > 0).map(({ path }) => path);
+
+const variablesOf = (part) => variables().filter((path) => current.parameters.get(path).part === part);
 
 // The path that is designed: the one chosen, else the first of the contact.
 export function variable() {
-  const known = variables().filter((path) => path.startsWith(`${state.contact}.`));
+  const known = variablesOf(state.contact);
   return known.find((path) => path === `${state.contact}.${state.variable}`) ?? known[0] ?? "";
 }
 
 export function chooseVariable(path) {
-  [state.contact, state.variable] = path.split(".");
-  if (variables().find((other) => other.startsWith(`${state.contact}.`)) === path) state.variable = "";
+  [state.contact, state.variable = ""] = path.split(".");
+  if (variablesOf(state.contact)[0] === path) state.variable = "";
 }
 
 // What a request about this scene says.
 export const asked = () => ({ scene: state.scene, set: { ...state.set }, harmonics: state.harmonics });
 
-// The scene as a drawing shows it: contacts with the values set.
+// The scene as a drawing shows it: contacts and dampers with the values set.
 export function shownScene() {
-  const contacts = (current.body.contacts ?? []).map((contact) => {
-    const shown = { ...contact };
-    for (const [path, number] of Object.entries(state.set)) {
-      const [name, keyName] = path.split(".");
-      if (name === contact.name) shown[keyName] = number;
-    }
-    return shown;
-  });
-  return { ...current.body, contacts };
+  const asSet = (part) => {
+    const own = Object.entries(state.set).filter(([path]) => path.split(".")[0] === part.name);
+    return { ...part, ...Object.fromEntries(own.map(([path, number]) => [path.split(".")[1], number])) };
+  };
+  const { contacts = [], dampers = [] } = current.body;
+  return { ...current.body, contacts: contacts.map(asSet), dampers: dampers.map(asSet) };
 }
 
 export function defaultRange() {

@@ -8,7 +8,7 @@ import { length, number, quantity, unitOf } from "../base/format.js";
 import { previewer } from "../network/previews.js";
 import { responseOf } from "../charts/curves.js";
 import { ghosts, pinned } from "./pins.js";
-import { asked, current, ownValue, ranges, value, variedContacts } from "../scene/scenes.js";
+import { asked, current, ownValue, ranges, value, variedParts } from "../scene/scenes.js";
 
 const STEPS = 400;
 const RATE_WINDOW = 20;
@@ -126,7 +126,7 @@ function buildSliders() {
 }
 
 function contactChooser() {
-  const names = variedContacts().map((c) => c.name);
+  const names = variedParts();
   if (names.length < 2) return null;
   const choose = el("select", { id: "contact" }, names.map((name) => el("option", { value: name, selected: name === state.contact }, name)));
   choose.addEventListener("change", () => {

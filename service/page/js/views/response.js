@@ -7,7 +7,7 @@ import { saveFrom } from "../base/exports.js";
 import { length, number, seconds } from "../base/format.js";
 import { responseOf, throughPeak } from "../charts/curves.js";
 import { previewer } from "../network/previews.js";
-import { current } from "../scene/scenes.js";
+import { chosenContact, current } from "../scene/scenes.js";
 import { state } from "../base/address.js";
 import { saveToml } from "../base/toml.js";
 import { betweenPoints, notes } from "../base/words.js";
@@ -45,7 +45,7 @@ export const sweepView = {
   submitted(job) {
     points = [];
     const { scene, set, harmonics } = job.request;
-    asking({ kind: "limits", scene, set: set ?? {}, harmonics: harmonics ?? 11, contact: state.contact || null }, state.scene);
+    asking({ kind: "limits", scene, set: set ?? {}, harmonics: harmonics ?? 11, contact: chosenContact() }, state.scene);
   },
   waiting: () => say("response-status", "The sweep waits for a worker."),
   progress: ({ took, points: count }) => say("response-status", `Sweep:${took}; ${count} points.`),

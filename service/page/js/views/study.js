@@ -41,7 +41,8 @@ function bodyOf(kind) {
   const body = asked();
   const { scene, set } = body;
   // Peaks are followed where every contact is plain friction; a map without them is for all laws.
-  const tracked = current.body.contacts.every((contact) => (contact.law ?? "coulomb") === "coulomb");
+  const { contacts = [], dampers = [] } = current.body;
+  const tracked = !dampers.length && contacts.every((contact) => (contact.law ?? "coulomb") === "coulomb");
   const bodies = {
     sweep: () => body,
     design: () => ({ ...body, variables: { [path]: [low, high] } }),

@@ -1,0 +1,92 @@
+"""What the service says of the parameters of a scene's contacts, dampers, bodies and loads, and its speed."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, replace
+
+from pydantic import BaseModel, Field
+from pydantic.fields import FieldInfo
+
+from service.schemas.answers import AnswerModel
+from service.schemas.law_answers import SpanAnswer
+from solver.contacts.laws.parts import Span
+from solver.scene.bodies.paths import SPEED
+from solver.scene.parameter_paths import parameter_of
+from solver.scene.scene import Scene
+
+_INSIDE = 0.99
+
+
+class SceneParameterAnswer(AnswerModel):
+    """A number of a scene that may be set, swept over and designed."""
+
+    path: str
+    part: str = Field(description="The contact, damper, body or load that has it.")
+    name: str
+    symbol: str
+    unit: str = Field(description="Empty of a pure number.")
+    words: str
+    value: float
+    otherwise: list[str] | None = Field(
+        description="Paths whose product it is, where the scene leaves it out; null: it is written down."
+    )
+    slider: SpanAnswer | None = Field(description="What a slider covers, as values; null: it has none.")
+
+
+class SceneParameterList(AnswerModel):
+    """The parameters of a scene, those of a part one after the other."""
+
+    items: list[SceneParameterAnswer]
+
+
+def scene_parameters(scene: Scene) -> SceneParameterList:
+    """Return what can be said of every parameter of the parts of a scene and of its speed."""
+    parts = {part.name: part for part in (*scene.contacts, *scene.bodies, *scene.loads, *scene.dampers)}
+    items = []
+    for path in scene.parameter_paths():
+        owner, _, name = path.rpartition(".")
+        if owner in parts or path == SPEED:
+            items.append(_described(scene, path, parts.get(owner), name))
+    return SceneParameterList(items=items)
+
+
+def _described(scene: Scene, path: str, part: object, name: str) -> SceneParameterAnswer:
+    found = parameter_of(scene, path)
+    owner = path.rpartition(".")[0]
+    value, quantity = found.get(), found.quantities[0] if found.quantities else None
+    given = getattr(part, name, value) is not None
+    otherwise = None if given or quantity is None else quantity.otherwise
+    span, slider = found.span(name) if given or otherwise else None, None
+    field = type(part).model_fields.get(name) if isinstance(part, BaseModel) else None
+    if span is not None:
+        slider = SpanAnswer(**asdict(_of_value(scene, path, span, value, _least_and_most(field))))
+    return SceneParameterAnswer(
+        path=path, part=owner or path, name=name,
+        symbol=(quantity.symbol if quantity else "") or name, unit=found.unit,
+        words=(field.description if field else None) or "", value=value,
+        otherwise=None if otherwise is None else [f"{owner}.{other}" for other in otherwise],
+        slider=slider,
+    )  # fmt: skip
+
+
+def _of_value(scene: Scene, path: str, span: Span, value: float, ends: tuple[float, float]) -> Span:
+    """What a slider covers as values: around the size that it is told in, on one side of a negative value."""
+    if span.of is None:
+        size = 1.0
+    else:
+        owner = path.rpartition(".")[0]
+        size = abs(scene.value(f"{owner}.{span.of}" if owner else span.of)) or 1.0
+    low, high = span.low * size, span.high * size
+    negative = value < 0.0
+    low, high = max(-high if negative else low, ends[0]), min(high, ends[1])
+    return replace(span, low=low, high=high, of=None, logarithmic=span.logarithmic and not negative)
+
+
+def _least_and_most(field: FieldInfo | None) -> tuple[float, float]:
+    """What the schema of scenes allows; of an open end, a little inside."""
+    low, high = -math.inf, math.inf
+    for bound in () if field is None else field.metadata:
+        low = max(low, getattr(bound, "ge", low), _INSIDE * getattr(bound, "gt", low))
+        high = min(high, getattr(bound, "le", high), _INSIDE * getattr(bound, "lt", high))
+    return low, high
