@@ -6,7 +6,6 @@ import math
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from typing import TYPE_CHECKING, Unpack
 
 import numpy as np
@@ -166,7 +165,7 @@ def _solved(
     if before is not None and before.problem.cases is not problem.cases:
         before = None  # by another measure nothing is known but responses
     seen = () if before is None else before.looked_at
-    whole = WholeRange(search, local_search_of(problem.method, again=before is not None), found, seen)
+    whole = WholeRange(search, local_search_of(problem.method), found, seen)
     others = () if before is None else [dict(basin.values) for basin in before.basins[1:]]
     try:
         status = _search(whole, found, [*eased.starts, *others])
@@ -187,18 +186,15 @@ def _search(whole: WholeRange, found: list[Local], starts: Sequence[Mapping[str,
     return judge(min(found, key=lambda local: local.standing), finished=whole.finished)
 
 
-def local_search_of(method: Method, *, again: bool = False) -> LocalSearch:
-    """Return the local search of a method; CasADi and CVXPY are loaded when they are needed.
-
-    `again`: it goes on from an optimum with fewer harmonics, near which that with more is looked for.
-    """
+def local_search_of(method: Method) -> LocalSearch:
+    """Return the local search of a method; CasADi and CVXPY are loaded when they are needed."""
     if method is Method.IPOPT:
         from optim.methods.ipopt import ipopt_search
 
         return ipopt_search
-    from optim.methods.minimax import NEAR_RADIUS, thorough_search
+    from optim.methods.minimax import thorough_search
 
-    return partial(thorough_search, radius=NEAR_RADIUS) if again else thorough_search
+    return thorough_search
 
 
 def judge(best: Local, *, finished: bool = True) -> DesignStatus:

@@ -49,7 +49,6 @@ class DesignSearch:
         self._scale: float | None = None
         self._above = above  # the search with all harmonics, for which this one only ranks designs
         self._scout: DesignSearch | None = None
-        self._scout_leads = False
         self._least = (math.inf, math.inf)
         self._known: dict[tuple[float, ...], DesignEvaluation] = {}
         # Of another search: by another measure, or with other harmonics.
@@ -69,11 +68,8 @@ class DesignSearch:
             return self._known[place]
         if len(self.history) >= self._most:
             raise SearchStoppedError(DesignStatus.TOO_MANY)
-        before = self._earlier.get(place)
-        if before is None and self._scout is not None and self._scout_leads:
-            before = self._scout(values)
         evaluation = evaluate(
-            self.problem, values, errors=False, should_stop=self.should_stop, before=before
+            self.problem, values, errors=False, should_stop=self.should_stop, before=self._earlier.get(place)
         )  # fmt: skip
         self._known[place] = evaluation
         self.keep(evaluation)
@@ -88,13 +84,8 @@ class DesignSearch:
         scout = 0 if self._scout is None else len(self._scout.history)
         return self._before + len(self.history) + scout
 
-    def scout(self, harmonics: int, *, leads: bool = False) -> DesignSearch:
-        """Return a search of the same problem with fewer harmonics, to be handed to `scouting_done`.
-
-        If it `leads`, every response begins where that with fewer harmonics does: from nothing, one with many
-        may take longer to begin than to follow.
-        """
-        self._scout_leads = leads
+    def scout(self, harmonics: int) -> DesignSearch:
+        """Return a search of the same problem with fewer harmonics, to be handed to `scouting_done`."""
         fewer = replace(self.problem, harmonics=harmonics)
         self._scout = DesignSearch(
             fewer, self.on_progress, self.should_stop, on_best=self.on_best, above=self,

@@ -72,7 +72,7 @@ class WholeRange:
         few = max(FEWEST, (search.problem.harmonics + 1) // 2)
         few = few if self._n > 1 else search.problem.harmonics
         few = min((one.harmonics for one in seen), default=few)
-        self._scout = search if few >= search.problem.harmonics else search.scout(few, leads=bool(seen))
+        self._scout = search if few >= search.problem.harmonics else search.scout(few)
         self._seen = [one for one in seen if one.harmonics == few]
         self._starts: list[Real] = []
         self._ends: list[tuple[Local, DesignEvaluation]] = []  # with the numbers of the look

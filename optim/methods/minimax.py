@@ -26,7 +26,6 @@ from optim.problem.variables import BoundedVariable, Real, snapped, unscaled
 Subproblem = Callable[[Model, Real, float], Step | None]
 
 FIRST_RADIUS = 0.2
-NEAR_RADIUS = 0.02  # the same from an optimum with fewer harmonics
 LARGEST_RADIUS = 0.5
 SMALLEST_RADIUS = 1e-9
 STATIONARY = 1e-11  # predicted relative decrease below which a design is optimal
@@ -43,7 +42,7 @@ NOTHING = 1e-9  # multipliers below it are rounding of the conic solver
 def minimax_search(
     evaluate: Evaluate, variables: tuple[BoundedVariable, ...], begin: DesignEvaluation, model_of: ModelOf, *,
     solve: Subproblem | None = None, norm: float = np.inf, remembered: int = REMEMBERED,
-    enough: float = -np.inf, radius: float = FIRST_RADIUS,
+    enough: float = -np.inf,
 ) -> Local:  # fmt: skip
     """Improve a design until no first-order decrease is left.
 
@@ -57,13 +56,12 @@ def minimax_search(
     norm : in which its trust region is round.
     remembered : designs whose rows are kept as cuts.
     enough : merit from which on nothing better is looked for.
-    radius : of the first trust region.
     """
     solve = solve or solve_subproblem
     n = len(variables)
     here, model = begin, model_of(begin)
     model = replace(model, penalty=min(FIRST_PENALTY * abs(model.objective) or PENALTY, PENALTY))
-    hessian = np.zeros((n, n))
+    hessian, radius = np.zeros((n, n)), FIRST_RADIUS
     seen: deque[Model] = deque(maxlen=remembered)
     for _ in range(MOST_STEPS):
         known = with_cuts(model, seen, CUTS_REACH * radius)
@@ -107,18 +105,16 @@ def _too_weak(model: Model, step: Step) -> bool:
 
 def thorough_search(
     evaluate: Evaluate, variables: tuple[BoundedVariable, ...], begin: DesignEvaluation, model_of: ModelOf,
-    enough: float = -np.inf, radius: float = FIRST_RADIUS,
+    enough: float = -np.inf,
 ) -> Local:  # fmt: skip
     """Improve a design with cuts, and go on without them where that does not settle.
 
     A row bent over a long step may pass for a new one and hold a search where nothing is.
     """
-    found = minimax_search(evaluate, variables, begin, model_of, enough=enough, radius=radius)
+    found = minimax_search(evaluate, variables, begin, model_of, enough=enough)
     if found.settled or found.merit <= enough:
         return found
-    again = minimax_search(
-        evaluate, variables, found.evaluation, model_of, remembered=0, enough=enough, radius=radius
-    )  # fmt: skip
+    again = minimax_search(evaluate, variables, found.evaluation, model_of, remembered=0, enough=enough)
     return min(found, again, key=lambda local: (local.standing, not local.settled))
 
 
