@@ -18,6 +18,7 @@ from optim.results.json import known_parts, over_bands
 from solver.balance.balance import build
 from solver.balance.kernels.output import HALF_RANGE, MAX_ABS
 from solver.balance.workspace import Workspace
+from solver.continuation.branch import Branch
 from solver.continuation.extrema.error_estimate import ErrorEstimator
 from solver.results.known import HALF_PEAK_TO_PEAK, Known
 from solver.results.watch import ShouldStop
@@ -39,7 +40,22 @@ def well_known(problem: Problem, evaluation: DesignEvaluation) -> bool:
 
 def doubt_in(problem: Problem, evaluation: DesignEvaluation) -> float:
     """Return the share by which the highest peak of a design may be higher."""
-    return doubt_of(known_parts(evaluation), {case.name: case.weight for case in problem.cases})
+    parts = [(case, _sized(b)) for case, b in over_bands(evaluation).items() if b.peak is not None]
+    return doubt_of(parts, {case.name: case.weight for case in problem.cases})
+
+
+def _sized(branch: Branch) -> Known:
+    """Return `Branch.known` as far as measure, value and error.
+
+    Where half peak to peak is observed these do not depend on what else the balance has at the peak, of
+    which a search takes longer than the response where contacts alone hold a part.
+    """
+    if branch.peak is None or not branch.balance.scene.observe.centred:
+        return branch.known
+    return Known(
+        measure=HALF_PEAK_TO_PEAK, peak_half_peak_to_peak=branch.peak.value,
+        half_peak_to_peak_error=branch.error_estimate,
+    )  # fmt: skip
 
 
 def _doubt_at_peaks(problem: Problem, evaluation: DesignEvaluation) -> float:
@@ -62,7 +78,7 @@ def _doubt_at_peaks(problem: Problem, evaluation: DesignEvaluation) -> float:
             return 0.0
         error = ErrorEstimator(workspace).at(there.u, p, across=peak.interior)
         known = replace(
-            branch.known, peak_max_abs=float(measures.values[MAX_ABS]), error_estimate=error.max_abs,
+            _sized(branch), peak_max_abs=float(measures.values[MAX_ABS]), error_estimate=error.max_abs,
             peak_half_peak_to_peak=float(measures.values[HALF_RANGE]),
             half_peak_to_peak_error=error.half_peak_to_peak,
         )  # fmt: skip
@@ -116,6 +132,10 @@ def with_enough(
             if found.good and well_known(more, found):
                 # With too few harmonics a mean may seem free that is not.
                 return replace(_by_its_measure(more, found), start=start), tried
+            if otherwise is not None and found.good and _by_its_measure(more, found) is not more:
+                # A mean that is free with twice the harmonics is free: by the right measure the optimum may
+                # lie elsewhere, and it is that one whose harmonics count.
+                return otherwise, tried
             last, left = (found, doubt_in(more, found)) if found.good else (last, doubt)
         # From one doubling to the next a doubt falls by the same factor, if it falls; not among the first
         # harmonics, of which one may meet a resonance that those before it do not.

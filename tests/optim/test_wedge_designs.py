@@ -99,3 +99,26 @@ def test_the_best_wedge_is_that_of_points(
     found = optim.design(scene, variables=variables, harmonics=HARMONICS)
     assert found.status is status
     _is_least(scene, found, variables, (-1e-2, -1e-3, -1e-5, 1e-5, 1e-3, 1e-2), 61, 10)
+
+
+@pytest.mark.long
+def test_a_heavier_wedge_than_max_x_asks_for_is_best_by_half_peak_to_peak() -> None:
+    """The mean is free: a grid of sweeps by half peak to peak judges, and twice the harmonics agree."""
+    scene = solver.load_scene("platform-wedge")
+    found = optim.design(scene, variables={"wedge.mass": (0.005, 0.05)}, harmonics=HARMONICS)
+    assert found.status is DesignStatus.AT_BOUND
+    assert found.known is not None
+    assert found.peak is not None
+    assert found.known.measure == "half_peak_to_peak"
+    assert found.optimum["wedge.mass"] == pytest.approx(0.05, rel=1e-9)
+    observed = scene.model_copy(
+        update={"observe": scene.observe.model_copy(update={"measure": "half_peak_to_peak"})}
+    )
+    for mass in np.geomspace(0.005, 0.05, 15):
+        swept = solver.sweep(observed.with_values({"wedge.mass": float(mass)}), harmonics=HARMONICS)
+        if swept.reached:
+            assert swept.peak is not None
+            assert swept.peak.value >= found.peak.value * (1.0 - 1e-9)
+    best = solver.sweep(observed.with_values(dict(found.optimum)), harmonics=2 * HARMONICS)
+    assert best.peak is not None
+    assert best.peak.value == pytest.approx(found.peak.value, rel=1e-9)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 
 import numpy as np
@@ -181,29 +181,39 @@ def glance_at(
     )
 
 
+class _TooLongError(Exception):
+    """A sweep takes far longer than those before."""
+
+
 def sweep_within(scene: Scene, harmonics: int, effects: Effects | None, allowance: Allowance) -> Branch:
-    """Sweep over the band of a scene; one that takes far longer than those before is left incomplete.
+    """Sweep over the band of a scene; one that takes far longer than those before is given up.
+
+    Of that one a beginning without peaks is returned, with all its Newton iterations: to look for peaks
+    among its many points would cost several times what it has cost already.
 
     Raises
     ------
     HaltedError
         The caller wants it to end.
     """
-    spent, stopped = 0, False
+    spent = 0
 
     def watch(stretch: Stretch) -> None:
         nonlocal spent
         spent = stretch.newton_iterations
 
     def stop() -> bool:
-        nonlocal stopped
-        stopped = allowance.due()
-        return stopped or spent > allowance.longest
+        if allowance.due():
+            raise HaltedError(TrackStatus.STOPPED)
+        if spent > allowance.longest:
+            raise _TooLongError
+        return False
 
-    branch = sweep(scene, harmonics=harmonics, effects=effects, on_stretch=watch, should_stop=stop)
-    if stopped:
-        raise HaltedError(TrackStatus.STOPPED)
-    return branch
+    try:
+        return sweep(scene, harmonics=harmonics, effects=effects, on_stretch=watch, should_stop=stop)
+    except _TooLongError:
+        begun = sweep(scene, harmonics=harmonics, effects=effects, peaks=False, should_stop=lambda: True)
+        return replace(begun, newton_iterations=spent)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

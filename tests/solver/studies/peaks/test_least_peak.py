@@ -15,6 +15,8 @@ import solver
 from solver.errors import SettingError
 from solver.studies.peaks.minimise_peak import least_peak
 from solver.studies.peaks.results import LeastPeak, TrackStatus
+from solver.studies.peaks.track import sweep_within
+from solver.studies.peaks.work_limit import Allowance
 
 DESIGNS = [
     ("two-dof", "damper.N0", 10.0, 500.0),
@@ -269,6 +271,22 @@ def test_stopped_before_the_proof() -> None:
     assert best.branch is None
     assert not any(basin.proven for basin in best.basins)
     assert best.peak <= highest(case_a(), "damper.N0", best.at)[0] * (1.0 + 1e-8)
+
+
+def test_a_response_that_takes_far_longer_is_given_up_with_all_its_work(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It has no peaks to be followed; one that takes as long as others has those of a sweep."""
+    allowance, scene = Allowance(None), scene_of("bladed-disk")
+    whole = sweep_within(scene, 11, None, allowance)
+    assert whole.reached
+    assert [peak.value for peak in whole.peaks] == [peak.value for peak in solver.sweep(scene).peaks]
+    allowance.measure([1])
+    monkeypatch.setattr("solver.studies.peaks.work_limit.LONGEST", 0.1)
+    short = sweep_within(scene, 11, None, allowance)
+    assert not short.reached
+    assert not short.peaks
+    assert allowance.longest < short.newton_iterations <= whole.newton_iterations
 
 
 @pytest.mark.parametrize("basins", [0, -1, 1.5, True])
