@@ -13,6 +13,7 @@ from typing import Any
 
 from service.errors import BodyTooLargeError, InvalidRequestError, MalformedBodyError, issues_to_json
 from service.jobs.common.measurements import read_measurements
+from service.jobs.common.scene_parameters import scene_parameters
 from service.jobs.common.scene_text import issues_of_scene, read_text, side_by_side
 from service.jobs.common.scenes import (
     read_scene,
@@ -169,8 +170,6 @@ def _text(words: Words, source: SceneSource) -> str:
 
 
 def _parameters(words: Words, source: SceneSource) -> JsonText:
-    from service.schemas.scene_parameters import scene_parameters
-
     return encoded(scene_parameters(resolve_scene(words["request"], source)).model_dump())
 
 

@@ -13,11 +13,11 @@ from service.http.dependencies import TEXT, Context, InContext, JsonBody, TypedR
 from service.http.in_lane import computed, reading
 from service.jobs import answering
 from service.jobs.answering import STORE
+from service.jobs.common.scene_parameters import SceneParameterList
 from service.jobs.common.scenes import SceneRequest
 from service.queue.scene_store import shipped
 from service.schemas.answers import SceneAnswer, SceneDetail, SceneList
 from service.schemas.pages import Cursor, Limit, ListQuery, page_of
-from service.schemas.scene_parameters import SceneParameterList
 from solver.scene.descriptions import DAMPER_LOAD
 
 texts = APIRouter(prefix="/v1/scenes", tags=["scenes"], route_class=TypedRoute)

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, replace
 
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, ConfigDict, Field
 from pydantic.fields import FieldInfo
 
-from service.schemas.answers import AnswerModel
-from service.schemas.law_answers import SpanAnswer
 from solver.contacts.laws.parts import Span
 from solver.scene.bodies.paths import SPEED
 from solver.scene.parameter_paths import parameter_of
@@ -18,8 +15,20 @@ from solver.scene.scene import Scene
 _INSIDE = 0.99
 
 
-class SceneParameterAnswer(AnswerModel):
+class SliderAnswer(BaseModel):
+    """What a slider covers."""
+
+    model_config = ConfigDict(frozen=True)
+
+    low: float
+    high: float
+    logarithmic: bool
+
+
+class SceneParameterAnswer(BaseModel):
     """A number of a scene that may be set, swept over and designed."""
+
+    model_config = ConfigDict(frozen=True)
 
     path: str
     part: str = Field(description="The contact, damper, body or load that has it.")
@@ -31,10 +40,10 @@ class SceneParameterAnswer(AnswerModel):
     otherwise: list[str] | None = Field(
         description="Paths whose product it is, where the scene leaves it out; null: it is written down."
     )
-    slider: SpanAnswer | None = Field(description="What a slider covers, as values; null: it has none.")
+    slider: SliderAnswer | None = Field(description="What a slider covers, as values; null: it has none.")
 
 
-class SceneParameterList(AnswerModel):
+class SceneParameterList(BaseModel):
     """The parameters of a scene, those of a part one after the other."""
 
     items: list[SceneParameterAnswer]
@@ -60,7 +69,7 @@ def _described(scene: Scene, path: str, part: object, name: str) -> SceneParamet
     span, slider = found.span(name) if given or otherwise else None, None
     field = type(part).model_fields.get(name) if isinstance(part, BaseModel) else None
     if span is not None:
-        slider = SpanAnswer(**asdict(_of_value(scene, path, span, value, _least_and_most(field))))
+        slider = _slider(scene, path, span, value, _least_and_most(field))
     return SceneParameterAnswer(
         path=path, part=owner or path, name=name,
         symbol=(quantity.symbol if quantity else "") or name, unit=found.unit,
@@ -70,7 +79,7 @@ def _described(scene: Scene, path: str, part: object, name: str) -> SceneParamet
     )  # fmt: skip
 
 
-def _of_value(scene: Scene, path: str, span: Span, value: float, ends: tuple[float, float]) -> Span:
+def _slider(scene: Scene, path: str, span: Span, value: float, ends: tuple[float, float]) -> SliderAnswer:
     """What a slider covers as values: around the size that it is told in, on one side of a negative value."""
     if span.of is None:
         size = 1.0
@@ -80,7 +89,7 @@ def _of_value(scene: Scene, path: str, span: Span, value: float, ends: tuple[flo
     low, high = span.low * size, span.high * size
     negative = value < 0.0
     low, high = max(-high if negative else low, ends[0]), min(high, ends[1])
-    return replace(span, low=low, high=high, of=None, logarithmic=span.logarithmic and not negative)
+    return SliderAnswer(low=low, high=high, logarithmic=span.logarithmic and not negative)
 
 
 def _least_and_most(field: FieldInfo | None) -> tuple[float, float]:
