@@ -6,9 +6,12 @@ The names stand once, in the stub that type checkers and editors read: ``from .m
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable, Mapping
+from functools import wraps
 from importlib import import_module
+from types import FunctionType
 
 
 def names_of(package: str, file: str) -> dict[str, str]:
@@ -38,7 +41,31 @@ def on_first_use(
             known = sys.modules[package]  # what Python reads to ask "Did you mean …?"
             raise AttributeError(f"module {package!r} has no attribute {name!r}", name=name, obj=known)
         value = getattr(import_module(homes[name]), name)
+        if homes[name].startswith(f"{package}."):  # not what another package has made public already
+            value = _with_names_of_scenes(value, package)
         setattr(sys.modules[package], name, value)
         return value
 
     return load, lambda: sorted({*vars(sys.modules[package]), *homes}), sorted(homes)
+
+
+def _with_names_of_scenes(value: object, package: str) -> object:
+    """Return a public function of a scene such that its name or file does as well; others as they are."""
+    if not isinstance(value, FunctionType):
+        return value
+    inner = value
+    while isinstance(known := getattr(inner, "__wrapped__", None), FunctionType):
+        inner = known
+    if not inner.__code__.co_argcount or inner.__code__.co_varnames[0] != "scene":
+        return value
+
+    @wraps(value)
+    def asked(*args: object, **kwargs: object) -> object:
+        if args and isinstance(args[0], str | os.PathLike):
+            args = (import_module("solver.scene.scene").load_scene(args[0]), *args[1:])
+        elif isinstance(kwargs.get("scene"), str | os.PathLike):
+            kwargs["scene"] = import_module("solver.scene.scene").load_scene(kwargs["scene"])
+        return value(*args, **kwargs)
+
+    asked.__module__ = package  # where it is found by its name, as pickle does
+    return asked

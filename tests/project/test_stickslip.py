@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 import subprocess
 import sys
 from importlib import import_module
@@ -125,3 +126,15 @@ def test_every_result_is_shown_by_functions_that_are_there() -> None:
         places = [f"summary:{view.summary}", f"to_dataset:{view.dataset}"]
         for place in [*places, *([f"plots.{figure}"] if view.figure else [])]:
             assert callable(on_demand(f"{view.package}.{place}"))
+
+
+def test_the_name_of_a_scene_does_where_a_scene_does(tmp_path: Path) -> None:
+    by_name = stickslip.solve("two-dof", frequency_hz=1.0, harmonics=3)
+    given = stickslip.solve(stickslip.load_scene("two-dof"), frequency_hz=1.0, harmonics=3)
+    assert by_name.max_abs == given.max_abs
+    file = tmp_path / "mine.toml"
+    file.write_text((ROOT / "solver" / "scene" / "shipped" / "two-dof.toml").read_text())
+    assert stickslip.plan(scene=file, harmonics=3).unknowns == stickslip.plan("two-dof", harmonics=3).unknowns
+    with pytest.raises(stickslip.SceneError, match="did you mean"):
+        stickslip.sweep("two-dofs")
+    assert pickle.loads(pickle.dumps(stickslip.solve)) is stickslip.solve
