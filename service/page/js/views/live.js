@@ -90,7 +90,7 @@ function drawn(answer, { milliseconds, token }) {
   latest = answer;
   redraw();
   tell("states", { states: answer.states, at: answer.peak?.at });
-  const fewer = answer.n_harmonics < state.harmonics ? ` · with ${answer.n_harmonics} of ${state.harmonics} harmonics, as the whole disk is solved: the frequency response below keeps all` : "";
+  const fewer = answer.n_harmonics < state.harmonics ? ` · with ${answer.n_harmonics} of ${state.harmonics} harmonics, to answer at once: the frequency response below keeps all` : "";
   byId("live-status").textContent = `${words(answer)} · ${answer.points} points in ${number(answer.seconds * 1e3, 2)} ms, answered after ${number(milliseconds, 2)} ms${fewer}`;
   performance.mark("live-drawn");
   document.documentElement.dataset.live = String(Number(document.documentElement.dataset.live ?? 0) + 1);
