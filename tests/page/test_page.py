@@ -243,7 +243,7 @@ def test_what_is_too_large_for_the_sliders_says_so_and_becomes_a_job(profile: Pr
     whole["structure"] |= {"sectors": 6, "mistuning": {"of": ["tip"], "spread": 0.02, "seed": 1}}
     assert httpx.post(f"{site.url}/v1/scenes", json=whole).status_code in (200, 201)
     page = visit(context, site, "?scene=whole")
-    expect(page.locator("#live-status")).to_contain_text("with 4 of 11 harmonics, as the whole disk is")
+    expect(page.locator("#live-status")).to_contain_text("with 4 of 11 harmonics, to answer at once")
     expect(page.locator("#plan-facts summary").first).to_have_text("and 5 further sectors")
     page.goto(f"{site.url}/?scene=two-dof&harmonics=50&tab=all")
     expect(page.locator("#live-status")).to_contain_text("must be at most 41, got 50")

@@ -32,6 +32,11 @@ export function startLive() {
   ask = previewer("sweep", drawn, refused);
   pinned(() => latest);
   on("pins", redraw);
+  // The curve of another scene is not shown under the name of this one, whether its own comes or not.
+  on("scene-left", () => {
+    latest = null;
+    plot.clear();
+  });
   on("scene", () => {
     latest = null;
     buildSliders();
