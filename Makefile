@@ -71,7 +71,7 @@ demo: $(PACKAGES)
 test: style
 	$(BIN)/python -m service.warm_up
 	$(BIN)/mypy & types=$$!; \
-	  PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n 4 --dist loadgroup $(PYTEST); tests=$$?; \
+	  PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n 4 --dist worksteal $(PYTEST); tests=$$?; \
 	  wait $$types && exit $$tests
 
 test-long: dev

@@ -15,10 +15,6 @@ for _library in ("OMP", "OPENBLAS", "MKL"):
     os.environ[f"{_library}_NUM_THREADS"] = "1"
 
 
-# Folders whose tests have one service for the session.
-SHARING = ("page", "service/attacks")
-
-
 @pytest.hookimpl(wrapper=True)
 def pytest_collection() -> Generator[None, object, object]:
     """What is collected stays: the garbage collector does not look through it, then or later."""
@@ -69,14 +65,6 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         config.hook.pytest_deselected(items=of_other_parts)
         others = set(of_other_parts)
         items[:] = [item for item in items if item not in others]
-    for item in items:
-        item.add_marker(pytest.mark.xdist_group(_together(item)))
-
-
-def _together(item: pytest.Item) -> str:
-    """What one of several processes runs whole: tests that share a service, a browser, computed truths."""
-    path = item.path.relative_to(item.config.rootpath / "tests")
-    return next((name for name in SHARING if path.is_relative_to(name)), str(path))
 
 
 def _named(item: pytest.Item, keep: Collection[object]) -> bool:

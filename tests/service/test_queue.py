@@ -125,12 +125,13 @@ def test_a_waiting_job_is_dismissed_at_once_and_an_ended_one_not(lasting: Embedd
 
 
 def test_higher_priority_first_then_in_order(lasting: EmbeddedService) -> None:
-    blocker = lasting.submit("iteration", {"seconds": 0.5})
+    blocker = lasting.submit("iteration", {"seconds": 60.0})
     until(lambda: lasting.job(blocker).status is JobState.RUNNING)
     low = lasting.submit("iteration", {"seed": 1, "priority": -1})
     first = lasting.submit("iteration", {"seed": 2})
     second = lasting.submit("iteration", {"seed": 3})
     high = lasting.submit("iteration", {"seed": 4, "priority": 5})
+    lasting.dismiss(blocker)
     started = {job: lasting.wait(job, timeout=PATIENCE).started for job in (low, first, second, high)}
     assert sorted(started, key=started.__getitem__) == [high, first, second, low]
 

@@ -1,6 +1,7 @@
 """The transient from rest to a response whose contacts stick, against matrix exponentials of the annulus."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -102,7 +103,7 @@ def test_a_motion_that_grows_is_not_proven() -> None:
     start = _start(scene)
     model = start.model
     grows = Start(
-        model=model.__class__(**{name: getattr(model, name) for name in model.__slots__} | {"C0": -model.C0}),
-        stiffness=start.stiffness, x=start.x, v=start.v, omega=start.omega,
+        model=replace(model, C0=-model.C0), stiffness=start.stiffness, x=start.x, v=start.v,
+        omega=start.omega,
     )  # fmt: skip
     assert not keeps_sticking(grows, lambda _moved, _tau: True, lambda _moved: True)
