@@ -61,11 +61,17 @@ def _with_names_of_scenes(value: object, package: str) -> object:
 
     @wraps(value)
     def asked(*args: object, **kwargs: object) -> object:
-        if args and isinstance(args[0], str | os.PathLike):
-            args = (import_module("solver.scene.scene").load_scene(args[0]), *args[1:])
-        elif isinstance(kwargs.get("scene"), str | os.PathLike):
-            kwargs["scene"] = import_module("solver.scene.scene").load_scene(kwargs["scene"])
+        if args:
+            args = (_scene_of(args[0]), *args[1:])
+        elif "scene" in kwargs:
+            kwargs["scene"] = _scene_of(kwargs["scene"])
         return value(*args, **kwargs)
 
     asked.__module__ = package  # where it is found by its name, as pickle does
     return asked
+
+
+def _scene_of(given: object) -> object:
+    """Return the scene of that name or file; what is none of both as it is."""
+    named = isinstance(given, str | os.PathLike)
+    return import_module("solver.scene.scene").load_scene(given) if named else given
