@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from solver.contacts.kernels.coulomb.planar import periods_to_repeat, plane_step
 from solver.contacts.kernels.state_durations import find_segments
 from solver.contacts.kernels.stick_slip_events import (
     BEGIN,
@@ -74,26 +73,3 @@ def motion_at(found: Segments, tau: Real) -> list[ContactMotion]:
         inside = (tau - row[BEGIN]) % _TURN <= row[END] - row[BEGIN]
         motion[inside] = ContactMotion.SLIP if row[MOTION] == SLIP else ContactMotion.STICK
     return motion.tolist()
-
-
-def sampled_shares(motions: Real, load: Real, kt: float, mu: float, samples: int) -> Shares:
-    """Return the shares under a circular limit, whose law is sampled: those of its intervals.
-
-    Parameters
-    ----------
-    motions : (2, 2H + 1) full coefficients [m]; load : full coefficients [N].
-    """
-    tau = np.linspace(0.0, _TURN, samples, endpoint=False)
-    u = np.ascontiguousarray((fourier.basis(tau, (motions.shape[1] - 1) // 2) @ motions.T).T)
-    limit = mu * (fourier.basis(tau, (load.size - 1) // 2) @ load)
-    T, seeds, nothing = np.zeros(2), np.empty((7, 0)), np.empty((2, 0))
-    plane_step(kt, u[0, 0], u[1, 0], limit[0], limit[0], T, seeds, nothing)
-    apart = slips = 0
-    for _ in range(periods_to_repeat(u, limit, kt)):
-        apart = slips = 0
-        for j in range(samples):
-            to = (j + 1) % samples
-            du, dw = u[0, to] - u[0, j], u[1, to] - u[1, j]
-            slips += bool(plane_step(kt, du, dw, limit[j], limit[to], T, seeds, nothing))
-            apart += bool(limit[to] <= 0.0)
-    return Shares(stick=(samples - slips - apart) / samples, slip=slips / samples, separation=apart / samples)

@@ -167,13 +167,10 @@ def _every_one(solution: Solution, sticking: tuple[_Contact, ...]) -> bool:
 
 
 def _sticks(slider: Slider, response: ContactResponse) -> bool:
-    """Return whether what has one limit sticks all the time.
-
-    Of a contact that slips one direction may stick, and one that is sampled may graze its limit without slip.
-    """
+    """Return whether what has one limit sticks all the time; of a contact that slips one direction may."""
     if response.state is ContactState.STUCK:
         return True
-    if not (slider.sampled or slider.limits_apart) or response.state is not ContactState.SLIPPING:
+    if not slider.limits_apart or response.state is not ContactState.SLIPPING:
         return False
     motions, forces, ports = np.array(response.motions), np.array(response.forces), list(slider.ports)
     slips = np.abs(forces[ports, 1:] - slider.pull(motions[ports, 1:]))

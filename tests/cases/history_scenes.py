@@ -75,8 +75,6 @@ def _contact(rng: np.random.Generator, name: str, dofs: list[str], force: float,
     if kind == "circle" and (name == "c0" or rng.random() < 0.5):
         limit = "circle" if rng.random() < 0.7 else "box"
         contact |= {"law": "coulomb-2d", "between_second": pair(), "limit": limit}
-        if limit == "circle":
-            contact["samples"] = 512
     if kind.startswith("box"):
         contact |= {"law": "coulomb-2d", "between_second": pair(), "limit": "box"}
     if kind == "box-moving" and (name == "c0" or rng.random() < 0.5):

@@ -12,7 +12,7 @@ from solver.contacts.kernels.laws import law_force, law_number
 from solver.contacts.kernels.stick_slip_events import SEGMENT_COLUMNS
 from solver.jit import fourier
 
-COULOMB_BOX, ELASTIC_NORMAL, GAP_SPRING, POLYNOMIAL, COULOMB_PLANE = columns.KERNELS[:5]
+COULOMB_LINE, ELASTIC_NORMAL, GAP_SPRING, POLYNOMIAL, _, COULOMB_CIRCLE, COULOMB_BOX, _ = columns.KERNELS
 LOAD_KS = fourier.all_harmonics(1)
 
 
@@ -87,7 +87,7 @@ def derivative_errors(
             same = (moved.state, moved.piece) == (here.state, here.piece)
             return moved.F.reshape(-1) if same else None
 
-        scale = max(np.abs(getattr(element, k)).max() / np.abs(d).max() for k, d in change.items())
+        scale = max(np.nanmax(np.abs(getattr(element, k))) / np.abs(d).max() for k, d in change.items())
         return central_difference(force, step * scale)
 
     found: dict[str, tuple[np.ndarray, list[np.ndarray | None]]] = {}
@@ -96,7 +96,7 @@ def derivative_errors(
     for name in names:
         unit = row_of(**{name: 1.0})
         at = getattr(columns, name)
-        change = unit * max(abs(element.row[at]), 1e-3) / max(np.abs(element.row).max(), 1e-300)
+        change = unit * max(abs(element.row[at]), 1e-3) / max(np.nanmax(np.abs(element.row)), 1e-300)
         exact = evaluate(element, slope=change).dF_dp.reshape(-1, 1)
         found[name] = (exact, [along(row=change)])
     if np.any(element.load):

@@ -19,6 +19,7 @@ PLANE: dict[str, Any] = {
     "N0": 0.8,
 }
 GAP: dict[str, Any] = {"law": "gap", "k": 3.0, "gap": 0.25}
+DAHL: dict[str, Any] = {"law": "dahl", "sigma": 2.0, "limit": 0.4}
 CUBIC: dict[str, Any] = {"law": "polynomial", "a1": 0.2, "a2": 0.1, "a3": 1.0}
 
 

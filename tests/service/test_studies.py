@@ -140,16 +140,13 @@ def test_a_long_one_tells_how_far_it_is_and_stops_when_it_is_dismissed(
     assert shipped.get(job["links"]["self"] + "/results").status_code == 409
 
 
-SAMPLED = {
-    "name": "ring", "law": "coulomb-2d", "between": ["m1", "ground"], "between_second": ["m2", "ground"],
-    "kt": 5.0, "mu": 0.3, "N0": 1.0, "samples": 64,
-}  # fmt: skip
+RING = {"name": "ring", "law": "dahl", "between": ["m1", "ground"], "sigma": 5.0, "limit": 0.3}
 
 
-def sampled() -> dict[str, Any]:
+def smooth() -> dict[str, Any]:
     """A scene whose peaks are not tracked: for its contacts there are no exact second derivatives."""
     scene: dict[str, Any] = dict(solver.load_scene("two-dof").to_dict())
-    scene["contacts"] = [*scene["contacts"], SAMPLED]
+    scene["contacts"] = [*scene["contacts"], RING]
     return scene
 
 
@@ -172,8 +169,8 @@ def sampled() -> dict[str, Any]:
         ({**MAP, "scene": "bladed-disk", "parameter": "shroud.N0", "set": {}, "steps": 1000,
           "frequencies": 500, "harmonics": 200, "ridge": False, "to": -1}, ["/to"]),
         ({**MAP, "ridge": "no"}, ["/ridge"]),
-        ({**PEAKS, "scene": sampled()}, ["/scene"]),
-        ({**MAP, "scene": sampled()}, ["/ridge"]),
+        ({**PEAKS, "scene": smooth()}, ["/scene"]),
+        ({**MAP, "scene": smooth()}, ["/ridge"]),
         ({**ACCURACY, "frequency_hz": 0}, ["/frequency_hz"]),
         ({**ACCURACY, "harmonics": []}, ["/harmonics"]),
         ({**ACCURACY, "harmonics": [3, 0]}, ["/harmonics/1"]),

@@ -39,20 +39,18 @@ CLOSED, TOUCHING, DEFORMING = 5, 6, 7
 # The kernels whose numbers are the same in every process, in their order; those of others are given when they
 # are first asked for.
 KERNELS = (
-    "solver.contacts.kernels.coulomb.ports:coulomb_ports",
+    "solver.contacts.kernels.coulomb.given_load:coulomb_line",
     "solver.contacts.kernels.coulomb.elastic_normal:elastic_normal",
     "solver.contacts.kernels.springs.force:gap_spring",
     "solver.contacts.kernels.springs.force:polynomial_spring",
-    "solver.contacts.kernels.coulomb.planar:coulomb_plane",
-    "solver.contacts.kernels.coulomb.ports:coulomb_sampled",
+    "solver.contacts.kernels.coulomb.given_load:coulomb_sampled",
     "solver.contacts.kernels.circle.law:coulomb_circle",
     "solver.contacts.kernels.coulomb.box:coulomb_box",
     "solver.contacts.kernels.history.law:history_law",
 )
 # Likewise those of second derivatives.
 SECOND_KERNELS = (
-    "solver.contacts.kernels.coulomb.second_law:ports_second",
-    "solver.contacts.kernels.coulomb.second_law:elastic_normal_second",
+    "solver.contacts.kernels.coulomb.second_law:line_second",
     "solver.contacts.kernels.coulomb.second_law:box_second",
     "solver.contacts.kernels.circle.second_law:circle_law_second",
     "solver.contacts.kernels.springs.second_law:gap_second",

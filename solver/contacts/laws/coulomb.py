@@ -63,8 +63,8 @@ class Contact(SlidesOnALine):
     FORCE: ClassVar[str] = (
         "stick `kt u + c`, slip `± μN`, nothing while `N <= 0`; `N = N0 + N1 cos(ωt + N1_phase)`"
     )
-    KERNEL: ClassVar[str] = "solver.contacts.kernels.coulomb.ports:coulomb_ports"
-    SECOND: ClassVar[str | None] = "solver.contacts.kernels.coulomb.second_law:ports_second"
+    KERNEL: ClassVar[str] = "solver.contacts.kernels.coulomb.given_load:coulomb_line"
+    SECOND: ClassVar[str | None] = "solver.contacts.kernels.coulomb.second_law:line_second"
     JENKINS: ClassVar[bool] = True
 
     law: Literal["coulomb"] | None = None
@@ -74,7 +74,7 @@ class Contact(SlidesOnALine):
     @property
     def sampled_kernel(self) -> str:
         """The kernel that samples motion and load instead."""
-        return "solver.contacts.kernels.coulomb.ports:coulomb_sampled"
+        return "solver.contacts.kernels.coulomb.given_load:coulomb_sampled"
 
     @property
     def evaluation(self) -> str:

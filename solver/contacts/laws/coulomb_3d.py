@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Any, ClassVar, Literal
 
@@ -12,7 +11,7 @@ from solver.contacts.fields import Between, Positive, Real
 from solver.contacts.kernels import columns
 from solver.contacts.laws.friction import FrictionContact
 from solver.contacts.laws.parts import LawQuantity, RestStiffness
-from solver.contacts.laws.plane import CIRCLE, CIRCLE_SECOND, SlidesInAPlane
+from solver.contacts.laws.plane import SlidesInAPlane
 
 _CLOSED = (columns.N0, 1)
 
@@ -24,8 +23,6 @@ class SpaceContact(SlidesInAPlane):
 
     Attributes
     ----------
-    between_second : (str, str) or None
-        The ends of the motion in the second direction. Left out where `normal` is given.
     normal_between : (str, str) or None
         The ends of the normal motion v = x(first) - x(second), v > 0 presses; None: the load is given. Left
         out where `normal` is given: the load then moves if there is a `kn`.
@@ -39,8 +36,6 @@ class SpaceContact(SlidesInAPlane):
     prestressed : bool
         Whether v counts from the state in which a positive N0 is in equilibrium already: the force on the
         normal pair is then max(N, 0) - max(N0, 0). Else it is the whole max(N, 0).
-    limit : "circle", "box" or None
-        |T| <= mu N for the whole force (also if left out), or each direction by itself.
     """
 
     LAW: ClassVar[str] = "coulomb-3d"
@@ -122,21 +117,7 @@ class SpaceContact(SlidesInAPlane):
         """The stiffness of each direction [N/m]."""
         return self.kt, self.kt if self.kt_second is None else self.kt_second
 
-    # Contact table and kernel
-
-    @property
-    def kernel(self) -> str:
-        """The kernel of its limit."""
-        if self.limits_apart:
-            return "solver.contacts.kernels.coulomb.box:coulomb_box"
-        return CIRCLE
-
-    @property
-    def second_kernel(self) -> str:
-        """The kernel of the second derivatives of its limit."""
-        if self.limits_apart:
-            return "solver.contacts.kernels.coulomb.second_law:box_second"
-        return CIRCLE_SECOND
+    # Contact table
 
     def value_of(self, key: str) -> float:
         """Value of a parameter; a second stiffness that is left out is the first."""
@@ -152,11 +133,11 @@ class SpaceContact(SlidesInAPlane):
         return super().followers(key) | tied
 
     def fill(self, row: Real, highest: int) -> None:
-        """Put its numbers into its row of the contact table; a tied second stiffness is NaN."""
+        """Put its numbers into its row of the contact table."""
         super().fill(row, highest)
         row[columns.PRESTRESSED] = float(self.prestressed)
-        if self.kt_second is None:
-            row[columns.KT_SECOND] = math.nan
+        if self.kt_second is not None:
+            row[columns.KT_SECOND] = self.kt_second
 
     def with_numbers(self, row: Real) -> SpaceContact:
         """The contact with the numbers of a row of the contact table."""

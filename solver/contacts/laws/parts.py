@@ -173,8 +173,6 @@ class Slider:
         The motion that changes the load, and by how much [N/m]; None and 0 where the load is given.
     limits_apart : bool
         Each direction has its own limit, in place of one for the whole force.
-    sampled : bool
-        The force comes from samples, so that it may graze its limit without any slip.
     """
 
     kt: float
@@ -184,7 +182,6 @@ class Slider:
     normal_port: int | None = None
     normal_stiffness: float = 0.0
     limits_apart: bool = False
-    sampled: bool = False
 
     @property
     def stiffnesses(self) -> tuple[float, ...]:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from solver.contacts.fields import Between, Real
+from solver.contacts.kernels import columns
 from solver.contacts.laws.friction import FrictionContact
 from solver.contacts.laws.parts import Follows, Row, Slider
 
@@ -13,12 +15,17 @@ if TYPE_CHECKING:
     from solver.contacts.pieces.piece import ContactPart
     from solver.contacts.segments import Shares
 
-CIRCLE = "solver.contacts.kernels.circle.law:coulomb_circle"
-CIRCLE_SECOND = "solver.contacts.kernels.circle.second_law:circle_law_second"
-
 
 class SlidesInAPlane(FrictionContact):
-    """Friction in two directions."""
+    """Friction in two directions.
+
+    Attributes
+    ----------
+    between_second : (str, str) or None
+        The ends of the motion in the second direction. Left out where `normal` is given.
+    limit : "circle", "box" or None
+        |T| <= mu N for the whole force (also if left out), or each direction by itself.
+    """
 
     RUBBING: ClassVar[tuple[int, ...]] = (0, 1)
 
@@ -26,14 +33,33 @@ class SlidesInAPlane(FrictionContact):
     limit: Literal["circle", "box"] | None = None
 
     @property
+    def kernel(self) -> str:
+        """The kernel of its limit."""
+        if self.limits_apart:
+            return "solver.contacts.kernels.coulomb.box:coulomb_box"
+        return "solver.contacts.kernels.circle.law:coulomb_circle"
+
+    @property
+    def second_kernel(self) -> str:
+        """The kernel of the second derivatives of its limit."""
+        if self.limits_apart:
+            return "solver.contacts.kernels.coulomb.second_law:box_second"
+        return "solver.contacts.kernels.circle.second_law:circle_law_second"
+
+    @property
     def force_alone(self) -> bool:
         """Whether its limit is the circle, whose kernel finds the force alone for less."""
-        return self.kernel == CIRCLE
+        return not self.limits_apart
 
     @property
     def limits_apart(self) -> bool:
         """Whether each direction has its own limit."""
         return self.limit == "box"
+
+    def fill(self, row: Real, highest: int) -> None:
+        """Put its numbers into its row of the contact table; NaN: a second stiffness that is the first's."""
+        super().fill(row, highest)
+        row[columns.KT_SECOND] = math.nan
 
     @property
     def tangent_varies(self) -> bool:

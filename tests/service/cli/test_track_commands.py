@@ -100,12 +100,12 @@ def test_contacts_without_second_derivatives_are_mapped_but_not_tracked(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     text = (Path(solver.__file__).parent / "scene" / "shipped" / "two-dof.toml").read_text()
-    plane = (
-        '[[contacts]]\nname = "plane"\nlaw = "coulomb-2d"\nbetween = ["m1", "ground"]\n'
-        'between_second = ["m2", "ground"]\nkt = 10.0\nmu = 0.3\nN0 = 50.0\nsamples = 64\n\n'
+    ring = (
+        '[[contacts]]\nname = "ring"\nlaw = "dahl"\nbetween = ["m1", "ground"]\n'
+        "sigma = 10.0\nlimit = 15.0\n\n"
     )
-    scene = tmp_path / "plane.toml"
-    scene.write_text(text.replace("[excitation]", f"{plane}[excitation]"))
+    scene = tmp_path / "ring.toml"
+    scene.write_text(text.replace("[excitation]", f"{ring}[excitation]"))
     asked = [str(scene), *PEAKS[2:8]]
     grid = ["--steps", "2", "--frequencies", "3"]
     for arguments in (["peaks", *asked], ["map", *asked, *grid]):
@@ -113,7 +113,7 @@ def test_contacts_without_second_derivatives_are_mapped_but_not_tracked(
         out, err = capsys.readouterr()
         assert out == ""
         assert "`scene`" in err
-        assert "plane (coulomb-2d)" in err
+        assert "ring (dahl)" in err
     assert main(["map", *asked, *grid, "--no-ridge", "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["ridge"] is None

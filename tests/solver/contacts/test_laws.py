@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
@@ -12,7 +13,7 @@ from contact_cases import Case, crude_force, values
 from contact_cases import evaluate as coulomb
 from law_cases import (
     COULOMB_BOX,
-    COULOMB_PLANE,
+    COULOMB_CIRCLE,
     ELASTIC_NORMAL,
     GAP_SPRING,
     POLYNOMIAL,
@@ -67,7 +68,7 @@ def polynomial(rng: Random, H: int) -> Element:
 
 def planar(law: str) -> Callable[[Random, int], Element]:
     def make(rng: Random, H: int) -> Element:
-        row = row_of(KT=10.0 ** rng.uniform(-1, 1), MU=rng.uniform(0.1, 1.0), SAMPLES=128)
+        row = row_of(KT=10.0 ** rng.uniform(-1, 1), MU=rng.uniform(0.1, 1.0), KT_SECOND=math.nan)
         return Element(law=law, U=pair(rng, H), load=given_load(rng), row=row)
 
     return make
@@ -78,7 +79,7 @@ LAWS = {
     "gap": (gap_spring, ("K_GAP", "GAP"), (SEPARATED, columns.CLOSED, columns.TOUCHING)),
     "polynomial": (polynomial, ("A_1",), (columns.DEFORMING,)),
     "box": (planar(COULOMB_BOX), ("KT", "MU"), (STUCK, SLIPPING, LIFTING)),
-    "plane": (planar(COULOMB_PLANE), ("KT", "MU"), (STUCK, SLIPPING, LIFTING)),
+    "plane": (planar(COULOMB_CIRCLE), ("KT", "MU"), (STUCK, SLIPPING, LIFTING)),
 }
 
 
@@ -89,11 +90,13 @@ def test_every_derivative(law: str):
     seen: Counter[int] = Counter()
     for _ in range(60):
         element = make(rng, int(rng.integers(1, 9)))
-        errors = derivative_errors(element, names, 1e-6)
-        if errors is not None:
+        # One event may be so near a corner that the differences, not the derivatives, lose digits; a circle
+        # is exact to 1e-9 of its force, of which a small step makes more.
+        steps = (1e-4, 1e-5, 1e-6) if law == "plane" else (1e-6,)
+        errors = [found for step in steps if (found := derivative_errors(element, names, step)) is not None]
+        if errors:
             seen[evaluate(element).state] += 1
-            # One event may be so near a corner that the differences, not the derivatives, lose digits.
-            assert max(errors.values()) < 2e-5, errors
+            assert min(max(found.values()) for found in errors) < 2e-5, errors
     assert min(seen[state] for state in states) >= 2, seen
     assert sum(seen.values()) >= 40
 
@@ -187,10 +190,8 @@ def test_circular_limit_against_plain_return_mapping():
     rng = np.random.default_rng(4)
     seen: Counter[int] = Counter()
     for _ in range(8):
-        element = planar(COULOMB_PLANE)(rng, int(rng.integers(1, 4)))
-        row = element.row.copy()
-        row[columns.SAMPLES] = 2048
-        answer = evaluate(replace(element, row=row))
+        element = planar(COULOMB_CIRCLE)(rng, int(rng.integers(1, 4)))
+        answer = evaluate(element)
         seen[answer.state] += 1
         coarse, fine = (plane_reference(element, samples, 6) for samples in (2**12, 2**13))
         scale = np.abs(fine).max()
@@ -198,25 +199,9 @@ def test_circular_limit_against_plain_return_mapping():
     assert seen[SLIPPING] + seen[LIFTING] >= 4
 
 
-def test_circular_limit_is_of_second_order():
-    rng = np.random.default_rng(6)
-    element = replace(planar(COULOMB_PLANE)(rng, 3), load=np.array([1.0, 0.3, 0.2]))
-    element = replace(element, row=row_of(KT=2.0, MU=0.6), U=2.0 * element.U / np.abs(element.U).max())
-
-    def at(samples: int) -> np.ndarray:
-        row = element.row.copy()
-        row[columns.SAMPLES] = samples
-        return evaluate(replace(element, row=row)).F
-
-    truth = at(2**15)
-    errors = [np.abs(at(n) - truth).max() for n in (128, 512, 2048, 8192)]
-    assert errors[0] > 10.0 * errors[1] > 100.0 * errors[2] > 1000.0 * errors[3]
-    assert errors[1] < 1e-3 * np.abs(truth).max()
-
-
 def test_circular_limit_turns_with_the_motion():
     rng = np.random.default_rng(7)
-    element = planar(COULOMB_PLANE)(rng, 5)
+    element = planar(COULOMB_CIRCLE)(rng, 5)
     turn = np.array([[np.cos(0.7), -np.sin(0.7)], [np.sin(0.7), np.cos(0.7)]])
     turned = evaluate(replace(element, U=turn @ element.U)).F
     straight = evaluate(element).F
@@ -224,14 +209,14 @@ def test_circular_limit_turns_with_the_motion():
 
 
 def test_both_limits_agree_in_one_direction():
-    """Motion along one axis only: circle and square are the same law but for the circle's sampling."""
+    """Motion along one axis only: circle and square are the same law."""
     rng = np.random.default_rng(8)
     box = planar(COULOMB_BOX)(rng, 4)
-    row = row_of(KT=2.0, MU=0.5, SAMPLES=4096)
+    row = row_of(KT=2.0, MU=0.5, KT_SECOND=math.nan)
     box = replace(
         box, U=np.stack([motion(rng, 4, 2.0), np.zeros(9)]), row=row, load=np.array([1.0, 0.4, 0.0])
     )
-    plane = evaluate(replace(box, law=COULOMB_PLANE))
+    plane = evaluate(replace(box, law=COULOMB_CIRCLE))
     exact = evaluate(box)
     assert exact.state == plane.state == SLIPPING
     np.testing.assert_allclose(plane.F, exact.F, atol=1e-5 * np.abs(exact.F).max())
@@ -244,8 +229,10 @@ def test_square_limit_is_two_contacts():
         one = coulomb(
             Case(U=element.U[a], N=element.load, kt=element.row[columns.KT], mu=element.row[columns.MU])
         )
-        np.testing.assert_array_equal(answer.F[a], one.F)
-        np.testing.assert_array_equal(answer.dF_dU[3 * a], one.dF_dU)
+        np.testing.assert_allclose(answer.F[a], one.F, rtol=0.0, atol=1e-14 * np.abs(one.F).max())
+        np.testing.assert_allclose(
+            answer.dF_dU[3 * a], one.dF_dU, rtol=0.0, atol=1e-13 * np.abs(one.dF_dU).max()
+        )
     assert not answer.dF_dU[1:3].any()
 
 

@@ -8,6 +8,7 @@ from typing import Any
 import jsonschema
 import numpy as np
 import pytest
+from law_cases import COULOMB_CIRCLE
 from load_scenes import fourier_load, loaded, random_loads
 
 import optim
@@ -16,7 +17,6 @@ from solver import Scene, march, solve
 from solver.balance.balance import build
 from solver.balance.simplifications import Effects
 from solver.balance.workspace import Workspace
-from solver.contacts.laws.plane import CIRCLE
 from solver.errors import SceneError, SettingError
 from solver.scene.json_schema import scene_schema
 from solver.sensitivity.gradient import Sensitivities
@@ -166,7 +166,7 @@ def test_first_and_second_derivatives_are_those_of_differences(seed: int) -> Non
     here, u = slopes(scene, None)
     gradient, hessian = here.gradient(u, hz), here.hessian(u, hz)
     # A circular limit is integrated by collocation: its derivatives are those of the exact law.
-    tolerance = 1e-4 if scene.contacts[0].kernel == CIRCLE else 1e-7
+    tolerance = 1e-4 if scene.contacts[0].kernel == COULOMB_CIRCLE else 1e-7
     for i, path in enumerate(paths):
         size = abs(scene.value(path)) or 1.0
         errors = []

@@ -8,9 +8,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from law_cases import (
+    COULOMB_BOX,
+    COULOMB_CIRCLE,
+    COULOMB_LINE,
+    ELASTIC_NORMAL,
+    GAP_SPRING,
+    POLYNOMIAL,
+)
 from space_elements import random_elements
 
-from solver.contacts.kernels import columns
 from solver.contacts.kernels.columns import A_1, COLUMNS, GAP, K_GAP, KN, KT, KT_SECOND, MU
 from solver.contacts.kernels.laws import law_force, law_number
 from solver.contacts.kernels.second_laws import law_second, second_number
@@ -35,38 +42,37 @@ class Law:
 _RUBBING = "solver.contacts.kernels.coulomb.second_law:"
 _SPACE = (KT, KT_SECOND, MU, KN)
 LAWS = {
-    "coulomb": Law(force=columns.KERNELS[0], second=_RUBBING + "ports_second", ports=(0,), columns=(KT, MU)),
+    "coulomb": Law(force=COULOMB_LINE, second=_RUBBING + "line_second", ports=(0,), columns=(KT, MU)),
     "coulomb-2d, box": Law(
-        force=columns.KERNELS[0], second=_RUBBING + "ports_second", ports=(0, 1), columns=(KT, MU)
+        force=COULOMB_BOX, second=_RUBBING + "box_second", ports=(0, 1), columns=(KT, MU), tied=True
     ),
     "elastic-normal": Law(
-        force=columns.KERNELS[1], second=_RUBBING + "elastic_normal_second", ports=(0, 2),
-        columns=(KT, MU, KN),
+        force=ELASTIC_NORMAL, second=_RUBBING + "line_second", ports=(0, 2), columns=(KT, MU, KN)
     ),
     "coulomb-3d, box": Law(
-        force=columns.KERNELS[7], second=_RUBBING + "box_second", ports=(0, 1, 2), columns=_SPACE
+        force=COULOMB_BOX, second=_RUBBING + "box_second", ports=(0, 1, 2), columns=_SPACE
     ),
     "coulomb-3d, box, one stiffness": Law(
-        force=columns.KERNELS[7], second=_RUBBING + "box_second", ports=(0, 1, 2), columns=(KT, MU, KN),
+        force=COULOMB_BOX, second=_RUBBING + "box_second", ports=(0, 1, 2), columns=(KT, MU, KN),
         tied=True,
     ),
     "coulomb-3d, box, given load": Law(
-        force=columns.KERNELS[7], second=_RUBBING + "box_second", ports=(0, 1), columns=(KT, KT_SECOND, MU)
+        force=COULOMB_BOX, second=_RUBBING + "box_second", ports=(0, 1), columns=(KT, KT_SECOND, MU)
     ),
     "coulomb-3d": Law(
-        force=columns.KERNELS[6], second="solver.contacts.kernels.circle.second_law:circle_law_second",
+        force=COULOMB_CIRCLE, second="solver.contacts.kernels.circle.second_law:circle_law_second",
         ports=(0, 1, 2), columns=_SPACE,
     ),
     "coulomb-3d, one stiffness": Law(
-        force=columns.KERNELS[6], second="solver.contacts.kernels.circle.second_law:circle_law_second",
+        force=COULOMB_CIRCLE, second="solver.contacts.kernels.circle.second_law:circle_law_second",
         ports=(0, 1, 2), columns=(KT, MU, KN), tied=True,
     ),
     "gap": Law(
-        force=columns.KERNELS[2], second="solver.contacts.kernels.springs.second_law:gap_second", ports=(0,),
+        force=GAP_SPRING, second="solver.contacts.kernels.springs.second_law:gap_second", ports=(0,),
         columns=(K_GAP, GAP),
     ),
     "polynomial": Law(
-        force=columns.KERNELS[3], second="solver.contacts.kernels.springs.second_law:polynomial_second",
+        force=POLYNOMIAL, second="solver.contacts.kernels.springs.second_law:polynomial_second",
         ports=(0,), columns=tuple(range(A_1, A_1 + 5)),
     ),
 }  # fmt: skip

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from contact_cases import closing_cases
 from contact_cases import evaluate as on_a_line
+from law_cases import ELASTIC_NORMAL
 from law_cases import Element as AnyElement
 from law_cases import evaluate as any_law
 from law_cases import row_of as any_row
@@ -243,7 +244,7 @@ def test_second_derivatives_in_every_state():
 def one_direction(element: Element, port: int) -> np.ndarray:
     """Friction and normal force of the law for one direction."""
     row = any_row(KT=element.row[KT if port == 0 else KT_SECOND], MU=element.row[MU], KN=element.row[KN])
-    return any_law(AnyElement(law=columns.KERNELS[1], U=element.U[[port, 2]], load=element.load, row=row)).F
+    return any_law(AnyElement(law=ELASTIC_NORMAL, U=element.U[[port, 2]], load=element.load, row=row)).F
 
 
 def test_a_box_is_each_direction_by_itself():

@@ -16,7 +16,7 @@ from curvature_cases import (
     sizes,
     solved,
 )
-from law_scene_cases import PLANE
+from law_scene_cases import DAHL
 from law_scene_cases import scene as two_directions
 from matrix_cases import beam_scene
 from sensitivity_cases import BEAM, TWO_DOF, disk, loose, two_dof
@@ -179,9 +179,9 @@ def test_what_breaks_a_symmetry_has_a_kink_and_no_hessian() -> None:
 
 
 def test_what_has_no_hessian_is_refused_by_name() -> None:
-    other = two_directions({**PLANE, "samples": 512}, {"kt": 1.0, "mu": 0.3, "N0": 0.4})
+    other = two_directions(DAHL, {"kt": 1.0, "mu": 0.3, "N0": 0.4})
     balance, u = solved(other, 0.2, ALL)
-    with pytest.raises(SettingError, match=r"no second derivatives: c0 \(coulomb-2d\)"):
+    with pytest.raises(SettingError, match=r"no second derivatives: c0 \(dahl\)"):
         Sensitivities(balance, ["c1.N0"]).hessian(u, 0.2)
     balance, u = solved(two_dof(), 1.1, ALL)
     for paths in (("damper.N1", "damper.N0"), ("damper.N1", "damper.N1_ratio")):

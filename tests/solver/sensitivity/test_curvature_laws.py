@@ -10,7 +10,7 @@ from curvature_cases import (
     error_of_hessian,
     solved,
 )
-from law_scene_cases import CUBIC, GAP, PLANE, RUB, scene
+from law_scene_cases import CUBIC, DAHL, GAP, PLANE, RUB, scene
 from space_cases import MOVING, SPACE, in_space
 
 from solver.balance.simplifications import Effects
@@ -77,7 +77,7 @@ def test_the_hessian_in_space_without_even_harmonics() -> None:
 
 
 def test_a_law_without_second_derivatives_is_named() -> None:
-    other = scene({**PLANE, "samples": 512}, PLAIN)
+    other = scene(DAHL, PLAIN)
     balance, u = solved(other, 0.2, ALL)
-    with pytest.raises(SettingError, match=r"no second derivatives: c0 \(coulomb-2d\)"):
+    with pytest.raises(SettingError, match=r"no second derivatives: c0 \(dahl\)"):
         Sensitivities(balance, ["c1.N0"]).hessian(u, 0.2)

@@ -69,6 +69,9 @@ from solver.jit.separate import apart
 
 TINY = 1e-30  # of the direction
 ROUNDS = 4  # of Newton's method from a real solution, each of which all but squares what is left
+# A stick that begins with contact and is so short [rad] ends where rounding says, force and limit both being
+# all but 0: its end moves with its begin. What that leaves out is of the size of the force there.
+SHORTEST = 1e-7
 
 
 @compiled
@@ -170,7 +173,9 @@ def _carry(
         curves_at(waves, row[BEGIN], at)
         if before[MOTION] == STICK:
             offset_x, offset_y = tx - at[X], ty - at[Y] / kappa
-            if followed and whole[i + 1, MOTION] == SLIP:
+            if not follows and found[HOW] == OPENS and before[END] - before[BEGIN] < SHORTEST:
+                row[END] += row[BEGIN] - before[BEGIN]
+            elif followed and whole[i + 1, MOTION] == SLIP:
                 row[END] = _end_of_stick(waves, kappa, offset_x, offset_y, row[END], at)
             curves_at(waves, row[END], at)
             tx, ty = offset_x + at[X], offset_y + at[Y] / kappa

@@ -175,23 +175,11 @@ def _rubbing(
 
 
 @apart
-def ports_second(
+def line_second(
     U: Real, ks: Integer, load: Real, load_ks: Integer, row: Real, cos_table: Real, sin_table: Real, w: Real,
     dU: Real, drow: Real, dload: Real, out_U: Real, out_row: Real, out_load: Real,
 ) -> int:  # fmt: skip
-    """Differentiate `solver.contacts.kernels.coulomb.ports` (as in the contract)."""
-    return _rubbing(
-        U, ks, load, load_ks, row, cos_table, sin_table, w, dU, drow, dload, U.shape[0], KT, out_U, out_row,
-        out_load,
-    )  # fmt: skip
-
-
-@apart
-def elastic_normal_second(
-    U: Real, ks: Integer, load: Real, load_ks: Integer, row: Real, cos_table: Real, sin_table: Real, w: Real,
-    dU: Real, drow: Real, dload: Real, out_U: Real, out_row: Real, out_load: Real,
-) -> int:  # fmt: skip
-    """Differentiate `solver.contacts.kernels.coulomb.elastic_normal` (as in the contract)."""
+    """Differentiate the laws along one line, under a load that is given or moves (as in the contract)."""
     return _rubbing(
         U, ks, load, load_ks, row, cos_table, sin_table, w, dU, drow, dload, 1, KT, out_U, out_row, out_load
     )

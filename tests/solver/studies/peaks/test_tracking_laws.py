@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from law_scene_cases import GAP, PLANE, RUB, scene
+from law_scene_cases import DAHL, GAP, PLANE, RUB, scene
 from peak_cases import highest
 from space_cases import SPACE, in_space
 
@@ -74,8 +74,8 @@ def test_the_design_search_tracks_a_load_that_moves() -> None:
 
 
 def test_peaks_of_a_law_without_second_derivatives_are_refused() -> None:
-    there = scene({**PLANE, "samples": 512})
-    with pytest.raises(SettingError, match=r"no second derivatives.*c0 \(coulomb-2d\)"):
-        track_peak(there, "c0.N0", 0.1, 1.0)
-    with pytest.raises(DesignError, match=r"second derivatives, which c0 \(coulomb-2d\)"):
-        optim.design(there, variables={"c0.N0": (0.1, 1.0)}, method="tracked")
+    there = scene(DAHL)
+    with pytest.raises(SettingError, match=r"no second derivatives.*c0 \(dahl\)"):
+        track_peak(there, "c0.limit", 0.1, 1.0)
+    with pytest.raises(DesignError, match=r"second derivatives, which c0 \(dahl\)"):
+        optim.design(there, variables={"c0.limit": (0.1, 1.0)}, method="tracked")

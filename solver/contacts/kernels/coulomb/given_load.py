@@ -1,6 +1,5 @@
-"""Elastic Coulomb friction with a given load behind the contract of the laws: in closed form, or by samples.
-
-Each direction is on its own: one port, or several with a limit each.
+"""Elastic Coulomb friction along a line with a given load behind the contract of the laws: in closed form, or
+by samples.
 """
 
 from __future__ import annotations
@@ -10,10 +9,9 @@ import numpy as np
 from solver.contacts.kernels.columns import KT, MU, SAMPLES
 from solver.contacts.kernels.coulomb.aft import sampled_force
 from solver.contacts.kernels.coulomb.force import contact_force
-from solver.contacts.kernels.stick_slip_events import FAILED, LIFTING, SEPARATED, SLIPPING, STUCK, piece_of
+from solver.contacts.kernels.stick_slip_events import FAILED, piece_of
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Integer, Real
-from solver.jit.lapack import fill_block
 from solver.jit.separate import apart
 
 
@@ -30,35 +28,22 @@ def _along_parameter(
 
 
 @apart
-def coulomb_ports(
+def coulomb_line(
     U: Real, ks: Integer, load: Real, load_ks: Integer, row: Real, slope: Real, dload: Real,
     cos_table: Real, sin_table: Real, segments: Real, F: Real, dF_dU: Real, dF_dp: Real,
 ) -> tuple[int, int]:  # fmt: skip
-    """Fill the forces, their Jacobian and their derivative by λ in closed form (as in the contract)."""
-    m, n = U.shape
+    """Fill the force, its Jacobian and its derivative by λ in closed form (as in the contract)."""
+    n = U.shape[1]
     work = np.empty(n * (2 + load.size))  # one piece of memory: an element takes a few microseconds
     dF_dkt, dF_dmu, dF_dN = work[:n], work[n : 2 * n], work[2 * n :].reshape((n, load.size))
-    stuck, lifting, separated, piece = True, False, True, 0
-    for a in range(m):
-        for b in range(m):
-            if b != a:
-                fill_block(dF_dU[a * m + b], 0.0)
-        state, count = contact_force(
-            U[a], ks, load, load_ks, row[KT], row[MU], cos_table, sin_table, segments, dF_dU[a * m + a],
-            dF_dkt, dF_dmu, dF_dN, F[a],
-        )  # fmt: skip
-        if state == FAILED:
-            return FAILED, piece
-        stuck = stuck and state == STUCK
-        lifting = lifting or state == LIFTING
-        separated = separated and state == SEPARATED
-        piece = 1_000_003 * piece + piece_of(segments, count)
-        _along_parameter(slope, dload, dF_dkt, dF_dmu, dF_dN, dF_dp[a])
-    if separated:
-        return SEPARATED, piece
-    if stuck:
-        return STUCK, piece
-    return (LIFTING if lifting else SLIPPING), piece
+    state, count = contact_force(
+        U[0], ks, load, load_ks, row[KT], row[MU], cos_table, sin_table, segments, dF_dU[0], dF_dkt, dF_dmu,
+        dF_dN, F[0],
+    )  # fmt: skip
+    if state == FAILED:
+        return FAILED, 0
+    _along_parameter(slope, dload, dF_dkt, dF_dmu, dF_dN, dF_dp[0])
+    return state, piece_of(segments, count)
 
 
 @apart
@@ -66,7 +51,7 @@ def coulomb_sampled(
     U: Real, ks: Integer, load: Real, load_ks: Integer, row: Real, slope: Real, dload: Real,
     cos_table: Real, sin_table: Real, segments: Real, F: Real, dF_dU: Real, dF_dp: Real,
 ) -> tuple[int, int]:  # fmt: skip
-    """Fill the force of one port by `row[SAMPLES]` samples of a period instead (as in the contract)."""
+    """Fill the same by `row[SAMPLES]` samples of a period instead (as in the contract)."""
     n = U.shape[1]
     dF_dkt, dF_dmu, dF_dN = np.empty(n), np.empty(n), np.empty((n, load.size))
     state, count = sampled_force(
