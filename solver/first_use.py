@@ -42,22 +42,27 @@ def on_first_use(
             raise AttributeError(f"module {package!r} has no attribute {name!r}", name=name, obj=known)
         value = getattr(import_module(homes[name]), name)
         if homes[name].startswith(f"{package}."):  # not what another package has made public already
-            value = _with_names_of_scenes(value, package)
+            value = _of_a_scene(value, package)
         setattr(sys.modules[package], name, value)
         return value
 
     return load, lambda: sorted({*vars(sys.modules[package]), *homes}), sorted(homes)
 
 
-def _with_names_of_scenes(value: object, package: str) -> object:
-    """Return a public function of a scene such that its name or file does as well; others as they are."""
+def _of_a_scene(value: object, package: str) -> object:
+    """Return a public function of a scene such that its name or file does as well; others as they are.
+
+    One that can be stopped ends with what it has so far at Ctrl-C, if nobody else stops it.
+    """
     if not isinstance(value, FunctionType):
         return value
     inner = value
     while isinstance(known := getattr(inner, "__wrapped__", None), FunctionType):
         inner = known
-    if not inner.__code__.co_argcount or inner.__code__.co_varnames[0] != "scene":
+    code = inner.__code__
+    if not code.co_argcount or code.co_varnames[0] != "scene":
         return value
+    stops = "should_stop" in code.co_varnames[code.co_argcount :][: code.co_kwonlyargcount]
 
     @wraps(value)
     def asked(*args: object, **kwargs: object) -> object:
@@ -65,7 +70,10 @@ def _with_names_of_scenes(value: object, package: str) -> object:
             args = (_scene_of(args[0]), *args[1:])
         elif "scene" in kwargs:
             kwargs["scene"] = _scene_of(kwargs["scene"])
-        return value(*args, **kwargs)
+        if not stops or "should_stop" in kwargs:
+            return value(*args, **kwargs)
+        with import_module("solver.results.watch").stopped_by_interrupt() as should_stop:
+            return value(*args, should_stop=should_stop, **kwargs)
 
     asked.__module__ = package  # where it is found by its name, as pickle does
     return asked

@@ -26,6 +26,7 @@ from service.rendering.plain import print_result
 from service.rendering.tables.text import show
 from solver.errors import SettingError
 from solver.results.views import on_demand
+from solver.results.watch import stopped_by_interrupt
 
 if TYPE_CHECKING:
     from solver.scene.scene import Scene
@@ -105,6 +106,13 @@ class Keys:
         return with_parameters(command, listed)
 
 
+@contextmanager
+def watched(study: type[Study]) -> Iterator[Watch]:
+    """Who watches a study that computes here: a bar, and Ctrl-C, which ends it with what it has so far."""
+    with bar(study.NAME, study.COUNTED) as on_progress, stopped_by_interrupt() as should_stop:
+        yield Watch(on_progress, should_stop)
+
+
 def command_of(study: type[Study]) -> Callable[..., None]:
     """Return the command of a study, with an option for each key."""
     keys = Keys.of(study)
@@ -118,8 +126,8 @@ def command_of(study: type[Study]) -> Callable[..., None]:
         asked = keys.read(given)
         if wrong := study.model_construct(**asked).issues(scene):
             raise refused(wrong, keys.flags)
-        with keys.named(), bar(study.NAME, study.COUNTED) as on_progress:
-            answer = study.compute(scene, asked, Watch(on_progress))
+        with keys.named(), watched(study) as watch:
+            answer = study.compute(scene, asked, watch)
         give(study, answer, outputs, scene, as_json=as_json)
 
     return keys.command(compute, {}, {}, doc=study.__doc__)

@@ -13,6 +13,7 @@ from solver.results.views import Views
 
 if TYPE_CHECKING:
     import pandas as pd
+    import polars as pl
     import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
@@ -48,6 +49,10 @@ class Shown(Told):
     def to_pandas(self) -> pd.DataFrame:
         """The result as a table, in SI units; needs pandas (``pip install 'stickslip[data]'``)."""
         return self.to_dataset().to_pandas()
+
+    def to_polars(self) -> pl.DataFrame:
+        """The result as a table of polars, in SI units (``pip install 'stickslip[polars]'``)."""
+        return self.to_dataset().to_polars()
 
     def to_xarray(self) -> xr.Dataset:
         """The result as arrays with coordinates, units and attributes; needs xarray (the extra ``data``)."""

@@ -15,6 +15,7 @@ from solver.results.told import Piece, Summary
 
 if TYPE_CHECKING:
     import pandas as pd
+    import polars as pl
     import xarray as xr
 
 ROW = "row"
@@ -132,6 +133,9 @@ class Dataset(Piece):
     def to_xarray(self) -> xr.Dataset:
         """Arrays with named dimensions, coordinates, units and attributes.
 
+        Points along a parameter have it for their coordinate, in place of `point`: ``.sel(frequency=740,
+        method="nearest")`` where the branch does not turn back.
+
         Raises
         ------
         MissingExtraError
@@ -144,4 +148,23 @@ class Dataset(Piece):
         arrays = {name: (v.dims, v.values, v.attributes) for name, v in self.variables.items()}
         along = {name: array for name, array in arrays.items() if array[0] == (name,)}
         rest = {name: array for name, array in arrays.items() if name not in along}
-        return xr.Dataset(rest, along, {"kind": self.kind, **self.attributes})
+        made = xr.Dataset(rest, along, {"kind": self.kind, **self.attributes})
+        parameter, path = self.variables.get("parameter"), str(self.attributes.get("parameter", ""))
+        if parameter is None or not path or parameter.dims[0] in self.variables or path in self.variables:
+            return made
+        place = (parameter.dims, parameter.values, parameter.attributes)
+        return made.assign_coords({path: place}).swap_dims({parameter.dims[0]: path})
+
+    def to_polars(self) -> pl.DataFrame:
+        """The same table as `to_pandas` for polars, which has no attributes.
+
+        Raises
+        ------
+        MissingExtraError
+            polars is not installed.
+        """
+        try:
+            import polars as pl
+        except ImportError as error:
+            raise MissingExtraError("polars", "polars") from error
+        return pl.DataFrame({name: column.values for name, column in self.table().variables.items()})

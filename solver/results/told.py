@@ -70,6 +70,17 @@ class Summary:
     pairs: tuple[tuple[str, str], ...]
 
 
+def html_table(kind: str, found: Summary) -> str:
+    """A summary as a table of a notebook."""
+    rows = "".join(
+        f"<tr><th style='text-align:left'>{escape(name)}</th><td style='text-align:left'>{escape(value)}"
+        "</td></tr>"
+        for name, value in found.pairs[:_MOST]
+    )
+    caption = " · ".join(escape(part) for part in (kind, found.title) if part)
+    return f"<table><caption style='text-align:left'>{caption}</caption><tbody>{rows}</tbody></table>"
+
+
 class Told(ABC):
     """Root of everything that is looked at: its JSON, a short text, and a table in a notebook.
 
@@ -122,14 +133,7 @@ class Told(ABC):
 
     def _repr_html_(self) -> str:
         """Return the summary as a table, for notebooks."""
-        found = self.summary()
-        rows = "".join(
-            f"<tr><th style='text-align:left'>{escape(name)}</th><td style='text-align:left'>{escape(value)}"
-            "</td></tr>"
-            for name, value in found.pairs[:_MOST]
-        )
-        caption = " · ".join(escape(part) for part in (type(self).__name__, found.title) if part)
-        return f"<table><caption style='text-align:left'>{caption}</caption><tbody>{rows}</tbody></table>"
+        return html_table(type(self).__name__, self.summary())
 
 
 class Piece(Told):

@@ -25,6 +25,8 @@ from solver.contacts.laws.gap import GapSpring
 from solver.contacts.laws.polynomial import PolynomialSpring
 from solver.contacts.laws.registry import on_change
 from solver.errors import SceneError, SettingError
+from solver.results.told import Summary, html_table
+from solver.results.units import number
 from solver.scene import parameter_paths as scene_paths
 from solver.scene.bodies import kinematics
 from solver.scene.bodies.body import Body, Load, Node
@@ -175,6 +177,18 @@ class Scene(Part):
         )
 
     __str__ = __repr__
+
+    def _repr_html_(self) -> str:
+        """Return its numbers as a table, for notebooks: a row for each owner of parameter paths."""
+        laws, rows = {contact.name: contact.LAW for contact in self.contacts}, dict[str, list[str]]()
+        for path in scene_paths.parameter_paths(self):
+            found = scene_paths.parameter_of(self, path)
+            owner, _, key = path.rpartition(".")
+            said = [f"law {laws[owner]}"] if owner in laws else []
+            value = number(found.get(), digits=6)
+            rows.setdefault(owner, said).append(" ".join((key, value, found.unit)).rstrip())
+        pairs = tuple((owner, ", ".join(said)) for owner, said in rows.items())
+        return html_table("Scene", Summary(title=repr(self)[len("<Scene ") : -1], pairs=pairs))
 
     @field_validator("excitation", mode="before")
     @classmethod

@@ -13,12 +13,10 @@ from service.cli.options import inputs, problem_inputs
 from service.cli.options import shared as options
 from service.cli.options.problem import ProblemFlags, takes_problem
 from service.cli.output_files import Outputs
-from service.cli.progress import bar
-from service.cli.study_command import give
+from service.cli.study_command import give, watched
 from service.jobs.common.problem import ProblemRequest
 from service.jobs.studies.design import Design
 from service.jobs.studies.pareto import Pareto
-from service.jobs.study import Watch
 
 Report = Annotated[
     str | None, typer.Option("--report", metavar="F", help="Write a design report: .html or .pdf.")
@@ -40,8 +38,8 @@ def command_of_problem(study: type[ProblemRequest]) -> Callable[..., None]:
         outputs = Outputs.asked(plot, out)
         page = inputs.output_path("--report", report, SUFFIXES)
         scene, given = problem_inputs.posed(told, study)
-        with told.named(), bar(study.NAME, study.COUNTED) as on_progress:
-            answer = study.compute(scene, given, Watch(on_progress))
+        with told.named(), watched(study) as watch:
+            answer = study.compute(scene, given, watch)
         if page is not None:
             from service.rendering.report.sections import Designed
 

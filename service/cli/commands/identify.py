@@ -11,10 +11,8 @@ import typer
 from service.cli.commands.report import SUFFIXES, write
 from service.cli.options import inputs
 from service.cli.output_files import Outputs
-from service.cli.progress import bar
-from service.cli.study_command import Keys, give
+from service.cli.study_command import Keys, give, watched
 from service.jobs.studies.identify import Identify
-from service.jobs.study import Watch
 from solver.scene.descriptions import DISK_LOAD
 
 if TYPE_CHECKING:
@@ -63,8 +61,8 @@ def _identify(
     told = inputs.output_path("--report", report, SUFFIXES)
     scene = inputs.scene(name, values)
     asked = {"data": data, **_KEYS.read(given)}
-    with _KEYS.named(), bar(Identify.NAME, Identify.COUNTED) as on_progress:
-        answer = Identify.compute(scene, asked, Watch(on_progress))
+    with _KEYS.named(), watched(Identify) as watch:
+        answer = Identify.compute(scene, asked, watch)
     found: Any = answer.result
     if problem is not None and found.fitted:
         _write(problem, name, inputs.settings(values), found)

@@ -185,10 +185,15 @@ def test_a_result_is_a_table_and_arrays(result: Any) -> None:
     frame, arrays = result.to_pandas(), result.to_xarray()
     data = result.to_dataset()
     assert len(frame) == np.prod([data.sizes[dim] for dim in data.rows])
-    assert dict(arrays.sizes) == data.sizes
+    table = result.to_polars()
+    assert table.columns == list(frame.columns)
+    assert len(table) == len(frame)
+    path = arrays.attrs.get("parameter", "")
+    named = {"point": path} if path in arrays.dims else {}
+    assert dict(arrays.sizes) == {named.get(dim, dim): size for dim, size in data.sizes.items()}
     assert arrays.attrs["source"].startswith("stickslip")
     for name, variable in data.variables.items():
-        assert arrays[name].dims == variable.dims
+        assert arrays[name].dims == tuple(named.get(dim, dim) for dim in variable.dims)
         assert arrays[name].attrs.get("units", "") == variable.unit
 
 
@@ -279,14 +284,33 @@ def test_what_cannot_be_saved_is_refused(tmp_path: Path) -> None:
 
 def test_a_missing_extra_is_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     found = solver.plan(two_dof())
-    for package in ("pandas", "xarray", "pyarrow", "pyarrow.parquet"):
+    for package in ("pandas", "polars", "xarray", "pyarrow", "pyarrow.parquet"):
         monkeypatch.setitem(__import__("sys").modules, package, None)
     for use in (found.to_pandas, found.to_xarray):
         with pytest.raises(solver.MissingExtraError, match=r"pip install 'stickslip\[data\]'"):
             use()
+    with pytest.raises(solver.MissingExtraError, match=r"stickslip\[polars\]"):
+        found.to_polars()
     with pytest.raises(solver.MissingExtraError, match=r"stickslip\[parquet\]"):
         solver.save(found, tmp_path / "plan.parquet")
     assert not list(tmp_path.iterdir())
+
+
+def test_points_are_selected_and_drawn_by_the_frequency() -> None:
+    branch = solver.sweep(two_dof(), "frequency", 0.8, 1.2, harmonics=3)
+    arrays = branch.to_xarray()
+    at = arrays.sel(frequency=1.0, method="nearest")
+    nearest = int(np.abs(branch.values - 1.0).argmin())
+    assert float(at.amplitude) == branch.to_dataset()["amplitude"][nearest]
+    (line,) = arrays.max_abs.plot()
+    np.testing.assert_array_equal(line.get_xdata(), branch.values)
+    assert "Hz" in line.axes.get_xlabel()
+
+
+def test_a_scene_shows_its_numbers_in_a_notebook() -> None:
+    page = solver.load_scene("platform-wedge")._repr_html_()
+    for said in ("<caption", "platform-wedge", "wedge", "mass", "mu", "excitation", "kg"):
+        assert said in page
 
 
 def test_a_notebook_gets_escaped_text() -> None:
