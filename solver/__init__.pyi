@@ -119,11 +119,11 @@ from .studies.interference_result import (
     InterferenceStatus as InterferenceStatus,
     Wave as Wave,
 )
-from .studies.mistuning import (
+from .studies.mistuning import mistuning_study as mistuning_study
+from .studies.mistuning_result import (
     MistunedDisk as MistunedDisk,
     MistuningStatus as MistuningStatus,
     MistuningStudy as MistuningStudy,
-    mistuning_study as mistuning_study,
 )
 from .studies.map_result import MapStatus as MapStatus, ResponseMap as ResponseMap
 from .studies.peaks.minimise_peak import least_peak as least_peak
@@ -134,6 +134,7 @@ from .studies.peaks.results import (
     TrackStatus as TrackStatus,
 )
 from .studies.peaks.track_peak import track_peak as track_peak
-from .studies.plan import Plan as Plan, plan as plan
+from .studies.plan import plan as plan
+from .studies.plan_result import Plan as Plan
 from .studies.response_map import response_map as response_map
 from .views.io import load as load, save as save

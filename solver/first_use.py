@@ -12,6 +12,10 @@ from collections.abc import Callable, Mapping
 from functools import wraps
 from importlib import import_module
 from types import FunctionType
+from typing import ParamSpec, TypeVar
+
+_Given = ParamSpec("_Given")
+_Found = TypeVar("_Found")
 
 
 def names_of(package: str, file: str) -> dict[str, str]:
@@ -77,6 +81,26 @@ def _of_a_scene(value: object, package: str) -> object:
 
     asked.__module__ = package  # where it is found by its name, as pickle does
     return asked
+
+
+def renamed(**words: str) -> Callable[[Callable[_Given, _Found]], Callable[_Given, _Found]]:
+    """Let a function take keywords as they were called before, with a warning: ``renamed(low="start")``."""
+
+    def decorate(function: Callable[_Given, _Found]) -> Callable[_Given, _Found]:
+        @wraps(function)
+        def called(*args: _Given.args, **kwargs: _Given.kwargs) -> _Found:
+            for old in words.keys() & kwargs.keys():
+                import warnings
+
+                behind = sys._getframe(1).f_code.co_filename == __file__  # a public function stands for it
+                told = f"`{old}` is `{words[old]}` now; the old word goes with 0.2"
+                warnings.warn(told, DeprecationWarning, stacklevel=3 if behind else 2)
+                kwargs[words[old]] = kwargs.pop(old)
+            return function(*args, **kwargs)
+
+        return called
+
+    return decorate
 
 
 def _scene_of(given: object) -> object:

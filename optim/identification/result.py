@@ -46,14 +46,14 @@ class IdentifyStatus(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Estimate(Piece):
-    """An unknown."""
+    """An unknown with how sure it is; bounds in place of an interval where the data do not tell it."""
 
     JSON: ClassVar = "name unit value standard_error interval told at_bound bounds"
 
     name: Annotated[str, "Parameter path, or several that share the value."]
     unit: Annotated[str, "Of the value."]
     value: Annotated[float, "The estimate."]
-    standard_error: Annotated[float, "Its standard error; NaN where the data do not tell it."]
+    standard_error: Annotated[FloatOrNaN, "Its standard error; NaN where the data do not tell it."]
     interval: Annotated[tuple[float, float], "Of 95 %; the bounds where the data do not tell it."]
     told: Annotated[
         bool,

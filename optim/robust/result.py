@@ -183,7 +183,8 @@ class RobustResult(MadeOfResponses, Drawn):
     VIEWS: ClassVar = Views("optim.views", "of_robust", "robust_dataset", "designs:robust_figure")
     JSON: ClassVar = (
         "scene=problem.scene.name aim quantile uncertain optimum nominal robust objective gain cuts gap"
-        " inner_look optimality violation unknown designs responses seconds nominal_status=design.status"
+        " inner_look optimality=conditions.residual"
+        " violation=conditions.violation unknown designs responses seconds nominal_status=design.status"
         " warnings=design.warnings reached status"
     )
 
@@ -237,11 +238,8 @@ class RobustResult(MadeOfResponses, Drawn):
 
     def to_json(self) -> dict[str, Any]:
         """Return the result as one JSON object."""
-        found = self.conditions
         return self._json(
             quantile=self.quantile if self.aim is Aim.QUANTILE else None,
             nominal=None if self.nominal is None else self.nominal.to_json(self.quantile),
             robust=None if self.robust is None else self.robust.to_json(self.quantile),
-            optimality=None if found is None else found.residual,
-            violation=None if found is None else found.violation,
         )

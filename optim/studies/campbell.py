@@ -124,7 +124,7 @@ def _response(branch: Branch, order: int, speeds: Ranges, stuck: Real, free: Rea
     exceeded = _scaled(bands, per_hz)
     inside = tuple((max(a, c), min(b, d)) for a, b in exceeded for c, d in speeds if max(a, c) < min(b, d))
     amplitudes = _Amplitudes(branch)
-    peaks = sorted((peak for peak in branch.peaks if peak.interior), key=lambda peak: peak.at)
+    peaks = sorted(branch.interior_peaks, key=lambda peak: peak.at)
     top = max(branch.start, branch.stop)
     return OrderResponse(
         order=order, branch=branch, running_hz=_scaled(speeds, 1.0 / per_hz),

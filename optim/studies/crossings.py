@@ -48,9 +48,10 @@ class OrderResponse(Piece):
     """What one order excites; natural frequencies are of its nodal diameter if the structure is cyclic."""
 
     JSON: ClassVar = (
-        "order range_hz running_hz limit peaks bands_hz exceeded_rpm exceeded_running_rpm crossings_rpm"
-        " crossings highest_running stuck_hz open_hz peak_certificate=branch.peak_certificate band_known"
-        " measure peak_max_abs error_estimate peak_half_peak_to_peak half_peak_to_peak_error relative_error"
+        "order range_hz running_hz limit peaks=branch.interior_peaks bands_hz exceeded_rpm"
+        " exceeded_running_rpm crossings_rpm crossings highest_running stuck_hz open_hz"
+        " peak_certificate=branch.peak_certificate band_known=branch.band_known measure peak_max_abs"
+        " error_estimate peak_half_peak_to_peak half_peak_to_peak_error relative_error"
         " flags completed=branch.reached status=branch.status"
     )
 
@@ -72,13 +73,11 @@ class OrderResponse(Piece):
 
     def to_json(self) -> dict[str, Any]:
         """Return the response of the order as one JSON object."""
-        branch, band, certificate = self.branch, self.branch.band, self.branch.peak_certificate
-        known = branch.known.to_json()
+        known = self.branch.known.to_json()
         del known["peaks_open"]
         return self._json(
-            range_hz=(branch.start, branch.stop), peaks=[peak for peak in branch.peaks if peak.interior],
-            crossings_rpm=[crossing.speed_rpm for crossing in self.crossings],
-            band_known=None if band is None else band.known and certificate.known, **known,
+            range_hz=(self.branch.start, self.branch.stop),
+            crossings_rpm=[crossing.speed_rpm for crossing in self.crossings], **known,
         )  # fmt: skip
 
 

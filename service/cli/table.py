@@ -112,7 +112,9 @@ COMMANDS = {
     "Service": (
         CommandEntry("serve", "commands.service.serve", "Serve the REST API and work off its queue."),
         CommandEntry("worker", "commands.service.worker", "Work off a queue without HTTP."),
-        CommandEntry("submit", "lazy.SubmitGroup", "Hand a job to a running service.", group=True),
+        CommandEntry(
+            "submit", "commands.client.submit.SubmitGroup", "Hand a job to a running service.", group=True
+        ),
         CommandEntry("watch", "commands.client.jobs.watch", "Follow a job until it has ended.", keyed=True),
         CommandEntry(
             "results", "commands.client.jobs.results",

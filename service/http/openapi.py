@@ -100,7 +100,7 @@ def _in_place(content: dict[str, Any], schemas: dict[str, Any]) -> None:
 
 def _results(schemas: dict[str, Any], registry: Registry) -> None:
     """The results of the kinds that say how theirs look; others are objects."""
-    known = {kind.name: kind.result for kind in registry if kind.result is not None}
+    known = {kind.name: made for kind in registry if (made := kind.answers) is not None}
     for name, model in known.items():
         schemas[result_name(name)] = _schema(model, schemas)
     if known:

@@ -1,4 +1,4 @@
-"""From the stored result of a job to its picture: what the kinds share."""
+"""From the stored result of a job to its picture: as its kind says, and what the kinds share."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from service.jobs.kind_view import Json, NothingToDrawError, ReadSweep, StoredCurve, StoredSweep
+from service.jobs.registry import Registry
 from solver.jit.fourier import Real
 from solver.views.plots.curves import Response, above, with_peak
 
@@ -36,6 +37,28 @@ def response_of(sweep: StoredCurve) -> Response:
         intervals=() if limit is None else above(values, amplitude, limit),
         unstable=unstable,
     )
+
+
+def result_figure(
+    kind: str, result: Json, sweeps: Sequence[StoredSweep], read: ReadSweep, registry: Registry
+) -> Figure:
+    """The picture of a job.
+
+    Parameters
+    ----------
+    kind : of the job.
+    result : what it computed, as JSON.
+    sweeps : those it stored.
+    read : gives a stored sweep with its arrays.
+    registry : the kinds there are; results of others are drawn as their stored sweep.
+
+    Raises
+    ------
+    NothingToDrawError
+        The job found nothing, or stored no sweep.
+    """
+    known = registry[kind].view.draw if kind in registry else None
+    return (known or best_sweep_figure)(result, sweeps, read)
 
 
 def best_sweep_figure(result: Json, sweeps: Sequence[StoredSweep], read: ReadSweep) -> Figure:

@@ -183,8 +183,8 @@ class JobKind:
     run_on : callable or None
         `run` with a fourth argument, `service.jobs.checkpoints.Checkpoints`: keeps what it has, and goes on
         from what an earlier attempt kept. Divided kinds need none: their parts are kept.
-    result : type of BaseModel or None
-        The schema of the result; None for any JSON object.
+    result : type of BaseModel, function or None
+        The schema of the result, or what makes it when it is asked for; None for any JSON object.
     view : KindView
         What people see of it.
 
@@ -201,8 +201,13 @@ class JobKind:
     run: Run
     parts: Division | None = None
     run_on: RunOn | None = None
-    result: type[BaseModel] | None = None
+    result: type[BaseModel] | Callable[[], type[BaseModel]] | None = None
     view: KindView = field(default_factory=KindView)
+
+    @property
+    def answers(self) -> type[BaseModel] | None:
+        """The schema of the result; None for any JSON object."""
+        return self.result if self.result is None or isinstance(self.result, type) else self.result()
 
     def __post_init__(self) -> None:
         if not _NAME.fullmatch(self.name):

@@ -117,7 +117,7 @@ class Study(SceneRequest):
 
     NAME: ClassVar[str]
     FUNCTION: ClassVar[str]
-    RESULT: ClassVar[type[BaseModel]]
+    RESULT: ClassVar[type[BaseModel] | Callable[[], type[BaseModel]]]
     SHOWS: ClassVar[str]
     SWEEPS: ClassVar[str] = ""
     COUNTED: ClassVar[str] = "points"

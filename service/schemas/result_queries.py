@@ -207,7 +207,7 @@ def quantities(of: str, registry: Registry) -> dict[str, Quantity]:
     """
     if of in RECORDS:
         return quantities_of_record(RECORDS[of])
-    known = {kind.name: kind.result for kind in registry}
+    known = {kind.name: kind.answers for kind in registry}
     if of not in known:
         hint = nearest(of, [*RECORDS, *known])
         wanted = f"must be {SWEEP}, {DESIGN} or another kind of job{hint}"

@@ -11,15 +11,12 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Protocol
 
 import numpy as np
 
-from solver.balance.balance import Balance
-from solver.balance.kernels.output import HALF_RANGE, MAX_ABS, MEAN, RESIDUAL, SLOPE
-from solver.balance.parameter import Parameter
+from solver.arrays import FloatOrNaN, Integer, Real
 from solver.continuation.certificate import PeakCertificate
-from solver.continuation.kernels.state import FINISHED, LEFT_RANGE, NO_START, STALLED
 from solver.continuation.peaks import Band, Peak
-from solver.jit.fourier import Integer, Real
 from solver.results.base import Drawn
 from solver.results.known import Known
+from solver.results.verdict import Stable, Verdict
 from solver.results.views import Views, on_demand
 from solver.scene.scene import Scene
 
@@ -27,8 +24,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from solver.balance.balance import Balance
+    from solver.balance.parameter import Parameter
     from solver.continuation.marks import Bifurcations
-    from solver.results.verdict import Verdict
 
 
 class BranchStatus(Enum):
@@ -75,14 +73,6 @@ class BranchStatus(Enum):
     )
 
 
-ENDINGS = {
-    FINISHED: BranchStatus.COMPLETED,
-    NO_START: BranchStatus.NO_START,
-    STALLED: BranchStatus.STALLED,
-    LEFT_RANGE: BranchStatus.TURNED_BACK,
-}
-
-
 class Posed(Protocol):
     """What a branch is of: the problem that each of its points solves."""
 
@@ -109,10 +99,11 @@ class AnyBranch(Drawn):
     VIEWS: ClassVar = Views("solver.views", "of_branch", "branch_dataset", "of_branch")
     JSON: ClassVar = (
         "scene parameter=values parameter_path=parameter unit speed_rpm=speeds_rpm amplitude"
-        " half_peak_to_peak mean peak peaks stable stable_ground peaks_stable band_hz band_limit"
-        " band_intervals_hz band_known peak_certificate drift_per_period points n_harmonics"
-        " error_estimate newton_iterations rejected_steps folds unstable marks stability_known_by"
-        " mean_undetermined largest_residual seconds flags completed=reached status"
+        " half_peak_to_peak mean peak peaks=interior_peaks stable=highest_stability.stable"
+        " stable_ground=highest_stability.ground peaks_stable band_hz=band.width band_limit=band.limit"
+        " band_intervals_hz=band.intervals band_known peak_certificate drift_per_period points=values.size"
+        " n_harmonics error_estimate newton_iterations rejected_steps folds unstable marks"
+        " stability_known_by mean_undetermined largest_residual seconds flags completed=reached status"
     )
 
     status: Annotated[BranchStatus, "How it ended."]
@@ -137,7 +128,9 @@ class AnyBranch(Drawn):
         Band | None,
         "Where the amplitude exceeds the limit asked for (peak/√2 if none was); None without a peak.",
     ]
-    error_estimate: Annotated[float, "Estimated error of the highest peak's value [m]; NaN without a peak."]
+    error_estimate: Annotated[
+        FloatOrNaN, "Estimated error of the highest peak's value [m]; NaN without a peak."
+    ]
     newton_iterations: Annotated[int, "Of all points."]
     rejected_steps: Annotated[int, "Steps that were tried again, shorter."]
     seconds: Annotated[float, "Time taken [s]."]
@@ -209,35 +202,67 @@ class AnyBranch(Drawn):
         """Whether the branch reached the end of the range."""
         return self.status is BranchStatus.COMPLETED
 
+    def _measure(self, name: str) -> Real:
+        """Return a column of the measures; its number is the kernel's, which results are read without."""
+        column: Any = on_demand(f"solver.balance.kernels.output:{name}")
+        found: Real = self.measures[:, column]
+        return found
+
     @property
     def amplitude(self) -> Real:
         """max|x| of the observed DOF at each point [m]."""
-        return self.measures[:, MAX_ABS]
+        return self._measure("MAX_ABS")
 
     @property
     def half_peak_to_peak(self) -> Real:
         """(max x − min x)/2 of the observed DOF at each point [m]."""
-        return self.measures[:, HALF_RANGE]
+        return self._measure("HALF_RANGE")
 
     @property
     def mean(self) -> Real:
         """Mean of the observed DOF at each point [m]."""
-        return self.measures[:, MEAN]
+        return self._measure("MEAN")
 
     @property
     def residuals(self) -> Real:
         """Relative residual at each point."""
-        return self.measures[:, RESIDUAL]
+        return self._measure("RESIDUAL")
 
     @property
     def slopes(self) -> Real:
         """Change of max|x| along the unit tangent at each point."""
-        return self.measures[:, SLOPE]
+        return self._measure("SLOPE")
 
     @property
     def peak(self) -> Peak | None:
         """The highest peak, or None if the branch has no point."""
         return self.peaks[0] if self.peaks else None
+
+    @property
+    def interior_peaks(self) -> tuple[Peak, ...]:
+        """All local maxima that are no ends of the branch, highest first."""
+        return tuple(peak for peak in self.peaks if peak.interior)
+
+    @property
+    def highest_stability(self) -> Verdict | None:
+        """Whether the highest peak is stable; None if the branch has no point."""
+        return next(iter(self.peak_stability), None)
+
+    @property
+    def peaks_stable(self) -> tuple[Stable, ...]:
+        """Whether each of `interior_peaks` is stable: yes, no, or not known."""
+        both = zip(self.peak_stability, self.peaks, strict=True)
+        return tuple(one.stable for one, peak in both if peak.interior)
+
+    @property
+    def band_known(self) -> bool | None:
+        """Whether the whole band is: no crossing of its limit hides between points; None without a band."""
+        return None if self.band is None else self.band.known and self.peak_certificate.known
+
+    @property
+    def largest_residual(self) -> float | None:
+        """Largest relative residual of all points; None if there is none."""
+        return max(self.residuals.tolist(), default=None)
 
     @property
     def ratchets(self) -> bool:
@@ -269,18 +294,7 @@ class AnyBranch(Drawn):
 
     def to_json(self) -> dict[str, Any]:
         """Return the branch as one JSON object."""
-        band, judged = self.band, self.peak_stability
-        found = self._json(
-            peaks=[peak for peak in self.peaks if peak.interior],
-            stable=judged[0].stable if judged else None, stable_ground=judged[0].ground if judged else None,
-            peaks_stable=[one.stable for one, at in zip(judged, self.peaks, strict=True) if at.interior],
-            band_hz=None if band is None else band.width, band_limit=None if band is None else band.limit,
-            band_intervals_hz=None if band is None else band.intervals,
-            band_known=None if band is None else band.known and self.peak_certificate.known,
-            points=len(self.values),
-            largest_residual=self.residuals.max() if len(self.values) else None,
-            **self.bifurcations.of_a_branch(),
-        )  # fmt: skip
+        found = self._json(**self.bifurcations.of_a_branch())
         return found if self.ratchets else {k: v for k, v in found.items() if k != "drift_per_period"}
 
 

@@ -12,7 +12,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.jit.fourier import Real
+from solver.arrays import Real
 from solver.results.told import Piece
 
 

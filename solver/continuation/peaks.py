@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
-from solver.jit.fourier import Real
+from solver.arrays import Real
 from solver.results.told import Piece
 
 

@@ -7,15 +7,15 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-from solver.jit.fourier import Real
-from solver.response.contact_response import ContactResponse
+from solver.arrays import FloatOrNaN, Real
 from solver.results.base import Drawn
+from solver.results.verdict import Stable, Verdict
 from solver.results.views import Views, on_demand
 from solver.scene.scene import Scene
 
 if TYPE_CHECKING:
+    from solver.response.contact_response import ContactResponse
     from solver.response.stability.uniqueness import Uniqueness
-    from solver.results.verdict import Stable, Verdict
 
 MEAN_UNDETERMINED = "mean_undetermined"
 HISTORY_DEPENDENT = "history_dependent"
@@ -71,8 +71,8 @@ class Solution(Drawn):
     VIEWS: ClassVar = Views("solver.views", "of_solution", "solution_dataset", "of_solution")
     JSON: ClassVar = (
         "scene frequency_hz converged status max_abs half_peak_to_peak mean harmonics flags contacts"
-        " stable stable_ground unique unique_ground residual error_estimate n_harmonics"
-        " newton_iterations seconds"
+        " stable=stability.stable stable_ground=stability.ground unique unique_ground residual error_estimate"
+        " n_harmonics newton_iterations seconds drift_per_period mean_range"
     )
 
     scene: Annotated[Scene, "What vibrates."]
@@ -80,13 +80,13 @@ class Solution(Drawn):
     n_harmonics: Annotated[int, "The number asked for."]
     status: Annotated[SolutionStatus, "Whether and why; every number below is NaN where it is none."]
     max_abs: Annotated[
-        float,
+        FloatOrNaN,
         "Largest of the observed DOF over the period [m]. Not unique when `flags` has ``mean_undetermined``: "
         "it and the mean then depend on the history, and with ``history_dependent`` half peak to peak too. "
         "Without these flags they are what a start from rest with contacts free of force leads to.",
     ]
-    half_peak_to_peak: Annotated[float, "(max x - min x) / 2 of it [m]."]
-    mean: Annotated[float, "Its mean [m]."]
+    half_peak_to_peak: Annotated[FloatOrNaN, "(max x - min x) / 2 of it [m]."]
+    mean: Annotated[FloatOrNaN, "Its mean [m]."]
     harmonics: Annotated[
         Real,
         "|mean| and the amplitude of each harmonic of the observed DOF [m], up to the highest one kept: "
@@ -102,9 +102,9 @@ class Solution(Drawn):
         "`solver.continuation.branches.symmetry_breaking`. ``mean_load_above_friction`` of what ratchets "
         "because its contacts cannot hold its mean load (`solver.balance.mean_loads`).",
     ]
-    residual: Annotated[float, "Relative residual of the balance."]
+    residual: Annotated[FloatOrNaN, "Relative residual of the balance."]
     error_estimate: Annotated[
-        float,
+        FloatOrNaN,
         "Estimated error of `max_abs` by the harmonics left out and the residual [m]; of "
         "`half_peak_to_peak` where the mean is not determined. See "
         "`solver.continuation.extrema.error_estimate`.",
@@ -160,7 +160,7 @@ class Solution(Drawn):
         return self.status is SolutionStatus.RATCHETS
 
     @property
-    def drift_per_period(self) -> float:
+    def drift_per_period(self) -> FloatOrNaN:
         """How far what RATCHETS drifts in a period [m]; found when asked for (`solver.response.drift`).
 
         It is the largest of all DOFs; infinite where a mean load above friction speeds it up without end,
@@ -182,10 +182,10 @@ class Solution(Drawn):
             )
             return {**self.to_json(), "stability": found}
         only = self.uniqueness
-        return self._json(
+        found = self._json(
             harmonics=self.harmonics if self.converged else None,
             contacts={contact.name: contact.state for contact in self.contacts},
-            unique=only.unique, unique_ground=only.ground, **self.stability.to_json(),
-            **({"drift_per_period": self.drift_per_period} if self.ratchets else {}),
-            **({"mean_range": self.mean_range} if MEAN_UNDETERMINED in self.flags else {}),
+            unique=only.unique, unique_ground=only.ground,
         )  # fmt: skip
+        told = {"drift_per_period": self.ratchets, "mean_range": MEAN_UNDETERMINED in self.flags}
+        return {key: value for key, value in found.items() if told.get(key, True)}

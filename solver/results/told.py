@@ -12,7 +12,6 @@ from enum import Enum
 from functools import cache
 from html import escape
 from inspect import cleandoc
-from operator import attrgetter
 from typing import Any, ClassVar
 
 _MOST = 30
@@ -62,6 +61,13 @@ def json_keys(kind: type[Told]) -> dict[str, str]:
     return {key: path or key for key, _, path in (name.partition("=") for name in named)}
 
 
+def _at(value: Any, path: str) -> Any:
+    """The value at the end of a path of attributes; None if one on the way is."""
+    for name in path.split("."):
+        value = None if value is None else getattr(value, name)
+    return value
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Summary:
     """What is most worth knowing of a result: a title, and names with their values."""
@@ -91,7 +97,8 @@ class Told(ABC):
     Attributes
     ----------
     JSON : str
-        The keys of the JSON in their order, ``key=path.of.attribute`` where they differ; if empty all fields.
+        The keys of the JSON in their order, ``key=path.of.attribute`` where they differ, null where one on
+        the way is None; if empty all fields.
     WORDS : mapping
         What each field is in words.
     """
@@ -118,7 +125,7 @@ class Told(ABC):
     def _json(self, **others: object) -> dict[str, Any]:
         """The JSON object; `others` are the values of keys that are not those of attributes."""
         paths = json_keys(type(self)).items()
-        found = {key: others.pop(key) if key in others else attrgetter(path)(self) for key, path in paths}
+        found = {key: others.pop(key) if key in others else _at(self, path) for key, path in paths}
         return {key: json_value(value) for key, value in (found | others).items()}
 
     @abstractmethod

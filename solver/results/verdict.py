@@ -22,7 +22,7 @@ class Stable(Enum):
 class Verdict(Piece):
     """Whether a response is stable, and how that is known."""
 
-    stable: Annotated[Stable, "The verdict."]
+    stable: Annotated[Stable, "Whether small perturbations die out: yes, no, or not known."]
     ground: Annotated[
         str,
         "Why, in one line; of a response that is not stable also a stable one of the same frequency, if "

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from solver.first_use import renamed
 from solver.scene.scene import Scene
 from solver.scene.toml import toml_text
 
@@ -59,9 +60,10 @@ class SceneBuilder:
         self._rest["excitation"].append({"dof": dof, "amplitude": amplitude, **more})
         return self
 
-    def observe(self, dof: str, low: float, high: float, **more: object) -> SceneBuilder:
+    @renamed(low="start", high="stop")
+    def observe(self, dof: str, start: float, stop: float, **more: object) -> SceneBuilder:
         """Say whose amplitude counts, and in which band of frequencies [Hz]."""
-        self._rest["observe"] = {"dof": dof, "band": [low, high], **more}
+        self._rest["observe"] = {"dof": dof, "band": [start, stop], **more}
         return self
 
     def part(self, key: str, **table: object) -> SceneBuilder:

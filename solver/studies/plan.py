@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Annotated, ClassVar
-
 import numpy as np
 
 from solver.balance.balance import Balance, build
@@ -13,9 +10,6 @@ from solver.contacts.kernels.system import DENSE, MODES, POLES
 from solver.jit.fourier import Real
 from solver.linear.leading_ports import FEWEST_PORTS
 from solver.response.stability.cost import forecast
-from solver.results.base import Shown
-from solver.results.told import Piece
-from solver.results.views import Views
 from solver.scene.bodies.kinematics import static_forces
 from solver.scene.cyclic.annulus import sectors_needed
 from solver.scene.parts import MatricesStructure
@@ -25,6 +19,7 @@ from solver.scene.scene import (
 )
 from solver.studies.cost import point_seconds, stuck_forces
 from solver.studies.memory import dense_bytes
+from solver.studies.plan_result import Effect, Plan
 
 _SECONDS_A_DIAMETER = 1e-8  # of the modes of a Hermitian structure of n coordinates, times n³
 
@@ -33,45 +28,6 @@ _FORMS = {
     POLES: "poles and residues: the damping couples the modes, the complex eigenvectors span the state space",
     DENSE: "the matrices themselves: the eigenvectors do not span the state space",
 }
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class Effect(Piece):
-    """One effect, whether it is paid for, and why."""
-
-    name: Annotated[str, "For example ``separation``."]
-    used: Annotated[bool, "Whether it is computed."]
-    reason: Annotated[str, "In words and numbers."]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class Plan(Shown):
-    """What solving a scene will take."""
-
-    VIEWS: ClassVar = Views("solver.views", "of_plan", "plan_dataset")
-    JSON: ClassVar = (
-        "scene effects unknowns linear_dofs contacts n_harmonics=harmonics"
-        " estimated_seconds_a_point=seconds_a_point estimated_seconds_of_stability=seconds_of_stability"
-        " estimated_dense_bytes=dense_bytes performance_curve"
-    )
-
-    scene: Annotated[str, "Name of the scene."]
-    effects: Annotated[tuple[Effect, ...], "Those in use and those left out."]
-    unknowns: Annotated[int, "Real unknowns of the condensed balance."]
-    linear_dofs: Annotated[int, "Linear DOFs behind it."]
-    contacts: Annotated[int, "Contacts."]
-    harmonics: Annotated[int, "Highest harmonic kept."]
-    seconds_a_point: Annotated[float, "Estimated cost of a point of a branch [s]."]
-    dense_bytes: Annotated[int, "Estimated memory of the dense matrices of a response [bytes]."]
-    performance_curve: Annotated[
-        str,
-        "Whether the performance curve of one mode may stand in for responses in a design, and when it does.",
-    ] = ""
-    seconds_of_stability: Annotated[
-        float,
-        "Estimated cost of the Floquet multipliers of a response [s], infinite (null in JSON) where it is "
-        "not known; answers have them by themselves below a second.",
-    ] = 0.0
 
 
 def performance_curve_words(scene: Scene) -> str:

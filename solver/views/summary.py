@@ -25,9 +25,9 @@ if TYPE_CHECKING:
     from solver.studies.blades import BladeAmplitudes, BladePeaks
     from solver.studies.interference_result import InterferenceDiagram
     from solver.studies.map_result import ResponseMap
-    from solver.studies.mistuning import MistuningStudy
+    from solver.studies.mistuning_result import MistuningStudy
     from solver.studies.peaks.results import LeastPeak, PeakTrack
-    from solver.studies.plan import Plan
+    from solver.studies.plan_result import Plan
 
 LEVEL = 1e-9  # relative difference of damping ratios that is none
 Pairs = list[tuple[str, str]]

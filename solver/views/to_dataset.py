@@ -26,9 +26,9 @@ if TYPE_CHECKING:
     from solver.studies.blades import BladeAmplitudes, BladePeaks
     from solver.studies.interference_result import InterferenceDiagram
     from solver.studies.map_result import ResponseMap
-    from solver.studies.mistuning import MistuningStudy
+    from solver.studies.mistuning_result import MistuningStudy
     from solver.studies.peaks.results import LeastPeak, PeakTrack
-    from solver.studies.plan import Plan
+    from solver.studies.plan_result import Plan
 
 AMPLITUDE = "max|x| of the observed DOF"
 

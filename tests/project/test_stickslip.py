@@ -138,3 +138,12 @@ def test_the_name_of_a_scene_does_where_a_scene_does(tmp_path: Path) -> None:
     with pytest.raises(stickslip.SceneError, match="did you mean"):
         stickslip.sweep("two-dofs")
     assert pickle.loads(pickle.dumps(stickslip.solve)) is stickslip.solve
+
+
+def test_words_of_a_range_as_they_were_still_work_and_warn() -> None:
+    with pytest.warns(DeprecationWarning, match="`low` is `start` now") as told:
+        stickslip.SceneBuilder("one").observe("x", low=1.0, stop=2.0)
+    with pytest.warns(DeprecationWarning, match="`high` is `stop` now") as more:
+        found = stickslip.peaks.least_peak("two-dof", "damper.N0", start=50.0, high=200.0, harmonics=1)
+    assert {one.filename for one in (*told, *more)} == {__file__}
+    assert found.at == stickslip.peaks.least_peak("two-dof", "damper.N0", 50.0, 200.0, harmonics=1).at

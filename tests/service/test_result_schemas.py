@@ -91,12 +91,12 @@ class Shipped:
 def test_a_result_is_what_its_schema_says(case: str) -> None:
     name, body = BODIES[case]
     kind = SHIPPED[name]
-    assert kind.result is not None
+    assert kind.answers is not None
     spec = kind.resolve(validated(kind.request, body), Shipped()).spec
     output = kind.run(spec, Silent(), lambda: False)
     assert {sweep.intermediate for sweep in output.sweeps} <= {name in ON_THE_WAY}
     result = json.loads(json.dumps(output.result))
-    checked = kind.result.model_validate(result)
+    checked = kind.answers.model_validate(result)
     told = getattr(checked, "root", checked)
     assert set(result) - set(type(told).model_fields) == set(), "keys without a schema"
     assert set(type(told).model_fields) - set(result) <= SOMETIMES, "keys that are not there"

@@ -10,7 +10,7 @@ import pytest
 
 from service.cli import main
 from service.jobs.outputs import Silent
-from service.jobs.studies.sweep import Sweep, SweepResult
+from service.jobs.studies.sweep import Sweep, sweep_result
 from solver.scene.scene import Scene
 from solver.scene.toml import toml_text
 
@@ -32,7 +32,7 @@ def test_a_job_gives_the_result_and_the_stored_sweep() -> None:
     }  # fmt: skip
     output = Sweep.run(spec, Silent(), lambda: False)
     told = json.loads(json.dumps(output.result, allow_nan=False))
-    SweepResult.model_validate(told)
+    sweep_result().model_validate(told)
     assert output.shortfall is None
     record = output.sweeps[0]
     assert record.points == told["points"] == len(told["parameter"])

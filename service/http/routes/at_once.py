@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from typing import Annotated
+from typing import Annotated, Any
 
 from fastapi import APIRouter, Body, Response
 
@@ -22,10 +22,10 @@ plans = APIRouter(prefix="/v1/plan", tags=["scenes"], route_class=TypedRoute)
 PlanBody = Annotated[Plan, Body(openapi_examples={"plan": {"value": EXAMPLE}})]
 
 
-@plans.post("")
-async def plan(body: PlanBody, context: InContext) -> PlanResult:
+@plans.post("", response_model=PlanResult)
+async def plan(body: PlanBody, context: InContext) -> Any:
     """The effects this scene calls for and those left out, each with the reason; sizes and cost."""
-    return PlanResult.model_validate(await computed(context, PLAN, {"request": body}))
+    return await computed(context, PLAN, {"request": body})
 
 
 previews = APIRouter(prefix="/v1/previews", tags=["previews"], route_class=TypedRoute)

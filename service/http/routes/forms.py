@@ -113,6 +113,7 @@ def list_kinds(context: InContext) -> KindList:
 
 
 def _answer(kind: JobKind) -> KindAnswer:
-    result = None if kind.result is None else plain(kind.result.model_json_schema())
+    answers = kind.answers
+    result = None if answers is None else plain(answers.model_json_schema())
     body = plain(body_model(kind.name, kind.request).model_json_schema())
     return KindAnswer(name=kind.name, summary=kind.summary, body=body, result=result)

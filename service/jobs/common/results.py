@@ -11,6 +11,7 @@ from types import NoneType, UnionType
 from typing import TYPE_CHECKING, Annotated, Any, Union, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, Field, create_model
+from pydantic.fields import FieldInfo
 
 if TYPE_CHECKING:
     from solver.results.told import Told
@@ -89,8 +90,8 @@ def result_model(kind: type[Told], name: str, **types: Any) -> type[KindResult]:
     ----------
     kind : the class; how well responses are known, and how a result ended, is said in all alike.
     name : of the schema.
-    types : of keys whose JSON has another one than the attribute, or none that is known here; of further keys
-        their fields, as of `pydantic.create_model`.
+    types : of keys whose JSON has another one than the attribute, or none that is known here; with a default
+        as a pair where results may be without. Of further keys their fields, as of `pydantic.create_model`.
     """
     # Loaded here: the help of a command whose model is written out needs no numbers.
     from solver.results.base import MadeOfResponses
@@ -107,8 +108,9 @@ def result_model(kind: type[Told], name: str, **types: Any) -> type[KindResult]:
     for key, path in keys.items():
         if key not in shared:
             kept, words = _described(kind, path)
-            given = types.pop(key, kept)
-            own[key] = given if isinstance(given, tuple) else (given, Field(description=words))
+            given, default = one if isinstance(one := types.pop(key, kept), tuple) else (one, ...)
+            field = default if isinstance(default, FieldInfo) else Field(default, description=words)
+            own[key] = given, field
     about = (kind.__doc__ or "").partition("\n")[0]
     return create_model(name, __base__=bases or (KindResult,), __doc__=about, **own, **types)
 
@@ -117,14 +119,16 @@ def _described(kind: Any, path: str) -> tuple[Any, str | None]:
     """Return the type that the JSON of an attribute has, and its description."""
     name, _, rest = path.partition(".")
     found_in = (one for one in kind.__mro__ if name in {*inspect.get_annotations(one), *vars(one)})
-    owner = next(found_in, None)
-    if owner is None:  # of what is there for type checkers alone
-        return Table, None
+    owner = next(found_in, object)
     made = getattr(vars(owner).get(name), "fget", None)
-    text = owner.__annotations__[name] if made is None else made.__annotations__["return"]
+    text = inspect.get_annotations(owner).get(name) if made is None else made.__annotations__["return"]
+    if text is None:  # of what is there for type checkers alone, or nothing of ours
+        return Table, None
     found = eval(text, {}, _Names({**vars(builtins), **vars(sys.modules[owner.__module__])}))
     if rest:
-        return _described(found, rest)
+        kinds = get_args(found) if get_origin(found) in (Union, UnionType) else (found,)
+        inner, words = _described(next(one for one in kinds if one is not NoneType), rest)
+        return (inner | None if NoneType in kinds else inner), words
     words = getattr(kind, "WORDS", {}).get(name) if made is None else (made.__doc__ or "").partition("\n")[0]
     return _json_type(found), words
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import BeforeValidator, ConfigDict, Field
 
 from optim.criteria.json_types import Pair
 from optim.errors import DesignError
-from optim.identification.result import Identification
+from optim.identification.result import Estimate, Identification
 from optim.problem.keys import MAX_VARIABLES, VariableName
 from optim.problem.words import ScalingWord
 from service.jobs.common.results import Table, result_model
@@ -53,23 +53,10 @@ def _small(value: object) -> object:
     return value
 
 
-class EstimateResult(BaseModel):
-    """An unknown with how sure it is; bounds in place of an interval where the data do not tell it."""
-
-    model_config = ConfigDict(extra="allow", defer_build=True)
-
-    name: str
-    unit: str
-    value: float
-    standard_error: float | None
-    interval: list[float]
-    told: bool
-    at_bound: bool
-
-
+EstimateResult = result_model(Estimate, "EstimateResult")
 IdentifyResult = result_model(
-    Identification, "IdentifyResult", estimates=list[EstimateResult], correlated=list[Table],
-    covariance=list[list[float]], correlation=list[list[float]],
+    Identification, "IdentifyResult", correlated=list[Table], covariance=list[list[float]],
+    correlation=list[list[float]], estimates=list[EstimateResult],  # type: ignore[valid-type]
 )  # fmt: skip
 
 

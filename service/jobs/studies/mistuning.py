@@ -13,7 +13,7 @@ from pydantic import BeforeValidator, ConfigDict, Field, WithJsonSchema
 
 from optim.criteria.json_types import Name
 from service.jobs.arrays import decode, encode
-from service.jobs.common.results import EndedResult, KnownResult, Table
+from service.jobs.common.results import Table, result_model
 from service.jobs.common.scenes import FrequencyHz, HarmonicRequest, stored_scene
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
 from service.jobs.common.study_keys import band_issues
@@ -23,6 +23,7 @@ from service.jobs.registry import Flag, JobKind
 from service.jobs.study import Study
 from solver.errors import Issue, SceneError, SettingError
 from solver.results.known import Known
+from solver.studies.mistuning_result import MistuningStudy
 
 if TYPE_CHECKING:
     from solver import BladePeaks
@@ -64,23 +65,10 @@ PartNames = Annotated[
 ]
 
 
-class MistuningResult(KnownResult, EndedResult):
-    """The peaks of every blade of every disk, and how much higher they are than the tuned disk's."""
-
-    scene: str
-    dof: str
-    of: list[str]
-    spread: float
-    tuned: Table
-    samples: list[Table]
-    mean: float | None = Field(description="Of the magnification.")
-    mean_error: float | None = Field(description="Estimated error of the mean, by those of the peaks.")
-    standard_error: float | None = Field(description="Of the mean, as that of so many disks.")
-    deviation: float | None = Field(description="Standard deviation of the magnifications of the disks.")
-    quantiles: list[Table]
-    worst: Table | None
-    n_harmonics: int
-    seconds: float
+MistuningResult = result_model(
+    MistuningStudy, "MistuningResult", dof=str, samples=list[Table], quantiles=list[Table],
+    worst=Table | None,
+)  # fmt: skip
 
 
 class Mistuning(Study, HarmonicRequest):

@@ -5,14 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import ConfigDict
 
-from service.jobs.common.results import KindResult
+from service.jobs.common.results import result_model
 from service.jobs.common.scenes import HarmonicRequest
 from service.jobs.common.study_keys import AUTO, EffectsWord, effects_issues, solved_issues, with_effects
 from service.jobs.study import Answer, Study, Watch
 from solver.errors import Issue
 from solver.scene.descriptions import DISK_LOAD
+from solver.studies import plan_result
 
 if TYPE_CHECKING:
     from solver.scene.scene import Scene
@@ -20,27 +21,10 @@ if TYPE_CHECKING:
 EXAMPLE: dict[str, Any] = {"scene": "bladed-disk", "set": {DISK_LOAD: 150}}
 
 
-class EffectResult(BaseModel):
-    """An effect that a scene calls for or does not."""
-
-    name: str
-    used: bool
-    reason: str
-
-
-class PlanResult(KindResult):
-    """The effects of a scene; sizes and cost."""
-
-    scene: str
-    effects: list[EffectResult]
-    unknowns: int
-    linear_dofs: int
-    contacts: int
-    n_harmonics: int
-    estimated_seconds_a_point: float
-    estimated_seconds_of_stability: float | None
-    performance_curve: str
-    estimated_dense_bytes: int
+EffectResult = result_model(plan_result.Effect, "EffectResult")
+PlanResult = result_model(
+    plan_result.Plan, "PlanResult", effects=list[EffectResult],  # type: ignore[valid-type]
+)  # fmt: skip
 
 
 class Plan(Study, HarmonicRequest):

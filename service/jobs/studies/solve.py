@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cache
 from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import ConfigDict, Field
 
-from service.jobs.common.results import Amplitude, KindResult
+from service.jobs.common.results import Curve, KindResult, Table, result_model
 from service.jobs.common.scenes import FrequencyHz, HarmonicRequest
 from service.jobs.common.study_keys import (
     AUTO,
@@ -32,55 +33,34 @@ _STOPPED = "The search was stopped: these are the solutions found until then."
 _NONE = "No solution was found: try more starts or more harmonics."
 
 
-class SolveResult(KindResult):
-    """One periodic response: of a search for all, the largest."""
+@cache
+def solve_result() -> type[KindResult]:
+    """Return the schema of one periodic response: of a search for all, the largest, with what was found."""
+    # Loaded here: the help of the command needs no numbers.
+    from solver.response.solution import Solution
 
-    scene: str
-    frequency_hz: float
-    converged: bool
-    status: str
-    max_abs: Amplitude
-    half_peak_to_peak: Amplitude
-    mean: Amplitude
-    harmonics: list[float] | None = Field(description="Amplitudes of the harmonics from 0 on [m].")
-    flags: list[str]
-    contacts: dict[str, str] = Field(description="What each contact does during the period.")
-    stable: str = Field(
-        default="not known", description="Whether small perturbations die out: yes, no, not known."
-    )
-    stable_ground: str = Field(default="", description="Why, and a stable response beside one that is not.")
-    unique: str = Field(
-        default="not known", description="Whether it is the only response: proven or not known."
-    )
-    unique_ground: str = Field(default="", description="Why.")
-    residual: float | None
-    error_estimate: Amplitude
-    n_harmonics: int
-    newton_iterations: int
-    seconds: float
-    mean_range: list[float | None] | None = Field(
-        default=None, description="Means that any history can leave [m], if the mean depends on it."
-    )
-    drift_per_period: float | None = Field(
-        default=None, description="How far a part that ratchets drifts in a period [m], if that is known."
-    )
-    solutions: list[dict[str, Any]] | None = Field(
-        default=None, description="Of a search for all: each solution with its stability, largest first."
-    )
-    complete: bool | None = Field(default=None, description="Whether these are proven to be all.")
-    missing_by_signs: int | None = Field(
-        default=None, description="How many are missing at least, by the signs of the determinants."
-    )
-    starts: int | None = Field(default=None, description="Random starts that were made.")
-    stopped: bool | None = Field(default=None, description="Whether the search was ended before its end.")
-    note: str | None = Field(default=None, description="What is known of the list.")
+    further = {
+        "solutions": (list[Table], "Of a search for all: each solution with its stability, largest first."),
+        "complete": (bool, "Whether these are proven to be all."),
+        "missing_by_signs": (int, "How many are missing at least, by the signs of the determinants."),
+        "starts": (int, "Random starts that were made."),
+        "stopped": (bool, "Whether the search was ended before its end."),
+        "note": (str, "What is known of the list."),
+    }
+    return result_model(
+        Solution, "SolveResult", harmonics=list[float] | None, contacts=dict[str, str],
+        unique=(str, Field(description="Whether it is the only response: proven or not known.")),
+        unique_ground=(str, Field(description="Why.")), mean_range=(Curve | None, None),
+        drift_per_period=(float | None, None),
+        **{key: (kind | None, Field(None, description=words)) for key, (kind, words) in further.items()},
+    )  # fmt: skip
 
 
 class Solve(Study, HarmonicRequest):
     """Compute one periodic response, or look for all of them."""
 
     model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE, _EVERY]})
-    NAME, FUNCTION, RESULT = "solve", "solver:solve", SolveResult
+    NAME, FUNCTION, RESULT = "solve", "solver:solve", solve_result
     SHOWS, COUNTED = "the response at one frequency", "solutions"
     EMPTY = ("harmonics", "no response was found")
     FIGURE = "service.jobs.drawing:harmonics_of"

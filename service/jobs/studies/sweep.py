@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import ConfigDict, Field
 
 from service.jobs.checkpoints import Checkpoints
-from service.jobs.common.results import Amplitude, Curve, EndedResult, PeakAt, Table
+from service.jobs.common.results import KindResult, PeakAt, Table, result_model
 from service.jobs.common.scenes import (
     FrequencyHz,
     HarmonicRequest,
@@ -48,54 +48,22 @@ _OVER_A_LOAD: dict[str, Any] = {
 }  # fmt: skip
 
 
-class SweepResult(EndedResult):
-    """A branch: its points, its peaks and its resonance band."""
+@cache
+def sweep_result() -> type[KindResult]:
+    """Return the schema of a branch: its points, its peaks and its resonance band."""
+    # Loaded here: the help of the command needs no numbers.
+    from solver.continuation.branch import AnyBranch
 
-    scene: str
-    parameter: Curve
-    parameter_path: str
-    unit: str
-    speed_rpm: Curve | None = Field(description="Speeds [1/min] of the points along an engine-order line.")
-    amplitude: Curve
-    half_peak_to_peak: Curve
-    mean: Curve
-    peak: PeakAt | None
-    peaks: list[PeakAt]
-    stable: str | None = Field(
-        default=None, description="Whether the highest peak is stable: yes, no, not known."
-    )
-    stable_ground: str | None = Field(default=None, description="Why.")
-    peaks_stable: list[str] = Field(default=[], description="The same word for each of `peaks`.")
-    band_hz: float | None
-    band_limit: Amplitude
-    band_intervals_hz: list[list[float]] | None
-    band_known: bool | None
-    peak_certificate: Table
-    points: int
-    n_harmonics: int
-    error_estimate: Amplitude
-    newton_iterations: int
-    rejected_steps: int
-    folds: int
-    unstable: list[list[int]] = Field(
-        default=[], description="First and last point of every stretch that is not stable."
-    )
-    marks: list[dict[str, Any]] = Field(
-        default=[], description="Folds, branch points and an early end, with the point each comes behind."
-    )
-    stability_known_by: str = Field(
-        default="", description="uniqueness, determinant (real perturbations of the same period) or nothing."
-    )
-    branches: list[dict[str, Any]] | None = Field(
-        default=None, description="At each branch point its tangents and the branches that leave there."
-    )
-    mean_undetermined: bool
-    largest_residual: float | None
-    seconds: float
-    flags: list[str]
-    drift_per_period: float | None = Field(
-        default=None, description="How far a part that ratchets drifts in a period [m], if that is known."
-    )
+    leaving = "At each branch point its tangents and the branches that leave there."
+    return result_model(
+        AnyBranch,  # type: ignore[type-abstract]
+        "SweepResult", peak=PeakAt | None, peaks=list[PeakAt], points=int,
+        unstable=(list[list[int]], Field([], description="First and last point of what is not stable.")),
+        marks=(list[Table], Field([], description="Folds, branch points, an early end; behind which point.")),
+        stability_known_by=(str, Field("", description="uniqueness, determinant, multipliers or nothing.")),
+        branches=(list[Table] | None, Field(None, description=leaving)),
+        drift_per_period=(float | None, None),
+    )  # fmt: skip
 
 
 class Sweep(Study, HarmonicRequest):
@@ -105,7 +73,7 @@ class Sweep(Study, HarmonicRequest):
     """
 
     model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE, _OVER_A_LOAD]})
-    NAME, FUNCTION, RESULT = "sweep", "solver:sweep", SweepResult
+    NAME, FUNCTION, RESULT = "sweep", "solver:sweep", sweep_result
     SHOWS, SWEEPS = "peaks, band, folds", "the branch"
     EMPTY = ("parameter", "it stored no sweep to draw")
 

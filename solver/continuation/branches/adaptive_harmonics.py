@@ -233,7 +233,7 @@ def harmonics_for(branch: Branch, accuracy: float) -> int | None:
 def _points(branch: Branch) -> list[tuple[Real, float, float]]:
     """Return (u, λ, amplitude) of the peaks and of points all along a branch."""
     inside = branch.balance.parameter.inside
-    points = [(peak.solution, float(inside(peak.at)), peak.value) for peak in branch.peaks if peak.interior]
+    points = [(peak.solution, float(inside(peak.at)), peak.value) for peak in branch.interior_peaks]
     stride = max(len(branch.values) // _LOOKED_AT, 1)
     for row, amplitude in zip(branch.solutions[::stride], branch.amplitude[::stride], strict=True):
         points.append((row[:-1], float(row[-1]), float(amplitude)))

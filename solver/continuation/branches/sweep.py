@@ -18,7 +18,7 @@ from solver.balance.kernels.output import MAX_ABS
 from solver.balance.parameter import Kind, Parameter
 from solver.balance.simplifications import Effects
 from solver.balance.workspace import Workspace
-from solver.continuation.branch import ENDINGS, Branch, BranchStatus
+from solver.continuation.branch import Branch, BranchStatus
 from solver.continuation.branches.adaptive_harmonics import sweep_to
 from solver.continuation.branches.point_by_point import is_unique, rows_before_a_turn, walk_by_points
 from solver.continuation.branches.symmetry_breaking import branch_flags
@@ -51,6 +51,12 @@ _LARGE = 400  # unknowns from which it may
 _DEAR, _LONGER = 1000, 2.5
 _STRETCH_SECONDS = 0.5
 _MOST_FOLLOWED = 500  # points of a look at a resonance beside the branch
+_ENDINGS = {
+    walk_states.FINISHED: BranchStatus.COMPLETED,
+    walk_states.NO_START: BranchStatus.NO_START,
+    walk_states.STALLED: BranchStatus.STALLED,
+    walk_states.LEFT_RANGE: BranchStatus.TURNED_BACK,
+}
 _LOST = (
     BranchStatus.STALLED, BranchStatus.TURNED_BACK, BranchStatus.TOO_MANY_POINTS, BranchStatus.POWER_LOST,
 )  # fmt: skip
@@ -282,7 +288,7 @@ def walk(
         last = np.concatenate([last, rows[0][:count]])[-MANY:]
         if code == walk_states.RUNNING and stands_still(last, control):
             code = walk_states.STALLED
-        status, again = ENDINGS.get(code), None
+        status, again = _ENDINGS.get(code), None
         if status is BranchStatus.STALLED:
             again = taken_up(workspace, control, state, last)
         if again is not None:

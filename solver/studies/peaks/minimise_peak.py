@@ -16,6 +16,7 @@ import numpy as np
 
 from solver.balance.simplifications import Effects
 from solver.errors import SettingError
+from solver.first_use import renamed
 from solver.results.default_bar import shows_progress
 from solver.scene.scene import Scene
 from solver.studies.peaks.envelope_minimum import DOUBT, Lowest, flat, minima, rows_at
@@ -46,12 +47,13 @@ _PACE = TrackingPace(
 )  # fmt: skip
 
 
+@renamed(low="start", high="stop")
 @shows_progress("least peak")
 def least_peak(
     scene: Scene,
     parameter: str,
-    low: float,
-    high: float,
+    start: float,
+    stop: float,
     *,
     harmonics: int = 11,
     first: float | None = None,
@@ -68,7 +70,7 @@ def least_peak(
     ----------
     scene : what vibrates, with the values that stay fixed.
     parameter : path of the parameter, for example ``shroud.N0``.
-    low, high : its bounds in user units.
+    start, stop : its range in user units.
     harmonics : highest harmonic kept.
     first : where the first sweep is made; the middle of the range if left out.
     basins : how many local minima are looked for. With more than one, a coarse stage follows the proof of the
@@ -93,14 +95,14 @@ def least_peak(
         raise SettingError("basins", basins, "must be a whole number >= 1")
     pace = replace(_PACE, above=WIDE) if thorough and basins > 1 else _PACE
     allowance = Allowance(should_stop, RESPONSES * (THOROUGHLY if thorough else 1.0))
-    tracker = Tracker(scene, parameter, low, high, harmonics, effects, pace, allowance)
+    tracker = Tracker(scene, parameter, start, stop, harmonics, effects, pace, allowance)
     tracker.on_look = on_look
     scale = tracker.scale
     places = [scale.low + share * scale.span for share in _STARTS]
     if first is not None:
         z = scale.inside(tracker.balance.parameter.check("first", first))
         if not scale.low <= z <= scale.high:
-            raise SettingError("first", first, f"must be from {min(low, high)} to {max(low, high)}")
+            raise SettingError("first", first, f"must be from {min(start, stop)} to {max(start, stop)}")
         places.insert(0, z)
     try:
         _begin(tracker, places, on_progress)

@@ -11,8 +11,9 @@ import pytest
 import optim
 import solver
 from service.cli import main
+from service.jobs.drawing import result_figure
 from service.jobs.kind_view import NothingToDrawError
-from service.rendering.plots import result_figure
+from service.jobs.kinds import SHIPPED
 
 COMMANDS = {
     "solve": "two-dof --frequency 1.2 --harmonics 3",
@@ -86,7 +87,9 @@ def results() -> dict[str, Any]:
 @pytest.mark.long
 def test_a_stored_result_is_drawn_as_the_computed_one() -> None:
     for kind, computed in results().items():
-        page = result_figure(kind, computed.to_json(), [], lambda _: pytest.fail("no sweep is needed"))
+        page = result_figure(
+            kind, computed.to_json(), [], lambda _: pytest.fail("no sweep is needed"), SHIPPED
+        )
         axes, wanted = page.axes[0], computed.plot().axes[0]
         if kind in ("solve", "march"):
             assert axes.get_xlabel() == "harmonic (0: mean)"
@@ -105,4 +108,4 @@ def test_nothing_to_draw_is_said(kind: str) -> None:
     empty = {"peak": None, "orders": [], "rows": [], "points": [], "harmonics": None, "worst": None}
     empty |= {"amplitude": [], "diameters": []}
     with pytest.raises(NothingToDrawError):
-        result_figure(kind, empty, [], lambda _: pytest.fail("no sweep is read"))
+        result_figure(kind, empty, [], lambda _: pytest.fail("no sweep is read"), SHIPPED)

@@ -149,8 +149,8 @@ def _show(job: JobAnswer, answer: ResultsAnswer, *, as_json: bool) -> None:
 
 
 def _draw(client: Client, kind: str, answer: ResultsAnswer, picture: Path) -> None:
+    from service.jobs.drawing import result_figure
     from service.jobs.kind_view import NothingToDrawError
-    from service.rendering.plots import result_figure
     from service.settings.kinds import registry_here
     from solver.views.plots.html import save
 

@@ -6,6 +6,7 @@ from collections.abc import Container, Sequence
 from typing import TYPE_CHECKING, Any
 
 import typer
+from typer.core import TyperCommand, TyperGroup
 
 from optim.problem.keys import options as key_options_of
 from service.cli.commands.client.jobs import hand_in, scene_of
@@ -22,11 +23,39 @@ from service.cli.options.parameters import Command, keyed, keyword, with_paramet
 from service.cli.options.problem import FLAGS, ProblemFlags, takes_problem
 from service.cli.table import TOP
 from service.jobs.registry import ABOUT_THE_RUN, JobKind
+from service.settings.kinds import registry_here
 
 if TYPE_CHECKING:
     import inspect
 
     from service.jobs.common.problem import ProblemRequest
+
+
+class SubmitGroup(TyperGroup):
+    """The group `submit`: a command for every kind of job there is, made when it is asked for."""
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        """The names of the kinds."""
+        self._fill()
+        return super().list_commands(ctx)
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """Name and summary of a kind; None if there is none of this name."""
+        self._fill()
+        return super().get_command(ctx, cmd_name)
+
+    def resolve_command(self, ctx: Any, args: Any) -> Any:
+        """The name of the kind asked for, its command, and the arguments left."""
+        name, _, rest = super().resolve_command(ctx, args)
+        if name is None:
+            return name, None, rest
+        return name, command_of(registry_here()[name]), rest
+
+    def _fill(self) -> None:
+        if not self.commands:
+            for kind in registry_here():
+                self.add_command(TyperCommand(kind.name, help=kind.summary, rich_markup_mode=None))
+
 
 _OF_ALL = ("fresh", "priority", "max_seconds", *ABOUT_THE_RUN)
 
