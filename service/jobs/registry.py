@@ -88,7 +88,9 @@ class JobRequest(BaseModel):
         leaves them out.
     """
 
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True, validate_by_name=True)
+    model_config = ConfigDict(
+        extra="forbid", allow_inf_nan=False, frozen=True, validate_by_name=True, defer_build=True
+    )
 
     fresh: bool = Field(
         default=False, strict=True, description="Compute again even if a stored result exists."
