@@ -88,9 +88,7 @@ class JobRequest(BaseModel):
         leaves them out.
     """
 
-    model_config = ConfigDict(
-        extra="forbid", allow_inf_nan=False, frozen=True, validate_by_name=True, defer_build=True
-    )
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True, validate_by_name=True)
 
     fresh: bool = Field(
         default=False, strict=True, description="Compute again even if a stored result exists."
