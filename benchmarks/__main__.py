@@ -100,7 +100,7 @@ def main() -> int:
     cases = _cases()
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
     listed = "; ".join(f"{name}: {(case.__doc__ or '').splitlines()[0]}" for name, case in cases.items())
-    parser.add_argument("case", nargs="*", metavar="CASE", help=listed)
+    parser.add_argument("case", nargs="*", metavar="CASE", help=listed.replace("%", "%%"))
     asked = parser.parse_args().case or list(cases)
     names = [case for name in asked for case in GROUPS.get(name, (name,))]
     unknown = [name for name in names if name not in cases]

@@ -15,6 +15,7 @@ import json
 import math
 import resource
 import statistics
+import subprocess
 import sys
 import time
 from collections.abc import Callable
@@ -280,6 +281,63 @@ def _disk_along_a_branch() -> Callable[[], Answer]:
         return Answer(value=branch.peak.value, parts=len(branch.values))
 
     return call
+
+
+def _mistuned_disks(blades: int, disks: int, study: int) -> Callable[[], Callable[[], Answer]]:
+    """Every blade's peak of some disks; the figure is the minutes of a study on two cores of these costs."""
+
+    def prepare() -> Callable[[], Answer]:
+        import solver
+        from benchmarks.mistuned import HARMONICS, disk_of
+
+        drawn = [disk_of(blades, seed=10 + k) for k in range(disks)]
+        solver.blade_peaks(drawn[0], 600.0, 620.0, harmonics=HARMONICS, every_branch=False)
+
+        def call() -> Answer:
+            begun = time.process_time()
+            found = [solver.blade_peaks(disk, harmonics=HARMONICS, every_branch=False) for disk in drawn]
+            each = (time.process_time() - begun) / disks
+            expect("all peaks are known", all(peaks.reached for peaks in found))
+            return Answer(value=sum(peaks.largest for peaks in found), figure=each * study / 120.0)
+
+        return call
+
+    return prepare
+
+
+for _blades, _disks, _study, _goal in ((8, 50, 1000, 3.0), (24, 4, 100, 2.5)):
+    row(
+        f"mistuned-{_blades}", f"{_study} mistuned disks of {_blades} blades, H = 5, every blade, two cores",
+        _goal, unit="min", runs=0,
+    )(_mistuned_disks(_blades, _disks, _study))  # fmt: skip
+
+
+def _cold(*arguments: str) -> Callable[[], Callable[[], Answer]]:
+    """A process of the command from its start to its end, kernels cached."""
+
+    def prepare() -> Callable[[], Answer]:
+        # Of a checkout from before the command had a process of its own, `main` is that.
+        start = "import sys; from service import cli; sys.exit(getattr(cli, 'process', cli.main)())"
+
+        def call() -> Answer:
+            before = resource.getrusage(resource.RUSAGE_CHILDREN)
+            done = subprocess.run(
+                [sys.executable, "-c", start, *arguments], check=False, stdout=subprocess.DEVNULL
+            )
+            after = resource.getrusage(resource.RUSAGE_CHILDREN)
+            expect(f"{' '.join(arguments)} ends well", done.returncode == 0)
+            spent = after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime
+            return Answer(value=1.0, figure=spent)
+
+        return call
+
+    return prepare
+
+
+for _arguments, _goal in (("solve two-dof --frequency 1", 0.5), ("--help", 0.1)):
+    row(f"cold-{_arguments.split()[0].strip('-')}", f"`stickslip {_arguments}`, cold", _goal, runs=9)(
+        _cold(*_arguments.split())
+    )
 
 
 def _forecast_scenes() -> list[tuple[Any, int]]:

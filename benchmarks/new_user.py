@@ -28,7 +28,7 @@ from benchmarks.service_process import serving
 ROOT = Path(__file__).resolve().parent.parent
 KEY_SECONDS = 0.08
 THINK_SECONDS = 1.0
-COMMAND = "import sys; from service.cli import main; sys.exit(main())"
+COMMAND = "import sys; from service.cli import process; sys.exit(process())"
 # The key of a line that the page wants changed, and the line it stands for if that has another beginning.
 _CHANGE = re.compile(r"`((\w+) = [^`]+)`(?: takes the place of the line that begins with `(# \w+)`)?")
 # A design variable with the value found for it.

@@ -18,7 +18,7 @@ from typing import Any, Self
 
 from benchmarks.harness import WrongResultError
 
-_COMMAND = (sys.executable, "-c", "import sys; from service.cli import main; sys.exit(main())")
+_COMMAND = (sys.executable, "-c", "import sys; from service.cli import process; sys.exit(process())")
 _TICKS = os.sysconf("SC_CLK_TCK")
 _START_SECONDS = 600.0
 

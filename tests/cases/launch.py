@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-COMMAND = (sys.executable, "-c", "import sys; from service.cli import main; sys.exit(main())")
+COMMAND = (sys.executable, "-c", "import sys; from service.cli import process; sys.exit(process())")
 
 
 def free_port() -> int:

@@ -116,3 +116,52 @@ def test_what_computes_loads_no_service() -> None:
     loaded = modules_after("import service.workers.preloaded, service.workers.worker")
     assert "numba" in loaded
     assert loaded & (SERVICE | PICTURES | {"service.settings.settings"}) == set()
+
+
+PROCESS = "import sys; from service.cli import process; sys.exit(process())"
+
+
+@pytest.mark.parametrize(
+    ("status", "arguments"), [(0, "--version"), (2, "solve no-such-scene --frequency 1")]
+)
+def test_a_process_leaves_with_its_status_and_takes_nothing_apart(status: int, arguments: str) -> None:
+    code = (
+        "import sys; from service.cli import process\n"
+        "class Held:\n    def __del__(self): print('taken apart')\n"
+        "held = Held(); sys.exit(process())"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, *arguments.split()], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == status, done.stderr
+    assert "taken apart" not in done.stdout
+
+
+def test_what_a_command_registers_happens_at_its_end() -> None:
+    code = (
+        "import atexit, sys; import service.cli as cli\n"
+        "def main():\n    atexit.register(print, 'registered')\n    return 3\n"
+        "cli.main = main; sys.exit(cli.process())"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (3, "registered\n")
+
+
+def test_a_process_that_fails_shows_why() -> None:
+    code = (
+        "import sys; import service.cli as cli\n"
+        "def main(): raise RuntimeError('broken')\n"
+        "cli.main = main; sys.exit(cli.process())"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert "RuntimeError: broken" in done.stderr
+
+
+def test_a_process_whose_output_nobody_reads_says_so() -> None:
+    with subprocess.Popen(
+        [sys.executable, "-c", PROCESS, "--help"], stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    ) as process:
+        assert process.stdout is not None
+        process.stdout.close()
+        assert process.wait(timeout=60) != 0
