@@ -15,7 +15,14 @@ from optim.criteria.linearised import conditions, model_of
 from optim.criteria.rows import DesignEvaluation
 from optim.methods.afterwards import looked_after, settled_status
 from optim.methods.eased import Eased
-from optim.methods.enough_harmonics import by_the_better_known, honest, most_harmonics, with_enough
+from optim.methods.enough_harmonics import (
+    by_first_response,
+    by_the_better_known,
+    honest,
+    mean_is_free,
+    most_harmonics,
+    with_enough,
+)
 from optim.methods.evaluator import DesignSearch, SearchStoppedError, Tally
 from optim.methods.global_look import WholeRange
 from optim.methods.kkt import FLAT_SLOPE, Local, LocalSearch
@@ -84,7 +91,14 @@ def solve_problem(
 ) -> DesignResult:
     """Search the best design of a problem; see `design`."""
     tally = Tally(on_progress)
-    found = _solved(problem, tally.searching, should_stop, on_best)
+    measured, told = by_first_response(problem, should_stop)
+    found = _solved(measured, tally.searching, should_stop, on_best, told=told)
+    if measured is not problem and not (found.evaluation and mean_is_free(found.evaluation)):
+        # The best design has a mean of its own, or there is none: max|x| is what was asked for.
+        seen = (*told, *found.looked_at, *found.history)
+        again = _solved(problem, tally.again(found.evaluations), should_stop, on_best, told=seen)
+        found = _counted(again, found.evaluations)
+    found = _counted(found, sum(one.computed for one in told))
     most = most_harmonics(problem.harmonics)
     found, more = _with_enough_harmonics(found, most, tally, should_stop, on_best)
     if problem.method is Method.PERFORMANCE_CURVE:
@@ -101,6 +115,11 @@ def solve_problem(
     if found.evaluation is not None:
         tally.tell(1.0)
     return found
+
+
+def _counted(found: DesignResult, responses: int) -> DesignResult:
+    """Return a result with the responses computed before it."""
+    return replace(found, evaluations=found.evaluations + responses, work=found.work + responses)
 
 
 def _undamped(found: DesignResult, should_stop: ShouldStop) -> bool:
@@ -123,7 +142,7 @@ def _with_enough_harmonics(
     found = found.with_errors()
     problem, tried = with_enough(found, most, should_stop)
     responses = sum(one.computed for one in tried)
-    found = replace(found, evaluations=found.evaluations + responses, work=found.work + responses)
+    found = _counted(found, responses)
     if problem is None:
         return found, tried
     same = problem.cases is found.problem.cases
@@ -144,9 +163,12 @@ def _with_enough_harmonics(
 
 def _solved(
     problem: Problem, on_progress: OnProgress, should_stop: ShouldStop, on_best: OnBest,
-    before: DesignResult | None = None,
+    before: DesignResult | None = None, told: Sequence[DesignEvaluation] = (),
 ) -> DesignResult:  # fmt: skip
-    """Search the best design of a problem by its method; `before`: of a search before with less known."""
+    """Search the best design of a problem by its method.
+
+    `before`: of a search before with less known; `told`: designs whose responses serve again.
+    """
     if problem.method is Method.PERFORMANCE_CURVE:
         return _by_curve(problem, on_progress, should_stop)
     begun = time.perf_counter()
@@ -158,7 +180,7 @@ def _solved(
         tracked = tracked_optimum(problem, on_progress=on_progress, should_stop=should_stop, on_best=on_best)
         if problem.method is Method.TRACKED or tracked.status is not DesignStatus.NOT_TRACKED:
             return _of_tracked(problem, tracked, time.perf_counter() - begun)
-    earlier = () if before is None else (*before.looked_at, *before.history)
+    earlier = told if before is None else (*before.looked_at, *before.history)
     search = DesignSearch(problem, on_progress, should_stop, on_best=on_best, before=earlier)
     eased = Eased.of(search, tracked)
     if eased.proven is not None:
