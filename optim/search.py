@@ -96,8 +96,8 @@ def solve_problem(
     if measured is not problem and not (found.evaluation and mean_is_free(found.evaluation)):
         # The best design has a mean of its own, or there is none: max|x| is what was asked for.
         seen = (*told, *found.looked_at, *found.history)
-        again = _solved(problem, tally.again(found.evaluations), should_stop, on_best, told=seen)
-        found = _counted(again, found.evaluations)
+        asked = _solved(problem, tally.again(found.evaluations), should_stop, on_best, told=seen)
+        found = _counted(asked, found.evaluations)
     found = _counted(found, sum(one.computed for one in told))
     most = most_harmonics(problem.harmonics)
     found, more = _with_enough_harmonics(found, most, tally, should_stop, on_best)

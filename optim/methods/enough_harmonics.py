@@ -161,9 +161,7 @@ def by_first_response(
     middle = {variable.name: variable.outside(0.5) for variable in problem.variables}
     start = middle if problem.start is None else dict(problem.start)
     found = evaluate(problem, start, gradients=False, errors=False, should_stop=should_stop)
-    if not found.good:
-        return problem, (found,)
-    return _by_its_measure(problem, found), (found,)
+    return _by_its_measure(problem, found) if found.good else problem, (found,)
 
 
 def mean_is_free(evaluation: DesignEvaluation) -> bool:
