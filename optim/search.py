@@ -21,6 +21,7 @@ from optim.methods.enough_harmonics import (
     honest,
     mean_is_free,
     most_harmonics,
+    well_known,
     with_enough,
 )
 from optim.methods.evaluator import DesignSearch, SearchStoppedError, Tally
@@ -93,14 +94,19 @@ def solve_problem(
     tally = Tally(on_progress)
     measured, told = by_first_response(problem, should_stop)
     found = _solved(measured, tally.searching, should_stop, on_best, told=told)
-    if measured is not problem and not (found.evaluation and mean_is_free(found.evaluation)):
+    if measured is not problem and not _free_at_its_best(found):
         # The best design has a mean of its own, or there is none: max|x| is what was asked for.
         seen = (*told, *found.looked_at, *found.history)
         asked = _solved(problem, tally.again(found.evaluations), should_stop, on_best, told=seen)
-        found = _counted(asked, found.evaluations)
+        measured, found = problem, _counted(asked, found.evaluations)
     found = _counted(found, sum(one.computed for one in told))
     most = most_harmonics(problem.harmonics)
     found, more = _with_enough_harmonics(found, most, tally, should_stop, on_best)
+    if measured is not problem and not _known_by(found):
+        seen = (*told, *found.looked_at, *found.history)
+        asked = _solved(problem, tally.again(found.evaluations), should_stop, on_best, told=seen)
+        if asked.evaluation is not None and asked.status is not DesignStatus.STOPPED:
+            found = by_the_better_known(_counted(asked.with_errors(), found.evaluations), found)
     if problem.method is Method.PERFORMANCE_CURVE:
         return honest(found)  # it stands for no other design
     chosen = looked_after(found, should_stop, tally.further, more)
@@ -115,6 +121,20 @@ def solve_problem(
     if found.evaluation is not None:
         tally.tell(1.0)
     return found
+
+
+def _free_at_its_best(found: DesignResult) -> bool:
+    """Return whether the mean is free at what a search by half peak to peak has found, or it was stopped."""
+    if found.status is DesignStatus.STOPPED:
+        return True
+    return found.evaluation is not None and mean_is_free(found.evaluation)
+
+
+def _known_by(found: DesignResult) -> bool:
+    """Return whether a design is known by its measure, has none to know, or its search was stopped."""
+    if found.evaluation is None or found.status is DesignStatus.STOPPED:
+        return True
+    return well_known(found.problem, found.evaluation)
 
 
 def _counted(found: DesignResult, responses: int) -> DesignResult:
