@@ -15,7 +15,15 @@ from optim.criteria.linearised import conditions, model_of
 from optim.criteria.rows import DesignEvaluation
 from optim.methods.afterwards import looked_after, settled_status
 from optim.methods.eased import Eased
-from optim.methods.enough_harmonics import by_the_better_known, honest, most_harmonics, with_enough
+from optim.methods.enough_harmonics import (
+    by_first_response,
+    by_the_better_known,
+    honest,
+    mean_is_free,
+    most_harmonics,
+    well_known,
+    with_enough,
+)
 from optim.methods.evaluator import DesignSearch, SearchStoppedError, Tally
 from optim.methods.global_look import WholeRange
 from optim.methods.kkt import FLAT_SLOPE, Local, LocalSearch
@@ -84,9 +92,21 @@ def solve_problem(
 ) -> DesignResult:
     """Search the best design of a problem; see `design`."""
     tally = Tally(on_progress)
-    found = _solved(problem, tally.searching, should_stop, on_best)
+    measured, told = by_first_response(problem, should_stop)
+    found = _solved(measured, tally.searching, should_stop, on_best, told=told)
+    if measured is not problem and not _free_at_its_best(found):
+        # The best design has a mean of its own, or there is none: max|x| is what was asked for.
+        seen = (*told, *found.looked_at, *found.history)
+        asked = _solved(problem, tally.again(found.evaluations), should_stop, on_best, told=seen)
+        measured, found = problem, _counted(asked, found.evaluations)
+    found = _counted(found, sum(one.computed for one in told))
     most = most_harmonics(problem.harmonics)
     found, more = _with_enough_harmonics(found, most, tally, should_stop, on_best)
+    if measured is not problem and not _known_by(found):
+        seen = (*told, *found.looked_at, *found.history)
+        asked = _solved(problem, tally.again(found.evaluations), should_stop, on_best, told=seen)
+        if asked.evaluation is not None and asked.status is not DesignStatus.STOPPED:
+            found = by_the_better_known(_counted(asked.with_errors(), found.evaluations), found)
     if problem.method is Method.PERFORMANCE_CURVE:
         return honest(found)  # it stands for no other design
     chosen = looked_after(found, should_stop, tally.further, more)
@@ -101,6 +121,25 @@ def solve_problem(
     if found.evaluation is not None:
         tally.tell(1.0)
     return found
+
+
+def _free_at_its_best(found: DesignResult) -> bool:
+    """Return whether the mean is free at what a search by half peak to peak has found, or it was stopped."""
+    if found.status is DesignStatus.STOPPED:
+        return True
+    return found.evaluation is not None and mean_is_free(found.evaluation)
+
+
+def _known_by(found: DesignResult) -> bool:
+    """Return whether a design is known by its measure, has none to know, or its search was stopped."""
+    if found.evaluation is None or found.status is DesignStatus.STOPPED:
+        return True
+    return well_known(found.problem, found.evaluation)
+
+
+def _counted(found: DesignResult, responses: int) -> DesignResult:
+    """Return a result with the responses computed before it."""
+    return replace(found, evaluations=found.evaluations + responses, work=found.work + responses)
 
 
 def _undamped(found: DesignResult, should_stop: ShouldStop) -> bool:
@@ -123,7 +162,7 @@ def _with_enough_harmonics(
     found = found.with_errors()
     problem, tried = with_enough(found, most, should_stop)
     responses = sum(one.computed for one in tried)
-    found = replace(found, evaluations=found.evaluations + responses, work=found.work + responses)
+    found = _counted(found, responses)
     if problem is None:
         return found, tried
     same = problem.cases is found.problem.cases
@@ -144,9 +183,12 @@ def _with_enough_harmonics(
 
 def _solved(
     problem: Problem, on_progress: OnProgress, should_stop: ShouldStop, on_best: OnBest,
-    before: DesignResult | None = None,
+    before: DesignResult | None = None, told: Sequence[DesignEvaluation] = (),
 ) -> DesignResult:  # fmt: skip
-    """Search the best design of a problem by its method; `before`: of a search before with less known."""
+    """Search the best design of a problem by its method.
+
+    `before`: of a search before with less known; `told`: designs whose responses serve again.
+    """
     if problem.method is Method.PERFORMANCE_CURVE:
         return _by_curve(problem, on_progress, should_stop)
     begun = time.perf_counter()
@@ -158,7 +200,7 @@ def _solved(
         tracked = tracked_optimum(problem, on_progress=on_progress, should_stop=should_stop, on_best=on_best)
         if problem.method is Method.TRACKED or tracked.status is not DesignStatus.NOT_TRACKED:
             return _of_tracked(problem, tracked, time.perf_counter() - begun)
-    earlier = () if before is None else (*before.looked_at, *before.history)
+    earlier = told if before is None else (*before.looked_at, *before.history)
     search = DesignSearch(problem, on_progress, should_stop, on_best=on_best, before=earlier)
     eased = Eased.of(search, tracked)
     if eased.proven is not None:

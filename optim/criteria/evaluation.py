@@ -16,9 +16,13 @@ from solver.balance.simplifications import Effects, even_harmonics_reason
 from solver.continuation.branch import Branch
 from solver.continuation.branches.observation import observing
 from solver.continuation.branches.sweep import sweep
+from solver.continuation.settings import ContinuationSettings
 from solver.results.watch import ShouldStop
 from solver.scene.scene import Scene
 from solver.studies.peaks.seeds import fitted
+
+# A response that does not cover its range tells a design nothing; a usual one has 80 to 800 points.
+SETTINGS = ContinuationSettings(most_points=4000, unfinished_peaks=False)
 
 
 def evaluate(
@@ -80,7 +84,7 @@ def _case(
         else:
             branch = sweep(
                 here, start=over.low, stop=over.high, harmonics=problem.harmonics, limit=problem.limit,
-                effects=effects, errors=errors, should_stop=should_stop,
+                settings=SETTINGS, effects=effects, errors=errors, should_stop=should_stop,
                 guess=None if there is None else _begin(problem, here, effects, there),
             )  # fmt: skip
         responses.append(CaseResponse(case=case.name, branch=branch, shared=shared))

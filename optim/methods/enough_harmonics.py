@@ -20,6 +20,8 @@ from solver.balance.kernels.output import HALF_RANGE, MAX_ABS
 from solver.balance.workspace import Workspace
 from solver.continuation.branch import Branch
 from solver.continuation.extrema.error_estimate import ErrorEstimator
+from solver.linear.condensation import loose_ports
+from solver.response.solution import MEAN_UNDETERMINED
 from solver.results.known import HALF_PEAK_TO_PEAK, Known
 from solver.results.watch import ShouldStop
 from solver.scene.scene import Scene
@@ -143,6 +145,32 @@ def with_enough(
             break
         doubt, harmonics = left, 2 * harmonics
     return otherwise, tried
+
+
+def by_first_response(
+    problem: Problem, should_stop: ShouldStop
+) -> tuple[Problem, tuple[DesignEvaluation, ...]]:
+    """Return the problem by the measure that a response amid the range asks for, and that response.
+
+    Where contacts alone hold a part its mean is free at nearly every design: what a search by max|x| finds
+    would be searched for again by half peak to peak. Elsewhere no response is computed.
+    """
+    floats = any(loose_ports(case.scene)[0].size for case in problem.cases)
+    if not floats or problem.keeps_measure or problem.method not in (Method.AUTO, Method.MINIMAX):
+        return problem, ()
+    middle = {variable.name: variable.outside(0.5) for variable in problem.variables}
+    start = middle if problem.start is None else dict(problem.start)
+    found = evaluate(problem, start, gradients=False, errors=False, should_stop=should_stop)
+    return _by_its_measure(problem, found) if found.good else problem, (found,)
+
+
+def mean_is_free(evaluation: DesignEvaluation) -> bool:
+    """Return whether the mean of the peak of a design is free and not zero, in one of its cases."""
+    return any(
+        MEAN_UNDETERMINED in known.flags
+        and not known.peak_max_abs <= known.peak_half_peak_to_peak * (1.0 + NO_MEAN)
+        for _, known in known_parts(evaluation)
+    )
 
 
 def by_the_better_known(before: DesignResult, after: DesignResult) -> DesignResult:

@@ -51,6 +51,8 @@ class DesignSearch:
         self._scout: DesignSearch | None = None
         self._least = (math.inf, math.inf)
         self._known: dict[tuple[float, ...], DesignEvaluation] = {}
+        # By identity, with the evaluation itself, which so keeps its place in memory.
+        self._models: dict[int, tuple[DesignEvaluation, Model]] = {}
         # Of another search: by another measure, or with other harmonics.
         self._earlier = {self._place(one.values): one for one in before}
 
@@ -154,8 +156,13 @@ class DesignSearch:
         return [evaluation for evaluation in self.history if evaluation.good]
 
     def model(self, evaluation: DesignEvaluation) -> Model:
-        """Return the model of a good evaluation, relative to the first one."""
-        return model_of(evaluation, self.variables, self._scale or 1.0, self.scales)
+        """Return the model of a good evaluation, relative to the first one; each is made once."""
+        scale = self._scale or 1.0
+        known = self._models.get(id(evaluation))
+        if known is None or known[1].unit != scale:
+            known = evaluation, model_of(evaluation, self.variables, scale, self.scales)
+            self._models[id(evaluation)] = known
+        return known[1]
 
     def merit(self, evaluation: DesignEvaluation) -> float:
         """Return what the search decreases."""

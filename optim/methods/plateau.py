@@ -27,6 +27,7 @@ from solver.results.watch import ShouldStop
 LEVEL = 1e-6  # relative change below which what is minimised counts as constant
 STEP = 0.01  # scaled, to the first designs that are compared
 END = 1e-8  # scaled, to which the ends of a plateau are known
+SAME = 1e-12  # relative, of numbers of two responses that are one
 PLACES = 9  # designs on a plateau that the next criterion is compared at
 PRECISE = 1e-7  # scaled, to which its least place is known
 BROAD = 1e-5  # scaled width from which the next criterion is level too
@@ -108,6 +109,7 @@ class _Level:
         self._enough = best.objective * (1.0 + LEVEL)
         self._allowed = max(best.violation(self._scales), KEPT)
         self._found: dict[tuple[str, float], tuple[float, float]] = {}
+        self._known: dict[tuple[str, tuple[float, ...]], dict[float, DesignEvaluation]] = {}
         self._lower = best.objective * (1.0 - LEVEL)
         self.better: DesignEvaluation | None = None
         self.responses = 0
@@ -165,8 +167,10 @@ class _Level:
         return not abs(amplitude - row.value) > LEVEL * abs(row.value)
 
     def _along(self, here: DesignEvaluation, variable: BoundedVariable) -> Along:
-        """Return what evaluates designs along a variable."""
-        known: dict[float, DesignEvaluation] = {variable.inside(here.values[variable.name]): here}
+        """Return what evaluates designs along a variable, each once."""
+        others = tuple(value for name, value in here.values.items() if name != variable.name)
+        known = self._known.setdefault((variable.name, others), {})
+        known.setdefault(variable.inside(here.values[variable.name]), here)
 
         def along(z: float) -> DesignEvaluation:
             if z not in known:
@@ -224,12 +228,35 @@ def _at_most(criterion: TieBreak, enough: float) -> Callable[[DesignEvaluation],
     return kept
 
 
+def _same(one: DesignEvaluation, other: DesignEvaluation) -> bool:
+    """Return whether two designs have the same responses: no number of them tells one from the other.
+
+    So it is along the load of a contact that sticks everywhere.
+    """
+    if not (one.good and other.good) or len(one.rows) != len(other.rows):
+        return False
+    return all(
+        abs(there.value - here.value) <= SAME * abs(here.value) and there.what == here.what
+        for here, there in zip(one.rows, other.rows, strict=True)
+    ) and all(
+        [peak.at for peak in here.branch.peaks] == [peak.at for peak in there.branch.peaks]
+        for here, there in zip(one.responses, other.responses, strict=True)
+    )
+
+
 def _ends(
     along: Along, good: Callable[[DesignEvaluation], bool], z: float, within: tuple[float, float]
 ) -> tuple[float, float]:
-    """Return how far designs are good on both sides of a place, by doubled steps and bisection."""
+    """Return how far designs are good on both sides of a place, by doubled steps and bisection.
+
+    Where the first step and the bound have the same responses as the place, so has what is between.
+    """
     ends = []
     for bound, sign in ((within[0], -1.0), (within[1], 1.0)):
+        first = max(z - STEP, bound) if sign < 0.0 else min(z + STEP, bound)
+        if z != bound and _same(along(z), along(first)) and _same(along(z), along(bound)):
+            ends.append(bound)
+            continue
         inside, step = z, STEP
         outside = None
         while inside != bound and outside is None:
@@ -250,6 +277,8 @@ def _ends(
 
 def _least(along: Along, criterion: TieBreak, low: float, high: float) -> tuple[float, float] | None:
     """Return where a criterion is least and what counts as that; None where it is not known or level."""
+    if _same(along(low), along(high)) and _same(along(low), along(0.5 * (low + high))):
+        return None
     places = np.linspace(low, high, PLACES)
     values = [criterion(along(float(z))) for z in places]
     known = [value for value in values if value is not None]

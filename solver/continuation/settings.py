@@ -36,6 +36,8 @@ class ContinuationSettings:
         Distance from predicted to corrected point, relative to the step, beyond which a step is halved.
     most_points : int
         Points after which the branch ends with a status.
+    unfinished_peaks : bool
+        Whether peaks are looked for on a branch that does not reach its end, too.
     """
 
     predictor: Predictor = Predictor.CUBIC
@@ -47,3 +49,4 @@ class ContinuationSettings:
     most_iterations: int = 8
     largest_turn: float = 1.0
     most_points: int = 20_000
+    unfinished_peaks: bool = True

@@ -136,11 +136,15 @@ def describe(
         seconds=0.0,
     )
     history, nothing_holds = history_of(solution), _nothing_holds_a_part(workspace)
-    another = has_another_solution(workspace, found.u, omega, from_nothing=estimated)
-    mean_open = nothing_holds or history.mean_open or another
+    mean_open, open_anyway = nothing_holds or history.mean_open, history.half_range_open
+    # Another solution would open both: where they are open already none is looked for.
+    another = not (mean_open and open_anyway) and has_another_solution(
+        workspace, found.u, omega, from_nothing=estimated
+    )
+    mean_open = mean_open or another
     return replace(
         solution,
-        flags=_flags(contacts, mean_open=mean_open, half_range_open=history.half_range_open or another),
+        flags=_flags(contacts, mean_open=mean_open, half_range_open=open_anyway or another),
         error_estimate=error.half_peak_to_peak if mean_open else error.max_abs,
         mean_range=(math.nan, math.nan) if nothing_holds else history.mean_range,
         seconds=time.perf_counter() - begun,

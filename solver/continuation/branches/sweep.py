@@ -171,6 +171,7 @@ def sweep(
             break
     if status in _LOST and too_stiff(workspace, stretches):
         status = BranchStatus.TOO_STIFF
+    peaks = peaks and (settings.unfinished_peaks or status is BranchStatus.COMPLETED)
     earlier = 0.0 if resume is None else resume.seconds
     branch = _finish(workspace, stretches, status, first, last, limit, begun - earlier, peaks=peaks)
     if errors:
