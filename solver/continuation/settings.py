@@ -25,7 +25,8 @@ class ContinuationSettings:
     predictor : Predictor
         How the next point is guessed.
     first_step, largest_step, smallest_step : float
-        Arc length steps; the largest is 2.5 times this from 1000 unknowns on, where a point is dear.
+        Arc length steps; the largest is 2.5 times this from 1000 unknowns on, where a point is dear, and
+        so is the first where fewer motions lead those of the contacts.
     range_length : float
         Arc length of the whole range of λ if u did not change: more gives a finer branch.
     wanted_iterations : int

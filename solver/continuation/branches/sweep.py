@@ -18,7 +18,8 @@ from solver.balance.kernels.output import MAX_ABS
 from solver.balance.parameter import Kind, Parameter
 from solver.balance.simplifications import Effects
 from solver.balance.workspace import Workspace
-from solver.continuation.branch import Branch, BranchStatus
+from solver.contacts.kernels.system import is_spanned
+from solver.continuation.branch import ENDINGS, Branch, BranchStatus
 from solver.continuation.branches.adaptive_harmonics import sweep_to
 from solver.continuation.branches.point_by_point import is_unique, rows_before_a_turn, walk_by_points
 from solver.continuation.branches.symmetry_breaking import branch_flags
@@ -47,7 +48,8 @@ from solver.scene.scene import Scene
 _STRETCH = 64  # points between two looks at the caller, at most
 _SHORT_STRETCH = 4  # the first of them where a point may take long
 _LARGE = 400  # unknowns from which it may
-# Unknowns from which a point is so dear that steps are longer, and how much: the survey adds what it needs.
+# Unknowns from which a point is so dear that the largest step is longer, and how much: the survey adds what
+# it needs. Where fewer motions lead the others so is the first one.
 _DEAR, _LONGER = 1000, 2.5
 _STRETCH_SECONDS = 0.5
 _MOST_FOLLOWED = 500  # points of a look at a resonance beside the branch
@@ -269,6 +271,8 @@ def walk(
     )  # fmt: skip
     if balance.n_unknowns >= _DEAR:
         control = control._replace(largest_step=_LONGER * control.largest_step)
+        if is_spanned(system):
+            control = control._replace(first_step=_LONGER * control.first_step)
     linear, point = workspace.linear, workspace.point
     if resume is None:
         found = solve_from_nothing(workspace, control.start, guess)

@@ -36,8 +36,9 @@ from solver.jit.fourier import Real
 SHARP_RESIDUAL = 2e-11  # of a peak; what is above was accepted because arcs allowed no better
 NEAR_BY = 1e-2
 HALF_POWER = 1.0 / math.sqrt(2.0)
-# A curve this far below the other one all over an interval is no max|x| there.
-HIDDEN = 0.8
+# A curve this far below the other one all over an interval is no max|x| there, nor is one that so many times
+# what both change by keeps below it.
+HIDDEN, FAR_BELOW = 0.8, 10.0
 COMPETES_FOR_HIGHEST = 0.8  # share of the highest point from which a maximum may turn out to be the highest
 # Where the highest is looked for alone: share of it, and of the range, from which an interval is parted in
 # which contacts change, how often at most, and how much more than estimated a cubic may be wrong.
@@ -223,7 +224,8 @@ class Survey:
         for c, curve in enumerate(CURVES):
             ends = slopes[0][c], slopes[1][c]
             if ends[0] > 0.0 >= ends[1]:
-                node = self._peak_between(left, right, curve, ends, top)
+                other = abs(slopes[0][1 - c]) + abs(slopes[1][1 - c])
+                node = self._peak_between(left, right, curve, ends, other, top)
                 if node.measures[curve[0]] >= node.measures[MAX_ABS] * (1.0 - 1e-12):
                     inside.append(node)
         if left.tangent[-1] * right.tangent[-1] > 0.0:
@@ -238,13 +240,18 @@ class Survey:
         right: PointRow,
         curve: tuple[int, int, int],
         ends: tuple[float, float],
+        other: float,
         top: float,
     ) -> PointRow:
-        """Return the maximum of one curve between two nodes; where polishing fails, the higher of the two."""
+        """Return the maximum of one curve between two nodes; where polishing fails, the higher of the two.
+
+        `ends` are its slopes there, `other` the sum of the sizes of those of the other curve.
+        """
         value, _, what = curve
         higher = left if left.measures[value] > right.measures[value] else right
-        height = higher.measures[value] + 0.25 * (ends[0] - ends[1])
-        hidden = height < HIDDEN * min(left.measures[MAX_ABS], right.measures[MAX_ABS])
+        rise, above = ends[0] - ends[1], min(left.measures[MAX_ABS], right.measures[MAX_ABS])
+        height = higher.measures[value] + 0.25 * rise
+        hidden = height < HIDDEN * above or height + FAR_BELOW * (rise + other) < above
         if hidden or height < self._least:
             return higher
         close = SHARP if height >= COMPETES * top else ENOUGH

@@ -20,11 +20,12 @@ from solver.contacts.kernels.circle.panels import (
     X,
     Y,
     solve_columns,
-    turning,
+    turning_by,
 )
 from solver.contacts.kernels.circle.path import FROM, START, TO
 from solver.contacts.kernels.circle.radau import NODES, SLOPES, STAGES, WEIGHTS
-from solver.contacts.kernels.coulomb.force import bases_at
+from solver.contacts.kernels.coulomb.force import bases_by
+from solver.jit.angles import cosines_and_sines
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Integer
 from solver.jit.separate import apart
@@ -48,16 +49,23 @@ def moments_between(begin: Number, end: Number, cosines: Array, sines: Array) ->
 
 
 @compiled
-def _slip_moments(tau: Number, along: Number, across: Number, sums: Array) -> None:
-    """Add along·(cos qτ, sin qτ) and across·(…) to the sums over slips."""
-    cos1, sin1 = np.cos(tau), np.sin(tau)
-    cosine, sine = 0.0 * cos1 + 1.0, 0.0 * cos1
-    for q in range(sums.shape[1]):
-        sums[ALONG_COS, q] += along * cosine
-        sums[ALONG_SIN, q] += along * sine
-        sums[ACROSS_COS, q] += across * cosine
-        sums[ACROSS_SIN, q] += across * sine
-        cosine, sine = cosine * cos1 - sine * sin1, sine * cos1 + cosine * sin1
+def _slip_moments(cosines: Array, sines: Array, along: Array, across: Array, sums: Array) -> None:
+    """Add along·(cos qτ, sin qτ) and across·(…) at the nodes to the sums over slips, two nodes at once.
+
+    `cosines` and `sines` are those of τ.
+    """
+    for i in range(0, STAGES, 2):
+        j = i + 1
+        a1, b1, c1, d1 = cosines[i], sines[i], cosines[j], sines[j]
+        a, b = 0.0 * a1 + 1.0, 0.0 * a1
+        c, d = a, b
+        for q in range(sums.shape[1]):
+            sums[ALONG_COS, q] += along[i] * a + along[j] * c
+            sums[ALONG_SIN, q] += along[i] * b + along[j] * d
+            sums[ACROSS_COS, q] += across[i] * a + across[j] * c
+            sums[ACROSS_SIN, q] += across[i] * b + across[j] * d
+            a, b = a * a1 - b * b1, b * a1 + a * b1
+            c, d = c * c1 - d * d1, d * c1 + c * d1
 
 
 @compiled
@@ -118,12 +126,16 @@ def panel_back(
     e, de, kept = basis[0], basis[1], basis[2, :n]
     matrix, first = np.empty((STAGES, STAGES), dtype), np.empty(STAGES, dtype)
     begin, h = panel[FROM], panel[TO] - panel[FROM]
+    times, waves = np.empty((3, STAGES), dtype), np.empty((4, STAGES), dtype)
     for i in range(STAGES):
-        tau, theta = begin + h * NODES[i], panel[START + 1 + i]
-        bases_at(tau, all_ks, e, de)
+        times[0, i] = begin + h * NODES[i]
+    cosines_and_sines(times[0], times[1], times[2])
+    cosines_and_sines(panel[START + 1 : START + 1 + STAGES], waves[0], waves[1])
+    for i in range(STAGES):
+        c, s = waves[0, i], waves[1, i]
+        bases_by(times[1, i], times[2, i], all_ks, e, de)
         _curves_of_basis(packed, e, de, at)
-        _, slope, g, dg = turning(at, kappa, theta)
-        c, s = np.cos(theta), np.sin(theta)
+        _, slope, g, dg = turning_by(at, kappa, c, s)
         rate = SLOPES[i, 0] * panel[START]
         for j in range(STAGES):
             rate += SLOPES[i, j + 1] * panel[START + 1 + j]
@@ -141,13 +153,15 @@ def panel_back(
         if not active:
             continue
         share = h * WEIGHTS[i]
-        _slip_moments(tau, share * c, share * s, sums)
+        waves[2, i], waves[3, i] = share * c, share * s
         norm = share * at[LIMIT] / math.pi
         for j in range(n):
             kept[j] = norm * e[of_motion[j]]
         if all_ks[0] == 0 and of_motion[0] == 0:
             kept[0] *= 0.5
         _weigh(kept, c, s, weights, F, line)
+    if active:
+        _slip_moments(times[1], times[2], waves[2], waves[3], sums)
     for r in range(m):
         adjoint[STAGES - 1, r] += eta[r]
     solve_columns(matrix, adjoint)

@@ -22,6 +22,8 @@ from solver.contacts.kernels.circle.panels import (
     DX,
     DY,
     LIMIT,
+    NODE_ROWS,
+    PANEL_MATRIX,
     Array,
     Number,
     X,
@@ -118,9 +120,8 @@ def _carry_slip(
 
     `before` is the real piece, `given` has the real panels. Where it `sticks` the end moves to q = 0.
     """
-    nodes, matrix = np.empty((STAGES, CURVES), np.complex128), np.empty((STAGES, STAGES), np.complex128)
-    right, first = np.empty((STAGES, 2), np.complex128), int(before[FIRST])
-    count, length = int(before[COUNT]), before[END] - before[BEGIN]
+    nodes, matrix = np.empty((NODE_ROWS, STAGES), np.complex128), np.empty(PANEL_MATRIX, np.complex128)
+    first, count, length = int(before[FIRST]), int(before[COUNT]), before[END] - before[BEGIN]
     for _ in range(ROUNDS):
         theta = panels[first, START]
         stretch = (row[END] - row[BEGIN]) / length
@@ -129,13 +130,11 @@ def _carry_slip(
             panel[FROM] = row[BEGIN] + stretch * (given[p, FROM] - before[BEGIN])
             panel[TO] = row[BEGIN] + stretch * (given[p, TO] - before[BEGIN])
             panel[START] = theta
-            solve_panel(
-                waves, kappa, panel[FROM], panel[TO], theta, False, panel[START + 1 :], nodes, matrix, right
-            )
+            solve_panel(waves, kappa, panel[FROM], panel[TO], theta, False, panel[START + 1 :], nodes, matrix)
             theta = panel[START + STAGES]
         if not sticks:
             break
-        panel, last = panels[first + count - 1], nodes[STAGES - 1]
+        panel, last = panels[first + count - 1], nodes[:, STAGES - 1]
         slope = SLOPES[STAGES - 1, 0] * panel[START]
         for j in range(STAGES):
             slope += SLOPES[STAGES - 1, j + 1] * panel[START + 1 + j]

@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.contacts.kernels.circle.radau import NODES, SLOPES, STAGES
+from solver.jit.angles import cosines_and_sines
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Real
 from solver.jit.separate import apart
@@ -36,6 +37,13 @@ X, Y, LIMIT = 0, 1, 2
 DX, DY, DLIMIT = 3, 4, 5
 DDX, DDY, DDLIMIT = 6, 7, 8
 CURVES = 9
+# Rows of `nodes` (NODE_ROWS, STAGES): the curves at the nodes of a panel, and room for angles.
+COSINES, SINES, ANGLES = CURVES, CURVES + 1, CURVES + 2
+NODE_ROWS = CURVES + 3
+# Columns of the matrix of a panel behind ∂R/∂θ: −R, which becomes Newton's step, and −∂R/∂θ0, which becomes
+# ∂θ/∂θ0.
+STEP, BY_START = STAGES, STAGES + 1
+PANEL_MATRIX = STAGES, STAGES + 2
 NEWTON_STEPS = 14
 SMALL_TURN = 3e-6  # rad: Newton's step after which what is left is its square
 
@@ -59,24 +67,45 @@ def curves_at(waves: Array, tau: Number, out: Array) -> None:
 
 
 @compiled
-def _slopes_at(waves: Array, tau: Number, out: Array) -> None:
-    """Fill in `out` (CURVES,) what a direction turns by: L and the slopes of X, Y and L."""
-    cos1, sin1 = np.cos(tau), np.sin(tau)
-    cosine, sine = cos1, sin1
-    load, dx, dy, rise = waves[LIMIT, 0, 0], 0.0 * tau, 0.0 * tau, 0.0 * tau
-    for k in range(1, waves.shape[2]):
-        load += waves[LIMIT, 0, k] * cosine + waves[LIMIT, 1, k] * sine
-        rise += k * (waves[LIMIT, 1, k] * cosine - waves[LIMIT, 0, k] * sine)
-        dx += k * (waves[X, 1, k] * cosine - waves[X, 0, k] * sine)
-        dy += k * (waves[Y, 1, k] * cosine - waves[Y, 0, k] * sine)
-        cosine, sine = cosine * cos1 - sine * sin1, sine * cos1 + cosine * sin1
-    out[LIMIT], out[DX], out[DY], out[DLIMIT] = load, dx, dy, rise
+def _slopes_at_nodes(waves: Array, begin: Number, h: Number, nodes: Array) -> None:
+    """Fill in what directions turn by at the nodes of a panel: L and the slopes of X, Y and L."""
+    angles, cosines, sines = nodes[ANGLES], nodes[COSINES], nodes[SINES]
+    for i in range(STAGES):
+        angles[i] = begin + h * NODES[i]
+    cosines_and_sines(angles, cosines, sines)
+    for i in range(0, STAGES, 2):
+        # Two nodes at once: either waits for the last harmonic before it has the next one.
+        a1, b1, c1, d1 = cosines[i], sines[i], cosines[i + 1], sines[i + 1]
+        a, b, c, d = a1, b1, c1, d1
+        load = more_load = waves[LIMIT, 0, 0]
+        rise = dx = dy = more_rise = more_dx = more_dy = 0.0 * a1
+        for k in range(1, waves.shape[2]):
+            p, q = waves[LIMIT, 0, k], waves[LIMIT, 1, k]
+            x, u, y, v = k * waves[X, 0, k], k * waves[X, 1, k], k * waves[Y, 0, k], k * waves[Y, 1, k]
+            load += p * a + q * b
+            rise += k * (q * a - p * b)
+            dx += u * a - x * b
+            dy += v * a - y * b
+            more_load += p * c + q * d
+            more_rise += k * (q * c - p * d)
+            more_dx += u * c - x * d
+            more_dy += v * c - y * d
+            a, b = a * a1 - b * b1, b * a1 + a * b1
+            c, d = c * c1 - d * d1, d * c1 + c * d1
+        j = i + 1
+        nodes[LIMIT, i], nodes[DX, i], nodes[DY, i], nodes[DLIMIT, i] = load, dx, dy, rise
+        nodes[LIMIT, j], nodes[DX, j], nodes[DY, j], nodes[DLIMIT, j] = more_load, more_dx, more_dy, more_rise
 
 
 @compiled
 def turning(at: Array, kappa: Number, theta: Number) -> tuple[Number, Number, Number, Number]:
     """Return F, ∂F/∂θ, g and ∂g/∂θ with the curves `at` a point."""
-    c, s = np.cos(theta), np.sin(theta)
+    return turning_by(at, kappa, np.cos(theta), np.sin(theta))
+
+
+@compiled
+def turning_by(at: Array, kappa: Number, c: Number, s: Number) -> tuple[Number, Number, Number, Number]:
+    """Return the same from cos θ and sin θ."""
     more = (kappa - 1.0) * at[DLIMIT]
     F = c * at[DY] - s * at[DX] - more * s * c
     slope = -s * at[DY] - c * at[DX] - more * (c * c - s * s)
@@ -141,22 +170,61 @@ def solve_columns(matrix: Array, right: Array) -> bool:
 
 
 @compiled
-def panel_rows(
-    nodes: Array, kappa: Number, h: Number, theta0: Number, theta: Array, matrix: Array, right: Array
+def _solve_panel_matrix(matrix: Array) -> bool:
+    """Solve as `solve_columns` for both columns behind the matrix of a panel, in place.
+
+    A row is written out: it stays in registers while it is taken from those below.
+    """
+    for k in range(STAGES):
+        p = matrix[k]
+        if not abs(p[k]) > 0.0:
+            return False
+        inverse = 1.0 / p[k]
+        p0, p1, p2, p3, p4, p5 = p[0], p[1], p[2], p[3], p[4], p[5]
+        p6, p7, p8, p9, p10, p11 = p[6], p[7], p[8], p[9], p[10], p[11]
+        for i in range(k + 1, STAGES):
+            row = matrix[i]
+            factor = row[k] * inverse
+            row[0] -= factor * p0
+            row[1] -= factor * p1
+            row[2] -= factor * p2
+            row[3] -= factor * p3
+            row[4] -= factor * p4
+            row[5] -= factor * p5
+            row[6] -= factor * p6
+            row[7] -= factor * p7
+            row[8] -= factor * p8
+            row[9] -= factor * p9
+            row[10] -= factor * p10
+            row[11] -= factor * p11
+    for k in range(STAGES - 1, -1, -1):
+        inverse = 1.0 / matrix[k, k]
+        step, slope = matrix[k, STEP] * inverse, matrix[k, BY_START] * inverse
+        matrix[k, STEP], matrix[k, BY_START] = step, slope
+        for i in range(k):
+            factor = matrix[i, k]
+            matrix[i, STEP] -= factor * step
+            matrix[i, BY_START] -= factor * slope
+    return True
+
+
+@compiled
+def _fill_panel_matrix(
+    nodes: Array, kappa: Number, h: Number, theta0: Number, theta: Array, matrix: Array
 ) -> None:
-    """Fill ∂R/∂θ (STAGES, STAGES) and, as columns of `right`, −R and −∂R/∂θ0, from the curves at `nodes`."""
-    inverse = 1.0 / h
+    """Fill the matrix (PANEL_MATRIX) of a step of Newton's method from the curves at `nodes`."""
+    inverse, cosines, sines = 1.0 / h, nodes[COSINES], nodes[SINES]
+    cosines_and_sines(theta, cosines, sines)
     for i in range(STAGES):
-        F, slope, g, dg = turning(nodes[i], kappa, theta[i])
+        F, slope, g, dg = turning_by(nodes[:, i], kappa, cosines[i], sines[i])
         rate = SLOPES[i, 0] * theta0
         for j in range(STAGES):
             rate += SLOPES[i, j + 1] * theta[j]
-        factor = nodes[i, LIMIT] * g * inverse
+        row, factor = matrix[i], nodes[LIMIT, i] * g * inverse
         for j in range(STAGES):
-            matrix[i, j] = factor * SLOPES[i, j + 1]
-        matrix[i, i] += nodes[i, LIMIT] * dg * rate * inverse - slope
-        right[i, 0] = F - factor * rate
-        right[i, 1] = -factor * SLOPES[i, 0]
+            row[j] = factor * SLOPES[i, j + 1]
+        row[i] += nodes[LIMIT, i] * dg * rate * inverse - slope
+        row[STEP], row[BY_START] = F - factor * rate, -factor * SLOPES[i, 0]
 
 
 @compiled
@@ -164,9 +232,9 @@ def _guess(nodes: Array, kappa: Number, h: Number, theta0: Number, theta: Array)
     """Fill `theta` with one linearly implicit step from node to node, backward where L is 0."""
     before, rate, place = theta0, 0.0 * theta0, 0.0
     for i in range(STAGES):
-        F, slope, g, _ = turning(nodes[i], kappa, before)
+        F, slope, g, _ = turning(nodes[:, i], kappa, before)
         half = 0.5 * h * (NODES[i] - place)
-        scale = nodes[i, LIMIT] * g
+        scale = nodes[LIMIT, i] * g
         if i == 0:
             half *= 2.0
         moved = half * (rate * scale + F) / (scale - half * slope) if slope.real < 0.0 else half * 0.0
@@ -178,31 +246,30 @@ def _guess(nodes: Array, kappa: Number, h: Number, theta0: Number, theta: Array)
 @apart
 def solve_panel(
     waves: Array, kappa: Number, begin: Number, end: Number, theta0: Number, fresh: bool, theta: Array,
-    nodes: Array, matrix: Array, right: Array,
+    nodes: Array, matrix: Array,
 ) -> bool:  # fmt: skip
     """Solve R = 0 at the nodes of [begin, end] by Newton's method from `theta`, or a `fresh` guess.
 
-    On return `nodes` has L and the slopes of X, Y and L at the nodes, all curves at the last one, and `right`
-    ∂θ/∂θ0 as its column 1. False if it fails.
+    On return `nodes` has L and the slopes of X, Y and L at the nodes, all curves at the last one, and
+    `matrix` (PANEL_MATRIX) ∂θ/∂θ0 as its column BY_START. False if it fails.
     """
     h = end - begin
-    for i in range(STAGES - 1):
-        _slopes_at(waves, begin + h * NODES[i], nodes[i])
-    curves_at(waves, end, nodes[STAGES - 1])
+    _slopes_at_nodes(waves, begin, h, nodes)
+    curves_at(waves, end, nodes[:CURVES, STAGES - 1])
     if fresh:
         _guess(nodes, kappa, h, theta0, theta)
     for _ in range(NEWTON_STEPS):
-        panel_rows(nodes, kappa, h, theta0, theta, matrix, right)
-        if not solve_columns(matrix, right):
+        _fill_panel_matrix(nodes, kappa, h, theta0, theta, matrix)
+        if not _solve_panel_matrix(matrix):
             return False
         most = 0.0
         for i in range(STAGES):
-            most = max(most, abs(right[i, 0]))
+            most = max(most, abs(matrix[i, STEP]))
         if not most < 1e6:
             return False
         share = 1.0 / max(most, 1.0)
         for i in range(STAGES):
-            theta[i] += share * right[i, 0]
+            theta[i] += share * matrix[i, STEP]
         if most < SMALL_TURN:
             return True
     return False

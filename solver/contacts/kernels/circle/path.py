@@ -12,6 +12,7 @@ import math
 import numpy as np
 
 from solver.contacts.kernels.circle.panels import (
+    BY_START,
     CURVES,
     DDLIMIT,
     DDX,
@@ -19,6 +20,8 @@ from solver.contacts.kernels.circle.panels import (
     DX,
     DY,
     LIMIT,
+    NODE_ROWS,
+    PANEL_MATRIX,
     Number,
     X,
     Y,
@@ -72,14 +75,14 @@ def _falls(nodes: Real, kappa: float, theta: Real, first: float, tol: float, pas
 
     Negative if it may do so in a dip about that node. Nodes up to `past` are known not to be in one.
     """
-    before = first if past == 0 else slip_rate(nodes[past - 1], kappa, theta[past - 1])
-    here = slip_rate(nodes[past], kappa, theta[past])
+    before = first if past == 0 else slip_rate(nodes[:, past - 1], kappa, theta[past - 1])
+    here = slip_rate(nodes[:, past], kappa, theta[past])
     for i in range(past, STAGES):
         if here < -tol:
             return i + 1
         if i + 1 == STAGES:
             break
-        after = slip_rate(nodes[i + 1], kappa, theta[i + 1])
+        after = slip_rate(nodes[:, i + 1], kappa, theta[i + 1])
         # A dip between nodes: below 0 if as deep as the parabola through three of them, and twice that.
         if before > here < after and here < 0.25 * max(before - here, after - here):
             return -(i + 1)
@@ -145,14 +148,14 @@ def _where_it_falls(
 @apart
 def _end_of_slip(
     waves: Real, kappa: float, begin: float, guess: float, theta0: float, theta: Real, nodes: Real,
-    matrix: Real, right: Real,
+    matrix: Real,
 ) -> float:  # fmt: skip
     """Move the end of a panel to where q is 0, solving it anew; return the end, or −1 if that fails."""
     end = guess
     for turn in range(12):
-        if not solve_panel(waves, kappa, begin, end, theta0, False, theta, nodes, matrix, right):
+        if not solve_panel(waves, kappa, begin, end, theta0, False, theta, nodes, matrix):
             return -1.0
-        last = nodes[STAGES - 1]
+        last = nodes[:, STAGES - 1]
         angle = theta[STAGES - 1]
         slope = SLOPES[STAGES - 1, 0] * theta0
         for j in range(STAGES):
@@ -181,7 +184,7 @@ def _error_of(limit0: float, nodes: Real, theta0: float, theta: Real, scale: flo
     """
     most = 0.0
     for i in range(STAGES):
-        limits[i] = nodes[i, LIMIT] / scale
+        limits[i] = nodes[LIMIT, i] / scale
         most = max(most, limits[i])
     return max(tail(theta0, theta) * min(most, 1.0), tail(limit0 / scale, limits))
 
@@ -234,8 +237,8 @@ def slip_on(
     (place, direction there, its derivative by theta0, panels filled, 1 if it sticks there, 0 at the end,
     TABLE_FULL or UNSOLVED).
     """
-    nodes, matrix = np.empty((STAGES, CURVES)), np.empty((STAGES, STAGES))
-    right, theta, at = np.empty((STAGES, 2)), np.empty(STAGES), np.empty(CURVES)
+    nodes, matrix = np.empty((NODE_ROWS, STAGES)), np.empty(PANEL_MATRIX)
+    theta, at = np.empty(STAGES), np.empty(CURVES)
     tau, factor, tol, small = begin, 1.0, numbers[TOL_RATE], numbers[TAIL_SIZE]
     curves_at(waves, begin, at)
     first, limit0, limits = slip_rate(at, kappa, theta0), at[LIMIT], np.empty(STAGES)
@@ -244,7 +247,7 @@ def slip_on(
         rest = end - tau
         share = rest if h > 0.95 * rest else (0.5 * rest if h > 0.5 * rest else h)
         to = end if share == rest else tau + share
-        if not solve_panel(waves, kappa, tau, to, theta0, True, theta, nodes, matrix, right):
+        if not solve_panel(waves, kappa, tau, to, theta0, True, theta, nodes, matrix):
             if share <= LEAST_PANEL:
                 return tau, theta0, factor, filled, UNSOLVED
             h = 0.2 * share
@@ -265,7 +268,7 @@ def slip_on(
             return tau, theta0, factor, filled, 1
         if stops:
             _shortened(theta0, theta, place)
-            to = _end_of_slip(waves, kappa, tau, tau + place * share, theta0, theta, nodes, matrix, right)
+            to = _end_of_slip(waves, kappa, tau, tau + place * share, theta0, theta, nodes, matrix)
             if to < 0.0:
                 h = 0.5 * share
                 continue
@@ -274,8 +277,8 @@ def slip_on(
         _keep(panels, filled, tau, to, theta0, theta)
         filled += 1
         tau, theta0 = to, theta[STAGES - 1]
-        factor *= right[STAGES - 1, 1]
-        first, limit0 = slip_rate(nodes[STAGES - 1], kappa, theta0), nodes[STAGES - 1, LIMIT]
+        factor *= matrix[STAGES - 1, BY_START]
+        first, limit0 = slip_rate(nodes[:, STAGES - 1], kappa, theta0), nodes[LIMIT, STAGES - 1]
         if stops:
             return tau, theta0, factor, filled, 1
         h = min(change * share, numbers[LONGEST])

@@ -198,7 +198,12 @@ def contact_force(
 @compiled
 def bases_at(tau: Any, ks: Integer, e: NDArray[Any], de: NDArray[Any]) -> None:
     """Fill `e` with the basis for the harmonics `ks` at `tau`, real or complex, and `de` with its slope."""
-    cos1, sin1 = np.cos(tau), np.sin(tau)
+    bases_by(np.cos(tau), np.sin(tau), ks, e, de)
+
+
+@compiled
+def bases_by(cos1: Any, sin1: Any, ks: Integer, e: NDArray[Any], de: NDArray[Any]) -> None:
+    """Fill in the same from cos τ and sin τ."""
     cosine, sine = 0.0 * cos1 + 1.0, 0.0 * cos1
     k, here = 0, 0
     for i in range(ks.size):
