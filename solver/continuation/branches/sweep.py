@@ -19,7 +19,7 @@ from solver.balance.parameter import Kind, Parameter
 from solver.balance.simplifications import Effects
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.system import is_spanned
-from solver.continuation.branch import ENDINGS, Branch, BranchStatus
+from solver.continuation.branch import Branch, BranchStatus
 from solver.continuation.branches.adaptive_harmonics import sweep_to
 from solver.continuation.branches.point_by_point import is_unique, rows_before_a_turn, walk_by_points
 from solver.continuation.branches.symmetry_breaking import branch_flags
