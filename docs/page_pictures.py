@@ -171,6 +171,7 @@ def anew(page: Any, scene: str = "bladed-disk", rest: str = "") -> None:
 def edit(page: Any) -> None:
     """Open the editor of the scene."""
     anew(page)
+    page.click("#scene-menu")
     page.locator("#edit-scene").click()
     page.locator("#editor-form[aria-busy=false]").wait_for()
     page.locator("#editor").evaluate("card => card.scrollIntoView()")
@@ -179,6 +180,7 @@ def edit(page: Any) -> None:
 def choose(page: Any) -> None:
     """Open the choice of cases for a new scene."""
     anew(page)
+    page.click("#scene-menu")
     page.locator("#new-scene").click()
     page.locator(".choice-card").first.wait_for()
 
@@ -193,6 +195,7 @@ def question(page: Any) -> None:
 def matrices(page: Any) -> None:
     """Open the form for the matrices of a finite-element program."""
     anew(page)
+    page.click("#scene-menu")
     page.locator("#open-matrices").click()
 
 

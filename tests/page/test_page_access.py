@@ -24,7 +24,7 @@ NEXT = """() => {
   return true;
 }"""
 CUT_OFF = """() => [...document.querySelectorAll("button, label, dd, p, h2, svg.chart")]
-  .filter((node) => node.checkVisibility() && !node.closest(".scroll, .unseen, .skip"))
+  .filter((node) => node.checkVisibility() && !node.closest(".scroll, .unseen, .skip, [role=tablist]"))
   .filter((node) => node.getBoundingClientRect().right > innerWidth + 1)
   .map((node) => node.outerHTML.slice(0, 120))
 """
@@ -69,8 +69,14 @@ def unfold(page: Page) -> None:
     page.evaluate("for (const node of document.querySelectorAll('details')) node.open = true")
     for one in ("variables", "cases", "uncertain"):
         page.click(f"#problem-{one}-add")
+    narrow = page.locator("#rail-open").is_visible()
+    if narrow:
+        page.click("#rail-open")
     page.click("#project-new")
     expect(page.locator("#runs-list .run-form").first).to_be_visible()
+    if narrow:
+        assert page.evaluate(CUT_OFF) == []
+        page.click("#rail-close")
 
 
 def compute_further(page: Page) -> None:
@@ -100,6 +106,7 @@ def test_axe_finds_nothing_serious(browser: Browser, site: Site, studied: str, s
         page = visit(context, site, studied)
         expect(page.locator("#front-facts tbody tr").first).to_be_visible()
         compute_further(page)
+        page.click("#scene-menu")
         page.click("#edit-scene")
         expect(page.locator("#editor-status")).to_contain_text("Nothing is wrong")
         unfold(page)
@@ -125,6 +132,7 @@ def test_the_disk_is_for_everybody_too(browser: Browser, site: Site, scheme: str
             tab.click()
             expect(tab).to_have_attribute("aria-selected", "true")
             assert serious(page) == [], tab.text_content()
+        page.click("#scene-menu")
         page.click("#edit-scene")
         expect(page.locator("#editor-status")).to_contain_text("Nothing is wrong")
         assert serious(page) == []

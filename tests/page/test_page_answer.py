@@ -176,11 +176,18 @@ def test_a_report_is_one_file_that_holds_the_answer(browser: Browser, site: Site
         link = page.evaluate("navigator.clipboard.readText()")
         assert link == page.url
         assert re.search(r"[?&]design=[0-9a-f-]{36}", link), "the link has the design"
-    for words in ("104.79 N", "2.35 → 2.346 m", "stickslip design two-dof.toml", "held by", "in use"):
+    job = link.partition("design=")[2].partition("&")[0]
+    made = httpx.get(f"{site.url}/v1/jobs/{job}/report?format=html", timeout=60.0).text
+    assert re.findall("<h2>.*?</h2>", text) == re.findall("<h2>.*?</h2>", made), "the report of the service"
+    for words in (
+        "Before and after",
+        "What holds it",
+        "Sensitivities",
+        "excitation.amplitude",
+        "To have it again",
+    ):
         assert words in text
-    for words in ("Sensitivities", "excitation.amplitude", "Scene, drawn"):
-        assert words in text
-    assert re.search(rf"<p>[^<]*{date.today().year}[^<]*Scene two-dof", text), "the date"
-    assert text.count("<svg") >= 4
+    assert re.search(r"104\.7\d* N", text)
+    assert str(date.today().year) in text
     assert not re.search(r'(?:src|href)="https?://', text)
     assert "<button" not in text

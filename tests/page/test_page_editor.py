@@ -168,6 +168,7 @@ def test_a_template_asks_and_makes_a_scene_that_answers(
     context, watch = profile
     watch.allowed = ("status of 422",)
     page = visit(context, site)
+    page.click("#scene-menu")
     page.click("#new-scene")
     page.get_by_role("button", name=title).click()
     page.get_by_label("Friction coefficient").fill("-1")
@@ -193,6 +194,7 @@ def test_a_template_asks_and_makes_a_scene_that_answers(
 def test_every_shipped_scene_can_be_edited(profile: Profile, site: Site, scene: str, scheme: str) -> None:
     page = visit(profile[0], site, f"?scene={scene}")
     page.emulate_media(color_scheme=scheme)  # type: ignore[arg-type]
+    page.click("#scene-menu")
     page.click("#edit-scene")
     settled(page)
     for contact in page.locator("#editor-tables [aria-label^='N0 of']").all():

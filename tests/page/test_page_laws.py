@@ -111,6 +111,7 @@ def test_every_law_has_its_sliders_and_units(page_of: Any) -> None:
         assert page.input_value("#variable") == f"{contact}.{names[0]}"
     assert {"pad.kn", "pad.kt_second", "stop.gap", "rubber.a3"} <= set(variables(page))
     assert columns(page) == ["law", "N0", "kt", "μ", "kn", "k", "gap", "a1", "a3"]
+    page.click("#scene-menu")
     page.click("#edit-scene")
     expect(page.locator("#editor-status")).to_contain_text("Nothing is wrong")
     heads = page.locator("#field-contacts th").all_inner_texts()

@@ -103,6 +103,7 @@ def test_matrices_with_what_was_read(browser: Browser, site: Site, tmp_path: Pat
         page = context.new_page()
         page.goto(site.url)
         page.locator("html[data-ready]").wait_for(state="attached")
+        page.click("#scene-menu")
         page.click("#open-matrices")
         page.set_input_files("#matrix-input", ANSYS)
         page.get_by_label("Modes kept of the rest").fill("6")

@@ -72,6 +72,7 @@ def test_matrices_become_a_scene_and_its_response(profile: Profile, site: Site) 
     expect(page.locator("#point-facts")).to_contain_text("max |x|")
     stored = httpx.get(f"{site.url}/v1/scenes/blade").json()["scene"]["structure"]
     assert stored["reduction"]["dofs"] == len(M)
+    page.click("#scene-menu")
     page.click("#edit-scene")
     expect(page.locator("#field-structure-damping-ratio")).to_have_value("0.001")
     assert page.locator("#editor input").count() < 40, "nobody edits a matrix number by number"

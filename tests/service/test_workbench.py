@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from datetime import timedelta
 from typing import Any
 
@@ -225,6 +226,16 @@ def test_a_link_shows_its_run_and_nothing_else(http: ServedClient, monkeypatch: 
     shown = http.get(link["link"]).json()
     assert (shown["id"], shown["notes"], shown["request"]["seed"]) == (run["id"], "why", 1)
     assert ask("/results").json()["result"] == run["result"]
+    browser = {"Accept": "text/html,application/xhtml+xml,application/xml;q=0.9,*/*;q=0.8"}
+    page = http.get(link["link"], headers=browser)
+    assert page.headers["content-type"].startswith("text/html")
+    assert "default-src 'none'" in page.headers["content-security-policy"]
+    assert "<th scope='row'>notes</th><td>why</td>" in page.text
+    assert "<button" not in page.text
+    files = [address.replace("&amp;", "&") for address in re.findall(r'href="([^"]+)"', page.text)]
+    assert len(files) == ("scene" in run["request"]) + 1 + len(run["sweeps"])
+    assert all(http.get(address).status_code == 200 for address in files)
+    assert other["id"] not in page.text
     assert ask(f"/sweeps/{run['sweeps'][0]['id']}").json()["arrays"]
     is_problem(ask(f"/sweeps/{other['sweeps'][0]['id']}"), 404)
     is_problem(ask(token=link["token"][:-1] + "x"), 404)

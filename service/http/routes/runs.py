@@ -16,6 +16,7 @@ from fastapi import APIRouter, Body, Depends, Header, Query, Request, Response
 
 from service.auth.authenticator import Authenticator
 from service.auth.callers import KEYLESS, LINK_READERS, Caller, Scope
+from service.db.models import JobState
 from service.db.repositories.runs import RunRow
 from service.errors import ConflictError, NotFoundError
 from service.http.dependencies import (
@@ -33,8 +34,8 @@ from service.http.in_lane import drawing, reading, writing, writing_files
 from service.http.middleware.admission import address_of
 from service.http.routes.jobs import results_answer
 from service.http.routes.stored import SWEEP_FORMS, SweepForm, sweep_answer
-from service.rendering.representations import chosen
-from service.schemas.answers import JobScene, ResultsAnswer, SweepDetail
+from service.rendering.representations import JSON, chosen
+from service.schemas.answers import JobScene, ResultsAnswer, SweepAnswer, SweepDetail
 from service.schemas.comparisons import comparison
 from service.schemas.pages import newest
 from service.schemas.workbench_answers import (
@@ -316,11 +317,27 @@ def _shared(context: Context) -> tuple[RunRow, Caller]:
     return run, replace(KEYLESS, owner=run.owner, scopes=frozenset({Scope.READ}))
 
 
-@shares.get("/shared")
+_PAGE = "text/html"
+
+
+@shares.get("/shared", response_model=SharedRun, responses={200: media({_PAGE: TEXT})})
 @reading
-def shared_run(context: OfLink) -> SharedRun:
-    """The run of a link: what was asked, and how it ended."""
-    return SharedRun.of(_shared(context)[0])
+def shared_run(context: OfLink) -> Response:
+    """The run of a link: what was asked, and how it ended; a page with what came out where a browser asks."""
+    run, reader = _shared(context)
+    told = SharedRun.of(run)
+    kind = chosen(context.request.headers.get("accept"), (JSON, _PAGE))
+    if kind == JSON:
+        return as_json(told, headers={"Vary": "Accept"})
+    from service.rendering.shared import POLICY, shared_page
+
+    result, sweeps = None, []
+    if run.job.state is JobState.SUCCESSFUL:
+        with context.service.database.reading():
+            found = context.service.results(run.id, reader)
+            result, sweeps = found.result, [SweepAnswer.of(one) for one in found.sweeps]
+    headers = {"Vary": "Accept", "Content-Security-Policy": POLICY}
+    return Response(shared_page(told, result, sweeps, context.token), media_type=_PAGE, headers=headers)
 
 
 @shares.get("/shared/scene", response_model=JobScene)

@@ -1,6 +1,6 @@
 // The page of stickslip: projects, scenes and runs at the left, one scene with its answer and views beside them.
 
-import { read, state, write } from "./base/address.js";
+import { asOneStep, lastWritten, read, state, write } from "./base/address.js";
 import { Problem, patiently } from "./network/api.js";
 import { byId, el, show } from "./base/dom.js";
 import { startInterference } from "./disk/interference.js";
@@ -34,9 +34,10 @@ import { saveToml } from "./base/toml.js";
 import { VIEWS } from "./views.js";
 import { startPanel } from "./design/panel.js";
 import { startComparison } from "./workbench/comparison.js";
+import { startFrame } from "./workbench/frame.js";
 import { listProjects, startProjects } from "./workbench/projects.js";
 import { listRuns, startRuns } from "./workbench/runs.js";
-import { startTabs, tabOf } from "./workbench/tabs.js";
+import { restoreTab, startTabs, tabOf } from "./workbench/tabs.js";
 
 const FIRST = "bladed-disk";
 let states = { states: null, at: null };
@@ -96,16 +97,41 @@ function drawScene() {
   show(byId("structure-states"), contactTable(scene, states.states, states.at));
 }
 
-async function change(name) {
+const forgetAll = () => {
   for (const kind of new Set([...Object.keys(VIEWS), ...Object.keys(state.jobs)])) forget(kind);
+};
+
+const change = (name) => asOneStep(async () => {
+  forgetAll();
   Object.assign(state, { scene: name, set: {}, contact: "", variable: "", range: null, at: null, jobs: {} });
   tell("scene-left");
   sceneList();
   await open().catch(failed);
+});
+
+// Back and forward: what the address says is shown; a tab alone needs nothing new of the service.
+const WITHOUT_TAB = /(?<=[?&])tab=[^&]*&?/;
+
+async function restore() {
+  const [before, now] = [lastWritten(), location.search].map((words) => words.replace(WITHOUT_TAB, "").replace(/[?&]$/, ""));
+  const { compare } = state;
+  if (before !== now) forgetAll();
+  read();
+  if (before === now) Object.assign(state, { compare });
+  restoreTab();
+  if (before === now) return;
+  byId("scene").value = state.scene;
+  tell("scene-left");
+  sceneList();
+  await open();
+  tell("values");
+  tell("runs-changed");
 }
 
 // A run as it was computed: its scene, its values, its result in its view.
-async function openRun({ id, kind, request }) {
+const openRun = (run) => asOneStep(() => openedRun(run));
+
+async function openedRun({ id, kind, request }) {
   if (request.scene !== state.scene) {
     byId("scene").value = request.scene;
     await change(request.scene);
@@ -150,8 +176,7 @@ function controls() {
   byId("edit-scene").addEventListener("click", () => editCurrent().catch(failed));
   byId("save-toml").addEventListener("click", () => saveToml(`${state.scene}.toml`));
   byId("share").addEventListener("click", share);
-  // Beside the views where there is room, folded above them where there is not.
-  byId("rail").open = matchMedia("(min-width: 70rem)").matches;
+  addEventListener("popstate", () => asOneStep(restore, { back: true }).catch(failed));
 }
 
 // Files that were chosen or dropped: a scene is opened, anything else is taken for matrices.
@@ -162,7 +187,7 @@ async function take(files) {
 }
 
 function startDrops() {
-  const card = byId("start");
+  const card = document.body;
   const over = (event, on) => {
     if (!event.dataTransfer?.types.includes("Files")) return;
     event.preventDefault();
@@ -235,6 +260,7 @@ function start() {
   startAnswer();
   startStudy();
   startPanel();
+  startFrame();
   controls();
   on("states", (found) => {
     states = found;

@@ -48,14 +48,24 @@ def print_pairs(title: str, pairs: Iterable[tuple[str, str]]) -> None:
 def print_table(
     title: str, columns: Sequence[str], rows: Iterable[Sequence[str]], *, right: str = ""
 ) -> None:
-    """Print rows under column heads; `right` lists the numbers of the columns that are aligned right."""
+    """Print rows under column heads; `right` lists the numbers of the columns that are aligned right.
+
+    What identifies a thing, in a column `id`, stands whole on one line, to be copied: other columns fold.
+    """
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
 
     table = Table(box=SIMPLE_HEAD, pad_edge=False, show_edge=False)
+    listed = list(rows)
     for index, column in enumerate(columns):
-        table.add_column(column, justify="right" if str(index) in right else "left", overflow="fold")
-    for row in rows:
+        whole = max((len(row[index]) for row in listed), default=0) if column == "id" else None
+        table.add_column(
+            column,
+            justify="right" if str(index) in right else "left",
+            overflow="fold",
+            min_width=whole,
+        )
+    for row in listed:
         table.add_row(*row)
     console = _console()
     console.print(title, style="bold")

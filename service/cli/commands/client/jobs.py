@@ -92,7 +92,7 @@ def scene_of(name: str) -> Any:
 
 
 def hand_in(url: str, body: Mapping[str, Any], *, wait: bool, as_json: bool) -> None:
-    """Submit a job; print its id, or wait for its end and print what came out."""
+    """Submit a job; print its id, or wait for its end and print what came out, with the id below."""
     with client_of(url) as client:
         job = client.submit(uploaded(client, body))
         if not wait:
@@ -146,6 +146,7 @@ def _show(job: JobAnswer, answer: ResultsAnswer, *, as_json: bool) -> None:
     ]
     if rows:
         print_table("Stored sweeps", ("id", "parameter", "points", "peak [m]"), rows, right="23")
+    say(f"job {job.id}")
 
 
 def _draw(client: Client, kind: str, answer: ResultsAnswer, picture: Path) -> None:

@@ -21,6 +21,7 @@ export const state = {
 };
 
 export function read() {
+  written = location.search;
   const words = new URLSearchParams(location.search);
   state.scene = words.get("scene") ?? "";
   state.contact = words.get("contact") ?? "";
@@ -36,6 +37,28 @@ export function read() {
   state.jobs = {};
   for (const [kind, id] of words) {
     if (!WORDS.includes(kind) && KIND.test(kind) && ID.test(id)) state.jobs[kind] = id;
+  }
+}
+
+let held = 0;
+let written = "";
+
+// What stood in the address before the browser went back or forward.
+export const lastWritten = () => written;
+
+// A further entry of the browser's history, which what follows writes to: Back leads to what was seen before.
+export function step() {
+  if (!held && state.scene) history.pushState(null, "", location.href);
+}
+
+// What is done within is one step, or none where it goes back itself.
+export async function asOneStep(work, { back = false } = {}) {
+  if (!back) step();
+  held += 1;
+  try {
+    return await work();
+  } finally {
+    held -= 1;
   }
 }
 
@@ -56,6 +79,7 @@ export function write() {
   const text = words.toString().replaceAll("%3A", ":").replaceAll("%2C", ",");
   const address = `${location.pathname}${text ? `?${text}` : ""}`;
   if (address !== location.pathname + location.search) history.replaceState(null, "", address + location.hash);
+  written = location.search;
 }
 
 function pairs(text) {

@@ -8,6 +8,7 @@ import { extent } from "./scales.js";
 import { dragged, joined, zoomButtons, zoomKey, zoomed } from "./zoom.js";
 
 const MARGIN_LEFT = 62;
+const LEAST_HEIGHT = 120;
 const DASHES = { dashed: "7 4", dotted: "2 4" };
 
 // What a chart shows: {x, y: {name, unit, log, zero, low, high}, series: [{name, x, y, colour, dash, width, shape, bare}],
@@ -19,11 +20,14 @@ export function chart(host, { label, file, height = 300, onPick, legend = true, 
   const drawing = svg("svg", { class: "chart", role: "group", tabindex: 0, "aria-label": label });
   drawing.setAttribute("aria-roledescription", onPick ? "chart, arrows move along it, Enter picks" : "chart, arrows move along it");
   const tools = el("div", { class: "chart-tools" });
-  show(host, drawing, el("div", { class: "chart-foot" }, read, tools));
+  const foot = el("div", { class: "chart-foot" }, read, tools);
+  show(host, drawing, foot);
+  // Where the layout gives a figure its height (`--fill: 1`), the drawing takes what its foot leaves.
+  const tall = () => (getComputedStyle(host).getPropertyValue("--fill") === "1" ? Math.max(host.clientHeight - foot.offsetHeight, LEAST_HEIGHT) : height);
   const self = { drawing, shown: null, at: null, link, log: null, window: null };
   tools.append(...zoomButtons(self, label), ...saving(self, file, label));
 
-  self.repaint = () => self.shown && paint(self, host, height, legend, label);
+  self.repaint = () => self.shown && paint(self, host, tall(), legend, label);
   self.draw = (what) => {
     const before = self.shown && self.at !== null ? pointOf(self, pickSeries).x : null;
     self.shown = what;
@@ -39,7 +43,8 @@ export function chart(host, { label, file, height = 300, onPick, legend = true, 
     read.textContent = "";
     const width = Math.max(host.clientWidth, 240);
     self.width = host.clientWidth;
-    drawingOf(drawing, width, height, empty(width, height, words));
+    const high = tall();
+    drawingOf(drawing, width, high, empty(width, high, words));
   };
   self.clear();
   self.cursor = (index) => moveCursor(self, index, read, pickSeries);
@@ -59,7 +64,7 @@ export function chart(host, { label, file, height = 300, onPick, legend = true, 
     });
   }
   new ResizeObserver(() => {
-    if (Math.abs(host.clientWidth - (self.width ?? 0)) <= 1) return;
+    if (Math.abs(host.clientWidth - (self.width ?? 0)) <= 1 && Math.abs(tall() - Number(drawing.getAttribute("height"))) <= 1) return;
     if (self.shown) self.repaint();
     else self.clear();
   }).observe(host);

@@ -10,7 +10,6 @@ import { inUse, sameValues } from "../scene/inputs.js";
 import { givenByScene, variable } from "../scene/scenes.js";
 import { load } from "./design.js";
 import { changedSince, isUnderway, renewButton } from "./renewal.js";
-import { saveReport } from "./report.js";
 
 let designed = null;
 let before = null;
@@ -59,7 +58,7 @@ function draw() {
     return;
   }
   show(host, el("dl", { class: "figures" }, figures().map(([name, value, more, id]) =>
-    el("div", { id: id ?? undefined }, el("dt", {}, name), el("dd", { class: "large" }, value), more ? el("dd", { class: "small" }, more) : null))));
+    el("div", { id: id ?? undefined }, el("dt", {}, name), el("dd", { class: "large" }, value), more ? el("dd", { class: "small", title: more }, more) : null))));
   actions();
 }
 
@@ -71,21 +70,22 @@ function actions() {
     : []);
   const used = inUse(request, result.optimum);
   const use = byId("use-design");
-  use.textContent = used ? "In use" : "Use this design";
+  use.textContent = used ? "In use" : "Use";
   use.disabled = used || Object.keys(result.optimum).length === 0;
   use.onclick = () => load(result.optimum, request);
-  byId("save-report").onclick = () => saveReport(designed, figures(), changed);
-  byId("save-pdf").onclick = savePdf;
+  byId("save-report").onclick = () => saveReport("save-report", "html", "text/html");
+  byId("save-pdf").onclick = () => saveReport("save-pdf", "pdf", "application/pdf");
 }
 
-// The service makes it, from the job of the design.
-async function savePdf() {
-  const button = byId("save-pdf");
+// The service makes it, from the job of the design: of the problem that was solved, whatever is set now.
+async function saveReport(id, form, type) {
+  const button = byId(id);
+  const words = button.textContent;
   button.disabled = true;
   button.textContent = "Being made …";
-  await saveFrom(`/v1/jobs/${state.jobs.design}/report?format=pdf`, "application/pdf", `report-${state.scene}.pdf`);
+  await saveFrom(`/v1/jobs/${state.jobs.design}/report?format=${form}`, type, `report-${state.scene}.${form}`);
   button.disabled = false;
-  button.textContent = "Report as PDF";
+  button.textContent = words;
   button.focus();
 }
 

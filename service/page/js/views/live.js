@@ -146,10 +146,11 @@ function contactChooser() {
 }
 
 function fillSliders() {
-  for (const { range, slide, box } of sliders) {
+  for (const { range, slide, box, node } of sliders) {
     const now = value(range.path);
     slide.value = String(toStep(range, now));
     slide.setAttribute("aria-valuetext", quantity(range.path, now));
+    node.classList.toggle("changed", range.path in state.set && now !== ownValue(range.path));
     if (document.activeElement !== box) box.value = String(Number(now.toPrecision(6)));
   }
 }

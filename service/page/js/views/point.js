@@ -20,9 +20,9 @@ let ask = null;
 
 export function startPoint() {
   plots = {
-    loops: chart(byId("loops-figure"), { label: "Hysteresis loop", file: "loop", height: 280 }),
-    history: chart(byId("history-figure"), { label: "One period", file: "period", height: 280 }),
-    harmonics: chart(byId("harmonics-figure"), { label: "Amplitude of each harmonic", file: "harmonics", height: 280, legend: false }),
+    loops: chart(byId("loops-figure"), { label: "Hysteresis loop", file: "loop", height: 190 }),
+    history: chart(byId("history-figure"), { label: "One period", file: "period", height: 190 }),
+    harmonics: chart(byId("harmonics-figure"), { label: "Amplitude of each harmonic", file: "harmonics", height: 190, legend: false }),
   };
   ask = previewer("point", (answer, { token }) => token === wish() && arrived(answer), (error) => say("point-status", error.message, true));
   byId("point-show").addEventListener("click", () => go(byId("point-at").valueAsNumber));

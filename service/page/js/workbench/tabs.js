@@ -1,6 +1,6 @@
 // Tabs: which cards are seen together. A card may stand under several; "All" is the whole page under one another.
 
-import { FIRST_TAB, state, write } from "../base/address.js";
+import { FIRST_TAB, state, step, write } from "../base/address.js";
 import { byId, el, show } from "../base/dom.js";
 import { on } from "../base/events.js";
 
@@ -26,10 +26,14 @@ export function startTabs() {
     byId(`tab-${TABS[next][0]}`).focus();
   });
   on("tab", openTab);
-  openTab(known(state.tab) ? state.tab : FIRST_TAB);
+  restoreTab();
 }
 
+// The tab of the address as it is now.
+export const restoreTab = () => openTab(known(state.tab) ? state.tab : FIRST_TAB);
+
 export function openTab(name) {
+  if (name !== state.tab) step();
   state.tab = name;
   for (const [each] of TABS) {
     const tab = byId(`tab-${each}`);
@@ -37,6 +41,7 @@ export function openTab(name) {
     tab.tabIndex = each === name ? 0 : -1;
   }
   byId("panel").setAttribute("aria-labelledby", `tab-${name}`);
-  for (const card of byId("panel").children) card.classList.toggle("off", name !== "all" && !card.dataset.tabs.split(" ").includes(name));
+  byId("panel").dataset.view = name;
+  for (const card of byId("panel").querySelectorAll("[data-tabs]")) card.classList.toggle("off", name !== "all" && !card.dataset.tabs.split(" ").includes(name));
   if (state.scene) write();
 }

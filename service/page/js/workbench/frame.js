@@ -1,0 +1,74 @@
+// The frame of the page: the drawer that holds the rail where there is no room for it, the menus of the bar, and the
+// chips of values that differ from the scene.
+
+import { state } from "../base/address.js";
+import { byId, el, show } from "../base/dom.js";
+import { on } from "../base/events.js";
+import { quantity } from "../base/format.js";
+import { ownValue, variable } from "../scene/scenes.js";
+import { putAll } from "../views/live.js";
+
+const WIDE = matchMedia("(min-width: 1100px)");
+
+export function startFrame() {
+  startDrawer();
+  menu("scene-menu", "scene-tools", (node, open) => { node.hidden = !open; });
+  menu("search-menu", "search", (node, open) => node.classList.toggle("is-open", open));
+  for (const event of ["scene", "values", "settled"]) on(event, drawChips);
+  for (const event of ["scene", "settings", "scene-contact", "contact"]) on(event, sayWhat);
+}
+
+// The rail stands beside the view, or in a dialog over it: focus stays inside, Escape closes, focus returns.
+function startDrawer() {
+  const [drawer, rail] = [byId("drawer"), byId("rail")];
+  const main = byId("main");
+  byId("rail-open").addEventListener("click", () => {
+    drawer.append(rail);
+    drawer.showModal();
+  });
+  byId("rail-close").addEventListener("click", () => drawer.close());
+  drawer.addEventListener("click", (event) => event.target === drawer && drawer.close());
+  drawer.addEventListener("close", () => main.before(rail));
+  WIDE.addEventListener("change", () => drawer.close());
+  on("scene-left", () => drawer.close());
+  on("open-run", () => drawer.close());
+}
+
+function menu(id, folded, unfold) {
+  const [button, node] = [byId(id), byId(folded)];
+  const put = (open) => {
+    button.setAttribute("aria-expanded", String(open));
+    unfold(node, open);
+  };
+  const isOpen = () => button.getAttribute("aria-expanded") === "true";
+  button.addEventListener("click", () => put(!isOpen()));
+  node.addEventListener("click", (event) => event.target.closest("button") && put(false));
+  document.addEventListener("pointerdown", (event) => isOpen() && !button.parentElement.contains(event.target) && put(false));
+  button.parentElement.addEventListener("keydown", (event) => {
+    if (event.key !== "Escape" || !isOpen()) return;
+    put(false);
+    button.focus();
+  });
+}
+
+function drawChips() {
+  const changed = Object.entries(state.set).filter(([path, value]) => value !== ownValue(path));
+  show(byId("chips"), changed.map(([path, value]) => {
+    const scene = ownValue(path);
+    return el("li", { class: "set-chip" },
+      el("b", {}, `${path} = ${quantity(path, value)}`),
+      scene === null ? null : ` (scene: ${quantity(path, scene)})`,
+      el("button", { type: "button", "aria-label": `Put ${path} back to the value of the scene`, onclick: () => putBack(path) }, "×"));
+  }));
+}
+
+function putBack(path) {
+  const { [path]: _, ...rest } = state.set;
+  putAll(rest);
+  (byId("chips").querySelector("button") ?? byId("study")).focus();
+}
+
+function sayWhat() {
+  const path = variable();
+  byId("search-words").textContent = path && state.range ? `${path} ${state.range.join(" – ")} ${byId("variable-unit").textContent}` : "–";
+}
