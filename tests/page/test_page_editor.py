@@ -111,6 +111,7 @@ def test_what_is_wrong_is_said_at_its_field_and_its_line(profile: Profile, site:
 def test_a_scene_is_drawn_up_from_nothing(profile: Profile, site: Site) -> None:
     """Two masses, a spring between them and a stop beside the damper, by keyboard and mouse."""
     page = visit(profile[0], site)
+    page.click("#scene-menu")
     page.get_by_role("button", name="New scene…").press("Enter")
     expect(page.locator(".choice-card").first).to_be_focused()
     page.keyboard.press("Enter")

@@ -39,6 +39,7 @@ def test_matrices_become_a_scene_and_its_response(profile: Profile, site: Site) 
     context, watch = profile
     watch.allowed = ("status of 422",)
     page = visit(context, site)
+    page.click("#scene-menu")
     page.get_by_role("button", name="Matrices…").press("Enter")
     expect(page.locator("#matrix-choose")).to_be_focused()
     endings = [suffix for reader in readers() for suffix in reader.suffixes]
@@ -81,6 +82,7 @@ def test_matrices_become_a_scene_and_its_response(profile: Profile, site: Site) 
 
 def check_sector(page: Page, site: Site) -> None:
     """One sector of a disk: its deck tells the sets and the places, and the sector is drawn."""
+    page.click("#scene-menu")
     page.get_by_role("button", name="Matrices…").click()
     for name in ("blade_K.matrix", "blade_M.matrix", "blade_K.mapping"):
         page.get_by_role("button", name=f"Leave out {name.replace('_', ' ')}").click()

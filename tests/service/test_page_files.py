@@ -92,15 +92,15 @@ def luminance(colour: str) -> float:
 def test_the_colours_of_the_text_of_a_scene_can_be_read() -> None:
     """The text lies under the field that is typed in, where axe can not tell its ground."""
     base, editor = ((FOLDER / "css" / name).read_text("utf-8") for name in ("base.css", "editor.css"))
-    used = re.findall(r"\.toml-\w+ \{ color: var\((--\w+)\)", editor)
+    used = re.findall(r"\.toml-\w+ \{ color: var\((--[\w-]+)\)", editor)
     assert len(used) >= 5
-    themes = [dict(re.findall(r"(--\w+): (#[0-9a-f]{6});", block)) for block in base.split("--ground:")[1:]]
-    assert len(themes) == 3, "light, dark by the system, dark by choice"
-    for theme in themes:
-        ground = luminance(theme["--field"])
+    (below,) = re.findall(r"^\.toml \{[^}]*background: var\((--[\w-]+)\)", editor, flags=re.MULTILINE)
+    tokens = re.findall(r"(--[\w-]+): light-dark\((#[0-9a-f]{6}), (#[0-9a-f]{6})\);", base)
+    for theme in ({name: pair[i] for name, *pair in tokens} for i in range(2)):
+        ground = luminance(theme[below])
         for name in used:
             light, dark = sorted((luminance(theme[name]), ground), reverse=True)
-            assert (light + 0.05) / (dark + 0.05) >= 4.5, f"{name} {theme[name]} on {theme['--field']}"
+            assert (light + 0.05) / (dark + 0.05) >= 4.5, f"{name} {theme[name]} on {theme[below]}"
 
 
 def test_the_code_of_the_page_is_small() -> None:

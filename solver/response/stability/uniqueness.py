@@ -138,7 +138,8 @@ def _takes_out_power(model: LinearModel) -> bool:
     if not model.every_diameter or not (model.extra is None or model.extra.is_real):
         return False
     free, diameters = model.free, np.arange(model.sectors)
-    for n in np.array_split(diameters, math.ceil(diameters.size * model.M.size / _ENTRIES)):
+    parts = max(math.ceil(diameters.size * free.size**2 / _ENTRIES), 1)
+    for n in np.array_split(diameters, parts):
         K, C, _ = (each[:, free][:, :, free] for each in model.at(n, np.ones(n.size, np.bool_)))
         if not np.all(np.abs(K - np.swapaxes(K.conj(), 1, 2)) <= _SAME * _largest(K)):
             return False
