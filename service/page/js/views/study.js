@@ -62,7 +62,6 @@ function study() {
   if (!readSettings()) return;
   state.at = null;
   write();
-  say("study-status", `The jobs are under way: response, design, map, front, accuracy, Campbell diagram${isDisk() ? ", interference diagram" : ""}.`);
   const mine = (studies += 1);
   const designed = begin("design");
   const all = [
@@ -71,6 +70,7 @@ function study() {
     ...["map", "accuracy", "campbell", ...(isDisk() ? ["interference"] : [])].map((kind) => begin(kind)),
     frontAfter(designed, mine),
   ];
+  say("study-status", `${all.length} jobs are under way.`);
   Promise.all(all).then((done) => {
     const short = done.filter((each) => !each).length;
     if (mine !== studies) return;
