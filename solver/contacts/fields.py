@@ -63,6 +63,8 @@ Signed = Annotated[float, Field(strict=True, ge=-LARGEST, le=LARGEST, allow_inf_
 Vector = tuple[Signed, Signed, Signed]
 Friction = Annotated[float, Field(strict=True, ge=0.0, le=100.0, allow_inf_nan=False)]
 Angle = Annotated[float, Field(strict=True, ge=-1e4, le=1e4, allow_inf_nan=False)]
+LEAST_SAMPLES, MOST_SAMPLES = 32, 65_536  # of a period
+Samples = Annotated[int, Field(strict=True, ge=LEAST_SAMPLES, le=MOST_SAMPLES)]
 
 
 class Part(BaseModel):

@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar, Literal
+from typing import ClassVar, Literal
 
-from pydantic import Field
-
-from solver.contacts.fields import NonNegative
+from solver.contacts.fields import NonNegative, Samples
 from solver.contacts.kernels import columns
 from solver.contacts.laws.parts import RestStiffness
 from solver.contacts.laws.plane import SlidesInAPlane
-
-MOST_SAMPLES = 65_536
-Samples = Annotated[int, Field(strict=True, ge=32, le=MOST_SAMPLES)]
 
 
 class PlanarContact(SlidesInAPlane):

@@ -96,7 +96,7 @@ class SlidesInAPlane(FrictionContact):
         return shares_in_space(path_in_space(motions, load, *self.tangential, self.mu))
 
     def perturbed(self, motions: Real, load: Real) -> tuple[ContactPart, ...]:
-        """Return how it follows small perturbations of a motion; a sampled limit as the exact one does."""
+        """Return how it follows small perturbations of a motion."""
         from solver.contacts.pieces.circle import circle_pieces
         from solver.contacts.pieces.line import friction_pieces
         from solver.contacts.pieces.piece import ContactPart

@@ -4,23 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Annotated, ClassVar, Self
+from typing import ClassVar, Self
 
 import numpy as np
-from pydantic import Field, PrivateAttr
+from pydantic import PrivateAttr
 
-from solver.contacts.fields import Real
+from solver.contacts.fields import LEAST_SAMPLES, Real, Samples
 from solver.contacts.kernels import columns
 from solver.contacts.laws.base import AnyContact
-from solver.contacts.laws.history.definition import LEAST_SAMPLES, MOST_SAMPLES, HistoryLaw
+from solver.contacts.laws.history.definition import HistoryLaw
 from solver.contacts.laws.parts import Follows, RestStiffness, Row
 from solver.errors import SettingError
 
 NODES_A_HARMONIC, BETWEEN_REVERSALS = 32, 16
 _SMALL = 1e-9  # m; the motion whose force tells the stiffness at rest
 _FORM = {"steps": 1, "reversals": 2, "alone": 4}  # bits of `solver.contacts.kernels.history.law`
-
-Samples = Annotated[int, Field(strict=True, ge=LEAST_SAMPLES, le=MOST_SAMPLES)]
 
 
 class HistoryContact(AnyContact):

@@ -9,13 +9,12 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
 
-from solver.contacts.fields import LARGEST
+from solver.contacts.fields import LARGEST, LEAST_SAMPLES, MOST_SAMPLES
 from solver.contacts.kernels.columns import MOST_OWN, OWN
 from solver.contacts.laws.parts import LawQuantity
 from solver.errors import SettingError
 
 MOST_STATES = 200
-LEAST_SAMPLES, MOST_SAMPLES = 32, 65_536
 _NAME = re.compile(r"[a-z][a-z0-9-]*\Z")
 _KEY = re.compile(r"[A-Za-z][A-Za-z0-9_]*\Z")
 _TAKEN = {"name", "law", "between", "group", "samples", "at", "normal", "tangents", "motions"}
