@@ -197,6 +197,19 @@ class Authenticator:
                 f"by links {most} requests a minute may be made", math.ceil(max(waits))
             )
 
+    def count_login(self, address: str) -> None:
+        """Count a log-in, of which an address has as many a minute as keys that do not work.
+
+        Raises
+        ------
+        TooManyRequestsError
+            There were as many as may be made.
+        """
+        most = self._settings.failed_keys_per_minute
+        wait = self._links.take(f"log-in from {_neighbourhood(address)}", most)
+        if wait > 0.0:
+            raise TooManyRequestsError(f"{most} log-ins a minute may be made", math.ceil(wait))
+
     def _failed(self, reason: str, address: str) -> UnauthorizedError | TooManyRequestsError:
         """The refusal of a key; a working key from the same address is admitted all the same.
 

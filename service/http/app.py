@@ -10,6 +10,7 @@ from fastapi import FastAPI
 from starlette.concurrency import run_in_threadpool
 
 from service.auth.authenticator import Authenticator
+from service.errors import ConfigurationError
 from service.http import openapi
 from service.http.dependencies import BodyTurns, HostCheck
 from service.http.metrics import Metrics, RequestMetrics
@@ -100,8 +101,23 @@ def create_app(settings: Settings | None = None, registry: Registry | None = Non
         page.reference, page.router,
     ):  # fmt: skip
         app.include_router(router)
+    if service.settings.oidc_issuer is not None:
+        _offer_login(app, service)
     openapi.install(app, service.registry)
     return app
+
+
+def _offer_login(app: FastAPI, service: Service) -> None:
+    """Let people log in at the provider that the settings name."""
+    try:
+        from service.auth.login import Login
+        from service.http.routes import login
+    except ImportError as error:
+        raise ConfigurationError(
+            f"`oidc_issuer` (STICKSLIP_OIDC_ISSUER) needs the extra `oidc` of stickslip: {error}"
+        ) from error
+    app.state.login = Login(service.settings, service.keys, service.jobs.now)
+    app.include_router(login.router)
 
 
 def _connections(settings: Settings) -> Connections:

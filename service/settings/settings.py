@@ -5,8 +5,9 @@ from __future__ import annotations
 import ipaddress
 import os
 from typing import Literal, Self
+from urllib.parse import urlsplit
 
-from pydantic import Field, FilePath, ValidationError, field_validator, model_validator
+from pydantic import Field, FilePath, SecretStr, ValidationError, field_validator, model_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 from sqlalchemy.engine import URL, make_url
 from sqlalchemy.exc import ArgumentError
@@ -191,6 +192,32 @@ class Settings(ClientLimits):
         "the names of loopback when bound to loopback, so that a web page elsewhere cannot reach the service "
         "by a name of its own; all when bound to another address.",
     )
+
+    public_url: str | None = Field(
+        default=None,
+        pattern=r"^https?://[^/?#@\s]+$",
+        description="Address at which people reach the service, https://dampers.example; for `oidc_issuer`.",
+    )
+    oidc_issuer: str | None = Field(
+        default=None,
+        pattern=r"^https?://[^?#@\s]+$",
+        description="Address of the OpenID Connect provider where people log in; unset: keys alone.",
+    )
+    oidc_client_id: str | None = Field(default=None, description="Name of this service at the provider.")
+    oidc_client_secret: SecretStr | None = Field(default=None, description="Its secret there.")
+    oidc_owner_claim: str = Field(
+        default="email",
+        description="What the provider says that becomes the owner: a verified `email`, `sub`, …",
+    )
+    oidc_allowed: tuple[str, ...] = Field(
+        default=(),
+        description='Owners that may come in, `["ann@example.org", "@example.com"]`; none: whom the '
+        "provider lets in.",
+    )
+    oidc_admins: tuple[str, ...] = Field(
+        default=(), description="Owners whose log-in has the scope `admin`; the others have `submit`."
+    )
+    oidc_hours: float = Field(default=12.0, ge=0.01, le=8760.0, description="How long a log-in lasts [h].")
 
     kinds: tuple[str, ...] = Field(
         default=(),
@@ -415,6 +442,25 @@ class Settings(ClientLimits):
                 "leave it out and make keys (`stickslip keys create`), use 127.0.0.1, or set "
                 "STICKSLIP_ALLOW_REMOTE=true (`allow_remote`) if everyone who can reach it may use it"
             )
+        return self
+
+    @model_validator(mode="after")
+    def _login_is_whole(self) -> Self:
+        if self.oidc_issuer is None:
+            return self
+        for name in ("oidc_client_id", "oidc_client_secret", "public_url"):
+            if getattr(self, name) is None:
+                raise ValueError(f"`oidc_issuer` needs `{name}` (STICKSLIP_{name.upper()})")
+        if not self.keys_required:
+            raise ValueError(
+                "`oidc_issuer` needs `require_keys` (STICKSLIP_REQUIRE_KEYS=true): who logs in gets a key"
+            )
+        for name in ("oidc_issuer", "public_url"):
+            url = urlsplit(getattr(self, name))
+            if url.scheme == "http" and not is_loopback(url.hostname or ""):
+                raise ValueError(
+                    f"`{name}` must begin with https:// unless it is on loopback, got {url.geturl()!r}"
+                )
         return self
 
     @model_validator(mode="after")

@@ -32,6 +32,10 @@ class Site:
         self.database = f"sqlite:///{folder}/jobs.db"
         self._process: subprocess.Popen[bytes] | None = None
 
+    def set_environment(self, **environment: str) -> None:
+        """Set variables for the starts to come."""
+        self._environment.update(environment)
+
     def start(self) -> None:
         where = ("--port", str(self.port), "--database", self.database, "--workers", "1")
         with (self._folder / "log").open("a") as log:

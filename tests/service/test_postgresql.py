@@ -12,12 +12,13 @@ from contextlib import ExitStack
 from datetime import timedelta
 from pathlib import Path
 
+import psycopg
 import pytest
 from launch import free_port
-from postgresql_cluster import Cluster
+from postgresql_cluster import Cluster, binaries
 from private_kinds import PRIVATE
 from service_helpers import PATIENCE, pids, settings_of, until
-from sqlalchemy import select, text, update
+from sqlalchemy import make_url, select, text, update
 
 from service.cli import main
 from service.client.client import Client
@@ -278,3 +279,35 @@ def test_services_tell_each_other_without_polling(url: str, monkeypatch: pytest.
         assert one.wait(job, 30.0).state is JobState.SUCCESSFUL
         assert not other.queue.status().busy
         one.dismiss(here)
+
+
+def test_the_drill_of_deploy_restores_a_backup(cluster: Cluster, tmp_path: Path) -> None:
+    """It dumps, restores beside, checks and drops; a database that is damaged ends it with what is wrong."""
+    programs, command = binaries(), Path(sys.executable).parent
+    assert programs is not None
+    drill = Path(__file__).resolve().parents[2] / "deploy" / "restore-drill.sh"
+    with cluster.database(empty=False) as url:
+        parts = make_url(url)
+        environment = {
+            **os.environ, "PATH": os.pathsep.join([str(command), str(programs), os.environ["PATH"]]),
+            "PGHOST": str(parts.host), "PGPORT": str(parts.port), "PGUSER": str(parts.username),
+            "PGPASSWORD": str(parts.password),
+        }  # fmt: skip
+        dump = tmp_path / "backup.dump"
+
+        def drilled() -> subprocess.CompletedProcess[str]:
+            words = ["sh", str(drill), str(parts.database), str(dump)]
+            return subprocess.run(words, env=environment, capture_output=True, text=True, check=False)
+
+        done = drilled()
+        assert done.returncode == 0, done.stderr
+        assert "checked" in done.stdout
+        assert dump.stat().st_size > 1000
+        with psycopg.connect(cluster.conninfo(str(parts.database)), autocommit=True) as connection:
+            assert connection.execute(
+                "SELECT count(*) FROM pg_database WHERE datname LIKE %s", [f"{parts.database}_%"]
+            ).fetchone() == (0,), "the copy is gone"
+            connection.execute("UPDATE alembic_version SET version_num = 'another'")
+        failed = drilled()
+        assert failed.returncode != 0
+        assert "revision" in failed.stderr + failed.stdout

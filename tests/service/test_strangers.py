@@ -46,6 +46,7 @@ TABLE: dict[str, tuple[tuple[int, ...], Any]] = {
     "GET /openapi.json": (OPEN, None),
     "GET /docs": (OPEN, None),
     "GET /docs/style.css": (OPEN, None),
+    "GET /v1/login": (OPEN, None),
     "GET /health/live": (OPEN, None),
     "GET /health/ready": (OPEN, None),
     "GET /metrics": (MONITOR, None),

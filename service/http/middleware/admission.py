@@ -71,6 +71,8 @@ class ConcurrencyLimits:
 
 OPEN = frozenset({"/health/live", "/health/ready", "/openapi.json", "/docs", "/docs/style.css", "/"})
 """Paths that need no key: whether the service lives, what its API is, and the page, which asks for a key."""
+LOGIN = "/v1/login"
+"""Below it people log in who have no key yet."""
 _PAGE = "/page/"
 _SHARED = "/v1/shared"
 """What a link to a run shows, by the token in the query."""
@@ -83,6 +85,8 @@ _BEARER = "bearer "
 def scope_of(method: str, path: str) -> callers.Scope | None:
     """The scope that a request needs; None for none."""
     if (path in OPEN or path.startswith(_PAGE) or by_link(path)) and method in _READING:
+        return None
+    if path == LOGIN or path.startswith(f"{LOGIN}/"):
         return None
     if path in _MONITORED:
         return callers.Scope.MONITOR

@@ -15,6 +15,7 @@ from fastapi import APIRouter, BackgroundTasks, Request, Response
 
 from service.errors import NotFoundError
 from service.http.dependencies import TEXT, InContext, media, tagged
+from service.http.middleware.admission import LOGIN
 
 router = APIRouter(include_in_schema=False)
 
@@ -77,6 +78,12 @@ async def begun(context: InContext, tasks: BackgroundTasks) -> Response:
     tasks.add_task(context.service.answers.begin)
     headers = {**_HEADERS, "Cache-Control": "no-cache"}
     return tagged(context.request, index(), _TYPES[".html"], headers)
+
+
+@router.get(LOGIN)
+async def ways_in(context: InContext) -> dict[str, str | None]:
+    """The address at which people log in, None where the service takes keys alone."""
+    return {"url": None if context.service.settings.oidc_issuer is None else f"{LOGIN}/begin"}
 
 
 @router.get("/page/{hashed}/{path:path}")

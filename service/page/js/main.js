@@ -11,6 +11,7 @@ import { on, tell } from "./base/events.js";
 import { startFront } from "./views/front.js";
 import { loadLaws } from "./scene/laws.js";
 import { forget, resume, run, startJobs } from "./network/jobs.js";
+import { finishLogin, startLogin } from "./network/login.js";
 import { openLibrary, startLibrary } from "./views/library.js";
 import { showResponse, startLive } from "./views/live.js";
 import { startIdentify } from "./identify/view.js";
@@ -233,9 +234,11 @@ async function begin() {
   performance.mark("page-ready");
 }
 
-function start() {
+async function start() {
   startTheme();
   startNotices();
+  startLogin();
+  await finishLogin();
   read();
   startTabs();
   startProjects();
