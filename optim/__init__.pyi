@@ -15,3 +15,4 @@ from .studies.sensitivity_result import (
     SensitivityResult as SensitivityResult,
     SensitivityStatus as SensitivityStatus,
 )
+from .views.explorer import explore as explore

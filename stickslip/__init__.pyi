@@ -16,6 +16,7 @@ from optim import (
     DesignResult as DesignResult,
     Limit as Limit,
     design as design,
+    explore as explore,
     identify as identify,
     pareto_front as pareto_front,
     robust_design as robust_design,
