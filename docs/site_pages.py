@@ -26,7 +26,8 @@ _SECTION = re.compile(r"^## (.+)$")
 _ENTRY = re.compile(r"^- \[(?P<title>[^]]+)\]\((?P<page>[\w-]+\.md)\)")
 OUTSIDE = (
     "README.md", "CONTRIBUTING.md", "CHANGELOG.md", "LICENSE", "CITATION.cff", "tests/README.md",
-    "deploy/stickslip.service", "deploy/stickslip.env.example", "deploy/compose.yaml",
+    "deploy/stickslip.service", "deploy/stickslip.env.example", "deploy/compose.yaml", "deploy/nginx.conf",
+    "deploy/Caddyfile", "deploy/alerts.yaml", "deploy/grafana.json",
 )  # fmt: skip
 _PICTURE = re.compile(r"!\[(?P<words>[^]]*)\]\((?P<path>img/[\w./-]+\.(?:png|svg))\)")
 # pdoc takes what stands behind a colon for a type. Here it is one where a sentence follows on the next line,
