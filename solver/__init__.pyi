@@ -9,7 +9,7 @@ from .continuation.extrema.error_estimate import (
 )
 from .continuation.marks import Bifurcations as Bifurcations, Mark as Mark, MarkKind as MarkKind
 from .continuation.peaks import Band as Band, Peak as Peak
-from .continuation.segment import Stretch as Stretch, joined as joined
+from .continuation.segment import Course as Course, Stretch as Stretch, joined as joined
 from .continuation.settings import ContinuationSettings as ContinuationSettings, Predictor as Predictor
 from .errors import (
     Issue as Issue,

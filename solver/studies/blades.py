@@ -162,8 +162,10 @@ def blade_peaks(
     if branch is not None and branch.reached:
         progress(1.0, len(branch.values))
     if branch is None:
+        given = settings or ContinuationSettings()
         branch = sweep(
-            seen, start=start, stop=stop, harmonics=harmonics, settings=settings, errors=whole, peaks=whole,
+            seen, start=start, stop=stop, harmonics=harmonics,
+            settings=replace(given, peaks=whole and given.peaks, errors=whole and given.errors),
             on_progress=progress, should_stop=should_stop,
         )  # fmt: skip
     if not whole and branch.reached:
