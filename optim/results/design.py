@@ -12,15 +12,13 @@ from optim.criteria.band import BAND
 from optim.criteria.criterion import CriterionRow
 from optim.criteria.peak import PEAK
 from optim.problem.words import Method
-from optim.results.basins import Checked, LocalOptimum
-from optim.results.curve_check import CurveCheck
 from optim.results.doubts import doubts_of
 from optim.results.json import conditions_json, evaluation_json, known_parts, looked_json
+from optim.results.parts import Checked, CurveCheck, LocalOptimum
 from solver.arrays import FloatOrNaN
 from solver.results.base import Drawn, MadeOfResponses
-from solver.results.known import Known
+from solver.results.known import Known, Stable, Verdict, worst
 from solver.results.told import Piece
-from solver.results.verdict import Stable, Verdict, worst
 from solver.results.views import Views
 
 if TYPE_CHECKING:

@@ -15,8 +15,7 @@ from solver.arrays import FloatOrNaN, Integer, Real
 from solver.continuation.certificate import PeakCertificate
 from solver.continuation.peaks import Band, Peak
 from solver.results.base import Drawn
-from solver.results.known import Known
-from solver.results.verdict import Stable, Verdict
+from solver.results.known import Known, Stable, Verdict
 from solver.results.views import Views, on_demand
 from solver.scene.scene import Scene
 

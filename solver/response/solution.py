@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from solver.arrays import FloatOrNaN, Real
 from solver.results.base import Drawn
-from solver.results.verdict import Stable, Verdict
+from solver.results.known import Stable, Verdict
 from solver.results.views import Views, on_demand
 from solver.scene.scene import Scene
 

@@ -22,9 +22,9 @@ from solver.jit.trig_polynomial import grid_size, grid_tables, on_grid
 from solver.response.solution import Solution
 from solver.response.time_history import motion
 from solver.results.base import Drawn, MadeOfResponses
-from solver.results.default_bar import shows_progress
 from solver.results.known import NOTHING_KNOWN, Known
 from solver.results.views import Views
+from solver.results.watch import shows_progress
 from solver.scene.cyclic.annulus import annulus, sectors_needed
 from solver.scene.parts import LumpedStructure, Mass, MatricesStructure
 from solver.scene.scene import Scene

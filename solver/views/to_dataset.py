@@ -22,13 +22,10 @@ if TYPE_CHECKING:
     from solver.response.solution import Solution
     from solver.response.stability.floquet import Stability
     from solver.scene.scene import Scene
-    from solver.studies.accuracy_result import AccuracyStudy
     from solver.studies.blades import BladeAmplitudes, BladePeaks
-    from solver.studies.interference_result import InterferenceDiagram
-    from solver.studies.map_result import ResponseMap
     from solver.studies.mistuning_result import MistuningStudy
     from solver.studies.peaks.results import LeastPeak, PeakTrack
-    from solver.studies.plan_result import Plan
+    from solver.studies.study_results import AccuracyStudy, InterferenceDiagram, Plan, ResponseMap
 
 AMPLITUDE = "max|x| of the observed DOF"
 

@@ -28,9 +28,8 @@ from service.jobs.common.study_keys import (
     solved_issues,
     with_effects,
 )
-from service.jobs.kind_view import Json, ReadSweep, StoredSweep
 from service.jobs.outputs import JobOutput, Progress, ShouldStop
-from service.jobs.registry import Flag, JobKind
+from service.jobs.registry import Flag, JobKind, Json, ReadSweep, StoredSweep
 from service.jobs.study import Answer, Study, Watch
 from solver.errors import Issue, Naming, SettingError, Shown
 from solver.scene.descriptions import DISK_LOAD

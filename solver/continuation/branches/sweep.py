@@ -39,9 +39,8 @@ from solver.continuation.settings import ContinuationSettings
 from solver.errors import SettingError
 from solver.jit.fourier import Integer, Real, to_full
 from solver.linear.modal import undamped_resonance
-from solver.results.default_bar import shows_progress
 from solver.results.notes import ABOVE_FRICTION
-from solver.results.watch import OnProgress, ShouldStop
+from solver.results.watch import OnProgress, ShouldStop, shows_progress
 from solver.scene.bodies.paths import SPEED
 from solver.scene.parameter_paths import FREQUENCY
 from solver.scene.scene import Scene

@@ -30,8 +30,7 @@ from solver.response.contact_response import code_of
 from solver.response.exact.branch import ExactBranch, Orbits, Point
 from solver.response.exact.piecewise import FREE, STICK, MemberState, Piecewise
 from solver.response.solution import HISTORY_DEPENDENT, MEAN_UNDETERMINED, Solution, SolutionStatus
-from solver.results.default_bar import shows_progress
-from solver.results.watch import OnProgress, ShouldStop
+from solver.results.watch import OnProgress, ShouldStop, shows_progress
 from solver.scene.scene import Scene
 
 _OFF = 0.02  # of the highest amplitude so far, by which a point may lie beside what is foreseen

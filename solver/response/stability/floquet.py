@@ -20,9 +20,8 @@ from solver.linear.contact_table import port_counts
 from solver.response.solution import Solution
 from solver.response.stability.monodromy import PERIOD, LinearPart, Monodromy, PeriodElement, monodromy
 from solver.results.base import Drawn
-from solver.results.default_bar import shows_progress
 from solver.results.views import Views
-from solver.results.watch import OnProgress, ShouldStop
+from solver.results.watch import OnProgress, ShouldStop, shows_progress
 from solver.scene.cyclic.annulus import annulus
 from solver.scene.scene import Scene
 

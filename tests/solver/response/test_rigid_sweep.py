@@ -13,7 +13,7 @@ from test_rigid import one_mass, pressed, random_scene, with_stops, without_stop
 import stickslip
 from solver.continuation.branch import Branch
 from solver.response.exact.branch import ExactBranch
-from solver.results.verdict import Stable
+from solver.results.known import Stable
 from solver.studies.peaks.track_peak import track_peak
 
 
