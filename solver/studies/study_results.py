@@ -11,7 +11,7 @@ from solver.arrays import FloatOrNaN, Real
 from solver.results.base import Drawn, MadeOfResponses, Shown
 from solver.results.known import NOTHING_KNOWN, Known
 from solver.results.told import Piece
-from solver.results.views import Views
+from solver.results.views import Data, Views
 from solver.scene.scene import Scene
 from solver.studies.peaks.results import PeakTrack
 
@@ -45,7 +45,11 @@ class AccuracyRow(Piece):
 class AccuracyStudy(Drawn):
     """Rows of `accuracy_study` with what they are measured against."""
 
-    VIEWS: ClassVar = Views("solver.views", "of_accuracy", "accuracy_dataset", "accuracy:accuracy_figure")
+    VIEWS: ClassVar = Views("solver.views", "of_accuracy", "accuracy:accuracy_figure")
+    DATA: ClassVar = Data(
+        "accuracy", {"way=rows": "harmonics evaluator samples max_abs error milliseconds iterations"
+         " residual pareto"}, "frequency_hz reference reference_harmonics reference_error",
+    )  # fmt: skip
     JSON: ClassVar = (
         "scene frequency_hz reference reference_harmonics reference_error rows completed=reached status"
     )
@@ -79,7 +83,13 @@ class MapStatus(Enum):
 class ResponseMap(MadeOfResponses, Drawn):
     """max|x| of the observed DOF over a parameter and the frequency."""
 
-    VIEWS: ClassVar = Views("solver.views", "of_map", "map_dataset", "of_map")
+    VIEWS: ClassVar = Views("solver.views", "of_map", "of_map")
+    DATA: ClassVar = Data(
+        "map", {"parameter": "parameter", "frequency": "frequency",
+        "parameter frequency": "amplitude half_peak_to_peak", "ridge": "ridge_parameter=ridge.parameter"
+         " ridge_peak=ridge.peak ridge_frequency=ridge.frequency"},
+        "parameter=parameter_path harmonics=n_harmonics", scene="given", rows=("parameter", "frequency"),
+    )  # fmt: skip
     JSON: ClassVar = (
         "scene parameter parameter_path unit frequency amplitude half_peak_to_peak ridge n_harmonics"
         " newton_iterations largest_residual seconds completed=reached status"
@@ -126,7 +136,8 @@ class Effect(Piece):
 class Plan(Shown):
     """What solving a scene will take."""
 
-    VIEWS: ClassVar = Views("solver.views", "of_plan", "plan_dataset")
+    VIEWS: ClassVar = Views("solver.views", "of_plan")
+    DATA: ClassVar = Data("plan", {"effect=effects": "effect=name used reason"}, status="planned", scene="")
     JSON: ClassVar = (
         "scene effects unknowns linear_dofs contacts n_harmonics=harmonics"
         " estimated_seconds_a_point=seconds_a_point estimated_seconds_of_stability=seconds_of_stability"
@@ -214,7 +225,7 @@ class InterferenceDiagram(Drawn):
     """Natural frequencies of a disk over its nodal diameters, and the engine orders that meet them."""
 
     VIEWS: ClassVar = Views(
-        "solver.views", "of_interference", "interference_dataset", "disks:interference_figure"
+        "solver.views", "of_interference", "disks:interference_figure", "interference_dataset"
     )
     JSON: ClassVar = (
         "scene sectors speed_rpm within diameters=points orders crossings missing seconds completed=reached"

@@ -43,7 +43,7 @@ class Growth(Enum):
 class Stability(Drawn):
     """Whether small perturbations of a periodic response die out."""
 
-    VIEWS: ClassVar = Views("solver.views", "of_stability", "stability_dataset", "of_stability")
+    VIEWS: ClassVar = Views("solver.views", "of_stability", "of_stability", "stability_dataset")
     JSON: ClassVar = "stable growth radius neutral multipliers frequency_hz seconds"
 
     multipliers: Annotated[
