@@ -31,12 +31,10 @@ from optim.problem.keys import ROBUST, DesignKeys
 from optim.problem.keywords import keywords
 from optim.problem.problem import Method, Problem, pose
 from optim.problem.typed import Limit, with_limits
-from optim.results.basins import SAME_PLACE, LocalOptimum
-from optim.results.best_so_far import OnBest
 from optim.results.design import DesignResult, DesignStatus
+from optim.results.parts import SAME_PLACE, LocalOptimum, OnBest
 from solver.continuation.branch import BranchStatus
-from solver.results.default_bar import shows_progress
-from solver.results.watch import OnProgress, ShouldStop
+from solver.results.watch import OnProgress, ShouldStop, shows_progress
 from solver.scene.scene import Scene
 
 if TYPE_CHECKING:

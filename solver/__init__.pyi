@@ -9,7 +9,7 @@ from .continuation.extrema.error_estimate import (
 )
 from .continuation.marks import Bifurcations as Bifurcations, Mark as Mark, MarkKind as MarkKind
 from .continuation.peaks import Band as Band, Peak as Peak
-from .continuation.segment import Stretch as Stretch, joined as joined
+from .continuation.segment import Course as Course, Stretch as Stretch, joined as joined
 from .continuation.settings import ContinuationSettings as ContinuationSettings, Predictor as Predictor
 from .errors import (
     Issue as Issue,
@@ -100,7 +100,7 @@ from .sensitivity.nonsmooth import (
     PeakKind as PeakKind,
     peak_gradient as peak_gradient,
 )
-from .studies.accuracy_result import AccuracyRow as AccuracyRow, AccuracyStudy as AccuracyStudy
+from .studies.study_results import AccuracyRow as AccuracyRow, AccuracyStudy as AccuracyStudy
 from .studies.blades import (
     BladeAmplitudes as BladeAmplitudes,
     BladePeaks as BladePeaks,
@@ -111,7 +111,7 @@ from .studies.blades import (
 from .studies.convergence import accuracy_study as accuracy_study
 from .studies.instant import start_of as start_of
 from .studies.interference import interference_diagram as interference_diagram
-from .studies.interference_result import (
+from .studies.study_results import (
     DiameterFrequencies as DiameterFrequencies,
     FoldedOrder as FoldedOrder,
     Interference as Interference,
@@ -125,7 +125,7 @@ from .studies.mistuning_result import (
     MistuningStatus as MistuningStatus,
     MistuningStudy as MistuningStudy,
 )
-from .studies.map_result import MapStatus as MapStatus, ResponseMap as ResponseMap
+from .studies.study_results import MapStatus as MapStatus, ResponseMap as ResponseMap
 from .studies.peaks.minimise_peak import least_peak as least_peak
 from .studies.peaks.results import (
     Basin as Basin,
@@ -135,6 +135,6 @@ from .studies.peaks.results import (
 )
 from .studies.peaks.track_peak import track_peak as track_peak
 from .studies.plan import plan as plan
-from .studies.plan_result import Plan as Plan
+from .studies.study_results import Plan as Plan
 from .studies.response_map import response_map as response_map
 from .views.io import load as load, save as save

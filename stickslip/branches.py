@@ -5,6 +5,7 @@ from solver import (
     Bifurcations as Bifurcations,
     BranchStatus as BranchStatus,
     ContinuationSettings as ContinuationSettings,
+    Course as Course,
     ErrorEstimate as ErrorEstimate,
     Mark as Mark,
     MarkKind as MarkKind,

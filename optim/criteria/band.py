@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from optim.criteria.criterion import Criterion, CriterionRow, Form, Judged, Key
-from optim.criteria.json_types import FrequencyHz
+from optim.criteria.key import FrequencyHz
 
 if TYPE_CHECKING:
     from optim.problem.variables import Real

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from optim.criteria.criterion import Criterion, CriterionRow, Judged
 from optim.criteria.registry import criteria
 from optim.criteria.rows import CaseResponse, DesignEvaluation
 from optim.problem.cases import LoadCase
 from optim.problem.problem import Problem
-from optim.problem.variables import Real, parameter_values
+from optim.problem.variables import parameter_values
 from solver.balance.balance import build
 from solver.balance.simplifications import Effects, even_harmonics_reason
 from solver.continuation.branch import Branch
 from solver.continuation.branches.observation import observing
 from solver.continuation.branches.sweep import sweep
+from solver.continuation.segment import Course
 from solver.continuation.settings import ContinuationSettings
 from solver.results.watch import ShouldStop
 from solver.scene.scene import Scene
@@ -84,20 +85,20 @@ def _case(
         else:
             branch = sweep(
                 here, start=over.low, stop=over.high, harmonics=problem.harmonics, limit=problem.limit,
-                settings=SETTINGS, effects=effects, errors=errors, should_stop=should_stop,
-                guess=None if there is None else _begin(problem, here, effects, there),
+                settings=replace(SETTINGS, errors=errors), effects=effects, should_stop=should_stop,
+                course=None if there is None else _begin(problem, here, effects, there),
             )  # fmt: skip
         responses.append(CaseResponse(case=case.name, branch=branch, shared=shared))
         rows += judge.rows(branch, over)
     return responses, rows
 
 
-def _begin(problem: Problem, scene: Scene, effects: Effects, branch: Branch) -> Real | None:
+def _begin(problem: Problem, scene: Scene, effects: Effects, branch: Branch) -> Course | None:
     """Return where a response begins, by that of the same design with other harmonics."""
     if not len(branch.solutions):
         return None
     balance = build(scene, "frequency", harmonics=problem.harmonics, frequency_hz=None, effects=effects)
-    return fitted(branch.solutions[0, :-1], branch.balance.system.ks, balance)
+    return Course(guess=fitted(branch.solutions[0, :-1], branch.balance.system.ks, balance))
 
 
 def effects_of(problem: Problem, scene: Scene) -> Effects:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from optim.criteria.criterion import Criterion, CriterionContext, CriterionRow, Form, Judged, Key, Ranges
-from optim.criteria.json_types import Ranges as RangesInBodies
+from optim.criteria.key import Ranges as RangesInBodies
 
 if TYPE_CHECKING:
     from optim.problem.cases import LoadCase

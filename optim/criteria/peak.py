@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from optim.criteria.criterion import Criterion, CriterionRow, Form, Judged, Key
-from optim.criteria.json_types import PositiveNumber
+from optim.criteria.key import PositiveNumber
 
 
 def _rows(judged: Judged) -> list[CriterionRow]:

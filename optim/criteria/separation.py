@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from pydantic import Field
 
 from optim.criteria.criterion import Criterion, CriterionContext, CriterionRow, Form, Judged, Key
-from optim.criteria.json_types import Name
+from optim.criteria.key import Name
 
 if TYPE_CHECKING:
     from solver.scene.scene import AnyContact, Scene

@@ -25,8 +25,7 @@ from optim.problem.variables import Real
 from solver.balance.balance import check_harmonics
 from solver.balance.parameter import resolve
 from solver.errors import SceneError, SettingError
-from solver.results.default_bar import shows_progress
-from solver.results.watch import OnProgress, ShouldStop
+from solver.results.watch import OnProgress, ShouldStop, shows_progress
 from solver.scene.scene import Scene
 
 _BOUND = 1e-6  # scaled distance from a bound within which an estimate lies on it

@@ -15,10 +15,10 @@ from optim.methods.evaluator import DesignSearch, SearchStoppedError
 from optim.methods.kkt import KEPT, KKT_TOLERANCE
 from optim.methods.plateau import DesignPlateau, Tick, nothing, plateau_of
 from optim.problem.problem import Method
-from optim.results.basins import Checked, LocalOptimum
 from optim.results.design import DesignResult, DesignStatus
 from optim.results.doubts import DOUBTFUL, open_peaks
 from optim.results.json import known_parts
+from optim.results.parts import Checked, LocalOptimum
 from solver.results.watch import ShouldStop
 
 HELD = 1e-7  # multiplier of a bound, relative objective per scaled variable, from which it holds the design

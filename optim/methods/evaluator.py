@@ -12,9 +12,9 @@ from optim.criteria.rows import DesignEvaluation
 from optim.methods.kkt import KEPT
 from optim.problem.problem import Problem
 from optim.problem.variables import BoundedVariable
-from optim.results.best_so_far import FEWER_HARMONICS, PEAKS_OPEN, VERIFIED, BestSoFar, OnBest
 from optim.results.design import DesignStatus
 from optim.results.doubts import open_peaks
+from optim.results.parts import FEWER_HARMONICS, PEAKS_OPEN, VERIFIED, BestSoFar, OnBest
 from solver.results.watch import OnProgress, ShouldStop
 
 MOST_EVALUATIONS = 800

@@ -10,9 +10,8 @@ from optim.criteria.evaluation import Judge, effects_of, evaluate, ranges_of
 from optim.criteria.peak import PEAK
 from optim.criteria.rows import CaseResponse, DesignEvaluation
 from optim.problem.problem import Problem
-from optim.results.basins import LocalOptimum
-from optim.results.best_so_far import PEAKS_OPEN, VERIFIED, BestSoFar, OnBest
 from optim.results.design import DesignStatus
+from optim.results.parts import PEAKS_OPEN, VERIFIED, BestSoFar, LocalOptimum, OnBest
 from solver.continuation.branch import Branch
 from solver.results.watch import OnProgress, ShouldStop
 from solver.studies.peaks.minimise_peak import least_peak

@@ -23,8 +23,8 @@ from optim.methods.evaluator import SearchStoppedError
 from optim.methods.surrogate import quasi_random
 from optim.problem.problem import Problem
 from optim.problem.variables import BoundedVariable, Real, by_variables, parameter_values, unscaled
-from optim.results.curve_check import CurveCheck
 from optim.results.design import DesignStatus
+from optim.results.parts import CurveCheck
 from solver.modes.peaks.peak_correction import corrected_peak
 from solver.modes.peaks.peak_gradient import CurvePeak, peak_at_excitation
 from solver.modes.peaks.performance import PerformanceCurve

@@ -12,8 +12,18 @@ from typing import Annotated, Any, Literal, Optional, TypeVar, get_args
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema, create_model
 
-from optim.criteria.json_types import LARGEST, Harmonics, Name, Number, Pair, ParameterPath, PositiveNumber
-from optim.criteria.key import Form, Key, Option
+from optim.criteria.key import (
+    LARGEST,
+    Form,
+    Harmonics,
+    Key,
+    Name,
+    Number,
+    Option,
+    Pair,
+    ParameterPath,
+    PositiveNumber,
+)
 from optim.criteria.registry import criteria, limit_keys, weight_words
 from optim.problem.words import AimWord, MethodWord, ScalingWord
 from solver.scene.descriptions import DAMPER_LOAD, DISK_LOAD, DISK_LOADS

@@ -12,15 +12,13 @@ from optim.criteria.band import BAND
 from optim.criteria.criterion import CriterionRow
 from optim.criteria.peak import PEAK
 from optim.problem.words import Method
-from optim.results.basins import Checked, LocalOptimum
-from optim.results.curve_check import CurveCheck
 from optim.results.doubts import doubts_of
 from optim.results.json import conditions_json, evaluation_json, known_parts, looked_json
+from optim.results.parts import Checked, CurveCheck, LocalOptimum
 from solver.arrays import FloatOrNaN
 from solver.results.base import Drawn, MadeOfResponses
-from solver.results.known import Known
+from solver.results.known import Known, Stable, Verdict, worst
 from solver.results.told import Piece
-from solver.results.verdict import Stable, Verdict, worst
 from solver.results.views import Views
 
 if TYPE_CHECKING:
@@ -113,7 +111,7 @@ class DesignPeak(Piece):
 class DesignResult(MadeOfResponses, Drawn):
     """The best design found."""
 
-    VIEWS: ClassVar = Views("optim.views", "of_design", "design_dataset", "of_design")
+    VIEWS: ClassVar = Views("optim.views", "of_design", "of_design", "design_dataset")
     JSON: ClassVar = (
         "scene method optimum peak n_harmonics=problem.harmonics peaks band_hz limit bands objective rows"
         " held_by error_estimate stable stable_ground errors warnings plateau chosen_by certainty checked"

@@ -6,8 +6,8 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from optim.results.basins import Checked
 from optim.results.json import known_parts
+from optim.results.parts import Checked
 from solver.results.known import Known
 from solver.results.notes import flag_words
 

@@ -13,8 +13,8 @@ from optim.methods.surrogate import quasi_random
 from optim.problem.problem import Problem
 from optim.problem.uncertainty_set import Scenario
 from optim.problem.variables import scaled, unscaled
-from optim.results.basins import SAME_PLACE
 from optim.results.design import DesignResult
+from optim.results.parts import SAME_PLACE
 from optim.robust.result import Cut, RobustStatus
 from optim.robust.scenarios import Outcome, number_of
 from optim.robust.search import RobustSearch

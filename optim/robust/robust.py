@@ -33,18 +33,17 @@ from optim.problem.typed import Limit, with_limits
 from optim.problem.uncertainty_input import check_settings, read_uncertain
 from optim.problem.uncertainty_set import Scenario
 from optim.problem.words import Aim, Method
-from optim.results.best_so_far import OnBest
 from optim.results.design import DesignResult, DesignStatus
 from optim.results.doubts import WELL_KNOWN
+from optim.results.parts import OnBest
 from optim.robust.cutting_sets import CLOSED, SearchProgress, cutting_sets, sampled
 from optim.robust.result import RobustResult, RobustStatus, Side, Spread
 from optim.robust.scenarios import Outcome, rank_of
 from optim.robust.search import RobustSearch
 from optim.robust.worst_case import MOST_BESIDES, Aspect, UnknownScenarioError, pessimise
 from optim.search import solve_problem
-from solver.results.default_bar import shows_progress
 from solver.results.known import worst_of
-from solver.results.watch import OnProgress, ShouldStop
+from solver.results.watch import OnProgress, ShouldStop, shows_progress
 from solver.scene.scene import Scene
 
 if TYPE_CHECKING:

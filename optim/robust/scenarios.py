@@ -20,6 +20,7 @@ from optim.problem.words import Aim
 from optim.results.json import over_bands
 from solver.continuation.branches.observation import observing
 from solver.continuation.branches.sweep import sweep
+from solver.continuation.settings import ContinuationSettings
 from solver.results.known import Known, worst_of
 from solver.studies.blades import blade_peaks
 
@@ -223,7 +224,7 @@ def _of_all_blades(
     for over in ranges:
         branch = sweep(
             here, start=over.low, stop=over.high, harmonics=problem.harmonics, limit=problem.limit,
-            effects=effects, errors=False, should_stop=should_stop,
+            settings=ContinuationSettings(errors=False), effects=effects, should_stop=should_stop,
         )  # fmt: skip
         if not branch.reached:
             return [], len(ranges)

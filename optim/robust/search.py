@@ -22,8 +22,8 @@ from optim.problem.problem import Problem
 from optim.problem.uncertainty_set import Scenario, UncertainSet
 from optim.problem.variables import BoundedVariable, Real
 from optim.problem.words import Aim
-from optim.results.best_so_far import NOMINAL, BestSoFar, OnBest
 from optim.results.design import DesignStatus
+from optim.results.parts import NOMINAL, BestSoFar, OnBest
 from optim.robust.scenarios import Outcome, aim_model, known_in, outcome, together
 from optim.robust.worst_case import Aspect
 from solver.results.known import Known

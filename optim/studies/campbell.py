@@ -25,8 +25,7 @@ from solver.continuation.extrema.error_estimate import ErrorEstimator
 from solver.continuation.peaks import Peak
 from solver.errors import Place
 from solver.jit.fourier import Real
-from solver.results.default_bar import shows_progress
-from solver.results.watch import OnProgress, ShouldStop, part_of
+from solver.results.watch import OnProgress, ShouldStop, part_of, shows_progress
 from solver.scene.scene import Scene
 from solver.studies.natural_frequencies import natural_frequencies
 

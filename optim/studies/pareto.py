@@ -34,8 +34,7 @@ from optim.problem.variables import BoundedVariable, scaled, unscaled
 from optim.results.design import DesignResult, DesignStatus
 from optim.search import judge, local_search_of, solve_problem
 from optim.studies.pareto_result import ParetoPoint, ParetoResult, ParetoStatus, front_of
-from solver.results.default_bar import shows_progress
-from solver.results.watch import OnProgress, ShouldStop
+from solver.results.watch import OnProgress, ShouldStop, shows_progress
 from solver.scene.scene import Scene
 
 if TYPE_CHECKING:

@@ -15,8 +15,8 @@ from typing import Any
 
 from sqlalchemy.exc import SQLAlchemyError
 
+from service.auth.allowances import Buckets
 from service.auth.callers import KEYLESS, NO_LIMITS, Caller, KeyLimits, Scope, included
-from service.auth.rate_limit import Buckets
 from service.db.clock import Clock
 from service.db.models import ApiKey
 from service.db.repositories.owned import KEYS, KeyRepository

@@ -10,9 +10,8 @@ from typing import Annotated
 import typer
 
 from service.cli.failures import REPORTED, report
-from service.cli.lazy import LazyGroup
 from service.cli.options.inputs import join_words
-from service.cli.table import COMMANDS
+from service.cli.table import COMMANDS, LazyGroup
 
 _app = typer.Typer(
     cls=LazyGroup,

@@ -1,4 +1,4 @@
-"""The command of a study: its options are its keys, and it computes here."""
+"""The command of a study: its options are its keys; it computes here, and writes files beside that."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol, Self
 
 import typer
 from typer.core import TyperGroup
@@ -16,9 +17,9 @@ from optim.errors import DesignError
 from service.cli.failures import end, refused
 from service.cli.options import inputs
 from service.cli.options import shared as options
+from service.cli.options.inputs import output_path
 from service.cli.options.key_options import KeyOption, key_options
 from service.cli.options.parameters import keyword, with_parameters
-from service.cli.output_files import Outputs
 from service.cli.progress import bar
 from service.errors import InputError
 from service.jobs.study import Answer, Study, Watch
@@ -29,7 +30,68 @@ from solver.results.views import on_demand
 from solver.results.watch import stopped_by_interrupt
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from solver.results.dataset import Dataset
     from solver.scene.scene import Scene
+
+
+class Result(Protocol):
+    """What can be written as a table."""
+
+    def to_dataset(self) -> Dataset:
+        """The result as named arrays."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Outputs:
+    """Where a picture and the numbers go, if anywhere."""
+
+    picture: Path | None
+    file: Path | None
+
+    @classmethod
+    def asked(cls, plot: str | None, out: str | None) -> Self:
+        """Check both options before the work begins.
+
+        Raises
+        ------
+        InputError
+            A suffix that has no writer, or a folder that is not there.
+        """
+        if plot is None and out is None:
+            return cls(picture=None, file=None)
+        from solver.views.io import SUFFIXES as FILES
+        from solver.views.plots import SUFFIXES as PICTURES
+
+        return cls(picture=output_path("--plot", plot, PICTURES), file=output_path("--out", out, FILES))
+
+    def write(
+        self, result: Result, draw: Callable[[], Figure] | None, *, scene: Scene | None = None
+    ) -> None:  # fmt: skip
+        """Write what was asked for.
+
+        Parameters
+        ----------
+        result : what was computed.
+        draw : makes its picture; None where there is nothing to draw.
+        scene : of a result that does not know its own.
+        """
+        if self.picture is None and self.file is None:
+            return
+        from dataclasses import replace
+
+        from solver.views.io import save, scene_attributes
+
+        data = result.to_dataset()
+        if scene is not None and "scene" not in data.attributes:
+            data = replace(data, attributes={**data.attributes, **scene_attributes(scene)})
+        if self.picture is not None and draw is not None:
+            from solver.views.plots import html
+
+            html.save(draw(), self.picture, data)
+        if self.file is not None:
+            save(data, self.file)
 
 
 def command_named(name: str) -> Callable[..., None]:

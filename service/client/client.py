@@ -38,8 +38,14 @@ from service.schemas.answers import (
 )
 from service.schemas.event_answers import END, EventData, JobPoints, JobProgress, told
 from service.schemas.law_answers import LawAnswer, LawList
-from service.schemas.matrix_answers import FormatAnswer, FormatsAnswer, MatricesAnswer
-from service.schemas.upload_answers import NewUpload, UploadAnswer, UploadPage
+from service.schemas.matrix_answers import (
+    FormatAnswer,
+    FormatsAnswer,
+    MatricesAnswer,
+    NewUpload,
+    UploadAnswer,
+    UploadPage,
+)
 
 _SILENCE_SECONDS = 60.0
 

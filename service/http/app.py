@@ -11,17 +11,15 @@ from starlette.concurrency import run_in_threadpool
 
 from service.auth.authenticator import Authenticator
 from service.errors import ConfigurationError
-from service.http import openapi
+from service.http import metrics, openapi
 from service.http.dependencies import BodyTurns, HostCheck
 from service.http.metrics import Metrics, RequestMetrics
 from service.http.middleware.admission import Admission, ConcurrencyLimits
 from service.http.middleware.connections import Connections
 from service.http.middleware.every_answer import HeadAsGet, HeadersAndAudit, RequestLog
 from service.http.routes import (
-    at_once,
     events,
     forms,
-    health,
     jobs,
     page,
     runs,
@@ -96,8 +94,8 @@ def create_app(settings: Settings | None = None, registry: Registry | None = Non
     for router in (
         jobs.router, forms.kinds, forms.laws, events.router, stored.designs, stored.results,
         stored.sweeps, scenes.texts,
-        forms.templates, scenes.router, uploads.router, uploads.matrices, uploads.measurements, at_once.plans,
-        at_once.previews, runs.projects, runs.reports, runs.runs, runs.shares, health.router,
+        forms.templates, scenes.router, uploads.router, uploads.matrices, uploads.measurements, scenes.plans,
+        scenes.previews, runs.projects, runs.reports, runs.runs, runs.shares, metrics.router,
         page.reference, page.router,
     ):  # fmt: skip
         app.include_router(router)

@@ -1,17 +1,23 @@
-"""What a monitor reads at ``/metrics``: requests as they come, jobs and workers as they are when asked."""
+"""What a monitor asks: ``/health``, whether it can work, and ``/metrics``, what it does."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Iterable
+from typing import Literal
 
+from fastapi import APIRouter, Request, Response
 from prometheus_client import CollectorRegistry, Counter, Histogram, generate_latest
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
 from prometheus_client.registry import Collector
 from sqlalchemy.exc import SQLAlchemyError
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from service.auth import callers
+from service.http.dependencies import TEXT, InContext, media
 from service.queue.core import SOLVER_VERSION, Service
+from service.queue.health import Health, Probe, Readiness
+from service.schemas.answers import AnswerModel
 
 CONTENT_TYPE = "text/plain; version=0.0.4; charset=utf-8"
 _SECONDS = (0.001, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0, 30.0, 60.0)
@@ -109,3 +115,36 @@ _METHODS = frozenset({"GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"
 def _route(scope: Scope) -> str:
     """Return the template of the route that answered, ``none`` for a request that matched none."""
     return str(getattr(scope.get("route"), "path", "none"))
+
+
+router = APIRouter(tags=["health"])
+
+
+class Alive(AnswerModel):
+    """The process answers."""
+
+    status: Literal["live"] = "live"
+
+
+@router.get("/health/live")
+async def live() -> Alive:
+    """The process answers."""
+    return Alive()
+
+
+@router.get("/health/ready", responses={503: {"model": Health, "description": "It cannot work now."}})
+async def ready(context: InContext, response: Response) -> Health | Readiness:
+    """Database, queue and workers are up; the details are for who may see them: where no key is needed, and
+    with the scope `monitor`.
+    """
+    probe: Probe = context.request.app.state.probe
+    health = await (probe.detailed() if context.caller.may(callers.Scope.MONITOR) else probe.brief())
+    response.status_code = 200 if health.ready else 503
+    return health
+
+
+@router.get("/metrics", response_class=Response, responses={200: media({"text/plain": TEXT})})
+def metrics(request: Request) -> Response:
+    """Requests, jobs and workers in Prometheus' text format."""
+    held: Metrics = request.app.state.metrics
+    return Response(held.text(), media_type=CONTENT_TYPE)

@@ -26,7 +26,7 @@ from service.jobs.registry import Registry
 from service.queue.core import Service
 from service.settings import logs
 from service.settings.settings import Settings
-from service.uploads.scratch import scratch_folder
+from service.uploads.uploads import scratch_folder
 
 log = logging.getLogger("stickslip.service")
 

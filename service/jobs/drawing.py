@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from service.jobs.kind_view import Json, NothingToDrawError, ReadSweep, StoredCurve, StoredSweep
-from service.jobs.registry import Registry
+from service.jobs.registry import Json, NothingToDrawError, ReadSweep, Registry, StoredCurve, StoredSweep
 from solver.jit.fourier import Real
 from solver.views.plots.curves import Response, above, with_peak
 
@@ -85,7 +84,7 @@ def harmonics_of(result: Json) -> Figure:
 
 def map_of(result: Json) -> Figure:
     """A map with its ridge."""
-    from solver.studies.map_result import MapStatus, ResponseMap
+    from solver.studies.study_results import MapStatus, ResponseMap
     from solver.views.plots.tracks import map_figure
 
     found = ResponseMap(

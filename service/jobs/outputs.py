@@ -21,7 +21,7 @@ from service.jobs.strict_json import JsonText
 from solver.errors import Issue
 
 Best = Mapping[str, Any]
-"""The best design so far, as JSON (`optim.results.best_so_far`)."""
+"""The best design so far, as JSON (`optim.results.design`)."""
 Point = tuple[float, float]
 """Value of what is swept and amplitude [m]."""
 OnProgress = Callable[[float, int], None]

@@ -1,4 +1,4 @@
-"""What a kind of job is: a request model, a resolution of the request, a function that computes.
+"""What a kind of job is: a request model, a resolution of it, a function that computes, and its view.
 
 A new kind is one module in `service.jobs.kinds` and one entry in its registry, or a module elsewhere that the
 setting `kinds` names; queue, database, HTTP, command and documentation know kinds only through this contract.
@@ -9,20 +9,119 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, Protocol
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from service.errors import InvalidRequestError
-from service.jobs.kind_view import KindView
 from service.jobs.outputs import JobOutput, Progress, Run, ShouldStop
 from solver.errors import Shown
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from service.jobs.checkpoints import Checkpoints
     from service.jobs.parts import Division
+
+
+Json = Mapping[str, Any]
+
+
+class PeakPlace(Protocol):
+    """The highest peak of a stored sweep."""
+
+    @property
+    def at(self) -> float:
+        """Value of the parameter."""
+
+    @property
+    def value(self) -> float:
+        """Amplitude [m]."""
+
+
+class StoredSweep(Protocol):
+    """What is drawn of a stored sweep, without its arrays."""
+
+    @property
+    def id(self) -> str:
+        """By which it is read."""
+
+    @property
+    def points(self) -> int:
+        """How many points it has."""
+
+    @property
+    def peak(self) -> PeakPlace | None:
+        """The highest peak, if there is one."""
+
+
+class StoredCurve(StoredSweep, Protocol):
+    """What is drawn of a stored sweep with its arrays."""
+
+    @property
+    def scene(self) -> str:
+        """Name of the scene."""
+
+    @property
+    def parameter(self) -> str:
+        """Path of the parameter."""
+
+    @property
+    def limit(self) -> float | None:
+        """Amplitude that bounds the resonance band [m]."""
+
+    @property
+    def arrays(self) -> Mapping[str, Sequence[Any]]:
+        """Name to values."""
+
+
+ReadSweep = Callable[[str], StoredCurve]
+"""Gives a stored sweep with its arrays."""
+Draw = Callable[[Json, Sequence[StoredSweep], ReadSweep], "Figure"]
+"""From a result, the sweeps stored with it and the way to their arrays, to a picture."""
+
+
+class NothingToDrawError(Exception):
+    """A result without anything a picture could show; the message says why."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PrintedResult:
+    """What is printed of a result: a title, and names with their values."""
+
+    title: str
+    pairs: Sequence[tuple[str, str]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KindView:
+    """What people see of a kind; all of it has a plain default.
+
+    Attributes
+    ----------
+    result : str
+        What a job computes, for the documentation; Markdown.
+    sweeps : str
+        Which sweeps it stores; empty for none.
+    keys : str
+        In place of the list of its keys, where they are described elsewhere.
+    flags : mapping
+        Options of ``stickslip submit KIND`` that are not called as the key: key to ``--option``.
+    tell : callable or None
+        What is printed of a result; its numbers and words, by their keys, if left out.
+    draw : callable or None
+        The picture of a result, NothingToDrawError if it has none; the stored sweep with the peak of the
+        result if left out.
+    """
+
+    result: str = ""
+    sweeps: str = ""
+    keys: str = ""
+    flags: Mapping[str, str] = field(default_factory=dict)
+    tell: Callable[[Json], PrintedResult] | None = None
+    draw: Draw | None = None
 
 
 LONGEST_NAME, LONGEST_NOTES, LONGEST_TAG, MOST_TAGS = 200, 10_000, 50, 20

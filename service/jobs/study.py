@@ -26,9 +26,17 @@ from service.jobs.common.scenes import (
     stored_scene,
 )
 from service.jobs.figures import SweepRecord
-from service.jobs.kind_view import Json, KindView, NothingToDrawError, ReadSweep, StoredSweep
 from service.jobs.outputs import JobOutput, OnProgress, Progress, ShouldStop
-from service.jobs.registry import JobKind, Resolved, SceneSource
+from service.jobs.registry import (
+    JobKind,
+    Json,
+    KindView,
+    NothingToDrawError,
+    ReadSweep,
+    Resolved,
+    SceneSource,
+    StoredSweep,
+)
 from solver.errors import Issue, SettingError
 from solver.results.views import on_demand
 from solver.results.watch import part_of

@@ -7,6 +7,7 @@ is written as a whole.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from functools import partial
 from pathlib import Path
 
 from pydantic.fields import FieldInfo
@@ -19,7 +20,9 @@ from optim.identification.readers.registry import data_formats
 from optim.problem.keys import CaseRequest, options
 from optim.problem.keyword_source import keyword_source
 from service.jobs.common.problem import ABOUT_THE_JOB
-from service.jobs.kinds.table import placed
+from service.jobs.common.scenes import HarmonicRequest, SceneRequest
+from service.jobs.kinds import SHIPPED
+from service.jobs.registry import JobKind, JobRequest, Registry
 from service.jobs.studies.design import Design
 from service.jobs.studies.pareto import Pareto
 from service.settings.settings import ClientLimits, Settings
@@ -32,6 +35,13 @@ _GIVES = {
     "matrix": "one matrix", "matrices": "one matrix or several", "modes": "modes", "labels": "names of rows",
     "nodes": "nodes",
 }  # fmt: skip
+_OF_ALL = (HarmonicRequest, SceneRequest, JobRequest)
+_WAYS = {
+    "goes on": "goes on behind the last point that was kept; the result is the one it would have been, bit "
+    "for bit",
+    "parts": "computes the parts that are missing; the result is the same bit for bit",
+    "anew": "begins anew",
+}
 
 
 def _table(heads: str, rows: Iterable[Iterable[str]]) -> str:
@@ -133,8 +143,50 @@ def _setting(name: str, field: FieldInfo) -> tuple[str, str, str]:
     return f"`STICKSLIP_{name.upper()}`", said, (field.description or "").replace("|", "\\|")
 
 
+def kinds_table(registry: Registry) -> str:
+    """What each kind takes, computes and stores, as a table of Markdown."""
+    rows = (
+        (f"`{kind.name}`", _keys(kind), kind.view.result or kind.summary, kind.view.sweeps)
+        for kind in registry
+    )
+    return _table("kind | keys of its own, those needed in bold | result | sweeps stored", rows)
+
+
+def interrupted_table(registry: Registry) -> str:
+    """What becomes of a job of each kind whose worker died, as a table of Markdown."""
+    names = {way: _quoted(kind.name for kind in registry if _way(kind) == way) for way in _WAYS}
+    return _table(
+        "kind | what the next attempt does", ((names[way], _WAYS[way]) for way in _WAYS if names[way])
+    )
+
+
+def _keys(kind: JobKind) -> str:
+    """The keys that not every kind has, with those that must be given in bold."""
+    if kind.view.keys:
+        return kind.view.keys
+    shared = next(base for base in _OF_ALL if issubclass(kind.request, base))
+    own = [
+        (field.alias or name, field.is_required())
+        for name, field in kind.request.model_fields.items()
+        if shared.model_fields.get(name) is None or shared.model_fields[name].annotation != field.annotation
+    ]
+    return ", ".join(f"**`{key}`**" if needed else f"`{key}`" for key, needed in own)
+
+
+def _way(kind: JobKind) -> str:
+    if kind.run_on is not None:
+        return "goes on"
+    return "anew" if kind.parts is None else "parts"
+
+
+def tables_of_kinds(registry: Registry) -> Mapping[str, Callable[[], str]]:
+    """The tables of docs/jobs.md for some kinds, by their marks."""
+    return {"kinds": partial(kinds_table, registry), "interrupted": partial(interrupted_table, registry)}
+
+
 TABLES: Mapping[str, Mapping[str, Callable[[], str]]] = {
     "design.md": {"keys": problem_table, "criteria": criteria_table},
+    "jobs.md": tables_of_kinds(SHIPPED),
     "identification.md": {"columns": data_columns_table, "formats": data_formats_table},
     "laws.md": {"laws": laws_table},
     "matrices.md": {"formats": formats_table},
@@ -143,6 +195,14 @@ TABLES: Mapping[str, Mapping[str, Callable[[], str]]] = {
 """Page of docs/, name of the mark, table."""
 SOURCES: Mapping[str, Callable[[], str]] = {"optim/problem/keyword_types.py": keyword_source}
 """File, its text."""
+
+
+def placed(text: str, name: str, table: str) -> str:
+    """A page with a table between its marks (ValueError if one is not there)."""
+    begin, end = f"<!-- {name}: begin -->", f"<!-- {name}: end -->"
+    before, rest = text.split(begin)
+    _, after = rest.split(end)
+    return f"{before}{begin}\n\n{table}\n{end}{after}"
 
 
 def with_tables(text: str, tables: Mapping[str, Callable[[], str]]) -> str:

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from service.jobs.kind_view import Json, PrintedResult
-from service.jobs.registry import Registry
+from service.jobs.registry import Json, PrintedResult, Registry
 from service.rendering.tables.text import print_pairs
 
 _FEW = 6

@@ -15,8 +15,8 @@ from service.jobs.arrays import decode
 from service.jobs.figures import SweepRecord
 from service.jobs.strict_json import digest
 from service.schemas.answers import SweepDetail
-from solver.results.csv import csv_text
 from solver.results.dataset import Dataset
+from solver.results.files import csv_text
 from solver.scene.parameter_paths import find_parameter, parameter_unit
 from solver.scene.scene import Scene
 from solver.views.io import written

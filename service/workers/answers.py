@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from service.auth.rate_limit import Buckets
+from service.auth.allowances import Buckets
 from service.errors import (
     BodyTooLargeError,
     InvalidRequestError,

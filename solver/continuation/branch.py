@@ -15,8 +15,7 @@ from solver.arrays import FloatOrNaN, Integer, Real
 from solver.continuation.certificate import PeakCertificate
 from solver.continuation.peaks import Band, Peak
 from solver.results.base import Drawn
-from solver.results.known import Known
-from solver.results.verdict import Stable, Verdict
+from solver.results.known import Known, Stable, Verdict
 from solver.results.views import Views, on_demand
 from solver.scene.scene import Scene
 
@@ -96,7 +95,7 @@ class AnyBranch(Drawn):
     A `Branch` has them by continuation of a balance of harmonics, an `ExactBranch` by exact orbits.
     """
 
-    VIEWS: ClassVar = Views("solver.views", "of_branch", "branch_dataset", "of_branch")
+    VIEWS: ClassVar = Views("solver.views", "of_branch", "of_branch", "branch_dataset")
     JSON: ClassVar = (
         "scene parameter=values parameter_path=parameter unit speed_rpm=speeds_rpm amplitude"
         " half_peak_to_peak mean peak peaks=interior_peaks stable=highest_stability.stable"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated
 
@@ -87,6 +87,29 @@ class Stretch(Piece):
             newton_iterations=iterations, rejected_steps=rejected, stepped_over=over,
             seconds=float(arrays["seconds"][0]), walk=real["walk"],
         )  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Course:
+    """Where a branch begins, and who is given its points.
+
+    Attributes
+    ----------
+    guess : (n_unknowns,) or None
+        Slip motions [m] to start from, instead of the start-up ladder.
+    resume : Stretch or None
+        The beginning of the same branch, to go on behind its last point.
+    on_stretch : callable or None
+        Called with all consecutive points as they are found; `joined` they are what `resume` takes.
+    on_points : callable or None
+        Called with the new points, at first with those of `resume`: (k,) values in user units, (k,)
+        amplitudes [m].
+    """
+
+    guess: Real | None = None
+    resume: Stretch | None = None
+    on_stretch: Callable[[Stretch], None] | None = None
+    on_points: Callable[[Real, Real], None] | None = None
 
 
 def joined(stretches: Sequence[Stretch]) -> Stretch:

@@ -37,8 +37,13 @@ class ContinuationSettings:
         Distance from predicted to corrected point, relative to the step, beyond which a step is halved.
     most_points : int
         Points after which the branch ends with a status.
+    peaks : bool
+        Whether peaks and the band are looked for between the points; without them the branch has none.
     unfinished_peaks : bool
-        Whether peaks are looked for on a branch that does not reach its end, too.
+        Whether they are on a branch that does not reach its end, too.
+    errors : bool
+        Whether the error of the highest peak is estimated;
+        `solver.continuation.branches.sweep.with_error` does it later if not.
     """
 
     predictor: Predictor = Predictor.CUBIC
@@ -50,4 +55,6 @@ class ContinuationSettings:
     most_iterations: int = 8
     largest_turn: float = 1.0
     most_points: int = 20_000
+    peaks: bool = True
     unfinished_peaks: bool = True
+    errors: bool = True

@@ -25,7 +25,7 @@ from solver.marching.kernels import state as kernel
 from solver.marching.kernels import taylor as stepping
 from solver.marching.result import MarchResult, MarchStatus, describe
 from solver.marching.start import MarchStart, state_at
-from solver.results.default_bar import shows_progress
+from solver.results.watch import shows_progress
 from solver.scene.cyclic.annulus import annulus
 from solver.scene.scene import Excitation, Scene
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from solver.arrays import FloatOrNaN, Real
 from solver.results.base import Drawn
-from solver.results.views import Views
+from solver.results.views import Data, Views
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -52,7 +52,12 @@ class MarchStatus(Enum):
 class MarchResult(Drawn):
     """The last period of a time march, from the run with the smaller step; n samples."""
 
-    VIEWS: ClassVar = Views("solver.views", "of_march", "march_dataset", "of_march")
+    VIEWS: ClassVar = Views("solver.views", "of_march", "of_march")
+    DATA: ClassVar = Data(
+        "march", {"time": "time displacement velocity", "contact": "contact=contacts",
+        "contact time": "slip force=contact_force normal_load"},
+        "frequency_hz max_abs periods steps_per_period error_estimate", scene="",
+    )  # fmt: skip
     JSON: ClassVar = (
         "max_abs half_peak_to_peak mean harmonics periods steps_per_period error_estimate status seconds"
     )

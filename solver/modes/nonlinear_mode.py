@@ -21,7 +21,7 @@ from solver.modes.equations import Equations
 from solver.modes.records import collect
 from solver.modes.results import NonlinearMode, NonlinearModeStatus
 from solver.modes.start import LinearMode, begin, damped_mode, equilibrium, linear_modes, slopes_at_rest
-from solver.results.default_bar import shows_progress
+from solver.results.watch import shows_progress
 from solver.scene.cyclic.annulus import written_out
 
 if TYPE_CHECKING:

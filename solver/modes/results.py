@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
 from typing import TYPE_CHECKING, Annotated, ClassVar
@@ -12,13 +13,17 @@ import numpy as np
 from solver.arrays import Complex, Integer, Real
 from solver.errors import SettingError
 from solver.results.base import Drawn
-from solver.results.views import Views
+from solver.results.views import Data, Views
 from solver.scene.scene import Scene
 from solver.wording import listing
 
 if TYPE_CHECKING:
     from solver.modes.corrector import ModeState
     from solver.response.contact_response import ContactState
+
+
+OF_CONTACTS: Mapping[str, str] = {"contact": "contact=contact_names", "point contact": "state=state_words"}
+"""The columns of a data set that say what the contacts do."""
 
 
 class NonlinearModeStatus(Enum):
@@ -71,7 +76,13 @@ class ModalCurve(Drawn):
 class NonlinearMode(ModalCurve):
     """Frequency and damping ratio of a mode over its amplitude; n points along the curve."""
 
-    VIEWS: ClassVar = Views("solver.views", "of_mode", "mode_dataset", "modes:mode_figure")
+    VIEWS: ClassVar = Views("solver.views", "of_mode", "modes:mode_figure")
+    DATA: ClassVar = Data(
+        "modes", {"point": "amplitude frequency=frequency_hz damping_ratio frequency_error damping_error"
+         " max_abs forcing", **OF_CONTACTS, "dof": "dof=scene.dofs",
+        "point dof harmonic": "motion=dof_motions"},
+        "mode_number=mode harmonics=n_harmonics nodal_diameter",
+    )  # fmt: skip
     JSON: ClassVar = (
         "scene mode nodal_diameter completed=reached status amplitude frequency=frequency_hz damping_ratio"
         " frequency_error damping_error dof=scene.observe.dof max_abs contacts=contact_names"

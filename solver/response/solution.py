@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from solver.arrays import FloatOrNaN, Real
 from solver.results.base import Drawn
-from solver.results.verdict import Stable, Verdict
+from solver.results.known import Stable, Verdict
 from solver.results.views import Views, on_demand
 from solver.scene.scene import Scene
 
@@ -68,7 +68,7 @@ class SolutionStatus(Enum):
 class Solution(Drawn):
     """A periodic response at one frequency."""
 
-    VIEWS: ClassVar = Views("solver.views", "of_solution", "solution_dataset", "of_solution")
+    VIEWS: ClassVar = Views("solver.views", "of_solution", "of_solution", "solution_dataset")
     JSON: ClassVar = (
         "scene frequency_hz converged status max_abs half_peak_to_peak mean harmonics flags contacts"
         " stable=stability.stable stable_ground=stability.ground unique unique_ground residual error_estimate"

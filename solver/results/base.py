@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from solver.results.known import Known, worst_of
 from solver.results.told import Summary, Told
-from solver.results.views import Views
+from solver.results.views import Data, Views
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -26,6 +26,7 @@ class Shown(Told):
 
     __slots__ = ()
     VIEWS: ClassVar[Views]
+    DATA: ClassVar[Data]
 
     @property
     def completed(self) -> bool:

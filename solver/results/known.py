@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from enum import Enum
 from typing import Annotated, Any, ClassVar
 
 from solver.results import units
@@ -124,3 +125,40 @@ def known_pairs(found: Mapping[str, Any], *, besides: Sequence[str] = ()) -> lis
             ("warning", f"a response may have a higher peak. {reason}") for reason in found["peaks_open"]
         ]
     return pairs
+
+
+class Stable(Enum):
+    """Whether small perturbations die out; the value is the word in answers."""
+
+    YES = "yes"
+    NO = "no"
+    NOT_KNOWN = "not known"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Verdict(Piece):
+    """Whether a response is stable, and how that is known."""
+
+    stable: Annotated[Stable, "Whether small perturbations die out: yes, no, or not known."]
+    ground: Annotated[
+        str,
+        "Why, in one line; of a response that is not stable also a stable one of the same frequency, if "
+        "the search of `solve_all` finds one.",
+    ]
+
+    def to_json(self) -> dict[str, str]:
+        """Return it as entries of an answer."""
+        return {"stable": self.stable.value, "stable_ground": self.ground}
+
+    @property
+    def line(self) -> str:
+        """It in one line."""
+        return f"{self.stable.value}: {self.ground}"
+
+
+def worst(verdicts: Sequence[Verdict]) -> Verdict:
+    """Return the verdict of several responses: no if one is not stable, yes if all are."""
+    if not verdicts:
+        return Verdict(stable=Stable.NOT_KNOWN, ground="there is no response")
+    order = (Stable.NO, Stable.NOT_KNOWN, Stable.YES)
+    return min(verdicts, key=lambda each: order.index(each.stable))

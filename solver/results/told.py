@@ -18,7 +18,7 @@ _MOST = 30
 _FEW = 6
 _DIGITS = 5
 _DESCRIBED = re.compile(r"Annotated\[(.+?), (['\"].+['\"])\]")
-_UNIT = re.compile(r"\[([^]]+)\]")
+UNIT = re.compile(r" ?\[([^]]+)\]")
 
 
 def json_number(value: float) -> float | None:
@@ -57,11 +57,15 @@ def json_value(value: Any) -> Any:
 @cache
 def json_keys(kind: type[Told]) -> dict[str, str]:
     """The keys of the JSON of a class in their order, and the attributes that they have the values of."""
-    named = kind.JSON.split() or [one.name for one in fields(kind)]  # type: ignore[arg-type]
-    return {key: path or key for key, _, path in (name.partition("=") for name in named)}
+    return keys_and_paths(kind.JSON or " ".join(one.name for one in fields(kind)))  # type: ignore[arg-type]
 
 
-def _at(value: Any, path: str) -> Any:
+def keys_and_paths(text: str) -> dict[str, str]:
+    """Names that stand for attributes, ``key=path.of.attribute`` where they differ."""
+    return {key: path or key for key, _, path in (name.partition("=") for name in text.split())}
+
+
+def at(value: Any, path: str) -> Any:
     """The value at the end of a path of attributes; None if one on the way is."""
     for name in path.split("."):
         value = None if value is None else getattr(value, name)
@@ -125,7 +129,7 @@ class Told(ABC):
     def _json(self, **others: object) -> dict[str, Any]:
         """The JSON object; `others` are the values of keys that are not those of attributes."""
         paths = json_keys(type(self)).items()
-        found = {key: others.pop(key) if key in others else _at(self, path) for key, path in paths}
+        found = {key: others.pop(key) if key in others else at(self, path) for key, path in paths}
         return {key: json_value(value) for key, value in (found | others).items()}
 
     @abstractmethod
@@ -150,7 +154,7 @@ class Piece(Told):
 
     def summary(self) -> Summary:
         """Every field with its unit."""
-        said = {name: _UNIT.search(words) for name, words in self.WORDS.items()}
+        said = {name: UNIT.search(words) for name, words in self.WORDS.items()}
         units = {name: unit[1] for name, unit in said.items() if unit is not None}
         given = [(one.name, getattr(self, one.name)) for one in fields(self)]  # type: ignore[arg-type]
         pairs = tuple((name, _words(value, units.get(name, ""))) for name, value in given)

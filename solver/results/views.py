@@ -6,10 +6,35 @@ loaded when somebody asks: computing needs no Matplotlib, and results import not
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
+
+
+@dataclass(frozen=True, slots=True)
+class Data:
+    """The data set of a class of result: its attributes with their units and words.
+
+    Parameters
+    ----------
+    kind : of data set.
+    columns : dimensions to the names of what stands along them, ``name=path.of.attribute`` where they differ.
+        ``"way=rows"``: a dimension along the parts in `rows`, whose attributes are meant. Along ``harmonic``
+        stand coefficients.
+    notes : names of attributes of the whole, likewise.
+    status, scene : where they stand; a status is else a word, a scene left out.
+    index : a dimension that is counted.
+    rows : dimensions that make the rows of a table, the first of `columns` if left out.
+    """
+
+    kind: str
+    columns: Mapping[str, str]
+    notes: str = ""
+    status: str = "status"
+    scene: str = "scene"
+    index: str = ""
+    rows: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,15 +44,15 @@ class Views:
     Parameters
     ----------
     package : where the modules ``summary``, ``to_dataset`` and ``plots.figures`` stand.
-    summary, dataset : names of functions there.
+    summary, dataset : names of functions there; ``described`` makes the data set that the class says.
     figure : that of a function of ``plots.figures``, or ``module:name`` of one in ``plots`` that draws what
         `to_json` gives; empty where there is no picture.
     """
 
     package: str
     summary: str
-    dataset: str
     figure: str = ""
+    dataset: str = "described"
 
     def call(self, what: str, result: Any, *arguments: Any, **options: Any) -> Any:
         """Show a result: `what` is ``summary``, ``to_dataset`` or ``plots.figures``."""

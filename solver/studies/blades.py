@@ -22,9 +22,9 @@ from solver.jit.trig_polynomial import grid_size, grid_tables, on_grid
 from solver.response.solution import Solution
 from solver.response.time_history import motion
 from solver.results.base import Drawn, MadeOfResponses
-from solver.results.default_bar import shows_progress
 from solver.results.known import NOTHING_KNOWN, Known
-from solver.results.views import Views
+from solver.results.views import Data, Views
+from solver.results.watch import shows_progress
 from solver.scene.cyclic.annulus import annulus, sectors_needed
 from solver.scene.parts import LumpedStructure, Mass, MatricesStructure
 from solver.scene.scene import Scene
@@ -38,7 +38,10 @@ _OF_THE_SWEEP = 0.4  # share of the time; the rest looks for the peaks of the ot
 class BladeAmplitudes(Drawn):
     """The motion of one DOF in every sector."""
 
-    VIEWS: ClassVar = Views("solver.views", "of_amplitudes", "amplitudes_dataset", "of_amplitudes")
+    VIEWS: ClassVar = Views("solver.views", "of_amplitudes", "of_amplitudes")
+    DATA: ClassVar = Data(
+        "blades", {"sector": "max_abs half_peak_to_peak"}, status="solved", scene="", index="sector",
+    )  # fmt: skip
 
     dof: Annotated[str, "Its name in one sector."]
     max_abs: Annotated[Real, "Over the period [m], (sectors,)."]
@@ -63,7 +66,11 @@ class BladeAmplitudes(Drawn):
 class BladePeaks(MadeOfResponses, Drawn):
     """The highest peak of one DOF in every sector over a range of the frequency."""
 
-    VIEWS: ClassVar = Views("solver.views", "of_blade_peaks", "blade_peaks_dataset", "of_blade_peaks")
+    VIEWS: ClassVar = Views("solver.views", "of_blade_peaks", "of_blade_peaks")
+    DATA: ClassVar = Data(
+        "blade-peaks", {"sector": "peak=value frequency=at_hz status"}, status="solved", scene="",
+        index="sector",
+    )  # fmt: skip
     JSON: ClassVar = "dof peaks=value at_hz status"
 
     dof: Annotated[str, "Its name in one sector."]
@@ -162,8 +169,10 @@ def blade_peaks(
     if branch is not None and branch.reached:
         progress(1.0, len(branch.values))
     if branch is None:
+        given = settings or ContinuationSettings()
         branch = sweep(
-            seen, start=start, stop=stop, harmonics=harmonics, settings=settings, errors=whole, peaks=whole,
+            seen, start=start, stop=stop, harmonics=harmonics,
+            settings=replace(given, peaks=whole and given.peaks, errors=whole and given.errors),
             on_progress=progress, should_stop=should_stop,
         )  # fmt: skip
     if not whole and branch.reached:

@@ -20,11 +20,10 @@ from solver.continuation.branches.sweep import sweep
 from solver.continuation.extrema.error_estimate import truncation_error
 from solver.errors import SettingError
 from solver.jit.fourier import Real
-from solver.results.default_bar import shows_progress
-from solver.results.watch import ShouldStop
+from solver.results.watch import ShouldStop, shows_progress
 from solver.scene.harmonics import kept_harmonics
 from solver.scene.scene import Scene
-from solver.studies.accuracy_result import AccuracyRow, AccuracyStatus, AccuracyStudy
+from solver.studies.study_results import AccuracyRow, AccuracyStatus, AccuracyStudy
 
 CLOSED_FORM, SAMPLED = "closed form", "sampled"
 HARMONICS = (1, 3, 5, 7, 11, 15, 21, 31, 41)

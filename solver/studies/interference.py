@@ -23,10 +23,11 @@ import numpy as np
 from solver.errors import SettingError
 from solver.linear.extra_terms import depends_on_speed
 from solver.modes.nonlinear_mode import at_nodal_diameter
-from solver.results.default_bar import shows_progress
-from solver.results.watch import OnProgress, ShouldStop
+from solver.results.watch import OnProgress, ShouldStop, shows_progress
 from solver.scene.scene import MatricesStructure, Scene
-from solver.studies.interference_result import (
+from solver.studies.mistuning import without_mistuning
+from solver.studies.natural_frequencies import natural_frequencies
+from solver.studies.study_results import (
     DiameterFrequencies,
     FoldedOrder,
     Interference,
@@ -34,8 +35,6 @@ from solver.studies.interference_result import (
     InterferenceStatus,
     Wave,
 )
-from solver.studies.mistuning import without_mistuning
-from solver.studies.natural_frequencies import natural_frequencies
 
 MOST_FAMILIES = 100
 MOST_ORDERS = 1000

@@ -14,8 +14,7 @@ from dataclasses import replace
 from solver.continuation.branch import Branch
 from solver.errors import SettingError
 from solver.response.known import relative_sum
-from solver.results.default_bar import shows_progress
-from solver.results.watch import OnProgress, ShouldStop, part_of
+from solver.results.watch import OnProgress, ShouldStop, part_of, shows_progress
 from solver.scene.parts import LumpedStructure, Mistuning
 from solver.scene.scene import Scene
 from solver.studies.blades import BladePeaks, blade_peaks, mistuned, with_mistuning

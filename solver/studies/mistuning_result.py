@@ -15,7 +15,7 @@ from solver.results.base import Drawn, MadeOfResponses
 from solver.results.known import Known
 from solver.results.order_statistics import quantile_json
 from solver.results.told import Piece
-from solver.results.views import Views
+from solver.results.views import Data, Views
 
 if TYPE_CHECKING:
     from solver.continuation.branch import Branch
@@ -73,7 +73,12 @@ class MistunedDisk(Piece):
 class MistuningStudy(MadeOfResponses, Drawn):
     """What becomes of the highest peak when blades are not quite equal."""
 
-    VIEWS: ClassVar = Views("solver.views", "of_mistuning", "mistuning_dataset", "disks:mistuning_figure")
+    VIEWS: ClassVar = Views("solver.views", "of_mistuning", "disks:mistuning_figure")
+    DATA: ClassVar = Data(
+        "mistuning", {"disk=disks": "seed magnification", "disk sector=disks": "factor=factors"
+         " peak=peaks.value frequency=peaks.at_hz"},
+        "spread of harmonics=n_harmonics tuned_peak=tuned.largest", index="sector",
+    )  # fmt: skip
     JSON: ClassVar = (
         "scene dof=tuned.dof of spread tuned=tuned_peak samples=disks mean mean_error standard_error"
         " deviation quantiles worst n_harmonics seconds completed=reached status"

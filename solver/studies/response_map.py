@@ -18,15 +18,14 @@ from solver.jit.fourier import Integer, Real
 from solver.response.known import known_of_solution
 from solver.response.solution import MEAN_UNDETERMINED
 from solver.response.solve import solve
-from solver.results.default_bar import shows_progress
 from solver.results.known import NOTHING_KNOWN, Known
-from solver.results.watch import part_of
+from solver.results.watch import part_of, shows_progress
 from solver.scene.scene import Scene
 from solver.studies.kernels.map_rows import GIVEN, MAX_ABS, RESIDUAL, ROW_VALUES, SOLVED, solve_row
-from solver.studies.map_result import MapStatus, ResponseMap
 from solver.studies.peaks.results import PeakTrack, TrackStatus
 from solver.studies.peaks.track_peak import track_peak
 from solver.studies.peaks.tracker import check_laws
+from solver.studies.study_results import MapStatus, ResponseMap
 
 MOST_POINTS = 4_000_000
 OF_THE_GRID = 0.7  # share of the progress, where the peaks are tracked too

@@ -16,11 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.errors import ResultFileError, SettingError
-from solver.results import netcdf, parquet
 from solver.results.base import Shown
-from solver.results.csv import csv_text
 from solver.results.dataset import ROW, Attribute, Dataset, Variable
-from solver.results.files import whole
+from solver.results.files import csv_text, whole
+from solver.results.formats import read_netcdf, read_parquet, write_netcdf, write_parquet
 from solver.scene.scene import Scene
 from solver.scene.toml import toml_text
 
@@ -246,14 +245,14 @@ _WRITERS: dict[str, Callable[[Dataset, Path], None]] = {
     ".json": _write_json,
     ".npz": _write_npz,
     ".mat": _write_mat,
-    ".nc": netcdf.write,
-    ".parquet": parquet.write,
+    ".nc": write_netcdf,
+    ".parquet": write_parquet,
 }
 _READERS: dict[str, Callable[[Path], Dataset]] = {
     ".csv": _read_csv,
     ".json": _read_json,
     ".npz": _read_npz,
     ".mat": _read_mat,
-    ".nc": netcdf.read,
-    ".parquet": parquet.read,
+    ".nc": read_netcdf,
+    ".parquet": read_parquet,
 }

@@ -21,13 +21,10 @@ if TYPE_CHECKING:
     from solver.modes.results import NonlinearMode
     from solver.response.solution import Solution
     from solver.response.stability.floquet import Stability
-    from solver.studies.accuracy_result import AccuracyStudy
     from solver.studies.blades import BladeAmplitudes, BladePeaks
-    from solver.studies.interference_result import InterferenceDiagram
-    from solver.studies.map_result import ResponseMap
     from solver.studies.mistuning_result import MistuningStudy
     from solver.studies.peaks.results import LeastPeak, PeakTrack
-    from solver.studies.plan_result import Plan
+    from solver.studies.study_results import AccuracyStudy, InterferenceDiagram, Plan, ResponseMap
 
 LEVEL = 1e-9  # relative difference of damping ratios that is none
 Pairs = list[tuple[str, str]]

@@ -2,33 +2,27 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
+from enum import Enum
 from importlib.metadata import PackageNotFoundError, version
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from solver.results.dataset import Attribute, Dataset, Variable
+from solver.results.told import UNIT, at, keys_and_paths
 from solver.views.io import scene_attributes
 
 if TYPE_CHECKING:
     from solver.continuation.branch import AnyBranch
     from solver.jit.fourier import Real
-    from solver.marching.result import MarchResult
-    from solver.modes.driven.results import HeldAmplitude, PhaseResonance
-    from solver.modes.peaks.performance import PerformanceCurve
-    from solver.modes.results import ModalCurve, NonlinearMode
     from solver.response.solution import Solution
     from solver.response.stability.floquet import Stability
+    from solver.results.base import Shown
     from solver.scene.scene import Scene
-    from solver.studies.accuracy_result import AccuracyStudy
-    from solver.studies.blades import BladeAmplitudes, BladePeaks
-    from solver.studies.interference_result import InterferenceDiagram
-    from solver.studies.map_result import ResponseMap
-    from solver.studies.mistuning_result import MistuningStudy
-    from solver.studies.peaks.results import LeastPeak, PeakTrack
-    from solver.studies.plan_result import Plan
+    from solver.studies.study_results import InterferenceDiagram
 
 AMPLITUDE = "max|x| of the observed DOF"
 
@@ -62,6 +56,57 @@ def harmonics(coefficients: Real, dims: tuple[str, ...], name: str, unit: str) -
     }
 
 
+def described(found: Shown) -> Dataset:
+    """What the class of a result says of its data set, see `solver.results.views.Data`."""
+    data = found.DATA
+    variables: dict[str, Variable] = {}
+    for place, names in data.columns.items():
+        over, _, rows = place.partition("=")
+        dims = tuple(over.split())
+        owners = at(found, rows) if rows else (found,)
+        for name, path in keys_and_paths(names).items():
+            given = [at(one, path) for one in owners]
+            if rows or given[0] is not None:
+                values = np.asarray(_plain(given if rows else given[0]))
+                unit, about = _said(owners[0], path) if len(owners) else ("", "")
+                coefficients = dims[-1] == "harmonic"
+                one = Variable(dims=dims, values=values, unit=unit, about=about)
+                variables |= harmonics(values, dims, name, unit) if coefficients else {name: one}
+    rows_of = data.rows or tuple(next(iter(data.columns)).partition("=")[0].split())
+    sizes = Dataset(kind=data.kind, rows=rows_of, variables=variables).sizes
+    if data.index:
+        variables = {data.index: column(data.index, np.arange(sizes[data.index])), **variables}
+    status = at(found, data.status) if hasattr(found, data.status.partition(".")[0]) else data.status
+    scene = at(found, data.scene) if data.scene else None
+    notes = {name: at(found, path) for name, path in keys_and_paths(data.notes).items()}
+    notes |= {"scene_name": scene} if isinstance(scene, str) else {}
+    said = {name: ", ".join(value) if isinstance(value, tuple) else value for name, value in notes.items()}
+    whole = attributes(_plain(status), None if isinstance(scene, str) else scene, **said)
+    # A structure without contacts has no dimension of them.
+    kept = {name: one for name, one in variables.items() if "contact" not in one.dims or sizes["contact"]}
+    return Dataset(kind=data.kind, rows=rows_of, variables=kept, attributes=whole)
+
+
+def _plain(value: Any) -> Any:
+    """A value with the words of what is one of a few."""
+    if isinstance(value, tuple | list):
+        return [_plain(one) for one in value]
+    return value.value if isinstance(value, Enum) else value
+
+
+def _said(owner: Any, path: str) -> tuple[str, str]:
+    """Unit and description of an attribute: of the parameter of a result as the result says."""
+    before, _, name = path.rpartition(".")
+    owner = at(owner, before) if before else owner
+    if name == "parameter":
+        return owner.unit, owner.parameter_path
+    made = (getattr(type(owner), name, None).__doc__ or "").partition("\n")[0]  # of a property
+    words = getattr(owner, "WORDS", {}).get(name, made)
+    unit = UNIT.search(words)
+    return "" if unit is None else unit[1], _SHAPE.sub("", UNIT.sub("", words)).replace(" .", "").strip(" .")
+
+
+_SHAPE = re.compile(r",? \((?:\w+, ?)+[^()]*\)")  # of an array, (n, 2H + 1)
 _SAMPLES = 500
 ContactStates = tuple[Sequence[str], NDArray[np.integer]]
 
@@ -164,109 +209,6 @@ def solution_dataset(solution: Solution) -> Dataset:
     return Dataset(kind="solution", rows=("time",), variables=variables, attributes=notes)
 
 
-def march_dataset(march: MarchResult) -> Dataset:
-    """The last period: the observed DOF, and motion, force and load of every contact."""
-    variables = {
-        "time": column("time", march.time, "s", "from the start of the last period"),
-        "displacement": column("time", march.displacement, "m", "of the observed DOF"),
-        "velocity": column("time", march.velocity, "m/s", "of the observed DOF"),
-    }
-    if march.contacts:
-        variables["contact"] = column("contact", np.array(march.contacts, dtype=np.str_))
-        for name, values, unit in (
-            ("slip", march.slip, "m"), ("force", march.contact_force, "N"),
-            ("normal_load", march.normal_load, "N"),
-        ):  # fmt: skip
-            variables[name] = Variable(dims=("contact", "time"), values=values, unit=unit)
-    notes = attributes(
-        march.status.value, frequency_hz=march.frequency_hz, max_abs=march.max_abs, periods=march.periods,
-        steps_per_period=march.steps_per_period, error_estimate=march.error_estimate,
-    )  # fmt: skip
-    return Dataset(kind="march", rows=("time",), variables=variables, attributes=notes)
-
-
-def map_dataset(found: ResponseMap) -> Dataset:
-    """The grid; the tracked highest peak beside it, where it was asked for."""
-    variables = {
-        "parameter": column("parameter", found.parameter, found.unit, found.parameter_path),
-        "frequency": column("frequency", found.frequency, "Hz", "excitation frequency"),
-    }
-    for name, values in (("amplitude", found.amplitude), ("half_peak_to_peak", found.half_peak_to_peak)):
-        variables[name] = Variable(
-            dims=("parameter", "frequency"), values=values, unit="m",
-            about=AMPLITUDE if name == "amplitude" else "(max x - min x) / 2",
-        )  # fmt: skip
-    if found.ridge is not None:
-        ridge = found.ridge.to_dataset().variables
-        names = ("parameter", "peak", "frequency")
-        variables |= {
-            f"ridge_{name}": column("ridge", ridge[name].values, ridge[name].unit) for name in names
-        }
-    notes = attributes(
-        found.status.value, found.given, parameter=found.parameter_path, harmonics=found.n_harmonics
-    )
-    return Dataset(kind="map", rows=("parameter", "frequency"), variables=variables, attributes=notes)
-
-
-def track_dataset(track: PeakTrack) -> Dataset:
-    """The highest peak over the parameter."""
-    variables = {
-        "parameter": column("point", track.parameter, track.unit, track.parameter_path),
-        "peak": column("point", track.peak, "m", "highest peak, max|x| of the observed DOF"),
-        "frequency": column("point", track.frequency, "Hz", "of the highest peak"),
-        "slope": column("point", track.slope, "", "d peak / d parameter"),
-    }
-    best = track.optimum
-    notes = attributes(
-        track.status.value, track.given, parameter=track.parameter_path, harmonics=track.n_harmonics,
-        least_at=best.at, least_peak=best.peak,
-    )  # fmt: skip
-    return Dataset(kind="peaks", rows=("point",), variables=variables, attributes=notes)
-
-
-def accuracy_dataset(study: AccuracyStudy) -> Dataset:
-    """A row for each way to compute the point."""
-    units = {"max_abs": "m", "error": "m", "milliseconds": "ms"}
-    names = (
-        "harmonics", "evaluator", "samples", "max_abs", "error", "milliseconds", "iterations", "residual",
-        "pareto",
-    )  # fmt: skip
-    variables = {
-        name: column("way", np.array([getattr(row, name) for row in study.rows]), units.get(name, ""))
-        for name in names
-    }
-    notes = attributes(
-        study.status.value, frequency_hz=study.frequency_hz, reference=study.reference,
-        reference_harmonics=study.reference_harmonics, reference_error=study.reference_error,
-        scene_name=study.scene,
-    )  # fmt: skip
-    return Dataset(kind="accuracy", rows=("way",), variables=variables, attributes=notes)
-
-
-def mistuning_dataset(study: MistuningStudy) -> Dataset:
-    """A disk a row: its magnification, and the factor and the peak of every blade."""
-    disks = study.disks
-    sectors = len(study.tuned.value)
-    variables = {
-        "seed": column("disk", np.array([disk.seed for disk in disks], dtype=np.int64)),
-        "magnification": column("disk", np.array([disk.magnification for disk in disks], dtype=np.float64)),
-        "sector": column("sector", np.arange(sectors)),
-    }
-    rows = {
-        "factor": ([disk.factors for disk in disks], "", "of the named parts"),
-        "peak": ([disk.peaks.value for disk in disks], "m", "highest peak of the blade"),
-        "frequency": ([disk.peaks.at_hz for disk in disks], "Hz", "of that peak"),
-    }
-    for name, (values, unit, words) in rows.items():
-        array = np.array(values, dtype=np.float64).reshape(len(disks), -1)
-        variables[name] = Variable(dims=("disk", "sector"), values=array, unit=unit, about=words)
-    notes = attributes(
-        study.status.value, spread=study.spread, of=", ".join(study.of), harmonics=study.n_harmonics,
-        tuned_peak=study.tuned.largest, scene_name=study.scene,
-    )  # fmt: skip
-    return Dataset(kind="mistuning", rows=("disk",), variables=variables, attributes=notes)
-
-
 def interference_dataset(found: InterferenceDiagram) -> Dataset:
     """A family at a nodal diameter a row; beside them the orders with what they meet."""
     rows = [
@@ -294,51 +236,6 @@ def interference_dataset(found: InterferenceDiagram) -> Dataset:
     return Dataset(kind="interference", rows=("mode",), variables=variables, attributes=notes)
 
 
-def plan_dataset(found: Plan) -> Dataset:
-    """An effect a row: whether it is paid for, and why."""
-    variables = {
-        "effect": column("effect", np.array([effect.name for effect in found.effects], dtype=np.str_)),
-        "used": column("effect", np.array([effect.used for effect in found.effects], dtype=bool)),
-        "reason": column("effect", np.array([effect.reason for effect in found.effects], dtype=np.str_)),
-    }
-    return Dataset(kind="plan", rows=("effect",), variables=variables, attributes=attributes("planned"))
-
-
-def least_dataset(best: LeastPeak) -> Dataset:
-    """A local minimum of the highest peak a row, best first."""
-    basins = best.basins
-    variables = {
-        "parameter": column("minimum", np.array([one.at for one in basins], dtype=np.float64)),
-        "peak": column("minimum", np.array([one.peak for one in basins], dtype=np.float64), "m"),
-        "solved": column("minimum", np.array([one.solved for one in basins], dtype=bool)),
-        "proven": column("minimum", np.array([one.proven for one in basins], dtype=bool)),
-    }
-    scene = None if best.branch is None else best.branch.scene
-    notes = attributes(best.status.value, scene, least_at=best.at, least_peak=best.peak)
-    return Dataset(kind="least", rows=("minimum",), variables=variables, attributes=notes)
-
-
-def blade_peaks_dataset(peaks: BladePeaks) -> Dataset:
-    """A sector a row: the highest peak of its blade."""
-    variables = {
-        "sector": column("sector", np.arange(peaks.value.size)),
-        "peak": column("sector", peaks.value, "m", f"highest peak, max|x| of {peaks.dof}"),
-        "frequency": column("sector", peaks.at_hz, "Hz", "of that peak"),
-        "status": column("sector", np.array([one.value for one in peaks.status], dtype=np.str_)),
-    }
-    return Dataset(kind="blade-peaks", rows=("sector",), variables=variables, attributes=attributes("solved"))
-
-
-def amplitudes_dataset(blades: BladeAmplitudes) -> Dataset:
-    """A sector a row: the motion of its blade."""
-    variables = {
-        "sector": column("sector", np.arange(blades.max_abs.size)),
-        "max_abs": column("sector", blades.max_abs, "m", f"max|x| of {blades.dof}"),
-        "half_peak_to_peak": column("sector", blades.half_peak_to_peak, "m", "(max x - min x) / 2"),
-    }
-    return Dataset(kind="blades", rows=("sector",), variables=variables, attributes=attributes("solved"))
-
-
 def stability_dataset(found: Stability) -> Dataset:
     """A Floquet multiplier a row, largest first."""
     variables = {
@@ -348,72 +245,3 @@ def stability_dataset(found: Stability) -> Dataset:
     }
     notes = attributes(found.growth.value, frequency_hz=found.frequency_hz, neutral=found.neutral)
     return Dataset(kind="stability", rows=("multiplier",), variables=variables, attributes=notes)
-
-
-def mode_dataset(found: NonlinearMode) -> Dataset:
-    """A point a row: amplitude, frequency, damping ratio, the states of the contacts and the mode shape."""
-    variables = {
-        "amplitude": column("point", found.amplitude, "√kg m", "a² = Σ Q_kᴴ M Q_k"),
-        "frequency": column("point", found.frequency_hz, "Hz"),
-        "damping_ratio": column("point", found.damping_ratio),
-        "frequency_error": column("point", found.frequency_error, "Hz", "estimate by more harmonics"),
-        "damping_error": column("point", found.damping_error, "", "estimate by more harmonics"),
-        "max_abs": column("point", found.max_abs, "m", AMPLITUDE),
-        "forcing": column("point", found.forcing, "N/√kg", "|Qᴴ f| of the excitation, mode normalised"),
-        **_states(found),
-        "dof": column("dof", np.array(found.scene.dofs, dtype=np.str_)),
-        **harmonics(found.dof_motions, ("point", "dof", "harmonic"), "motion", "m"),
-    }
-    notes = attributes(
-        found.status.value, found.scene, mode_number=found.mode, harmonics=found.n_harmonics,
-        nodal_diameter=found.nodal_diameter,
-    )  # fmt: skip
-    return Dataset(kind="modes", rows=("point",), variables=variables, attributes=notes)
-
-
-def _states(found: ModalCurve) -> dict[str, Variable]:
-    words = np.array(found.state_words, np.str_).reshape(found.states.shape)
-    names = column("contact", np.array(found.contact_names, dtype=np.str_))
-    return {"contact": names, "state": Variable(dims=("point", "contact"), values=words)}
-
-
-def performance_dataset(curve: PerformanceCurve) -> Dataset:
-    """A point of the mode a row: factor on the excitation or on the loads, and the peak with it."""
-    variables = {
-        "excitation": column("point", curve.excitation, "", "factor on every force"),
-        "peak": column("point", curve.peak, "m", AMPLITUDE),
-        "frequency": column("point", curve.frequency_hz, "Hz", "of the peak"),
-        "load": column("point", curve.load, "", "factor on every load, the excitation as it is"),
-        "peak_at_load": column("point", curve.peak_at_load, "m", "the peak then"),
-    }
-    notes = attributes(curve.mode.status.value, curve.mode.scene, mode_number=curve.mode.mode)
-    return Dataset(kind="performance", rows=("point",), variables=variables, attributes=notes)
-
-
-def held_dataset(found: HeldAmplitude) -> Dataset:
-    """A frequency a row: the force that holds the amplitude, and the response to it."""
-    stable = ["" if one is None else "yes" if one else "no" for one in found.stable]
-    variables = {
-        "frequency": column("point", found.frequency_hz, "Hz"),
-        "excitation": column("point", found.excitation, "", "factor on every force"),
-        "excitation_error": column("point", found.excitation_error, "", "estimate by more harmonics"),
-        "phase": column("point", found.phase_deg, "deg", "of harmonic 1, ahead of the excitation"),
-        "max_abs": column("point", found.max_abs, "m", AMPLITUDE),
-        "stable": column("point", np.array(stable, dtype=np.str_), "", "while the force is held"),
-        **_states(found),
-        **harmonics(found.observed, ("point", "harmonic"), "observed", "m"),
-    }
-    notes = attributes(found.status.value, found.scene, amplitude=found.held, harmonics=found.n_harmonics)
-    return Dataset(kind="controlled", rows=("point",), variables=variables, attributes=notes)
-
-
-def resonance_dataset(found: PhaseResonance) -> Dataset:
-    """An amplitude a row: frequency and force of phase resonance."""
-    variables = {
-        "amplitude": column("point", found.amplitude, "√kg m", "a² = Σ Q_kᴴ M Q_k"),
-        "frequency": column("point", found.frequency_hz, "Hz"),
-        "excitation": column("point", found.excitation, "", "factor on every force"),
-        "max_abs": column("point", found.max_abs, "m", AMPLITUDE),
-    }
-    notes = attributes(found.status.value, found.scene, mode_number=found.mode)
-    return Dataset(kind="phase-resonance", rows=("point",), variables=variables, attributes=notes)

@@ -11,7 +11,7 @@ import numpy as np
 
 import solver
 from optim.criteria.criterion import Criterion, CriterionRow, Form, Judged, Key
-from optim.criteria.json_types import PositiveNumber
+from optim.criteria.key import PositiveNumber
 from solver.balance.workspace import Workspace
 
 if TYPE_CHECKING:

@@ -31,13 +31,12 @@ from service.jobs.common.records import sweep_record
 from service.jobs.common.scenes import FrequencyHz, HarmonicRequest, require, resolve_scene, resolved
 from service.jobs.common.sizes import balance_issues
 from service.jobs.figures import SweepRecord
-from service.jobs.kind_view import KindView, PrintedResult
 from service.jobs.kinds import SHIPPED
-from service.jobs.kinds.table import with_tables
 from service.jobs.outputs import JobOutput, OnProgress, ShouldStop
 from service.jobs.parts import Division, JobPart, PartOutput
-from service.jobs.registry import JobKind, Resolved, SceneSource
+from service.jobs.registry import JobKind, KindView, PrintedResult, Resolved, SceneSource
 from service.queue.core import Service
+from service.rendering.docs_tables import tables_of_kinds, with_tables
 from service.settings.kinds import registry_of
 from service.settings.settings import load_settings
 from solver.scene.scene import Scene
@@ -292,8 +291,8 @@ def test_every_kind_is_listed_with_its_schemas(url: str) -> None:
 def test_the_check_of_the_documentation_sees_it() -> None:
     registry = registry_of([ENTRY])
     page = (ROOT / "docs" / "jobs.md").read_text("utf-8")
-    assert with_tables(page, SHIPPED) == page
-    longer = with_tables(page, registry)
+    assert with_tables(page, tables_of_kinds(SHIPPED)) == page
+    longer = with_tables(page, tables_of_kinds(registry))
     row = (
         "| `distortion` | **`frequencies_hz`**, `sweep` | the share of the higher harmonics | the one between"
     )

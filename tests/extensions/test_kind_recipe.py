@@ -13,7 +13,7 @@ from service.cli import main
 from service.client.embedded import EmbeddedService
 from service.db.models import JobState
 from service.errors import InvalidRequestError
-from service.jobs.kinds.table import kinds_table
+from service.rendering.docs_tables import kinds_table
 from service.settings.kinds import registry_of
 from service.settings.settings import load_settings
 from solver.studies.natural_frequencies import natural_frequencies

@@ -13,9 +13,8 @@ from service.cli.commands.client import submit
 from service.errors import InputError
 from service.jobs.common.problem import Pair, ProblemRequest, Ranges
 from service.jobs.common.scenes import Number, SceneRequest
-from service.jobs.kind_view import KindView
 from service.jobs.kinds import SHIPPED
-from service.jobs.registry import JobKind, JobRequest
+from service.jobs.registry import JobKind, JobRequest, KindView
 
 
 class ShapesRequest(SceneRequest):

@@ -17,7 +17,7 @@ from unittest.mock import patch
 
 from service.cli import main
 from service.cli.app import command
-from service.cli.output_files import Outputs
+from service.cli.study_command import Outputs
 from tests.golden.golden_cases import MEASURED, SHIPPED, Case, own_scenes
 
 DATA = Path(__file__).parent / "data"

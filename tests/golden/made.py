@@ -7,8 +7,6 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from service.jobs.kinds import SHIPPED
-from service.jobs.kinds.table import interrupted_table, kinds_table
 from service.jobs.strict_json import digest
 from service.rendering.docs_tables import SOURCES, TABLES
 from tests.golden.faces import Studies, helped, paths
@@ -55,7 +53,6 @@ def _help(_folder: Path) -> dict[str, str]:
 def _tables(_folder: Path) -> dict[str, str]:
     """The tables of docs/, and the sources that are written."""
     found = {f"docs/{page} {name}": made() for page, each in TABLES.items() for name, made in each.items()}
-    found |= {"docs/jobs.md kinds": kinds_table(SHIPPED), "docs/jobs.md again": interrupted_table(SHIPPED)}
     return {name: text.strip() for name, text in found.items()} | {
         file: source().strip() for file, source in SOURCES.items()
     }

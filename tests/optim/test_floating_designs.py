@@ -27,8 +27,8 @@ from solver import (
     sweep,
     track_peak,
 )
-from solver.studies.map_result import MapStatus
 from solver.studies.peaks.results import TrackStatus
+from solver.studies.study_results import MapStatus
 
 H = 3
 LOADS = (30.0, 800.0)

@@ -24,7 +24,7 @@ import optim
 import solver
 from service.cli import main
 from service.cli.app import command
-from service.cli.options.problem import OPTIONS
+from service.cli.options.problem_inputs import OPTIONS
 from service.jobs.registry import ABOUT_THE_RUN
 from service.jobs.studies.design import Design
 from service.jobs.validation import validated

@@ -16,9 +16,9 @@ from private_kinds import PRIVATE
 from service_helpers import ServedClient, is_problem, serving, until
 from sqlalchemy import text
 
+from service.auth.allowances import Buckets
 from service.auth.authenticator import REMEMBERED_SECONDS, _neighbourhood, caller_of_row, create, id_of
 from service.auth.callers import KeyLimits, Scope
-from service.auth.rate_limit import Buckets
 from service.cli import main
 from service.client.client import Client
 from service.db import tokens

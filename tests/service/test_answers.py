@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from service_helpers import until
 
-from service.auth.rate_limit import Buckets
+from service.auth.allowances import Buckets
 from service.errors import InvalidRequestError, QueueFullError, TooManyRequestsError
 from service.jobs.answering import Answering, Words
 from service.jobs.registry import SceneSource, no_warm_up

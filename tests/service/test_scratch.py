@@ -10,11 +10,11 @@ from pathlib import Path
 
 import pytest
 
-from service.uploads.scratch import remove_abandoned, scratch_folder
+from service.uploads.uploads import remove_abandoned, scratch_folder
 
 _WORK = """
 import sys, tempfile
-from service.uploads.scratch import scratch_folder
+from service.uploads.uploads import scratch_folder
 with scratch_folder() as folder:
     print(tempfile.mkdtemp(prefix="upload-"), flush=True)
     sys.stdin.read()

@@ -9,9 +9,8 @@ from collections.abc import Iterator, Mapping
 import pytest
 
 from optim.problem.keys import options
-from service.cli.lazy import STUDY
 from service.cli.options.key_options import key_options, options_of
-from service.cli.table import TOP
+from service.cli.table import STUDY, TOP
 from service.jobs.common.problem import ProblemRequest
 from service.jobs.kinds import SHIPPED, studies
 from service.jobs.kinds.bodies import KIND, body_model

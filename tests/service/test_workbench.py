@@ -10,7 +10,7 @@ import httpx
 import pytest
 from service_helpers import ServedClient, is_problem, new_job, until
 
-from service.auth.rate_limit import Buckets
+from service.auth.allowances import Buckets
 from service.client import Client
 from service.db.clock import utc_now
 from service.db.engine import Database
@@ -26,7 +26,7 @@ from service.errors import (
     ServiceProblem,
     StorageFullError,
 )
-from service.jobs.differences import differences, figures
+from service.schemas.comparisons import differences, figures
 from solver.scene.scene import load_scene
 
 WAITED = {"Prefer": "wait=60"}

@@ -11,9 +11,8 @@ from optim.problem.keys import options as key_options
 from service.cli.commands.report import SUFFIXES, write
 from service.cli.options import inputs, problem_inputs
 from service.cli.options import shared as options
-from service.cli.options.problem import ProblemFlags, takes_problem
-from service.cli.output_files import Outputs
-from service.cli.study_command import give, watched
+from service.cli.options.problem_inputs import ProblemFlags, takes_problem
+from service.cli.study_command import Outputs, give, watched
 from service.jobs.common.problem import ProblemRequest
 from service.jobs.studies.design import Design
 from service.jobs.studies.pareto import Pareto

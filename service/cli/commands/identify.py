@@ -10,8 +10,7 @@ import typer
 
 from service.cli.commands.report import SUFFIXES, write
 from service.cli.options import inputs
-from service.cli.output_files import Outputs
-from service.cli.study_command import Keys, give, watched
+from service.cli.study_command import Keys, Outputs, give, watched
 from service.jobs.studies.identify import Identify
 from solver.scene.descriptions import DISK_LOAD
 

@@ -19,9 +19,8 @@ from service.cli.importing.files import (
     rows_of,
     sources,
 )
-from service.cli.importing.options import ImportOptions
 from service.cli.importing.patches import Patches
-from service.cli.importing.reduction import ReducedModel, reduce, reduced_file
+from service.cli.importing.reduction import ImportOptions, ReducedModel, reduce, reduced_file
 from service.cli.importing.scene import band, excitation, toml
 from service.cli.importing.scene import contacts as contact_tables
 from service.cli.importing.sector import (

@@ -1,9 +1,10 @@
-"""`stickslip scenes` and `schema`: the scenes that come with the package; what editors check files with."""
+"""`stickslip scenes` and `schema`: the scenes that come with the package; the JSON Schemas for editors."""
 
 from __future__ import annotations
 
 import json
-from typing import Annotated
+from enum import Enum
+from typing import Annotated, Any
 
 import typer
 
@@ -12,6 +13,55 @@ from service.cli.options import shared as options
 from service.errors import InputError
 from service.rendering.tables import results as reports
 from service.rendering.tables.text import print_json, say
+from solver.scene.json_schema import DIALECT, plain, scene_schema
+
+
+class Described(Enum):
+    """What there is a schema of; the value is the word users write."""
+
+    SCENE = "scene"
+    PROBLEM = "problem"
+    JOB = "job"
+
+
+def schema_of(what: Described) -> dict[str, Any]:
+    """The schema of one kind of file."""
+    if what is Described.SCENE:
+        return scene_schema()
+    return _problem() if what is Described.PROBLEM else _job()
+
+
+def _problem() -> dict[str, Any]:
+    """Of ``--problem FILE``: a design, with the key that only fronts have."""
+    from service.jobs.studies.design import Design
+    from service.jobs.studies.pareto import Pareto
+
+    found = plain(Design.model_json_schema())
+    front = plain(Pareto.model_json_schema())
+    found["$defs"] = {**front.get("$defs", {}), **found.get("$defs", {})}
+    found["properties"] = {**front["properties"], **found["properties"]}
+    # The scene may be the command's argument instead.
+    found["required"] = [key for key in found.get("required", []) if key != "scene"]
+    found["properties"]["scene"] = _scene_of_a_file(found["properties"]["scene"])
+    return {"$schema": DIALECT, "title": "stickslip design problem", **found}
+
+
+def _scene_of_a_file(scene: dict[str, Any]) -> dict[str, Any]:
+    """Beside names and objects, the name of a scene file."""
+    return {"anyOf": [{"type": "string"}, {"type": "object"}], "description": scene.get("description", "")}
+
+
+def _job() -> dict[str, Any]:
+    """Of the body of ``POST /v1/jobs``."""
+    from service.jobs.kinds.bodies import body_model
+    from service.settings.kinds import registry_here
+
+    kinds, definitions = [], {}
+    for kind in registry_here():
+        schema = plain(body_model(kind.name, kind.request).model_json_schema())
+        definitions.update(schema.pop("$defs", {}))
+        kinds.append({**schema, "title": kind.name})
+    return {"$schema": DIALECT, "title": "stickslip job", "oneOf": kinds, "$defs": definitions}
 
 
 def scenes(as_json: options.Json = False) -> None:
@@ -36,7 +86,7 @@ def schema(
     ] = "scene",
 ) -> None:
     """Print the JSON Schema of scene files, design problems or jobs, for editors."""
-    from service.schemas.json_schema import Described, schema_of
+    from service.cli.commands.scenes import Described, schema_of
 
     words = [one.value for one in Described]
     if what not in words:

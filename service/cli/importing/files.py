@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from service.errors import InputError
 
 if TYPE_CHECKING:
-    from service.cli.importing.options import ImportOptions
+    from service.cli.importing.reduction import ImportOptions
     from solver.matrices.load_set import MatrixSet
 
 MOST_UNNAMED = 200

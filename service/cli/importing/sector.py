@@ -16,7 +16,7 @@ from solver.results.files import whole
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from service.cli.importing.options import ImportOptions
+    from service.cli.importing.reduction import ImportOptions
     from solver.matrices.load_set import MatrixSet
     from solver.matrices.sectors.reduction import ReducedSector
 

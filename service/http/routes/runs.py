@@ -40,22 +40,20 @@ from service.schemas.comparisons import comparison
 from service.schemas.pages import newest
 from service.schemas.workbench_answers import (
     Comparison,
+    NewLink,
+    NewProject,
     NewShareAnswer,
     ProjectAnswer,
+    ProjectChanges,
     ProjectPage,
+    ProjectQuery,
     RunAnswer,
+    RunChanges,
     RunPage,
+    RunQuery,
     ShareAnswer,
     SharedRun,
     ShareList,
-)
-from service.schemas.workbench_queries import (
-    NewLink,
-    NewProject,
-    ProjectChanges,
-    ProjectQuery,
-    RunChanges,
-    RunQuery,
     changes_of,
 )
 
@@ -233,8 +231,7 @@ def report(
 
     `format` goes before `Accept`. It is made anew each time, in a process with limits.
     """
-    from service.rendering.report.apart import report_apart
-    from service.rendering.report.making import FORMS
+    from service.rendering.report.making import FORMS, report_apart
 
     wanted = FORMS[form] if form is not None else chosen(accept, tuple(FORMS.values()))
     suffix = next(name for name, kind in FORMS.items() if kind == wanted)

@@ -18,9 +18,16 @@ from service.http.in_lane import computed, reading, writing
 from service.jobs import answering
 from service.jobs.common.scenes import SceneRequest
 from service.jobs.validation import validated
-from service.schemas.matrix_answers import FormatAnswer, FormatsAnswer, MatricesAnswer
+from service.schemas.matrix_answers import (
+    FormatAnswer,
+    FormatsAnswer,
+    MatricesAnswer,
+    NewUpload,
+    UploadAnswer,
+    UploadedArray,
+    UploadPage,
+)
 from service.schemas.pages import Cursor, Limit, ListQuery, newest
-from service.schemas.upload_answers import NewUpload, UploadAnswer, UploadedArray, UploadPage
 from service.uploads.uploads import Arrived, file_name, format_of
 
 router = APIRouter(prefix="/v1/uploads", tags=["uploads"])

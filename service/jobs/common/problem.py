@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from pydantic import ConfigDict
 
-from optim.criteria.json_types import Name as Name
-from optim.criteria.json_types import Pair as Pair
-from optim.criteria.json_types import Ranges as Ranges
+from optim.criteria.key import Name as Name
+from optim.criteria.key import Pair as Pair
+from optim.criteria.key import Ranges as Ranges
 from optim.problem.keys import ROBUST, ProblemKeys
 from service.jobs.common.scenes import HarmonicRequest
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues

@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from functools import cache, lru_cache
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import BeforeValidator, Field, WithJsonSchema
 
-from optim.criteria.json_types import LARGEST as LARGEST
-from optim.criteria.json_types import MAX_HARMONICS as MAX_HARMONICS
-from optim.criteria.json_types import FrequencyHz as FrequencyHz
-from optim.criteria.json_types import Harmonics as Harmonics
-from optim.criteria.json_types import Number as Number
-from optim.criteria.json_types import ParameterPath as ParameterPath
-from optim.criteria.json_types import PositiveNumber as PositiveNumber
+from optim.criteria.key import LARGEST as LARGEST
+from optim.criteria.key import MAX_HARMONICS as MAX_HARMONICS
+from optim.criteria.key import FrequencyHz as FrequencyHz
+from optim.criteria.key import Harmonics as Harmonics
+from optim.criteria.key import Number as Number
+from optim.criteria.key import ParameterPath as ParameterPath
+from optim.criteria.key import PositiveNumber as PositiveNumber
 from service.errors import InvalidRequestError
 from service.jobs.registry import Flag, JobRequest, Resolved, SceneSource
 from service.jobs.strict_json import digest
@@ -25,6 +25,7 @@ from solver.scene.descriptions import DAMPER_LOAD
 
 if TYPE_CHECKING:
     from solver.scene.scene import Scene
+
 
 MOST_SET = 1000
 UPLOAD = "upload:"
@@ -228,3 +229,28 @@ def stored_scene(spec: Mapping[str, Any]) -> Scene:
 def installed() -> str:
     """The version of the package."""
     return version("stickslip")
+
+
+# A load, in units of all forces together, under which nothing slips: resonances magnify the forces less, and
+# the forces of the contacts keep enough digits beside it.
+_HOLDS = 1e8
+
+
+def linear_limit(scene: Scene, removed: Collection[str]) -> Scene:
+    """The scene without the friction of some contacts, and with every other friction contact stuck.
+
+    Contacts of other laws stay as they are.
+
+    Parameters
+    ----------
+    scene : what vibrates.
+    removed : names of the contacts that are removed.
+    """
+    load = _HOLDS * (sum(abs(force.amplitude) for force in scene.excitation) or 1.0)
+    raw: dict[str, Any] = scene.to_dict()
+    for table, contact in zip(raw["contacts"], scene.contacts, strict=True):
+        changed = contact.linear_limit(load, gone=contact.name in removed) or {}
+        table |= changed
+        for key in (key for key, value in changed.items() if value is None):
+            del table[key]
+    return scene.from_dict(raw)

@@ -11,11 +11,11 @@ from typing import Annotated, Any
 from pydantic import ConfigDict, Field
 
 import solver
-from service.jobs.common.linear_limits import linear_limit
 from service.jobs.common.scenes import (
     FrequencyHz,
     HarmonicRequest,
     PositiveNumber,
+    linear_limit,
     require,
     resolve_scene,
     resolved,
@@ -197,7 +197,7 @@ def run_limits(spec: Mapping[str, Any], _progress: Progress, should_stop: Should
 
 def run_point(spec: Mapping[str, Any], _progress: Progress, _should_stop: ShouldStop) -> JobOutput:
     """Solve the balance, and look at one period of it."""
-    from service.jobs.common.periods import period_of
+    from service.jobs.studies.march import period_of
 
     solution = solver.solve(
         stored_scene(spec), frequency_hz=spec["frequency_hz"], harmonics=spec["harmonics"]

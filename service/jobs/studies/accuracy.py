@@ -13,7 +13,7 @@ from service.jobs.figures import SweepRecord
 from service.jobs.registry import Flag
 from service.jobs.study import Study
 from solver.errors import Issue
-from solver.studies.accuracy_result import AccuracyStudy
+from solver.studies.study_results import AccuracyStudy
 
 if TYPE_CHECKING:
     from solver.scene.scene import Scene

@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import ConfigDict, Field
 
-from optim.criteria.json_types import Pair, PositiveNumber, Ranges
+from optim.criteria.key import Pair, PositiveNumber, Ranges
 from optim.studies.crossings import CampbellDiagram
 from service.jobs.common.results import result_model
 from service.jobs.common.scenes import HarmonicRequest
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
 from service.jobs.figures import SweepRecord
-from service.jobs.kind_view import Json, NothingToDrawError, ReadSweep, StoredSweep
-from service.jobs.registry import Flag
+from service.jobs.registry import Flag, Json, NothingToDrawError, ReadSweep, StoredSweep
 from service.jobs.study import Study
 from solver.errors import Issue
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import ConfigDict, Field
 
-from optim.criteria.json_types import Name
+from optim.criteria.key import Name
 from service.jobs.common.results import Table, result_model
 from service.jobs.common.scenes import HarmonicRequest, PositiveNumber
 from service.jobs.common.sizes import balance_issues

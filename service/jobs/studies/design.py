@@ -14,8 +14,8 @@ from service.jobs.common.problem import ProblemRequest, arguments
 from service.jobs.common.results import PeakAt, Table, result_model
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
 from service.jobs.figures import SweepRecord
-from service.jobs.kind_view import Json, ReadSweep, StoredSweep
 from service.jobs.outputs import JobOutput
+from service.jobs.registry import Json, ReadSweep, StoredSweep
 from service.jobs.study import Answer, Watch
 from solver.errors import Issue
 from solver.scene.descriptions import DISK_LOAD

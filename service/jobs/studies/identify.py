@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import BeforeValidator, ConfigDict, Field
 
-from optim.criteria.json_types import Pair
+from optim.criteria.key import Pair
 from optim.errors import DesignError
 from optim.identification.result import Estimate, Identification
 from optim.problem.keys import MAX_VARIABLES, VariableName
@@ -71,7 +71,7 @@ class Identify(Study, HarmonicRequest):
     NAME, FUNCTION, RESULT = "identify", "optim:identify", IdentifyResult
     SHOWS = "estimates, intervals, what the data do not tell ([identification](identification.md))"
     EMPTY, COUNTED = ("runs", "there is no fit to draw"), "places"
-    FIGURE = "optim.views.plots.identification:identification_figure"
+    FIGURE = "optim.views.plots.designs:identification_figure"
 
     data: Annotated[
         list[dict[str, Any]], BeforeValidator(_small), Field(min_length=1, max_length=MOST_TABLES)

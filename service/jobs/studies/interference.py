@@ -10,11 +10,10 @@ from pydantic import ConfigDict, Field
 from service.jobs.common.results import result_model
 from service.jobs.common.scenes import PositiveNumber, check
 from service.jobs.common.sizes import memory_issues
-from service.jobs.kind_view import Json
-from service.jobs.registry import Flag
+from service.jobs.registry import Flag, Json
 from service.jobs.study import Study
 from solver.errors import Issue
-from solver.studies.interference_result import InterferenceDiagram
+from solver.studies.study_results import InterferenceDiagram
 
 if TYPE_CHECKING:
     from solver.scene.scene import Scene

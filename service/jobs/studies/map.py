@@ -12,15 +12,14 @@ from service.jobs.common.results import Curve, result_model
 from service.jobs.common.scenes import CHECKED_BY, SCENE, stored_scene
 from service.jobs.common.sizes import MOST_POINTS, balance_issues
 from service.jobs.common.study_keys import RangeRequest, law_issues, range_issues
-from service.jobs.kind_view import Json
 from service.jobs.outputs import JobOutput, OnProgress, ShouldStop
 from service.jobs.parts import Division, JobPart, PartOutput, PartStoppedError
-from service.jobs.registry import Flag, JobKind
+from service.jobs.registry import Flag, JobKind, Json
 from service.jobs.studies.peaks import PeaksResult
 from service.jobs.study import Study
 from solver.errors import Issue
 from solver.scene.descriptions import DISK_LOAD
-from solver.studies.map_result import ResponseMap
+from solver.studies.study_results import ResponseMap
 
 if TYPE_CHECKING:
     from solver.scene.scene import Scene

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 from pydantic import BeforeValidator, ConfigDict, Field, WithJsonSchema
 
-from optim.criteria.json_types import Name
+from optim.criteria.key import Name
 from service.jobs.arrays import decode, encode
 from service.jobs.common.results import Table, result_model
 from service.jobs.common.scenes import FrequencyHz, HarmonicRequest, stored_scene

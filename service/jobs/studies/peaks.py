@@ -11,8 +11,7 @@ from service.jobs.common.results import result_model
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
 from service.jobs.common.study_keys import RangeRequest, law_issues, range_issues
 from service.jobs.figures import SweepRecord
-from service.jobs.kind_view import Json, ReadSweep, StoredSweep
-from service.jobs.registry import Flag
+from service.jobs.registry import Flag, Json, ReadSweep, StoredSweep
 from service.jobs.study import Study
 from solver.errors import Issue
 from solver.scene.descriptions import DISK_LOAD

@@ -13,7 +13,7 @@ from service.jobs.common.study_keys import AUTO, EffectsWord, effects_issues, so
 from service.jobs.study import Answer, Study, Watch
 from solver.errors import Issue
 from solver.scene.descriptions import DISK_LOAD
-from solver.studies import plan_result
+from solver.studies import study_results
 
 if TYPE_CHECKING:
     from solver.scene.scene import Scene
@@ -21,9 +21,9 @@ if TYPE_CHECKING:
 EXAMPLE: dict[str, Any] = {"scene": "bladed-disk", "set": {DISK_LOAD: 150}}
 
 
-EffectResult = result_model(plan_result.Effect, "EffectResult")
+EffectResult = result_model(study_results.Effect, "EffectResult")
 PlanResult = result_model(
-    plan_result.Plan, "PlanResult", effects=list[EffectResult],  # type: ignore[valid-type]
+    study_results.Plan, "PlanResult", effects=list[EffectResult],  # type: ignore[valid-type]
 )  # fmt: skip
 
 

@@ -12,8 +12,7 @@ from service.jobs.common.results import PeakAt, result_model
 from service.jobs.common.scenes import HarmonicRequest, PositiveNumber
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
 from service.jobs.figures import SweepRecord
-from service.jobs.kind_view import Json
-from service.jobs.registry import Flag
+from service.jobs.registry import Flag, Json
 from service.jobs.study import Answer, Study, Watch
 from solver.errors import Issue
 

@@ -28,9 +28,8 @@ from service.jobs.common.study_keys import (
     solved_issues,
     with_effects,
 )
-from service.jobs.kind_view import Json, ReadSweep, StoredSweep
 from service.jobs.outputs import JobOutput, Progress, ShouldStop
-from service.jobs.registry import Flag, JobKind
+from service.jobs.registry import Flag, JobKind, Json, ReadSweep, StoredSweep
 from service.jobs.study import Answer, Study, Watch
 from solver.errors import Issue, Naming, SettingError, Shown
 from solver.scene.descriptions import DISK_LOAD
@@ -38,7 +37,8 @@ from solver.scene.descriptions import DISK_LOAD
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from solver import AnyBranch, Stretch
+    from solver import AnyBranch, Course, Stretch
+    from solver.jit.fourier import Real
     from solver.scene.scene import Scene
 
 FREQUENCY, SPEED = "frequency", "speed"
@@ -185,14 +185,14 @@ class Sweep(Study, HarmonicRequest):
 
 
 def _followed(
-    scene: Scene, asked: Mapping[str, Any], watch: Watch, **kept: Any
+    scene: Scene, asked: Mapping[str, Any], watch: Watch, course: Course | None = None
 ) -> tuple[Answer, list[AnyBranch]]:
     """Follow the branch, and those that leave it."""
     import solver
 
     given = with_effects(asked)
     multipliers, switched = given.pop("multipliers", False), given.pop("switched", False)
-    branch = solver.sweep(scene, **given, **watch._asdict(), **kept)
+    branch = solver.sweep(scene, **given, **watch._asdict(), course=course)
     found, branches = branch.to_json(), [branch]
     if multipliers:
         found |= solver.bifurcations(branch, multipliers=True).of_a_branch()
@@ -226,14 +226,12 @@ def _kept(
         if checkpoints.due():
             keep()
 
-    answer, branches = _followed(
-        scene, asked, Watch(progress, should_stop),
-        resume=solver.joined(known) if known else None,
-        on_stretch=add,
-        on_points=lambda values, amplitudes: progress.found(
-            list(zip(values.tolist(), amplitudes.tolist(), strict=True))
-        ),
-    )  # fmt: skip
+    def points(values: Real, amplitudes: Real) -> None:
+        progress.found(list(zip(values.tolist(), amplitudes.tolist(), strict=True)))
+
+    resume = solver.joined(known) if known else None
+    course = solver.Course(resume=resume, on_stretch=add, on_points=points)
+    answer, branches = _followed(scene, asked, Watch(progress, should_stop), course)
     if branches[0].status is solver.BranchStatus.STOPPED and fresh:
         keep()
     return answer, branches

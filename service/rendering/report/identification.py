@@ -62,7 +62,7 @@ def _estimates(scene: Scene, found: Json) -> str:
 
 def _fit(found: Json) -> list[str]:
     """The data with the fit and its band, and the runs they are of."""
-    from optim.views.plots.identification import identification_figure
+    from optim.views.plots.designs import identification_figure
 
     if not found["runs"]:
         return []

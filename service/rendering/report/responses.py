@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 import solver
 from optim.problem.cases import LoadCase, read_cases
 from optim.problem.uncertainty_set import Coordinate, Disk, How
-from service.jobs.common.linear_limits import linear_limit
+from service.jobs.common.scenes import linear_limit
 from solver.continuation.branch import AnyBranch, Branch
 from solver.continuation.branches.observation import observing
 from solver.results import units

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -34,13 +34,13 @@ from solver.continuation.kernels.pseudo_arclength import begin_walk, walk_on
 from solver.continuation.kernels.state import Control, walk_by_value
 from solver.continuation.loose_parts import balanced_part, ending
 from solver.continuation.peaks import Peak
-from solver.continuation.segment import Stretch, go_on_from, joined, rows_of, state_of
+from solver.continuation.segment import Course, Stretch, go_on_from, joined, rows_of, state_of
 from solver.continuation.settings import ContinuationSettings
 from solver.errors import SettingError
 from solver.jit.fourier import Integer, Real, to_full
 from solver.linear.modal import undamped_resonance
-from solver.results.default_bar import shows_progress
 from solver.results.notes import ABOVE_FRICTION
+from solver.results.watch import OnProgress, ShouldStop, shows_progress
 from solver.scene.bodies.paths import SPEED
 from solver.scene.parameter_paths import FREQUENCY
 from solver.scene.scene import Scene
@@ -77,14 +77,9 @@ def sweep(
     limit: float | None = None,
     settings: ContinuationSettings | None = None,
     effects: Effects | None = None,
-    errors: bool = True,
-    peaks: bool = True,
-    guess: Real | None = None,
-    resume: Stretch | None = None,
-    on_stretch: Callable[[Stretch], None] | None = None,
-    on_progress: Callable[[float, int], None] | None = None,
-    on_points: Callable[[Real, Real], None] | None = None,
-    should_stop: Callable[[], bool] | None = None,
+    course: Course | None = None,
+    on_progress: OnProgress = None,
+    should_stop: ShouldStop = None,
 ) -> Branch:
     """Follow the periodic response over a range of one parameter.
 
@@ -100,19 +95,12 @@ def sweep(
         `solver.continuation.branches.adaptive_harmonics.harmonics_for` for where and how it is judged.
     frequency_hz : excitation frequency [Hz], needed unless it is the parameter.
     limit : amplitude [m] above which the resonance band is measured; peak/√2 if left out.
-    settings : of the continuation.
+    settings : of the continuation, and whether peaks and errors are looked for.
     effects : what is paid for though the scene does not call for it; see
-    `solver.balance.simplifications.Effects`.
-    errors : whether the error of the highest peak is estimated; `with_error` does it later if not.
-    peaks : whether peaks and the band are looked for between the points; without them the branch has none.
-    guess : (n_unknowns,) slip motions [m] to start from, instead of the start-up ladder.
-    resume : the beginning of the same branch, to go on behind its last point.
-    on_stretch : called with all consecutive points as they are found; joined (`solver.joined`) they are what
-        `resume` takes.
+        `solver.balance.simplifications.Effects`.
+    course : where the branch begins, and who is given its points, before `on_progress`; nobody while
+        `accuracy` is looked for, which may begin again with more harmonics.
     on_progress : called with (share of the range reached, points so far).
-    on_points : called before it with the new points, at first with those of `resume`:
-        (k,) values in user units, (k,) amplitudes [m]; not while `accuracy` is looked for, which may begin
-        again with more harmonics.
     should_stop : asked between stretches of points; True ends the branch with the status STOPPED.
 
     Returns
@@ -127,8 +115,9 @@ def sweep(
     if parameter == SPEED and scene.speed_order is not None:
         parameter = FREQUENCY
         start, stop = (None if end is None else end * scene.speed_order / 60.0 for end in (start, stop))
+    course, settings = course or Course(), settings or ContinuationSettings()
     if accuracy is not None:
-        if guess is not None or resume is not None:
+        if course.guess is not None or course.resume is not None:
             raise SettingError(
                 "accuracy", accuracy, "cannot go with a guess or a beginning, whose harmonics are fixed"
             )
@@ -141,28 +130,25 @@ def sweep(
 
         return sweep_to(sweep_with, accuracy)
     begun = time.perf_counter()
-    settings = settings or ContinuationSettings()
     if parameter == "frequency":
         start = scene.observe.band[0] if start is None else start
         stop = scene.observe.band[1] if stop is None else stop
-    balance = build(
-        scene, parameter, harmonics=harmonics, frequency_hz=frequency_hz, effects=effects
-    )  # fmt: skip
+    balance = build(scene, parameter, harmonics=harmonics, frequency_hz=frequency_hz, effects=effects)
     first, last = check_range(balance.parameter, start, stop)
     check_limit(limit)
     workspace = Workspace.of(balance)
     stretches: list[Stretch] = []
     status, count = BranchStatus.TOO_MANY_POINTS, 0
-    for stretch in _covering(workspace, first, last, settings, guess, resume):
+    for stretch in _covering(workspace, first, last, settings, course):
         stretches.append(stretch)
         count += len(stretch.solutions)
-        if on_stretch is not None and stretch is not resume:
-            on_stretch(stretch)
+        if course.on_stretch is not None and stretch is not course.resume:
+            course.on_stretch(stretch)
         if stretch.status is not None:
             status = stretch.status
             break
-        if on_points is not None:
-            on_points(*_curve(balance, stretch))
+        if course.on_points is not None:
+            course.on_points(*_curve(balance, stretch))
         if on_progress is not None:
             here = float(balance.parameter.outside(stretch.solutions[-1, -1]))
             on_progress(min(max((here - first) / (last - first), 0.0), 1.0), count)
@@ -173,10 +159,10 @@ def sweep(
             break
     if status in _LOST and too_stiff(workspace, stretches):
         status = BranchStatus.TOO_STIFF
-    peaks = peaks and (settings.unfinished_peaks or status is BranchStatus.COMPLETED)
-    earlier = 0.0 if resume is None else resume.seconds
+    peaks = settings.peaks and (settings.unfinished_peaks or status is BranchStatus.COMPLETED)
+    earlier = 0.0 if course.resume is None else course.resume.seconds
     branch = _finish(workspace, stretches, status, first, last, limit, begun - earlier, peaks=peaks)
-    if errors:
+    if settings.errors:
         branch = with_error(branch, workspace)
     if on_progress is not None and branch.reached:
         on_progress(1.0, len(branch.values))
@@ -184,10 +170,10 @@ def sweep(
 
 
 def _covering(
-    workspace: Workspace, start: float, stop: float, settings: ContinuationSettings, guess: Real | None,
-    resume: Stretch | None,
-) -> Iterator[Stretch]:  # fmt: skip
+    workspace: Workspace, start: float, stop: float, settings: ContinuationSettings, course: Course
+) -> Iterator[Stretch]:
     """Yield the branch as `walk` does; what cannot be followed is solved by points where it is unique."""
+    resume = course.resume
     begun = time.perf_counter() - (0.0 if resume is None else resume.seconds)
     balance = workspace.balance
     first, last = balance.parameter.inside(start), balance.parameter.inside(stop)
@@ -197,7 +183,7 @@ def _covering(
         before = resume
         yield resume
     else:
-        for stretch in walk(workspace, start, stop, settings, guess, resume):
+        for stretch in walk(workspace, start, stop, settings, course.guess, resume):
             turned = rows_before_a_turn(stretch, first, last) if unique else None
             lost = unique and stretch.status in (BranchStatus.STALLED, BranchStatus.TURNED_BACK)
             if turned is None and not lost:

@@ -9,8 +9,8 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 import numpy as np
 
 from solver.arrays import Real
-from solver.modes.results import ModalCurve, NonlinearModeStatus
-from solver.results.views import Views
+from solver.modes.results import OF_CONTACTS, ModalCurve, NonlinearModeStatus
+from solver.results.views import Data, Views
 
 
 class HeldStatus(Enum):
@@ -40,7 +40,12 @@ class LeastForce(NamedTuple):
 class HeldAmplitude(ModalCurve):
     """Responses of one amplitude over the frequency, at the DOF that the scene observes; n points."""
 
-    VIEWS: ClassVar = Views("solver.views", "of_held", "held_dataset", "modes:held_figure")
+    VIEWS: ClassVar = Views("solver.views", "of_held", "modes:held_figure")
+    DATA: ClassVar = Data(
+        "controlled", {"point": "frequency=frequency_hz excitation excitation_error phase=phase_deg"
+         " max_abs stable=stable_words", **OF_CONTACTS, "point harmonic": "observed"},
+        "amplitude=held harmonics=n_harmonics",
+    )  # fmt: skip
     JSON: ClassVar = (
         "scene dof=scene.observe.dof amplitude=held completed=reached status frequency=frequency_hz"
         " excitation excitation_error phase=phase_deg max_abs contacts=contact_names states=state_words"
@@ -72,6 +77,11 @@ class HeldAmplitude(ModalCurve):
         return self.status is HeldStatus.COMPLETED
 
     @property
+    def stable_words(self) -> tuple[str, ...]:
+        """Whether each response is stable: yes, no, or empty where it is not known."""
+        return tuple({None: "", True: "yes", False: "no"}[one] for one in self.stable)
+
+    @property
     def changes(self) -> tuple[tuple[float, float, str], ...]:
         """Where the curve has a kink: two frequencies [Hz] between which a contact changes its state."""
         found = []
@@ -91,7 +101,11 @@ class HeldAmplitude(ModalCurve):
 class PhaseResonance(ModalCurve):
     """Responses in phase resonance over the amplitude; n points along the curve."""
 
-    VIEWS: ClassVar = Views("solver.views", "of_resonance", "resonance_dataset", "modes:resonance_figure")
+    VIEWS: ClassVar = Views("solver.views", "of_resonance", "modes:resonance_figure")
+    DATA: ClassVar = Data(
+        "phase-resonance", {"point": "amplitude frequency=frequency_hz excitation max_abs"},
+        "mode_number=mode",
+    )  # fmt: skip
     JSON: ClassVar = (
         "scene mode completed=reached status amplitude frequency=frequency_hz excitation"
         " dof=scene.observe.dof max_abs contacts=contact_names states=state_words seconds"

@@ -24,7 +24,7 @@ from solver.jit.fourier import Real
 from solver.modes.nonlinear_mode import pose
 from solver.modes.results import NonlinearMode
 from solver.results.base import Drawn
-from solver.results.views import Views
+from solver.results.views import Data, Views
 from solver.scene.bodies.kinematics import static_forces
 from solver.scene.scene import Scene
 
@@ -42,7 +42,11 @@ class LeastOverLoads(NamedTuple):
 class PerformanceCurve(Drawn):
     """Resonance peaks of one mode over the excitation, or over the loads; n points along the mode's curve."""
 
-    VIEWS: ClassVar = Views("solver.views", "of_performance", "performance_dataset", "of_performance")
+    VIEWS: ClassVar = Views("solver.views", "of_performance", "of_performance")
+    DATA: ClassVar = Data(
+        "performance", {"point": "excitation peak frequency=frequency_hz load peak_at_load"},
+        "mode_number=mode.mode", status="mode.status", scene="mode.scene",
+    )  # fmt: skip
     JSON: ClassVar = "excitation peak frequency=frequency_hz scales load peak_at_load least"
 
     mode: Annotated[NonlinearMode, "It is of."]
@@ -50,7 +54,7 @@ class PerformanceCurve(Drawn):
         Real, "Factor on every force of the scene's excitation at which its response has this peak, (n,)."
     ]
     peak: Annotated[Real, "max|x| of the observed DOF there [m], (n,)."]
-    frequency_hz: Annotated[Real, "Where the peak is, (n,)."]
+    frequency_hz: Annotated[Real, "Where the peak is [Hz], (n,)."]
     scales: Annotated[
         bool,
         "Whether forces, loads and motions grow together here; only then are `load` and `peak_at_load` "

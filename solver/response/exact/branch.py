@@ -19,8 +19,7 @@ from solver.response.exact.answer import solve_beside
 from solver.response.exact.orbit import Orbit
 from solver.response.known import known_of_solution
 from solver.response.solution import MEAN_UNDETERMINED, Solution
-from solver.results.known import Known
-from solver.results.verdict import Stable, Verdict
+from solver.results.known import Known, Stable, Verdict
 from solver.scene.scene import Scene
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -23,14 +23,14 @@ from solver.continuation.branches.sweep import check_limit, check_range
 from solver.continuation.certificate import uncertain
 from solver.continuation.extrema.extrema import band_limit
 from solver.continuation.peaks import Band, Edge, Peak
+from solver.continuation.segment import Course
 from solver.continuation.settings import ContinuationSettings
 from solver.errors import SettingError
-from solver.jit.fourier import Real
 from solver.response.contact_response import code_of
 from solver.response.exact.branch import ExactBranch, Orbits, Point
 from solver.response.exact.piecewise import FREE, STICK, MemberState, Piecewise
 from solver.response.solution import HISTORY_DEPENDENT, MEAN_UNDETERMINED, Solution, SolutionStatus
-from solver.results.default_bar import shows_progress
+from solver.results.watch import OnProgress, ShouldStop, shows_progress
 from solver.scene.scene import Scene
 
 _OFF = 0.02  # of the highest amplitude so far, by which a point may lie beside what is foreseen
@@ -56,9 +56,8 @@ _NOT_PROVEN = (
 def sweep_exactly(
     scene: Scene, parameter: str = "frequency", start: float | None = None, stop: float | None = None, *,
     harmonics: int = 11, frequency_hz: float | None = None, limit: float | None = None,
-    settings: ContinuationSettings | None = None, on_progress: Callable[[float, int], None] | None = None,
-    on_points: Callable[[Real, Real], None] | None = None, should_stop: Callable[[], bool] | None = None,
-    **others: Any,
+    settings: ContinuationSettings | None = None, course: Course | None = None,
+    on_progress: OnProgress = None, should_stop: ShouldStop = None, **others: Any,
 ) -> ExactBranch:  # fmt: skip
     """Return the exact responses over a range of one parameter; the arguments are those of `sweep`.
 
@@ -71,11 +70,12 @@ def sweep_exactly(
         of the scene that cannot stand beside rigid contacts.
     """
     begun = time.perf_counter()
-    unknown = others.keys() - {"guess", "resume", "accuracy", "effects", "errors", "on_stretch"}
+    unknown = others.keys() - {"accuracy", "effects"}
     if unknown:
         raise TypeError(f"sweep takes no {', '.join(sorted(unknown))}")
+    course = course or Course()
     for name in ("guess", "resume"):
-        if others.get(name) is not None:
+        if getattr(course, name) is not None:
             raise SettingError(name, "given", "is for scenes without rigid contacts: leave it out")
     orbits = Orbits.of(scene, parameter, harmonics, frequency_hz)
     by_frequency = orbits.parameter.kind is Kind.FREQUENCY
@@ -86,8 +86,8 @@ def sweep_exactly(
     check_limit(limit)
     walk = OrbitWalk(orbits, first, last, (settings or ContinuationSettings()).most_points)
     for point in walk.points():
-        if on_points is not None:
-            on_points(np.array([point.value]), np.array([point.height]))
+        if course.on_points is not None:
+            course.on_points(np.array([point.value]), np.array([point.height]))
         if on_progress is not None:
             on_progress((point.value - first) / (last - first), len(walk.found))
         if should_stop is not None and should_stop():

@@ -26,9 +26,9 @@ from solver.response.stability.residual_forces import AmplitudeRange, amplitude_
 from solver.response.stability.search import SolutionSearch
 from solver.response.stability.uniqueness import Uniqueness, uniqueness
 from solver.response.stability.verdict import verdict_of
-from solver.results.default_bar import shows_progress
+from solver.results.known import Stable, Verdict
 from solver.results.told import Piece
-from solver.results.verdict import Stable, Verdict
+from solver.results.watch import shows_progress
 from solver.scene.scene import Scene
 
 INCOMPLETE = "The list may be incomplete: no search finds every solution for certain."

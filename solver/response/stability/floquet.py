@@ -20,9 +20,8 @@ from solver.linear.contact_table import port_counts
 from solver.response.solution import Solution
 from solver.response.stability.monodromy import PERIOD, LinearPart, Monodromy, PeriodElement, monodromy
 from solver.results.base import Drawn
-from solver.results.default_bar import shows_progress
 from solver.results.views import Views
-from solver.results.watch import OnProgress, ShouldStop
+from solver.results.watch import OnProgress, ShouldStop, shows_progress
 from solver.scene.cyclic.annulus import annulus
 from solver.scene.scene import Scene
 
@@ -44,7 +43,7 @@ class Growth(Enum):
 class Stability(Drawn):
     """Whether small perturbations of a periodic response die out."""
 
-    VIEWS: ClassVar = Views("solver.views", "of_stability", "stability_dataset", "of_stability")
+    VIEWS: ClassVar = Views("solver.views", "of_stability", "of_stability", "stability_dataset")
     JSON: ClassVar = "stable growth radius neutral multipliers frequency_hz seconds"
 
     multipliers: Annotated[

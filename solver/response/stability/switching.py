@@ -20,6 +20,7 @@ from solver.balance.workspace import Workspace
 from solver.continuation.branch import AnyBranch, Branch
 from solver.continuation.branches.sweep import sweep
 from solver.continuation.marks import Mark, MarkKind
+from solver.continuation.segment import Course
 from solver.continuation.settings import ContinuationSettings
 from solver.errors import SettingError
 from solver.jit.fourier import Real
@@ -154,5 +155,6 @@ def _followed(branch: Branch, beside: Real, place: Real, settings: ContinuationS
     hertz = None if branch.parameter == "frequency" else balance.system.omega / (2.0 * math.pi)
     return sweep(
         balance.scene, branch.parameter, min(max(at, low), high), onward, harmonics=balance.n_harmonics,
-        frequency_hz=hertz, settings=settings, effects=balance.effects, guess=beside[:-1].copy(),
+        frequency_hz=hertz, settings=settings, effects=balance.effects,
+        course=Course(guess=beside[:-1].copy()),
     )  # fmt: skip

@@ -18,7 +18,7 @@ from solver.linear.contact_table import port_counts
 from solver.response.stability.cost import forecast
 from solver.response.stability.uniqueness import MONOTONE, monotone
 from solver.results import units
-from solver.results.verdict import Stable, Verdict
+from solver.results.known import Stable, Verdict
 from solver.scene.scene import Scene
 
 if TYPE_CHECKING:

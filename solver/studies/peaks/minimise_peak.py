@@ -17,7 +17,7 @@ import numpy as np
 from solver.balance.simplifications import Effects
 from solver.errors import SettingError
 from solver.first_use import renamed
-from solver.results.default_bar import shows_progress
+from solver.results.watch import shows_progress
 from solver.scene.scene import Scene
 from solver.studies.peaks.envelope_minimum import DOUBT, Lowest, flat, minima, rows_at
 from solver.studies.peaks.plateau import Plateau, all_level, choose, dips, interval, look_at

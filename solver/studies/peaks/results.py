@@ -13,7 +13,7 @@ from solver.errors import SettingError
 from solver.results.base import Drawn, MadeOfResponses
 from solver.results.known import Known
 from solver.results.told import Piece
-from solver.results.views import Views
+from solver.results.views import Data, Views
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -102,7 +102,11 @@ class Basin(Piece):
 class LeastPeak(MadeOfResponses):
     """Where the highest peak is least."""
 
-    VIEWS: ClassVar = Views("solver.views", "of_least", "least_dataset")
+    VIEWS: ClassVar = Views("solver.views", "of_least")
+    DATA: ClassVar = Data(
+        "least", {"minimum=basins": "parameter=at peak solved proven"}, "least_at=at least_peak=peak",
+        scene="branch.balance.scene",
+    )  # fmt: skip
     JSON: ClassVar = "at peak active plateau chosen_by"
 
     status: Annotated[TrackStatus, "How it ended; proven only if `status.proven`."]
@@ -169,7 +173,12 @@ class CompetingPeak(Piece):
 class PeakTrack(MadeOfResponses, Drawn):
     """The highest peak over a parameter; where two peaks change places both are listed."""
 
-    VIEWS: ClassVar = Views("solver.views", "of_track", "track_dataset", "of_track")
+    VIEWS: ClassVar = Views("solver.views", "of_track", "of_track")
+    DATA: ClassVar = Data(
+        "peaks", {"point": "parameter peak frequency slope"},
+        "parameter=parameter_path harmonics=n_harmonics least_at=optimum.at least_peak=optimum.peak",
+        scene="given",
+    )  # fmt: skip
     JSON: ClassVar = (
         "scene parameter parameter_path unit peak frequency slope optimum exchanges competing peaks_open"
         " n_harmonics sweeps seconds completed=reached status"

@@ -20,7 +20,7 @@ from solver.continuation.branches.sweep import sweep, walk
 from solver.continuation.extrema.candidates import Rival, crests
 from solver.continuation.extrema.kernels.peak_continuation import DHEIGHT, DOMEGA, HEIGHT, OMEGA, Z
 from solver.continuation.peaks import Peak
-from solver.continuation.segment import Stretch
+from solver.continuation.segment import Course, Stretch
 from solver.continuation.settings import ContinuationSettings
 from solver.jit.fourier import Integer, Real
 from solver.scene.scene import Scene
@@ -210,9 +210,14 @@ def sweep_within(scene: Scene, harmonics: int, effects: Effects | None, allowanc
         return False
 
     try:
-        return sweep(scene, harmonics=harmonics, effects=effects, on_stretch=watch, should_stop=stop)
+        return sweep(
+            scene, harmonics=harmonics, effects=effects, course=Course(on_stretch=watch), should_stop=stop
+        )
     except _TooLongError:
-        begun = sweep(scene, harmonics=harmonics, effects=effects, peaks=False, should_stop=lambda: True)
+        settings = ContinuationSettings(peaks=False)
+        begun = sweep(
+            scene, harmonics=harmonics, effects=effects, settings=settings, should_stop=lambda: True
+        )
         return replace(begun, newton_iterations=spent)
 
 

@@ -17,7 +17,7 @@ from solver.balance.simplifications import Effects
 from solver.continuation.extrema.kernels.peak_continuation import DHEIGHT, HEIGHT, OMEGA, Z
 from solver.errors import SettingError
 from solver.jit.fourier import Real
-from solver.results.default_bar import shows_progress
+from solver.results.watch import shows_progress
 from solver.scene.scene import Scene
 from solver.studies.peaks.minimise_peak import COMPETES, MOST_LOOKS, THOROUGHLY, halted, prove
 from solver.studies.peaks.proof import EQUAL

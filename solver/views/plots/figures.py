@@ -23,7 +23,7 @@ from solver.views.plots.style import Into
 from solver.views.plots.tracks import map_figure, track_figure
 
 if TYPE_CHECKING:
-    from solver.studies.map_result import ResponseMap
+    from solver.studies.study_results import ResponseMap
 
 
 def of_branch(branch: AnyBranch, ax: Into = None, *, limit: float | None = None) -> Figure:

@@ -16,8 +16,8 @@ from solver.views.plots.responses import axis_name
 from solver.views.plots.style import Into
 
 if TYPE_CHECKING:
-    from solver.studies.map_result import ResponseMap
     from solver.studies.peaks.results import PeakTrack
+    from solver.studies.study_results import ResponseMap
 
 _LOGARITHMIC_FROM = 5.0  # ratio of the ends from which an axis is logarithmic
 _SAME_FREQUENCY = 2e-3  # relative distance from a tracked peak within which a point lies on it

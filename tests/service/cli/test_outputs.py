@@ -12,8 +12,8 @@ import optim
 import solver
 from service.cli import main
 from service.jobs.drawing import result_figure
-from service.jobs.kind_view import NothingToDrawError
 from service.jobs.kinds import SHIPPED
+from service.jobs.registry import NothingToDrawError
 
 COMMANDS = {
     "solve": "two-dof --frequency 1.2 --harmonics 3",

@@ -8,8 +8,7 @@ import sys
 
 import pytest
 
-from service.cli.lazy import CommandEntry, CommandGroup, Deferred
-from service.cli.table import TOP
+from service.cli.table import TOP, CommandEntry, CommandGroup, Deferred
 
 SERVICE = {"fastapi", "sqlalchemy", "alembic", "httpx", "uvicorn", "pydantic_settings", "prometheus_client"}
 PICTURES = {"matplotlib", "pandas", "xarray", "pyarrow"}

@@ -23,6 +23,7 @@ from solver.balance.kernels.output import RESIDUAL
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.stick_slip_events import LIFTING
 from solver.continuation.branches.sweep import walk
+from solver.continuation.segment import Course
 from solver.marching.result import MarchStatus
 
 LAW = 3e-4  # of the largest friction force: what sampling leaves
@@ -229,7 +230,7 @@ def test_a_branch_reached_over_the_load_goes_on_over_the_frequency():
     scene = two_dof(N1=150.0)
     even = Workspace.of(build(scene)).balance.n_unknowns == over_load.balance.n_unknowns
     guess = over_load.solutions[-1, :-1] if even else None
-    detour = sweep(scene, start=1.1, stop=2.6, guess=guess)
+    detour = sweep(scene, start=1.1, stop=2.6, course=Course(guess=guess))
     straight = sweep(scene, start=1.1, stop=2.6)
     assert detour.reached
     assert detour.peak is not None

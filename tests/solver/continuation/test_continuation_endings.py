@@ -12,6 +12,7 @@ from scene_cases import bladed_disk, oscillator, two_dof
 
 from solver import BranchStatus, ContinuationSettings, SettingError, sweep
 from solver.balance.kernels.output import MAX_ABS
+from solver.continuation.segment import Course
 from solver.jit.fourier import to_complex
 
 
@@ -76,7 +77,7 @@ def test_progress_rises_to_one():
 
 def test_a_guess_is_used():
     branch = sweep(two_dof(), start=1.0, stop=1.1)
-    again = sweep(two_dof(), start=1.1, stop=1.2, guess=branch.solutions[-1, :-1])
+    again = sweep(two_dof(), start=1.1, stop=1.2, course=Course(guess=branch.solutions[-1, :-1]))
     assert again.reached
     assert again.amplitude[0] == pytest.approx(branch.amplitude[-1], rel=1e-9)
     fresh = sweep(two_dof(), start=1.1, stop=1.2)

@@ -11,6 +11,7 @@ from scene_cases import bladed_disk, two_dof
 import solver
 from solver import ContinuationSettings, SettingError, Stretch, joined, sweep
 from solver.continuation.branch import Branch, BranchStatus
+from solver.continuation.segment import Course
 from solver.scene.scene import Scene
 
 FINE = ContinuationSettings(largest_step=0.05)
@@ -47,14 +48,14 @@ def stored(stretches: list[Stretch]) -> Stretch:
 def test_a_resumed_branch_is_the_branch(name: str) -> None:
     scene, arguments = CASES[name]
     stretches: list[Stretch] = []
-    whole = sweep(scene, settings=FINE, on_stretch=stretches.append, **arguments)
+    whole = sweep(scene, settings=FINE, course=Course(on_stretch=stretches.append), **arguments)
     assert whole.reached
     assert len(stretches) >= 3
     if name == "folds":
         assert whole.folds >= 2
     for cut in (1, len(stretches) // 2, len(stretches) - 1, len(stretches)):
         beginning = stored(stretches[:cut])
-        resumed = sweep(scene, settings=FINE, resume=beginning, **arguments)
+        resumed = sweep(scene, settings=FINE, course=Course(resume=beginning), **arguments)
         assert_same(resumed, whole, len(beginning.solutions))
 
 
@@ -88,8 +89,7 @@ def test_resumed_twice_and_stopped_between() -> None:
         branch = sweep(
             two_dof(),
             settings=FINE,
-            resume=joined(kept) if kept else None,
-            on_stretch=kept.append,
+            course=Course(resume=joined(kept) if kept else None, on_stretch=kept.append),
             on_progress=lambda share, _points: shares.append(share),
             should_stop=partial(more_than, kept, attempt),
         )
@@ -103,7 +103,7 @@ def test_resumed_twice_and_stopped_between() -> None:
 
 def test_the_beginning_of_another_branch_is_refused() -> None:
     stretches: list[Stretch] = []
-    sweep(two_dof(), settings=FINE, on_stretch=stretches.append)
+    sweep(two_dof(), settings=FINE, course=Course(on_stretch=stretches.append))
     beginning = joined(stretches[: len(stretches) // 2])
     others = [
         (two_dof(N0=90.0), {}),
@@ -113,17 +113,17 @@ def test_the_beginning_of_another_branch_is_refused() -> None:
     ]
     for scene, arguments in others:
         with pytest.raises(SettingError, match="`resume` must be the beginning of the same branch"):
-            sweep(scene, settings=FINE, resume=beginning, **arguments)
+            sweep(scene, settings=FINE, course=Course(resume=beginning), **arguments)
     with pytest.raises(SettingError, match="accuracy"):
-        sweep(two_dof(), resume=beginning, accuracy=1e-3)
+        sweep(two_dof(), course=Course(resume=beginning), accuracy=1e-3)
 
 
 def test_the_most_points_are_those_of_both_parts() -> None:
     settings = ContinuationSettings(largest_step=0.05, most_points=150)
     stretches: list[Stretch] = []
-    whole = sweep(two_dof(), settings=settings, on_stretch=stretches.append)
+    whole = sweep(two_dof(), settings=settings, course=Course(on_stretch=stretches.append))
     later: list[Stretch] = []
-    resumed = sweep(two_dof(), settings=settings, resume=stretches[0], on_stretch=later.append)
+    resumed = sweep(two_dof(), settings=settings, course=Course(resume=stretches[0], on_stretch=later.append))
     assert whole.status is resumed.status is BranchStatus.TOO_MANY_POINTS
     followed = [
         sum(len(stretch.solutions) for stretch in each) for each in (stretches, stretches[:1] + later)

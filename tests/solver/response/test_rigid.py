@@ -14,7 +14,7 @@ from scipy.optimize import brentq
 
 import stickslip
 from solver.response.solution import SolutionStatus
-from solver.results.verdict import Stable
+from solver.results.known import Stable
 from solver.scene.json_schema import scene_schema
 from solver.scene.toml import toml_text
 

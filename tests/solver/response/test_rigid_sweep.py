@@ -13,7 +13,7 @@ from test_rigid import one_mass, pressed, random_scene, with_stops, without_stop
 import stickslip
 from solver.continuation.branch import Branch
 from solver.response.exact.branch import ExactBranch
-from solver.results.verdict import Stable
+from solver.results.known import Stable
 from solver.studies.peaks.track_peak import track_peak
 
 
@@ -172,7 +172,9 @@ def test_it_is_watched_and_stopped() -> None:
     shares: list[float] = []
     found = stickslip.sweep(
         damped(0.4, 0.05), start=0.1, stop=0.2,
-        on_points=lambda values, amplitudes: (seen.extend(values), heights.extend(amplitudes)),
+        course=stickslip.branches.Course(
+            on_points=lambda values, amplitudes: (seen.extend(values), heights.extend(amplitudes))
+        ),
         on_progress=lambda share, _count: shares.append(share), should_stop=lambda: len(seen) == 7,
     )  # fmt: skip
     assert found.status is stickslip.branches.BranchStatus.STOPPED
@@ -200,7 +202,7 @@ def test_what_needs_a_balance_refuses_by_name() -> None:
     assert not isinstance(branch, Branch)
     for name in ("guess", "resume"):
         with pytest.raises(stickslip.SettingError, match=name):
-            stickslip.sweep(scene, **{name: np.zeros(3)})
+            stickslip.sweep(scene, course=stickslip.branches.Course(**{name: np.zeros(3)}))
     for start, stop, limit, key in (
         (0.1, 0.1, None, "stop"),
         (-1.0, 1.0, None, "start"),

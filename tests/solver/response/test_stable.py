@@ -15,7 +15,7 @@ import optim
 from solver import Scene, march, plan, solve, solve_all, sweep
 from solver.response.stability import verdict
 from solver.response.stability.cost import forecast
-from solver.results.verdict import Stable
+from solver.results.known import Stable
 from solver.studies.instant import start_of
 
 BOX: dict[str, Any] = json.loads((Path(__file__).parents[2] / "data" / "unstable_box.json").read_text())

@@ -11,8 +11,8 @@ import solver
 from solver.balance.workspace import PointSolution, Workspace
 from solver.errors import SettingError
 from solver.studies import response_map as maps
-from solver.studies.map_result import MapStatus
 from solver.studies.response_map import response_map
+from solver.studies.study_results import MapStatus
 
 
 @pytest.fixture(scope="module")

@@ -102,7 +102,8 @@ def test_a_result_says_what_it_is(result: Any) -> None:
 
 # What a user gives, and what is short by itself.
 NOT_LOOKED_AT = {
-    "Case", "ContinuationSettings", "Effects", "Issue", "LawParameter", "Limit", "MarchStart", "Summary",
+    "Case", "ContinuationSettings", "Course", "Effects", "Issue", "LawParameter", "Limit", "MarchStart",
+    "Summary",
 }  # fmt: skip
 
 
@@ -154,7 +155,9 @@ def test_everything_is_told_in_one_line() -> None:
     assert repr(scene) == str(scene)
     assert repr(scene) == "<Scene two-dof: lumped, 2 DOFs, contacts damper, m2 observed from 0.2 to 2.6 Hz>"
     stretches: list[solver.Stretch] = []
-    branch = solver.sweep(scene, "frequency", 0.8, 1.4, harmonics=3, on_stretch=stretches.append)
+    branch = solver.sweep(
+        scene, "frequency", 0.8, 1.4, harmonics=3, course=solver.Course(on_stretch=stretches.append)
+    )
     solution = solver.solve(scene, frequency_hz=1.2, harmonics=3)
     data = branch.to_dataset()
     points = len(branch.values)

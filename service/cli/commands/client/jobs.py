@@ -1,28 +1,141 @@
-"""The commands that talk to a running service: watch, results, and what every submission does."""
+"""The commands about jobs of a running service: watch, results, the stored designs, and every submission."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
-from service.cli.commands.client import stored_designs
 from service.cli.failures import BAD_INPUT, FELL_SHORT
 from service.cli.options import inputs, problem_inputs
 from service.cli.options import shared as options
+from service.cli.options.inputs import amount, count
 from service.cli.options.parameters import given_key
 from service.cli.options.scene_files import scene_to_submit, uploaded
 from service.cli.progress import bar
 from service.errors import InputError
 from service.rendering.plain import print_result
 from service.rendering.tables.text import print_json, print_table, say
+from solver.results import units
+from solver.scene.parameter_paths import parameter
 
 if TYPE_CHECKING:
     from service.client.client import Client
-    from service.schemas.answers import JobAnswer, ResultsAnswer
+    from service.schemas.answers import AnswerModel, JobAnswer, ResultsAnswer
+
+
+MOST = 50
+_T = TypeVar("_T")
+_OPTIONS = {"peak_max": "--peak-max", "band_max": "--band-max", "limit": "--count"}
+
+OfScene = Annotated[
+    str | None, typer.Option("--scene", metavar="NAME", help="Designs of this scene; for the list.")
+]
+OfVariable = Annotated[
+    str | None, typer.Option("--variable", metavar="PATH", help="Designs that chose it; for the list.")
+]
+PeakMax = Annotated[
+    float | None,
+    amount("--peak-max", "A", "Highest peak at most [m]; for the list."),
+]
+BandMax = Annotated[
+    float | None,
+    amount("--band-max", "HZ", "Band at most [Hz]; for the list."),
+]
+Reached = Annotated[
+    bool | None,
+    typer.Option(
+        "--reached/--missed", help="Whether the goal was reached; for the list.", show_default=False
+    ),
+]
+Sort = Annotated[
+    str | None,
+    typer.Option(
+        "--sort", metavar="KEY",
+        help="created, objective, peak, peak_at, band, work or seconds, largest first with - before it; "
+        "-created.",
+    ),
+]  # fmt: skip
+Most = Annotated[
+    int | None,
+    count("--count", "N", f"At most so many; {MOST}."),
+]
+
+
+def refuse_filters(filters: Mapping[str, Any]) -> None:
+    """Refuse the filters of the list beside a job."""
+    for name, value in filters.items():
+        if value is not None:
+            option = _OPTIONS.get(name, f"--{name}")
+            raise InputError(f"`{option}` is for the list of stored designs, leave JOB out; got {value!r}")
+
+
+def stored_designs(client: Client, filters: Mapping[str, Any]) -> dict[str, Any]:
+    """The stored designs that meet the filters of ``GET /v1/designs``."""
+    others = {name: value for name, value in filters.items() if name != "limit"}
+    found = listed(client.designs, filters["limit"], **others)
+    return {"items": [one.model_dump(mode="json") for one in found]}
+
+
+def show_designs(found: Mapping[str, Any], *, as_json: bool) -> None:
+    """Print the list."""
+    if as_json:
+        print_json(found)
+        return
+    rows = [
+        (
+            one["id"],
+            one["scene"],
+            ", ".join(_chosen(name, variable["value"]) for name, variable in one["variables"].items()),
+            "" if one["peak"] is None else units.length(one["peak"]["value"]),
+            "" if one["band_hz"] is None else f"{units.number(one['band_hz'])} Hz",
+            "yes" if one["reached"] else "no",
+        )
+        for one in found["items"]
+    ]
+    print_table("Stored designs", ("id", "scene", "design", "peak", "band", "reached"), rows, right="34")
+
+
+def _chosen(name: str, value: float | None) -> str:
+    return name if value is None else f"{name} = {parameter(name, value)}"
+
+
+def listed(ask: Callable[..., Iterator[_T]], count: int | None, **filters: Any) -> list[_T]:
+    """The first of what a list holds, as many as ``--count`` says.
+
+    Raises
+    ------
+    InputError
+        It says less than one.
+    """
+    most = MOST if count is None else count
+    if most < 1:
+        raise InputError(f"`--count` must be >= 1, got {most!r}")
+    return list(islice(ask(**filters, limit=min(most, 1000)), most))
+
+
+def tell_list(
+    found: Sequence[AnswerModel], title: str, columns: Sequence[str], rows: Iterable[Sequence[str]],
+    *, right: str, as_json: bool,
+) -> None:  # fmt: skip
+    """Print a list: one JSON object, or a table as of `print_table`."""
+    if as_json:
+        print_json({"items": [one.model_dump(mode="json") for one in found]})
+    else:
+        print_table(title, columns, rows, right=right)
+
+
+def tell(answer: AnswerModel, words: str, *, as_json: bool) -> None:
+    """Print one JSON object, or `words`."""
+    if as_json:
+        print_json(answer.model_dump(mode="json"))
+    else:
+        say(words)
+
 
 _INPUT_FAILURES = ("scene", "setting")
 
@@ -42,13 +155,13 @@ def results(
     job: Annotated[
         str | None, typer.Argument(metavar="[JOB]", help="Id of a job; the stored designs if left out.")
     ] = None,
-    scene: stored_designs.OfScene = None,
-    variable: stored_designs.OfVariable = None,
-    peak_max: stored_designs.PeakMax = None,
-    band_max: stored_designs.BandMax = None,
-    reached: stored_designs.Reached = None,
-    sort: stored_designs.Sort = None,
-    limit: stored_designs.Count = None,
+    scene: OfScene = None,
+    variable: OfVariable = None,
+    peak_max: PeakMax = None,
+    band_max: BandMax = None,
+    reached: Reached = None,
+    sort: Sort = None,
+    limit: Most = None,
     out: Annotated[
         str | None, typer.Option("--out", metavar="F", help="Also write the JSON object to a file.")
     ] = None,
@@ -69,12 +182,12 @@ def results(
         if picture is not None:
             raise InputError("`--plot` needs a JOB: a list is not drawn")
         with client_of(url) as client:
-            listed = stored_designs.listed(client, filters)
+            designs = stored_designs(client, filters)
         if file is not None:
-            _write(file, listed)
-        stored_designs.show(listed, as_json=as_json)
+            _write(file, designs)
+        show_designs(designs, as_json=as_json)
         return
-    stored_designs.refuse_filters(filters)
+    refuse_filters(filters)
     with client_of(url) as client:
         ended = client.job(job)
         answer = client.results(job)
@@ -151,7 +264,7 @@ def _show(job: JobAnswer, answer: ResultsAnswer, *, as_json: bool) -> None:
 
 def _draw(client: Client, kind: str, answer: ResultsAnswer, picture: Path) -> None:
     from service.jobs.drawing import result_figure
-    from service.jobs.kind_view import NothingToDrawError
+    from service.jobs.registry import NothingToDrawError
     from service.settings.kinds import registry_here
     from solver.views.plots.html import save
 

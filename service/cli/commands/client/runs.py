@@ -1,4 +1,4 @@
-"""The commands about runs of a service: listed, named, put in the bin, compared, shared."""
+"""The commands about runs and projects of a service: listed, named, put in the bin, compared, shared."""
 
 from __future__ import annotations
 
@@ -6,8 +6,7 @@ from typing import Annotated, Any
 
 import typer
 
-from service.cli.commands.client.jobs import client_of
-from service.cli.commands.client.told import MOST, listed, tell, tell_list
+from service.cli.commands.client.jobs import MOST, client_of, listed, tell, tell_list
 from service.cli.options import shared as options
 from service.cli.options.inputs import amount, count
 from service.errors import InputError
@@ -144,3 +143,63 @@ def _word(value: Any) -> str:
     if value is None:
         return ""
     return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+Project = Annotated[str, typer.Argument(metavar="PROJECT", help="Id of a project.")]
+NewName = Annotated[str, typer.Argument(metavar="NAME", help="Name of the project.")]
+
+
+def show_projects(
+    text: Text = None,
+    deleted: Binned = False,
+    limit: Count = None,
+    as_json: options.Json = False,
+    url: options.Url = options.DEFAULT_URL,
+) -> None:
+    """List the projects, newest first."""
+    with client_of(url) as client:
+        found = listed(client.projects, limit, text=text, deleted=deleted)
+    rows = [(one.id, one.name, str(one.runs), f"{one.changed:%Y-%m-%d %H:%M}") for one in found]
+    columns = ("id", "name", "runs", "changed [UTC]")
+    tell_list(found, "Projects", columns, rows, right="2", as_json=as_json)
+
+
+def create_project(
+    name: NewName,
+    notes: Notes = None,
+    as_json: options.Json = False,
+    url: options.Url = options.DEFAULT_URL,
+) -> None:
+    """Make a project and print its id."""
+    with client_of(url) as client:
+        made = client.make_project(name, notes or "")
+    tell(made, made.id, as_json=as_json)
+
+
+def change_project(
+    project: Project,
+    name: Name = None,
+    notes: Notes = None,
+    as_json: options.Json = False,
+    url: options.Url = options.DEFAULT_URL,
+) -> None:
+    """Change name or notes of a project."""
+    changes = given_of(name=name, notes=notes)
+    with client_of(url) as client:
+        tell(client.change_project(project, **changes), f"project {project} is changed", as_json=as_json)
+
+
+def delete_project(
+    project: Project, as_json: options.Json = False, url: options.Url = options.DEFAULT_URL
+) -> None:
+    """Put a project in the bin; its runs stay."""
+    with client_of(url) as client:
+        tell(client.delete_project(project), f"project {project} is in the bin", as_json=as_json)
+
+
+def restore_project(
+    project: Project, as_json: options.Json = False, url: options.Url = options.DEFAULT_URL
+) -> None:
+    """Take a project out of the bin."""
+    with client_of(url) as client:
+        tell(client.restore_project(project), f"project {project} is out of the bin", as_json=as_json)

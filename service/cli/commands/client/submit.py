@@ -10,7 +10,6 @@ from typer.core import TyperCommand, TyperGroup
 
 from optim.problem.keys import options as key_options_of
 from service.cli.commands.client.jobs import hand_in, scene_of
-from service.cli.lazy import CommandEntry
 from service.cli.options import problem_inputs
 from service.cli.options import shared as options
 from service.cli.options.key_options import (
@@ -20,8 +19,8 @@ from service.cli.options.key_options import (
     options_of,
 )
 from service.cli.options.parameters import Command, keyed, keyword, with_parameters
-from service.cli.options.problem import FLAGS, ProblemFlags, takes_problem
-from service.cli.table import TOP
+from service.cli.options.problem_inputs import FLAGS, ProblemFlags, takes_problem
+from service.cli.table import TOP, CommandEntry
 from service.jobs.registry import ABOUT_THE_RUN, JobKind
 from service.settings.kinds import registry_here
 

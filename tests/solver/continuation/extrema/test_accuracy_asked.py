@@ -14,6 +14,7 @@ from scene_cases import bladed_disk, loose_mass, oscillator, two_dof
 from service.cli import main
 from solver import BranchStatus, Scene, SettingError, SolutionStatus, branch_errors, solve, sweep
 from solver.continuation.branches import adaptive_harmonics as adaptive
+from solver.continuation.segment import Course
 
 CASES = {
     "slipping": (two_dof(), 1.2),
@@ -132,7 +133,7 @@ def test_bad_accuracies(accuracy: Any):
 
 def test_a_guess_has_its_own_harmonics():
     with pytest.raises(SettingError, match="guess"):
-        sweep(two_dof(), accuracy=1e-3, guess=np.zeros(23))
+        sweep(two_dof(), accuracy=1e-3, course=Course(guess=np.zeros(23)))
 
 
 def test_on_the_command_line(capsys: pytest.CaptureFixture[str]):

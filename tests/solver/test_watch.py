@@ -12,15 +12,15 @@ import pytest
 
 import optim
 import solver
-from solver.results import default_bar
-from solver.results.default_bar import Bar, is_watched, shows_progress
+from solver.results import watch
+from solver.results.watch import Bar, is_watched, shows_progress
 
 ROOT = Path(__file__).resolve().parents[2]
 
 
 def test_nobody_watches_a_pipe(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
-    monkeypatch.delenv(default_bar.SETTING, raising=False)
-    monkeypatch.setattr(default_bar, "PATIENCE", 0.0)
+    monkeypatch.delenv(watch.SETTING, raising=False)
+    monkeypatch.setattr(watch, "PATIENCE", 0.0)
     assert not is_watched()
     solver.sweep(solver.load_scene("two-dof"), harmonics=3)
     assert capfd.readouterr().err == ""
@@ -45,9 +45,9 @@ def test_a_bar_says_how_far_it_is_and_leaves_nothing(capsys: pytest.CaptureFixtu
 def test_what_runs_within_another_has_no_bar_of_its_own(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setenv(default_bar.SETTING, "1")
-    monkeypatch.setattr(default_bar, "PATIENCE", 0.0)
-    monkeypatch.setattr(default_bar, "PAUSE", 0.0)
+    monkeypatch.setenv(watch.SETTING, "1")
+    monkeypatch.setattr(watch, "PATIENCE", 0.0)
+    monkeypatch.setattr(watch, "PAUSE", 0.0)
     scene = solver.load_scene("two-dof")
     optim.design(scene, harmonics=3)
     written = capsys.readouterr().err
@@ -73,10 +73,10 @@ def test_only_what_tells_its_progress_can_have_one() -> None:
 def test_a_terminal_shows_it_and_the_command_has_its_own() -> None:
     """In a process whose standard error is a terminal; without a tenth of a second of patience."""
     code = (
-        "from solver.results import default_bar as d; d.PATIENCE = d.PAUSE = 0.0\n"
+        "from solver.results import watch as d; d.PATIENCE = d.PAUSE = 0.0\n"
         "import solver; solver.sweep(solver.load_scene('two-dof'), harmonics=3)"
     )
-    environment = {key: value for key, value in os.environ.items() if key != default_bar.SETTING}
+    environment = {key: value for key, value in os.environ.items() if key != watch.SETTING}
     ours, theirs = pty.openpty()
     try:
         subprocess.run([sys.executable, "-c", code], cwd=ROOT, stderr=theirs, check=True, env=environment)

@@ -1,4 +1,4 @@
-"""Results as NetCDF 3, the form that every reader knows, through SciPy alone."""
+"""Data sets as NetCDF 3, which every reader knows, through SciPy alone; tables as Parquet."""
 
 from __future__ import annotations
 
@@ -9,13 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.results.dataset import Dataset, Variable
+from solver.errors import MissingExtraError
+from solver.results.dataset import ROW, Dataset, Variable
 
 _ROWS, _KIND = "stickslip_rows", "kind"
 _TEXT = "string_of_"  # dimensions of characters, joined to texts by readers
 
 
-def write(data: Dataset, path: Path) -> None:
+def write_netcdf(data: Dataset, path: Path) -> None:
     """Write every variable with its unit; texts as characters, booleans and integers as NetCDF has them."""
     from scipy.io import netcdf_file
 
@@ -36,8 +37,8 @@ def write(data: Dataset, path: Path) -> None:
             setattr(file, key, value.encode() if isinstance(value, str) else value)
 
 
-def read(path: Path) -> Dataset:
-    """Read what `write` wrote.
+def read_netcdf(path: Path) -> Dataset:
+    """Read what `write_netcdf` wrote.
 
     Raises
     ------
@@ -90,3 +91,57 @@ def _plain(value: Any) -> Any:
     if isinstance(value, bytes):
         return value.decode()
     return value.item() if isinstance(value, (np.generic, np.ndarray)) else value
+
+
+_KEY = b"stickslip"
+
+
+def write_parquet(data: Dataset, path: Path) -> None:
+    """Write the table of a dataset; MissingExtraError without pyarrow."""
+    pa, pq = _pyarrow()
+    columns = data.table().variables
+    fields = [pa.field(name, _type(pa, v), metadata=v.attributes or None) for name, v in columns.items()]
+    about = json.dumps({"kind": data.kind, "attributes": dict(data.attributes)})
+    schema = pa.schema(fields, metadata={_KEY: about.encode()})
+    pq.write_table(pa.table([pa.array(v.values) for v in columns.values()], schema=schema), path)
+
+
+def read_parquet(path: Path) -> Dataset:
+    """Read a table that `write_parquet` wrote, or any other.
+
+    Raises
+    ------
+    OSError, ValueError
+        Not a Parquet file.
+    MissingExtraError
+        pyarrow is not installed.
+    """
+    _, pq = _pyarrow()
+    table = pq.read_table(path)
+    about = json.loads((table.schema.metadata or {}).get(_KEY, b"{}"))
+    variables = {}
+    for field, column in zip(table.schema, table.columns, strict=True):
+        notes = {key.decode(): text.decode() for key, text in (field.metadata or {}).items()}
+        values = column.to_numpy()
+        variables[field.name] = Variable(
+            dims=(ROW,), values=values.astype(np.str_) if values.dtype.kind == "O" else values,
+            unit=notes.get("units", ""), about=notes.get("long_name", ""),
+        )  # fmt: skip
+    return Dataset(
+        kind=about.get("kind", "table"), rows=(ROW,), variables=variables,
+        attributes=about.get("attributes", {}),
+    )  # fmt: skip
+
+
+def _type(pa: Any, variable: Variable) -> Any:
+    kind = variable.values.dtype
+    return pa.string() if kind.kind == "U" else pa.from_numpy_dtype(kind)
+
+
+def _pyarrow() -> tuple[Any, Any]:
+    try:
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+    except ImportError as error:
+        raise MissingExtraError("pyarrow", "parquet") from error
+    return pa, pq

@@ -1,12 +1,70 @@
-"""What a design by a performance curve is worth: the curve beside the exact response at its optimum."""
+"""Parts of a design: local optima, the best so far, what a performance curve is worth."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar
 
 from solver.results.told import Piece
+
+SAME_PLACE = 1e-3  # scaled distance within which two optima are one
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class LocalOptimum(Piece):
+    """A local optimum."""
+
+    values: Annotated[Mapping[str, float], "Variable name to value."]
+    peak: Annotated[float, "Highest peak [m]."]
+    objective: Annotated[float, "What is minimised."]
+    settled: Annotated[bool, "Whether the first-order conditions hold there."]
+    feasible: Annotated[bool, "Whether the limits are kept there."]
+    proven: Annotated[
+        bool,
+        "Whether a response there was computed, so that no peak is higher than `peak`. A further basin of "
+        "the tracked peak is solved for along the peaks that were followed: it is at least that high.",
+    ]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Checked(Piece):
+    """A local optimum again with more harmonics."""
+
+    JSON: ClassVar = "values n_harmonics=harmonics peak objective feasible"
+
+    values: Annotated[Mapping[str, float], "Variable name to value."]
+    harmonics: Annotated[int, "Highest harmonic kept."]
+    peak: Annotated[float, "Highest peak [m]; NaN where a response could not be computed."]
+    objective: Annotated[float, "What is minimised; NaN likewise."]
+    feasible: Annotated[bool, "Whether the limits are kept."]
+
+
+VERIFIED = "Its whole response was computed with all harmonics."
+FEWER_HARMONICS = "Ranked with fewer harmonics; those that count are computed with all of them."
+PEAKS_OPEN = "Its response was computed, but a higher peak may lie between its points."
+NOMINAL = "The best without the uncertainty; what that does to it is looked at next."
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class BestSoFar(Piece):
+    """The best design of a search on its way; the result may be another."""
+
+    values: Annotated[Mapping[str, float], "The design."]
+    peak: Annotated[
+        float, "Its highest peak [m]; of a robust design the highest over the scenarios looked at."
+    ]
+    objective: Annotated[float, "What is minimised."]
+    feasible: Annotated[bool, "Whether it keeps the limits."]
+    verified: Annotated[
+        bool, "Whether these are the numbers of whole responses of the problem as it was asked."
+    ]
+    words: Annotated[str, "What is known of it, a sentence."]
+    evaluations: Annotated[int, "Designs, of a tracked peak responses, looked at when it was found."]
+
+
+OnBest = Callable[[BestSoFar], None] | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
