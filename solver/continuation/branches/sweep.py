@@ -83,6 +83,9 @@ def sweep(
 ) -> Branch:
     """Follow the periodic response over a range of one parameter.
 
+    As `stickslip.sweep` it takes `peaks` and `errors` of the settings and the fields of the course by
+    themselves too: ``sweep(scene, errors=False)``.
+
     Parameters
     ----------
     scene : what vibrates, with the values that stay fixed.

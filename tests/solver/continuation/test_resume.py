@@ -130,3 +130,21 @@ def test_the_most_points_are_those_of_both_parts() -> None:
     ]
     assert followed[0] == followed[1] >= settings.most_points
     assert np.array_equal(resumed.values, whole.values)
+
+
+def test_words_of_settings_and_course_may_stand_by_themselves() -> None:
+    scene, seen = two_dof(), []
+    short = sweep(scene, harmonics=3, errors=False, peaks=False, on_points=lambda *rows: seen.append(rows))
+    settings = ContinuationSettings(errors=False, peaks=False)
+    long = sweep(scene, harmonics=3, settings=settings)
+    assert short.peaks == ()
+    assert sum(len(values) for values, _ in seen) <= len(short.values)
+    assert seen
+    assert np.isnan(short.error_estimate)
+    np.testing.assert_array_equal(short.solutions, long.solutions)
+    fine = sweep(scene, harmonics=3, settings=FINE, errors=False)
+    assert len(fine.values) > len(short.values), "the other settings stay"
+    with pytest.raises(SettingError, match="accuracy"):
+        sweep(scene, accuracy=0.1, guess=np.zeros(3))
+    with pytest.raises(TypeError, match="nonsense"):
+        sweep(scene, nonsense=1)
