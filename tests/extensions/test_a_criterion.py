@@ -6,15 +6,12 @@ Its sum can be had from responses at single frequencies, without any of the desi
 from __future__ import annotations
 
 import json
-import os
-import subprocess
-from collections.abc import Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from launch import COMMAND, served
 from rms_amplitude import RMS, WEIGHTS, frequencies
 
 import optim
@@ -27,18 +24,15 @@ from service.errors import ServiceProblem
 from service.rendering.docs_tables import TABLES, criteria_table
 from solver import extensions
 
-ROOT = Path(__file__).resolve().parent.parent.parent
 HARMONICS = 3
 BOUNDS = {"damper.N0": (20.0, 400.0)}
-
-
-NAMED = {extensions.VARIABLE: json.dumps(["rms_amplitude:RMS"])}
+NAMED = json.dumps(["rms_amplitude:RMS"])
 
 
 @pytest.fixture
 def named(monkeypatch: pytest.MonkeyPatch) -> None:
     """In this process."""
-    monkeypatch.setenv(extensions.VARIABLE, NAMED[extensions.VARIABLE])
+    monkeypatch.setenv(extensions.VARIABLE, NAMED)
 
 
 def by_solutions(load: float, mu: float = 0.3) -> float:
@@ -49,20 +43,6 @@ def by_solutions(load: float, mu: float = 0.3) -> float:
         for hz in frequencies(scene).tolist()
     ]
     return float(np.sqrt(0.5 * WEIGHTS @ np.square(a)))
-
-
-def environment() -> dict[str, str]:
-    paths = os.pathsep.join((str(ROOT), str(Path(__file__).parent)))
-    return {**os.environ, **NAMED, "PYTHONPATH": paths}
-
-
-def command(*arguments: str, cwd: Path) -> dict[str, Any]:
-    ended = subprocess.run(
-        [*COMMAND, *arguments], env=environment(), cwd=cwd, capture_output=True, text=True, check=False
-    )
-    assert ended.returncode in (0, 1), ended.stderr
-    found: dict[str, Any] = json.loads(ended.stdout)
-    return found
 
 
 @pytest.mark.usefixtures("named")
@@ -143,24 +123,17 @@ def test_what_is_wrong_is_told() -> None:
         pose(scene, max_rsm=1.0)
 
 
-def test_the_command_takes_its_options_and_key(tmp_path: Path) -> None:
+def test_the_command_takes_its_options_and_key(tmp_path: Path, command: Callable[..., Any]) -> None:
     options = ("--variable", "damper.N0", "20", "400", "--harmonics", "3", "--json")
-    minimised = command("design", "two-dof", *options, "--weight", "rms=1", cwd=tmp_path)
+    minimised = command("design", "two-dof", *options, "--weight", "rms=1")
     (row,) = (row for row in minimised["rows"] if row["quantity"] == "rms amplitude")
     assert row["value"] == pytest.approx(by_solutions(minimised["optimum"]["damper.N0"]), rel=1e-9)
     bound = 1.01 * row["value"]
     (tmp_path / "problem.toml").write_text(f'scene = "two-dof"\nmax_rms = {bound!r}\n')
-    limited = command("design", "--problem", "problem.toml", *options, cwd=tmp_path)
-    by_option = command("design", "two-dof", "--max-rms", repr(bound), *options, cwd=tmp_path)
+    limited = command("design", "--problem", "problem.toml", *options)
+    by_option = command("design", "two-dof", "--max-rms", repr(bound), *options)
     assert limited["optimum"] == by_option["optimum"]
     assert by_solutions(limited["optimum"]["damper.N0"]) <= bound * (1.0 + 1e-6)
-
-
-@pytest.fixture(scope="module")
-def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Client]:
-    """A service in a process of its own, with a worker."""
-    with served(tmp_path_factory.mktemp("service"), environment()) as url, Client(url) as client:
-        yield client
 
 
 @pytest.mark.long
@@ -185,7 +158,7 @@ def test_the_service_refuses_and_describes_its_key(client: Client) -> None:
 
 def test_the_table_of_criteria_has_it(monkeypatch: pytest.MonkeyPatch) -> None:
     assert "rms" not in criteria_table()
-    monkeypatch.setenv(extensions.VARIABLE, NAMED[extensions.VARIABLE])
+    monkeypatch.setenv(extensions.VARIABLE, NAMED)
     (line,) = (line for line in TABLES["design.md"]["criteria"]().splitlines() if "rms" in line)
     assert line == (
         f"| **rms amplitude** [m]: {RMS.help} | `rms` [1/m] | "

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import os
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -17,7 +17,6 @@ import httpx
 import numpy as np
 import pytest
 from jsonschema import Draft202012Validator
-from launch import served
 from pydantic import BaseModel, ConfigDict, Field
 
 import solver
@@ -139,15 +138,6 @@ DISTORTION = JobKind(
 )
 
 # The tests -----------------------------------------------------------------------------------------------
-
-
-@pytest.fixture(scope="module")
-def url(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """A service with the kind, as whoever runs it starts it: by its environment."""
-    paths = [str(ROOT), str(ROOT / "tests" / "cases"), str(Path(__file__).parent)]
-    environment = {**os.environ, "STICKSLIP_KINDS": json.dumps([ENTRY]), "PYTHONPATH": os.pathsep.join(paths)}
-    with served(tmp_path_factory.mktemp("kind"), environment) as url:
-        yield url
 
 
 @pytest.fixture

@@ -6,16 +6,14 @@ Time marching of its sliders, each by itself, is the referee: it shares nothing 
 from __future__ import annotations
 
 import json
-import os
-import subprocess
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from contact_cases import central_difference
 from joined_scene import JOINED as SCENE
-from launch import COMMAND, served
 from law_cases import Element, evaluate, jacobian
 from sliders import LIMIT, SLIDERS, K, SlidersContact
 
@@ -24,13 +22,10 @@ import solver
 from service.client.client import Client
 from service.errors import ServiceProblem
 from service.rendering.docs_tables import TABLES
-from solver import extensions
 from solver.contacts.kernels import columns
 from solver.contacts.laws.registry import laws, register, unregister
 from solver.scene.json_schema import scene_schema
 
-ROOT = Path(__file__).resolve().parent.parent.parent
-NAMED = {extensions.VARIABLE: json.dumps(["sliders:SlidersContact"])}
 HZ, HARMONICS = 0.19, 21
 
 
@@ -45,19 +40,6 @@ def registered() -> Iterator[None]:
 def scene(**values: float) -> solver.Scene:
     found = solver.Scene.from_dict(SCENE)
     return found.with_values({f"joint.{key}": value for key, value in values.items()})
-
-
-def environment() -> dict[str, str]:
-    paths = os.pathsep.join((str(ROOT), str(Path(__file__).parent)))
-    return {**os.environ, **NAMED, "PYTHONPATH": paths}
-
-
-def command(*arguments: str, cwd: Path) -> str:
-    ended = subprocess.run(
-        [*COMMAND, *arguments], env=environment(), cwd=cwd, capture_output=True, text=True, check=False
-    )
-    assert ended.returncode == 0, ended.stderr
-    return ended.stdout
 
 
 def test_the_kernel_has_the_derivatives_of_its_force() -> None:
@@ -190,26 +172,13 @@ def test_the_table_of_laws_has_it() -> None:
     assert line == f"| `sliders` | {SlidersContact.FORCE} | `k`, `limit` |"
 
 
-def test_the_command_solves_and_describes_it(tmp_path: Path) -> None:
+@pytest.mark.usefixtures("registered")
+def test_the_command_solves_and_describes_it(tmp_path: Path, command: Callable[..., Any]) -> None:
     (tmp_path / "joined.json").write_text(json.dumps(SCENE))
-    solved = command(
-        "solve", "joined.json", "--frequency", str(HZ), "--harmonics", "5", "--json", cwd=tmp_path
-    )
-    register(SlidersContact)
-    try:
-        expected = solver.solve(scene(), frequency_hz=HZ, harmonics=5).max_abs
-    finally:
-        unregister(SlidersContact)
-    assert json.loads(solved)["max_abs"] == pytest.approx(expected, rel=1e-9)
-    described = json.loads(command("schema", "scene", cwd=tmp_path))
-    assert "SlidersContact" in described["$defs"]
-
-
-@pytest.fixture(scope="module")
-def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Client]:
-    """A service in a process of its own, with a worker."""
-    with served(tmp_path_factory.mktemp("service"), environment()) as url, Client(url) as client:
-        yield client
+    solved = command("solve", "joined.json", "--frequency", str(HZ), "--harmonics", "5", "--json")
+    expected = solver.solve(scene(), frequency_hz=HZ, harmonics=5).max_abs
+    assert solved["max_abs"] == pytest.approx(expected, rel=1e-9)
+    assert "SlidersContact" in command("schema", "scene")["$defs"]
 
 
 def test_the_service_computes_and_plans_it(client: Client) -> None:

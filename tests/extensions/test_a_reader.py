@@ -11,12 +11,10 @@ import httpx
 import numpy as np
 import pytest
 from banded_text import BANDED
-from service_helpers import serving
 
 import solver
 from service.cli import main
 from service.client.client import Client
-from service.jobs.kinds import SHIPPED
 from service.rendering.docs_tables import formats_table
 from solver import extensions
 from solver.matrices.files import MatrixFileError, read_matrix
@@ -34,7 +32,6 @@ def text(matrix: np.ndarray) -> str:
 
 @pytest.fixture(autouse=True)
 def named(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The processes that read uploads find it by the environment."""
     monkeypatch.setenv(extensions.VARIABLE, json.dumps(["banded_text:BANDED"]))
 
 
@@ -46,8 +43,8 @@ def files(tmp_path: Path) -> Path:
 
 
 @pytest.fixture(scope="module")
-def http(tmp_path_factory: pytest.TempPathFactory) -> Iterator[httpx.Client]:
-    with serving(tmp_path_factory.mktemp("service"), SHIPPED) as client:
+def http(url: str) -> Iterator[httpx.Client]:
+    with httpx.Client(base_url=url, timeout=60.0) as client:
         yield client
 
 

@@ -35,18 +35,12 @@ def browser() -> Iterator[Browser]:
 
 @pytest.fixture(scope="session")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
-    """A service that begins with an empty database, shared by all tests of the page."""
-    made = Site(tmp_path_factory.mktemp("page"))
-    made.start()
-    yield made
-    made.stop()
+    """A service that begins with an empty database, shared by all tests of the page.
 
-
-@pytest.fixture(scope="session")
-def extended(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
-    """A service with a law and a kind of job from outside the package: those of tests/extensions."""
+    It has a law and a kind of job from outside the package besides: those of tests/extensions.
+    """
     made = Site(
-        tmp_path_factory.mktemp("extended"),
+        tmp_path_factory.mktemp("page"),
         PYTHONPATH=os.pathsep.join(str(TESTS / folder) for folder in ("..", "cases", "extensions")),
         STICKSLIP_EXTENSIONS=json.dumps(["sliders:SlidersContact"]),
         STICKSLIP_KINDS=json.dumps(["test_a_kind:DISTORTION"]),

@@ -252,6 +252,7 @@ def test_what_is_too_large_for_the_sliders_says_so_and_becomes_a_job(profile: Pr
     expect(page.locator("#response-facts")).to_contain_text("highest peak")
 
 
+@pytest.mark.long
 def test_what_is_wrong_with_a_scene_is_said_beside_its_field(profile: Profile, site: Site) -> None:
     context, _ = profile
     page = visit(context, site)
@@ -272,7 +273,7 @@ def test_what_is_wrong_with_a_scene_is_said_beside_its_field(profile: Profile, s
     assert httpx.get(f"{site.url}/v1/scenes/my-damper").status_code == 200
 
 
-@pytest.mark.few(3)
+@pytest.mark.long
 @pytest.mark.parametrize("text", ["name = = 3", "{", "<script>alert(1)</script>"])
 def test_a_file_that_is_no_scene_is_refused(profile: Profile, site: Site, text: str) -> None:
     page = visit(profile[0], site)

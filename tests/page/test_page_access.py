@@ -180,7 +180,7 @@ def tab_through(page: Page) -> int:
     return int(page.evaluate("window.__seen.size"))
 
 
-@pytest.mark.few(keep=(320,))
+@pytest.mark.long
 @pytest.mark.parametrize(("width", "height"), [(640, 450), (320, 600)])
 def test_zoomed_and_narrow_nothing_is_cut_off(
     browser: Browser, site: Site, studied: str, width: int, height: int

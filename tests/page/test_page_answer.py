@@ -90,6 +90,7 @@ def test_what_changed_is_said_on_every_card_and_renewed_there(
     expect(page.locator("#design-stale")).to_contain_text("damper.mu 0.31, now 0.3")
 
 
+@pytest.mark.long
 def test_as_good_and_of_which_case_are_said(profile: Profile, site: Site, found: str) -> None:
     """A plateau and several cases are rare on two masses: they are told of a result that has them."""
     context, _ = profile
@@ -148,6 +149,7 @@ def test_a_design_is_used_with_the_values_it_was_computed_for(
     expect(page.locator("#response-stale")).to_contain_text("damper.N0 100 N, now 104.79 N")
 
 
+@pytest.mark.long
 def test_a_link_mixes_no_two_scenes(profile: Profile, site: Site, found: str) -> None:
     page = visit(profile[0], site, found.replace("scene=two-dof", "scene=bladed-disk"))
     expect(page.locator("#design-status")).to_contain_text("of the scene two-dof, not of bladed-disk")
@@ -159,6 +161,7 @@ def test_a_link_mixes_no_two_scenes(profile: Profile, site: Site, found: str) ->
     assert job not in page.url
 
 
+@pytest.mark.long
 def test_a_report_is_one_file_that_holds_the_answer(browser: Browser, site: Site, found: str) -> None:
     with opened(browser, site) as (context, _):
         page = visit(context, site, found)

@@ -66,6 +66,7 @@ def test_a_curve_goes_through_its_peak(profile: Profile, site: Site, swept: str)
         assert gap <= 0.06, f"{figure}: the curve passes its peak by {gap:.1f} pixels"
 
 
+@pytest.mark.long
 def test_a_curve_whose_points_miss_its_peak_is_drawn_to_it(profile: Profile, site: Site) -> None:
     page = visit(profile[0], site, "?scene=two-dof")
     found = page.evaluate(
@@ -113,6 +114,7 @@ def test_zoom_is_linked_and_comes_back(profile: Profile, site: Site, swept: str)
     assert ends(page, "live") == pytest.approx(whole, rel=1e-3)
 
 
+@pytest.mark.long
 def test_an_axis_is_logarithmic_on_request(profile: Profile, site: Site, swept: str) -> None:
     page = visit(profile[0], site, swept)
     expect(page.locator("#live-status")).to_contain_text("peak")
@@ -200,7 +202,7 @@ def test_a_length_has_a_unit_of_its_size(profile: Profile, site: Site) -> None:
     assert said == ["4.8e-14 m", "3 nm", "25 µm", "509000 N/m", "92.7 N"]
 
 
-@pytest.mark.few(4)
+@pytest.mark.long
 @pytest.mark.parametrize("harmonics", ["2.5", "0", "201", ""])
 def test_harmonics_that_cannot_be_are_refused_where_they_stand(
     profile: Profile, site: Site, harmonics: str

@@ -133,6 +133,7 @@ def test_what_is_wrong_with_a_problem_is_said_at_its_field(
     expect(page.locator(f"#problem-{field}")).to_be_focused()
 
 
+@pytest.mark.long
 def test_rows_are_added_and_removed_by_keyboard(profile: Profile, site: Site) -> None:
     page = visit(profile[0], site, "?scene=two-dof&tab=design")
     page.locator("#problem-variables-add").press("Enter")

@@ -40,18 +40,18 @@ IN_SPACE: dict[str, Any] = {
 
 
 @pytest.fixture(scope="module")
-def outside(extended: Site) -> Site:
-    """A service that knows a law from outside the package, with scenes stored."""
+def stored(site: Site) -> Site:
+    """Scenes of other laws, one of them from outside the package, are stored."""
     for scene in (JOINED, IN_SPACE):
-        assert httpx.post(f"{extended.url}/v1/scenes", json=scene, timeout=60.0).status_code == 201
-    return extended
+        assert httpx.post(f"{site.url}/v1/scenes", json=scene, timeout=60.0).status_code == 201
+    return site
 
 
 @pytest.fixture
-def page_of(browser: Browser, outside: Site) -> Iterator[Any]:
+def page_of(browser: Browser, stored: Site) -> Iterator[Any]:
     """Visits to the page with a scene."""
-    with opened(browser, outside) as (context, _):
-        yield lambda scene: visit(context, outside, f"?scene={scene}")
+    with opened(browser, stored) as (context, _):
+        yield lambda scene: visit(context, stored, f"?scene={scene}")
 
 
 def sliders(page: Page) -> list[str]:
@@ -67,6 +67,7 @@ def variables(page: Page) -> list[str]:
     return page.locator("#variable option").all_inner_texts()
 
 
+@pytest.mark.long
 def test_coulomb_friction_has_the_sliders_it_had(page_of: Any) -> None:
     page = page_of("two-dof")
     assert sliders(page) == ["N0 of damper", "N1 of damper", "kt of damper", "μ of damper", "f0, the force"]
@@ -126,6 +127,7 @@ def test_what_is_left_out_follows_what_it_is_taken_from(page_of: Any) -> None:
     assert page.input_value("#slide-pad-kt_second >> xpath=../span/input") == "6"
 
 
+@pytest.mark.long
 def test_a_damper_between_blades_is_drawn_varied_and_designed(page_of: Any) -> None:
     """The wedge of a shipped scene: sliders of its mass, friction and angle, which the response follows."""
     page = page_of("platform-wedge")

@@ -14,10 +14,10 @@ if TYPE_CHECKING:
     from playwright.sync_api import Browser
 
 
-def test_a_kind_without_a_view_has_a_form_and_a_result(browser: Browser, extended: Site) -> None:
-    with opened(browser, extended) as (context, watch):
+def test_a_kind_without_a_view_has_a_form_and_a_result(browser: Browser, site: Site) -> None:
+    with opened(browser, site) as (context, watch):
         page = context.new_page()
-        page.goto(f"{extended.url}/?scene=two-dof&tab=data")
+        page.goto(f"{site.url}/?scene=two-dof&tab=data")
         page.locator("html[data-ready]").wait_for(state="attached")
         names = page.locator("#others-kind option").all_text_contents()
         assert set(names) == {
@@ -40,8 +40,8 @@ def test_a_kind_without_a_view_has_a_form_and_a_result(browser: Browser, extende
         page.get_by_label("frequencies_hz (needed)").fill("0.9, 1.2")
         page.locator("#others-form").get_by_role("button", name="Submit").click()
         expect(page.locator("#others-status")).to_contain_text("distortion is done", timeout=60_000)
-        [job] = httpx.get(f"{extended.url}/v1/jobs?kind=distortion").json()["items"]
-        found = httpx.get(f"{extended.url}/v1/jobs/{job['id']}/results").json()["result"]
+        [job] = httpx.get(f"{site.url}/v1/jobs?kind=distortion").json()["items"]
+        found = httpx.get(f"{site.url}/v1/jobs/{job['id']}/results").json()["result"]
         expect(page.locator("#others-result")).to_contain_text(f"{found['worst']:.6f}"[:7])
         assert f"distortion={job['id']}" in page.url
         page.reload()

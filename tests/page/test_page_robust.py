@@ -68,6 +68,7 @@ def test_a_reload_goes_on_watching_and_two_tabs_do_not_disturb_each_other(
         expect(tab.locator("#map-status")).to_contain_text("The job was stopped.")
 
 
+@pytest.mark.long
 def test_another_scene_in_the_middle_of_a_study_begins_anew(profile: Profile, site: Site) -> None:
     context, _ = profile
     page = visit(context, site, "?scene=two-dof&set=damper.mu:0.31")

@@ -44,6 +44,7 @@ def row(page: Page, run: str) -> Any:
     return page.locator(f"#runs-list li.run:has([data-focus='open-{run}'])")
 
 
+@pytest.mark.long
 def test_tabs_show_their_cards_and_a_link_keeps_them(profile: Profile, site: Site) -> None:
     page = visit(profile[0], site, "?scene=two-dof&tab=response")
     expect(page.locator("#live")).to_be_visible()
@@ -123,6 +124,7 @@ def test_a_run_that_somebody_else_changed_is_not_overwritten(profile: Profile, s
     assert httpx.get(f"{site.url}/v1/runs/{run}").json()["name"] == "theirs"
 
 
+@pytest.mark.long
 def test_two_runs_are_compared_and_one_is_opened(profile: Profile, site: Site) -> None:
     soft, hard = (run_of(site, set={"damper.N0": load, "damper.mu": 0.3}) for load in (61.0, 140.0))
     page = visit(profile[0], site, "?scene=two-dof&tab=map")

@@ -22,8 +22,8 @@ def job(number: int) -> dict[str, Any]:
     return {"kind": "iteration", "seed": number, "sweeps": 1}
 
 
-@pytest.mark.few(2)
-@pytest.mark.parametrize("number", [40, pytest.param(96, marks=pytest.mark.long)])
+@pytest.mark.few(keep=("postgresql",))
+@pytest.mark.parametrize("number", [20, pytest.param(96, marks=pytest.mark.long)])
 def test_every_job_of_many_clients_is_done_once(url: str, tmp_path: Path, number: int) -> None:
     with serving(url, workers=2, log=tmp_path / "log", command=words) as service:
         handed_in = run_load(service, number, 16, wait=False, job=job)

@@ -88,9 +88,19 @@ def test_a_service_killed_loses_nothing_and_leaves_no_worker(
     assert [job.status for job in done] == [JobState.SUCCESSFUL] * 4
     assert max(job.attempt for job in done) == 2
     assert sum(job.attempt for job in done) == len(pids(file)), "each attempt is counted, none is made twice"
+    process.send_signal(signal.SIGINT)
+    assert process.wait(PATIENCE) == 0
 
+
+@pytest.mark.long
+def test_a_service_that_is_stopped_ends_what_does_not_heed_and_goes_on_with_it_later(
+    tmp_path: Path, port: int, client: Client, start: Start
+) -> None:
+    file = tmp_path / "pids"
+    process = start(port)
+    until(lambda: answers(port))
     running = client.submit({"kind": "deaf", "seconds": 600.0, "pid_file": str(file)}).id
-    until(lambda: len(pids(file)) > sum(job.attempt for job in done))
+    until(lambda: pids(file))
     process.terminate()
     assert process.wait(PATIENCE) == 0, "it does not wait for what takes 600 s"
     assert not any(alive(pid) for pid in pids(file))

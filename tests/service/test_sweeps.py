@@ -57,7 +57,7 @@ def random_sweep(generator: random.Random) -> SweepRecord:
 def filled(module_database: Database) -> tuple[Database, list[SweepRecord]]:
     """A database with enough sweeps that some conditions lead a query and others do not."""
     generator = random.Random(5)
-    records = [random_sweep(generator) for _ in range(3000)]
+    records = [random_sweep(generator) for _ in range(600)]
     job, _ = JobRepository(module_database).submit(NEW, queue_limit=10)
     with module_database.writing() as connection:
         insert_results(connection, job.id, records, utc_now())

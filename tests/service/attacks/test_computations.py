@@ -135,7 +135,7 @@ def test_an_integer_of_thousands_of_digits_is_refused_with_its_place(site: Site,
 
 def test_many_costly_computations_of_one_key_hurt_nobody_else(site: Site) -> None:
     """They take turns among themselves, whatever the number of connections."""
-    figures = site.bears([plan(masses(1000), 11)] * 3, at_once=3)
+    figures = site.bears([plan(masses(600), 11)] * 3, at_once=3)
     assert {answer.status for answer in figures.answers} <= {200, 422, 429, 503}
 
 
@@ -143,7 +143,7 @@ def test_another_client_is_answered_while_one_computes(site: Site) -> None:
     def ask() -> int:
         return site.send(plan("two-dof"), site.other).status
 
-    assert site.meanwhile([plan(masses(1000))] * 8, ask, at_once=2) == 200
+    assert site.meanwhile([plan(masses(1000))] * 3, ask, at_once=2) == 200
 
 
 @pytest.mark.long

@@ -194,7 +194,7 @@ def meets(site: Site, count: int, seed: int) -> None:
 
 
 def test_random_bodies_over_all_routes_meet_no_error_of_the_program(site: Site) -> None:
-    meets(site, 150, SEED)
+    meets(site, 100, SEED)
 
 
 @pytest.mark.long

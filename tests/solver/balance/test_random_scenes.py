@@ -79,7 +79,7 @@ def test_random_solves(seed: int):
     solved(*drawn(seed))
 
 
-@pytest.mark.few(3)
+@pytest.mark.few(5)
 @pytest.mark.parametrize("seed", range(BEYOND, BEYOND + 25))
 def test_random_responses(seed: int):
     swept(*drawn(seed)[:2])

@@ -105,7 +105,7 @@ def test_the_schema_takes_what_a_scene_takes() -> None:
 # Answers
 
 
-@pytest.mark.few(4)
+@pytest.mark.few(10)
 @pytest.mark.parametrize("seed", range(60))
 def test_the_answer_is_that_of_the_march(seed: int) -> None:
     scene, hz = random_loads(seed)
@@ -148,7 +148,7 @@ def test_one_sector_answers_as_the_whole_annulus(pattern: str) -> None:
 # Derivatives
 
 
-@pytest.mark.few(4)
+@pytest.mark.few(8)
 @pytest.mark.parametrize("seed", range(30))
 def test_first_and_second_derivatives_are_those_of_differences(seed: int) -> None:
     """By mean, every amplitude and every phase, stuck, slipping and open."""

@@ -101,7 +101,7 @@ def test_a_slip_ends_behind_a_dip_of_its_rate():
     v = [5.085705, 1.009546, -1.14854, -0.6224295, 0.07674498, -0.1095588, 0.07463083, -0.05050278]
     last = [[-0.4257518, -0.9911092], [-0.02700998, 0.09741692, 0.06651671]]
     U = np.array([[*u, *last[0]], np.zeros(11), [*v, *last[1]]])
-    for share in (0.9998, 0.9999, 1.0, 1.0001, 1.0002):
+    for share in (0.9998, 1.0, 1.0002):
         element = Element(U=share * U, load=np.zeros(3), row=row_of(10.0, 10.0, 0.3, 15.0))
         truth = integrated(element)
         np.testing.assert_allclose(

@@ -60,7 +60,7 @@ def band_of(scene: Scene) -> tuple[float, float]:
 
 
 # Every scene with one predictor or two, each of the three with scenes of both kinds.
-@pytest.mark.few(2)
+@pytest.mark.few(4)
 @pytest.mark.parametrize("predictor", Predictor)
 @pytest.mark.parametrize("name", RESPONSES)
 def test_whole_responses(predictor: Predictor, name: str):
@@ -154,7 +154,7 @@ def test_other_scenes(scene: Scene):
     assert branch.residuals.max() <= 1e-9
 
 
-@pytest.mark.parametrize("count", [40, pytest.param(120, marks=pytest.mark.long)])
+@pytest.mark.parametrize("count", [20, pytest.param(120, marks=pytest.mark.long)])
 def test_random_oscillators(count: int):
     """Cusps at the edge of full stick, touching loads, stiff contacts, little damping: none turns back."""
     rng = np.random.default_rng(2)

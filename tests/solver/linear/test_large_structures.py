@@ -45,7 +45,7 @@ def with_contacts(n: int, structure: dict[str, Any], seed: int = 3) -> Scene:
     [
         (7, {"stiffness_proportional_damping": 1e-3}, MODES),
         (60, {"damping_ratio": 0.01, "mass_proportional_damping": 0.2}, MODES),
-        (600, {"stiffness_proportional_damping": 1e-3, "mass_proportional_damping": 0.1}, MODES),
+        (300, {"stiffness_proportional_damping": 1e-3, "mass_proportional_damping": 0.1}, MODES),
         (40, {"stiffness_proportional_damping": 1e-3, "C": "local"}, POLES),
     ],
 )

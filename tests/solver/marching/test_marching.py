@@ -153,7 +153,7 @@ def test_two_dof_references(row: dict[str, Any]):
         np.testing.assert_allclose(result.harmonics[:6], row["harmonics"], atol=1e-7 * result.max_abs)
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(4)
 @pytest.mark.parametrize("row", DISK, ids=lambda row: f"N1={row['N1']} {row['frequency_hz']} Hz")
 def test_bladed_disk_references(row: dict[str, Any]):
     scene = load_scene("bladed-disk").with_values({"shroud.N0": row["N0"], "shroud.N1": row["N1"]})

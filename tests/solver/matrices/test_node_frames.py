@@ -73,13 +73,14 @@ def told(path: Path, M: Array, K: Array, axis: Array, labels: list[Label] | None
     ]
 
 
+@pytest.mark.parametrize("decks", [20, pytest.param(70, marks=pytest.mark.long)])
 @pytest.mark.parametrize("program", list(WRITERS))
 def test_random_decks_give_the_frequencies_of_matrices_in_the_global_frame(
-    program: str, tmp_path: Path
+    program: str, decks: int, tmp_path: Path
 ) -> None:
     M, K, at = ring()
     bare = 0
-    for seed in range(70):
+    for seed in range(decks):
         rng = np.random.default_rng([seed, len(program)])
         tilt = turned(rng.normal(size=3), rng.uniform(-3, 3))
         axis, own = tilt @ np.array([0.0, 0.0, 1.0]), np.kron(np.eye(9), tilt)
@@ -95,7 +96,7 @@ def test_random_decks_give_the_frequencies_of_matrices_in_the_global_frame(
             np.testing.assert_allclose(values, frequencies(Mg, Kg, pairs, n), rtol=2e-6, err_msg=f"{seed}")
         wrong = frequencies(T.T @ Mg @ T, T.T @ Kg @ T, pairs, 2)
         bare += bool(abs(wrong[0] / ours[2][0] - 1.0) < 1e-4)
-    assert bare <= 20, "the frames must matter in most decks"
+    assert bare <= 0.3 * decks, "the frames must matter in most decks"
 
 
 def held(

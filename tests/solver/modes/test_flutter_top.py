@@ -85,13 +85,9 @@ def _wrong(seed: int) -> list[str]:
     return wrong
 
 
-def test_both_cycles_lie_on_their_side_of_the_most_damping() -> None:
-    assert [each for seed in range(5, 9) for each in _wrong(seed)] == []
-
-
-@pytest.mark.long
-def test_both_cycles_of_many_blades() -> None:
-    assert [each for seed in range(100, 300) for each in _wrong(seed)] == []
+@pytest.mark.parametrize("seeds", [(5, 7), pytest.param((100, 300), marks=pytest.mark.long)])
+def test_both_cycles_lie_on_their_side_of_the_most_damping(seeds: tuple[int, int]) -> None:
+    assert [each for seed in range(*seeds) for each in _wrong(seed)] == []
 
 
 def test_more_than_the_most_has_no_cycle_however_little() -> None:

@@ -35,6 +35,7 @@ def _matrices(seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray
     return *(np.array(of[key]) for key in "MCK"), np.array(rows), kt, limits
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("seed", [25, 23])
 def test_a_march_by_small_steps_repeats_a_cycle(seed: int) -> None:
     _, aero, cycle = _cycle(seed, stability=False)

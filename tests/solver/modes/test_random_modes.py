@@ -76,6 +76,7 @@ def _check(found: solver.NonlinearMode) -> int:
     return len(chosen)
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize("seed", [6, 7, 11, 12, 18, 20, 23])
 def test_the_march_repeats_a_mode_of_a_random_scene(seed: int) -> None:
     found = _followed(seed)

@@ -49,21 +49,19 @@ def with_stops(b: float, F: float) -> float:
         t1 = math.acos(X - F) / b
         p, q = X - F - c * math.cos(b * t1), b * c * math.sin(b * t1)
 
-        def rate(t: float) -> float:
-            return -p * math.sin(t - t1) + q * math.cos(t - t1) - b * c * math.sin(b * t)
+        def rate(t: Any) -> Any:
+            return -p * np.sin(t - t1) + q * np.cos(t - t1) - b * c * np.sin(b * t)
 
         ts = np.linspace(t1, t1 + 1.001 * math.pi / b, 4001)[1:]
-        first = next(i for i in range(len(ts) - 1) if rate(ts[i]) < 0.0 <= rate(ts[i + 1]))
-        t = brentq(rate, ts[first], ts[first + 1], xtol=1e-15)
+        back = rate(ts) >= 0.0
+        (turns,) = np.nonzero(~back[:-1] & back[1:])
+        if not len(turns):
+            return math.nan
+        t = brentq(rate, ts[turns[0]], ts[turns[0] + 1], xtol=1e-15)
         return p * math.cos(t - t1) + q * math.sin(t - t1) + c * math.cos(b * t) + F + X
 
     xs = np.linspace(max(1e-6, F - 1.0 + 1e-9), F + 1.0 - 1e-9, 400)
-    values: list[float] = []
-    for X in xs:
-        try:
-            values.append(way(float(X)))
-        except StopIteration:
-            values.append(math.nan)
+    values = [way(float(X)) for X in xs]
     i = next(
         i for i in range(399) if values[i] * values[i + 1] <= 0.0 and abs(values[i] - values[i + 1]) < 1.0
     )

@@ -160,7 +160,7 @@ def test_any_change_gives_what_is_wanted(name: str, most: int, monkeypatch: pyte
     monkeypatch.setattr(editing, "_leading_comments", lambda text: (anew.append(text), ())[1])
     text = ODD if name == "odd" else SHIPPED[name]
     chance = random.Random(name)
-    for _ in range(120):
+    for _ in range(60):
         wanted = read(text)
         owner, key = chance.choice(leaves(wanted))
         action = chance.choice(("set", "drop", "double", "add"))

@@ -94,7 +94,7 @@ PEAKS: dict[str, tuple[Scene, float, tuple[str, ...]]] = {
 }  # fmt: skip
 
 
-@pytest.mark.few(keep=("two-dof", "bladed disk, separating"))
+@pytest.mark.few(keep=("two-dof",))
 @pytest.mark.parametrize("case", PEAKS)
 def test_the_hessian_of_a_peak_equals_differences_through_the_sweep(case: str) -> None:
     scene, near, paths = PEAKS[case]

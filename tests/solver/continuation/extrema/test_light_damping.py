@@ -42,7 +42,7 @@ def test_a_scene_with_a_narrow_resonance(name):
 
 
 # Every third has scenes of each of the kinds.
-@pytest.mark.few(7, keep=HARD)
+@pytest.mark.few(14, keep=HARD)
 @pytest.mark.parametrize("seed", [*range(SUITE), *HARD])
 def test_random_scene(seed):
     scene, _, harmonics = light_scene(seed)

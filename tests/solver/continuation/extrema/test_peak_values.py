@@ -18,7 +18,7 @@ RESPONSES = [
 ]
 
 
-@pytest.mark.few(3)
+@pytest.mark.few(6)
 @pytest.mark.parametrize(("name", "values", "low", "high"), RESPONSES)
 def test_the_peak_does_not_depend_on_the_way_along_the_branch(
     name: str, values: dict[str, float], low: float, high: float

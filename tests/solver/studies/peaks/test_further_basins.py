@@ -146,11 +146,9 @@ def check_random(seed: int, points: int) -> None:
         assert top(float(value)) >= best.peak * (1.0 - 1e-7)  # as far as a proof tells heights apart
 
 
-def test_a_random_scene() -> None:
-    check_random(13, 13)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("seed", [5, 6, 10, 13, 17, 34, *range(100, 130)])
-def test_more_random_scenes(seed: int) -> None:
-    check_random(seed, 61)
+@pytest.mark.few(40)
+@pytest.mark.parametrize(
+    ("seed", "points"), [(13, 5), *((seed, 61) for seed in (5, 6, 10, 13, 17, 34, *range(100, 130)))]
+)
+def test_random_scenes(seed: int, points: int) -> None:
+    check_random(seed, points)

@@ -114,7 +114,7 @@ OTHERS = [
 ]
 
 
-@pytest.mark.few(3)
+@pytest.mark.few(4)
 @pytest.mark.parametrize("points", [15, pytest.param(121, marks=pytest.mark.long)])
 @pytest.mark.parametrize(("name", "path", "low", "high"), OTHERS)
 def test_other_parameters_against_brute_force(
@@ -140,7 +140,7 @@ def test_two_peaks_close_beside_each_other() -> None:
     assert best.peak == pytest.approx(9.7768092e-5, rel=1e-7)
     slopes = [peak.slope for peak in best.active]
     assert min(slopes) < 0.0 < max(slopes)
-    for value in np.geomspace(20.0, 3000.0, 41):
+    for value in np.geomspace(20.0, 3000.0, 21):
         assert highest(scene, "shroud.N0", float(value))[0] >= best.peak * (1.0 - 1e-8)
 
 
@@ -173,7 +173,7 @@ def check_random(seed: int, points: int) -> None:
             assert branch.peak.value >= best.peak * (1.0 - 1e-8)
 
 
-@pytest.mark.few(keep=(2, 48))
+@pytest.mark.few(keep=(2,))
 @pytest.mark.parametrize(
     ("seed", "points"),
     [*((seed, 13) for seed in (2, 8, 14, 30, 34, 37, 48, 72)), *((seed, 41) for seed in range(100, 140))],

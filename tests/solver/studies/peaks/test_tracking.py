@@ -89,7 +89,7 @@ def test_every_point_is_the_highest_peak_of_a_sweep(name: str, path: str, start:
     assert track.parameter[0] == pytest.approx(start)
     assert track.parameter[-1] == pytest.approx(stop)
     assert (np.diff(track.parameter) >= 0.0).all()
-    for index in range(0, track.parameter.size, max(track.parameter.size // 12, 1)):
+    for index in range(0, track.parameter.size, max(track.parameter.size // 6, 1)):
         value, at = highest(scene_of(name), path, float(track.parameter[index]))
         assert track.peak[index] == pytest.approx(value, rel=1e-8)
         if not is_exchange(track, float(track.parameter[index]), 1e-6):

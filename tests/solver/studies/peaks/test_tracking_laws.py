@@ -64,6 +64,7 @@ def test_a_track_of_a_law_is_the_highest_peak_of_sweeps(law: str) -> None:
         assert track.slope[index] == pytest.approx(slope, rel=1e-3, abs=1e-5 * track.peak[index] / value)
 
 
+@pytest.mark.long
 def test_the_design_search_tracks_a_load_that_moves() -> None:
     there, path, low, high = RANGES["elastic-normal"]
     tracked = optim.design(there, variables={path: (low, high)}, method="tracked")
