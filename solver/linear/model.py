@@ -32,6 +32,19 @@ class Identity(Generic[_Kept]):
         return id(self.it)
 
 
+def dynamic_stiffness(K: Any, C: Any, M: Any, k: Any, omega: float) -> tuple[Complex, Complex, Complex]:
+    """Return Z_k(ω) = K + ikωC − (kω)²M of harmonics k, ∂Z_k/∂ω and ∂²Z_k/∂ω².
+
+    Of arrays whose shapes go together: matrices, diagonals of modes (M = 1), or poles (−s, 1 and 0); and, as
+    it is linear in them, of derivatives of these.
+    """
+    return (
+        np.asarray(K + 1j * (k * omega) * C - (k * omega) ** 2 * M, np.complex128),
+        np.asarray(1j * k * C - 2.0 * k * (k * omega) * M, np.complex128),
+        np.asarray(-2.0 * k**2 * M + 0.0j * C, np.complex128),
+    )
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ForceTerm:
     """One force amplitude * cos(harmonic * omega t + phase) along `vector`.

@@ -23,6 +23,7 @@ from solver.errors import SettingError
 from solver.jit.fourier import Complex, Real
 from solver.linear.assembly import linear_model, structure_derivative
 from solver.linear.condensation import term_amplitudes
+from solver.linear.model import dynamic_stiffness
 from solver.modes.corrector import ModeState, scales
 from solver.modes.equations import Equations, Evaluated
 from solver.modes.nonlinear_mode import pose
@@ -190,9 +191,8 @@ class ModeSensitivities:
         diameters = model.diameters(ks)
         dK, dC, dM = d.at(diameters, s.moving)
         omega, zeta = float(state.y[-2]), float(state.y[-1])
-        k = ks.astype(np.float64)[:, None, None]
         x = (s.shapes @ at.x[:, :, None])[:, :, 0]
-        dZ = dK + 1j * k * omega * dC - ((k * omega) ** 2 + 2j * k * zeta * omega**2) * dM
+        dZ, *_ = dynamic_stiffness(dK, dC - 2.0 * zeta * omega * dM, dM, ks[:, None, None], omega)
         pushes = -(dZ @ x[:, :, None])[:, :, 0]
         moved = None
         if d.contact_here is not None and d.contact_next is not None:
