@@ -27,6 +27,8 @@ from solver.scene.linear_terms import (
     DiameterCoefficient,
     Influence,
     SpeedDependence,
+    coupling_kinds,
+    kind_of,
 )
 from solver.scene.parts import (
     KINDS,
@@ -91,13 +93,20 @@ def between_keys() -> tuple[str, ...]:
 
 def _tags(table: str) -> tuple[str, tuple[str, ...]]:
     """The key that tells the kinds of a table apart, and its words."""
-    words = {"contacts": ("law", tuple(laws())), "dampers": ("shape", tuple(SHAPES))}
+    words = {
+        "contacts": ("law", tuple(laws())), "dampers": ("shape", tuple(SHAPES)),
+        "couplings": ("kind", tuple(coupling_kinds())),
+    }  # fmt: skip
     return words.get(table, ("kind", KINDS))
 
 
-def _contact_keys() -> dict[tuple[str, ...], tuple[str, tuple[str, ...]]]:
-    """Name and known keys of the contacts of each law."""
-    found: dict[tuple[str, ...], tuple[str, tuple[str, ...]]] = {}
+def _keys_of_kinds() -> dict[tuple[str, ...], tuple[str, tuple[str, ...]]]:
+    """Name and known keys of the contacts of each law, and of the couplings of each kind."""
+    found: dict[tuple[str, ...], tuple[str, tuple[str, ...]]] = {
+        ("couplings", kind): (f"a coupling of the kind `{kind}`", tuple(each.model_fields))
+        for kind, each in coupling_kinds().items()
+        if each is not Coupling
+    }
     for law, each in laws().items():
         keys = tuple(field.alias or key for key, field in each.model_fields.items())
         answer = f"a contact with the law `{law}`", keys
@@ -184,7 +193,7 @@ def _walk(loc: Iterable[int | str], raw: object) -> tuple[list[int | str], objec
 def _table(loc: tuple[int | str, ...]) -> tuple[str, tuple[str, ...]]:
     """Name and known keys of the innermost table on the way to a location."""
     names = tuple(step for step in loc[:-1] if isinstance(step, str))
-    for known, answer in reversed([*_KEYS.items(), *_contact_keys().items()]):
+    for known, answer in reversed([*_KEYS.items(), *_keys_of_kinds().items()]):
         without_tag = tuple(name for name in names if name not in KINDS)
         if names[: len(known)] == known or (known and without_tag[: len(known)] == known):
             return answer
@@ -380,7 +389,6 @@ def _engine_order_issues(raw: dict[str, Any], structure: dict[str, Any]) -> Iter
 
 
 AMPLITUDE_PATH = "excitation.amplitude"
-_TURNING = ("gyroscopic", "k_omega2")
 
 
 def term_issues(raw: dict[str, Any]) -> list[Issue]:
@@ -392,14 +400,16 @@ def term_issues(raw: dict[str, Any]) -> list[Issue]:
 
 def _issues(raw: dict[str, Any], structure: dict[str, Any]) -> Iterator[Issue]:
     dofs, cyclic = dofs_of(raw), is_cyclic(structure)
+    kinds = coupling_kinds()
     for steps, row in rows_of(raw, "couplings"):
-        yield from _places(steps, row, ("on", "of"), dofs)
+        kind = kinds.get(kind_of(row), Coupling)
+        yield from _places(steps, row, kind.DOFS, dofs)
         if row.get("offset") and not cyclic:
             yield Issue(
                 (*steps, "offset"),
                 f"= {row['offset']!r} needs a cyclic structure; this one has no other sectors",
             )
-        for key in _TURNING:
+        for key in kind.TURNING:
             if row.get(key) and not _has_speed(raw):
                 yield _needs_speed(*steps, key)
     for key in ("G", "K_omega2"):
@@ -419,7 +429,12 @@ def _issues(raw: dict[str, Any], structure: dict[str, Any]) -> Iterator[Issue]:
     tables = ("aerodynamics", "bodies", "nodes", "loads", "dampers", "contacts")
     rows = [row for table in tables for row in rows_of(raw, table)]
     named = [((*steps, "name"), row["name"]) for steps, row in rows if isinstance(row.get("name"), str)]
-    mine = [row.get("name") for _, row in rows_of(raw, "aerodynamics")]
+    # Couplings of one name are set together: they are one owner.
+    coupled = {
+        row["name"]: steps for steps, row in rows_of(raw, "couplings") if isinstance(row.get("name"), str)
+    }
+    named = [*(((*steps, "name"), name) for name, steps in coupled.items()), *named]
+    mine = [*coupled, *(row.get("name") for _, row in rows_of(raw, "aerodynamics"))]
     yield from duplicates([(s, name) for s, name in reversed(named) if name in mine], "paths")
 
 

@@ -18,7 +18,7 @@ from solver.matrices.validation import DofTable
 from solver.matrices.values import MOST_DOFS, Matrix
 from solver.results.told import Piece
 from solver.scene.bodies.kinematics import forms_of, written_form
-from solver.scene.linear_terms import Coupling
+from solver.scene.linear_terms import Coupling, LinearTerm
 from solver.scene.parameter_paths import changed_quantities
 from solver.scene.parts import Recovered
 from solver.scene.scene import (
@@ -225,7 +225,9 @@ def annulus(scene: Scene) -> Scene:
         speed_order=scene.speed_order,
         with_speed=scene.with_speed,
         recovery=tuple(_recovered(r, j) for j in sectors for r in scene.recovery),
-        couplings=tuple(_coupling(c, j, n) for j in sectors for c in scene.couplings + _gas(scene, n)),
+        couplings=tuple(
+            _placed_term(term, j, n) for j in sectors for term in (*scene.couplings, *_gas(scene, n))
+        ),
     )
 
 
@@ -363,9 +365,8 @@ def _recovered(recovered: Recovered, j: int) -> Recovered:
     return recovered.model_copy(update={"name": _in_sector(recovered.name, j), "terms": terms})
 
 
-def _coupling(coupling: Coupling, j: int, n: int) -> Coupling:
-    on, of = _in_sector(coupling.on, j), _in_sector(coupling.of, (j + coupling.offset) % n)
-    return coupling.model_copy(update={"on": on, "of": of, "offset": 0})
+def _placed_term(term: LinearTerm, j: int, n: int) -> LinearTerm:
+    return term.in_sector(lambda dof, ahead: _in_sector(dof, (j + ahead) % n))
 
 
 def _gas(scene: Scene, n: int) -> tuple[Coupling, ...]:
