@@ -14,8 +14,8 @@ from solver.scene.scene_parameter import SceneParameter, Slope, changed
 STRUCTURE = "structure."
 _LOSS = "loss_factor"
 _PROPORTIONAL = {"stiffness_proportional_damping": "s", "mass_proportional_damping": "1/s"}
-_TABLES = ("masses", "springs", "dampers")
-_NUMBERS = {Mass: "m", Spring: "k", Damper: "c"}
+TABLES = ("masses", "springs", "dampers")
+NUMBERS = {Mass: "m", Spring: "k", Damper: "c"}
 _UNITS = {"m": "kg", "k": "N/m", "c": "N s/m"}
 _TERMS = ("couplings", "aerodynamics")
 _Named = Mass | Spring | Damper
@@ -67,13 +67,13 @@ def structure_parameter(scene: HasParts, path: str) -> SceneParameter | None:
 def _of_parts(structure: Structure, path: str, members: list[tuple[int, _Named, float]]) -> SceneParameter:
     """Return the value of a part, or of a group of one kind, in which each has its share."""
     _, first, whole = members[0]
-    key = _NUMBERS[type(first)]
+    key = NUMBERS[type(first)]
     unit = _UNITS[key]
     wanted = f"must be a number {'>' if key == 'm' else '>='} 0 and <= 1e15 [{unit}]"
 
     def with_value(new: float) -> dict[str, Any]:
         found = {id(part): changed(part, {key: new * share}, path, new, wanted) for _, part, share in members}
-        tables = {table: getattr(structure, table) for table in _TABLES}
+        tables = {table: getattr(structure, table) for table in TABLES}
         update = {table: tuple(found.get(id(old), old) for old in parts) for table, parts in tables.items()}
         return {"structure": structure.model_copy(update=update)}
 

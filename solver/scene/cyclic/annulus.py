@@ -39,6 +39,7 @@ from solver.scene.scene import (
     Structure,
     parse_end,
 )
+from solver.scene.structure_parameters import NUMBERS, TABLES
 from solver.wording import listing
 
 
@@ -263,28 +264,19 @@ def _mistuned(structure: CyclicStructure, factor: float) -> CyclicStructure:
     """The structure with `factor` on every part that the mistuning names."""
     if structure.mistuning is None:
         return structure
-    of = structure.mistuning.of
-    parts: tuple[Mass | Spring | Damper, ...] = (*structure.masses, *structure.springs, *structure.dampers)
-    dofs = set(of) - {part.name for part in parts}
+    of, tables = structure.mistuning.of, {table: getattr(structure, table) for table in TABLES}
+    dofs = set(of) - {part.name for parts in tables.values() for part in parts}
+
+    def scaled(part: _NamedT) -> _NamedT:
+        if part.name not in of and getattr(part, "dof", None) not in dofs:
+            return part
+        key = NUMBERS[type(part)]
+        named = {} if part.name is None or factor == 1.0 else {"factor": factor}
+        return part.model_copy(update={key: factor * getattr(part, key), **named})
+
     return structure.model_copy(
-        update={
-            "masses": tuple(
-                _scaled(m, {"m": factor * m.m}, factor) if m.name in of or m.dof in dofs else m
-                for m in structure.masses
-            ),
-            "springs": tuple(
-                _scaled(s, {"k": factor * s.k}, factor) if s.name in of else s for s in structure.springs
-            ),
-            "dampers": tuple(
-                _scaled(d, {"c": factor * d.c}, factor) if d.name in of else d for d in structure.dampers
-            ),
-        }
+        update={table: tuple(scaled(part) for part in parts) for table, parts in tables.items()}
     )
-
-
-def _scaled(part: _NamedT, value: dict[str, float], factor: float) -> _NamedT:
-    named = {} if part.name is None or factor == 1.0 else {"factor": factor}
-    return part.model_copy(update={**value, **named})
 
 
 def _in_sector(name: str, j: int) -> str:
@@ -335,13 +327,7 @@ def _moving(scene: Scene, contact: AnyContact, j: int, n: int) -> tuple[dict[str
             sums[dof] = sums.get(dof, 0.0) + factor
         motions.append(tuple((dof, factor) for dof, factor in sums.items() if factor != 0.0))
     ends = tuple(_end(text, j, n) for text in contact.between)
-    update: dict[str, object] = {
-        "between": ends,
-        "motions": tuple(motions),
-        "at": None,
-        "normal": None,
-        "tangents": None,
-    }
+    update = {"between": ends, "motions": tuple(motions)} | dict.fromkeys(("at", "normal", "tangents"))
     return update, [bool(motion) for motion in motions]
 
 
@@ -406,12 +392,8 @@ def _mass(mass: Mass, j: int) -> Mass:
 
 
 def _contact(contact: ContactOfAnyLaw, j: int, turn: float, *, standing: bool) -> ContactOfAnyLaw:
-    update: dict[str, object] = {
-        "name": _in_sector(contact.name, j),
-        "group": contact.group or contact.name,
-    }
-    update |= contact.in_sector(turn, _cosine(turn) if standing else None)
-    return contact.model_copy(update=update)
+    named = {"name": _in_sector(contact.name, j), "group": contact.group or contact.name}
+    return contact.model_copy(update=named | contact.in_sector(turn, _cosine(turn) if standing else None))
 
 
 def _force(force: Excitation, j: int, turn: float, *, standing: bool) -> Excitation:
