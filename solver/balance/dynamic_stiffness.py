@@ -14,6 +14,7 @@ import numpy as np
 from solver.balance.parameter_derivatives import HarmonicMatrices
 from solver.contacts.kernels.system import DENSE, MODES, System
 from solver.jit.fourier import Complex, Real
+from solver.linear.model import dynamic_stiffness
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -123,14 +124,11 @@ def whole_motion(
         turned = {i: given * forces for i, forces in found.forces_by.items()}
         return replace(found, forces=given * found.forces, forces_by=turned)
     values, which, k = system.eigenvalues[system.which], system.which, ks[:, None]
-    if system.form == MODES:
-        c = system.dampings[which]
-        d = values.real - (k * omega) ** 2 + 1j * k * omega * c
-        slope, bend = -2.0 * k**2 * omega + 1j * k * c, -2.0 * k**2 + 0.0j * c
-    else:
-        d = 1j * k * omega - values
-        slope, bend = 1j * k + 0.0 * values, 0.0 * values
-    by = {i: (1j * k * omega * dC, 1j * k * dC) for i, dC in dampings.items()}
+    alike = np.ones_like(values.real)
+    modes = system.form == MODES
+    K, C, M = (values.real, system.dampings[which], alike) if modes else (-values, alike, 0.0 * alike)
+    d, slope, bend = dynamic_stiffness(K, C, M, k, omega)
+    by = {i: dynamic_stiffness(0.0, dC, 0.0, k, omega)[:2] for i, dC in dampings.items()}
     if np.any(d == 0.0):
         raise np.linalg.LinAlgError("Z is singular")
     return WholeMotion(
@@ -148,14 +146,10 @@ def _levels(system: System, omega: float) -> Real:
 
 def _of_matrices(matrices: HarmonicMatrices, k: Real, omega: float) -> WholeMotion:
     """Return the linear part of matrices; `k` (nk, 1, 1)."""
-    C, M, speed = matrices.C, matrices.M, k * omega
-    by = {
-        i: (dK + 1j * speed * dC - speed**2 * dM, 1j * k * dC - 2.0 * k * speed * dM)
-        for i, (dK, dC, dM) in matrices.by.items()
-    }
+    Z, by_omega, by_omega_twice = dynamic_stiffness(matrices.K, matrices.C, matrices.M, k, omega)
     return WholeMotion(
-        inverse=np.asarray(np.linalg.inv(matrices.K + 1j * speed * C - speed**2 * M), np.complex128),
-        by_omega=1j * k * C - 2.0 * k * speed * M, by_omega_twice=-2.0 * k**2 * M + 0.0j, by_structure=by,
+        inverse=np.asarray(np.linalg.inv(Z), np.complex128), by_omega=by_omega, by_omega_twice=by_omega_twice,
+        by_structure={i: dynamic_stiffness(*each, k, omega)[:2] for i, each in matrices.by.items()},
         contact=matrices.L, back=matrices.L.conj(),
         observe=np.broadcast_to(matrices.observe, matrices.forces.shape), forces=matrices.forces,
         forces_by=matrices.forces_by, motions_by=matrices.motions_by,

@@ -8,10 +8,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from solver.balance.balance import Balance, check_level
+from solver.balance.kernels.residual import contact_values
 from solver.balance.parameter import Kind, Parameter, resolve
 from solver.balance.simplifications import even_harmonics_reason
 from solver.balance.speed_line import check_given_loads
-from solver.contacts.kernels.system import MODES
+from solver.contacts.kernels.laws import law_force
+from solver.contacts.kernels.system import MODES, Evaluation
 from solver.contacts.load_derivatives import load_slopes
 from solver.errors import SettingError
 from solver.jit.fourier import Complex, Real
@@ -20,7 +22,7 @@ from solver.linear.condensation import reduce_model, term_amplitudes
 from solver.linear.contact_table import port_stiffnesses
 from solver.linear.model import LinearModelDerivative
 from solver.scene.bodies.paths import FORCE
-from solver.scene.parameter_paths import parameter_of
+from solver.scene.parameter_paths import AMPLITUDE, parameter_of
 from solver.scene.scene import MatricesStructure, Scene
 
 
@@ -64,6 +66,39 @@ def contact_slopes(balance: Balance, parameters: Sequence[Parameter]) -> tuple[R
             slope[acts, parameter.column] = parameter.active[acts]
             load[:] = load_slopes(rows, slope, parameter.column)
     return slopes, loads
+
+
+def force_along(
+    balance: Balance, point: Evaluation, e: int, motions: Real, omega: float, slope: Real, dload: Real
+) -> tuple[Real, Real, int]:
+    """Return a contact's force, its derivative along changes of its numbers and load, and the state code.
+
+    Parameters
+    ----------
+    point : by value; what is returned are its rows, (ports, n) each.
+    motions : (ports, n) of contact `e` [m].
+    slope, dload : of one path, as `contact_slopes` gives them.
+    """
+    system = balance.system
+    ports = slice(int(system.first_port[e]), int(system.first_port[e + 1]))
+    blocks = slice(int(system.first_block[e]), int(system.first_block[e + 1]))
+    table, load, _, _ = contact_values(system, omega, 0.0)
+    state, _ = law_force(
+        system.laws[e], np.ascontiguousarray(motions, dtype=np.float64), system.ks, load[e], system.load_ks,
+        table[e], slope, dload, system.cos_table, system.sin_table, point.segments, point.F[ports],
+        point.dF_dU[blocks], point.dF_dp[ports],
+    )  # fmt: skip
+    return point.F[ports], point.dF_dp[ports], int(state)
+
+
+def excitation_slopes(balance: Balance, parameters: Sequence[Parameter]) -> tuple[Real, Real]:
+    """Return what a unit of each parameter gives all forces, as a share and as a phase, (n_paths,)."""
+    kinds = [parameter.kind for parameter in parameters]
+    level = balance.scene.value(AMPLITUDE) or 1.0 if Kind.LEVEL in kinds else 1.0
+    return (
+        np.array([1.0 / level if kind is Kind.LEVEL else 0.0 for kind in kinds]),
+        np.array([1.0 if kind is Kind.FORCE_PHASE else 0.0 for kind in kinds]),
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -28,7 +28,7 @@ from solver.linear.model import ForceTerm, Identity, LinearModel, LinearModelDer
 from solver.linear.moving_base import base_motions, derivative_with_base, with_base
 from solver.linear.sector_matrices import ProportionalDamping, sector_matrices
 from solver.matrices.values import frozen
-from solver.scene.bodies.kinematics import Form
+from solver.scene.bodies.kinematics import Form, static
 from solver.scene.cyclic.annulus import written_out
 from solver.scene.parameter_paths import parameter_of
 from solver.scene.scene import (
@@ -191,7 +191,8 @@ def _derivative_by(scene: Scene, path: str) -> LinearModelDerivative:
     first, second = extra_slopes(scene, slope, here, gains if lossy is None else 1.0, lossy)
     return LinearModelDerivative(
         **terms, sectors=structure.sector_count, extra=first, second_extra=second,
-        forces=_force_terms(here, slope.forces), second_forces=_force_terms(here, slope.second_forces),
+        forces=_force_terms(here, static(slope.forces)),
+        second_forces=_force_terms(here, static(slope.second_forces)),
     )  # fmt: skip
 
 

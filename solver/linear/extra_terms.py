@@ -1,9 +1,5 @@
 """What a structure has beside springs and dashpots: couplings, gyroscopic and hysteretic terms, gas.
 
-Kept apart from the symmetric matrices of `solver.linear.model.LinearModel` as Σ_m X_m e^{jmθ} over offsets m
-between sectors, complex where a term is one of the frequency domain. A hysteretic term (structural damping
-K (1 + iη), an imaginary coefficient) is of a motion e^{iωt} with ω > 0 and has no share in the mean.
-
 A sector given by its matrices has G, K_omega2 and what is unsymmetric as blocks at the offsets 0, 1 and −1,
 as its high boundary is eliminated; structural damping goes with its stiffness at each nodal diameter, however
 that is known.
@@ -11,14 +7,14 @@ that is known.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.linear.model import ExtraTerms, Terms
 from solver.matrices.sectors.blocks import full_elimination
 from solver.matrices.values import frozen
 from solver.scene.bodies.body import REVOLUTIONS
@@ -26,72 +22,9 @@ from solver.scene.linear_terms import Entry
 from solver.scene.scene import MatricesStructure, Scene
 from solver.scene.scene_parameter import Slope
 
-if TYPE_CHECKING:
-    from solver.linear.model import Terms
-
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Blocks = tuple[tuple[int, Real], ...]  # offsets between sectors, and a matrix for each
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class ExtraTerms:
-    """Terms beside the symmetric matrices; all arrays read-only, m offsets.
-
-    Attributes
-    ----------
-    offsets : tuple of int
-        Sectors ahead; (0,) of a structure without sectors.
-    K, C : (m, n, n) array
-        Complex stiffness [N/m] and damping [N s/m].
-    still : (n, n) array or None
-        Stiffness of the mean alone [N/m].
-    loss_factor : float
-        The symmetric stiffness times i and this belongs to it too.
-    lossy : Terms or None
-        Those whose stiffness it is; None: of the terms beside which these stand.
-    """
-
-    offsets: tuple[int, ...]
-    K: Complex
-    C: Complex
-    still: Real | None = None
-    loss_factor: float = 0.0
-    lossy: Terms | None = None
-
-    @property
-    def is_real(self) -> bool:
-        """Whether all of it is a term of equations in time."""
-        return not (self.loss_factor or np.any(self.K.imag) or np.any(self.C.imag))
-
-    @property
-    def keeps_energy(self) -> bool:
-        """Whether it is gyroscopic alone: no stiffness, and antisymmetric damping, which does no work."""
-        if self.loss_factor or np.any(self.K) or np.any(self.C.imag):
-            return False
-        by = dict(zip(self.offsets, self.C, strict=True))
-        return all(
-            -offset in by and np.allclose(C, -by[-offset].T, rtol=0.0, atol=1e-12 * np.abs(C).max())
-            for offset, C in by.items()
-        )
-
-    def at(
-        self, turns: Complex, moving: NDArray[np.bool_], stiffness: Callable[[], NDArray[Any]]
-    ) -> tuple[Complex, Complex]:
-        """Return what it adds to K and C, (ns, n, n), at e^{jθ} of structures that move or are at rest.
-
-        `stiffness` gives the symmetric one (ns, n, n), with which structural damping goes.
-        """
-        powers = turns[:, None] ** np.array(self.offsets)
-        K = np.einsum("sm,mij->sij", powers, self.K)
-        if not np.all(moving) and np.any(self.K.imag):
-            still = np.einsum("sm,mij->sij", powers, self.K.real.astype(np.complex128))
-            K = np.where(moving[:, None, None], K, still)
-        if self.still is not None:
-            K = K + np.where(moving, 0.0, 1.0)[:, None, None] * self.still
-        if self.loss_factor:
-            K = K + np.where(moving, 1j * self.loss_factor, 0.0)[:, None, None] * stiffness()
-        return K, np.einsum("sm,mij->sij", powers, self.C)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -191,16 +124,14 @@ def extra_terms(scene: Scene, coordinates: Coordinates) -> ExtraTerms | None:
     if not (scene.couplings or scene.aerodynamics or loss or coordinates.own):
         return None
     spin = (scene.speed or 0.0) * REVOLUTIONS
-    return _terms(_entries(scene), loss, spin, coordinates)
+    return _terms(scene.entries, loss, spin, coordinates)
 
 
 @lru_cache(maxsize=64)
 def _terms(entries: tuple[Entry, ...], loss: float, spin: float, coordinates: Coordinates) -> ExtraTerms:
     total = _Sum(coordinates)
-    total.add_entries(entries)
-    if coordinates.own is not None:
-        total.add_own(*coordinates.own.skew, 1.0 + 1j * loss)
-    total.add_turning(entries, spin**2, spin)
+    total.add_entries(entries, 1.0, spin**2, spin)
+    total.add_own(1.0 + 1j * loss, 1.0, spin**2, spin)
     return total.terms(loss)
 
 
@@ -215,13 +146,13 @@ def extra_slopes(
     if not (slope.entries or loss_factor or spinning):
         return None, None
     first, second = (_Sum(coordinates) for _ in range(2))
-    first.add_entries(slope.entries)
-    if coordinates.own is not None and slope.loss:
-        first.add_own(coordinates.own.skew[0], (), 1j)
+    spin = (scene.speed or 0.0) * REVOLUTIONS
+    first.add_entries(slope.entries, 1.0, spin**2, spin)
+    if slope.loss:
+        first.add_own(1j, 0.0, 0.0, 0.0)
     if spinning:
-        spin, entries = (scene.speed or 0.0) * REVOLUTIONS, _entries(scene)
-        first.add_turning(entries, 2.0 * spin * REVOLUTIONS, REVOLUTIONS)
-        second.add_turning(entries, 2.0 * REVOLUTIONS**2, 0.0)
+        first.add_turning(scene, 2.0 * spin * REVOLUTIONS, REVOLUTIONS)
+        second.add_turning(scene, 2.0 * REVOLUTIONS**2, 0.0)
     bent = second.terms()
     return first.terms(loss_factor, lossy), bent if np.any(bent.K) else None
 
@@ -231,7 +162,7 @@ def terms_of_line(scene: Scene, coordinates: Coordinates) -> ExtraTerms | None:
     if not depends_on_speed(scene):
         return None
     total = _Sum(coordinates)
-    total.add_turning(_entries(scene), 1.0, 1.0)
+    total.add_turning(scene, 1.0, 1.0)
     return total.terms()
 
 
@@ -239,7 +170,7 @@ def depends_on_speed(scene: Scene) -> bool:
     """Whether matrices of a scene depend on the speed of rotation."""
     given = scene.structure
     spinning = isinstance(given, MatricesStructure) and not (given.G is None and given.K_omega2 is None)
-    return spinning or any(coupling.turns for coupling in scene.couplings)
+    return spinning or any(entry.turns for entry in scene.entries)
 
 
 class _Sum:
@@ -251,30 +182,30 @@ class _Sum:
         self._K: dict[int, Complex] = {}
         self._C: dict[int, Complex] = {}
 
-    def add_entries(self, entries: tuple[Entry, ...]) -> None:
-        """Add what does not depend on the speed."""
+    def add_entries(self, entries: tuple[Entry, ...], one: float, square: float, spin: float) -> None:
+        """Add what is constant, goes with the squared speed and with the speed, times these factors."""
         for entry in entries:
-            self._add(entry, entry.k, entry.c)
+            on, of = (self._in.shapes[self._in.dofs.index(dof)] for dof in (entry.on, entry.of))
+            place = np.outer(on, of)
+            self._at(self._K, entry.offset)[:] += (one * entry.k + square * entry.k_omega2) * place
+            self._at(self._C, entry.offset)[:] += (one * entry.c + spin * entry.g) * place
 
-    def _add(self, entry: Entry, k: complex, c: complex) -> None:
-        """Add k and c in the row of one DOF and the column of another."""
-        on, of = (self._in.shapes[self._in.dofs.index(dof)] for dof in (entry.on, entry.of))
-        self._at(self._K, entry.offset)[:] += k * np.outer(on, of)
-        self._at(self._C, entry.offset)[:] += c * np.outer(on, of)
-
-    def add_own(self, K: Blocks, C: Blocks, by: complex = 1.0, by_c: complex = 1.0) -> None:
-        """Add multiples of the structure's own matrices, in front of the coordinates of bodies."""
-        for to, blocks, factor in ((self._K, K, by), (self._C, C, by_c)):
-            for offset, matrix in blocks:
+    def add_own(self, K: complex, C: float, square: float, spin: float) -> None:
+        """Add the structure's own matrices times these factors, in front of the coordinates of bodies."""
+        own = self._in.own
+        if own is None:
+            return
+        skew_K, skew_C = own.skew
+        parts = (skew_K, K), (own.K_omega2, square), (skew_C, C), (own.G, spin)
+        for to, (blocks, factor) in zip((self._K, self._K, self._C, self._C), parts, strict=True):
+            for offset, matrix in blocks if factor else ():
                 size = len(matrix)
                 self._at(to, offset)[:size, :size] += factor * matrix
 
-    def add_turning(self, entries: tuple[Entry, ...], square: float, spin: float) -> None:
-        """Add what goes with the squared speed and with the speed, times these factors."""
-        for entry in entries:
-            self._add(entry, square * entry.k_omega2, spin * entry.g)
-        if self._in.own is not None:
-            self.add_own(self._in.own.K_omega2, self._in.own.G, square, spin)
+    def add_turning(self, scene: Scene, square: float, spin: float) -> None:
+        """Add all that goes with the squared speed and with the speed, times these factors."""
+        self.add_entries(scene.entries, 0.0, square, spin)
+        self.add_own(0.0, 0.0, square, spin)
 
     def terms(self, loss_factor: float = 0.0, lossy: Terms | None = None) -> ExtraTerms:
         """Return what was added, with structural damping."""
@@ -284,10 +215,3 @@ class _Sum:
 
     def _at(self, part: dict[int, Complex], offset: int) -> Complex:
         return part.setdefault(offset, np.zeros((self._n, self._n), np.complex128))
-
-
-def _entries(scene: Scene) -> tuple[Entry, ...]:
-    """Every entry that couplings and gas add."""
-    own = [entry for coupling in scene.couplings for entry in coupling.entries()]
-    own += [entry for gas in scene.aerodynamics for entry in gas.entries(scene.structure.sector_count)]
-    return tuple(own)

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-
-from solver.linear.extra_terms import ExtraTerms
 
 FloatArray = NDArray[np.float64]
 Integer = NDArray[np.int64]
@@ -30,6 +29,19 @@ class Identity(Generic[_Kept]):
 
     def __hash__(self) -> int:
         return id(self.it)
+
+
+def dynamic_stiffness(K: Any, C: Any, M: Any, k: Any, omega: float) -> tuple[Complex, Complex, Complex]:
+    """Return Z_k(ω) = K + ikωC − (kω)²M of harmonics k, ∂Z_k/∂ω and ∂²Z_k/∂ω².
+
+    Of arrays whose shapes go together: matrices, diagonals of modes (M = 1), or poles (−s, 1 and 0); and, as
+    it is linear in them, of derivatives of these.
+    """
+    return (
+        np.asarray(K + 1j * (k * omega) * C - (k * omega) ** 2 * M, np.complex128),
+        np.asarray(1j * k * C - 2.0 * k * (k * omega) * M, np.complex128),
+        np.asarray(-2.0 * k**2 * M + 0.0j * C, np.complex128),
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,6 +71,69 @@ class Source(Protocol):
 
     def at(self, diameter: int) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
         """Return K, C and M at a nodal diameter, Hermitian."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ExtraTerms:
+    """Terms beside the symmetric matrices, Σ_m X_m e^{jmθ} over m offsets; all arrays read-only.
+
+    They are complex where a term is one of the frequency domain. A hysteretic term (structural damping
+    K (1 + iη), an imaginary coefficient) is of a motion e^{iωt} with ω > 0 and has no share in the mean.
+
+    Attributes
+    ----------
+    offsets : tuple of int
+        Sectors ahead; (0,) of a structure without sectors.
+    K, C : (m, n, n) array
+        Complex stiffness [N/m] and damping [N s/m].
+    still : (n, n) array or None
+        Stiffness of the mean alone [N/m].
+    loss_factor : float
+        The symmetric stiffness times i and this belongs to it too.
+    lossy : Terms or None
+        Those whose stiffness it is; None: of the terms beside which these stand.
+    """
+
+    offsets: tuple[int, ...]
+    K: Complex
+    C: Complex
+    still: FloatArray | None = None
+    loss_factor: float = 0.0
+    lossy: Terms | None = None
+
+    @property
+    def is_real(self) -> bool:
+        """Whether all of it is a term of equations in time."""
+        return not (self.loss_factor or np.any(self.K.imag) or np.any(self.C.imag))
+
+    @property
+    def keeps_energy(self) -> bool:
+        """Whether it is gyroscopic alone: no stiffness, and antisymmetric damping, which does no work."""
+        if self.loss_factor or np.any(self.K) or np.any(self.C.imag):
+            return False
+        by = dict(zip(self.offsets, self.C, strict=True))
+        return all(
+            -offset in by and np.allclose(C, -by[-offset].T, rtol=0.0, atol=1e-12 * np.abs(C).max())
+            for offset, C in by.items()
+        )
+
+    def at(
+        self, turns: Complex, moving: Flags, stiffness: Callable[[], NDArray[Any]]
+    ) -> tuple[Complex, Complex]:
+        """Return what it adds to K and C, (ns, n, n), at e^{jθ} of structures that move or are at rest.
+
+        `stiffness` gives the symmetric one (ns, n, n), with which structural damping goes.
+        """
+        powers = turns[:, None] ** np.array(self.offsets)
+        K = np.einsum("sm,mij->sij", powers, self.K)
+        if not np.all(moving) and np.any(self.K.imag):
+            still = np.einsum("sm,mij->sij", powers, self.K.real.astype(np.complex128))
+            K = np.where(moving[:, None, None], K, still)
+        if self.still is not None:
+            K = K + np.where(moving, 0.0, 1.0)[:, None, None] * self.still
+        if self.loss_factor:
+            K = K + np.where(moving, 1j * self.loss_factor, 0.0)[:, None, None] * stiffness()
+        return K, np.einsum("sm,mij->sij", powers, self.C)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -19,8 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.errors import SettingError
-from solver.linear.extra_terms import ExtraTerms
-from solver.linear.model import ForceTerm, LinearModel, LinearModelDerivative, Terms
+from solver.linear.model import ExtraTerms, ForceTerm, LinearModel, LinearModelDerivative, Terms
 from solver.matrices.values import frozen
 from solver.scene.excitation import Motion
 from solver.scene.scene import Scene

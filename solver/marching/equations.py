@@ -86,7 +86,7 @@ def _of_matrices(
     pushed = [dof for force in scene.forces for dof, *_ in force.parts]
     moved = [dof for force in scene.forces if force.base is not None for dof, *_ in force.base.shares]
     used = [*ends, *pushed, *moved, *(dof for dof, _ in scene.seen(scene.observe.dof) or ())]
-    used += [dof for coupling in scene.couplings for dof in (coupling.on, coupling.of)]
+    used += [dof for entry in scene.entries for dof in (entry.on, entry.of)]
     spin = (scene.speed or 0.0) * REVOLUTIONS
     found = equations(structure, [dof for dof in used if dof not in own], spin)
     A, B, W = (csr_array(each) for each in (found.A, found.B, found.W))
@@ -111,7 +111,7 @@ def _with_couplings(
     if scene.structure.loss_factor:
         raise SettingError("loss_factor", scene.structure.loss_factor, _IN_TIME)
     spin = (scene.speed or 0.0) * REVOLUTIONS
-    for entry in (entry for coupling in scene.couplings for entry in coupling.entries()):
+    for entry in scene.entries:
         if entry.k.imag != 0.0:
             raise SettingError("k_imaginary", entry.k.imag, _IN_TIME)
         push = csr_array(W[:, [index[entry.on]]])

@@ -10,7 +10,7 @@ import numpy as np
 
 from solver.jit.fourier import Integer, Real
 from solver.modes.corrector import Corrected, ModeState, correct
-from solver.modes.curve import LEAST_SHARE, share_of_first, walk
+from solver.modes.curve import LEAST_SHARE, follow, share_of_first
 from solver.modes.gradient import ModeSensitivities
 from solver.modes.nonlinear_mode import MOST_POINTS, ModeProblem, pose
 from solver.modes.start import begin
@@ -108,14 +108,10 @@ def _along_the_curve(problem: ModeProblem, logs: Real) -> list[Corrected | None]
     found: list[Corrected | None] = [None] * logs.size
     low = float(logs.min()) + math.log(_BELOW)
     first = begin(equations, problem.mode, problem.rest, low, turns=problem.turns)
-    if not first.converged:
-        return found
     before: ModeState | None = None
-    high = float(logs.max())
-    for each in walk(
-        equations, first, high, turns=problem.turns, most_points=MOST_POINTS, ended=lambda _end: None
-    ):
-        here = each.point.state
+    curve = follow(equations, first, float(logs.max()), turns=problem.turns, most_points=MOST_POINTS)
+    for each in curve.points:
+        here = each.state
         if before is not None:
             for i in np.flatnonzero((logs >= before.log_amplitude) & (logs <= here.log_amplitude)).tolist():
                 if found[i] is None:

@@ -11,7 +11,7 @@ that was asked for, so points whose harmonic 1 has too little of a² are leapt o
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import Enum
 
@@ -34,9 +34,9 @@ _FARTHEST = 2.0  # ln a below the first amplitude, where a curve that turned bac
 
 
 class CurveEnd(Enum):
-    """How a curve ended."""
+    """How a curve ended; a status of each kind of curve has these names."""
 
-    REACHED = "reached"
+    COMPLETED = "completed"
     NOT_BEGUN = "not begun"
     STOPPED = "stopped"
     TURNED_BACK = "turned back"
@@ -45,36 +45,55 @@ class CurveEnd(Enum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Walked:
-    """A point with what it cost to get there."""
+class FollowedCurve:
+    """The points of a curve, how it ended, and how many steps were tried again."""
 
-    point: Corrected
-    rejected: int
+    points: list[Corrected]
+    end: CurveEnd
+    rejected: int = 0
 
 
-def walk(
+def follow(
     equations: Equations, first: Corrected, high: float, *, turns: bool, most_points: int,
-    least_share: float = LEAST_SHARE, ended: Callable[[CurveEnd], None],
-) -> Iterator[Walked]:  # fmt: skip
-    """Yield the points of a curve from a converged first one to ln a = `high`.
+    least_share: float = LEAST_SHARE, least: float = -math.inf,
+    done: Callable[[float], float] | None = None, on_progress: Callable[[float, int], None] | None = None,
+    should_stop: Callable[[], bool] | None = None,
+) -> FollowedCurve:  # fmt: skip
+    """Follow a curve from a first point to ln a = `high`.
 
     Parameters
     ----------
-    least_share : of a² that harmonic 1 has at every point; 0 follows the curve wherever it leads.
+    first : the curve is not begun where it has not converged.
     turns : the motion may begin at any instant; its phase is then fixed anew at every point.
-    ended : is told how the curve ended, before the last point is yielded or after it.
+    least_share : of a² that harmonic 1 has at every point; 0 follows the curve wherever it leads.
+    least : ln a below which it has turned back.
+    done : the share of the way at ln a; that of the logarithm if left out.
+    on_progress : is told that share and the number of points.
+    should_stop : is asked at every point whether to stop there.
     """
+    points: list[Corrected] = []
+    if not first.converged:
+        return FollowedCurve(points=points, end=CurveEnd.NOT_BEGUN)
     point, low = first, first.state.log_amplitude
     farthest = purest = first
-    yield Walked(point=point, rejected=0)
-    tangent, size = tangent_of(equations, point), FIRST_STEP
-    for _ in range(most_points):
-        if point.state.log_amplitude >= high:
-            ended(CurveEnd.REACHED)
-            return
-        here = _with_phase(equations, point) if turns else point
+    tangent, size, total = tangent_of(equations, point), FIRST_STEP, 0
+    for count in range(most_points + 1):
+        at = point.state.log_amplitude
+        if at < least:
+            return FollowedCurve(points=points, end=CurveEnd.TURNED_BACK, rejected=total)
+        points.append(point)
+        if on_progress is not None:
+            share = (at - low) / (high - low) if done is None else done(at)
+            on_progress(min(max(share, 0.0), 1.0), len(points))
+        if should_stop is not None and should_stop():
+            return FollowedCurve(points=points, end=CurveEnd.CANCELLED, rejected=total)
+        if at >= high:
+            return FollowedCurve(points=points, end=CurveEnd.COMPLETED, rejected=total)
+        if count == most_points:
+            break
         found, rejected, before = None, 0, tangent
-        if tangent is not None and point.state.log_amplitude > low - _FARTHEST:
+        if tangent is not None and at > low - _FARTHEST:
+            here = _with_phase(equations, point) if turns else point
             found, size, rejected = _advance(equations, here, tangent, size, high)
         if found is None or share_of_first(equations, found) < least_share:
             # From there on toward larger amplitudes.
@@ -83,16 +102,14 @@ def walk(
             )
             found, size, before = _leap(equations, back, high, least_share), _RESOLVED, None
         if found is None:
-            turned = point.state.log_amplitude <= low - _FARTHEST
-            ended(CurveEnd.TURNED_BACK if turned else CurveEnd.STOPPED)
-            return
-        tangent, point = tangent_of(equations, found, before), found
+            end = CurveEnd.TURNED_BACK if at <= low - _FARTHEST else CurveEnd.STOPPED
+            return FollowedCurve(points=points, end=end, rejected=total)
+        tangent, point, total = tangent_of(equations, found, before), found, total + rejected
         if point.state.log_amplitude > farthest.state.log_amplitude:
             farthest = point
         if share_of_first(equations, point) > _PURE:
             purest = point
-        yield Walked(point=point, rejected=rejected)
-    ended(CurveEnd.REACHED if point.state.log_amplitude >= high else CurveEnd.TOO_LONG)
+    return FollowedCurve(points=points, end=CurveEnd.TOO_LONG, rejected=total)
 
 
 def share_of_first(equations: Equations, found: Corrected) -> float:

@@ -286,6 +286,35 @@ class Equations:
         return turned
 
 
+class Forced(Equations):
+    """The responses to the excitation times a factor, which is the last unknown, in place of ζ."""
+
+    KEEPS_J = False
+
+    def __init__(self, balance: Balance) -> None:
+        super().__init__(balance)
+        self.unit = 1.0  # what the factor counts in
+
+    def damping(self, _last: float) -> float:
+        """Return ζ: none but the structure's own."""
+        return 0.0
+
+    def driven(self, last: float, log_amplitude: float) -> Complex | float:
+        """Return the force of a factor."""
+        return last * self.by_force(log_amplitude)
+
+    def by_last(self, _x: Complex, _dynamics: Dynamics, log_amplitude: float) -> Complex:
+        """Return that of 1."""
+        return self.by_force(log_amplitude)
+
+    def by_force(self, _log_amplitude: float = 0.0) -> Complex:
+        """Return the excitation in this unit on the coordinates, (nk, N)."""
+        s = self.structure
+        force = np.zeros((s.ks.size, s.force.size), np.complex128)
+        force[s.first] = self.unit * s.force
+        return force
+
+
 def _block_places(balance: Balance) -> Integer:
     """Return row port, column port and number of every block of dF_dU, (nb, 3)."""
     system = balance.system

@@ -18,7 +18,7 @@ from solver.errors import SettingError
 from solver.jit.fourier import Complex
 from solver.modes.along import with_turns, zeta_of
 from solver.modes.corrector import Corrected, ModeState, correct
-from solver.modes.curve import tangent_of, walk
+from solver.modes.curve import CurveEnd, follow, tangent_of
 from solver.modes.equations import Equations
 from solver.modes.error_estimate import Wider
 from solver.modes.records import PointRecord, Recorder
@@ -109,10 +109,9 @@ def _most_damping(
     first = correct(equations, raised(points[before].state), most=40)
     if not first.converged or first.state.log_amplitude >= high:
         return zeta_of(first) if first.converged else math.nan
-    walked = walk(equations, first, high, turns=True, most_points=_MOST_POINTS, ended=lambda _end: None)
-    found = with_turns(equations, [each.point for each in walked], math.nan)
-    reached = found[-1].state.log_amplitude >= high
-    return max(map(zeta_of, found)) if reached else math.nan
+    curve = follow(equations, first, high, turns=True, most_points=_MOST_POINTS)
+    found = with_turns(equations, curve.points, math.nan)
+    return max(map(zeta_of, found)) if curve.end is CurveEnd.COMPLETED else math.nan
 
 
 def _same_cycle(wider: Wider, cycle: Cycle) -> Cycle | None:

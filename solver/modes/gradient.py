@@ -14,15 +14,14 @@ from typing import Annotated, cast
 
 import numpy as np
 
-from solver.balance.kernels.residual import contact_values
 from solver.balance.parameter import Kind, Parameter
-from solver.balance.parameter_derivatives import contact_slopes, resolved
+from solver.balance.parameter_derivatives import contact_slopes, excitation_slopes, force_along, resolved
 from solver.balance.speed_line import check_no_line
-from solver.contacts.kernels.laws import law_force
 from solver.errors import SettingError
 from solver.jit.fourier import Complex, Real
 from solver.linear.assembly import linear_model, structure_derivative
 from solver.linear.condensation import term_amplitudes
+from solver.linear.model import dynamic_stiffness
 from solver.modes.corrector import ModeState, scales
 from solver.modes.equations import Equations, Evaluated
 from solver.modes.nonlinear_mode import pose
@@ -154,8 +153,8 @@ class ModeSensitivities:
         system = self._equations.balance.system
         if parameter.kind is Kind.LEVEL:
             if s.ks[0] == 0 and not system.constant_mean:
-                level = self._equations.balance.scene.value("excitation.amplitude") or 1.0
-                pushes[0] = s.constant / level
+                (level,), _ = excitation_slopes(self._equations.balance, [parameter])
+                pushes[0] = level * s.constant
             return _Change(pushes=pushes)
         if parameter.kind is Kind.FORCE_PHASE:
             turned = 0.0 if self._turns else np.vdot(1j * state.phase, at.x[s.first])
@@ -166,21 +165,15 @@ class ModeSensitivities:
 
     def _force_slopes(self, i: int, state: ModeState) -> Real:
         """Return ∂F/∂p of every port, (nc, n), by path i."""
-        equations = self._equations
-        system, n, point = equations.balance.system, equations.n, equations.point
-        w = state.y[: equations.size].reshape(equations.r, n)
-        motions = np.ascontiguousarray(equations.motions(w))
-        table, load, _, _ = contact_values(system, float(state.y[-2]), 0.0)
-        found = np.zeros((equations.balance.n_ports, n))
-        for e in np.flatnonzero(np.any(self._slopes[i] != 0.0, axis=1)):
-            begin, end = int(system.first_port[e]), int(system.first_port[e + 1])
-            blocks = slice(int(system.first_block[e]), int(system.first_block[e + 1]))
-            law_force(
-                system.laws[e], motions[begin:end], system.ks, load[e], system.load_ks, table[e],
-                self._slopes[i, e], self._loads[i, e], system.cos_table, system.sin_table, point.segments,
-                point.F[begin:end], point.dF_dU[blocks], point.dF_dp[begin:end],
-            )  # fmt: skip
-            found[begin:end] = point.dF_dp[begin:end]
+        equations, omega = self._equations, float(state.y[-2])
+        motions = equations.motions(state.y[: equations.size].reshape(equations.r, equations.n))
+        found = np.zeros((equations.balance.n_ports, equations.n))
+        for e in np.flatnonzero(np.any(self._slopes[i] != 0.0, axis=1)).tolist():
+            ports = slice(*equations.balance.system.first_port[e : e + 2].tolist())
+            along = self._slopes[i, e], self._loads[i, e]
+            _, found[ports], _ = force_along(
+                equations.balance, equations.point, e, motions[ports], omega, *along
+            )
         return found
 
     def _of_structure(self, parameter: Parameter, state: ModeState, at: Evaluated) -> _Change:
@@ -190,9 +183,8 @@ class ModeSensitivities:
         diameters = model.diameters(ks)
         dK, dC, dM = d.at(diameters, s.moving)
         omega, zeta = float(state.y[-2]), float(state.y[-1])
-        k = ks.astype(np.float64)[:, None, None]
         x = (s.shapes @ at.x[:, :, None])[:, :, 0]
-        dZ = dK + 1j * k * omega * dC - ((k * omega) ** 2 + 2j * k * zeta * omega**2) * dM
+        dZ, *_ = dynamic_stiffness(dK, dC - 2.0 * zeta * omega * dM, dM, ks[:, None, None], omega)
         pushes = -(dZ @ x[:, :, None])[:, :, 0]
         moved = None
         if d.contact_here is not None and d.contact_next is not None:

@@ -23,7 +23,7 @@ from solver.errors import SettingError
 from solver.jit.fourier import Complex, Real
 from solver.modes.along import CurveSegment, points_of, with_turns, zeta_of
 from solver.modes.corrector import Corrected
-from solver.modes.curve import walk
+from solver.modes.curve import CurveEnd, follow
 from solver.modes.equations import Equations
 from solver.modes.finer import PERIOD, SAFETY, Cycle, Ladder, cycle_at, multipliers_of
 from solver.modes.nonlinear_mode import MOST_POINTS, ModeProblem, pose
@@ -233,13 +233,8 @@ def _followed(problem: ModeProblem, found: NonlinearMode) -> tuple[list[Correcte
         return [], False
     low, high = found.points[0].log_amplitude, found.points[-1].log_amplitude
     first = begin(problem.equations, problem.mode, problem.rest, low, turns=True)
-    if not first.converged:
-        return [], False
-    walked = walk(
-        problem.equations, first, high, turns=True, most_points=MOST_POINTS, ended=lambda _end: None
-    )
-    points = [each.point for each in walked]
-    return points, points[-1].state.log_amplitude >= high
+    curve = follow(problem.equations, first, high, turns=True, most_points=MOST_POINTS)
+    return curve.points, curve.end is CurveEnd.COMPLETED
 
 
 def stability_left_out(scene: Scene, stability: bool | None) -> str:

@@ -15,11 +15,10 @@ from solver.balance.simplifications import Effects
 from solver.errors import SettingError
 from solver.jit.fourier import Real
 from solver.linear.assembly import linear_model
-from solver.modes.corrector import Corrected
-from solver.modes.curve import CurveEnd, walk
+from solver.modes.curve import follow
 from solver.modes.equations import Equations
 from solver.modes.records import collect
-from solver.modes.results import NonlinearMode, NonlinearModeStatus
+from solver.modes.results import NonlinearMode
 from solver.modes.start import LinearMode, begin, damped_mode, equilibrium, linear_modes, slopes_at_rest
 from solver.results.watch import shows_progress
 from solver.scene.cyclic.annulus import written_out
@@ -29,11 +28,6 @@ if TYPE_CHECKING:
 
 LEAST = 1e-100  # amplitude whose square, and that of its inverse, floating-point numbers can tell
 MOST_POINTS = 2000
-STATUS = {
-    CurveEnd.REACHED: NonlinearModeStatus.COMPLETED, CurveEnd.NOT_BEGUN: NonlinearModeStatus.NOT_BEGUN,
-    CurveEnd.STOPPED: NonlinearModeStatus.STOPPED, CurveEnd.TURNED_BACK: NonlinearModeStatus.TURNED_BACK,
-    CurveEnd.TOO_LONG: NonlinearModeStatus.TOO_LONG, CurveEnd.CANCELLED: NonlinearModeStatus.CANCELLED,
-}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -92,23 +86,11 @@ def nonlinear_mode(
     problem = pose(scene, mode, nodal_diameter, harmonics)
     equations = problem.equations
     first = begin(equations, problem.mode, problem.rest, low, turns=problem.turns)
-    points: list[Corrected] = []
-    rejected, end = 0, [CurveEnd.NOT_BEGUN]
-    if first.converged:
-        walked = walk(equations, first, high, turns=problem.turns, most_points=most_points, ended=end.append)
-        for each in walked:
-            points.append(each.point)
-            rejected += each.rejected
-            if on_progress is not None:
-                done = (each.point.state.log_amplitude - low) / (high - low)
-                on_progress(min(max(done, 0.0), 1.0), len(points))
-            if should_stop is not None and should_stop():
-                end.append(CurveEnd.CANCELLED)
-                break
-    return collect(
-        equations, points, mode=int(mode), turns=problem.turns, errors=errors, status=STATUS[end[-1]],
-        rejected=rejected, begun=begun,
+    curve = follow(
+        equations, first, high, turns=problem.turns, most_points=most_points, on_progress=on_progress,
+        should_stop=should_stop,
     )  # fmt: skip
+    return collect(equations, curve, mode=int(mode), turns=problem.turns, errors=errors, begun=begun)
 
 
 def check_amplitudes(amplitudes: Sequence[float]) -> tuple[float, float]:

@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from solver.contacts.kernels.system import DENSE, System, by_reference
 from solver.jit.fourier import Complex, Integer, Real, to_full
 from solver.linear.assembly import linear_model
 from solver.modes.corrector import Corrected
+from solver.modes.curve import FollowedCurve
 from solver.modes.equations import Equations
 from solver.modes.error_estimate import Wider
 from solver.modes.results import NonlinearMode, NonlinearModeStatus
@@ -87,36 +89,51 @@ class Recorder:
         return np.asarray(turn ** s.ks.astype(np.float64))
 
 
+def told_of(
+    equations: Equations, points: Sequence[Corrected], rows: Sequence[PointRecord], begun: float
+) -> dict[str, Any]:
+    """Return the fields of every `ModalCurve`."""
+    scene, n = equations.balance.scene, len(points)
+    return {
+        "scene": scene,
+        "max_abs": np.array([row.max_abs for row in rows], dtype=np.float64),
+        "states": np.array([row.states for row in rows], dtype=np.int64).reshape(n, len(scene.contacts)),
+        "residual": np.array([point.residual for point in points], dtype=np.float64),
+        "seconds": time.perf_counter() - begun,
+    }
+
+
+def last_unknowns(points: Sequence[Corrected]) -> tuple[Real, Real]:
+    """Return the frequencies [Hz] and the last unknown of points, (n,) each."""
+    y = np.array([point.state.y[-2:] for point in points], dtype=np.float64).reshape(len(points), 2)
+    return y[:, 0] / (2.0 * math.pi), y[:, 1]
+
+
 def collect(
-    equations: Equations, points: Sequence[Corrected], *, mode: int, turns: bool, errors: bool,
-    status: NonlinearModeStatus, rejected: int, begun: float,
-) -> NonlinearMode:  # fmt: skip
+    equations: Equations, curve: FollowedCurve, *, mode: int, turns: bool, errors: bool, begun: float
+) -> NonlinearMode:
     """Return the result of a curve; arguments as `solver.modes.nonlinear_mode` has them."""
-    balance = equations.balance
+    balance, points = equations.balance, curve.points
     scene, n, size = balance.scene, len(points), 2 * balance.highest_harmonic + 1
     recorder = Recorder(equations, turns=turns)
     rows = [recorder.of(point) for point in points]
-    y = np.array([point.state.y[-2:] for point in points], dtype=np.float64).reshape(n, 2)
+    frequency, zeta = last_unknowns(points)
     error = np.full((n, 2), math.nan)
     if errors and points:
         wider = Wider(equations)
         error = np.array([wider.estimate(point) for point in points])
     logs = np.array([point.state.log_amplitude for point in points], dtype=np.float64)
     return NonlinearMode(
-        scene=scene, mode=mode, nodal_diameter=diameter_of(scene), n_harmonics=balance.n_harmonics,
-        status=status, amplitude=np.exp(logs), frequency_hz=y[:, 0] / (2.0 * math.pi),
-        damping_ratio=y[:, 1], frequency_error=error[:, 0], damping_error=error[:, 1],
-        max_abs=np.array([row.max_abs for row in rows], dtype=np.float64),
-        states=np.array([row.states for row in rows], dtype=np.int64).reshape(n, len(scene.contacts)),
-        residual=np.array([point.residual for point in points], dtype=np.float64),
+        **told_of(equations, points, rows, begun), mode=mode, nodal_diameter=diameter_of(scene),
+        n_harmonics=balance.n_harmonics, status=NonlinearModeStatus[curve.end.name], amplitude=np.exp(logs),
+        frequency_hz=frequency, damping_ratio=zeta, frequency_error=error[:, 0], damping_error=error[:, 1],
         contact_motions=np.array([row.motions for row in rows]).reshape(n, balance.n_ports, size),
         contact_forces=np.array([row.forces for row in rows]).reshape(n, balance.n_ports, size),
         dof_motions=np.array([row.dofs for row in rows]).reshape(n, len(scene.dofs), size),
         forcing=np.array([row.forcing for row in rows], dtype=np.float64),
         points=tuple(point.state for point in points),
-        whole_matrices=balance.system.form == DENSE, rejected_steps=rejected,
+        whole_matrices=balance.system.form == DENSE, rejected_steps=curve.rejected,
         newton_iterations=sum(point.iterations for point in points),
-        seconds=time.perf_counter() - begun,
     )  # fmt: skip
 
 

@@ -21,6 +21,7 @@ from solver.jit.fourier import Complex, Flags, Integer, Real
 from solver.linear.assembly import linear_model
 from solver.linear.condensation import reduce_model
 from solver.linear.contact_table import port_stiffnesses
+from solver.linear.model import dynamic_stiffness
 from solver.matrices.normal_modes import hermitian, undamped_modes
 from solver.modes.kernels.dynamics import fill_stiffness, invert_modes
 from solver.modes.sparse import Factors, Pattern
@@ -114,12 +115,12 @@ class ModeStructure:
     def nearest(self, omega: float, zeta: float) -> int:
         """Return the mode of the structure alone that is nearest to singular at (ω, ζ)."""
         K, C, M, fed = self.own
-        return int(np.argmin(np.abs(K + 1j * omega * C - omega**2 * M - 2j * zeta * omega**2 * fed)))
+        return int(np.argmin(np.abs(dynamic_stiffness(K, C - 2.0 * zeta * omega * fed, M, 1.0, omega)[0])))
 
     def stiffness(self, omega: float) -> Complex:
         """Return K + iωC − ω²M of harmonic 1, (N, N)."""
         i = self.first
-        Z = self.K[i] + 1j * omega * self.C[i] - omega**2 * self.M[i]
+        Z = dynamic_stiffness(self.K[i], self.C[i], self.M[i], 1.0, omega)[0]
         if self.pattern is not None:
             return np.asarray(self.pattern.matrix(Z).toarray())
         return np.diag(Z) if self.is_diagonal else Z

@@ -28,6 +28,7 @@ from solver.jit.fourier import Complex, Integer, Real
 from solver.linear.assembly import linear_model
 from solver.linear.contact_table import port_stiffnesses
 from solver.response.kernels.slide import slide
+from solver.sensitivity.gradient import Amplitudes
 
 if TYPE_CHECKING:
     from solver.continuation.branch import Branch
@@ -152,7 +153,7 @@ class _Drifting:
             workspace=workspace, p=p, start=held.u.copy(), ways=ways, shapes=shapes, pulled=pulled,
             damped=damped, dragged=bool(np.all(np.diag(damped) > _DRAG * most)),
             A=_in_real(linear.A[0], system.ks), sliders=tuple(sliders),
-            free=_coefficients(linear.u_linear[0].T, system.ks).reshape(-1),
+            free=Amplitudes(balance).coefficients(linear.u_linear[0].T).reshape(-1),
         )  # fmt: skip
 
     def first(self, *, above: bool) -> Real:
@@ -330,13 +331,6 @@ def _instants(ks: bytes) -> Real:
     orders = np.frombuffer(ks, np.int64)
     tau = np.asarray(2.0 * math.pi / SAMPLES * np.arange(SAMPLES), np.float64)
     return fourier.from_full(fourier.basis(tau, int(orders[-1])), orders)
-
-
-def _coefficients(amplitudes: Complex, ks: Integer) -> Real:
-    """Return the coefficients (..., n) of complex amplitudes (..., nk) of the harmonics kept."""
-    full = np.zeros((*amplitudes.shape[:-1], int(ks[-1]) + 1), np.complex128)
-    full[..., ks] = amplitudes
-    return fourier.from_full(fourier.to_real(full), ks)
 
 
 def _in_real(A: Complex, ks: Integer) -> Real:

@@ -11,8 +11,9 @@ import numpy as np
 from solver.jit import fourier
 from solver.linear.assembly import linear_model
 from solver.linear.condensation import force_amplitudes
+from solver.linear.model import dynamic_stiffness
 from solver.response.solution import Solution
-from solver.response.time_history import all_coordinates, mass, matrices
+from solver.response.time_history import all_coordinates
 from solver.results.told import Piece
 
 
@@ -54,22 +55,24 @@ def power_balance(solution: Solution) -> PowerBalance:
         The solution did not converge.
     """
     model = linear_model(solution.scene)
-    free = model.free
+    free, omega = model.free, 2.0 * math.pi * solution.frequency_hz
     put_in = taken = 0.0
-    for k, motion in enumerate(all_coordinates(solution, first=1), 1):
-        speed = 2.0 * math.pi * solution.frequency_hz * k
-        velocity, moved = 1j * speed * motion[free], motion[~free]
-        force = force_amplitudes(model, np.array([k], dtype=np.int64))[0]
-        K, C, L = matrices(model, k)
-        dynamic = K - speed**2 * mass(model, k) + 1j * speed * C
-        put_in += 0.5 * float(np.vdot(velocity, force[free] - dynamic[np.ix_(free, ~free)] @ moved).real)
+    ks = np.arange(1, solution.highest_harmonic + 1)
+    diameters = model.diameters(ks)
+    given = model.at(diameters, ks > 0)
+    parts = *given, dynamic_stiffness(*given, ks[:, None, None], omega)[0], model.ports_at(diameters)
+    forces = force_amplitudes(model, ks)
+    for k, motion, force, K, C, _, Z, L in zip(
+        ks.tolist(), all_coordinates(solution, first=1), forces, *parts, strict=True
+    ):
+        velocity, moved = 1j * k * omega * motion[free], motion[~free]
+        put_in += 0.5 * float(np.vdot(velocity, force[free] - Z[np.ix_(free, ~free)] @ moved).real)
         rubbing = [fourier.to_complex(each)[k] for contact in solution.contacts for each in contact.forces]
         if moved.size and rubbing:
-            put_in += 0.5 * float(np.vdot(1j * speed * L[:, ~free] @ moved, rubbing).real)
+            put_in += 0.5 * float(np.vdot(1j * k * omega * L[:, ~free] @ moved, rubbing).real)
         taken += 0.5 * float(np.vdot(velocity, C[np.ix_(free, free)] @ velocity).real)
         if model.extra is not None:  # what a stiffness that is not symmetric or not real takes out
-            taken += 0.5 / speed * float(np.vdot(velocity, K[np.ix_(free, free)] @ velocity).imag)
-    omega = 2.0 * math.pi * solution.frequency_hz
+            taken += 0.5 / (k * omega) * float(np.vdot(velocity, K[np.ix_(free, free)] @ velocity).imag)
     friction = {}
     for contact in solution.contacts:
         friction[contact.name] = 0.5 * sum(

@@ -16,7 +16,7 @@ from solver.jit.fourier import Complex, Real
 from solver.linear.assembly import linear_model, row_of
 from solver.linear.condensation import contacts_hold, force_amplitudes
 from solver.linear.contact_table import port_stiffnesses
-from solver.linear.model import LinearModel
+from solver.linear.model import LinearModel, dynamic_stiffness
 from solver.response.solution import Solution
 from solver.wording import listing
 
@@ -31,8 +31,7 @@ def motion(solution: Solution) -> Real:
     SettingError
         The solution did not converge.
     """
-    amplitudes = [response(solution, k) for k in range(solution.highest_harmonic + 1)]
-    return fourier.to_real(np.array(amplitudes).T)
+    return fourier.to_real(linear_model(solution.scene).shapes @ all_coordinates(solution).T)
 
 
 def time_history(solution: Solution, dof: str, *, samples: int = 512) -> tuple[Real, Real]:
@@ -73,38 +72,19 @@ def hysteresis_loop(solution: Solution, contact: str, *, samples: int = 512) -> 
     return basis @ found.slip, found.force_over(given.at_frequency(omega), tau)
 
 
-def response(solution: Solution, k: int) -> Complex:
-    """Return the complex amplitudes x̂_k [m] of all DOFs, (n_dofs,), behind a converged solution."""
-    return np.asarray(linear_model(solution.scene).shapes @ coordinates(solution, k), dtype=np.complex128)
-
-
-def coordinates(solution: Solution, k: int) -> Complex:
-    """Return the complex amplitudes of all coordinates of the matrices, (n,), behind a converged solution.
+def all_coordinates(solution: Solution, *, first: int = 0) -> Complex:
+    """Return the complex amplitudes of all coordinates of every harmonic from `first` on, a row each.
 
     They are the DOFs, or those of the matrices or modes a structure is given by. The mean, and every
     harmonic of a structure that contacts alone hold, is found with contact stiffnesses on both sides,
     (Z_k + Lᵀ kt L) x̂_k = f̂_k − Lᵀ (F̂_k − kt û_k): without, all would be the difference of forces that
     nearly balance over an inertia that may be next to nothing.
+
+    Raises
+    ------
+    SettingError
+        The solution did not converge.
     """
-    _check_converged(solution)
-    model = linear_model(solution.scene)
-    K, C, L = matrices(model, k)
-    M = mass(model, k)
-    force = force_amplitudes(model, np.array([k], dtype=np.int64))[0]
-    forces = [fourier.to_complex(force)[k] for c in solution.contacts for force in c.forces]
-    friction = np.array(forces, dtype=np.complex128)
-    if solution.contacts and (k == 0 or contacts_hold(model)):
-        kt = port_stiffnesses(solution.scene, model)
-        motions = [fourier.to_complex(motion)[k] for c in solution.contacts for motion in c.motions]
-        friction = friction - kt * np.array(motions)
-        K = K + L.conj().T @ (kt[:, None] * L)
-    speed = 2.0 * math.pi * solution.frequency_hz * k
-    dynamic = K - speed**2 * M + 1j * speed * C
-    return np.asarray(np.linalg.solve(dynamic, force - L.conj().T @ friction), dtype=np.complex128)
-
-
-def all_coordinates(solution: Solution, *, first: int = 0) -> Complex:
-    """Return the complex amplitudes of all coordinates of every harmonic from `first` on, a row each."""
     _check_converged(solution)
     model = linear_model(solution.scene)
     ks = np.arange(first, solution.highest_harmonic + 1)
@@ -121,8 +101,8 @@ def all_coordinates(solution: Solution, *, first: int = 0) -> Complex:
         K[held] += np.swapaxes(L[held].conj(), 1, 2) @ (kt[:, None] * L[held])
     pushes = force_amplitudes(model, ks) - np.einsum("kpn,kp->kn", L.conj(), friction)
     moved = np.flatnonzero(pushes.any(axis=1))  # of odd harmonics alone, every second is nothing
-    speed = (2.0 * math.pi * solution.frequency_hz * ks[moved])[:, None, None]
-    dynamic = K[moved] - speed**2 * M[moved] + 1j * speed * C[moved]
+    omega = 2.0 * math.pi * solution.frequency_hz
+    dynamic, *_ = dynamic_stiffness(K[moved], C[moved], M[moved], ks[moved][:, None, None], omega)
     motions: Complex = np.zeros_like(pushes)
     motions[moved] = np.linalg.solve(dynamic, pushes[moved, :, None])[:, :, 0]
     return motions

@@ -45,7 +45,7 @@ from solver.response.wear_measures import (
     work_of,
 )
 from solver.results.told import Piece
-from solver.sensitivity.nonsmooth import BESIDE, FAR, SMOOTH
+from solver.sensitivity.nonsmooth import BESIDE, SMOOTH, beside, of_corner
 
 # Maxima below this share of the highest cannot lead within one step of an optimiser.
 COMPETES = 0.6
@@ -336,14 +336,10 @@ def _across(
     sides = []
     for way in (-1.0, 1.0):
         at_hz = worst.at * (1.0 + way * distance)
-        found = Workspace.of(sensitivity.balance).solve(2.0 * math.pi * at_hz, worst.solution)
-        change = np.abs(found.u - worst.solution).max(initial=0.0)
-        if not found.converged or change > FAR * np.abs(worst.solution).max(initial=0.0):
+        solved = Workspace.of(sensitivity.balance).solve(2.0 * math.pi * at_hz, worst.solution)
+        u = beside(solved, worst.solution)
+        if u is None:
             return None
-        sides.append(_measured(sensitivity.at(at_hz, found.u), contact, measure))
-    left, right = sides
-    rises = left.by_frequency, right.by_frequency
-    if not rises[0] * rises[1] < 0.0:
-        return None
-    drift = -(right.gradient - left.gradient) / (rises[1] - rises[0])
-    return np.asarray(left.gradient + rises[0] * drift)
+        found = _measured(sensitivity.at(at_hz, u), contact, measure)
+        sides.append((found.by_frequency, found.gradient))
+    return of_corner(*sides) if sides[0][0] * sides[1][0] < 0.0 else None

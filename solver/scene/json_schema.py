@@ -108,7 +108,8 @@ def plain(schema: Any) -> Any:
 
 
 def _model(name: str) -> type[BaseModel]:
-    by_name: dict[str, type[BaseModel]] = {law.__name__: law for law in laws().values()}
+    kinds = (*laws().values(), *linear_terms.coupling_kinds().values())
+    by_name: dict[str, type[BaseModel]] = {each.__name__: each for each in kinds}
     return by_name.get(name) or next(getattr(home, name) for home in _HOMES if hasattr(home, name))
 
 

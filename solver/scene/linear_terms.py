@@ -12,20 +12,21 @@ is the scene at one point of it.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, Self
+from collections.abc import Callable, Mapping, Sequence
+from functools import reduce
+from operator import or_
+from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Discriminator, Field, GetCoreSchemaHandler, Tag, model_validator
+from pydantic_core import CoreSchema
 
 from solver.contacts.fields import DofName, Name, NonNegative, Part, Signed
-from solver.scene.scene_parameter import SceneParameter, Slope, changed
-
-if TYPE_CHECKING:
-    from solver.scene.bodies.kinematics import HasParts
+from solver.contacts.laws.registry import announce
+from solver.errors import SettingError
+from solver.extensions import extension_classes
 
 Offset = Annotated[int, Field(strict=True, ge=-10_000, le=10_000)]
-_FACTOR = "factor"  # of aerodynamic influence
 _ROUNDING = 1e-14  # of the largest coefficient: less is what a Fourier transform leaves
 
 
@@ -50,8 +51,48 @@ class Entry(NamedTuple):
     g: float
     k_omega2: float
 
+    @property
+    def turns(self) -> bool:
+        """Whether it depends on the speed of rotation."""
+        return self.g != 0.0 or self.k_omega2 != 0.0
 
-class Coupling(Part):
+
+class LinearTerm(Part):
+    """What adds entries to K and C.
+
+    Attributes
+    ----------
+    name : str or None
+        Makes its numbers parameters ``<name>.<key>``; terms of one name are set together.
+    """
+
+    KIND: ClassVar[str] = ""
+    """Its `kind` in ``[[couplings]]``; one from outside has a field `kind` of that word."""
+    DOFS: ClassVar[tuple[str, ...]] = ()
+    """Its fields that name a DOF."""
+    TURNING: ClassVar[tuple[str, ...]] = ()
+    """Its fields that need a speed of rotation."""
+    PARAMETERS: ClassVar[Mapping[str, str]] = {}
+    """Its fields that are parameters, with their units; what it adds is affine in each."""
+
+    name: Name | None = None
+
+    def entries(self, sectors: int) -> tuple[Entry, ...]:
+        """What it adds to the matrices of a disk of so many sectors, or (1) of no disk."""
+        raise NotImplementedError
+
+    def slope(self, key: str, sectors: int) -> tuple[Entry, ...]:
+        """What a unit of a parameter adds."""
+        unit, nothing = (self.model_copy(update={key: at}).entries(sectors) for at in (1.0, 0.0))
+        less = (Entry(e.on, e.of, e.offset, -e.k, -e.c, -e.g, -e.k_omega2) for e in nothing)
+        return (*unit, *less)
+
+    def in_sector(self, named: Callable[[str, int], str]) -> Self:
+        """The same in one sector of a disk that is written out; `named` names a DOF so many sectors ahead."""
+        return self.model_copy(update={key: named(getattr(self, key), 0) for key in self.DOFS})
+
+
+class Coupling(LinearTerm):
     """Entries of stiffness and damping in the row of one DOF and the column of another.
 
     Attributes
@@ -77,6 +118,13 @@ class Coupling(Part):
         Stiffness per squared speed of rotation [N/m per (rad/s)²].
     """
 
+    KIND = "coupling"
+    DOFS = ("on", "of")
+    TURNING = ("gyroscopic", "k_omega2")
+    PARAMETERS: ClassVar = {
+        "k": "N/m", "k_imaginary": "N/m", "c": "N s/m", "gyroscopic": "N s^2/m", "k_omega2": "N s^2/m",
+    }  # fmt: skip
+
     on: DofName
     of: DofName
     offset: Offset = 0
@@ -93,12 +141,7 @@ class Coupling(Part):
             raise ValueError(f"`antisymmetric` couples two different DOFs, got {self.on!r} twice")
         return self
 
-    @property
-    def turns(self) -> bool:
-        """Whether it depends on the speed of rotation."""
-        return self.gyroscopic != 0.0 or self.k_omega2 != 0.0
-
-    def entries(self) -> tuple[Entry, ...]:
+    def entries(self, _sectors: int) -> tuple[Entry, ...]:
         """What it adds to the matrices."""
         k = complex(self.k, self.k_imaginary)
         first = Entry(self.on, self.of, self.offset, k, self.c, self.gyroscopic, self.k_omega2)
@@ -106,6 +149,72 @@ class Coupling(Part):
             return (first,)
         back = Entry(self.of, self.on, -self.offset, -k, -self.c, -self.gyroscopic, -self.k_omega2)
         return first, back
+
+    def in_sector(self, named: Callable[[str, int], str]) -> Self:
+        """The same between the DOFs of two sectors."""
+        ends = {"on": named(self.on, 0), "of": named(self.of, self.offset)}
+        return self.model_copy(update={**ends, "offset": 0})
+
+
+_added: list[type[LinearTerm]] = []
+
+
+def coupling_kinds() -> dict[str, type[LinearTerm]]:
+    """Every kind of ``[[couplings]]`` by its word: the one of the package, then those from outside.
+
+    Raises
+    ------
+    SettingError
+        A kind from outside has the word of another.
+    """
+    found: dict[str, type[LinearTerm]] = {Coupling.KIND: Coupling}
+    for kind in (*extension_classes(LinearTerm), *_added):
+        if found.setdefault(kind.KIND, kind) is not kind:
+            raise SettingError("kind", kind.KIND, f"must be the word of one kind, not of {kind.__name__} too")
+    return found
+
+
+def register(kind: type[LinearTerm]) -> type[LinearTerm]:
+    """Add a kind in this process; what starts processes of its own, as the service does, needs extensions.
+
+    Raises
+    ------
+    ValueError
+        There is one of this word.
+    """
+    if kind.KIND in coupling_kinds():
+        raise ValueError(f"there is a kind {kind.KIND!r} already")
+    _added.append(kind)
+    announce()
+    return kind
+
+
+def unregister(kind: type[LinearTerm]) -> None:
+    """Take back what `register` added."""
+    _added.remove(kind)
+    announce()
+
+
+def kind_of(data: object) -> str:
+    """The kind of a coupling: of a table or of one already read."""
+    kind = data.get("kind") if isinstance(data, Mapping) else getattr(data, "kind", None)
+    return Coupling.KIND if kind is None else str(kind)
+
+
+class _OfAnyKind:
+    """The union of the classes of all kinds there are when the schema of the scene is made."""
+
+    @classmethod
+    def __get_pydantic_core_schema__(cls, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
+        kinds = coupling_kinds()
+        if len(kinds) == 1:
+            return handler.generate_schema(Coupling)
+        members: list[Any] = [Annotated[each, Tag(word)] for word, each in kinds.items()]
+        union = Annotated[reduce(or_, members), Discriminator(kind_of)]  # type: ignore[valid-type]
+        return handler.generate_schema(union)
+
+
+CouplingOfAnyKind = Annotated[LinearTerm, _OfAnyKind]
 
 
 class Influence(Part):
@@ -149,7 +258,7 @@ class DiameterCoefficient(Part):
     damping: Signed = 0.0
 
 
-class Aerodynamics(Part):
+class Aerodynamics(LinearTerm):
     """Aerodynamic influence on one DOF of every blade, between neighbours or for each nodal diameter.
 
     The force on a blade is minus the sum of the coefficients times the motions.
@@ -158,8 +267,6 @@ class Aerodynamics(Part):
     ----------
     dof : str
         DOF of a sector that the gas acts on and that moves the gas.
-    name : str or None
-        Makes `factor` a parameter ``<name>.factor``.
     factor : float
         Multiplies all coefficients.
     influence : tuple of Influence
@@ -168,8 +275,10 @@ class Aerodynamics(Part):
         coefficients of waves; 0 for those left out.
     """
 
+    DOFS = ("dof",)
+    PARAMETERS: ClassVar = {"factor": "1"}
+
     dof: DofName
-    name: Name | None = None
     factor: Signed = 1.0
     influence: tuple[Influence, ...] = ()
     nodal_diameters: tuple[DiameterCoefficient, ...] = ()
@@ -190,35 +299,6 @@ class Aerodynamics(Part):
             Entry(self.dof, self.dof, offset, self.factor * k, self.factor * c, 0.0, 0.0)
             for offset, k, c in (each if isinstance(each, tuple) else _of_blade(each) for each in given)
         )
-
-
-def gas_paths(scene: HasParts) -> tuple[str, ...]:
-    """Return the paths of the factors of aerodynamic influence."""
-    return tuple(f"{each.name}.{_FACTOR}" for each in scene.aerodynamics if each.name is not None)
-
-
-def gas_parameter(scene: HasParts, path: str) -> SceneParameter | None:
-    """Return what the factor of aerodynamic influence is, if the path is one."""
-    owner, _, key = path.rpartition(".")
-    members = [each for each in scene.aerodynamics if owner and each.name == owner and key == _FACTOR]
-    if not members:
-        return None
-
-    def with_value(new: float) -> dict[str, Any]:
-        wanted = "must be a number from -1e15 to 1e15"
-        gas = tuple(
-            changed(each, {_FACTOR: new}, path, new, wanted) if each in members else each
-            for each in scene.aerodynamics
-        )
-        return {"aerodynamics": gas}
-
-    def slope() -> Slope:
-        unit = (each.model_copy(update={_FACTOR: 1.0}) for each in members)
-        return Slope(entries=tuple(e for each in unit for e in each.entries(scene.structure.sector_count)))
-
-    return SceneParameter(
-        get=lambda: members[0].factor, with_value=with_value, unit="1", least=-math.inf, slope=slope
-    )
 
 
 def _of_blade(given: Influence) -> tuple[int, complex, complex]:

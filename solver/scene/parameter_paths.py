@@ -20,9 +20,14 @@ from solver.scene.bodies.shape_parts import own_parts, shape_parameter, shape_pa
 from solver.scene.excitation import AMPLITUDE as AMPLITUDE
 from solver.scene.excitation import PHASE as PHASE
 from solver.scene.excitation import excitation_parameter
-from solver.scene.linear_terms import at_speed, gas_parameter, gas_paths
+from solver.scene.linear_terms import at_speed
 from solver.scene.scene_parameter import ActsOn, SceneParameter, changed
-from solver.scene.structure_parameters import structure_parameter, structure_paths
+from solver.scene.structure_parameters import (
+    structure_parameter,
+    structure_paths,
+    term_parameter,
+    term_paths,
+)
 from solver.wording import listing, nearest
 
 FREQUENCY = "frequency"
@@ -81,7 +86,7 @@ OWNERS: tuple[tuple[_Lister, _Maker], ...] = (
     (of_bodies.body_paths, of_bodies.body_parameter),
     (of_bodies.load_paths, of_bodies.load_parameter),
     (of_bodies.speed_paths, of_bodies.speed_parameter),
-    (gas_paths, gas_parameter),
+    (term_paths, term_parameter),
 )
 """For every kind of owner what lists its paths and what makes the parameter of one; the first that does."""
 

@@ -36,7 +36,13 @@ from solver.scene.bodies.shapes import AnyShape
 from solver.scene.bodies.validation import body_issues
 from solver.scene.cyclic.validation import cyclic_issues
 from solver.scene.excitation import with_force_files
-from solver.scene.linear_terms import Aerodynamics, Coupling, SpeedDependence, at_speed
+from solver.scene.linear_terms import (
+    Aerodynamics,
+    CouplingOfAnyKind,
+    Entry,
+    SpeedDependence,
+    at_speed,
+)
 from solver.scene.parts import (
     KINDS,
     ContactOfAnyLaw,
@@ -133,7 +139,7 @@ class Scene(Part):
         place of `speed`.
     with_speed : tuple of SpeedDependence
         Normal loads and the amplitude of the excitation that follow the speed.
-    couplings : tuple of Coupling
+    couplings : tuple of Coupling, and of kinds from outside
         Entries of stiffness and damping that are no springs and dashpots: not symmetric, gyroscopic.
     aerodynamics : tuple of Aerodynamics
         Influence of the gas between blades, of a cyclic structure.
@@ -161,7 +167,7 @@ class Scene(Part):
     speed: NonNegative | None = None
     speed_order: Positive | None = None
     with_speed: tuple[SpeedDependence, ...] = ()
-    couplings: tuple[Coupling, ...] = ()
+    couplings: tuple[CouplingOfAnyKind, ...] = ()
     aerodynamics: tuple[Aerodynamics, ...] = ()
     recovery: tuple[Recovered, ...] = ()
 
@@ -274,6 +280,12 @@ class Scene(Part):
     def rigid_contact(self) -> AnyContact | None:
         """The first contact with an infinite stiffness: such a scene is followed by events."""
         return next((contact for contact in self.contacts if contact.is_rigid), None)
+
+    @property
+    def entries(self) -> tuple[Entry, ...]:
+        """Every entry that couplings and gas add to K and C."""
+        every, sectors = (*self.couplings, *self.aerodynamics), self.structure.sector_count
+        return tuple(entry for each in every for entry in each.entries(sectors))
 
     def seen(self, name: str) -> tuple[tuple[str, float], ...] | None:
         """The DOFs, each with its factor, that a DOF or a recovered quantity of that name is a sum of."""

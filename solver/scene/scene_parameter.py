@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import TYPE_CHECKING, Any, Literal, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeVar
 
 from pydantic import ValidationError
 
@@ -14,11 +14,21 @@ from solver.contacts.laws.parts import LawQuantity, Span, usual_span
 from solver.errors import SettingError
 
 if TYPE_CHECKING:
-    from solver.scene.bodies.kinematics import Form
-    from solver.scene.excitation import Excitation
     from solver.scene.linear_terms import Entry
 
 _PartT = TypeVar("_PartT", bound=Part)
+
+
+class Term(NamedTuple):
+    """One DOF of a linear form, here or in the next sector, and its factor."""
+
+    dof: str
+    next: bool
+    factor: float
+
+
+Form = tuple[Term, ...]
+Forces = tuple[tuple[str, float], ...]  # constant forces [N] by DOFs
 
 
 class ActsOn(Enum):
@@ -40,8 +50,8 @@ class Slope:
         Masses, springs and dashpots, counted in this order, and what each gains.
     masses : mapping
         Mass matrix of bodies, by their names.
-    forces, second_forces : tuple of Excitation
-        Constant forces, and by the unit squared.
+    forces, second_forces : tuple of (str, float)
+        Constant forces by DOFs, and by the unit squared.
     motions : mapping
         Relative motions of contacts, by their names.
     entries : tuple of Entry
@@ -56,8 +66,8 @@ class Slope:
 
     parts: tuple[tuple[int, float], ...] = ()
     masses: Mapping[str, Real] = field(default_factory=dict)
-    forces: tuple[Excitation, ...] = ()
-    second_forces: tuple[Excitation, ...] = ()
+    forces: Forces = ()
+    second_forces: Forces = ()
     motions: Mapping[str, tuple[Form, ...]] | None = None
     entries: tuple[Entry, ...] = ()
     damping: Literal["K", "M"] | None = None

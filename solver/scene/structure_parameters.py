@@ -1,7 +1,8 @@
-"""Parameters of a structure: values of masses, springs and dashpots and of groups of them, its damping."""
+"""Parameters of a structure: masses, springs and dashpots and groups of them, its damping, linear terms."""
 
 from __future__ import annotations
 
+import math
 from typing import Any, cast
 
 from solver.contacts.fields import LARGEST
@@ -13,9 +14,10 @@ from solver.scene.scene_parameter import SceneParameter, Slope, changed
 STRUCTURE = "structure."
 _LOSS = "loss_factor"
 _PROPORTIONAL = {"stiffness_proportional_damping": "s", "mass_proportional_damping": "1/s"}
-_TABLES = ("masses", "springs", "dampers")
-_NUMBERS = {Mass: "m", Spring: "k", Damper: "c"}
+TABLES = ("masses", "springs", "dampers")
+NUMBERS = {Mass: "m", Spring: "k", Damper: "c"}
 _UNITS = {"m": "kg", "k": "N/m", "c": "N s/m"}
+_TERMS = ("couplings", "aerodynamics")
 _Named = Mass | Spring | Damper
 
 
@@ -65,13 +67,13 @@ def structure_parameter(scene: HasParts, path: str) -> SceneParameter | None:
 def _of_parts(structure: Structure, path: str, members: list[tuple[int, _Named, float]]) -> SceneParameter:
     """Return the value of a part, or of a group of one kind, in which each has its share."""
     _, first, whole = members[0]
-    key = _NUMBERS[type(first)]
+    key = NUMBERS[type(first)]
     unit = _UNITS[key]
     wanted = f"must be a number {'>' if key == 'm' else '>='} 0 and <= 1e15 [{unit}]"
 
     def with_value(new: float) -> dict[str, Any]:
         found = {id(part): changed(part, {key: new * share}, path, new, wanted) for _, part, share in members}
-        tables = {table: getattr(structure, table) for table in _TABLES}
+        tables = {table: getattr(structure, table) for table in TABLES}
         update = {table: tuple(found.get(id(old), old) for old in parts) for table, parts in tables.items()}
         return {"structure": structure.model_copy(update=update)}
 
@@ -94,3 +96,38 @@ def _share(part: _Named, name: str) -> float:
     if part.group != name:
         return 0.0
     return 1.0 if part.factor is None else part.factor
+
+
+def term_paths(scene: HasParts) -> tuple[str, ...]:
+    """Return the paths of couplings and aerodynamic influence that have a name."""
+    named = (each for table in _TERMS for each in getattr(scene, table) if each.name is not None)
+    return tuple(dict.fromkeys(f"{each.name}.{key}" for each in named for key in each.PARAMETERS))
+
+
+def term_parameter(scene: HasParts, path: str) -> SceneParameter | None:
+    """Return what a path of a coupling or of aerodynamic influence is, if it is one."""
+    owner, _, key = path.rpartition(".")
+    tables = {table: getattr(scene, table) for table in _TERMS}
+    members = [
+        x for rows in tables.values() for x in rows if owner and x.name == owner and key in x.PARAMETERS
+    ]
+    if not members:
+        return None
+
+    def with_value(new: float) -> dict[str, Any]:
+        wanted = "must be a number from -1e15 to 1e15"
+        found = {id(each): changed(each, {key: new}, path, new, wanted) for each in members}
+        return {table: tuple(found.get(id(old), old) for old in rows) for table, rows in tables.items()}
+
+    def slope() -> Slope:
+        sectors = scene.structure.sector_count
+        entries = tuple(entry for each in members for entry in each.slope(key, sectors))
+        if scene.speed_order is not None and any(entry.turns for entry in entries):
+            wanted = "is set, not swept nor differentiated, along an engine-order line: give a `speed`"
+            raise SettingError("path", path, wanted)
+        return Slope(entries=entries)
+
+    return SceneParameter(
+        get=lambda: cast(float, getattr(members[0], key)), with_value=with_value,
+        unit=members[0].PARAMETERS[key], least=-math.inf, slope=slope,
+    )  # fmt: skip

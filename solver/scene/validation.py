@@ -6,14 +6,14 @@ not hide a misspelt degree of freedom.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import chain, islice
 from typing import Any, cast
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from solver.contacts.fields import GROUND, parse_end
+from solver.contacts.fields import GROUND, End, parse_end
 from solver.contacts.laws.harmonics import LoadHarmonic
 from solver.contacts.laws.registry import DEFAULT, laws
 from solver.errors import Issue, Place, Shown, pointer
@@ -27,6 +27,8 @@ from solver.scene.linear_terms import (
     DiameterCoefficient,
     Influence,
     SpeedDependence,
+    coupling_kinds,
+    kind_of,
 )
 from solver.scene.parts import (
     KINDS,
@@ -91,13 +93,20 @@ def between_keys() -> tuple[str, ...]:
 
 def _tags(table: str) -> tuple[str, tuple[str, ...]]:
     """The key that tells the kinds of a table apart, and its words."""
-    words = {"contacts": ("law", tuple(laws())), "dampers": ("shape", tuple(SHAPES))}
+    words = {
+        "contacts": ("law", tuple(laws())), "dampers": ("shape", tuple(SHAPES)),
+        "couplings": ("kind", tuple(coupling_kinds())),
+    }  # fmt: skip
     return words.get(table, ("kind", KINDS))
 
 
-def _contact_keys() -> dict[tuple[str, ...], tuple[str, tuple[str, ...]]]:
-    """Name and known keys of the contacts of each law."""
-    found: dict[tuple[str, ...], tuple[str, tuple[str, ...]]] = {}
+def _keys_of_kinds() -> dict[tuple[str, ...], tuple[str, tuple[str, ...]]]:
+    """Name and known keys of the contacts of each law, and of the couplings of each kind."""
+    found: dict[tuple[str, ...], tuple[str, tuple[str, ...]]] = {
+        ("couplings", kind): (f"a coupling of the kind `{kind}`", tuple(each.model_fields))
+        for kind, each in coupling_kinds().items()
+        if each is not Coupling
+    }
     for law, each in laws().items():
         keys = tuple(field.alias or key for key, field in each.model_fields.items())
         answer = f"a contact with the law `{law}`", keys
@@ -184,17 +193,22 @@ def _walk(loc: Iterable[int | str], raw: object) -> tuple[list[int | str], objec
 def _table(loc: tuple[int | str, ...]) -> tuple[str, tuple[str, ...]]:
     """Name and known keys of the innermost table on the way to a location."""
     names = tuple(step for step in loc[:-1] if isinstance(step, str))
-    for known, answer in reversed([*_KEYS.items(), *_contact_keys().items()]):
+    for known, answer in reversed([*_KEYS.items(), *_keys_of_kinds().items()]):
         without_tag = tuple(name for name in names if name not in KINDS)
         if names[: len(known)] == known or (known and without_tag[: len(known)] == known):
             return answer
     return _KEYS[()]
 
 
+def structure_of(raw: Mapping[str, Any]) -> dict[str, Any]:
+    """The table of the structure; an empty one where it is none."""
+    structure = raw.get("structure")
+    return structure if isinstance(structure, dict) else {}
+
+
 def cross_issues(raw: dict[str, Any]) -> list[Issue]:
     """What is wrong between the parts of a scene: unknown DOFs, duplicate names, engine orders."""
-    structure = raw.get("structure")
-    structure = structure if isinstance(structure, dict) else {}
+    structure = structure_of(raw)
     table = "dofs" if structure.get("kind") == "matrices" else "masses"
     dofs = dofs_of(raw)
     cyclic = is_cyclic(structure)
@@ -204,7 +218,7 @@ def cross_issues(raw: dict[str, Any]) -> list[Issue]:
         _dof_issues(raw, dofs, structure.get("sectors") if cyclic else 0),
         duplicates(_structure_names(structure), "structure"),
         _contact_name_issues(raw, cyclic),
-        _engine_order_issues(raw, structure),
+        wave_issues(raw, "engine_order"),
     )
     return list(islice(found, MOST_ISSUES))
 
@@ -214,8 +228,7 @@ _Known = dict[str, None]
 
 def dofs_of(raw: dict[str, Any]) -> _Known | None:
     """The names of all DOFs, those of bodies behind the structure's; None if they cannot be told."""
-    structure = raw.get("structure")
-    structure = structure if isinstance(structure, dict) else {}
+    structure = structure_of(raw)
     table = "dofs" if structure.get("kind") == "matrices" else "masses"
     own = _dof_names(structure.get(table), table)
     if own is None:
@@ -263,35 +276,34 @@ def in_space(contact: dict[str, Any]) -> bool:
 def _end_issues(
     raw: dict[str, Any], structure: dict[str, Any], dofs: _Known | None, cyclic: bool
 ) -> Iterator[Issue]:
-    elements = [
-        (("structure", *steps), row)
-        for key in ("springs", "dampers")
-        for steps, row in rows_of(structure, key)
-    ]
+    def of_end(place: Place, text: str, end: End) -> Iterator[Issue]:
+        key = str(place[-2])
+        if end.next and not cyclic:
+            yield no_sector(place, key, text)
+        if end.dof is not None and dofs is not None and end.dof not in dofs:
+            yield unknown_dof(place, key, text, end.dof, [*dofs, GROUND])
+
+    rows = [row for key in ("springs", "dampers") for row in rows_of(structure, key)]
+    elements = [(("structure", *steps), row) for steps, row in rows]
     contacts = [each for each in rows_of(raw, "contacts") if not in_space(each[1])]
     for steps, row in [*elements, *contacts]:
         for key in between_keys():
-            yield from _pair_issues((*steps, key), row.get(key), dofs, cyclic)
+            yield from pair_issues((*steps, key), row.get(key), of_end)
 
 
-def _pair_issues(steps: Place, pair: object, dofs: _Known | None, cyclic: bool) -> Iterator[Issue]:
-    """What is wrong with a pair of ends; its form is pydantic's matter."""
+def pair_issues(
+    steps: Place, pair: object, of_end: Callable[[Place, str, End], Iterator[Issue]]
+) -> Iterator[Issue]:
+    """What is wrong with a pair of ends, and with each of them; its form is pydantic's matter."""
     if not (isinstance(pair, list) and len(pair) == 2 and all(isinstance(end, str) for end in pair)):
         return
+    ends = [parse_end(text) for text in pair]
     if pair[0] == pair[1]:
         yield Issue(steps, "must join two different ends", pair)
-    elif all(parse_end(end).next for end in pair):
+    elif all(end.next for end in ends):
         yield Issue(steps, "must have one end in this sector", pair)
-    for i, end in enumerate(pair):
-        yield from _one_end((*steps, i), end, dofs, cyclic)
-
-
-def _one_end(steps: Place, text: str, dofs: _Known | None, cyclic: bool) -> Iterator[Issue]:
-    end, key = parse_end(text), str(steps[-2])
-    if end.next and not cyclic:
-        yield no_sector(steps, key, text)
-    if end.dof is not None and dofs is not None and end.dof not in dofs:
-        yield unknown_dof(steps, key, text, end.dof, [*dofs, GROUND])
+    for i, (text, end) in enumerate(zip(pair, ends, strict=True)):
+        yield from of_end((*steps, i), text, end)
 
 
 def no_sector(place: Place, key: str, text: str) -> Issue:
@@ -325,17 +337,25 @@ def _dof_issues(raw: dict[str, Any], dofs: _Known | None, sectors: object) -> It
 _Named = list[tuple[Place, str]]
 
 
-def _structure_names(structure: dict[str, Any]) -> _Named:
+def named_rows(table: dict[str, Any], *keys: str, by: str = "name") -> _Named:
+    """The names in tables, or what else stands under the key `by`, with their places."""
+    rows = [row for key in keys for row in rows_of(table, key)]
+    return [((*steps, by), row[by]) for steps, row in rows if isinstance(row.get(by), str)]
+
+
+def parts_of(structure: dict[str, Any]) -> Iterator[tuple[Place, dict[str, Any]]]:
+    """Masses, springs and dashpots that are tables, with their places."""
     masses = structure.get("masses")
-    rows: list[tuple[Place, Any]] = [
-        (("masses", dof), mass) for dof, mass in (masses.items() if isinstance(masses, dict) else ())
-    ]
-    rows += [row for key in ("springs", "dampers") for row in rows_of(structure, key)]
-    return [
-        (("structure", *steps, "name"), row["name"])
-        for steps, row in rows
-        if isinstance(row, dict) and isinstance(row.get("name"), str)
-    ]
+    for dof, row in masses.items() if isinstance(masses, dict) else ():
+        if isinstance(row, dict):
+            yield ("structure", "masses", str(dof)), row
+    for key in ("springs", "dampers"):
+        for steps, row in rows_of(structure, key):
+            yield ("structure", *steps), row
+
+
+def _structure_names(structure: dict[str, Any]) -> _Named:
+    return [((*s, "name"), row["name"]) for s, row in parts_of(structure) if isinstance(row.get("name"), str)]
 
 
 def duplicates(named: _Named, what: str) -> Iterator[Issue]:
@@ -348,9 +368,7 @@ def duplicates(named: _Named, what: str) -> Iterator[Issue]:
 
 
 def _contact_name_issues(raw: dict[str, Any], cyclic: bool) -> Iterator[Issue]:
-    rows = list(rows_of(raw, "contacts"))
-    names: _Named = [((*s, "name"), row["name"]) for s, row in rows if isinstance(row.get("name"), str)]
-    groups: _Named = [((*s, "group"), row["group"]) for s, row in rows if isinstance(row.get("group"), str)]
+    names, groups = (named_rows(raw, "contacts", by=key) for key in ("name", "group"))
     yield from duplicates(names, "contacts")
     taken = {name for _, name in names}
     for steps, name in [*names, *groups]:
@@ -363,43 +381,43 @@ def _contact_name_issues(raw: dict[str, Any], cyclic: bool) -> Iterator[Issue]:
             yield Issue(steps, f"= {name!r}: no '@' in a cyclic scene")
 
 
-def _engine_order_issues(raw: dict[str, Any], structure: dict[str, Any]) -> Iterator[Issue]:
+def wave_issues(raw: dict[str, Any], key: str) -> Iterator[Issue]:
+    """Numbers or words of a wave round a disk that has no sectors, or that differ between its forces."""
+    structure, first = structure_of(raw), None
     kind = structure.get("kind")
-    first: object = None
     for steps, row in rows_of(raw, "excitation"):
-        order = row.get("engine_order")
-        if order is None:
+        given = row.get(key)
+        if given is None:
             continue
-        place = (*steps, "engine_order")
+        place = (*steps, key)
         if kind in ("lumped", "matrices") and not is_cyclic(structure):
-            yield Issue(place, f"= {quoted(order)} needs a cyclic structure; remove it from a {kind} one")
-        elif first is not None and order != first:
-            got = Shown(f"{quoted(order)} after {quoted(first)}")
-            yield Issue(place, "must be the same everywhere", got)
-        first = order if first is None else first
+            yield Issue(place, f"= {quoted(given)} needs a cyclic structure; remove it from a {kind} one")
+        elif first is not None and given != first:
+            yield Issue(place, "must be the same everywhere", Shown(f"{quoted(given)} after {quoted(first)}"))
+        first = given if first is None else first
 
 
 AMPLITUDE_PATH = "excitation.amplitude"
-_TURNING = ("gyroscopic", "k_omega2")
 
 
 def term_issues(raw: dict[str, Any]) -> list[Issue]:
     """Unknown DOFs, sectors where there are none, names taken twice, a speed that is missing."""
-    structure = raw.get("structure")
-    structure = structure if isinstance(structure, dict) else {}
-    return list(islice(_issues(raw, structure), MOST_ISSUES))
+    return list(islice(_issues(raw), MOST_ISSUES))
 
 
-def _issues(raw: dict[str, Any], structure: dict[str, Any]) -> Iterator[Issue]:
-    dofs, cyclic = dofs_of(raw), is_cyclic(structure)
+def _issues(raw: dict[str, Any]) -> Iterator[Issue]:
+    structure, dofs = structure_of(raw), dofs_of(raw)
+    cyclic = is_cyclic(structure)
+    kinds = coupling_kinds()
     for steps, row in rows_of(raw, "couplings"):
-        yield from _places(steps, row, ("on", "of"), dofs)
+        kind = kinds.get(kind_of(row), Coupling)
+        yield from _places(steps, row, kind.DOFS, dofs)
         if row.get("offset") and not cyclic:
             yield Issue(
                 (*steps, "offset"),
                 f"= {row['offset']!r} needs a cyclic structure; this one has no other sectors",
             )
-        for key in _TURNING:
+        for key in kind.TURNING:
             if row.get(key) and not _has_speed(raw):
                 yield _needs_speed(*steps, key)
     for key in ("G", "K_omega2"):
@@ -416,11 +434,12 @@ def _issues(raw: dict[str, Any], structure: dict[str, Any]) -> Iterator[Issue]:
         yield from _places(steps, row, ("dof",), dofs)
         if not cyclic:
             yield Issue(steps, "acts between the blades of a cyclic structure; this one has no sectors")
-    tables = ("aerodynamics", "bodies", "nodes", "loads", "dampers", "contacts")
-    rows = [row for table in tables for row in rows_of(raw, table)]
-    named = [((*steps, "name"), row["name"]) for steps, row in rows if isinstance(row.get("name"), str)]
-    mine = [row.get("name") for _, row in rows_of(raw, "aerodynamics")]
-    yield from duplicates([(s, name) for s, name in reversed(named) if name in mine], "paths")
+    named = named_rows(raw, "aerodynamics", "bodies", "nodes", "loads", "dampers", "contacts")
+    # Couplings of one name are set together: they are one owner.
+    coupled = {name: place for place, name in named_rows(raw, "couplings")}
+    mine = {*coupled, *(name for _, name in named_rows(raw, "aerodynamics"))}
+    every = [*((place, name) for name, place in coupled.items()), *named]
+    yield from duplicates([(place, name) for place, name in reversed(every) if name in mine], "paths")
 
 
 def _base_issues(raw: dict[str, Any], cyclic: bool) -> Iterator[Issue]:

@@ -25,11 +25,12 @@ from solver.balance.contact_hessian import (
 )
 from solver.balance.dynamic_stiffness import WholeMotion, times, whole_motion
 from solver.balance.kernels.jacobian import factorise, step_back
-from solver.balance.kernels.residual import contact_values
 from solver.balance.parameter import Kind
 from solver.balance.parameter_derivatives import (
     check_smooth_structure,
     contact_slopes,
+    excitation_slopes,
+    force_along,
     matrices_of_paths,
     modal_dampings,
     resolved,
@@ -37,7 +38,6 @@ from solver.balance.parameter_derivatives import (
 from solver.balance.speed_line import check_no_line
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.columns import KT, MU
-from solver.contacts.kernels.laws import law_force
 from solver.contacts.kernels.system import evaluation_by_value
 from solver.errors import SettingError
 from solver.jit.fourier import Complex, Integer, Real, cosine_position
@@ -243,14 +243,11 @@ class Sensitivities:
 
     def _directions(self) -> Directions:
         """Return what ω and every path change."""
-        n_paths = len(self._parameters)
-        kinds = np.array([parameter.kind for parameter in self._parameters], dtype=np.int64)
-        level = np.where(kinds == Kind.LEVEL, 1.0 / _level(self.balance), 0.0)
-        phase = (kinds == Kind.FORCE_PHASE).astype(np.float64)
+        level, phase = excitation_slopes(self.balance, self._parameters)
         return Directions(
             slopes=np.concatenate([np.zeros((1, *self._slopes.shape[1:])), self._slopes]),
             loads=np.concatenate([np.zeros((1, *self._loads.shape[1:])), self._loads]),
-            level=np.append(0.0, level), phase=np.append(0.0, phase).reshape(n_paths + 1),
+            level=np.append(0.0, level), phase=np.append(0.0, phase),
         )  # fmt: skip
 
     def _responses(
@@ -302,26 +299,18 @@ class Sensitivities:
         parts[:, plain, BY_KT] = self._slopes[:, plain, KT]
         parts[:, plain, BY_MU] = self._slopes[:, plain, MU]
         parts[:, plain, BY_LOAD:] = self._loads[:, plain]
-        for row, parameter in zip(rows, self._parameters, strict=True):
-            if parameter.kind is Kind.LEVEL:
-                row[ne * self._each + BY_LEVEL] = 1.0 / _level(self.balance)
-            elif parameter.kind is Kind.FORCE_PHASE:
-                row[ne * self._each + BY_PHASE] = 1.0
+        level, phase = excitation_slopes(self.balance, self._parameters)
+        rows[:, ne * self._each + BY_LEVEL], rows[:, ne * self._each + BY_PHASE] = level, phase
         return rows
 
     def _add_other_law(self, e: int, u: Real, omega: float, weights: Real, slopes: Real) -> None:
         """Add w·∂F/∂p of an element that follows another law: its force once for each path that acts."""
-        system, n, point = self.balance.system, self.balance.n_coefficients, self._point
-        begin, end = int(system.first_port[e]), int(system.first_port[e + 1])
-        blocks = slice(int(system.first_block[e]), int(system.first_block[e + 1]))
-        table, load, _, _ = contact_values(system, omega, 0.0)
+        ports = slice(*self.balance.system.first_port[e : e + 2].tolist())
+        motions = u.reshape(weights.shape)[ports]
         for i in np.flatnonzero(np.any(self._slopes[:, e] != 0.0, axis=1)):
-            law_force(
-                system.laws[e], u[begin * n : end * n].reshape(-1, n), system.ks, load[e], system.load_ks,
-                table[e], self._slopes[i, e], self._loads[i, e], system.cos_table, system.sin_table,
-                point.segments, point.F[begin:end], point.dF_dU[blocks], point.dF_dp[begin:end],
-            )  # fmt: skip
-            slopes[i] += float(np.sum(weights[begin:end] * point.dF_dp[begin:end]))
+            along = self._slopes[i, e], self._loads[i, e]
+            _, dF_dp, _ = force_along(self.balance, self._point, e, motions, omega, *along)
+            slopes[i] += float(np.sum(weights[ports] * dF_dp))
 
     def _add_structure(self, u: Real, omega: float, top: int, slopes: Real) -> None:
         """Add Re yᵀ (∂f/∂q − (∂L/∂q)ᴴ F − (∂Z/∂q) x) − Re λᵀ (∂L/∂q) x of every harmonic."""
@@ -345,8 +334,3 @@ class Sensitivities:
         """Return y = Z⁻ᵀ η, η the weights of the motion in the amplitude and the balance."""
         pulls = self._amplitudes.of(self._pulls[top].reshape(self._weights[top].shape)).conj()
         return motion.solve_transposed(motion.seen(self._turns[top], pulls))
-
-
-def _level(balance: Balance) -> float:
-    """Return the excitation amplitude that all forces are in proportion to."""
-    return balance.scene.value("excitation.amplitude") or 1.0

@@ -11,10 +11,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from solver.balance.balance import Balance
-from solver.balance.kernels.residual import contact_values
-from solver.balance.parameter_derivatives import contact_slopes, resolved
+from solver.balance.parameter_derivatives import contact_slopes, force_along, resolved
 from solver.balance.workspace import Workspace
-from solver.contacts.kernels.laws import law_force
 from solver.contacts.kernels.stick_slip_events import FAILED
 from solver.contacts.kernels.system import evaluation_by_value
 from solver.errors import SettingError
@@ -73,13 +71,6 @@ class LoopSensitivities:
 
     def _law(self, motion: Real, omega: float, slope: Real, dload: Real) -> tuple[tuple[Real, Real], int]:
         """Return the force and its derivative along (slope, dload), (n,) each, and the state."""
-        system, point, at = self._balance.system, self._point, self._at
-        table, load, _, _ = contact_values(system, omega, 0.0)
-        port, block = int(system.first_port[at]), int(system.first_block[at])
-        U = np.ascontiguousarray(motion, dtype=np.float64).reshape(1, -1)
-        state, _ = law_force(
-            system.laws[at], U, system.ks, load[at], system.load_ks, table[at], slope, dload,
-            system.cos_table, system.sin_table, point.segments, point.F[port : port + 1],
-            point.dF_dU[block : block + 1], point.dF_dp[port : port + 1],
-        )  # fmt: skip
-        return (point.F[port].copy(), point.dF_dp[port].copy()), int(state)
+        U = np.asarray(motion).reshape(1, -1)
+        force, change, state = force_along(self._balance, self._point, self._at, U, omega, slope, dload)
+        return (force[0].copy(), change[0].copy()), state

@@ -19,11 +19,11 @@ from typing import Annotated
 
 import numpy as np
 
-from solver.balance.workspace import Workspace
+from solver.balance.workspace import PointSolution, Workspace
 from solver.continuation.peaks import Peak
 from solver.jit.fourier import Real
 from solver.results.told import Piece
-from solver.sensitivity.gradient import Gradient, Sensitivities
+from solver.sensitivity.gradient import Sensitivities
 
 SMOOTH = 1e-6  # slope da/dω · ω/a below which a peak is a smooth maximum
 BESIDE = 1e-6  # distance of the nearer solutions from a corner, relative to its frequency
@@ -74,18 +74,25 @@ def peak_gradient(sensitivities: Sensitivities, peak: Peak) -> PeakGradient:
 
 def _across(sensitivities: Sensitivities, peak: Peak, distance: float) -> Real | None:
     """Return the derivatives of a corner from solutions at a relative distance on both sides."""
-    left, right = (_beside(sensitivities, peak, way * distance) for way in (-1.0, 1.0))
-    if left is None or right is None or not left.by_frequency > 0.0 > right.by_frequency:
-        return None
-    drift = -(right.by_parameters - left.by_parameters) / (right.by_frequency - left.by_frequency)
-    return np.asarray(left.by_parameters + left.by_frequency * drift)
+    sides = []
+    for way in (-1.0, 1.0):
+        at_hz = peak.at * (1.0 + way * distance)
+        solved = Workspace.of(sensitivities.balance).solve_from(2.0 * math.pi * at_hz, peak.solution)
+        u = beside(solved, peak.solution)
+        if u is None:
+            return None
+        found = sensitivities.gradient(u, at_hz)
+        sides.append((found.by_frequency, found.by_parameters))
+    return of_corner(*sides) if sides[0][0] > 0.0 > sides[1][0] else None
 
 
-def _beside(sensitivities: Sensitivities, peak: Peak, distance: float) -> Gradient | None:
-    """Return the gradient at the solution beside a peak; None if there is none on the same branch."""
-    at_hz = peak.at * (1.0 + distance)
-    found = Workspace.of(sensitivities.balance).solve_from(2.0 * math.pi * at_hz, peak.solution)
-    change = np.abs(found.u - peak.solution).max(initial=0.0)
-    if not found.converged or change > FAR * np.abs(peak.solution).max(initial=0.0):
-        return None
-    return sensitivities.gradient(found.u, at_hz)
+def of_corner(left: tuple[float, Real], right: tuple[float, Real]) -> Real:
+    """Return the derivatives of a corner from the slopes by frequency and parameters on both sides."""
+    drift = -(right[1] - left[1]) / (right[0] - left[0])
+    return np.asarray(left[1] + left[0] * drift)
+
+
+def beside(found: PointSolution, solution: Real) -> Real | None:
+    """Return what was solved for next to a solution; None if it is none on the same branch."""
+    change = np.abs(found.u - solution).max(initial=0.0)
+    return found.u if found.converged and change <= FAR * np.abs(solution).max(initial=0.0) else None

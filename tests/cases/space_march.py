@@ -14,7 +14,7 @@ from solver.contacts.laws.parts import Follows, Row
 from solver.marching.contacts import columns
 from solver.marching.kernels import state as kernel
 from solver.marching.kernels.taylor import run_periods
-from solver.scene.bodies.kinematics import Term
+from solver.scene.scene_parameter import Term
 
 DATA = json.loads((Path(__file__).parent.parent / "data" / "three_d.json").read_text())
 CASES: dict[str, Any] = DATA["cases"]

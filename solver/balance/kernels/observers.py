@@ -9,7 +9,8 @@ from solver.balance.kernels.residual import evaluate_contacts
 from solver.contacts.kernels.system import FREQUENCY, Evaluation, System
 from solver.jit.fourier import Complex, Real, coefficient_count, cosine_position
 from solver.jit.separate import apart
-from solver.linear.kernels.receptance import excitation, fill_terms
+from solver.linear.kernels.dynamic_stiffness import fill_terms
+from solver.linear.kernels.receptance import excitation
 
 
 @apart

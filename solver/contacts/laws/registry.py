@@ -65,21 +65,22 @@ def register(law: type[AnyContact]) -> type[AnyContact]:
     if law.LAW in laws():
         raise ValueError(f"there is a law {law.LAW!r} already")
     _added.append(law)
-    _tell()
+    announce()
     return law
 
 
 def unregister(law: type[AnyContact]) -> None:
     """Take back what `register` added."""
     _added.remove(law)
-    _tell()
+    announce()
 
 
 def on_change(listener: Callable[[], object]) -> None:
-    """Have a function called whenever a law is added or taken back, to make anew what it made of all laws."""
+    """Have a function called whenever scenes may hold something else, to make anew what it made of it."""
     _listeners.append(listener)
 
 
-def _tell() -> None:
+def announce() -> None:
+    """Tell whoever listens that scenes may hold something else: a law or a kind of coupling."""
     for listener in _listeners:
         listener()

@@ -12,7 +12,8 @@ from solver.contacts.kernels.system import DENSE, FREQUENCY, Receptance, System
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Complex
 from solver.jit.separate import apart
-from solver.linear.kernels.receptance import BLOCK, add_driven_modes, fill_driven, fill_terms, scale_driven
+from solver.linear.kernels.dynamic_stiffness import fill_terms
+from solver.linear.kernels.receptance import BLOCK, add_driven_modes, fill_driven, scale_driven
 
 
 @compiled

@@ -19,8 +19,14 @@ from solver.contacts.kernels.system import (
 )
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Complex, Real
-from solver.jit.lapack import invert, multiply
 from solver.jit.separate import apart
+from solver.linear.kernels.dynamic_stiffness import (
+    BY_OMEGA,
+    BY_P,
+    VALUE,
+    fill_from_matrices,
+    fill_terms,
+)
 from solver.linear.kernels.filled import is_filled, note
 from solver.linear.kernels.modal_products import basis_of_modes, fill_product
 
@@ -56,7 +62,7 @@ def receptance(system: System, p: float, out: Receptance) -> None:
     A that was filled for the same structure at the same λ is left as it is.
     """
     if system.form == DENSE:
-        _dense_receptance(system, p, out)
+        _from_matrices(system, p, out)
     elif is_filled(system, p, out):
         _modal_receptance(system, p, 0, out)
     else:
@@ -72,7 +78,7 @@ def observer_receptance(system: System, p: float, out: Receptance) -> None:
     Of many observed DOFs on one motion each needs its own, but A, by far the most work, need not be known.
     """
     if system.form == DENSE:
-        _dense_receptance(system, p, out)
+        _from_matrices(system, p, out)
     else:
         _modal_receptance(system, p, 0, out)
     scale_driven(system, p, out)
@@ -200,37 +206,6 @@ def fill_driven(system: System, s: int, first: int, size: int, i: int, driven: R
 
 
 @compiled
-def fill_terms(
-    system: System, s: int, first: int, size: int, k: float, omega: float, by_omega: float, terms: Real
-) -> None:
-    """Fill in 1/d_m and its derivative by λ: real, imaginary, real, imaginary; NaN where d_m is zero."""
-    speed, values = k * omega, system.eigenvalues[s]
-    for m in range(size):
-        terms[0, m] = values[first + m].real
-        terms[1, m] = values[first + m].imag
-    a, b, da, db = terms[0], terms[1], terms[2], terms[3]
-    if system.form == MODES:
-        dampings = system.dampings[s]
-        for m in range(size):
-            a[m] -= speed * speed
-            b[m] = speed * dampings[first + m]
-            da[m] = -2.0 * k * speed * by_omega
-            db[m] = k * dampings[first + m] * by_omega
-    else:
-        for m in range(size):
-            a[m] = -a[m]
-            b[m] = speed - b[m]
-            da[m] = 0.0
-            db[m] = k * by_omega
-    for m in range(size):
-        inverse = 1.0 / (a[m] * a[m] + b[m] * b[m])
-        re, im = a[m] * inverse, -b[m] * inverse
-        re2, im2 = re * re - im * im, 2.0 * re * im
-        a[m], b[m] = re, im
-        da[m], db[m] = im2 * db[m] - re2 * da[m], -re2 * db[m] - im2 * da[m]
-
-
-@compiled
 def _sums(weights: Real, row: int, terms: Real, size: int) -> tuple[complex, complex]:
     """Return Σ w_m / d_m and its derivative for one row of real weights."""
     re, im, dre, dim = 0.0, 0.0, 0.0, 0.0
@@ -287,96 +262,13 @@ def add_driven_modes(size: int, i: int, driven: Real, terms: Real, out: Receptan
 
 
 @apart
-def _dense_receptance(system: System, p: float, out: Receptance) -> None:
-    """Invert Z_k itself; λ may be the frequency or a structural parameter: dZ⁻¹ = −Z⁻¹ dZ Z⁻¹.
-
-    The mean is computed with k = 1 and matrices C and M of its own: 0, unless its stiffness follows ω².
-    """
-    omega = p if system.kind == FREQUENCY else system.omega
-    moved = p - system.parameter_reference if system.kind == STRUCTURE else 0.0
-    n = system.observe.size
-    Z, dZ = np.empty((n, n), np.complex128), np.empty((n, n), np.complex128)
-    green = np.empty((2, n, n), np.complex128)
-    half = np.empty((n, n), np.complex128)
-    force, rise = np.empty(n, np.complex128), np.empty(n, np.complex128)
-    for i in range(system.ks.size):
-        k, s = max(system.ks[i], 1), system.which[i]
-        speed = k * omega
-        damped, inertia = complex(0.0, speed), speed * speed
-        for a in range(n):
-            for b in range(n):
-                dK, dC, dM = system.dK[s, a, b], system.dC[s, a, b], system.dM[s, a, b]
-                K, C, M = system.K[s, a, b], system.C[s, a, b] + moved * dC, system.M[s, a, b] + moved * dM
-                if system.ddK.shape[0] > 0:
-                    K += 0.5 * moved * moved * system.ddK[s, a, b]
-                Z[a, b] = K + moved * dK + damped * C - inertia * M
-                if system.ddK.shape[0] > 0:
-                    dK += moved * system.ddK[s, a, b]
-                dZ[a, b] = 0.0
-                if system.kind == STRUCTURE:
-                    dZ[a, b] = dK + damped * dC - inertia * dM
-                elif system.kind == FREQUENCY:
-                    dZ[a, b] = complex(0.0, float(k)) * C - 2.0 * k * speed * M
-        if not invert(Z, green[0]):
-            green[0, 0, 0] = np.nan
-        multiply(dZ, green[0], half)
-        multiply(green[0], half, green[1])
-        for a in range(n):
-            for b in range(n):
-                green[1, a, b] = -green[1, a, b]
-        fill_forces(system, i, moved, force, rise)
-        for order in range(2):
-            project(system, s, force, green[order], i, order, out)
-        if system.kind == STRUCTURE:
-            add_driven(system, s, rise, green[0], out.u_linear[1, i], out.x_linear[1, i : i + 1])
-
-
-@compiled
-def fill_forces(system: System, i: int, moved: float, force: Complex, rise: Complex) -> None:
-    """Fill in the forces of harmonic number i where the structural parameter has moved, and their slope."""
-    for a in range(force.size):
-        force[a], rise[a] = system.forces[i, a], 0.0
-        if system.kind == STRUCTURE:
-            first, second = system.dforces[0, i, a], system.dforces[1, i, a]
-            force[a] += moved * (first + 0.5 * moved * second)
-            rise[a] = first + moved * second
-
-
-@compiled
-def add_driven(system: System, s: int, force: Complex, green: Complex, u: Complex, x: Complex) -> None:
-    """Add the motions of contacts (nc,) and observed DOF (1,) under forces, through Z⁻¹ or a derivative."""
-    for a in range(force.size):
-        motion = complex(0.0)
-        for b in range(force.size):
-            motion += green[a, b] * force[b]
-        x[0] += system.observe[a] * motion
-        for c in range(u.size):
-            u[c] += system.L[s, c, a] * motion
-
-
-@compiled
-def project(system: System, s: int, force: Complex, green: Complex, i: int, order: int, out: Any) -> None:
-    """Fill in Z⁻¹ (or a derivative) of harmonic number i, seen from contacts, excitation and observed DOF.
-
-    A is that of the leading ports, or, where `out` has room for them, of all.
-    """
-    nc, n, r = out.B.shape[2], green.shape[0], out.A.shape[2]
-    back, moved = np.empty((n, nc), np.complex128), np.empty((n, nc), np.complex128)
-    for a in range(n):
-        for c in range(nc):
-            back[a, c] = system.L[s, c, a].conjugate()
-    multiply(green, back, moved)
-    out.x_linear[order, i] = 0.0
-    for c in range(nc):
-        out.u_linear[order, i, c], out.B[order, i, c] = 0.0, 0.0
-        for a in range(n):
-            out.B[order, i, c] += system.observe[a] * moved[a, c]
-    add_driven(system, s, force, green, out.u_linear[order, i], out.x_linear[order, i : i + 1])
-    if r == nc:
-        multiply(system.L[s], moved, out.A[order, i])
-        return
-    rows, columns = np.empty((r, n), np.complex128), np.empty((n, r), np.complex128)
-    for c in range(r):
-        for a in range(n):
-            rows[c, a], columns[a, c] = system.L[s, system.leading[c], a], moved[a, system.leading[c]]
-    multiply(rows, columns, out.A[order, i])
+def _from_matrices(system: System, p: float, out: Receptance) -> None:
+    """Invert Z_k itself; λ may be the frequency or a structural parameter."""
+    omega, orders = p if system.kind == FREQUENCY else system.omega, np.array([VALUE])
+    if system.kind == FREQUENCY:
+        orders = np.array([VALUE, BY_OMEGA])
+    elif system.kind == STRUCTURE:
+        orders = np.array([VALUE, BY_P])
+    else:
+        out.A[1], out.B[1], out.u_linear[1], out.x_linear[1] = 0.0, 0.0, 0.0, 0.0
+    fill_from_matrices(system, omega, p, orders, out)

@@ -12,25 +12,22 @@ from typing import NamedTuple
 import numpy as np
 from numba.experimental import structref
 
-from solver.contacts.kernels.system import DENSE, MODES, STRUCTURE, System
+from solver.contacts.kernels.system import DENSE, STRUCTURE, System
 from solver.jit.decorators import compiled
-from solver.jit.fourier import Complex, Real
-from solver.jit.lapack import invert, multiply
+from solver.jit.fourier import Complex
 from solver.jit.reference import Reference
 from solver.jit.separate import apart
-from solver.linear.kernels.modal_products import basis_of_modes, fill_product
-from solver.linear.kernels.receptance import (
-    PAIRS_UP_TO,
-    add_driven,
-    clear,
-    excitation,
-    fill_forces,
-    project,
+from solver.linear.kernels.dynamic_stiffness import (
+    BY_BOTH,
+    BY_OMEGA,
+    BY_P,
+    ORDERS,
+    VALUE,
+    fill_from_matrices,
+    fill_terms,
 )
-
-# First index of every array.
-VALUE, BY_OMEGA, BY_OMEGA_TWICE, BY_P, BY_BOTH = 0, 1, 2, 3, 4
-ORDERS = 5
+from solver.linear.kernels.modal_products import basis_of_modes, fill_product
+from solver.linear.kernels.receptance import PAIRS_UP_TO, clear, excitation
 
 
 class Jets(NamedTuple):
@@ -72,7 +69,8 @@ def fill_jets(system: System, omega: float, p: float, out: Jets) -> None:
     clear(out)
     out.A[:] = 0.0
     if system.form == DENSE:
-        _dense(system, omega, p, out)
+        orders = np.arange(ORDERS if system.kind == STRUCTURE else BY_P)
+        fill_from_matrices(system, omega, p, orders, out)
     else:
         _modal(system, omega, out)
     nc = out.u_linear.shape[2]
@@ -101,7 +99,7 @@ def _modal(system: System, omega: float, out: Jets) -> None:
         for i in range(system.ks.size):
             if system.which[i] != s:
                 continue
-            _fill_terms(system, s, system.ks[i], omega, terms)
+            fill_terms(system, s, 0, nm, float(system.ks[i]), omega, 1.0, terms)
             for order in range(BY_P):
                 for m in range(nm):
                     part = complex(terms[2 * order, m], terms[2 * order + 1, m])
@@ -117,107 +115,3 @@ def _modal(system: System, omega: float, out: Jets) -> None:
                                 out.A[order, i, c, other] += phi * system.contact_duals[s, other, m]
             if nc > PAIRS_UP_TO:
                 fill_product(basis, duals, kinds, terms, BY_P, i, out.A)
-
-
-@compiled
-def _fill_terms(system: System, s: int, k: int, omega: float, terms: Real) -> None:
-    """Fill in 1/d_m and its first two derivatives by ω, real and imaginary parts; NaN where d_m is zero."""
-    speed = k * omega
-    for m in range(system.eigenvalues.shape[1]):
-        if system.form == MODES:
-            damping = system.dampings[s, m]
-            d = complex(system.eigenvalues[s, m].real - speed * speed, speed * damping)
-            slope, bend = complex(-2.0 * k * speed, k * damping), complex(-2.0 * k * k)
-        else:
-            d = complex(0.0, speed) - system.eigenvalues[s, m]
-            slope, bend = complex(0.0, float(k)), complex(0.0)
-        if d.real == 0.0 and d.imag == 0.0:
-            d = complex(np.nan, np.nan)
-        inverse = 1.0 / d
-        first = -slope * inverse * inverse
-        second = (2.0 * slope * slope * inverse - bend) * inverse * inverse
-        terms[0, m], terms[1, m] = inverse.real, inverse.imag
-        terms[2, m], terms[3, m] = first.real, first.imag
-        terms[4, m], terms[5, m] = second.real, second.imag
-
-
-@compiled
-def _dense(system: System, omega: float, p: float, out: Jets) -> None:
-    """Invert Z itself, with G = Z⁻¹: G_x = −G Z_x G, G_xy = G Z_x G Z_y G + G Z_y G Z_x G − G Z_xy G."""
-    moved = p - system.parameter_reference if system.kind == STRUCTURE else 0.0
-    structural = system.kind == STRUCTURE
-    n = system.observe.size
-    Z = np.zeros((ORDERS, n, n), np.complex128)
-    G = np.zeros((ORDERS, n, n), np.complex128)
-    half, one, two = (
-        np.empty((n, n), np.complex128),
-        np.empty((n, n), np.complex128),
-        np.empty((n, n), np.complex128),
-    )
-    force, rise = np.empty(n, np.complex128), np.empty(n, np.complex128)
-    for i in range(system.ks.size):
-        k, s = max(system.ks[i], 1), system.which[i]
-        speed = k * omega
-        ik = complex(0.0, float(k))
-        for a in range(n):
-            for b in range(n):
-                dK, dC, dM = system.dK[s, a, b], system.dC[s, a, b], system.dM[s, a, b]
-                K, C, M = system.K[s, a, b], system.C[s, a, b] + moved * dC, system.M[s, a, b] + moved * dM
-                if system.ddK.shape[0] > 0:
-                    K += 0.5 * moved * moved * system.ddK[s, a, b]
-                Z[VALUE, a, b] = K + moved * dK + ik * omega * C - speed * speed * M
-                if system.ddK.shape[0] > 0:
-                    dK += moved * system.ddK[s, a, b]
-                Z[BY_OMEGA, a, b] = ik * C - 2.0 * k * speed * M
-                Z[BY_OMEGA_TWICE, a, b] = -2.0 * k * k * M
-                if structural:
-                    Z[BY_P, a, b] = dK + ik * omega * dC - speed * speed * dM
-                    Z[BY_BOTH, a, b] = ik * dC - 2.0 * k * speed * dM
-        green = G[VALUE]
-        if not invert(Z[VALUE], green):
-            green[0, 0] = np.nan
-        _sandwich(green, Z[BY_OMEGA], green, half, one)
-        _set(G[BY_OMEGA], -1.0, one)
-        _sandwich(green, Z[BY_OMEGA_TWICE], green, half, one)
-        _sandwich(G[BY_OMEGA], Z[BY_OMEGA], green, half, two)
-        _set(G[BY_OMEGA_TWICE], -1.0, one)
-        _more(G[BY_OMEGA_TWICE], -2.0, two)
-        if structural:
-            _sandwich(green, Z[BY_P], green, half, one)
-            _set(G[BY_P], -1.0, one)
-            _sandwich(green, Z[BY_BOTH], green, half, one)
-            _set(G[BY_BOTH], -1.0, one)
-            _sandwich(G[BY_OMEGA], Z[BY_P], green, half, two)
-            _more(G[BY_BOTH], -1.0, two)
-            _sandwich(green, Z[BY_P], G[BY_OMEGA], half, two)
-            _more(G[BY_BOTH], -1.0, two)
-        fill_forces(system, i, moved, force, rise)
-        for order in range(ORDERS):
-            if structural or order < BY_P:
-                project(system, s, force, G[order], i, order, out)
-        if structural:
-            for order, by in ((BY_P, VALUE), (BY_BOTH, BY_OMEGA)):
-                add_driven(system, s, rise, G[by], out.u_linear[order, i], out.x_linear[order, i : i + 1])
-
-
-@apart
-def _sandwich(left: Complex, middle: Complex, right: Complex, half: Complex, out: Complex) -> None:
-    """Fill `out` with left @ middle @ right."""
-    multiply(left, middle, half)
-    multiply(half, right, out)
-
-
-@compiled
-def _set(target: Complex, factor: float, source: Complex) -> None:
-    """Set target = factor · source."""
-    for a in range(target.shape[0]):
-        for b in range(target.shape[1]):
-            target[a, b] = factor * source[a, b]
-
-
-@compiled
-def _more(target: Complex, factor: float, source: Complex) -> None:
-    """Add factor · source."""
-    for a in range(target.shape[0]):
-        for b in range(target.shape[1]):
-            target[a, b] += factor * source[a, b]

@@ -13,13 +13,13 @@ from solver.balance.speed_line import check_no_line
 from solver.errors import SettingError
 from solver.jit.fourier import Real
 from solver.modes.corrector import Corrected
-from solver.modes.curve import CurveEnd, walk
+from solver.modes.curve import FollowedCurve, follow
 from solver.modes.driven.held_amplitude import Held, first_held, least_force
 from solver.modes.driven.results import HeldAmplitude, HeldStatus, LeastForce
 from solver.modes.error_estimate import Wider
 from solver.modes.limit_cycles import stability_left_out
 from solver.modes.nonlinear_mode import LEAST, MOST_POINTS, pose
-from solver.modes.records import PointRecord, Recorder
+from solver.modes.records import PointRecord, Recorder, last_unknowns, told_of
 from solver.response.stability.floquet import motions_stability
 
 if TYPE_CHECKING:
@@ -28,13 +28,6 @@ if TYPE_CHECKING:
 LEVEL = "excitation.amplitude"
 _FAINT = 1e-12  # share of a motion in phase with the force below which the amplitude has no force to hold it
 _SAME = 1e-9  # relative distance of an end of the range within which a point is at it
-
-
-_STATUS = {
-    CurveEnd.REACHED: HeldStatus.COMPLETED, CurveEnd.NOT_BEGUN: HeldStatus.NOT_BEGUN,
-    CurveEnd.STOPPED: HeldStatus.STOPPED, CurveEnd.TURNED_BACK: HeldStatus.TURNED_BACK,
-    CurveEnd.TOO_LONG: HeldStatus.TOO_LONG, CurveEnd.CANCELLED: HeldStatus.CANCELLED,
-}  # fmt: skip
 
 
 def held_amplitude(
@@ -75,27 +68,14 @@ def held_amplitude(
     equations.target = float(amplitude)
     _check_moves(equations, scene, 2.0 * math.pi * low)
     first = first_held(equations, problem.rest, 2.0 * math.pi * low)
-    points: list[Corrected] = []
-    end = [CurveEnd.NOT_BEGUN]
-    if first.converged:
-        last = math.log(2.0 * math.pi * high)
-        for each in walk(
-            equations, first, last, turns=False, most_points=most_points, least_share=0.0, ended=end.append
-        ):
-            here = math.exp(each.point.state.log_amplitude) / (2.0 * math.pi)
-            if here < low * (1.0 - _SAME):
-                end.append(CurveEnd.TURNED_BACK)
-                break
-            points.append(each.point)
-            if on_progress is not None:
-                on_progress(min(max((here - low) / (high - low), 0.0), 1.0), len(points))
-            if should_stop is not None and should_stop():
-                end.append(CurveEnd.CANCELLED)
-                break
-    return _collect(
-        equations, points, _STATUS[end[-1]], errors=errors, unknown=stability_left_out(scene, stability),
-        begun=begun,
+    last, least = math.log(2.0 * math.pi * high), math.log(2.0 * math.pi * low * (1.0 - _SAME))
+    curve = follow(
+        equations, first, last, turns=False, most_points=most_points, least_share=0.0, least=least,
+        done=lambda at: (math.exp(at) / (2.0 * math.pi) - low) / (high - low), on_progress=on_progress,
+        should_stop=should_stop,
     )  # fmt: skip
+    unknown = stability_left_out(scene, stability)
+    return _collect(equations, curve, errors=errors, unknown=unknown, begun=begun)
 
 
 def _checked(scene: Scene, amplitude: float, dof: str | None) -> Scene:
@@ -139,31 +119,26 @@ def _check_moves(equations: Held, scene: Scene, omega: float) -> None:
 
 
 def _collect(
-    equations: Held, points: list[Corrected], status: HeldStatus, *, errors: bool, unknown: str, begun: float
+    equations: Held, curve: FollowedCurve, *, errors: bool, unknown: str, begun: float
 ) -> HeldAmplitude:
     """Return the result of a curve."""
-    balance, n = equations.balance, len(points)
-    scene, size = balance.scene, 2 * balance.highest_harmonic + 1
+    balance, points = equations.balance, curve.points
     recorder = Recorder(equations, turns=False)
     rows = [recorder.of(point) for point in points]
-    observed = np.array([row.observed for row in rows]).reshape(n, size)
-    error = np.full(n, math.nan)
+    observed = np.array([row.observed for row in rows]).reshape(-1, 2 * balance.highest_harmonic + 1)
+    error = np.full(len(points), math.nan)
     if errors and points:
         wider = Wider(equations)
         error = np.array([wider.estimate(point)[1] for point in points])
-    y = np.array([point.state.y[-2:] for point in points], dtype=np.float64).reshape(n, 2)
-    least = least_force(equations, points)
-    stable, unknown = _stable(equations, y, rows, unknown)
+    frequency, z = last_unknowns(points)
+    stable, unknown = _stable(equations, frequency, z, rows, unknown)
     return HeldAmplitude(
-        scene=scene, held=equations.target, n_harmonics=balance.n_harmonics, status=status,
-        frequency_hz=y[:, 0] / (2.0 * math.pi), excitation=y[:, 1] * equations.unit,
+        **told_of(equations, points, rows, begun), held=equations.target, n_harmonics=balance.n_harmonics,
+        status=HeldStatus[curve.end.name], frequency_hz=frequency, excitation=z * equations.unit,
         excitation_error=error * equations.unit,
         phase_deg=np.degrees(np.angle(observed[:, 1] - 1j * observed[:, 2])),
-        max_abs=np.array([row.max_abs for row in rows], dtype=np.float64),
-        states=np.array([row.states for row in rows], dtype=np.int64).reshape(n, len(scene.contacts)),
-        stable=stable, unknown=unknown, observed=observed, least=_force_of(equations, least),
-        residual=np.array([point.residual for point in points], dtype=np.float64),
-        seconds=time.perf_counter() - begun,
+        stable=stable, unknown=unknown, observed=observed,
+        least=_force_of(equations, least_force(equations, points)),
     )  # fmt: skip
 
 
@@ -175,18 +150,18 @@ def _force_of(equations: Held, point: Corrected | None) -> LeastForce:
 
 
 def _stable(
-    equations: Held, y: Real, rows: list[PointRecord], unknown: str
+    equations: Held, frequency: Real, z: Real, rows: list[PointRecord], unknown: str
 ) -> tuple[tuple[bool | None, ...], str]:
     """Return whether each point is stable while its force is held, and why that is not known."""
     if unknown:
         return (None,) * len(rows), unknown
     scene, found = equations.balance.scene, []
     ends = np.cumsum([len(contact.end_keys) for contact in scene.contacts])[:-1]
-    for row, (omega, z) in zip(rows, y.tolist(), strict=True):
-        there = scene.with_values({LEVEL: z * equations.unit * scene.value(LEVEL)})
+    for row, hertz, factor in zip(rows, frequency.tolist(), z.tolist(), strict=True):
+        there = scene.with_values({LEVEL: factor * equations.unit * scene.value(LEVEL)})
         motions = tuple(np.split(row.motions, ends))
         try:
-            found.append(motions_stability(there, omega / (2.0 * math.pi), motions).stable)
+            found.append(motions_stability(there, hertz, motions).stable)
         except SettingError as error:  # a law or a term without a motion in time
             return (None,) * len(rows), str(error)
     return tuple(found), ""

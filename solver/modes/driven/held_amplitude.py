@@ -27,7 +27,7 @@ from solver.balance.kernels.output import extremes
 from solver.contacts.kernels.system import System, by_reference
 from solver.jit.fourier import Complex, Real, cosine_position
 from solver.modes.corrector import Corrected, ModeState, correct
-from solver.modes.equations import Equations, Evaluated
+from solver.modes.equations import Evaluated, Forced
 from solver.modes.start import slopes_at_rest
 from solver.modes.structure import Dynamics
 
@@ -38,7 +38,7 @@ _LEAST_RISE = 1.01
 _CLOSE, _MOST_TRIES = 1e-9, 60  # of ln ω, where the force is least
 
 
-class Held(Equations):
+class Held(Forced):
     """The responses with a given harmonic 1, or max|x|, of the observed DOF; the last unknown is z.
 
     Attributes
@@ -48,11 +48,9 @@ class Held(Equations):
     whole : max|x| is held, not harmonic 1 alone.
     """
 
-    KEEPS_J = False
-
     def __init__(self, balance: Balance) -> None:
         super().__init__(balance)
-        self.target, self.unit, self.whole = 1.0, 1.0, False
+        self.target, self.whole = 1.0, False
         self._kernel: System = by_reference(balance.system)
 
     def over(self, balance: Balance) -> Held:
@@ -68,25 +66,6 @@ class Held(Equations):
         with the other sign.
         """
         return bool(before[-1] * y[-1] > 0.0)
-
-    def damping(self, _last: float) -> float:
-        """Return ζ: none but the structure's own."""
-        return 0.0
-
-    def driven(self, last: float, _log_amplitude: float) -> Complex | float:
-        """Return z c f."""
-        return last * self.by_force()
-
-    def by_last(self, _x: Complex, _dynamics: Dynamics, _log_amplitude: float) -> Complex:
-        """Return c f."""
-        return self.by_force()
-
-    def by_force(self) -> Complex:
-        """Return c f on the coordinates, (nk, N)."""
-        s = self.structure
-        force = np.zeros((s.ks.size, s.force.size), np.complex128)
-        force[s.first] = self.unit * s.force
-        return force
 
     def _seen(self, x: Complex) -> tuple[float, Complex]:
         """Return what is held [m], and c (nk, N) of its change Re Σ c_kᴴ dx_k."""

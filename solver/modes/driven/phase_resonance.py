@@ -18,19 +18,16 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from solver.balance.balance import Balance
 from solver.balance.speed_line import check_no_line
 from solver.errors import SettingError
 from solver.jit.fourier import Complex, Real
-from solver.modes.corrector import Corrected
-from solver.modes.curve import CurveEnd, walk
+from solver.modes.curve import follow
 from solver.modes.driven.results import PhaseResonance
-from solver.modes.equations import Equations, Evaluated
-from solver.modes.nonlinear_mode import MOST_POINTS, STATUS, check_amplitudes, pose
-from solver.modes.records import Recorder
+from solver.modes.equations import Evaluated, Forced
+from solver.modes.nonlinear_mode import MOST_POINTS, check_amplitudes, pose
+from solver.modes.records import Recorder, last_unknowns, told_of
 from solver.modes.results import NonlinearModeStatus
 from solver.modes.start import begin, coordinates_of
-from solver.modes.structure import Dynamics
 
 if TYPE_CHECKING:
     from solver.scene.scene import Scene
@@ -38,14 +35,11 @@ if TYPE_CHECKING:
 _FAINT = 1e-9  # share of the excitation along a mode below which it does not drive it
 
 
-class Driven(Equations):
-    """The responses to the excitation at a given amplitude; the last unknown is z, see the module."""
+class Driven(Forced):
+    """The responses to the excitation at a given amplitude; the last unknown is z, see the module.
 
-    KEEPS_J = False
-
-    def __init__(self, balance: Balance) -> None:
-        super().__init__(balance)
-        self.unit = 1.0  # c, set when the linear mode is known
+    `unit` is c, set when the linear mode is known.
+    """
 
     def evaluate(self, y: Real, log_amplitude: float, phase: Complex, mode: int) -> Evaluated | None:
         """Return the equations at y: the force grows with a."""
@@ -54,23 +48,9 @@ class Driven(Equations):
             return None
         return replace(at, by_log_amplitude=at.by_log_amplitude + y[-1] * at.jacobian[:, -1])
 
-    def damping(self, _last: float) -> float:
-        """Return ζ: none but the structure's own."""
-        return 0.0
-
-    def driven(self, last: float, log_amplitude: float) -> Complex | float:
-        """Return p f."""
-        return last * self._force(log_amplitude)
-
-    def by_last(self, _x: Complex, _dynamics: Dynamics, log_amplitude: float) -> Complex:
-        """Return p f / z."""
-        return self._force(log_amplitude)
-
-    def _force(self, log_amplitude: float) -> Complex:
-        s = self.structure
-        force = np.zeros((s.ks.size, s.force.size), np.complex128)
-        force[s.first] = self.unit * math.exp(log_amplitude) * s.force
-        return force
+    def by_force(self, log_amplitude: float = 0.0) -> Complex:
+        """Return p f / z on the coordinates."""
+        return math.exp(log_amplitude) * super().by_force()
 
 
 def phase_resonance(
@@ -109,35 +89,15 @@ def phase_resonance(
         raise SettingError("excitation", [each.place for each in scene.excitation], wanted)
     equations.unit = 2.0 * problem.mode.omega**2 / along
     first = begin(equations, problem.mode, problem.rest, low, turns=False)
-    points: list[Corrected] = []
-    end = [CurveEnd.NOT_BEGUN]
-    if first.converged:
-        walked = walk(equations, first, high, turns=False, most_points=most_points, ended=end.append)
-        for each in walked:
-            points.append(each.point)
-            if on_progress is not None:
-                done = (each.point.state.log_amplitude - low) / (high - low)
-                on_progress(min(max(done, 0.0), 1.0), len(points))
-            if should_stop is not None and should_stop():
-                end.append(CurveEnd.CANCELLED)
-                break
-    return _collect(equations, points, mode=int(mode), status=STATUS[end[-1]], begun=begun)
-
-
-def _collect(
-    equations: Driven, points: list[Corrected], *, mode: int, status: NonlinearModeStatus, begun: float
-) -> PhaseResonance:
-    """Return the result of a curve."""
-    scene, n = equations.balance.scene, len(points)
-    recorder = Recorder(equations, turns=False)
-    rows = [recorder.of(point) for point in points]
+    curve = follow(
+        equations, first, high, turns=False, most_points=most_points, on_progress=on_progress,
+        should_stop=should_stop,
+    )  # fmt: skip
+    points, recorder = curve.points, Recorder(equations, turns=False)
     amplitude = np.exp(np.array([point.state.log_amplitude for point in points], dtype=np.float64))
-    y = np.array([point.state.y[-2:] for point in points], dtype=np.float64).reshape(n, 2)
+    frequency, z = last_unknowns(points)
     return PhaseResonance(
-        scene=scene, mode=mode, status=status, amplitude=amplitude, frequency_hz=y[:, 0] / (2.0 * math.pi),
-        excitation=y[:, 1] * equations.unit * amplitude,
-        max_abs=np.array([row.max_abs for row in rows], dtype=np.float64),
-        states=np.array([row.states for row in rows], dtype=np.int64).reshape(n, len(scene.contacts)),
-        residual=np.array([point.residual for point in points], dtype=np.float64),
-        seconds=time.perf_counter() - begun,
+        **told_of(equations, points, [recorder.of(point) for point in points], begun), mode=int(mode),
+        status=NonlinearModeStatus[curve.end.name], amplitude=amplitude, frequency_hz=frequency,
+        excitation=z * equations.unit * amplitude,
     )  # fmt: skip

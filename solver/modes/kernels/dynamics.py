@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from solver.jit.fourier import Complex, Integer, Real, cosine_position
 from solver.jit.separate import apart
+from solver.linear.kernels.dynamic_stiffness import dynamic_stiffness
 
 
 @apart
@@ -13,13 +14,11 @@ def fill_stiffness(
 ) -> None:  # fmt: skip
     """Fill Z, ∂Z/∂ω and ∂Z/∂ζ entry by entry; all matrices (nk, L), of modes or of whole matrices."""
     for i in range(K.shape[0]):
-        k = turns[i]
-        turn = k * omega
         for j in range(K.shape[1]):
-            drag = complex(0.0, 2.0 * k) * mass[i, j]
-            damping, inertia = complex(0.0, k) * C[i, j], M[i, j]
-            Z[i, j] = K[i, j] + omega * damping - turn * turn * inertia - zeta * omega * omega * drag
-            by_omega[i, j] = damping - 2.0 * k * turn * inertia - 2.0 * zeta * omega * drag
+            drag = complex(0.0, 2.0 * turns[i]) * mass[i, j]
+            value, slope, _ = dynamic_stiffness(K[i, j], C[i, j], M[i, j], turns[i], omega)
+            Z[i, j] = value - zeta * omega * omega * drag
+            by_omega[i, j] = slope - 2.0 * zeta * omega * drag
             by_zeta[i, j] = -(omega * omega) * drag
 
 

@@ -23,19 +23,10 @@ from solver.contacts.frames import Axes, cross, unit
 from solver.contacts.laws.base import AnyContact
 from solver.scene.bodies.body import REVOLUTIONS, Body, Load, Node, Place
 from solver.scene.bodies.shapes import AnyShape
-from solver.scene.linear_terms import Aerodynamics, SpeedDependence
+from solver.scene.linear_terms import Aerodynamics, LinearTerm, SpeedDependence
 from solver.scene.parts import Excitation, LumpedStructure, Structure
-
-
-class Term(NamedTuple):
-    """One DOF of a form, here or in the next sector, and its factor."""
-
-    dof: str
-    next: bool
-    factor: float
-
-
-Form = tuple[Term, ...]
+from solver.scene.scene_parameter import Forces, Term
+from solver.scene.scene_parameter import Form as Form
 
 
 class InContact(Protocol):
@@ -92,6 +83,10 @@ class HasParts(Protocol):
     @property
     def speed_order(self) -> float | None:
         """Order of the line along which the speed follows the frequency."""
+
+    @property
+    def couplings(self) -> tuple[LinearTerm, ...]:
+        """Entries of K and C that are no springs and dashpots."""
 
     @property
     def aerodynamics(self) -> tuple[Aerodynamics, ...]:
@@ -250,7 +245,7 @@ def static_forces(scene: HasParts) -> tuple[Excitation, ...]:
     found = [part for load in scene.loads for part in towards(scene, load, load.force)]
     for body in scene.bodies:
         found += outward(body, body.mass * (body.radius_of_rotation or 0.0) * spin_of(scene) ** 2)
-    return static(found)
+    return static(tuple(found))
 
 
 def spin_of(scene: HasParts) -> float:
@@ -258,7 +253,7 @@ def spin_of(scene: HasParts) -> float:
     return (scene.speed or 0.0) * REVOLUTIONS if scene.speed_order is None else 1.0
 
 
-def static(parts: list[tuple[str, float]]) -> tuple[Excitation, ...]:
+def static(parts: Forces) -> tuple[Excitation, ...]:
     """Constant forces on DOFs."""
     return tuple(Excitation(dof=dof, amplitude=force, harmonic=0) for dof, force in parts)
 

@@ -8,7 +8,7 @@ from typing import Any
 from solver.contacts.fields import LARGEST
 from solver.errors import SettingError
 from solver.scene.bodies.body import MOMENTS, REVOLUTIONS, Body
-from solver.scene.bodies.kinematics import HasParts, outward, spin_of, static, towards
+from solver.scene.bodies.kinematics import HasParts, outward, spin_of, towards
 from solver.scene.scene_parameter import SceneParameter, Slope, changed
 
 SPEED = "speed"
@@ -57,7 +57,7 @@ def _slope(scene: HasParts, members: list[Body], key: str) -> Slope:
     for body in members:
         forces += outward(body, square * (body.mass if key != "mass" else body.radius_of_rotation or 0.0))
     masses = {body.name: body.mass_derivative(key) for body in members} if key == "mass" else {}
-    return Slope(masses=masses, forces=static(forces))
+    return Slope(masses=masses, forces=tuple(forces))
 
 
 def load_paths(scene: HasParts) -> tuple[str, ...]:
@@ -79,7 +79,7 @@ def load_parameter(scene: HasParts, path: str) -> SceneParameter | None:
 
     return SceneParameter(
         get=lambda: load.force, with_value=with_value, unit="N", least=-math.inf,
-        slope=lambda: Slope(forces=static(towards(scene, load, 1.0))),
+        slope=lambda: Slope(forces=tuple(towards(scene, load, 1.0))),
     )  # fmt: skip
 
 
@@ -104,7 +104,7 @@ def speed_parameter(scene: HasParts, path: str) -> SceneParameter | None:
             twice = 2.0 * body.mass * (body.radius_of_rotation or 0.0) * REVOLUTIONS
             first += outward(body, twice * spin_of(scene))
             second += outward(body, twice * REVOLUTIONS)
-        return Slope(forces=static(first), second_forces=static(second), speed=True)
+        return Slope(forces=tuple(first), second_forces=tuple(second), speed=True)
 
     return SceneParameter(get=lambda: speed, with_value=with_value, unit="1/min", slope=slope)
 

@@ -11,11 +11,11 @@ from pydantic import TypeAdapter, ValidationError
 
 from solver.contacts.laws.base import AnyContact
 from solver.errors import SettingError
-from solver.scene.bodies.kinematics import Form, HasParts, Term, placed_forms
+from solver.scene.bodies.kinematics import HasParts, placed_forms
 from solver.scene.bodies.paths import BODY_UNITS, body_parameter
 from solver.scene.bodies.shapes import POINTS, AnyShape
 from solver.scene.parts import ContactOfAnyLaw
-from solver.scene.scene_parameter import ActsOn, SceneParameter, Slope
+from solver.scene.scene_parameter import ActsOn, Form, SceneParameter, Slope, Term
 
 _UNITS = {
     **dict.fromkeys(("angle", "curved_angle"), "rad"), **dict.fromkeys(("width", "length", "radius"), "m"),

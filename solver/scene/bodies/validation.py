@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from itertools import chain, islice
 from typing import Any
 
-from solver.contacts.fields import GROUND, parse_end
+from solver.contacts.fields import GROUND, End, parse_end
 from solver.contacts.laws.registry import DEFAULT, laws
 from solver.errors import Issue, Place
 from solver.scene.bodies.shapes import WITH_BODY
@@ -18,8 +18,11 @@ from solver.scene.validation import (
     dofs_of,
     duplicates,
     in_space,
+    named_rows,
     no_sector,
+    pair_issues,
     rows_of,
+    structure_of,
     unknown_dof,
 )
 from solver.wording import listing, nearest, quoted
@@ -36,8 +39,7 @@ def further_ends(law: object) -> tuple[str, ...]:
 def body_issues(raw: dict[str, Any]) -> list[Issue]:
     """Unknown bodies, nodes and DOFs, names taken twice, ends without a position."""
     dofs = dofs_of(raw)
-    structure = raw.get("structure")
-    structure = structure if isinstance(structure, dict) else {}
+    structure = structure_of(raw)
     found = chain(
         _name_issues(raw, is_cyclic(structure)),
         _node_issues(raw, structure),
@@ -59,21 +61,16 @@ def _points_of(at: Place, damper: dict[str, Any]) -> list[tuple[Place, dict[str,
     return [((*at, "pairs", i), row) for i, row in rows if isinstance(row, dict)]
 
 
-def _named(raw: dict[str, Any], *tables: str) -> list[tuple[Place, str]]:
-    rows = [row for table in tables for row in rows_of(raw, table)]
-    return [((*steps, "name"), row["name"]) for steps, row in rows if isinstance(row.get("name"), str)]
-
-
 def _places(raw: dict[str, Any]) -> list[str]:
     """Names of everything with a position."""
     shapes = [row.get("name") for _, row in rows_of(raw, "dampers") if row.get("shape") in WITH_BODY]
-    dampers = [name for _, name in _named(raw, "dampers") if name in shapes]
-    return [*(name for _, name in _named(raw, "bodies", "nodes")), *dampers]
+    dampers = [name for _, name in named_rows(raw, "dampers") if name in shapes]
+    return [*(name for _, name in named_rows(raw, "bodies", "nodes")), *dampers]
 
 
 def _name_issues(raw: dict[str, Any], cyclic: bool) -> Iterator[Issue]:
     """Names of bodies, nodes and loads that are taken, reserved, or of a sector."""
-    named = _named(raw, "bodies", "nodes", "loads", "dampers")
+    named = named_rows(raw, "bodies", "nodes", "loads", "dampers")
     yield from duplicates(named, "bodies, nodes, loads and dampers")
     contacts = [row.get(key) for _, row in rows_of(raw, "contacts") for key in ("name", "group")]
     for steps, name in named:
@@ -132,16 +129,9 @@ def _contact_issues(
 def _end_issues(
     steps: Place, row: dict[str, Any], structure: dict[str, Any], known: list[str], dofs: _Dofs
 ) -> Iterator[Issue]:
-    ends = row.get("between")
-    if not (isinstance(ends, list) and len(ends) == 2 and all(isinstance(end, str) for end in ends)):
-        return
     cyclic = is_cyclic(structure)
-    if ends[0] == ends[1]:
-        yield Issue(steps, "must join two different ends", ends)
-    elif all(parse_end(end).next for end in ends):
-        yield Issue(steps, "must have one end in this sector", ends)
-    for i, text in enumerate(ends):
-        end, place = parse_end(text), (*steps, i)
+
+    def of_end(place: Place, text: str, end: End) -> Iterator[Issue]:
         if end.dof is not None and end.dof not in known:
             yield _unknown_place(place, "between", end.dof, known, dofs)
         if end.next and not cyclic:
@@ -152,6 +142,8 @@ def _end_issues(
                 "give the direction of the axis as `axis` of the structure (matrices: of [structure.cyclic])"
             )
             yield Issue(place, sentence, named=False)
+
+    yield from pair_issues(steps, row.get("between"), of_end)
 
 
 def _has_axis(structure: dict[str, Any]) -> bool:

@@ -18,7 +18,7 @@ from solver.matrices.validation import DofTable
 from solver.matrices.values import MOST_DOFS, Matrix
 from solver.results.told import Piece
 from solver.scene.bodies.kinematics import forms_of, written_form
-from solver.scene.linear_terms import Coupling
+from solver.scene.linear_terms import Coupling, LinearTerm
 from solver.scene.parameter_paths import changed_quantities
 from solver.scene.parts import Recovered
 from solver.scene.scene import (
@@ -39,6 +39,7 @@ from solver.scene.scene import (
     Structure,
     parse_end,
 )
+from solver.scene.structure_parameters import NUMBERS, TABLES
 from solver.wording import listing
 
 
@@ -225,7 +226,9 @@ def annulus(scene: Scene) -> Scene:
         speed_order=scene.speed_order,
         with_speed=scene.with_speed,
         recovery=tuple(_recovered(r, j) for j in sectors for r in scene.recovery),
-        couplings=tuple(_coupling(c, j, n) for j in sectors for c in scene.couplings + _gas(scene, n)),
+        couplings=tuple(
+            _placed_term(term, j, n) for j in sectors for term in (*scene.couplings, *_gas(scene, n))
+        ),
     )
 
 
@@ -261,28 +264,19 @@ def _mistuned(structure: CyclicStructure, factor: float) -> CyclicStructure:
     """The structure with `factor` on every part that the mistuning names."""
     if structure.mistuning is None:
         return structure
-    of = structure.mistuning.of
-    parts: tuple[Mass | Spring | Damper, ...] = (*structure.masses, *structure.springs, *structure.dampers)
-    dofs = set(of) - {part.name for part in parts}
+    of, tables = structure.mistuning.of, {table: getattr(structure, table) for table in TABLES}
+    dofs = set(of) - {part.name for parts in tables.values() for part in parts}
+
+    def scaled(part: _NamedT) -> _NamedT:
+        if part.name not in of and getattr(part, "dof", None) not in dofs:
+            return part
+        key = NUMBERS[type(part)]
+        named = {} if part.name is None or factor == 1.0 else {"factor": factor}
+        return part.model_copy(update={key: factor * getattr(part, key), **named})
+
     return structure.model_copy(
-        update={
-            "masses": tuple(
-                _scaled(m, {"m": factor * m.m}, factor) if m.name in of or m.dof in dofs else m
-                for m in structure.masses
-            ),
-            "springs": tuple(
-                _scaled(s, {"k": factor * s.k}, factor) if s.name in of else s for s in structure.springs
-            ),
-            "dampers": tuple(
-                _scaled(d, {"c": factor * d.c}, factor) if d.name in of else d for d in structure.dampers
-            ),
-        }
+        update={table: tuple(scaled(part) for part in parts) for table, parts in tables.items()}
     )
-
-
-def _scaled(part: _NamedT, value: dict[str, float], factor: float) -> _NamedT:
-    named = {} if part.name is None or factor == 1.0 else {"factor": factor}
-    return part.model_copy(update={**value, **named})
 
 
 def _in_sector(name: str, j: int) -> str:
@@ -333,13 +327,7 @@ def _moving(scene: Scene, contact: AnyContact, j: int, n: int) -> tuple[dict[str
             sums[dof] = sums.get(dof, 0.0) + factor
         motions.append(tuple((dof, factor) for dof, factor in sums.items() if factor != 0.0))
     ends = tuple(_end(text, j, n) for text in contact.between)
-    update: dict[str, object] = {
-        "between": ends,
-        "motions": tuple(motions),
-        "at": None,
-        "normal": None,
-        "tangents": None,
-    }
+    update = {"between": ends, "motions": tuple(motions)} | dict.fromkeys(("at", "normal", "tangents"))
     return update, [bool(motion) for motion in motions]
 
 
@@ -363,9 +351,8 @@ def _recovered(recovered: Recovered, j: int) -> Recovered:
     return recovered.model_copy(update={"name": _in_sector(recovered.name, j), "terms": terms})
 
 
-def _coupling(coupling: Coupling, j: int, n: int) -> Coupling:
-    on, of = _in_sector(coupling.on, j), _in_sector(coupling.of, (j + coupling.offset) % n)
-    return coupling.model_copy(update={"on": on, "of": of, "offset": 0})
+def _placed_term(term: LinearTerm, j: int, n: int) -> LinearTerm:
+    return term.in_sector(lambda dof, ahead: _in_sector(dof, (j + ahead) % n))
 
 
 def _gas(scene: Scene, n: int) -> tuple[Coupling, ...]:
@@ -405,12 +392,8 @@ def _mass(mass: Mass, j: int) -> Mass:
 
 
 def _contact(contact: ContactOfAnyLaw, j: int, turn: float, *, standing: bool) -> ContactOfAnyLaw:
-    update: dict[str, object] = {
-        "name": _in_sector(contact.name, j),
-        "group": contact.group or contact.name,
-    }
-    update |= contact.in_sector(turn, _cosine(turn) if standing else None)
-    return contact.model_copy(update=update)
+    named = {"name": _in_sector(contact.name, j), "group": contact.group or contact.name}
+    return contact.model_copy(update=named | contact.in_sector(turn, _cosine(turn) if standing else None))
 
 
 def _force(force: Excitation, j: int, turn: float, *, standing: bool) -> Excitation:

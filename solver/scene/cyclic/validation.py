@@ -8,18 +8,18 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from solver.errors import Issue, Place, Shown
+from solver.errors import Issue
 from solver.matrices.sectors.parts import WHOLE, PartsAcross
 from solver.scene.cyclic.sector_tables import is_cyclic
 from solver.scene.parts import Mistuning
+from solver.scene.validation import parts_of, structure_of, wave_issues
 from solver.wording import listing, nearest, quoted
 
 
 def cyclic_issues(raw: dict[str, Any]) -> list[Issue]:
     """Patterns and groups that do not fit, mistuned parts that do not exist, factors too few or not > 0."""
-    structure = raw.get("structure")
-    structure = structure if isinstance(structure, dict) else {}
-    found = [*_pattern_issues(raw.get("excitation"), structure)]
+    structure = structure_of(raw)
+    found = [*wave_issues(raw, "pattern")]
     found += _group_issues(structure)
     mistuning = structure.get("mistuning")
     if is_cyclic(structure) and isinstance(mistuning, dict):
@@ -27,45 +27,14 @@ def cyclic_issues(raw: dict[str, Any]) -> list[Issue]:
     return found
 
 
-def _pattern_issues(excitation: object, structure: dict[str, Any]) -> Iterator[Issue]:
-    kind = structure.get("kind")
-    one = isinstance(excitation, dict)
-    rows = [excitation] if one else excitation if isinstance(excitation, list) else []
-    first: object = None
-    for i, row in enumerate(rows):
-        pattern = row.get("pattern") if isinstance(row, dict) else None
-        if pattern is None:
-            continue
-        place = ("excitation", *(() if one else (i,)), "pattern")
-        if kind in ("lumped", "matrices") and not is_cyclic(structure):
-            yield Issue(place, f"= {quoted(pattern)} needs a cyclic structure; remove it from a {kind} one")
-        elif first is not None and pattern != first:
-            got = Shown(f"{quoted(pattern)} after {quoted(first)}")
-            yield Issue(place, "must be the same everywhere", got)
-        first = pattern if first is None else first
-
-
-def _parts(structure: dict[str, Any]) -> Iterator[tuple[Place, dict[str, Any]]]:
-    """Masses, springs and dashpots that are tables, with their places."""
-    masses = structure.get("masses")
-    for dof, row in masses.items() if isinstance(masses, dict) else ():
-        if isinstance(row, dict):
-            yield ("structure", "masses", str(dof)), row
-    for key in ("springs", "dampers"):
-        table = structure.get(key)
-        for i, row in enumerate(table if isinstance(table, list) else []):
-            if isinstance(row, dict):
-                yield ("structure", key, i), row
-
-
 def _names(structure: dict[str, Any]) -> list[str]:
-    return [row["name"] for _, row in _parts(structure) if isinstance(row.get("name"), str)]
+    return [row["name"] for _, row in parts_of(structure) if isinstance(row.get("name"), str)]
 
 
 def _group_issues(structure: dict[str, Any]) -> Iterator[Issue]:
     """Groups named like a part, in a cyclic structure, or of parts of another kind."""
     names, quantities = set(_names(structure)), dict[str, str]()
-    for steps, row in _parts(structure):
+    for steps, row in parts_of(structure):
         group, quantity = row.get("group"), str(steps[1])
         if not isinstance(group, str):
             continue

@@ -29,7 +29,8 @@ def turning() -> Scene:
     """Springs and dashpots with damping ratios and a loss factor, and what turns with the speed."""
     raw = two_dof().to_dict()
     raw["structure"] |= {"loss_factor": 0.02, "damping_ratio": [0.01, 0.02]}  # type: ignore[operator]
-    entry = {"on": "m1", "of": "m2", "antisymmetric": True, "gyroscopic": 0.01, "k_omega2": 1e-4, "k": 0.2}
+    entry = {"name": "seal", "on": "m1", "of": "m2", "k": 0.2, "k_imaginary": 0.03, "c": 0.01}
+    entry |= {"antisymmetric": True, "gyroscopic": 0.01, "k_omega2": 1e-4}
     load = {"name": "pull", "dof": "m1", "force": -3.0}
     return Scene.from_dict({**raw, "speed": 3000.0, "couplings": [entry], "loads": [load]})
 

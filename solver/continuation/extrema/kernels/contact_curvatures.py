@@ -21,7 +21,7 @@ from solver.jit.decorators import compiled
 from solver.jit.fourier import Real, coefficient_count
 from solver.jit.lapack import dot
 from solver.jit.separate import apart
-from solver.linear.kernels.receptance_derivatives import VALUE
+from solver.linear.kernels.dynamic_stiffness import VALUE
 
 
 @apart
