@@ -43,6 +43,37 @@ def magnitude(value: complex) -> float:
     return math.sqrt(value.real * value.real + value.imag * value.imag)
 
 
+@compiled
+def merged(a: Integer, b: Integer) -> Integer:
+    """Return the ascending harmonics that are in `a` or in `b`."""
+    out = np.empty(a.size + b.size, np.int64)
+    i, j, count = 0, 0, 0
+    while i < a.size or j < b.size:
+        take = a[i] if j >= b.size or (i < a.size and a[i] <= b[j]) else b[j]
+        if i < a.size and a[i] == take:
+            i += 1
+        if j < b.size and b[j] == take:
+            j += 1
+        out[count] = take
+        count += 1
+    return out[:count].copy()
+
+
+@compiled
+def positions(ks: Integer, inside: Integer) -> Integer:
+    """Return where the coefficients of the harmonics `ks` stand among those of `inside`, a larger set."""
+    out = np.empty(coefficient_count(ks), np.int64)
+    at = 0
+    for i in range(ks.size):
+        while inside[at] < ks[i]:
+            at += 1
+        here, there = cosine_position(ks, i), cosine_position(inside, at)
+        out[here] = there
+        if ks[i] > 0:
+            out[here + 1] = there + 1
+    return out
+
+
 def all_harmonics(n_harmonics: int) -> Integer:
     """Return the harmonics 0 … H."""
     return np.arange(n_harmonics + 1, dtype=np.int64)

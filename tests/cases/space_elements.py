@@ -13,7 +13,7 @@ from solver.contacts.kernels.circle import hessian as circle_hessian
 from solver.contacts.kernels.circle.law import circle_path, coulomb_circle
 from solver.contacts.kernels.circle.state import FOUND_SIZE, INTERVALS, new_tables
 from solver.contacts.kernels.columns import COLUMNS, KN, KT, KT_SECOND, MU, PRESTRESSED
-from solver.contacts.kernels.coulomb.box import coulomb_box
+from solver.contacts.kernels.coulomb.law import coulomb_box
 from solver.contacts.kernels.stick_slip_events import SEGMENT_COLUMNS, segment_capacity
 from solver.jit import fourier
 from solver.jit.trig_polynomial import grid_size, grid_tables

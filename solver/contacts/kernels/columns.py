@@ -39,13 +39,12 @@ CLOSED, TOUCHING, DEFORMING = 5, 6, 7
 # The kernels whose numbers are the same in every process, in their order; those of others are given when they
 # are first asked for.
 KERNELS = (
-    "solver.contacts.kernels.coulomb.given_load:coulomb_line",
-    "solver.contacts.kernels.coulomb.elastic_normal:elastic_normal",
+    "solver.contacts.kernels.coulomb.law:coulomb_line",
     "solver.contacts.kernels.springs.force:gap_spring",
     "solver.contacts.kernels.springs.force:polynomial_spring",
-    "solver.contacts.kernels.coulomb.given_load:coulomb_sampled",
+    "solver.contacts.kernels.coulomb.law:coulomb_sampled",
     "solver.contacts.kernels.circle.law:coulomb_circle",
-    "solver.contacts.kernels.coulomb.box:coulomb_box",
+    "solver.contacts.kernels.coulomb.law:coulomb_box",
     "solver.contacts.kernels.history.law:history_law",
 )
 # Likewise those of second derivatives.

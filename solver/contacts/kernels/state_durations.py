@@ -233,7 +233,7 @@ def _plain(U: Real, ks: Integer, N: Real, load_ks: Integer, kt: float, mu: float
             here += 2
     if mean + swing <= 0.0 and math.isfinite(reach):
         return SEPARATED
-    if kt * reach <= mu * (mean - swing):
+    if swing <= mean and kt * reach <= mu * (mean - swing):
         row = segments[0]
         row[MOTION], row[BEGIN], row[END] = STICK, 0.0, 2.0 * math.pi
         row[DIRECTION], row[ONSET], row[BEGAN] = 1.0, 0.0, UNLOADED

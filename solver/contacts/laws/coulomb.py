@@ -63,7 +63,7 @@ class Contact(SlidesOnALine):
     FORCE: ClassVar[str] = (
         "stick `kt u + c`, slip `± μN`, nothing while `N <= 0`; `N = N0 + N1 cos(ωt + N1_phase)`"
     )
-    KERNEL: ClassVar[str] = "solver.contacts.kernels.coulomb.given_load:coulomb_line"
+    KERNEL: ClassVar[str] = "solver.contacts.kernels.coulomb.law:coulomb_line"
     SECOND: ClassVar[str | None] = "solver.contacts.kernels.coulomb.second_law:line_second"
     JENKINS: ClassVar[bool] = True
 
@@ -74,7 +74,7 @@ class Contact(SlidesOnALine):
     @property
     def sampled_kernel(self) -> str:
         """The kernel that samples motion and load instead."""
-        return "solver.contacts.kernels.coulomb.given_load:coulomb_sampled"
+        return "solver.contacts.kernels.coulomb.law:coulomb_sampled"
 
     @property
     def evaluation(self) -> str:

@@ -37,7 +37,7 @@ class ElasticNormalContact(SlidesOnALine):
     FORCE: ClassVar[str] = (
         "the same with `N = N0 + N1 cos(ωt + N1_phase) + kn v`, and `max(N, 0)` on the normal pair"
     )
-    KERNEL: ClassVar[str] = "solver.contacts.kernels.coulomb.elastic_normal:elastic_normal"
+    KERNEL: ClassVar[str] = "solver.contacts.kernels.coulomb.law:coulomb_line"
     SECOND: ClassVar[str | None] = "solver.contacts.kernels.coulomb.second_law:line_second"
     PARAMETERS: ClassVar[Mapping[str, LawQuantity]] = {
         **FrictionContact.PARAMETERS,

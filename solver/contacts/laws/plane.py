@@ -36,7 +36,7 @@ class SlidesInAPlane(FrictionContact):
     def kernel(self) -> str:
         """The kernel of its limit."""
         if self.limits_apart:
-            return "solver.contacts.kernels.coulomb.box:coulomb_box"
+            return "solver.contacts.kernels.coulomb.law:coulomb_box"
         return "solver.contacts.kernels.circle.law:coulomb_circle"
 
     @property

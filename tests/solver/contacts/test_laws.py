@@ -260,6 +260,23 @@ def test_friction_that_never_opens_has_a_linear_normal_spring():
     np.testing.assert_allclose(answer.dF_dU[3], kn * np.eye(13), atol=1e-13)
 
 
+@pytest.mark.parametrize("law", [ELASTIC_NORMAL, COULOMB_BOX])
+def test_a_contact_without_friction_that_does_not_slide_opens(law: str):
+    """Its normal force is max(N, 0), by the trapezoidal rule on a fine grid."""
+    H, ports = 5, 2 if law == ELASTIC_NORMAL else 3
+    U = np.zeros((ports, 2 * H + 1))
+    U[-1, 1:5] = 3.0, 0.0, 0.4, -0.7
+    element = Element(law=law, U=U, load=np.array([1.0, 0.0, 0.0]), row=row_of(KT=2.0, KT_SECOND=2.0, KN=1.0))
+    tau = 2.0 * np.pi / FINE * np.arange(FINE)
+    basis = fourier.basis(tau, H)
+    expected = basis.T @ np.maximum(1.0 + basis @ U[-1], 0.0) * (2.0 / FINE)
+    expected[0] *= 0.5
+    answer = evaluate(element)
+    assert answer.state == LIFTING
+    assert not answer.F[:-1].any()
+    np.testing.assert_allclose(answer.F[-1], expected, atol=1e-7)
+
+
 @pytest.mark.parametrize("law", ["gap", "elastic-normal"])
 def test_both_sides_of_grazing(law: str):
     """The motion just reaches the gap, or the load just reaches 0: force continuous, derivatives exact."""

@@ -183,6 +183,24 @@ def test_first_and_second_derivatives_are_those_of_differences(seed: int) -> Non
         assert min(second for _, second in errors) < tolerance, path
 
 
+@pytest.mark.parametrize("order", [2, 4])
+@pytest.mark.parametrize("law", ["coulomb", "box"])
+def test_an_even_harmonic_that_is_0_has_a_slope(law: str, order: int) -> None:
+    """The response stays half-wave symmetric, and changes."""
+    scene = loaded([8.0, {"order": order, "amplitude": 0.0, "phase": 0.4}], law)
+    path = f"c.N{order}"
+
+    def at(amplitude: float) -> float:
+        return solve(scene.with_values({path: amplitude}), frequency_hz=1.0, harmonics=7).max_abs
+
+    balance = build(scene, harmonics=7)
+    found = Workspace.of(balance).solve(2.0 * math.pi)
+    slope = Sensitivities(balance, (path,)).gradient(found.u, 1.0).by_parameters[0]
+    difference = (at(1e-3) - at(-1e-3)) / 2e-3
+    assert abs(difference) > 1e-4
+    assert slope == pytest.approx(difference, abs=1e-5 * at(0.0))
+
+
 @pytest.mark.parametrize("path", ["c.N3", "c.N3_phase", "c.N5"])
 def test_a_branch_in_a_coefficient_passes_through_the_answers(path: str) -> None:
     scene = loaded([*LOAD, {"order": 5, "amplitude": 0.0}])

@@ -12,7 +12,7 @@ import numpy as np
 
 from solver.contacts.kernels.circle.adjoint import moments_between
 from solver.contacts.kernels.circle.gradient import circle_gradient
-from solver.contacts.kernels.circle.law import curves_of, load_of
+from solver.contacts.kernels.circle.law import curves_of
 from solver.contacts.kernels.circle.panels import (
     CURVES,
     DDLIMIT,
@@ -62,11 +62,11 @@ from solver.contacts.kernels.circle.state import (
     SETTLES,
 )
 from solver.contacts.kernels.columns import KN, KT, KT_SECOND, MU
-from solver.contacts.kernels.coulomb.elastic_normal import merged, positions
 from solver.contacts.kernels.coulomb.force import products
+from solver.contacts.kernels.coulomb.law import load_of
 from solver.contacts.kernels.stick_slip_events import LIFTING, SEPARATED, SLIP, STICK, UNLOADED
 from solver.jit.decorators import compiled
-from solver.jit.fourier import Integer, Real, coefficient_count
+from solver.jit.fourier import Integer, Real, coefficient_count, merged, positions
 from solver.jit.separate import apart
 
 TINY = 1e-30  # of the direction
@@ -282,7 +282,7 @@ def _gradient_of(
     all_ks = merged(ks, load_ks)
     size, of_motion, of_load = coefficient_count(all_ks), positions(ks, all_ks), positions(load_ks, all_ks)
     N, by_N = np.empty(size, np.complex128), np.zeros(size, np.complex128)
-    load_of(U, ks, load, load_ks, row[KN], all_ks, N)
+    load_of(U, 2, load, row[KN], of_motion, of_load, N)
     waves = np.empty((3, 2, all_ks[-1] + 1), np.complex128)
     kt, second, mu = row[KT], row[KT_SECOND], row[MU]
     curves_of(U, ks, N, all_ks, kt, mu, waves)

@@ -43,9 +43,8 @@ from solver.contacts.kernels.circle.state import (
     find_path,
     new_tables,
 )
-from solver.contacts.kernels.columns import KN, KT, KT_SECOND, MU, PRESTRESSED
-from solver.contacts.kernels.coulomb.elastic_normal import merged, positions
-from solver.contacts.kernels.coulomb.force import add_moments, products
+from solver.contacts.kernels.columns import KN, KT, KT_SECOND, MU
+from solver.contacts.kernels.coulomb.law import load_of, press, with_second
 from solver.contacts.kernels.stick_slip_events import (
     AFTER_SEPARATION,
     BEGAN,
@@ -53,7 +52,6 @@ from solver.contacts.kernels.stick_slip_events import (
     DIRECTION,
     END,
     FAILED,
-    LIFTING,
     MOTION,
     NO_LENGTH,
     ONSET,
@@ -65,36 +63,12 @@ from solver.contacts.kernels.stick_slip_events import (
     UNLOADED,
 )
 from solver.jit.decorators import compiled
-from solver.jit.fourier import Integer, Real, coefficient_count
-from solver.jit.lapack import fill, fill_block
+from solver.jit.fourier import Integer, Real, coefficient_count, merged, positions
+from solver.jit.lapack import fill_block
 from solver.jit.separate import apart
 from solver.jit.trig_polynomial import unpack
 
 MOST_TABLES = 64  # times the usual size of the tables of a path, at most
-
-
-@compiled
-def with_second(row: Real, slope: Real) -> tuple[Real, Real]:
-    """Return copies of both in which the second stiffness is that of the first where it follows it (NaN)."""
-    given, moved = row.copy(), slope.copy()
-    if math.isnan(row[KT_SECOND]):
-        given[KT_SECOND], moved[KT_SECOND] = row[KT], slope[KT]
-    return given, moved
-
-
-@compiled
-def load_of(
-    U: Array, ks: Integer, load: Array, load_ks: Integer, kn: Number, all_ks: Integer, N: Array
-) -> None:
-    """Fill N (for `all_ks`) with the given load and, where there is a third port, kn times its motion."""
-    fill(N, 0.0)
-    of_load = positions(load_ks, all_ks)
-    for j in range(load.size):
-        N[of_load[j]] += load[j]
-    if U.shape[0] > 2:
-        of_motion = positions(ks, all_ks)
-        for i in range(U.shape[1]):
-            N[of_motion[i]] += kn * U[2, i]
 
 
 @compiled
@@ -134,7 +108,7 @@ def circle_path(
     """Find what the contact does over a period; see `solver.contacts.kernels.circle.state.find_path`."""
     all_ks = merged(ks, load_ks)
     N = np.empty(coefficient_count(all_ks))
-    load_of(U, ks, load, load_ks, row[KN], all_ks, N)
+    load_of(U, 2, load, row[KN], positions(ks, all_ks), positions(load_ks, all_ks), N)
     waves = np.empty((3, 2, all_ks[-1] + 1))
     curves_of(U, ks, N, all_ks, row[KT], row[MU], waves)
     kappa = row[KT] / row[KT_SECOND]
@@ -179,6 +153,10 @@ def coulomb_circle(
     row, slope = with_second(row, slope)
     m = U.shape[0]
     all_ks = merged(ks, load_ks)
+    N, dN = np.empty(coefficient_count(all_ks)), np.empty(coefficient_count(all_ks))
+    of_motion, of_load = positions(ks, all_ks), positions(load_ks, all_ks)
+    load_of(U, 2, load, row[KN], of_motion, of_load, N)
+    load_of(U, 2, dload, slope[KN], of_motion, of_load, dN)
     for block in range(dF_dU.shape[0]):
         fill_block(dF_dU[block], 0.0)
     fill_block(F, 0.0)
@@ -202,11 +180,11 @@ def coulomb_circle(
     elif rubs and state == STUCK and pieces[0, PIECE_BEGAN] == UNLOADED and int(found[PIECES]) == 1:
         _stuck(U, row[KT], row[KT_SECOND], slope, F, dF_dU, dF_dp)
     elif rubs and state != SEPARATED:
-        _friction(U, ks, load, load_ks, row, slope, dload, found, pieces, panels, F, dF_dU, dF_dp)
+        _friction(U, ks, all_ks, of_motion, row, slope, N, dN, found, pieces, panels, F, dF_dU, dF_dp)
     if m > 2:
         press(
-            U, ks, load, load_ks, row, slope, dload, state, intervals[: int(found[INTERVALS])], F[2],
-            dF_dU[8:], dF_dp[2],
+            state, intervals[: int(found[INTERVALS])], ks, all_ks, of_motion, row, N, dN, load[0], dload[0],
+            F[2], dF_dU[8:], dF_dp[2],
         )  # fmt: skip
     return state, _write_segments(state, found, pieces, segments)
 
@@ -224,17 +202,14 @@ def _stuck(U: Real, kt: float, second: float, slope: Real, F: Real, dF_dU: Real,
 
 @apart
 def _friction(
-    U: Real, ks: Integer, load: Real, load_ks: Integer, row: Real, slope: Real, dload: Real, found: Real,
-    pieces: Real, panels: Real, F: Real, dF_dU: Real, dF_dp: Real,
+    U: Real, ks: Integer, all_ks: Integer, of_motion: Integer, row: Real, slope: Real, N: Real, dN: Real,
+    found: Real, pieces: Real, panels: Real, F: Real, dF_dU: Real, dF_dp: Real,
 ) -> None:  # fmt: skip
     """Fill the two friction forces from the path."""
     m, n = U.shape
     kt, second, mu, kn = row[KT], row[KT_SECOND], row[MU], row[KN]
-    all_ks = merged(ks, load_ks)
-    size, of_motion = coefficient_count(all_ks), positions(ks, all_ks)
-    N, dN, waves = np.empty(size), np.empty(size), np.empty((3, 2, all_ks[-1] + 1))
-    load_of(U, ks, load, load_ks, kn, all_ks, N)
-    load_of(U, ks, dload, load_ks, slope[KN], all_ks, dN)
+    size = N.size
+    waves = np.empty((3, 2, all_ks[-1] + 1))
     curves_of(U, ks, N, all_ks, kt, mu, waves)
     if dF_dU.shape[0] == 0:
         circle_force(waves, kt / second, ks, all_ks, found, pieces, panels, F[:2])
@@ -255,42 +230,6 @@ def _friction(
             for j in range(size):
                 total += line[2 * size + j] * (slope[MU] * N[j] + mu * dN[j])
             dF_dp[a, i] = total
-
-
-@apart
-def press(
-    U: Real, ks: Integer, load: Real, load_ks: Integer, row: Real, slope: Real, dload: Real, state: int,
-    intervals: Real, P: Real, dP_dv: Real, dP_dp: Real,
-) -> None:  # fmt: skip
-    """Fill the normal force max(N, 0): nothing if separated, N if always closed, else from the intervals.
-
-    `dP_dv` is (1, n, n), or of no block where no derivative is wanted.
-
-    Of a prestressed contact it counts from the state in which a positive mean load is in equilibrium.
-    """
-    all_ks = merged(ks, load_ks)
-    n, size, of_motion = U.shape[1], coefficient_count(all_ks), positions(ks, all_ks)
-    N, dN, dP_dN = np.empty(size), np.empty(size), np.zeros((n, size))
-    load_of(U, ks, load, load_ks, row[KN], all_ks, N)
-    load_of(U, ks, dload, load_ks, slope[KN], all_ks, dN)
-    if state == LIFTING:
-        cosines, sines = np.zeros(ks[-1] + all_ks[-1] + 1), np.zeros(ks[-1] + all_ks[-1] + 1)
-        for i in range(intervals.shape[0]):
-            add_moments(intervals[i, 0], intervals[i, 1], 1.0, cosines, sines)
-        products(cosines, sines, ks, all_ks, 1.0, dP_dN)
-    elif state != SEPARATED:
-        for i in range(n):
-            dP_dN[i, of_motion[i]] = 1.0
-    for i in range(n):
-        for j in range(size):
-            P[i] += dP_dN[i, j] * N[j]
-            dP_dp[i] += dP_dN[i, j] * dN[j]
-        for block in dP_dv:
-            for j in range(n):
-                block[i, j] = row[KN] * dP_dN[i, of_motion[j]]
-    if row[PRESTRESSED] > 0.0 and load[0] > 0.0 and ks[0] == 0:
-        P[0] -= load[0]
-        dP_dp[0] -= dload[0]
 
 
 @compiled

@@ -10,14 +10,14 @@ import math
 import numpy as np
 
 from solver.contacts.kernels.circle.hessian import circle_second
-from solver.contacts.kernels.circle.law import whole_path, with_second
+from solver.contacts.kernels.circle.law import whole_path
 from solver.contacts.kernels.circle.state import FOUND_SIZE, INTERVALS
 from solver.contacts.kernels.columns import KT, KT_SECOND, MU
-from solver.contacts.kernels.coulomb.elastic_normal import merged
+from solver.contacts.kernels.coulomb.law import with_second
 from solver.contacts.kernels.coulomb.second_law import tie_second
 from solver.contacts.kernels.stick_slip_events import FAILED
 from solver.jit.decorators import compiled
-from solver.jit.fourier import Integer, Real
+from solver.jit.fourier import Integer, Real, merged
 from solver.jit.lapack import fill_block
 from solver.jit.separate import apart
 

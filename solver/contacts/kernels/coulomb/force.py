@@ -38,7 +38,7 @@ from solver.contacts.kernels.stick_slip_events import (
     UNLOADED,
 )
 from solver.jit.decorators import compiled
-from solver.jit.fourier import Integer, Real, coefficient_count
+from solver.jit.fourier import Integer, Real, coefficient_count, cosine_position
 from solver.jit.lapack import dot, fill, fill_block
 from solver.jit.separate import apart
 
@@ -187,9 +187,12 @@ def contact_force(
             dF_dU[i, j] *= kt
     _add_onsets(segments, marched, weight, U, ks, N, load_ks, kt, mu, dF_dU, dF_dkt, dF_dmu, dF_dN)
     if symmetric:
-        for i in range(n):
-            for j in range(1, N.size):
-                dF_dN[i, j] = 0.0
+        # What a load of odd harmonics adds in one half it takes away in the other.
+        for b in range(load_ks.size):
+            if load_ks[b] % 2 == 1:
+                here = cosine_position(load_ks, b)
+                for i in range(n):
+                    dF_dN[i, here], dF_dN[i, here + 1] = 0.0, 0.0
     for i in range(n):
         F[i] = kt * dF_dkt[i] + mu * dF_dmu[i]
     return state, count

@@ -16,11 +16,10 @@ import math
 
 import numpy as np
 
-from solver.contacts.kernels.circle.law import with_second
 from solver.contacts.kernels.columns import KN, KT, KT_SECOND, MU
-from solver.contacts.kernels.coulomb.elastic_normal import merged, positions
 from solver.contacts.kernels.coulomb.force import add_moments, bases_at, contact_force, products
 from solver.contacts.kernels.coulomb.hessian import second_along
+from solver.contacts.kernels.coulomb.law import with_second
 from solver.contacts.kernels.stick_slip_events import (
     BEGIN,
     END,
@@ -31,7 +30,7 @@ from solver.contacts.kernels.stick_slip_events import (
     segment_capacity,
 )
 from solver.jit.decorators import compiled
-from solver.jit.fourier import Integer, Real, coefficient_count
+from solver.jit.fourier import Integer, Real, coefficient_count, merged, positions
 from solver.jit.lapack import dot, fill, fill_block
 from solver.jit.separate import apart
 
@@ -190,7 +189,7 @@ def box_second(
     U: Real, ks: Integer, load: Real, load_ks: Integer, row: Real, cos_table: Real, sin_table: Real, w: Real,
     dU: Real, drow: Real, dload: Real, out_U: Real, out_row: Real, out_load: Real,
 ) -> int:  # fmt: skip
-    """Differentiate `solver.contacts.kernels.coulomb.box` (as in the contract)."""
+    """Differentiate `solver.contacts.kernels.coulomb.law.coulomb_box` (as in the contract)."""
     given, moved = with_second(row, drow)
     state = _rubbing(
         U, ks, load, load_ks, given, cos_table, sin_table, w, dU, moved, dload, 2, KT_SECOND, out_U, out_row,
