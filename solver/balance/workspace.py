@@ -16,6 +16,7 @@ from solver.balance.kernels.mechanics import ALLOWED, unaccounted
 from solver.balance.kernels.newton import from_stuck, ladder, newton, stuck_start
 from solver.balance.kernels.output import MEASURES
 from solver.balance.kernels.residual import evaluate
+from solver.balance.known_springs import KnownSprings
 from solver.balance.mean_loads import friction_can_hold, may_stick
 from solver.balance.softening import solve_softened
 from solver.contacts.kernels.stick_slip_events import FAILED, STUCK
@@ -108,6 +109,7 @@ class Workspace:
     Attributes
     ----------
     loop : what is known of its resonances over the frequency.
+    springs : the contacts at solutions that were walked to.
     """
 
     balance: Balance
@@ -115,6 +117,7 @@ class Workspace:
     linear: Receptance
     point: Evaluation
     loop: ClosedLoop
+    springs: KnownSprings
 
     @classmethod
     def of(
@@ -133,7 +136,8 @@ class Workspace:
             loop = ClosedLoop(balance, None if like is None else like.loop)
         else:
             loop = observing_another.loop
-        return cls(balance, system, new_receptance(system), new_evaluation(system), loop)
+        springs = KnownSprings(balance.system, balance.parameter.kind)
+        return cls(balance, system, new_receptance(system), new_evaluation(system), loop, springs)
 
     def solve(self, p: float, guess: Real | None = None) -> PointSolution:
         """Solve at λ = `p` (inside unit): from `guess` if given, else from nothing.

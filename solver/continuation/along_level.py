@@ -89,7 +89,7 @@ def _followed(balance: Balance) -> tuple[Real | None, int]:
         return None, least.iterations
     system, linear, point = workspace.system, workspace.linear, workspace.point
     code, state = begin_walk(system, linear, point, control, least.u)
-    rows, points = rows_of(balance, _STRETCH), 0
+    rows, points = (*rows_of(balance, _STRETCH), workspace.springs.rows(0)), 0
     while code == RUNNING and points < MOST_POINTS:
         code, count = walk_on(system, linear, point, control, state, _STRETCH, *rows)
         points += count

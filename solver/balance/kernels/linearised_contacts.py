@@ -14,26 +14,37 @@ from solver.linear.kernels.receptance import receptance
 
 
 @apart
-def _fill_stiffness(system: System, point: Evaluation, stiffness: Complex) -> None:
-    """Fill ĝ_k, (nk, nc, nc) [N/m], of the contacts where `point` was evaluated: F̂_k changes by ĝ_k û_k.
+def fill_springs(system: System, point: Evaluation, springs: Complex) -> None:
+    """Fill ĝ_k, (nk, blocks) [N/m], of the contacts where `point` was evaluated: F̂_k changes by ĝ_k û_k.
 
     It is the part of dF/dU that commutes with a shift in time; what answers a change with its mirror image is
-    left out.
+    left out. The blocks are those of dF/dU: port by port of each contact.
     """
     for i in range(system.ks.size):
         here = cosine_position(system.ks, i)
-        for c in range(system.owner.size):
-            for d in range(system.owner.size):
+        for b in range(springs.shape[1]):
+            block = point.dF_dU[b]
+            answer = complex(block[here, here], 0.0)
+            if system.ks[i] > 0:
+                even = 0.5 * (block[here, here] + block[here + 1, here + 1])
+                answer = complex(even, 0.5 * (block[here, here + 1] - block[here + 1, here]))
+            springs[i, b] = answer
+
+
+@compiled
+def _fill_stiffness(system: System, point: Evaluation, stiffness: Complex) -> None:
+    """Fill ĝ_k as a matrix of all ports, (nk, nc, nc) [N/m]."""
+    nk, nc, ne = system.ks.size, system.owner.size, system.laws.size
+    springs = np.empty((nk, system.first_block[ne]), np.complex128)
+    fill_springs(system, point, springs)
+    for i in range(nk):
+        for c in range(nc):
+            for d in range(nc):
                 stiffness[i, c, d] = 0.0
             e = system.owner[c]
             first, m = system.first_port[e], system.first_port[e + 1] - system.first_port[e]
             for q in range(m):
-                block = point.dF_dU[system.first_block[e] + (c - first) * m + q]
-                answer = complex(block[here, here], 0.0)
-                if system.ks[i] > 0:
-                    even = 0.5 * (block[here, here] + block[here + 1, here + 1])
-                    answer = complex(even, 0.5 * (block[here, here + 1] - block[here + 1, here]))
-                stiffness[i, c, first + q] = answer
+                stiffness[i, c, first + q] = springs[i, system.first_block[e] + (c - first) * m + q]
 
 
 @compiled
@@ -73,6 +84,15 @@ def linearise(
             motions[3, i, c] = _amplitude(system, i, dF[c], 0)
     _fill_stiffness(system, point, stiffness)
     return norm
+
+
+@apart
+def springs_at(system: System, point: Evaluation, solutions: Real, springs: Complex) -> None:
+    """Fill `springs` (P, nk, blocks) as `fill_springs` at solutions (P, nt + 1), λ last."""
+    nt = solutions.shape[1] - 1
+    for row in range(solutions.shape[0]):
+        evaluate_contacts(system, solutions[row, :nt], solutions[row, nt], 0.0, False, point)
+        fill_springs(system, point, springs[row])
 
 
 @apart

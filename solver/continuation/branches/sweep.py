@@ -277,8 +277,9 @@ def walk(
     last = np.zeros((0, balance.n_unknowns + 1))
     size = _STRETCH if balance.n_unknowns <= _LARGE else _SHORT_STRETCH
     while code == walk_states.RUNNING:
-        rows, before = rows_of(balance, size), time.perf_counter()
-        code, count = walk_on(system, linear, point, control, state, size, *rows)
+        rows, springs, before = rows_of(balance, size), workspace.springs.rows(size), time.perf_counter()
+        code, count = walk_on(system, linear, point, control, state, size, *rows, springs)
+        workspace.springs.keep(rows[0][:count], springs)
         last = np.concatenate([last, rows[0][:count]])[-MANY:]
         if code == walk_states.RUNNING and stands_still(last, control):
             code = walk_states.STALLED

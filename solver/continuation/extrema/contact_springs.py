@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise, product
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solver.balance.kernels.linearised_contacts import forces_at, linearise
+from solver.balance.kernels.linearised_contacts import linearise, springs_at
 from solver.jit.fourier import Complex, Integer, Real, cosine_position
 
 if TYPE_CHECKING:
@@ -45,25 +46,21 @@ class Springs:
 
 
 class LocalModel:
-    """Contacts linearised at nodes of a branch over the frequency, each once, and predictions between two.
-
-    Attributes
-    ----------
-    stiffness : (rows, nk, nc, nc) array
-        Of the contacts against small changes of each harmonic [N/m]; `rows` tells whose each is.
-    """
+    """Contacts linearised at nodes of a branch over the frequency, each once, and predictions between two."""
 
     def __init__(self, solver: NodeSolver) -> None:
         self._solver = solver
         balance = solver.workspace.balance
         self._system = balance.system
-        nk, nc = balance.system.ks.size, balance.n_ports
         self._rows = np.zeros(0, np.int64)
         self._springs: dict[int, Springs] = {}  # by the number of the node
-        self.stiffness = np.zeros((0, nk, nc, nc), np.complex128)
+        ends = pairwise(self._system.first_port.tolist())
+        pairs = [pair for first, end in ends for pair in product(range(first, end), repeat=2)]
+        self._sides = np.array(pairs, np.int64).reshape(-1, 2).T  # the ports of each block of springs
+        self._blocks = np.zeros((0, self._system.ks.size, int(self._system.first_block[-1])), np.complex128)
 
     def rows(self, numbers: Integer) -> Integer:
-        """Return the rows in `stiffness` of nodes by their `numbers`, -1 for a fold.
+        """Return rows for `stiffness` of nodes by their `numbers`, -1 for a fold.
 
         There nothing is a function of λ.
         """
@@ -75,13 +72,28 @@ class LocalModel:
         self._rows[new] = -1
         chosen = new[table.tangents[new, -1] != 0.0]
         if chosen.size:
-            first = len(self.stiffness)
+            first, solutions = len(self._blocks), table.solutions[chosen]
             self._rows[chosen] = first + np.arange(chosen.size)
-            stiffness = np.empty((chosen.size, *self.stiffness.shape[1:]), np.complex128)
-            forces = np.empty(stiffness.shape[:3], np.complex128)
-            forces_at(workspace.system, workspace.point, table.solutions[chosen], forces, stiffness)
-            self.stiffness = np.concatenate([self.stiffness, stiffness]) if first else stiffness
+            blocks = np.empty((chosen.size, *self._blocks.shape[1:]), np.complex128)
+            for j, springs in enumerate(workspace.springs.of(solutions)):
+                if springs is None:
+                    one = slice(j, j + 1)
+                    springs_at(workspace.system, workspace.point, solutions[one], blocks[one])
+                else:
+                    blocks[j] = springs
+            self._blocks = np.concatenate([self._blocks, blocks]) if first else blocks
         return self._rows[numbers]
+
+    def stiffness(self, rows: Integer, harmonics: Integer) -> Complex:
+        """Return the stiffness of the contacts against small changes of harmonics, (..., nc, nc) [N/m].
+
+        `rows` of nodes and numbers of harmonics, of the same shape.
+        """
+        blocks = self._blocks[rows, harmonics]
+        nc = self._system.owner.size
+        found = np.zeros((*blocks.shape[:-1], nc, nc), np.complex128)
+        found[..., self._sides[0], self._sides[1]] = blocks
+        return found
 
     def at(self, node: PointRow) -> Springs | None:
         """Return the contacts at a node; None at a fold."""

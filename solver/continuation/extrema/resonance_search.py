@@ -183,7 +183,7 @@ class ResonanceSearch:
         narrow = np.ones(first.size, bool)
         narrow[known] = self._are_narrow(
             i[first[known]],
-            self._model.stiffness[linear[known], i[first[known], None]],
+            self._model.stiffness(linear[known], np.repeat(i[first[known], None], 2, axis=1)),
             rows.at[ends[known]],
             np.maximum.reduceat(rows.length[j], first)[known],
         )
@@ -226,7 +226,7 @@ class ResonanceSearch:
         np.maximum.at(reach, entry, rows.length[j][:, None])
         linear = self._model.rows(rows.numbers[node])
         may = linear >= 0
-        stiffness = self._model.stiffness[linear[may], number[may]]
+        stiffness = self._model.stiffness(linear[may], number[may])
         meets = self._loop.may_meet(stiffness, number[may], rows.at[node[may]], reach[may])
         may[may] = meets
         if not may.any():

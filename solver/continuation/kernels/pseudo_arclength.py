@@ -15,6 +15,7 @@ import numpy as np
 
 from solver.balance.kernels.broyden import frozen_arc
 from solver.balance.kernels.jacobian import factorise, step_back
+from solver.balance.kernels.linearised_contacts import fill_springs
 from solver.balance.kernels.newton import ACCEPTED, arc_newton, newton
 from solver.balance.kernels.output import RESIDUAL, measure, piece
 from solver.balance.kernels.residual import evaluate
@@ -51,7 +52,7 @@ from solver.continuation.kernels.state import (
     weights,
 )
 from solver.jit.decorators import compiled
-from solver.jit.fourier import Integer, Real
+from solver.jit.fourier import Complex, Integer, Real
 from solver.jit.lapack import copy_to, set_to
 from solver.jit.separate import apart
 from solver.linear.kernels.receptance import receptance
@@ -337,6 +338,7 @@ def _turn_over(system: System, linear: Receptance, point: Evaluation, control: C
 def walk_on(
     system: System, linear: Receptance, point: Evaluation, control: Control, walk: Walk,
     most_points: int, points: Real, tangents: Real, states: Integer, observed: Real, measures: Real,
+    springs: Complex,
 ) -> tuple[int, int]:  # fmt: skip
     """Append up to `most_points` converged points of the branch.
 
@@ -344,6 +346,7 @@ def walk_on(
     ----------
     points, tangents : (most_points, nt + 1), λ last; states : (most_points, nc); observed : (most_points, n)
         coefficients of the observed DOF; measures : (most_points, MEASURES), slopes along it; filled.
+    springs : (most_points, nk, blocks) the contacts as springs, filled; or of no row where nobody asks.
 
     Returns
     -------
@@ -360,6 +363,8 @@ def walk_on(
                 status = _turn_over(system, linear, point, control, walk)
         if walk.numbers[FRESH] > 0.0:
             _record(system, linear, point, walk, count, points, tangents, states, observed, measures)
+            if springs.shape[0] > 0:
+                fill_springs(system, point, springs[count])
             walk.numbers[FRESH] = 0.0
             count += 1
     return status, count
