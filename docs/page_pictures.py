@@ -209,8 +209,8 @@ def sector(page: Any) -> None:
 def interference(page: Any) -> None:
     """Show the interference diagram of the finite-element disk."""
     anew(page, "fe-disk", "&tab=disk")
-    page.fill("#interference-speed", "11000")
-    page.locator("#interference-form button").click()
+    page.fill("#interference-speed_rpm", "11000")
+    page.locator("#interference-submit").click()
     page.locator("#interference-figure path.series").first.wait_for()
     page.locator("#interference").evaluate("card => card.scrollIntoView()")
 

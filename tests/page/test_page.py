@@ -106,11 +106,11 @@ def test_a_newcomer_presses_one_button_and_takes_results_away(profile: Profile, 
 
 def check_interference(page: Page) -> None:
     """The diagram of the disk at a speed that is typed in, by keyboard: orders, what they meet, in words."""
-    page.fill("#interference-speed", "-3")
-    page.press("#interference-speed", "Enter")
-    expect(page.locator("#interference-wrong")).to_contain_text("must be a number above 0")
-    page.fill("#interference-speed", "11000")
-    page.press("#interference-speed", "Enter")
+    page.fill("#interference-speed_rpm", "-3")
+    page.press("#interference-speed_rpm", "Enter")
+    expect(page.locator(".field:has(#interference-speed_rpm) .message")).to_contain_text("must be a number above 0")
+    page.fill("#interference-speed_rpm", "11000")
+    page.press("#interference-speed_rpm", "Enter")
     rows = page.locator("#interference-facts tbody").first.locator("tr")
     expect(rows.first).to_have_text("33 forward5501513.86 – 781.25meets")
     found = solver.interference_diagram(solver.load_scene("bladed-disk"), speed_rpm=11e3, up_to_hz=1800.0)

@@ -120,7 +120,7 @@ def test_the_disk_is_for_everybody_too(browser: Browser, site: Site, scheme: str
         page = context.new_page()
         page.goto(f"{site.url}/?scene=bladed-disk&tab=disk&harmonics=3")
         page.locator("html[data-ready]").wait_for(state="attached")
-        page.locator("#interference-form button").press("Enter")
+        page.locator("#interference-submit").press("Enter")
         expect(page.locator("#interference-facts tbody tr").first).to_be_visible()
         assert serious(page) == []
         page.reload()  # Tab begins at the beginning again

@@ -52,7 +52,8 @@ def test_a_study_is_taken_as_it_is_proposed(shipped: httpx.Client, name: str) ->
     assert designed
     path, bounds = next(iter(designed.items()))
     assert 0.0 <= bounds[0] < bounds[1]
-    further = {"map": {"parameter": path, "from": bounds[0], "to": bounds[1]}, "mistuning": {"of": "nothing"}}
+    further = {"map": {"parameter": path, "from": bounds[0], "to": bounds[1]}, "mistuning": {"of": "nothing"},
+               "identify": {"data": [{"frequency": [1.0], "amplitude": [1.0]}]}}  # fmt: skip
     for study in told["studies"]:
         body = {"kind": study["kind"], "scene": name, **study["body"], **further.get(study["kind"], {})}
         answer = shipped.post("/v1/jobs", json=body)

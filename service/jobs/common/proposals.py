@@ -147,6 +147,14 @@ def _modes(scene: Scene) -> Proposed:
     return {"from": low, "to": high, "performance": True, "motions": True, "exact_peaks": _EXACT_PEAKS}
 
 
+def _identify(scene: Scene) -> Proposed:
+    """Friction and stiffness of the first part that has them."""
+    paths = [path for path in scene.parameter_paths() if path.rpartition(".")[2] in ("kt", "mu")]
+    first = paths[0].rpartition(".")[0] if paths else ""
+    own = [path for path in paths if path.rpartition(".")[0] == first and scene.value(path) > 0.0]
+    return {"unknowns": {path: around(scene.value(path)) for path in own}} if own else {}
+
+
 def _mistuning(scene: Scene) -> Proposed:
     return {} if _sectors(scene) else "The scene has no sectors."
 
@@ -157,5 +165,6 @@ def _at_one_frequency(scene: Scene) -> Proposed:
 
 _PROPOSED: Mapping[str, Callable[[Scene], Proposed]] = {
     "map": _map, "campbell": _campbell, "interference": _interference, "modes": _modes,
+    "identify": _identify,
     "mistuning": _mistuning, "solve": _at_one_frequency, "march": _at_one_frequency,
 }  # fmt: skip

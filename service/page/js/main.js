@@ -9,6 +9,7 @@ import { startDesign } from "./views/design.js";
 import { edit, editCurrent, newScene, openText } from "./editor/editor.js";
 import { on, tell } from "./base/events.js";
 import { startFront } from "./views/front.js";
+import { loadKinds } from "./scene/kinds.js";
 import { loadLaws } from "./scene/laws.js";
 import { forget, resume, run, startJobs } from "./network/jobs.js";
 import { openLibrary, startLibrary } from "./views/library.js";
@@ -19,11 +20,11 @@ import { startMap } from "./views/map.js";
 import { openMatrices } from "./scene/matrices.js";
 import { SCENES } from "./scene/matrix_files.js";
 import { startNotices } from "./base/notices.js";
-import { offerOthers, startOthers } from "./views/others.js";
+import { startOthers } from "./views/others.js";
 import { startPoint } from "./views/point.js";
 import { startRenewal } from "./views/renewal.js";
 import { startResponse, sweepView } from "./views/response.js";
-import { asked, current, listScenes, loadScene, shownScene, variedParts } from "./scene/scenes.js";
+import { asked, current, listScenes, loadScene, variedParts } from "./scene/scenes.js";
 import { fillSettings, startSettings } from "./scene/settings.js";
 import { contactTable, drawStructure } from "./scene/structure.js";
 import { startSensitivities } from "./views/sensitivities.js";
@@ -90,11 +91,10 @@ let drawn = "";
 
 // The drawing changes with the scene and the states alone; under a slider that is seldom.
 function drawScene() {
-  const scene = shownScene();
-  const now = JSON.stringify([scene.name, states.states]);
-  if (now !== drawn) drawStructure(byId("structure-figure"), scene, states.states);
+  const now = JSON.stringify([current.body.name, states.states]);
+  if (now !== drawn) drawStructure(byId("structure-figure"), states.states);
   drawn = now;
-  show(byId("structure-states"), contactTable(scene, states.states, states.at));
+  show(byId("structure-states"), contactTable(states.states, states.at));
 }
 
 const forgetAll = () => {
@@ -220,9 +220,9 @@ function failed(error) {
 async function begin() {
   try {
     await patiently(loadLaws);
+    await patiently(loadKinds);
     await patiently(scenes);
     await patiently(open);
-    await patiently(offerOthers);
     await openLibrary();
     await listProjects();
     await listRuns();

@@ -1,6 +1,6 @@
 // Numbers and units as people read them.
 
-const LENGTHS = [
+export const LENGTHS = [
   [0.1, "m", 1],
   [1e-4, "mm", 1e3],
   [1e-7, "µm", 1e6],
@@ -10,7 +10,7 @@ const LENGTHS = [
 ];
 const UNITS = new Map([["frequency", "Hz"], ["amplitude", "N"], ["phase", "rad"]]);
 
-// Units of the parameters of contacts.
+// Units of parameters, by their paths or their names.
 export const learnUnits = (found) => found.forEach(([name, unit]) => UNITS.set(name, unit));
 
 export const number = (value, digits = 4) => {
@@ -36,7 +36,7 @@ export const length = (metres) => {
   return `${number(metres * unit.perMetre)} ${unit.name}`;
 };
 
-export const unitOf = (path) => (path.startsWith("structure.") ? "" : (UNITS.get(path.split(".").pop()) ?? ""));
+export const unitOf = (path) => UNITS.get(path) ?? (path.startsWith("structure.") ? "" : UNITS.get(path.split(".").pop()) ?? "");
 
 export const withUnit = (path) => (unitOf(path) ? `${path} [${unitOf(path)}]` : path);
 
