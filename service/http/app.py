@@ -23,6 +23,7 @@ from service.http.routes import (
     health,
     jobs,
     page,
+    run_list,
     runs,
     scenes,
     stored,
@@ -96,7 +97,7 @@ def create_app(settings: Settings | None = None, registry: Registry | None = Non
         jobs.router, forms.kinds, forms.laws, events.router, stored.designs, stored.results,
         stored.sweeps, scenes.texts,
         forms.templates, scenes.router, uploads.router, uploads.matrices, uploads.measurements, at_once.plans,
-        at_once.previews, runs.projects, runs.reports, runs.runs, runs.shares, health.router,
+        at_once.previews, runs.projects, runs.reports, run_list.router, runs.runs, runs.shares, health.router,
         page.reference, page.router,
     ):  # fmt: skip
         app.include_router(router)

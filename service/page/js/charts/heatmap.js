@@ -1,6 +1,5 @@
 // The map of amplitude over two parameters: a canvas below, axes and lines in SVG above.
 
-import { } from "./chart.js";
 import { chartTools } from "./heatmap_tools.js";
 import { SHADES } from "../base/colours.js";
 import { el, show, svg } from "../base/dom.js";
