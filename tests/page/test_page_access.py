@@ -73,7 +73,7 @@ def unfold(page: Page) -> None:
     if narrow:
         page.click("#rail-open")
     page.click("#project-new")
-    expect(page.locator("#runs-list .run-form").first).to_be_visible()
+    expect(page.locator("#project-form")).to_be_visible()
     if narrow:
         assert page.evaluate(CUT_OFF) == []
         page.click("#rail-close")

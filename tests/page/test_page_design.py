@@ -77,7 +77,9 @@ def test_two_variables_two_cases_and_a_limit(profile: Profile, site: Site) -> No
     page.reload()
     expect(page.locator("[role=group][aria-label='variable 2'] [name=high]")).to_have_value("50")
     expect(page.locator("#problem-max_band_hz")).to_have_value("0.35")
-    expect(page.locator("[role=group][aria-label='case 2'] [name='excitation.amplitude']")).to_have_value("1.5")
+    expect(page.locator("[role=group][aria-label='case 2'] [name='excitation.amplitude']")).to_have_value(
+        "1.5"
+    )
 
 
 @pytest.mark.long
@@ -167,15 +169,17 @@ def test_from_nothing_to_a_compared_named_and_reported_design(profile: Profile, 
     page.click("#problem-submit")
     expect(page.locator("#design-status")).to_contain_text("waits")
     expect(page.locator("#design-status")).to_contain_text("Found in", timeout=LONG_MS)
-    runs = page.locator("#runs-list li.run", has_text="design of bladed-disk")
+    page.click("#tab-runs")
+    runs = page.locator("#runs-table tr[data-run]", has_text="bladed-disk")
     expect(runs).to_have_count(2)
-    runs.first.locator("summary", has_text="More").click()
-    runs.first.get_by_label("Name").fill("with a narrow band")
-    runs.first.get_by_role("button", name="Save").click()
-    expect(page.locator("#runs-list .run-name").first).to_have_text("with a narrow band")
+    runs.first.get_by_role("button", name="More of run").click()
+    form = page.locator("#runs-table tr[data-more]")
+    form.get_by_label("Name").fill("with a narrow band")
+    form.get_by_role("button", name="Save").click()
+    expect(page.locator("#runs-table .run-name").first).to_have_text("with a narrow band")
     for index in (0, 1):
-        page.locator("#runs-list li.run input[type=checkbox]").nth(index).check()
-    expect(page.get_by_role("region", name="Inputs of two runs")).to_contain_text("max_band_hz")
+        page.locator("#runs-table input[type=checkbox]").nth(index).check()
+    expect(page.get_by_role("region", name="Differences of two runs")).to_contain_text("max band")
     with page.expect_download() as taken:
         page.click("#save-report")
     text = Path(taken.value.path()).read_text(encoding="utf-8")

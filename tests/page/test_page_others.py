@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 def test_a_kind_without_a_view_has_a_form_and_a_result(browser: Browser, extended: Site) -> None:
     with opened(browser, extended) as (context, watch):
         page = context.new_page()
-        page.goto(f"{extended.url}/?scene=two-dof&tab=data")
+        page.goto(f"{extended.url}/?scene=two-dof&tab=runs")
         page.locator("html[data-ready]").wait_for(state="attached")
         names = page.locator("#others-kind option").all_text_contents()
         assert set(names) == {

@@ -1,6 +1,6 @@
 // Numbers and units as people read them.
 
-export const LENGTHS = [
+const LENGTHS = [
   [0.1, "m", 1],
   [1e-4, "mm", 1e3],
   [1e-7, "µm", 1e6],
@@ -8,6 +8,7 @@ export const LENGTHS = [
   // Below an atom's size only rounding is left: said in metres, with its power of ten.
   [0, "m", 1],
 ];
+export const METRES = { "m": 1, "mm": 1e-3, "µm": 1e-6 };
 const UNITS = new Map([["frequency", "Hz"], ["amplitude", "N"], ["phase", "rad"]]);
 
 // Units of parameters, by their paths or their names.
@@ -44,7 +45,13 @@ export const quantity = (path, value) => `${number(value, 5)} ${unitOf(path)}`.t
 
 export const seconds = (value) => (value < 1 ? `${number(value * 1e3, 3)} ms` : `${number(value, 3)} s`);
 
-export const when = (text) => (text ? new Date(text).toLocaleString() : "–");
+// Of today the time alone, over 24 hours.
+export function when(text) {
+  if (!text) return "–";
+  const at = new Date(text);
+  const time = at.toLocaleTimeString("en-GB");
+  return at.toDateString() === new Date().toDateString() ? time : `${at.toLocaleDateString("en-GB", { day: "numeric", month: "short", year: "numeric" })} ${time}`;
+}
 
 export const percent = (share) => `${Math.round(100 * share)} %`;
 

@@ -2,7 +2,7 @@
 
 import { byId, el, show } from "../base/dom.js";
 import { on } from "../base/events.js";
-import { LENGTHS, lengthUnit } from "../base/format.js";
+import { lengthUnit, METRES } from "../base/format.js";
 import { current } from "../scene/scenes.js";
 import { kindOf } from "../scene/kinds.js";
 import { hintOf, numberOf, readField, Unreadable, written } from "./fields.js";
@@ -166,9 +166,9 @@ export function schemaForm(host, kind, { id = kind, keys = () => true, top = [],
     const input = field.kind === "truth" ? el("input", { ...common, type: "checkbox" })
       : field.kind === "choice" ? el("select", common, (field.otherwise === undefined ? [""] : []).concat(field.choices).map((word) => el("option", { value: word, selected: word === field.otherwise }, word || "as usual")))
         : el("input", { ...common, type: "text", inputmode: field.kind === "number" ? "decimal" : "text", placeholder: hintOf(field), spellcheck: false, autocomplete: "off" });
-    const unit = field.unit === "m" ? el("select", { id: `${name}-unit`, "aria-label": `Unit of ${field.label}`, class: "unit" }, LENGTHS.map(([, unitName]) => unitName).slice(0, 3).map((each) => el("option", { value: each, selected: each === "mm" }, each))) : field.unit ? el("span", { class: "unit" }, field.unit) : null;
+    const unit = field.unit === "m" ? el("select", { id: `${name}-unit`, "aria-label": `Unit of ${field.label}`, class: "unit" }, Object.keys(METRES).map((each) => el("option", { value: each, selected: each === "mm" }, each))) : field.unit ? el("span", { class: "unit" }, field.unit) : null;
     if (field.unit === "m") units.set(input, unit);
-    const per = () => (field.unit === "m" ? LENGTHS.find(([, each]) => each === unit.value)[2] : 1);
+    const per = () => (field.unit === "m" ? 1 / METRES[unit.value] : 1);
     const [key, inside] = field.at;
     parts.set(field.key, {
       read() {
@@ -181,7 +181,7 @@ export function schemaForm(host, kind, { id = kind, keys = () => true, top = [],
         if (field.kind === "truth") input.checked = value ?? field.otherwise ?? false;
         else if (field.kind === "choice") input.value = value ?? field.otherwise ?? "";
         else {
-          if (field.unit === "m" && typeof value === "number" && ["m", "mm", "µm"].includes(lengthUnit(value).name)) unit.value = lengthUnit(value).name;
+          if (field.unit === "m" && typeof value === "number" && lengthUnit(value).name in METRES) unit.value = lengthUnit(value).name;
           input.value = written(field, value, per());
         }
       },
@@ -243,7 +243,7 @@ export function schemaForm(host, kind, { id = kind, keys = () => true, top = [],
   // Lengths are asked for in the unit of what is seen.
   on("size", (size) => {
     const { name } = lengthUnit(size);
-    for (const [input, unit] of units) if (input.value === "" && ["m", "mm", "µm"].includes(name)) unit.value = name;
+    for (const [input, unit] of units) if (input.value === "" && name in METRES) unit.value = name;
   });
   if (submit) {
     host.addEventListener("submit", (event) => {

@@ -26,11 +26,18 @@ export function startOthers() {
     for (const [name, { form }] of forms) form.fill({ ...proposed(name), ...ofTheBar(name) });
     const known = kindNames().filter((name) => !(name in VIEWS));
     const asked = known.find((name) => state.jobs[name]);
-    if (asked) byId("others-kind").value = asked;
     if (known.length) choose();
     // Goes on with the job that the address names.
-    if (asked) resume(asked, othersView(asked));
+    if (asked) showOther(asked);
   });
+}
+
+// A job of a kind without a view of its own: its form as it was asked, its result as a table.
+export function showOther(name) {
+  byId("others-kind").value = name;
+  choose();
+  byId("others").scrollIntoView({ block: "nearest" });
+  return resume(name, { ...othersView(name), submitted: (job) => forms.get(name).form.fill(job.request) });
 }
 
 // The form of the study that is chosen, as it was left.
@@ -51,7 +58,7 @@ function choose() {
 const plain = (value) => (Array.isArray(value) ? !value.some((one) => typeof one === "object") : typeof value !== "object");
 
 // Any study without a view of its own, by its name.
-export const othersView = (name) => ({
+const othersView = (name) => ({
   waiting() {
     say("others-status", `${name} waits for a worker.`);
     show(byId("others-result"));

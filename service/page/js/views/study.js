@@ -8,6 +8,7 @@ import { run } from "../network/jobs.js";
 import { askedFor, ofTheBar, proposed, refusedFor } from "../scene/kinds.js";
 import { readSettings } from "../scene/settings.js";
 import { VIEWS } from "../views.js";
+import { PRESS } from "../workbench/run_list.js";
 import { referee } from "./point.js";
 import { computedFor } from "./renewal.js";
 
@@ -78,6 +79,8 @@ function begin(kind, body = bodyOf(kind)) {
   return run(kind, body, view, PRIORITY[kind]);
 }
 
+const withTags = (body, tags) => body && { ...body, tags };
+
 const ask = (kind, body) => readSettings() && begin(kind, { ...askedFor(kind), ...ofTheBar(kind), ...several(kind), ...body });
 
 // The one button: every study of the scene.
@@ -86,12 +89,15 @@ function study() {
   state.at = null;
   write();
   const mine = (studies += 1);
-  const designed = begin("design");
+  // What one press began is folded together among the runs.
+  const tags = [`${PRESS}${Date.now().toString(36)}`];
+  const tagged = (kind) => begin(kind, withTags(bodyOf(kind), tags));
+  const designed = tagged("design");
   const all = [
-    begin("sweep").then(async (done) => done && (await referee(5))),
+    tagged("sweep").then(async (done) => done && (await referee(5, tags))),
     designed,
-    ...OF_THE_BUTTON.filter((kind) => !refusedFor(kind)).map((kind) => begin(kind)),
-    frontAfter(designed, mine),
+    ...OF_THE_BUTTON.filter((kind) => !refusedFor(kind)).map(tagged),
+    frontAfter(designed, mine, tags),
   ];
   say("study-status", `${all.length} jobs are under way.`);
   Promise.all(all).then((done) => {
@@ -104,10 +110,10 @@ function study() {
 
 // The front after the best design, which tells a fixed amplitude for the band: at half power of each peak, the
 // highest peaks would have the narrowest bands, and the front would praise designs that damp nothing.
-async function frontAfter(designed, mine) {
+async function frontAfter(designed, mine, tags) {
   say("front-status", "The front waits for the best design: its band is measured at half power of that peak.");
   await designed;
-  const body = mine === studies && bodyOf("pareto");
+  const body = mine === studies && withTags(bodyOf("pareto"), tags);
   return body && begin("pareto", bandAt === null ? body : { ...body, limit: bandAt });
 }
 
