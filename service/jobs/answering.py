@@ -12,7 +12,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from service.errors import BodyTooLargeError, InvalidRequestError, MalformedBodyError, issues_to_json
-from service.jobs.common.measurements import read_measurements
+from service.jobs.common.measurements import look_at, read_measurements
 from service.jobs.common.scene_parameters import scene_parameters
 from service.jobs.common.scene_text import issues_of_scene, read_text, side_by_side
 from service.jobs.common.scenes import (
@@ -30,7 +30,7 @@ from service.jobs.studies.plan import Plan
 from service.jobs.study import Watch
 
 PLAN, READ, TEXT, STORE, RESOLVE, PREVIEW = "plan", "read", "text", "store", "resolve", "preview"
-MEASURED, EDIT, PARAMETERS = "measured", "edit", "parameters"
+MEASURED, LOOK, EDIT, PARAMETERS = "measured", "look", "edit", "parameters"
 
 Words = Mapping[str, Any]
 Answer = Callable[[Words, SceneSource], Any]
@@ -178,6 +178,10 @@ def _measured(words: Words, source: SceneSource) -> JsonText:
     return encoded(read_measurements(scene, words["files"]))
 
 
+def _look(words: Words, source: SceneSource) -> JsonText:
+    return encoded(look_at(resolve_scene(words["request"], source), words["files"]))
+
+
 def _store(words: Words, source: SceneSource) -> dict[str, Any]:
     scene = read_scene(source.with_uploads(words))
     tables = scene.to_dict()
@@ -214,7 +218,7 @@ class Answering:
 def runs(jobs: Registry, previews: Registry) -> dict[str, RunOn]:
     """The functions of the processes, by the names of the tasks."""
     tasks: dict[str, Answer] = {
-        PLAN: _plan, READ: _read, TEXT: _text, EDIT: _edit, STORE: _store, MEASURED: _measured,
+        PLAN: _plan, READ: _read, TEXT: _text, EDIT: _edit, STORE: _store, MEASURED: _measured, LOOK: _look,
         PARAMETERS: _parameters,
         RESOLVE: _Resolving.of(jobs),
         PREVIEW: _Resolving.of(previews),

@@ -196,6 +196,7 @@ def test_the_table_is_sorted_folded_and_told_of_what_happens(profile: Profile, s
     row(page, design).get_by_role("button", name="1 more runs of the press").click()
     expect(row(page, sweep)).to_contain_text("damper.N0 91 N")
     page.uncheck("#runs-fold")
+    page.fill("#runs-text", "two-dof")
     rows = page.locator("#runs-table tbody tr:not(:has(.pin[aria-pressed=true]))")  # pinned ones lead
     expect(page.locator("#runs-table th[aria-sort=descending]")).to_contain_text("When")
     page.locator("#runs-table th button", has_text="Peak").click()

@@ -95,7 +95,7 @@ function listRow(field, given, paths) {
   }));
 }
 
-// A study's form in `host`. `keys` of the body that it has (all if left out), `groups` [{legend, id, keys}] that fold, the
+// A form in `host`, of the kind of a study or of `{fields}`. `keys` of the body that it has (all if left out), `groups` [{legend, id, keys}] that fold, the
 // rest in those before; `paths` that rows of values have columns for; `own` keys with a part of their own
 // {key: {node, read, fill, blame}}. It is there once the kinds are known.
 export function schemaForm(host, kind, { id = kind, keys = () => true, top = [], groups = [], paths = [], own = {}, submit = null, words = "Compute", primary = false, fold = "" } = {}) {
@@ -104,7 +104,7 @@ export function schemaForm(host, kind, { id = kind, keys = () => true, top = [],
   const units = new Map();
 
   function build() {
-    fields = kindOf(kind).fields.filter(({ key }) => keys(key));
+    fields = (kind.fields ?? kindOf(kind).fields).filter(({ key }) => keys(key));
     parts.clear();
     units.clear();
     const tables = tablesIn(fields);
@@ -238,8 +238,8 @@ export function schemaForm(host, kind, { id = kind, keys = () => true, top = [],
     first?.focus();
   }
 
-  on("kinds", build);
-  if (kindOf(kind)) build();
+  if (!kind.fields) on("kinds", build);
+  if (kind.fields || kindOf(kind)) build();
   // Lengths are asked for in the unit of what is seen.
   on("size", (size) => {
     const { name } = lengthUnit(size);

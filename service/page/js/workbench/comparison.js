@@ -7,7 +7,7 @@ import { tell } from "../base/events.js";
 import { lengthUnit, number, unitOf, when } from "../base/format.js";
 import { kindOf } from "../scene/kinds.js";
 import { titleOf } from "./run_list.js";
-import { valuesOf } from "./runs.js";
+import { valuesIn } from "./runs.js";
 
 const LONGEST = 48;
 const POINTS = 600;
@@ -46,15 +46,15 @@ export async function compareRuns(a, b) {
 }
 
 // Two with the same name are told apart by their values, or by when they were handed in.
-function headings(both) {
-  const told = both.map((run) => [titleOf(run), ...valuesOf(run, 1)].join(", "));
+function headings(both, summaries) {
+  const told = both.map((run, i) => [titleOf(run), ...valuesIn(summaries[i], 1)].join(", "));
   return told[0] === told[1] ? both.map((run) => `${titleOf(run)}, ${when(run.created)}`) : told;
 }
 
 function overlay(runs, summaries) {
   const drawn = summaries.map(({ curve, peak }, i) => ({ curve, peak, i })).filter(({ curve }) => curve);
   if (!drawn.length) return plot.clear("Neither run has stored a response over the frequency.");
-  const names = headings(runs);
+  const names = headings(runs, summaries);
   const unit = lengthUnit(Math.max(...drawn.flatMap(({ curve }) => curve.amplitude)));
   plot.draw({
     x: { name: "frequency [Hz]" }, y: { name: `amplitude [${unit.name}]`, unit, zero: true, pad: 0.1 },
@@ -96,7 +96,7 @@ function differences(found, summaries) {
   const differing = all.filter((each) => !isEqual(each) && (same || !each.scene));
   const equal = all.filter((each) => isEqual(each) && each.a !== null);
   const ofScenes = same ? [] : all.filter((each) => each.scene && !isEqual(each));
-  const heads = ["quantity", ...headings([a, b]).map((text) => ({ text, number: true })), { text: "difference", number: true }];
+  const heads = ["quantity", ...headings([a, b], summaries).map((text) => ({ text, number: true })), { text: "difference", number: true }];
   const part = (label, list) => el("div", { class: "scroll", role: "region", "aria-label": label, tabindex: 0 }, table(heads, list.map(row), label));
   return [
     same ? null : el("p", { class: "note" }, `The scenes are different ones: ${a.scene ?? "none"} and ${b.scene ?? "none"}.`),

@@ -39,8 +39,9 @@ export function presses(list) {
 export const isPinned = ({ tags }) => tags.includes(PINNED);
 
 // Which values a run has: two of the same kind are told apart.
-export function valuesOf(run, most = MOST_VALUES) {
-  const { request: body, values = {} } = summaryOf(run) ?? {};
+export const valuesOf = (run, most = MOST_VALUES) => valuesIn(summaryOf(run) ?? {}, most);
+
+export function valuesIn({ request: body, values = {} }, most) {
   const over = body?.variables ? Object.keys(body.variables) : typeof body?.parameter === "string" && body.from !== undefined ? [body.parameter] : [];
   const told = [...over.filter((path) => !(path in values)).map((path) => `over ${path}`), ...Object.entries(values).map(([path, value]) => `${path} ${quantity(path, value)}`),
     ...(body?.frequency_hz > 0 ? [`at ${quantity("frequency", body.frequency_hz)}`] : [])];
