@@ -144,7 +144,7 @@ def identify(page: Any) -> None:
     page.fill("#identify-paste", measured())
     page.click("#identify-paste-take")
     page.locator("#identify-files").get_by_text("30 points").wait_for()
-    page.get_by_role("button", name="Remove parameter 1").click()
+    page.get_by_role("button", name="Remove unknown 1").click()
     page.click("#identify-submit")
     page.locator("#identify-result").wait_for()
 
@@ -209,8 +209,8 @@ def sector(page: Any) -> None:
 def interference(page: Any) -> None:
     """Show the interference diagram of the finite-element disk."""
     anew(page, "fe-disk", "&tab=disk")
-    page.fill("#interference-speed", "11000")
-    page.locator("#interference-form button").click()
+    page.fill("#interference-speed_rpm", "11000")
+    page.locator("#interference-submit").click()
     page.locator("#interference-figure path.series").first.wait_for()
     page.locator("#interference").evaluate("card => card.scrollIntoView()")
 
@@ -218,11 +218,9 @@ def interference(page: Any) -> None:
 def compare(page: Any) -> None:
     """Show two runs side by side."""
     anew(page)
-    runs = page.locator("#runs-list li", has_text="design of bladed-disk")
-    page.locator("#runs-list li").first.wait_for()
-    while page.locator("#runs-more").is_visible():
-        page.locator("#runs-more").click()
-        page.wait_for_timeout(500)
+    page.click("#tab-runs")
+    runs = page.locator("#runs-table tr[data-run]")
+    runs.first.wait_for()
     # The last but one is that of the smaller range.
     for one in (runs.first, runs.nth(runs.count() - 2)):
         one.locator("input[type=checkbox]").first.check()
@@ -245,8 +243,7 @@ VIEWS: dict[str, Show] = {
     "modes": tab("modes", "tabs", follow_mode),
     "mode-peaks": tab("modes", "modes-frequency"),
     "accuracy": tab("accuracy", "tabs"),
-    "data": tab("data", "tabs"),
-    "library": tab("data", "library"),
+    "runs": tab("runs", "tabs"),
     # From here on each opens the page anew.
     "identify": identify,
     "estimates": lambda page: page.locator("#identify-response").evaluate("card => card.scrollIntoView()"),

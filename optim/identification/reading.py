@@ -13,7 +13,9 @@ import numpy as np
 from optim.errors import DataError
 from optim.identification.data.measured import DataKind, MeasuredRows, data_kinds
 from optim.identification.data.table import Table, check_numbers, runs_of
+from optim.identification.readers.csv_text import FORMAT as CSV
 from optim.identification.readers.csv_text import FromText
+from optim.identification.readers.export import Choice, read_export, text_of
 from optim.identification.readers.registry import Head, read_file, read_head, table_of
 from solver.errors import SettingError
 from solver.scene.scene import Scene
@@ -53,6 +55,37 @@ def read_data(scene: Scene, data: Sequence[Given], unknown: Sequence[str] = ()) 
         wanted = f"must be at most {MOST_RUNS} runs and {MOST_POINTS} numbers"
         raise DataError("data", f"{len(runs)} runs, {points} numbers", wanted)
     return tuple(runs)
+
+
+def with_columns(scene: Scene, data: Sequence[str], columns: Sequence[str]) -> list[Given]:
+    """Return files with those in CSV read by what their columns are.
+
+    Parameters
+    ----------
+    scene : what was measured.
+    data : as for `read_data`.
+    columns : ``HEADING=QUANTITY:UNIT`` of each column that counts; the others are left out. Of none the files
+        as they are.
+
+    Raises
+    ------
+    DataError
+        What is wrong, with its line.
+    """
+    if not columns:
+        return list(data)
+    choices, paths = dict(map(Choice.told, columns)), frozenset(scene.parameter_paths())
+    found: list[Given] = []
+    for given in data:
+        match = _WITH_HEAD.match(given)
+        file = Path(match["file"] if match else given)
+        if file.suffix.lower() not in CSV.suffixes:
+            found.append(given)
+            continue
+        pairs = match["pairs"].split(",") if match else []
+        conditions = {key: value for key, _, value in (pair.partition("=") for pair in pairs)}
+        found.append(read_export(text_of(file), file.name, paths, choices, conditions))
+    return found
 
 
 def _tables(given: Given, index: int, paths: frozenset[str]) -> list[Table]:

@@ -22,6 +22,7 @@ from service.http.routes import (
     forms,
     jobs,
     page,
+    run_list,
     runs,
     scenes,
     stored,
@@ -95,7 +96,7 @@ def create_app(settings: Settings | None = None, registry: Registry | None = Non
         jobs.router, forms.kinds, forms.laws, events.router, stored.designs, stored.results,
         stored.sweeps, scenes.texts,
         forms.templates, scenes.router, uploads.router, uploads.matrices, uploads.measurements, scenes.plans,
-        scenes.previews, runs.projects, runs.reports, runs.runs, runs.shares, metrics.router,
+        scenes.previews, runs.projects, runs.reports, run_list.router, runs.runs, runs.shares, metrics.router,
         page.reference, page.router,
     ):  # fmt: skip
         app.include_router(router)

@@ -7,11 +7,12 @@ memory. The service hands these tasks to worker processes, and looks up what the
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
 from service.errors import BodyTooLargeError, InvalidRequestError, MalformedBodyError, issues_to_json
+from service.jobs.common.measurements import look_at, read_measurements
 from service.jobs.common.scene_parameters import scene_parameters
 from service.jobs.common.scene_text import issues_of_scene, read_text, side_by_side
 from service.jobs.common.scenes import (
@@ -27,65 +28,9 @@ from service.jobs.registry import JobRequest, Registry, Resolve, RunOn, SceneSou
 from service.jobs.strict_json import JsonText, digest, encoded
 from service.jobs.studies.plan import Plan
 from service.jobs.study import Watch
-from solver.errors import SceneError, SettingError
-from solver.scene.scene import Scene
-
-_SHOWN = 2000
-"""Points of a run that are told besides."""
-
-
-def read_measurements(scene: Scene, files: Sequence[Mapping[str, str]]) -> dict[str, Any]:
-    """Read the texts against a scene, each for itself.
-
-    Parameters
-    ----------
-    scene : what was measured.
-    files : `name` and `text` of each.
-
-    Returns
-    -------
-    `files` have the `name` and the `table` of each that can be read, in the words of a job, and its `runs`
-    with what they measured; `issues` have `file`, `line`, `column` (null where it is of the whole) and
-    `detail`.
-    """
-    # Loaded here: it brings SciPy along, which a service that only lists does not need.
-    from optim.errors import DesignError
-    from optim.identification.readers.csv_text import described
-    from optim.identification.reading import read_data
-
-    paths = frozenset(scene.parameter_paths())
-    read, issues = [], []
-    for file in files:
-        name = file["name"]
-        try:
-            from_text = described(file["text"], name, paths)
-            runs = read_data(scene, [from_text])
-            read.append({"name": name, "table": from_text.job_table, "runs": [_shown(run) for run in runs]})
-        except DesignError as error:
-            issues.append({
-                "file": name, "line": getattr(error, "line", None),
-                "column": getattr(error, "column", "") or None, "detail": str(error),
-            })  # fmt: skip
-        except (SceneError, SettingError) as error:
-            issues.append({"file": name, "line": None, "column": None, "detail": str(error)})
-    return {"files": read, "issues": issues}
-
-
-def _shown(run: Any) -> dict[str, Any]:
-    """A run as it is drawn before anything is fitted: the data stand where a fit would."""
-    import numpy as np
-
-    told = run.to_json(run.observations, np.zeros(run.observations.size))
-    count = len(told["x"])
-    kept = np.unique(np.linspace(0, count - 1, min(count, _SHOWN)).round().astype(int)).tolist()
-    return {
-        "kind": told["kind"], "conditions": told["conditions"], "of": told.get("contact") or told.get("dof"),
-        "points": count, "x": [told["x"][i] for i in kept], "data": [told["data"][i] for i in kept],
-    }  # fmt: skip
-
 
 PLAN, READ, TEXT, STORE, RESOLVE, PREVIEW = "plan", "read", "text", "store", "resolve", "preview"
-MEASURED, EDIT, PARAMETERS = "measured", "edit", "parameters"
+MEASURED, LOOK, EDIT, PARAMETERS = "measured", "look", "edit", "parameters"
 
 Words = Mapping[str, Any]
 Answer = Callable[[Words, SceneSource], Any]
@@ -233,6 +178,10 @@ def _measured(words: Words, source: SceneSource) -> JsonText:
     return encoded(read_measurements(scene, words["files"]))
 
 
+def _look(words: Words, source: SceneSource) -> JsonText:
+    return encoded(look_at(resolve_scene(words["request"], source), words["files"]))
+
+
 def _store(words: Words, source: SceneSource) -> dict[str, Any]:
     scene = read_scene(source.with_uploads(words))
     tables = scene.to_dict()
@@ -269,7 +218,7 @@ class Answering:
 def runs(jobs: Registry, previews: Registry) -> dict[str, RunOn]:
     """The functions of the processes, by the names of the tasks."""
     tasks: dict[str, Answer] = {
-        PLAN: _plan, READ: _read, TEXT: _text, EDIT: _edit, STORE: _store, MEASURED: _measured,
+        PLAN: _plan, READ: _read, TEXT: _text, EDIT: _edit, STORE: _store, MEASURED: _measured, LOOK: _look,
         PARAMETERS: _parameters,
         RESOLVE: _Resolving.of(jobs),
         PREVIEW: _Resolving.of(previews),

@@ -253,6 +253,7 @@ class Service:
         )
         waiting = None if caller.key_id is None else share(caller, self.settings, "waiting")
         row, inserted = self.jobs.submit(new, self.settings.queue_limit, waiting)
+        self.waiters.progress(row.id, row.progress, row.points)
         if row.state is JobState.ACCEPTED:
             self.queue.wake()
             if self._notices is not None:

@@ -72,6 +72,8 @@ log = logging.getLogger("stickslip.queue")
 _LATELY = 4096
 
 Listener = Callable[["Event"], None]
+EVERY = ""
+"""In place of the id of a job: of all of them."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -96,7 +98,7 @@ class Waiters:
 
     @contextmanager
     def listening(self, job_id: str, listener: Listener) -> Iterator[None]:
-        """Call `listener` for every event of the job inside the block."""
+        """Call `listener` for every event of the job, or of `EVERY` one, inside the block."""
         with self._lock:
             self._listeners.setdefault(job_id, []).append(listener)
         try:
@@ -135,13 +137,13 @@ class Waiters:
     def wake_all(self) -> None:
         """The service stops: nobody should wait any longer."""
         with self._lock:
-            ids = list(self._listeners)
+            ids = [job_id for job_id in self._listeners if job_id != EVERY] or [EVERY]
         for job_id in ids:
             self._tell(job_id, Event(job_id=job_id, ended=True))
 
     def _tell(self, job_id: str, event: Event) -> None:
         with self._lock:
-            listeners = list(self._listeners.get(job_id, ()))
+            listeners = [*self._listeners.get(job_id, ()), *self._listeners.get(EVERY, ())]
         for listener in listeners:
             try:
                 listener(event)

@@ -96,21 +96,20 @@ def test_a_newcomer_presses_one_button_and_takes_results_away(profile: Profile, 
     assert page.get_attribute("#map-figure", "data-milliseconds"), "the map is drawn"
     check_files(page)
     check_clicks(page)
-    fewer = page.locator("#library-table tbody tr").count()
-    page.click("#library-filter summary")
-    page.check("#filter-intermediate")
-    page.locator("#library-form").get_by_role("button", name="Show").click()
-    expect(page.locator("#library-status")).not_to_contain_text(f"{fewer} sweeps")
-    assert page.locator("#library-table tbody tr").count() >= fewer + 5, "sweeps on the way are folded away"
+    head = page.locator("#runs-table tbody tr", has_text="design").first
+    expect(head).to_contain_text("and 6 more")
+    expect(head).to_contain_text("damper.N0 104.79 N")
 
 
 def check_interference(page: Page) -> None:
     """The diagram of the disk at a speed that is typed in, by keyboard: orders, what they meet, in words."""
-    page.fill("#interference-speed", "-3")
-    page.press("#interference-speed", "Enter")
-    expect(page.locator("#interference-wrong")).to_contain_text("must be a number above 0")
-    page.fill("#interference-speed", "11000")
-    page.press("#interference-speed", "Enter")
+    page.fill("#interference-speed_rpm", "-3")
+    page.press("#interference-speed_rpm", "Enter")
+    expect(page.locator(".field:has(#interference-speed_rpm) .message")).to_contain_text(
+        "must be a number above 0"
+    )
+    page.fill("#interference-speed_rpm", "11000")
+    page.press("#interference-speed_rpm", "Enter")
     rows = page.locator("#interference-facts tbody").first.locator("tr")
     expect(rows.first).to_have_text("33 forward5501513.86 – 781.25meets")
     found = solver.interference_diagram(solver.load_scene("bladed-disk"), speed_rpm=11e3, up_to_hz=1800.0)
@@ -171,41 +170,34 @@ def test_sweeps_are_filtered_compared_and_shared(profile: Profile, site: Site) -
         body = {"kind": "sweep", "scene": "two-dof", "set": values}
         assert httpx.post(f"{site.url}/v1/jobs", json=body, headers={"Prefer": "wait=30"}).status_code == 200
     context, _ = profile
-    page = visit(context, site, "?scene=two-dof")
-    page.click("#library-filter summary")
-    page.fill("#filter-N0_min", "109")
-    page.fill("#filter-N0_max", "111")
-    page.press("#filter-N0_max", "Enter")
-    rows = page.locator("#library-table tbody tr")
-    expect(rows).to_have_count(2)
-    expect(rows.nth(0)).to_contain_text("damper 110 N, damper.mu 0.2")
-    expect(rows.nth(1)).to_contain_text("damper 110 N, damper.mu 0.3")
-    page.select_option("#filter-peak-unit", "mm")
-    page.fill("#filter-peak_max", "2400")
-    page.press("#filter-peak_max", "Enter")
+    page = visit(context, site, "?scene=two-dof&tab=runs")
+    page.select_option("#runs-kind", "sweep")
+    rows = page.locator("#runs-table tbody tr")
+    page.fill("#runs-text", "damper.n0 110, peak < 2400 mm")
     expect(rows).to_have_count(1)
-    expect(rows).to_contain_text("damper 110 N")
-    page.fill("#filter-peak_max", "")
-    page.fill("#filter-N0_min", "79")
-    page.fill("#filter-N0_max", "121")
-    page.fill("#filter-parameter", "frequency")
-    page.press("#filter-parameter", "Enter")
-    expect(page.locator("#library-table tbody")).not_to_contain_text("damper 50 N")
-    page.get_by_label("Compare two-dof, damper 80 N").check()
-    page.get_by_label("Compare two-dof, damper 120 N").check()
-    expect(page.locator("#compare-facts thead th")).to_have_count(3)
-    expect(page.locator("#compare-facts thead")).to_contain_text("two-dof, damper 80 N")
-    has_paths(page, "compare-figure", 2)
-    page.get_by_label("Files of two-dof, damper 80 N").first.click()
-    forms = {form: downloaded(page, f"button[aria-label='{form} of two-dof, damper 80 N'] >> nth=0")
+    expect(rows).to_contain_text("damper.N0 110 N, damper.mu 0.3")
+    page.fill("#runs-text", "damper.mu 0.3")
+    expect(rows.filter(has_text="damper.N0 50 N")).to_have_count(1)
+    expect(rows.filter(has_text="damper.mu 0.2")).to_have_count(0)
+    for load in (80, 120):
+        rows.filter(has_text=f"damper.N0 {load} N").locator("input[type=checkbox]").check()
+    heads = page.get_by_role("region", name="Differences of two runs").locator("thead")
+    expect(heads).to_contain_text("damper.N0 80 N")
+    has_paths(page, "runs-compare-figure", 2)
+    rows.filter(has_text="damper.N0 80 N").get_by_role("button", name="More of run").click()
+    page.locator("#runs-table summary", has_text="Its sweep").click()
+    name = "two-dof, damper.N0 80 N"
+    page.get_by_label(f"Files of {name}").first.click()
+    forms = {form: downloaded(page, f"button[aria-label='{form} of {name}'] >> nth=0")
              for form in ("CSV", "Parquet", "SVG", "PNG", "TOML")}  # fmt: skip
     assert forms["Parquet"].startswith(b"PAR1")
     assert forms["PNG"].startswith(b"\x89PNG")
     again = solver.sweep(solver.Scene.from_dict(tomllib.loads(forms["TOML"].decode())))
-    rows = list(csv.DictReader(io.StringIO(forms["CSV"].decode())))
-    assert [float(row["amplitude"]) for row in rows] == pytest.approx(again.amplitude.tolist(), rel=1e-9)
+    table = list(csv.DictReader(io.StringIO(forms["CSV"].decode())))
+    assert [float(row["amplitude"]) for row in table] == pytest.approx(again.amplitude.tolist(), rel=1e-9)
     other = visit(context, site, page.url.removeprefix(f"{site.url}/"))
-    expect(other.locator("#compare-facts thead")).to_contain_text("two-dof, damper 120 N")
+    heads = other.get_by_role("region", name="Differences of two runs").locator("thead")
+    expect(heads).to_contain_text("damper.N0 120 N")
 
 
 def test_the_response_follows_the_sliders_and_nothing_is_stored(profile: Profile, site: Site) -> None:

@@ -74,18 +74,11 @@ def test_every_view_of_the_bladed_disk(browser: Browser, site: Site, tmp_path: P
         page.mouse.move(0, 0)
         for view in VIEWS:
             keep(page.locator(f"#{view}"), where / f"{view}.png")
-        page.click("#library-filter summary")
-        page.check("#filter-intermediate")
-        page.fill("#filter-contact", "shroud")
-        page.fill("#filter-N0_min", "60")
-        page.press("#filter-N0_min", "Enter")
-        boxes = page.locator("#library-table input[type=checkbox]")
-        for index in (0, 3, 6):
-            boxes.nth(index).check()
-        expect(page.locator("#compare-facts thead th")).to_have_count(4)
-        page.locator("#library-table").evaluate("node => { node.style.maxHeight = '18rem'; }")
-        page.locator("#library-table").evaluate("node => { node.style.overflowY = 'hidden'; }")
-        keep(page.locator("#library"), where / "library.png")
+        page.locator("#runs-table button.fold").first.click()
+        for index in (0, 1):
+            page.locator("#runs-table input[type=checkbox]").nth(index).check()
+        expect(page.get_by_role("region", name="Differences of two runs")).to_be_visible()
+        keep(page.locator("#runs"), where / "library.png")
         page.set_viewport_size({"width": 1400, "height": 900})
         page.click("#tab-response")
         page.evaluate("window.scrollTo(0, 0)")

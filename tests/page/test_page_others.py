@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 def test_a_kind_without_a_view_has_a_form_and_a_result(browser: Browser, site: Site) -> None:
     with opened(browser, site) as (context, watch):
         page = context.new_page()
-        page.goto(f"{site.url}/?scene=two-dof&tab=data")
+        page.goto(f"{site.url}/?scene=two-dof&tab=runs")
         page.locator("html[data-ready]").wait_for(state="attached")
         names = page.locator("#others-kind option").all_text_contents()
         assert set(names) == {
@@ -33,11 +33,11 @@ def test_a_kind_without_a_view_has_a_form_and_a_result(browser: Browser, site: S
         expect(page.locator("#others-summary")).to_have_text(
             "How much of a response is not in its first harmonic."
         )
-        page.get_by_label("frequencies_hz (needed)").fill("0.9, -1")
+        page.get_by_label("frequencies (needed)").fill("0.9, -1")
         watch.allowed += ("422",)
         page.locator("#others-form").get_by_role("button", name="Submit").click()
         expect(page.locator("#others-fields .field.wrong .message")).to_contain_text("got -1")
-        page.get_by_label("frequencies_hz (needed)").fill("0.9, 1.2")
+        page.get_by_label("frequencies (needed)").fill("0.9, 1.2")
         page.locator("#others-form").get_by_role("button", name="Submit").click()
         expect(page.locator("#others-status")).to_contain_text("distortion is done", timeout=60_000)
         [job] = httpx.get(f"{site.url}/v1/jobs?kind=distortion").json()["items"]

@@ -46,25 +46,24 @@ def test_a_reload_goes_on_watching_and_two_tabs_do_not_disturb_each_other(
     context, _ = profile
     job = endless
     page = visit(context, site, f"?scene=two-dof&map={job}")
-    expect(page.locator("#jobs-list")).to_contain_text("map of two-dof")
     expect(page.locator("#map-status")).to_contain_text("%")
     page.reload()
     expect(page.locator("#map-status")).to_contain_text("%")
     assert f"map={job}" in page.url
     other = visit(context, site, "?scene=bladed-disk")
     expect(other.locator("#live-status")).to_contain_text("0.1016 mm")
-    expect(other.locator("#jobs-list")).to_contain_text("None begun in this tab.")
+    expect(other.locator("#map-status")).not_to_contain_text("%")
     expect(page.locator("#live-status")).to_contain_text("2.35 m")
     twin = visit(context, site, f"?scene=two-dof&map={job}")
     expect(twin.locator("#map-status")).to_contain_text("%")
-    stop = page.get_by_role("button", name="Stop map of two-dof")
+    stop = page.locator("#runs-list").get_by_role("button", name="Stop run map of two-dof")
     stop.focus()
-    said = page.inner_text("#jobs-list")
-    expect(page.locator("#jobs-list")).not_to_have_text(said)
+    said = page.inner_text("#runs-list .run-time")
+    expect(page.locator("#runs-list .run-time")).not_to_have_text(said)
     expect(stop).to_be_focused()
     stop.click()
     for tab in (page, twin):
-        expect(tab.locator("#jobs-list")).to_contain_text("stopped")
+        expect(tab.locator("#runs-list li.run").first).to_contain_text("stopped")
         expect(tab.locator("#map-status")).to_contain_text("The job was stopped.")
 
 
@@ -73,10 +72,9 @@ def test_another_scene_in_the_middle_of_a_study_begins_anew(profile: Profile, si
     context, _ = profile
     page = visit(context, site, "?scene=two-dof&set=damper.mu:0.31")
     page.click("#study")
-    expect(page.locator("#jobs-list")).to_contain_text("map of two-dof")
+    expect(page.locator("#study-status")).to_contain_text("jobs are under way")
     page.select_option("#scene", "bladed-disk")
     expect(page.locator("#live-status")).to_contain_text("0.1016 mm")
-    expect(page.locator("#jobs-list")).to_contain_text("None begun in this tab.")
     expect(page.locator("#study-status")).to_have_text("")
     assert page.url.endswith("?scene=bladed-disk&contact=shroud&range=20:3000&tab=all")
     for job in httpx.get(f"{site.url}/v1/jobs").json()["items"]:
@@ -124,7 +122,7 @@ def test_a_link_to_what_is_gone_opens_all_the_same(profile: Profile, site: Site)
     watch.allowed = ("status of 404",)
     page = visit(context, site, "?scene=none&set=x:1e999,y&range=1&map=01a20065-53fc-74ea-b480-fc88aa1910b2")
     expect(page.locator("#scene")).to_have_value("bladed-disk")
-    expect(page.locator("#jobs-list")).to_contain_text("None begun in this tab.")
+    expect(page.locator("#map-figure")).to_contain_text("Nothing computed yet.")
     assert "map=" not in page.url
 
 

@@ -39,7 +39,7 @@ def test_a_mode_is_followed_and_its_points_are_looked_at(profile: Profile, site:
     page.fill("#modes-to", "300")
     watch.allowed += ("422",)
     page.click("#modes-submit")
-    expect(page.locator("#modes-to-wrong")).to_contain_text("must be above")
+    expect(page.locator(".field:has(#modes-to) .message")).to_contain_text("must be above")
     page.fill("#modes-from", "0.1")
     page.fill("#modes-exact_peaks", "3")
     page.click("#modes-submit")
@@ -97,7 +97,7 @@ def test_parameters_are_identified_from_what_is_pasted(profile: Profile, site: S
     page.fill("#identify-paste", "\n".join(lines))
     page.click("#identify-paste-take")
     expect(page.locator("#identify-files")).to_contain_text("2 runs, 18 points")
-    page.get_by_role("button", name="Remove parameter 1").click()
+    page.get_by_role("button", name="Remove unknown 1").click()
     expect(page.locator("#identify-unknowns [name=path]")).to_have_value("damper.mu")
     page.click("#identify-submit")
     expect(page.locator("#identify-status")).to_contain_text("The data tell every unknown.")
@@ -142,7 +142,7 @@ def test_what_was_identified_becomes_a_robust_design(profile: Profile, site: Sit
 def test_a_front_against_an_amplitude_of_ones_own(profile: Profile, site: Site) -> None:
     page = visit(profile[0], site, "?scene=two-dof&tab=map&harmonics=1")
     page.fill("#front-limit", "2200")
-    page.select_option("#front-unit", "mm")
+    page.select_option("#front-limit-unit", "mm")
     page.fill("#front-points", "3")
     page.click("#front-form button")
     expect(page.locator("#front-status")).to_contain_text("3 designs", timeout=60_000)
@@ -154,3 +154,32 @@ def test_a_front_against_an_amplitude_of_ones_own(profile: Profile, site: Site) 
     expect(page.locator("#front-facts button").nth(1)).to_be_focused()
     assert "set=damper.N0:" in page.url
     expect(page.locator("#front-figure path.f2")).to_have_count(1)
+
+
+def test_an_export_of_a_rig_is_shown_before_it_is_read(profile: Profile, site: Site) -> None:
+    """Semicolons, decimal commas, German headings, units to be chosen; remembered for the next file."""
+    lines = ["Messung vom 12.3.", "Frequenz [Hz];Kraft [N];Weg;T_Platte [°C];Bemerkung"]
+    rows = [(0.9 + 0.05 * i, 100, 1500 + 90 * i) for i in range(8)]
+    lines += [f"{f:.2f};{n};{x:.1f};41,2;ok".replace(".", ",") for f, n, x in rows]
+    file = {"name": "Prüfstand.csv", "mimeType": "text/csv", "buffer": "\r\n".join(lines).encode("cp1252")}
+    page = visit(profile[0], site, "?scene=two-dof&tab=identify&harmonics=3")
+    page.set_input_files("#identify-file", [file])
+    form = page.locator("#identify-columns form")
+    expect(form).to_contain_text("semicolons between, decimal commas, headings in line 2, 8 rows.")
+    expect(form.get_by_label("Frequenz [Hz] is")).to_have_value("frequency")
+    expect(form.get_by_label("Unit of Kraft [N]")).to_have_value("N")
+    expect(form.get_by_label("Weg is")).to_have_value("amplitude")
+    expect(form.get_by_label("Bemerkung is")).to_have_value("")
+    form.get_by_label("Weg is").select_option("max_abs")
+    form.get_by_label("Unit of Weg").select_option("mm")
+    expect(form).to_contain_text("it is read as max_abs")
+    expect(form.locator("code")).to_contain_text('--column "Weg=max_abs:mm"')
+    form.get_by_role("button", name="Read 8 rows").click()
+    expect(page.locator("#identify-files")).to_contain_text("1 run, 8 points")
+    expect(page.locator("#identify-files")).to_contain_text("excitation.amplitude 100 N")
+    expect(form).to_have_count(0)
+    page.set_input_files("#identify-file", [{**file, "name": "second.csv"}])
+    expect(form.get_by_label("Unit of Weg")).to_have_value("mm")
+    expect(form).to_contain_text("as last time")
+    form.get_by_role("button", name="Leave the file out").click()
+    expect(page.locator("#identify-files")).not_to_contain_text("second.csv")

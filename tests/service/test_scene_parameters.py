@@ -15,7 +15,8 @@ def test_every_parameter_can_be_set_within_its_slider(shipped: httpx.Client, nam
     assert items
     parts = {*(part.name for part in (*scene.contacts, *scene.dampers, *scene.bodies, *scene.loads)), "speed"}
     told = {item["path"]: item for item in items}
-    assert set(told) == {path for path in scene.parameter_paths() if path.split(".")[0] in parts}
+    of_parts = {path for path in scene.parameter_paths() if path.split(".")[0] in parts}
+    assert set(told) == of_parts | {"excitation.amplitude"}
     for path, item in told.items():
         assert item["value"] == scene.value(path)
         assert item["part"] == path.split(".")[0]
@@ -39,3 +40,36 @@ def test_a_scene_that_is_not_there_is_refused(shipped: httpx.Client) -> None:
     refused = shipped.post("/v1/scenes/parameters", json={"scene": "nowhere"})
     assert refused.status_code == 422
     assert refused.json()["errors"][0]["pointer"] == "/scene"
+
+
+@pytest.mark.parametrize("name", solver.shipped_scenes())
+def test_a_study_is_taken_as_it_is_proposed(shipped: httpx.Client, name: str) -> None:
+    """Every proposal goes through the checks of a job; what is refused is refused there too."""
+    told = shipped.post("/v1/scenes/parameters", json={"scene": name}).json()
+    contacts = {contact.name for contact in solver.load_scene(name).contacts}
+    assert {one for joint in told["joints"] for one in joint["contacts"]} == contacts
+    designed = {one["path"]: one["bounds"] for one in told["items"] if one["bounds"]}
+    assert designed
+    path, bounds = next(iter(designed.items()))
+    assert 0.0 <= bounds[0] < bounds[1]
+    further = {"map": {"parameter": path, "from": bounds[0], "to": bounds[1]}, "mistuning": {"of": "nothing"},
+               "identify": {"data": [{"frequency": [1.0], "amplitude": [1.0]}]}}  # fmt: skip
+    for study in told["studies"]:
+        body = {"kind": study["kind"], "scene": name, **study["body"], **further.get(study["kind"], {})}
+        answer = shipped.post("/v1/jobs", json=body)
+        if answer.is_success:
+            shipped.delete(f"/v1/jobs/{answer.json()['id']}")
+        good = study["refused"] is None and study["kind"] != "mistuning"
+        assert answer.is_success == good, (study, answer.text)
+
+
+def test_a_map_follows_ridges_where_every_law_lets_it(shipped: httpx.Client) -> None:
+    scene = solver.load_scene("two-dof").to_dict()
+    gap = {"law": "gap", "k": 50.0, "gap": 0.5}
+    smooth = {"law": "dahl", "sigma": 30.0, "limit": 30.0}
+    for law, tracked in ((gap, True), (smooth, False)):
+        further = {"name": "stop", "between": ["m1", "ground"], **law}
+        contacts = [*scene["contacts"], further]
+        told = shipped.post("/v1/scenes/parameters", json={"scene": {**scene, "contacts": contacts}}).json()
+        [study] = [one for one in told["studies"] if one["kind"] == "map"]
+        assert study["body"]["ridge"] is tracked

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ from optim.identification.readers.registry import DataFormat, Head, read_head, t
 from solver.jit.fourier import Real
 
 _SEPARATORS = (";", "\t", ",")
+_DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
 
 
 def read_csv(path: Path, paths: frozenset[str]) -> list[Table]:
@@ -110,13 +112,16 @@ def _row(source: str, line: int, text: str, separator: str, heads: list[str]) ->
     if len(cells) != len(heads):
         wanted = f"must have {len(heads)} numbers, as the heads have columns"
         raise DataError(source, f"{len(cells)}", wanted, line=line)
-    return [_number(source, line, name, cell) for name, cell in zip(heads, cells, strict=True)]
+    return [_number(source, line, name, cell, separator) for name, cell in zip(heads, cells, strict=True)]
 
 
-def _number(source: str, line: int, column: str, cell: str) -> float:
+def _number(source: str, line: int, column: str, cell: str, separator: str) -> float:
     try:
         return float(cell)
     except ValueError:
+        # Between semicolons or tabs a comma can stand for nothing but decimals.
+        if separator != "," and _DECIMAL_COMMA.fullmatch(cell):
+            return float(cell.replace(",", "."))
         wanted = "must be a number with a decimal point"
         if not cell:
             wanted = "must be a number: leave the whole row out if it is missing"

@@ -24,6 +24,14 @@ Data = Annotated[
         help=f"Files of measurements (.csv, .parquet, .uff); FILE:{DISK_LOAD}=200,dof=tip gives conditions.",
     ),
 ]
+Columns = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--column", metavar="HEADING=QUANTITY:UNIT",
+        help='What a column of a rig\'s export is, such as "Weg [µm]=amplitude:um"; repeatable. Then the '
+        "others are left out, and any separator, decimal commas and lines above the headings are read.",
+    ),
+]  # fmt: skip
 Uncertain = Annotated[
     str | None,
     typer.Option(
@@ -47,6 +55,7 @@ Report = Annotated[
 def _identify(
     name: str,
     data: list[str],
+    column: list[str] | None,
     values: list[str] | None,
     plot: str | None,
     out: str | None,
@@ -61,6 +70,10 @@ def _identify(
     scene = inputs.scene(name, values)
     asked = {"data": data, **_KEYS.read(given)}
     with _KEYS.named(), watched(Identify) as watch:
+        if column:
+            from optim.identification.reading import with_columns
+
+            asked["data"] = with_columns(scene, data, column)
         answer = Identify.compute(scene, asked, watch)
     found: Any = answer.result
     if problem is not None and found.fitted:
@@ -75,7 +88,10 @@ def _identify(
 
 _KEYS = Keys.of(Identify, "data")
 identify = _KEYS.command(
-    _identify, {"data": Data}, {"uncertain": Uncertain, "report": Report}, doc=Identify.__doc__
+    _identify,
+    {"data": Data},
+    {"column": Columns, "uncertain": Uncertain, "report": Report},
+    doc=Identify.__doc__,
 )
 
 

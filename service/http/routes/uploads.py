@@ -237,6 +237,15 @@ _FILES: dict[str, Any] = {"scene": "two-dof", "files": [{"name": "rig.csv", "tex
 MOST_CHARACTERS, MOST_FILES = 2_000_000, 50
 
 
+class ColumnChoice(BaseModel):
+    """What a column of an export is."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    quantity: str = Field(max_length=210, description="Such as `frequency`, or a parameter path.")
+    unit: str | None = Field(default=None, max_length=20, description="That of the heading if left out.")
+
+
 class MeasuredFile(BaseModel):
     """A file of measured data in CSV."""
 
@@ -244,6 +253,9 @@ class MeasuredFile(BaseModel):
 
     name: str = Field(min_length=1, max_length=200)
     text: str = Field(max_length=MOST_CHARACTERS)
+    columns: dict[str, ColumnChoice] | None = Field(
+        default=None, max_length=1000, description="Of an export: heading to what it is; others are left out."
+    )
 
 
 class MeasurementsRequest(SceneRequest):
@@ -303,4 +315,52 @@ async def read_measurements(body: ReadBody, context: InContext) -> Response:
         "files": [file.model_dump() for file in body.files],
     }
     found = await computed(context, answering.MEASURED, words, about="files")
+    return Response(found, media_type="application/json")
+
+
+class ExportColumn(BaseModel):
+    """A column of an export, and what it is likely to be: nothing where it is left out."""
+
+    heading: str
+    quantity: str
+    unit: str | None
+    cells: list[str] = Field(description="Of the first rows, as they stand there.")
+
+
+class ExportLayout(BaseModel):
+    """How a file is laid out."""
+
+    name: str
+    separator: str
+    decimal: str
+    head_line: int
+    rows: int
+    known: bool = Field(description="Whether every heading is a word that files have here.")
+    columns: list[ExportColumn]
+
+
+class ExportQuantity(BaseModel):
+    """What a column may be; `units` is empty where it is told in SI alone."""
+
+    name: str
+    words: str
+    units: list[str]
+
+
+class ExportLook(BaseModel):
+    """What stands in files, before they are read."""
+
+    files: list[ExportLayout]
+    quantities: list[ExportQuantity]
+    issues: list[MeasurementIssue]
+
+
+@measurements.post("/look", response_model=ExportLook)
+async def look_at_measurements(body: ReadBody, context: InContext) -> Response:
+    """Say how exports are laid out and what their columns are likely to be; nothing is stored.
+
+    Separators, decimal commas, lines above the headings and a line of units below them are told apart.
+    """
+    words = {"request": body, "files": [file.model_dump() for file in body.files]}
+    found = await computed(context, answering.LOOK, words, about="files")
     return Response(found, media_type="application/json")

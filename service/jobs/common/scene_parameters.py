@@ -1,4 +1,4 @@
-"""What the service says of the parameters of a scene's contacts, dampers, bodies and loads, and its speed."""
+"""What the service says of a scene beside its tables: parameters, joints, what studies begin with."""
 
 from __future__ import annotations
 
@@ -7,12 +7,15 @@ import math
 from pydantic import BaseModel, ConfigDict, Field
 from pydantic.fields import FieldInfo
 
+from service.jobs.common.proposals import StudyProposal, around, design_bounds, proposals
+from service.jobs.common.scene_parts import JointAnswer, joints
 from solver.contacts.laws.parts import Span
 from solver.scene.bodies.paths import SPEED
 from solver.scene.parameter_paths import parameter_of
 from solver.scene.scene import Scene
 
 _INSIDE = 0.99
+_FORCE, _FORCES = "excitation.amplitude", 20.0  # a slider covers the force over that, to that times it
 
 
 class SliderAnswer(BaseModel):
@@ -41,23 +44,48 @@ class SceneParameterAnswer(BaseModel):
         description="Paths whose product it is, where the scene leaves it out; null: it is written down."
     )
     slider: SliderAnswer | None = Field(description="What a slider covers, as values; null: it has none.")
+    bounds: list[float] | None = Field(description="Between which it may be designed; null: hardly worth it.")
+    around: list[float] | None = Field(description="Between which it may be identified; null: as `bounds`.")
 
 
 class SceneParameterList(BaseModel):
-    """The parameters of a scene, those of a part one after the other."""
+    """What is known of a scene beside its tables.
+
+    Attributes
+    ----------
+    items : its parameters, those of a part one after the other.
+    joints : what a drawing shows between its parts.
+    studies : what its studies begin with.
+    """
 
     items: list[SceneParameterAnswer]
+    joints: list[JointAnswer]
+    studies: list[StudyProposal]
 
 
 def scene_parameters(scene: Scene) -> SceneParameterList:
-    """Return what can be said of every parameter of the parts of a scene and of its speed."""
+    """Return what can be said of every parameter of the parts of a scene, of its force and of its speed."""
     parts = {part.name: part for part in (*scene.contacts, *scene.bodies, *scene.loads, *scene.dampers)}
     items = []
     for path in scene.parameter_paths():
         owner, _, name = path.rpartition(".")
         if owner in parts or path == SPEED:
             items.append(_described(scene, path, parts.get(owner), name))
-    return SceneParameterList(items=items)
+    if _FORCE in scene.parameter_paths():
+        items.append(_force(scene))
+    return SceneParameterList(items=items, joints=joints(scene), studies=proposals(scene))
+
+
+def _force(scene: Scene) -> SceneParameterAnswer:
+    value = scene.value(_FORCE)
+    size = abs(value) or 1.0
+    slider = SliderAnswer(low=size / _FORCES, high=size * _FORCES, logarithmic=True)
+    owner, _, name = _FORCE.rpartition(".")
+    return SceneParameterAnswer(
+        path=_FORCE, part=owner, name=name, symbol="f0", unit=parameter_of(scene, _FORCE).unit,
+        words="Amplitude of the force.", value=value, otherwise=None, slider=slider, bounds=None,
+        around=around(value) if value else None,
+    )  # fmt: skip
 
 
 def _described(scene: Scene, path: str, part: object, name: str) -> SceneParameterAnswer:
@@ -70,12 +98,15 @@ def _described(scene: Scene, path: str, part: object, name: str) -> SceneParamet
     field = type(part).model_fields.get(name) if isinstance(part, BaseModel) else None
     if span is not None:
         slider = _slider(scene, path, span, value, _least_and_most(field))
+    bounds = None
+    if slider is not None:
+        bounds = design_bounds(value, slider.low, slider.high, logarithmic=slider.logarithmic)
     return SceneParameterAnswer(
         path=path, part=owner or path, name=name,
         symbol=(quantity.symbol if quantity else "") or name, unit=found.unit,
         words=(field.description if field else None) or "", value=value,
         otherwise=None if otherwise is None else [f"{owner}.{other}" for other in otherwise],
-        slider=slider,
+        slider=slider, bounds=bounds, around=around(value) if value else None,
     )  # fmt: skip
 
 

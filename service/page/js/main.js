@@ -1,7 +1,7 @@
 // The page of stickslip: projects, scenes and runs at the left, one scene with its answer and views beside them.
 
 import { asOneStep, lastWritten, read, state, write } from "./base/address.js";
-import { Problem, patiently } from "./network/api.js";
+import { Problem, patiently, post } from "./network/api.js";
 import { byId, el, show } from "./base/dom.js";
 import { startInterference } from "./disk/interference.js";
 import { startAnswer } from "./views/answer.js";
@@ -9,10 +9,10 @@ import { startDesign } from "./views/design.js";
 import { edit, editCurrent, newScene, openText } from "./editor/editor.js";
 import { on, tell } from "./base/events.js";
 import { startFront } from "./views/front.js";
+import { loadKinds } from "./scene/kinds.js";
 import { loadLaws } from "./scene/laws.js";
-import { forget, resume, run, startJobs } from "./network/jobs.js";
+import { forget, resume, run } from "./network/jobs.js";
 import { finishLogin, startLogin } from "./network/login.js";
-import { openLibrary, startLibrary } from "./views/library.js";
 import { showResponse, startLive } from "./views/live.js";
 import { startIdentify } from "./identify/view.js";
 import { startModes } from "./modes/view.js";
@@ -20,11 +20,11 @@ import { startMap } from "./views/map.js";
 import { openMatrices } from "./scene/matrices.js";
 import { SCENES } from "./scene/matrix_files.js";
 import { startNotices } from "./base/notices.js";
-import { offerOthers, startOthers } from "./views/others.js";
+import { showOther, startOthers } from "./views/others.js";
 import { startPoint } from "./views/point.js";
 import { startRenewal } from "./views/renewal.js";
 import { startResponse, sweepView } from "./views/response.js";
-import { asked, current, listScenes, loadScene, shownScene, variedParts } from "./scene/scenes.js";
+import { asked, current, listScenes, loadScene, variedParts } from "./scene/scenes.js";
 import { fillSettings, startSettings } from "./scene/settings.js";
 import { contactTable, drawStructure } from "./scene/structure.js";
 import { startSensitivities } from "./views/sensitivities.js";
@@ -37,10 +37,13 @@ import { startPanel } from "./design/panel.js";
 import { startComparison } from "./workbench/comparison.js";
 import { startFrame } from "./workbench/frame.js";
 import { listProjects, startProjects } from "./workbench/projects.js";
-import { listRuns, startRuns } from "./workbench/runs.js";
+import { listRuns, startRunList } from "./workbench/run_list.js";
+import { startRuns } from "./workbench/runs.js";
+import { startRunsTable } from "./workbench/runs_table.js";
 import { restoreTab, startTabs, tabOf } from "./workbench/tabs.js";
 
 const FIRST = "bladed-disk";
+const MOST_NAMES = 20;
 let states = { states: null, at: null };
 let sceneNames = [];
 
@@ -91,11 +94,10 @@ let drawn = "";
 
 // The drawing changes with the scene and the states alone; under a slider that is seldom.
 function drawScene() {
-  const scene = shownScene();
-  const now = JSON.stringify([scene.name, states.states]);
-  if (now !== drawn) drawStructure(byId("structure-figure"), scene, states.states);
+  const now = JSON.stringify([current.body.name, states.states]);
+  if (now !== drawn) drawStructure(byId("structure-figure"), states.states);
   drawn = now;
-  show(byId("structure-states"), contactTable(scene, states.states, states.at));
+  show(byId("structure-states"), contactTable(states.states, states.at));
 }
 
 const forgetAll = () => {
@@ -115,10 +117,8 @@ const WITHOUT_TAB = /(?<=[?&])tab=[^&]*&?/;
 
 async function restore() {
   const [before, now] = [lastWritten(), location.search].map((words) => words.replace(WITHOUT_TAB, "").replace(/[?&]$/, ""));
-  const { compare } = state;
   if (before !== now) forgetAll();
   read();
-  if (before === now) Object.assign(state, { compare });
   restoreTab();
   if (before === now) return;
   byId("scene").value = state.scene;
@@ -126,16 +126,30 @@ async function restore() {
   sceneList();
   await open();
   tell("values");
-  tell("runs-changed");
+}
+
+// A scene that a run brought along, stored under its name or, where that is another's, under one beside it.
+async function storedAs(scene) {
+  for (let i = 1; ; i += 1) {
+    const name = i === 1 ? scene.name : `${scene.name}-${i}`;
+    try {
+      await post("/v1/scenes", { ...scene, name });
+      await scenes();
+      return name;
+    } catch (error) {
+      if (!(error instanceof Problem && error.status === 409 && i < MOST_NAMES)) throw error;
+    }
+  }
 }
 
 // A run as it was computed: its scene, its values, its result in its view.
 const openRun = (run) => asOneStep(() => openedRun(run));
 
 async function openedRun({ id, kind, request }) {
-  if (request.scene !== state.scene) {
-    byId("scene").value = request.scene;
-    await change(request.scene);
+  const scene = typeof request.scene === "string" ? request.scene : await storedAs(request.scene);
+  if (scene !== state.scene) {
+    byId("scene").value = scene;
+    await change(scene);
   }
   const [range] = Object.values(request.variables ?? {});
   Object.assign(state, { set: { ...request.set }, harmonics: request.harmonics ?? state.harmonics });
@@ -155,7 +169,7 @@ async function openedRun({ id, kind, request }) {
   tell("settled");
   tell("tab", tabOf(kind));
   if (VIEWS[kind]) await resume(kind, VIEWS[kind]);
-  tell("runs-changed");
+  else if (!(kind in VIEWS)) await showOther(kind);
 }
 
 // The frequency response alone, where it is too large to be followed live.
@@ -221,10 +235,9 @@ function failed(error) {
 async function begin() {
   try {
     await patiently(loadLaws);
+    await patiently(loadKinds);
     await patiently(scenes);
     await patiently(open);
-    await patiently(offerOthers);
-    await openLibrary();
     await listProjects();
     await listRuns();
   } catch (error) {
@@ -242,9 +255,10 @@ async function start() {
   read();
   startTabs();
   startProjects();
+  startRunList();
   startRuns();
+  startRunsTable();
   startComparison();
-  startJobs();
   startDesign();
   startSensitivities();
   startLive();
@@ -257,7 +271,6 @@ async function start() {
   startIdentify();
   startInterference();
   startOthers();
-  startLibrary();
   startSettings();
   startRenewal();
   startAnswer();

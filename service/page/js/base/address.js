@@ -31,8 +31,9 @@ export function read() {
   state.at = positive(words.get("at"));
   const range = (words.get("range") ?? "").split(":").map(Number);
   state.range = range.length === 2 && range.every((end) => end > 0) ? range : null;
-  state.compare = (words.get("compare") ?? "").split(",").filter((id) => ID.test(id));
-  state.tab = words.get("tab") ?? "";
+  state.compare = (words.get("compare") ?? "").split(",").filter((id) => ID.test(id)).slice(0, 2);
+  // The tab of the runs was called after the data once.
+  state.tab = (words.get("tab") ?? "").replace(/^data$/, "runs");
   state.project = ID.test(words.get("project") ?? "") ? words.get("project") : "";
   state.jobs = {};
   for (const [kind, id] of words) {

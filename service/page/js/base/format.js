@@ -8,9 +8,10 @@ const LENGTHS = [
   // Below an atom's size only rounding is left: said in metres, with its power of ten.
   [0, "m", 1],
 ];
+export const METRES = { "m": 1, "mm": 1e-3, "µm": 1e-6 };
 const UNITS = new Map([["frequency", "Hz"], ["amplitude", "N"], ["phase", "rad"]]);
 
-// Units of the parameters of contacts.
+// Units of parameters, by their paths or their names.
 export const learnUnits = (found) => found.forEach(([name, unit]) => UNITS.set(name, unit));
 
 export const number = (value, digits = 4) => {
@@ -36,7 +37,7 @@ export const length = (metres) => {
   return `${number(metres * unit.perMetre)} ${unit.name}`;
 };
 
-export const unitOf = (path) => (path.startsWith("structure.") ? "" : (UNITS.get(path.split(".").pop()) ?? ""));
+export const unitOf = (path) => UNITS.get(path) ?? (path.startsWith("structure.") ? "" : UNITS.get(path.split(".").pop()) ?? "");
 
 export const withUnit = (path) => (unitOf(path) ? `${path} [${unitOf(path)}]` : path);
 
@@ -44,7 +45,13 @@ export const quantity = (path, value) => `${number(value, 5)} ${unitOf(path)}`.t
 
 export const seconds = (value) => (value < 1 ? `${number(value * 1e3, 3)} ms` : `${number(value, 3)} s`);
 
-export const when = (text) => (text ? new Date(text).toLocaleString() : "–");
+// Of today the time alone, over 24 hours.
+export function when(text) {
+  if (!text) return "–";
+  const at = new Date(text);
+  const time = at.toLocaleTimeString("en-GB");
+  return at.toDateString() === new Date().toDateString() ? time : `${at.toLocaleDateString("en-GB", { day: "numeric", month: "short", year: "numeric" })} ${time}`;
+}
 
 export const percent = (share) => `${Math.round(100 * share)} %`;
 

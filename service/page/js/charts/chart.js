@@ -32,19 +32,18 @@ export function chart(host, { label, file, height = 300, onPick, legend = true, 
     const before = self.shown && self.at !== null ? pointOf(self, pickSeries).x : null;
     self.shown = what;
     tools.hidden = false;
+    drawing.toggleAttribute("hidden", false);
+    if (before === null) read.textContent = "";
     self.repaint();
     // What the cursor reads is of the curve that is seen, not of the one before.
     if (before !== null) self.cursor(nearest(self.shown.series[pickSeries], before));
   };
-  // Nothing to show: a frame of the same size, so that nothing moves when there is.
+  // Nothing to show is one line.
   self.clear = (words = "Nothing computed yet.") => {
-    Object.assign(self, { shown: null, at: null, window: null });
+    Object.assign(self, { shown: null, at: null, window: null, width: host.clientWidth });
     tools.hidden = true;
-    read.textContent = "";
-    const width = Math.max(host.clientWidth, 240);
-    self.width = host.clientWidth;
-    const high = tall();
-    drawingOf(drawing, width, high, empty(width, high, words));
+    drawing.toggleAttribute("hidden", true);
+    read.textContent = words;
   };
   self.clear();
   self.cursor = (index) => moveCursor(self, index, read, pickSeries);
@@ -65,8 +64,7 @@ export function chart(host, { label, file, height = 300, onPick, legend = true, 
   }
   new ResizeObserver(() => {
     if (Math.abs(host.clientWidth - (self.width ?? 0)) <= 1 && Math.abs(tall() - Number(drawing.getAttribute("height"))) <= 1) return;
-    if (self.shown) self.repaint();
-    else self.clear();
+    self.repaint();
   }).observe(host);
   return self;
 }
@@ -272,11 +270,6 @@ function keyed(self, event, onPick, which) {
   else return;
   event.preventDefault();
 }
-
-export const empty = (width, height, words) => [
-  svg("rect", { class: "nothing", x: 1, y: 1, width: width - 2, height: height - 2, rx: 6 }),
-  svg("text", { class: "soft", x: width / 2, y: height / 2, "text-anchor": "middle" }, words),
-];
 
 // The buttons that take a chart away.
 export function saving(self, file, label, canvas) {

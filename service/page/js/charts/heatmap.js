@@ -1,6 +1,5 @@
 // The map of amplitude over two parameters: a canvas below, axes and lines in SVG above.
 
-import { empty } from "./chart.js";
 import { chartTools } from "./heatmap_tools.js";
 import { SHADES } from "../base/colours.js";
 import { el, show, svg } from "../base/dom.js";
@@ -34,17 +33,17 @@ export function heatmap(host, { label, file, height = 340, onPick, link = "" }) 
     self.shown = what;
     self.range = rangeOf(what.rows);
     tools.hidden = false;
+    drawing.toggleAttribute("hidden", false);
+    read.textContent = "";
     self.repaint();
   };
-  // Nothing to show: a frame of the same size, so that nothing moves when there is.
+  // Nothing to show is one line.
   self.clear = () => {
     Object.assign(self, { shown: null, row: null, column: null, window: null, windowY: null, log: {} });
     tools.hidden = true;
     canvas.width = 0;
-    read.textContent = "";
-    const width = Math.max(host.clientWidth, 240);
-    sized(drawing, width, height);
-    show(drawing, empty(width, height, "Nothing computed yet."));
+    drawing.toggleAttribute("hidden", true);
+    read.textContent = "Nothing computed yet.";
   };
   self.clear();
   joined(self);

@@ -1,76 +1,31 @@
 // The interference diagram of a disk: natural frequencies over the nodal diameter, and the engine orders there.
 
 import { byId, el, say, show, table } from "../base/dom.js";
-import { on, tell } from "../base/events.js";
+import { on } from "../base/events.js";
 import { number } from "../base/format.js";
 import { chart } from "../charts/chart.js";
-import { current } from "../scene/scenes.js";
+import { refusedFor } from "../scene/kinds.js";
 
-const WITHIN = 0.05;
-const ABOVE_BAND = 2;
 const HEADROOM = 1.05;
 const MOST_NAMED = 40;
 const SHIFT = { forward: 0.07, backward: -0.07 };
 const ABOUT = "Natural frequencies over the nodal diameter, with what the engine orders excite at a speed.";
 let diagram = null;
 
-export const isDisk = () => Boolean(current.body?.structure.sectors);
-
-const ownOrder = () => [current.body?.excitation].flat().map((force) => force?.engine_order).find((order) => order !== undefined && order !== null) ?? 0;
-
 export function startInterference() {
   diagram = chart(byId("interference-figure"), { label: "Interference diagram", file: "interference", height: 380 });
-  byId("interference-form").addEventListener("submit", (event) => {
-    event.preventDefault();
-    if (read()) tell("renew", "interference");
-  });
   on("scene", () => {
-    byId("interference").hidden = !isDisk();
+    byId("interference").hidden = refusedFor("interference") !== "";
     diagram.clear();
     say("interference-status", ABOUT);
     show(byId("interference-facts"));
-    if (isDisk()) fill(current.body.speed || usualSpeed(), WITHIN);
   });
-}
-
-// The speed that brings the order of the scene into the middle of its band.
-function usualSpeed() {
-  const [low, high] = current.body.observe.band;
-  return Number(((60 * Math.sqrt(low * high)) / Math.max(ownOrder(), 1)).toPrecision(3));
-}
-
-function fill(speed, within) {
-  byId("interference-speed").value = speed;
-  byId("interference-within").value = Number((100 * within).toPrecision(6));
-  read();
-}
-
-// Says what is wrong beside the fields; whether nothing is.
-function read() {
-  const [speed, within] = ["speed", "within"].map((name) => byId(`interference-${name}`));
-  const wrong = [
-    [speed, speed.valueAsNumber > 0 ? "" : "The speed must be a number above 0."],
-    [within, within.valueAsNumber >= 0 && within.valueAsNumber <= 100 ? "" : "The distance must be from 0 to 100 %."],
-  ];
-  for (const [input, words] of wrong) {
-    if (words) input.setAttribute("aria-invalid", "true");
-    else input.removeAttribute("aria-invalid");
-  }
-  byId("interference-wrong").textContent = wrong.map(([, words]) => words).filter(Boolean).join(" ");
-  return !wrong.some(([, words]) => words);
-}
-
-export function interferenceBody() {
-  const found = { up_to_hz: ABOVE_BAND * current.body.observe.band[1] };
-  const [speed, within] = ["speed", "within"].map((name) => byId(`interference-${name}`).valueAsNumber);
-  return { ...found, speed_rpm: speed > 0 ? speed : usualSpeed(), within: within >= 0 ? within / 100 : WITHIN };
 }
 
 export const interferenceView = {
   waiting: () => say("interference-status", "The diagram waits for a worker."),
   progress: ({ took }) => say("interference-status", `Nodal diameters:${took}.`),
   result(found) {
-    if (found.speed_rpm !== null) fill(found.speed_rpm, found.within);
     draw(found);
     const inside = found.crossings.filter((one) => one.inside).length;
     const missing = found.missing.length ? ` The sector was not reduced for the nodal diameters ${found.missing.join(", ")}.` : "";

@@ -43,14 +43,6 @@ function turned(p, axis, angle) {
   return plus(plus(times(p, Math.cos(angle)), times(cross(k, p), Math.sin(angle))), times(k, dot(k, p) * (1 - Math.cos(angle))));
 }
 
-// Where a contact is: its own place, else that of the node it holds.
-function placeOf(contact, scene) {
-  if (contact.at) return contact.at;
-  const names = contact.between ?? [];
-  const node = (scene.nodes ?? []).find(({ name, dofs }) => names.some((end) => !end.endsWith("@next") && (end === name || Object.values(dofs ?? {}).includes(end))));
-  return node?.at ?? null;
-}
-
 // Scale and shift that bring a view into its half of the drawing.
 function fitted(view, points, left, width) {
   const flat = points.map(view.at);
@@ -70,14 +62,13 @@ const lines = (edges, places) =>
 const low = ({ x, y }) => svg("circle", { class: "f1", cx: x.toFixed(1), cy: y.toFixed(1), r: DOT });
 const high = ({ x, y }) => svg("rect", { class: "f2", x: (x - DOT).toFixed(1), y: (y - DOT).toFixed(1), width: 2 * DOT, height: 2 * DOT });
 
-// Draws the sector; `look` has what the drawing of a structure says of contacts: {pattern, classOf, wordsOf, plates, key}.
-export function drawSector(host, scene, states, look) {
+// Draws the sector; `look` has what the drawing of a structure says of contacts: {pattern, classOf, wordsOf, stateOf, plates, key}.
+export function drawSector(host, { body: scene, joints }, look) {
   const { outline, sectors, cyclic } = scene.structure;
   const axis = cyclic?.axis ?? [0, 0, 1];
   const pitch = (2 * Math.PI) / sectors;
-  const contacts = (scene.contacts ?? []).map((contact) => ({ contact, at: placeOf(contact, scene) }));
-  const placed = contacts.filter(({ at }) => at);
-  const words = contacts.map(({ contact }) => `${contact.name} ${look.wordsOf(states?.[contact.name])}`).join(", ");
+  const placed = joints.filter(({ at }) => at);
+  const words = joints.map((joint) => `${joint.name} ${look.wordsOf(joint)}`).join(", ");
   const drawing = svg("svg", {
     role: "img", viewBox: `0 0 ${WIDE} ${HIGH + 18}`,
     "aria-label": `${scene.name}: one of ${sectors} sectors from finite elements, seen along the axis and from the side; ${outline.low.length} nodes on the boundary to the sector before, ${outline.high.length} on that to the next one; ${words || "no contacts"}`,
@@ -90,22 +81,22 @@ export function drawSector(host, scene, states, look) {
     drawing.append(svg("path", { class: "mesh", d: lines(outline.edges, places) }));
     if (!outline.edges.length) drawing.append(...places.map(({ x, y }) => svg("circle", { class: "mesh-node", cx: x.toFixed(1), cy: y.toFixed(1), r: 1 })));
     drawing.append(...outline.low.map((k) => low(places[k])), ...outline.high.map((k) => high(places[k])));
-    drawing.append(...marks(placed, at, states, look, i === 1));
+    drawing.append(...marks(placed, at, look, i === 1));
     drawing.append(svg("text", { class: "soft", x: (i + 0.5) * (WIDE / 2), y: HIGH + 10, "text-anchor": "middle" }, view.words));
   });
-  show(host, drawing, legend(look, placed.length > 0), note(outline, contacts, placed));
+  show(host, drawing, legend(look, placed.length > 0), note(outline, joints, placed));
 }
 
 // Contacts as plates at their places, named in one view.
-function marks(placed, at, states, look, named) {
-  return placed.flatMap(({ contact, at: place }) => {
-    const [state, { x, y }] = [states?.[contact.name], at(place)];
+function marks(placed, at, look, named) {
+  return placed.flatMap((joint) => {
+    const { x, y } = at(joint.at);
     const side = x < 0.75 * WIDE ? -1 : 1;
     const half = PLATE / 1.4;
     const [from, to] = [{ x: x - half, y }, { x: x + half, y }];
     return [
-      look.plates(from, to, PLATE, look.classOf(state), `${contact.name} ${look.wordsOf(state)}`),
-      named ? svg("text", { class: "halo", x: x + side * (PLATE + 3), y: y + SIDEWAYS, "text-anchor": side < 0 ? "end" : "start" }, contact.name) : null,
+      look.plates(from, to, PLATE, look.classOf(look.stateOf(joint)), `${joint.name} ${look.wordsOf(joint)}`),
+      named ? svg("text", { class: "halo", x: x + side * (PLATE + 3), y: y + SIDEWAYS, "text-anchor": side < 0 ? "end" : "start" }, joint.name) : null,
     ].filter(Boolean);
   });
 }
@@ -117,8 +108,8 @@ function legend(look, rubbing) {
     entry(svg("path", { class: "mesh next", d: "M1 8H15" }), "the next sector"), rubbing ? look.key() : null);
 }
 
-function note(outline, contacts, placed) {
-  const missing = contacts.filter((each) => !placed.includes(each)).map(({ contact }) => contact.name);
+function note(outline, joints, placed) {
+  const missing = joints.filter((each) => !placed.includes(each)).map(({ name }) => name);
   const said = [
     outline.edges.length ? "" : "The deck tells no elements that can be drawn: the nodes stand for the mesh.",
     missing.length ? `Without a place, so not drawn: ${missing.join(", ")}.` : "",

@@ -4,6 +4,7 @@ import { Problem, patiently, post } from "../network/api.js";
 import { byId, el, show } from "../base/dom.js";
 import { number, quantity } from "../base/format.js";
 import { asked } from "../scene/scenes.js";
+import { askColumns } from "./columns.js";
 
 const PASTED = "pasted";
 let files = [];
@@ -43,20 +44,46 @@ function fresh(name) {
   }
 }
 
-const takeFiles = async (list) => take(await Promise.all(list.map(async (file) => ({ name: file.name, text: await file.text() }))));
-
-// Reads texts against the scene; what is wrong is said with file, line and column. Whether nothing is.
-async function take(texts) {
-  if (!texts.length) return true;
-  const { scene, set } = asked();
-  let answer;
+// Text in UTF-8, else in the code page of western Windows, as rigs write it.
+async function textOf(file) {
+  const bytes = await file.arrayBuffer();
   try {
-    answer = await patiently(() => post("/v1/measurements/read", { scene, set, files: texts }));
+    return new TextDecoder("utf-8", { fatal: true }).decode(bytes);
+  } catch {
+    return new TextDecoder("windows-1252").decode(bytes);
+  }
+}
+
+const takeFiles = async (list) => take(await Promise.all(list.map(async (file) => ({ name: file.name, text: await textOf(file) }))));
+
+// Asks the service about texts; what it refuses is said beside the files. Null then.
+async function asks(path, texts) {
+  const { scene, set } = asked();
+  try {
+    return await patiently(() => post(path, { scene, set, files: texts }));
   } catch (error) {
     if (!(error instanceof Problem)) throw error;
     issues((error.errors?.length ? error.errors : [error]).map((each) => ({ file: texts.map(({ name }) => name).join(", "), line: null, column: null, detail: each.detail ?? each.message })));
-    return false;
+    return null;
   }
+}
+
+// Reads texts whose headings are known; of an export is first said what its columns are. Whether nothing is wrong.
+async function take(texts) {
+  if (!texts.length) return true;
+  const looked = await asks("/v1/measurements/look", texts);
+  if (!looked) return false;
+  const exports = looked.files.filter(({ known }) => !known);
+  const plain = texts.filter(({ name }) => !exports.some((each) => each.name === name));
+  const good = !plain.length || await readTexts(plain);
+  askColumns(byId("identify-columns"), exports, looked.quantities, (layout, columns) => readTexts([{ ...texts.find(({ name }) => name === layout.name), columns }]));
+  return good;
+}
+
+// Reads texts against the scene; what is wrong is said with file, line and column. Whether nothing is.
+async function readTexts(texts) {
+  const answer = await asks("/v1/measurements/read", texts);
+  if (!answer) return false;
   for (const one of answer.files) {
     const text = texts.find(({ name }) => name === one.name)?.text;
     files = [...files.filter(({ name }) => name !== one.name), { ...one, text }];
@@ -81,6 +108,7 @@ function issues(list) {
 
 export function clearData() {
   files = [];
+  show(byId("identify-columns"));
   issues([]);
   list();
 }

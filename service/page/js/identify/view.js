@@ -6,29 +6,21 @@ import { on, tell } from "../base/events.js";
 import { csvText, saveText } from "../base/exports.js";
 import { number, percent, quantity, seconds } from "../base/format.js";
 import { chart } from "../charts/chart.js";
-import { rowsOf } from "../design/rows.js";
+import { schemaForm } from "../forms/form.js";
 import { run } from "../network/jobs.js";
-import { asked, ranges, value, variables, variedParts } from "../scene/scenes.js";
+import { askedFor, proposed } from "../scene/kinds.js";
 import { putAll } from "../views/live.js";
 import { clearData, fillData, list, runsRead, sourceNames, startData, tables } from "./data.js";
 import { candidatesTable, correlationTable, estimatesTable, loopsChart, phasesChart, responsesChart } from "./fit.js";
 
 const PRIORITY = 4;
-const AROUND = 3;
 const EMPTY = "Choose files of measured responses or loops, or paste one, to see them here.";
-let rows = null;
+let form = null;
 let plots = null;
 let last = null;
 
 export function startIdentify() {
-  const paths = () => [...new Set([...variables(), ...variedParts().flatMap(ranges).map(({ path }) => path), "excitation.amplitude"])];
-  rows = rowsOf(byId("identify-unknowns"), { id: "identify-unknowns", one: "parameter", least: 1, columns: [
-    { key: "path", label: "Parameter", type: "select", options: paths }, { key: "low", label: "from" }, { key: "high", label: "to" },
-    { key: "mean", label: "Known before: mean", hint: "none" }, { key: "sd", label: "± standard deviation", hint: "none" },
-    { key: "how", label: "Steps", type: "select", options: () => ["auto", "linear", "logarithmic"] }] });
-  // A parameter that is chosen brings bounds around its value.
-  byId("identify-unknowns").addEventListener("change", (event) => event.target.name === "path" && bounds(event.target.closest(".problem-row")));
-  byId("identify-unknowns-add").addEventListener("click", () => bounds(byId("identify-unknowns").querySelector(".problem-row:last-child")));
+  form = schemaForm(byId("identify-form"), "identify", { keys: (key) => key !== "data", top: ["unknowns"], groups: [{ legend: "Noise, outliers, starts", id: "more" }], submit, words: "Identify", primary: true });
   plots = {
     response: chart(byId("identify-response"), { label: "Fit over the data", file: "fit", height: 320, link: "measured" }),
     second: chart(byId("identify-second"), { label: "Phases or loops", file: "fit-phases", height: 320, link: "measured" }),
@@ -39,85 +31,26 @@ export function startIdentify() {
     draw();
     results();
   });
-  byId("identify-form").addEventListener("submit", (event) => {
-    event.preventDefault();
-    submit();
-  });
   on("scene", () => {
     last = null;
     clearData();
-    fillUnknowns({});
+    form.fill(proposed("identify"));
     draw();
     results();
     say("identify-status", "Parameters of the scene from what a rig measured, with how sure they are.");
   });
-  on("resubmit", (kind) => kind === "identify" && submit());
+  on("resubmit", (kind) => kind === "identify" && byId("identify-form").requestSubmit());
 }
 
-function bounds(row) {
-  const path = row?.querySelector("[name=path]").value;
-  const now = path ? value(path) : null;
-  if (!now) return;
-  const ends = [now / AROUND, now * AROUND].map((end) => Number(end.toPrecision(3))).sort((a, b) => a - b);
-  ["low", "high"].forEach((key, i) => { row.querySelector(`[name=${key}]`).value = String(ends[i]); });
-}
-
-function fillUnknowns({ unknowns, priors, scaling, noise, robust, starts }) {
-  const own = variedParts()[0];
-  const first = own ? ranges(own).map(({ path }) => path).filter((path) => /\.(kt|mu)$/.test(path)) : [];
-  const given = Object.entries(unknowns ?? {});
-  rows.fill(given.length
-    ? given.map(([path, [low, high]]) => ({ path, low, high, mean: priors?.[path]?.[0], sd: priors?.[path]?.[1], how: scaling?.[path] ?? "auto" }))
-    : (first.length ? first : variables().slice(0, 1)).map((path) => ({ path, how: "auto" })));
-  if (!given.length) for (const row of byId("identify-unknowns").querySelectorAll(".problem-row")) bounds(row);
-  byId("identify-noise").value = noise ?? "";
-  byId("identify-robust").checked = robust ?? false;
-  byId("identify-starts").value = String(starts ?? 16);
-}
-
-// What the fields say, in the words of the service. What is no number is said here, at its field.
-function body() {
-  const found = { data: tables(), unknowns: {}, robust: byId("identify-robust").checked };
-  const [priors, scaling, wrong] = [{}, {}, []];
-  const numberIn = (row, key, words, needed) => {
-    if (row[key] === undefined && !needed) return undefined;
-    const given = Number(row[key]);
-    if (row[key] === undefined || !Number.isFinite(given)) wrong.push({ pointer: `/unknowns/${row.path}`, detail: `${row.path}, ${words}, must be a number, got ${row[key] ?? "nothing"}.` });
-    return given;
-  };
-  for (const row of rows.read()) {
-    if (row.path in found.unknowns) wrong.push({ pointer: `/unknowns/${row.path}`, detail: `${row.path} stands there twice.` });
-    found.unknowns[row.path] = [numberIn(row, "low", "from", true), numberIn(row, "high", "to", true)];
-    if (row.mean !== undefined || row.sd !== undefined) priors[row.path] = [numberIn(row, "mean", "mean", true), numberIn(row, "sd", "standard deviation", true)];
-    if (row.how && row.how !== "auto") scaling[row.path] = row.how;
-  }
-  if (Object.keys(priors).length) found.priors = priors;
-  if (Object.keys(scaling).length) found.scaling = scaling;
-  for (const [key, input] of [["noise", byId("identify-noise")], ["starts", byId("identify-starts")]]) if (input.value !== "") found[key] = input.valueAsNumber;
-  if (!found.data.length) wrong.push({ pointer: "/data", detail: "Choose files of measured data first, or paste one." });
-  return { found, wrong };
-}
-
-async function submit() {
-  complain([]);
-  const { found, wrong } = body();
-  if (wrong.length) return complain(wrong);
+async function submit(body) {
+  const data = tables();
+  if (!data.length) return complain([{ pointer: "/data", detail: "Choose files of measured data first, or paste one." }]);
   // Values that the scene has been given by hand stay; those looked for are found.
-  await run("identify", { ...asked(), ...found }, identifyView, PRIORITY);
+  await run("identify", { ...askedFor("identify"), data, ...body }, identifyView, PRIORITY);
   return undefined;
 }
 
-function complain(errors) {
-  for (const node of byId("identify-form").querySelectorAll("[aria-invalid]")) node.removeAttribute("aria-invalid");
-  say("identify-wrong", errors.map(({ detail }) => named(detail)).join(" "), true);
-  for (const { pointer } of errors) {
-    const [top, which] = pointer.split("/").slice(1);
-    const row = [...byId("identify-unknowns").querySelectorAll(".problem-row")].find((each) => each.querySelector("[name=path]").value === which);
-    const field = row?.querySelector(top === "priors" ? "[name=mean]" : "[name=low]") ?? (["noise", "starts"].includes(top) ? byId(`identify-${top}`) : null);
-    field?.setAttribute("aria-invalid", "true");
-  }
-  byId("identify-form").querySelector("[aria-invalid]")?.focus();
-}
+const complain = (errors) => form.complain(errors.map((one) => ({ ...one, detail: named(one.detail) })));
 
 // A table of a job by the name of its file.
 const named = (text) => text.replaceAll(/data\[(\d+)\]/g, (whole, i) => sourceNames()[Number(i)] ?? whole);
@@ -126,7 +59,7 @@ export const identifyView = {
   waiting: () => say("identify-status", "The identification waits for a worker."),
   progress: ({ took, points }) => say("identify-status", `Identifying:${took}; ${points} evaluations.`),
   submitted(job) {
-    fillUnknowns(job.request);
+    form.fill(job.request);
     fillData(job.request.data ?? []);
   },
   result(result, _sweeps, job) {

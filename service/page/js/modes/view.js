@@ -6,13 +6,10 @@ import { on } from "../base/events.js";
 import { csvText, saveText } from "../base/exports.js";
 import { length, number, seconds } from "../base/format.js";
 import { chart } from "../charts/chart.js";
-import { run } from "../network/jobs.js";
-import { asked, current, value } from "../scene/scenes.js";
+import { current, value } from "../scene/scenes.js";
 import { putAll } from "../views/live.js";
 import { amplitudeOf, columnsOf, dampingChart, frequencyChart, loopChart, nearestMotion, performanceChart, shapeChart, stabilityOf, statesAt } from "./charts.js";
-import { buildForm, complain, fillForm, readForm } from "./form.js";
 
-const PRIORITY = 4;
 const MOST_PINS = 4;
 const EMPTY = "Choose a mode and its amplitudes, then press “Follow the mode”.";
 let plots = null;
@@ -24,7 +21,6 @@ let by = "load";
 let pins = [];
 
 export function startModes() {
-  buildForm(byId("modes-form"), submit);
   const pick = (_point, at) => choose(at);
   plots = {
     frequency: chart(byId("modes-frequency"), { label: "Frequency over amplitude", file: "mode-frequency", height: 280, link: "amplitude", onPick: pick }),
@@ -36,9 +32,7 @@ export function startModes() {
   on("scene", () => {
     [last, point, contact, pins] = [null, 0, 0, []];
     clear();
-    fillForm();
   });
-  on("resubmit", (kind) => kind === "modes" && submit());
 }
 
 function clear() {
@@ -51,15 +45,9 @@ function clear() {
   for (const id of ["modes-tools", "modes-facts", "modes-loop-more", "modes-performance-more"]) show(byId(id));
 }
 
-async function submit() {
-  complain([]);
-  await run("modes", { ...asked(), ...readForm() }, modesView, PRIORITY);
-}
-
 export const modesView = {
   waiting: () => say("modes-status", "The mode waits for a worker."),
   progress: ({ took, points }) => say("modes-status", `Following the mode:${took}; ${points} points.`),
-  submitted: (job) => fillForm(job.request),
   result(result, _sweeps, job) {
     if (!result.amplitude.length) return say("modes-status", result.status, true);
     last = { result, request: job.request };
@@ -70,10 +58,7 @@ export const modesView = {
     draw();
     return undefined;
   },
-  failed(words, errors = []) {
-    say("modes-status", words, true);
-    complain(errors);
-  },
+  failed: (words) => say("modes-status", words, true),
 };
 
 function draw() {
@@ -102,11 +87,11 @@ function drawPerformance() {
   return undefined;
 }
 
-// The loads of all contacts times a factor, as values to set.
+// Every force of the joints times a factor, as values to set.
 function loadsAt(factor) {
   if (!factor) return {};
-  return Object.fromEntries((current.body?.contacts ?? []).flatMap(({ name }) => ["N0", "N1"].map((key) => `${name}.${key}`))
-    .map((path) => [path, value(path)]).filter(([, load]) => typeof load === "number" && load !== 0).map(([path, load]) => [path, Number((load * factor).toPrecision(6))]));
+  const loads = [...current.parameters.values()].filter(({ part, unit, otherwise }) => unit === "N" && !otherwise && current.joints.some(({ name }) => name === part));
+  return Object.fromEntries(loads.map(({ path }) => [path, value(path)]).filter(([, load]) => load !== 0).map(([path, load]) => [path, Number((load * factor).toPrecision(6))]));
 }
 
 // Another point of the curve: its loop, its shape, what the contacts do there.

@@ -2,15 +2,13 @@
 
 import { Problem, patiently, post, request } from "./api.js";
 import { state, write } from "../base/address.js";
-import { byId, el, show } from "../base/dom.js";
-import { tell } from "../base/events.js";
+import { on, tell } from "../base/events.js";
 import { timing } from "../base/timing.js";
+import { lastTold } from "../workbench/run_list.js";
 import { watch } from "./stream.js";
 
-const WORDS = { accepted: "waits", running: "runs", successful: "done", failed: "failed", dismissed: "stopped" };
 const ENDED = ["successful", "failed", "dismissed"];
 const TICK_MS = 1000;
-const shown = new Map();
 const watching = new Map();
 
 // What is computed while a project is open belongs to it.
@@ -54,8 +52,6 @@ export async function resume(kind, view) {
     if (error instanceof Problem && error.status === 404) {
       delete state.jobs[kind];
       write();
-      shown.delete(kind);
-      list();
       view.gone?.();
     } else refused(kind, error, view, mine);
   } finally {
@@ -66,9 +62,7 @@ export async function resume(kind, view) {
 export function forget(kind) {
   watching.get(kind)?.abort();
   watching.delete(kind);
-  shown.delete(kind);
   delete state.jobs[kind];
-  list();
 }
 
 function begin(kind) {
@@ -86,10 +80,10 @@ function refused(kind, error, view, mine) {
 async function follow(kind, id, view, { signal }) {
   const first = await patiently(() => request(`/v1/jobs/${id}`, { signal }));
   if (typeof first.request.scene === "string" && first.request.scene !== state.scene) return ofAnotherScene(kind, first, view);
-  enter(kind, first);
+  // A scene that a job brought along is stored under a name before its run is shown.
+  first.request.scene = state.scene;
   view.submitted?.(first);
-  const job = ENDED.includes(first.status) ? first : await watched(kind, first, view, signal);
-  enter(kind, job);
+  const job = ENDED.includes(first.status) ? first : await watched(first, view, signal);
   if (job.status === "dismissed") {
     view.failed("The job was stopped.", [], job);
     return false;
@@ -100,7 +94,7 @@ async function follow(kind, id, view, { signal }) {
   });
   if (signal.aborted) return false;
   if (results) {
-    view.result(results.result, results.sweeps, job);
+    view.result(results.result, results.sweeps, { ...job, request: first.request });
     tell("computed", { kind, request: first.request, result: results.result });
   }
   if (job.status === "failed") view.failed(job.error?.detail ?? "The job failed.", job.error?.issues ?? [], results ? null : job);
@@ -109,26 +103,41 @@ async function follow(kind, id, view, { signal }) {
 }
 
 // Follows a job to its end; the time it takes is told every second, also while nothing else is new.
-async function watched(kind, first, view, signal) {
+async function watched(first, view, signal) {
   let now = first;
   const report = () => {
-    enter(kind, now);
     if (now.status === "running") view.progress?.({ ...now, took: timing(now) });
   };
   const clock = setInterval(() => now.status === "running" && report(), TICK_MS);
+  const onProgress = (news) => {
+    now = { ...now, ...news, started: now.started ?? (news.status === "running" ? new Date().toISOString() : null) };
+    report();
+  };
   try {
-    return await watch(first.id, {
-      signal,
-      onProgress: (news) => {
-        const started = now.started ?? (news.status === "running" ? new Date().toISOString() : null);
-        now = { ...now, ...news, started };
-        report();
-      },
-      onPoints: (news) => view.points?.(news),
-    });
+    return view.points ? await watch(first.id, { signal, onProgress, onPoints: (news) => view.points(news) }) : await ended(first.id, signal, onProgress);
   } finally {
     clearInterval(clock);
   }
+}
+
+// The end of a job, by the stream of all runs; it is asked for where that stream broke in between.
+function ended(id, signal, onProgress) {
+  return new Promise((resolve, reject) => {
+    const done = (settle, value) => {
+      for (const off of offs) off();
+      settle(value);
+    };
+    const told = (run) => {
+      if (run.id !== id) return;
+      if (ENDED.includes(run.status)) request(`/v1/jobs/${id}`, { signal }).then((job) => done(resolve, job), (error) => done(reject, error));
+      else onProgress({ status: run.status, progress: run.progress, points: run.points, best: run.best });
+    };
+    const look = () => patiently(() => request(`/v1/jobs/${id}`, { signal })).then(told, (error) => done(reject, error));
+    const offs = [on("run", told), on("runs-followed", look)];
+    signal.addEventListener("abort", () => done(reject, signal.reason));
+    const before = lastTold(id);
+    if (before) told(before);
+  });
 }
 
 // A job that a link names beside another scene: its values are not for this one.
@@ -138,46 +147,3 @@ function ofAnotherScene(kind, job, view) {
   view.failed(`The ${kind} of the link is of the scene ${job.scene}, not of ${state.scene}: it is left out.`, []);
   return false;
 }
-
-function enter(kind, job) {
-  shown.set(kind, job);
-  list();
-}
-
-// A row stays the node it is while its job goes on: its button keeps the focus, and a press on it is a click.
-const lines = new Map();
-
-function list() {
-  for (const [kind, { id }] of lines) if (shown.get(kind)?.id !== id) lines.delete(kind);
-  const rows = [...shown].map(([kind, job]) => {
-    if (!lines.has(kind)) lines.set(kind, line(kind, job));
-    const { node, bar, words, stop } = lines.get(kind);
-    const active = !ENDED.includes(job.status);
-    bar.value = active ? job.progress : 1;
-    words.textContent = `${WORDS[job.status]}${timing(job)}${job.result_of ? ", was stored" : ""}`;
-    stop.hidden = !active;
-    return node;
-  });
-  const host = byId("jobs-list");
-  const seen = [...(host.querySelector("ul")?.children ?? [])];
-  if (rows.length && rows.length === seen.length && rows.every((row, i) => row === seen[i])) return;
-  show(host, rows.length ? el("ul", { class: "plain" }, rows) : el("p", { class: "note" }, "None begun in this tab. What others began is told with the runs."));
-}
-
-function line(kind, job) {
-  const name = `${kind} of ${job.scene ?? "a scene"}`;
-  const bar = el("progress", { class: "bar", max: 1, value: 0, "aria-label": `Progress of ${name}` });
-  const words = el("span", { class: "note" });
-  const stop = el("button", { type: "button", "aria-label": `Stop ${name}`, onclick: () => dismiss(job.id) }, "Stop");
-  return { id: job.id, bar, words, stop, node: el("li", { class: "row" }, el("span", { class: "job-name" }, name), bar, words, stop) };
-}
-
-async function dismiss(id) {
-  try {
-    await request(`/v1/jobs/${id}`, { method: "DELETE" });
-  } catch (error) {
-    tell("notice", error.message);
-  }
-}
-
-export const startJobs = list;

@@ -13,6 +13,4 @@ export async function loadLaws() {
   learnUnits(items.flatMap((law) => law.parameters).map(({ name, unit }) => [name, unit]));
 }
 
-export const parametersOf = (contact) => laws.get(contact.law ?? usual) ?? [];
-
-export const parameterOf = (contact, key) => parametersOf(contact).find(({ name }) => name === key);
+export const parameterOf = (contact, key) => laws.get(contact.law ?? usual)?.find(({ name }) => name === key);

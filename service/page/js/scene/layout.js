@@ -34,22 +34,10 @@ function spread(layers, joints) {
   }
 }
 
-// A damper between two places as a contact between the first DOFs of these; what is no node stands still.
-function betweenDofs(damper, nodes) {
-  const dof = (place) => {
-    const [name, sector] = place.split("@");
-    const first = Object.values(nodes.find((node) => node.name === name)?.dofs ?? {})[0];
-    return first ? [first, sector].filter(Boolean).join("@") : GROUND;
-  };
-  return { ...damper, law: damper.shape, between: damper.between.map(dof) };
-}
-
 // What a scene's structure consists of, whatever its kind.
-export function partsOf(scene) {
-  const { structure } = scene;
+export function partsOf({ body: { structure, observe }, joints: contacts }) {
   const masses = structure.masses ? Object.keys(structure.masses) : Object.keys(structure.dofs ?? {});
-  const contacts = [...(scene.contacts ?? []), ...(scene.dampers ?? []).map((damper) => betweenDofs(damper, scene.nodes ?? []))];
-  const used = [...contacts.flatMap((c) => c.between), scene.observe.dof].map(ownName);
+  const used = [...contacts.flatMap((c) => c.between), observe.dof].map(ownName);
   const dofs = masses.length ? masses : [...new Set(used)].filter((name) => name !== GROUND);
   return {
     dofs: dofs.map(ownName).filter((name, i, all) => all.indexOf(name) === i),

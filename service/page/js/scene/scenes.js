@@ -4,8 +4,10 @@ import { request } from "../network/api.js";
 import { state } from "../base/address.js";
 import { learnUnits } from "../base/format.js";
 
-// Its parameters as the service tells them, by path.
-export const current = { body: null, parameters: new Map() };
+// What the service tells of it beside its tables: parameters by path, joints, what each study begins with.
+export const current = { body: null, parameters: new Map(), joints: [], studies: new Map() };
+
+const FORCE = "excitation";
 
 export async function listScenes() {
   const items = [];
@@ -18,38 +20,35 @@ export async function listScenes() {
 }
 
 export async function loadScene(name) {
-  const [{ scene }, { items }] = await Promise.all([
+  const [{ scene }, { items, joints, studies }] = await Promise.all([
     request(`/v1/scenes/${encodeURIComponent(name)}`),
     request("/v1/scenes/parameters", { method: "POST", body: { scene: name } }),
   ]);
-  current.body = scene;
-  current.parameters = new Map(items.map((parameter) => [parameter.path, parameter]));
-  learnUnits(items.map(({ name: own, unit }) => [own, unit]));
+  Object.assign(current, {
+    body: scene, joints, parameters: new Map(items.map((parameter) => [parameter.path, parameter])), studies: new Map(studies.map((study) => [study.kind, study])),
+  });
+  learnUnits(items.flatMap(({ path, name: own, unit }) => [[path, unit], [own, unit]]));
   return current.body;
 }
 
 // The contacts, dampers, bodies and loads that have something to vary by hand.
 export const variedParts = () =>
-  [...new Set([...current.parameters.values()].filter(({ slider }) => slider).map(({ part }) => part))];
+  [...new Set([...current.parameters.values()].filter(({ slider, part }) => slider && part !== FORCE).map(({ part }) => part))];
 
-// The contact that is looked at, if the part is one.
-export const chosenContact = () => (current.body?.contacts ?? []).find(({ name }) => name === state.contact)?.name ?? null;
+// The contact that is looked at, if the part is one that stands by itself.
+export const chosenContact = () => current.joints.find(({ name, contacts }) => name === state.contact && contacts.includes(name))?.name ?? null;
 
-export const firstForce = () => {
-  const { excitation } = current.body;
-  return Array.isArray(excitation) ? excitation[0] : excitation;
-};
+// The contacts that a normal load presses.
+export const contactsOf = () => current.joints.filter(({ friction }) => friction).flatMap(({ contacts }) => contacts);
 
 // The value that the scene itself writes down; none where it follows from others.
 export function givenByScene(path) {
-  if (path === "excitation.amplitude") return firstForce().amplitude;
   const known = current.parameters.get(path);
   return known && !known.otherwise ? known.value : undefined;
 }
 
 // The value of a path as the scene has it, before anything is set; what it leaves out follows from others.
 export function ownValue(path) {
-  if (path === "excitation.amplitude") return firstForce().amplitude;
   const known = current.parameters.get(path);
   return known?.otherwise ? known.otherwise.reduce((product, other) => product * (value(other) ?? 0), 1) : known?.value ?? null;
 }
@@ -57,14 +56,17 @@ export function ownValue(path) {
 export const value = (path) => state.set[path] ?? ownValue(path);
 
 // What the sliders of a part cover: a path, its words, its ends.
-export const ranges = (name) =>
+const ranges = (name) =>
   [...current.parameters.values()].filter(({ part, slider }) => slider && part === name).map(({ path, symbol, words, slider, ...own }) => ({
-    path, low: slider.low, high: slider.high, log: slider.logarithmic, text: path === name ? symbol : `${symbol} of ${name}`, words: words || own.name,
+    path, low: slider.low, high: slider.high, log: slider.logarithmic, words: words || own.name,
+    text: name === FORCE ? `${symbol}, the force` : path === name ? symbol : `${symbol} of ${name}`,
   }));
 
-// What may be designed: what is positive, or may be.
-export const variables = () =>
-  variedParts().flatMap(ranges).filter(({ path, log }) => log || ownValue(path) > 0).map(({ path }) => path);
+// Those of the part that is looked at, and of the force.
+export const sliders = () => [...ranges(state.contact), ...ranges(FORCE)];
+
+// What may be designed.
+export const variables = () => [...current.parameters.values()].filter(({ bounds }) => bounds).map(({ path }) => path);
 
 const variablesOf = (part) => variables().filter((path) => current.parameters.get(path).part === part);
 
@@ -82,19 +84,4 @@ export function chooseVariable(path) {
 // What a request about this scene says.
 export const asked = () => ({ scene: state.scene, set: { ...state.set }, harmonics: state.harmonics });
 
-// The scene as a drawing shows it: contacts and dampers with the values set.
-export function shownScene() {
-  const asSet = (part) => {
-    const own = Object.entries(state.set).filter(([path]) => path.split(".")[0] === part.name);
-    return { ...part, ...Object.fromEntries(own.map(([path, number]) => [path.split(".")[1], number])) };
-  };
-  const { contacts = [], dampers = [] } = current.body;
-  return { ...current.body, contacts: contacts.map(asSet), dampers: dampers.map(asSet) };
-}
-
-export function defaultRange() {
-  const path = variable();
-  const size = Math.abs(ownValue(path)) || 100;
-  const { log, high } = ranges(state.contact).find((each) => each.path === path);
-  return [size / 10, log ? size * 15 : Math.min(size * 15, high)].map((end) => Number(end.toPrecision(3)));
-}
+export const defaultRange = () => current.parameters.get(variable()).bounds;

@@ -3,8 +3,8 @@
 import { el, show, svg, table } from "../base/dom.js";
 import { number } from "../base/format.js";
 import { drawSector } from "../disk/sector.js";
-import { parametersOf } from "./laws.js";
 import { GROUND, chain, ownName, partsOf, ring } from "./layout.js";
+import { current, value } from "./scenes.js";
 
 export const STATES = {
   "stuck": ["is-stick", "sticks"],
@@ -22,11 +22,12 @@ const HEIGHT = 250;
 const classOf = (state) => STATES[state]?.[0] ?? "is-unknown";
 const wordsOf = (state) => STATES[state]?.[1] ?? "not computed yet";
 
-// Draws `scene`; `states` are those of its contacts by name.
-export function drawStructure(host, scene, states) {
-  if (scene.structure.outline) return drawSector(host, scene, states, { pattern, classOf, wordsOf, plates, key: stateKey });
-  const parts = partsOf(scene);
-  const names = parts.contacts.map((c) => `${c.name} ${statesOf(states, c.name)}`).join(", ");
+// Draws the scene; `states` are those of its contacts by name.
+export function drawStructure(host, states) {
+  const { body: scene } = current;
+  if (scene.structure.outline) return drawSector(host, current, { pattern, classOf, wordsOf: (joint) => statesOf(states, joint), stateOf: (joint) => stateIn(states, joint), plates, key: stateKey });
+  const parts = partsOf(current);
+  const names = parts.contacts.map((c) => `${c.name} ${statesOf(states, c)}`).join(", ");
   const label = `${scene.name}: ${parts.cyclic ? `${parts.sectors} sectors of ` : ""}${parts.dofs.length} masses, ${parts.springs.length} springs; ${names || "no contacts"}`;
   const drawing = svg("svg", { role: "img", "aria-label": label }, pattern());
   if (parts.cyclic) disk(drawing, scene, parts, states);
@@ -61,37 +62,31 @@ function stateKey() {
 }
 
 // The contacts as a table, with what they do at the frequency `at` [Hz].
-export function contactTable(scene, states, at) {
-  const parts = partsOf(scene);
-  if (!parts.contacts.length) return el("p", { class: "note" }, "The scene has no contacts: it is linear.");
-  const columns = columnsOf(parts.contacts);
-  const laws = new Set(parts.contacts.map(({ law }) => law)).size > 1;
-  const rows = parts.contacts.map((c) => [
-    c.name,
-    c.between.join(" – "),
-    statesOf(states, c.name),
-    ...(laws ? [c.law ?? ""] : []),
-    ...columns.map(({ name, unit }) => ({ text: typeof c[name] === "number" ? `${number(c[name])} ${unit}`.trim() : "", number: true })),
+export function contactTable(states, at) {
+  const { joints } = current;
+  if (!joints.length) return el("p", { class: "note" }, "The scene has no contacts: it is linear.");
+  const own = ({ slider, otherwise }) => slider && !otherwise;
+  const columns = [...new Map([...current.parameters.values()].filter((each) => own(each) && joints.some(({ name }) => name === each.part)).map((each) => [each.name, each])).values()];
+  const laws = new Set(joints.map(({ law }) => law)).size > 1;
+  const rows = joints.map((joint) => [
+    joint.name, joint.between.join(" – "), statesOf(states, joint), ...(laws ? [joint.law] : []),
+    ...columns.map(({ name, unit }) => {
+      const path = `${joint.name}.${name}`;
+      return { text: own(current.parameters.get(path) ?? {}) ? `${number(value(path))} ${unit}`.trim() : "", number: true };
+    }),
   ]);
-  const where = at ? `Contacts at ${number(at, 5)} Hz` : "Contacts";
   const heads = columns.map(({ symbol }) => ({ text: symbol, number: true }));
-  return table(["contact", "between", at ? `at ${number(at, 5)} Hz` : "state", ...(laws ? ["law"] : []), ...heads], rows, where);
+  return table(["contact", "between", at ? `at ${number(at, 5)} Hz` : "state", ...(laws ? ["law"] : []), ...heads], rows, at ? `Contacts at ${number(at, 5)} Hz` : "Contacts");
 }
 
-// The parameters that the contacts of a scene have of their own, each once, whatever their laws.
-function columnsOf(contacts) {
-  const own = contacts.flatMap((c) => parametersOf(c).filter(({ name, slider, otherwise }) => slider && !otherwise && typeof c[name] === "number"));
-  return [...new Map(own.map((parameter) => [parameter.name, parameter])).values()];
-}
+// The state of a joint, of several contacts the first; of a disk written out every sector j has its own.
+const stateIn = (states, { contacts }, j) => states?.[`${contacts[0]}@${j}`] ?? states?.[contacts[0]];
 
-// The state of a contact in sector j; of a disk written out every sector has its own.
-const stateIn = (states, name, j) => states?.[`${name}@${j}`] ?? states?.[name];
-
-// What a contact does, in words; where sectors differ, in how many of them.
-function statesOf(states, name) {
+// What the contacts of a joint do, in words; where they or sectors differ, in how many of them.
+function statesOf(states, { contacts }) {
   const counts = new Map();
   for (const [contact, found] of Object.entries(states ?? {})) {
-    if (ownName(contact) === name) counts.set(wordsOf(found), (counts.get(wordsOf(found)) ?? 0) + 1);
+    if (contacts.includes(ownName(contact))) counts.set(wordsOf(found), (counts.get(wordsOf(found)) ?? 0) + 1);
   }
   if (counts.size < 2) return [...counts.keys()][0] ?? wordsOf(undefined);
   return [...counts].map(([words, count]) => `${words} in ${count}`).join(", ");
@@ -185,8 +180,7 @@ function lumped(drawing, scene, parts, states, width) {
   });
   const held = new Map();
   for (const contact of parts.contacts) {
-    const words = `${contact.name} ${wordsOf(states?.[contact.name])}`;
-    drawing.append(...lumpedContact(contact, { places, size, width, held }, classOf(states?.[contact.name]), words));
+    drawing.append(...lumpedContact(contact, { places, size, width, held }, classOf(stateIn(states, contact)), `${contact.name} ${statesOf(states, contact)}`));
   }
   for (const dof of parts.dofs) {
     drawing.append(...mass(places.get(dof), size, dof, dof === ownName(scene.observe.dof), { dy: 4 }).filter(Boolean));
@@ -251,7 +245,7 @@ function disk(drawing, scene, parts, states) {
   for (const j of sectors) {
     for (const c of parts.contacts) {
       if (!reach(c.between, j)) continue;
-      const found = stateIn(states, c.name, j);
+      const found = stateIn(states, c, j);
       const words = `${c.name} ${wordsOf(found)}`;
       const ends = [end(c.between[0], j), end(c.between[1], j)];
       const [a, b] = beside(...ends, size);

@@ -114,11 +114,12 @@ function errorFigure({ error_estimate: error, peak }) {
 }
 
 // That it can not be lowered further was shown for what it was computed for, and for nothing else.
-function certificate({ reached, status, optimality, warnings = [] }) {
+function certificate({ reached, status, optimality, warnings = [], basins = [] }) {
   if (changedSince("design").length) return ["Certificate", "for earlier values", "not for those set now", "answer-certificate"];
   const residual = typeof optimality === "number" ? ` Optimality residual ${number(optimality, 2)}.` : "";
   const doubts = warnings.length ? ` ${warnings.length === 1 ? "A warning" : `${warnings.length} warnings`}, on the tab Design.` : "";
-  return ["Certificate", reached ? (warnings.length ? "optimal, with warnings" : "optimal") : "not reached", `${status}${residual}${doubts}`, "answer-certificate"];
+  const best = basins.length > 1 ? `best of ${basins.length} optima found` : "optimum found";
+  return ["Certificate", reached ? `${best}${warnings.length ? ", with warnings" : ""}` : "not reached", `${status}${residual}${doubts}`, "answer-certificate"];
 }
 
 // In spite of what is not known: the worst case of the best nominal design, and of this one.

@@ -8,7 +8,7 @@ import { length, number, quantity, unitOf } from "../base/format.js";
 import { previewer } from "../network/previews.js";
 import { responseOf } from "../charts/curves.js";
 import { ghosts, pinned } from "./pins.js";
-import { asked, current, ownValue, ranges, value, variedParts } from "../scene/scenes.js";
+import { asked, current, ownValue, sliders as ranges, value, variedParts } from "../scene/scenes.js";
 
 const STEPS = 400;
 const RATE_WINDOW = 20;
@@ -95,15 +95,11 @@ function drawn(answer, { milliseconds, token }) {
   latest = answer;
   redraw();
   tell("states", { states: answer.states, at: answer.peak?.at });
+  if (answer.peak) tell("size", answer.peak.value);
   const fewer = answer.n_harmonics < state.harmonics ? ` · with ${answer.n_harmonics} of ${state.harmonics} harmonics, to answer at once: the frequency response below keeps all` : "";
   byId("live-status").textContent = `${words(answer)} · ${answer.points} points in ${number(answer.seconds * 1e3, 2)} ms, answered after ${number(milliseconds, 2)} ms${fewer}`;
   performance.mark("live-drawn");
   document.documentElement.dataset.live = String(Number(document.documentElement.dataset.live ?? 0) + 1);
-}
-
-function allRanges() {
-  const force = Math.abs(ownValue("excitation.amplitude")) || 1;
-  return [...ranges(state.contact), { path: "excitation.amplitude", log: true, low: force / 20, high: force * 20, text: "f0, the force" }];
 }
 
 const toStep = ({ log, low, high }, number) =>
@@ -115,7 +111,7 @@ const fromStep = ({ log, low, high }, step) =>
 let sliders = [];
 
 function buildSliders() {
-  sliders = allRanges().map((range) => {
+  sliders = ranges().map((range) => {
     const id = `slide-${range.path.replace(".", "-")}`;
     const slide = el("input", { type: "range", id, min: 0, max: STEPS, step: 1, "aria-describedby": "live-status" });
     const box = el("input", { type: "number", step: "any", "aria-label": `${range.text}, number` });

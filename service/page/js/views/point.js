@@ -78,10 +78,10 @@ function arrived(answer) {
 const shares = ({ stick, slip, separation }) =>
   [["sticks", stick], ["slips", slip], ["open", separation]].filter(([, s]) => s > 0).map(([w, s]) => `${w} ${percent(s)}`).join(", ");
 
-export function referee(priority = 0) {
+export function referee(priority = 0, tags = []) {
   if (state.at === null) return null;
   const { scene, set } = asked();
-  return run("march", { scene, set, frequency_hz: state.at, history: true }, marchView, priority);
+  return run("march", { scene, set, frequency_hz: state.at, history: true, tags }, marchView, priority);
 }
 
 function judged() {

@@ -1,10 +1,9 @@
 // What accuracy costs, and the Campbell diagram.
 
 import { chart } from "../charts/chart.js";
-import { byId, el, facts, say, show } from "../base/dom.js";
+import { byId, facts, say, show } from "../base/dom.js";
 import { on, tell } from "../base/events.js";
 import { length, number } from "../base/format.js";
-import { current } from "../scene/scenes.js";
 import { warnings } from "../base/words.js";
 
 let costs = null;
@@ -45,17 +44,6 @@ export const accuracyView = {
   },
   failed: (text) => say("accuracy-status", text, true),
 };
-
-// The running speeds that bring the engine orders of a scene into its band.
-export function campbellBody() {
-  const { structure, observe, excitation } = current.body;
-  const order = (Array.isArray(excitation) ? excitation[0] : excitation).engine_order ?? 1;
-  const first = Math.max(order, 1);
-  const most = structure.kind === "cyclic" ? Math.max(Math.floor(structure.sectors / 2), first) : 3;
-  const orders = [first, first + 1, first + 2].filter((k) => k <= Math.max(most, first));
-  const [low, high] = observe.band;
-  return { speeds_rpm: [[Number(((60 * low) / orders[orders.length - 1]).toPrecision(4)), Number(((60 * high) / first).toPrecision(4))]], orders, band_hz: [low, high] };
-}
 
 export const campbellView = {
   waiting: () => say("campbell-status", "The diagram waits for a worker."),

@@ -1,32 +1,49 @@
-// The studies behind the one button, each also alone: their bodies, their order, what became of them.
+// The studies behind the one button, each also alone with a form of its keys: their bodies, their order, what became of them.
 
 import { state, write } from "../base/address.js";
 import { byId, say } from "../base/dom.js";
 import { on, tell } from "../base/events.js";
-import { interferenceBody, isDisk } from "../disk/interference.js";
+import { schemaForm } from "../forms/form.js";
 import { run } from "../network/jobs.js";
-import { asked, current, variable } from "../scene/scenes.js";
+import { askedFor, ofTheBar, proposed, refusedFor } from "../scene/kinds.js";
 import { readSettings } from "../scene/settings.js";
 import { VIEWS } from "../views.js";
+import { PRESS } from "../workbench/run_list.js";
 import { referee } from "./point.js";
 import { computedFor } from "./renewal.js";
-import { campbellBody } from "./studies.js";
 
 // The most wanted first.
-const PRIORITY = { sweep: 6, design: 5, map: 4, accuracy: 3, campbell: 3, interference: 3, pareto: 2 };
-const NOT_ASKED_AGAIN = ["kind", "fresh", "priority", "scene", "set", "harmonics", "project", "name", "notes", "tags"];
-const OF_THE_FORM = ["variables", "parameter", "from", "to", "steps", "frequencies", "ridge", "speeds_rpm", "orders", "band_hz"];
-const OWN_FORM = ["modes", "identify"];
+const PRIORITY = { sweep: 6, design: 5, map: 4, modes: 4, accuracy: 3, campbell: 3, interference: 3, pareto: 2 };
+// What the bar says has no field a second time.
+const OF_THE_BAR = ["parameter", "from", "to", "variables", "scaling", "start"];
+const FORMS = {
+  sweep: { id: "response", words: "Compute the response", hide: [...OF_THE_BAR, "frequency_hz"], fold: "Settings" },
+  map: { id: "map", words: "Draw the map", hide: OF_THE_BAR, fold: "Settings" },
+  pareto: { id: "front", words: "Compute the front", hide: OF_THE_BAR, top: ["limit", "points"], groups: [{ legend: "Limits, load cases, method", id: "more" }] },
+  accuracy: { id: "accuracy", words: "Measure it", fold: "Settings" },
+  campbell: { id: "campbell", words: "Draw the diagram", fold: "Settings" },
+  interference: { id: "interference", words: "Show", top: ["speed_rpm", "within"], groups: [{ legend: "Orders, families, frequencies", id: "more" }] },
+  modes: { id: "modes", words: "Follow the mode", primary: true, top: ["mode", "from", "to", "nodal_diameter", "aero_damping", "exact_peaks"], groups: [{ legend: "Loops, peaks, disturbances, phase resonance", id: "more" }] },
+};
+const OF_THE_BUTTON = ["map", "accuracy", "campbell", "interference"];
+const forms = new Map();
 let studies = 0;
 // The amplitude [m] at which the band of the best design was measured.
 let bandAt = null;
 
 export function startStudy() {
+  for (const [kind, { id, hide = [], ...how }] of Object.entries(FORMS)) {
+    const submit = (body) => ask(kind, body);
+    forms.set(kind, schemaForm(byId(`${id}-form`), kind, { id, submit, keys: (key) => !hide.includes(key), ...how }));
+  }
   byId("study").addEventListener("click", study);
   on("renew", renew);
-  on("front-wanted", front);
-  on("computed", ({ kind, result }) => {
+  on("computed", ({ kind, request, result }) => {
     if (kind === "design" && result.limit) bandAt = Number(result.limit.toPrecision(4));
+    fill(kind, request);
+  });
+  on("scene", () => {
+    for (const kind of forms.keys()) fill(kind, proposed(kind));
   });
   on("scene-left", () => {
     studies += 1;
@@ -35,27 +52,36 @@ export function startStudy() {
   });
 }
 
-function bodyOf(kind) {
-  const [low, high] = state.range ?? [];
-  const path = variable();
-  const body = asked();
-  const { scene, set } = body;
-  // Peaks are followed where every contact is plain friction; a map without them is for all laws.
-  const { contacts = [], dampers = [] } = current.body;
-  const tracked = !dampers.length && contacts.every((contact) => (contact.law ?? "coulomb") === "coulomb");
-  const bodies = {
-    sweep: () => body,
-    design: () => ({ ...body, variables: { [path]: [low, high] } }),
-    map: () => ({ ...body, parameter: path, from: low, to: high, steps: 60, frequencies: 400, ridge: tracked }),
-    accuracy: () => ({ scene, set }),
-    campbell: () => ({ ...body, ...campbellBody() }),
-    interference: () => ({ scene, set, ...interferenceBody() }),
-    pareto: () => ({ ...body, variables: { [path]: [low, high] }, ...ofTheFront({ limit: bandAt }) }),
-  };
-  return bodies[kind]();
+// What is being typed is not taken away by a study that ends meanwhile.
+function fill(kind, body) {
+  if (forms.has(kind) && !byId(`${FORMS[kind].id}-form`).contains(document.activeElement)) forms.get(kind).fill(body);
 }
 
-const begin = (kind, body = bodyOf(kind)) => run(kind, body, VIEWS[kind], PRIORITY[kind]);
+// A problem of several variables is not what the bar says: it stays what it was.
+const several = (kind) => {
+  const { variables } = computedFor(kind) ?? {};
+  return Object.keys(variables ?? {}).length > 1 ? { variables } : {};
+};
+
+// A body of the bar and of the form, null where the form says what is wrong.
+function bodyOf(kind) {
+  const { body, wrong } = forms.get(kind)?.read() ?? { body: {}, wrong: [] };
+  forms.get(kind)?.complain(wrong);
+  return wrong.length ? null : { ...askedFor(kind), ...ofTheBar(kind), ...body };
+}
+
+function begin(kind, body = bodyOf(kind)) {
+  if (!body) return Promise.resolve(false);
+  const view = { ...VIEWS[kind], failed(words, errors = [], job) {
+    VIEWS[kind].failed(words, errors, job);
+    forms.get(kind)?.complain(errors);
+  } };
+  return run(kind, body, view, PRIORITY[kind]);
+}
+
+const withTags = (body, tags) => body && { ...body, tags };
+
+const ask = (kind, body) => readSettings() && begin(kind, { ...askedFor(kind), ...ofTheBar(kind), ...several(kind), ...body });
 
 // The one button: every study of the scene.
 function study() {
@@ -63,12 +89,15 @@ function study() {
   state.at = null;
   write();
   const mine = (studies += 1);
-  const designed = begin("design");
+  // What one press began is folded together among the runs.
+  const tags = [`${PRESS}${Date.now().toString(36)}`];
+  const tagged = (kind) => begin(kind, withTags(bodyOf(kind), tags));
+  const designed = tagged("design");
   const all = [
-    begin("sweep").then(async (done) => done && (await referee(5))),
+    tagged("sweep").then(async (done) => done && (await referee(5, tags))),
     designed,
-    ...["map", "accuracy", "campbell", ...(isDisk() ? ["interference"] : [])].map((kind) => begin(kind)),
-    frontAfter(designed, mine),
+    ...OF_THE_BUTTON.filter((kind) => !refusedFor(kind)).map(tagged),
+    frontAfter(designed, mine, tags),
   ];
   say("study-status", `${all.length} jobs are under way.`);
   Promise.all(all).then((done) => {
@@ -81,30 +110,16 @@ function study() {
 
 // The front after the best design, which tells a fixed amplitude for the band: at half power of each peak, the
 // highest peaks would have the narrowest bands, and the front would praise designs that damp nothing.
-async function frontAfter(designed, mine) {
+async function frontAfter(designed, mine, tags) {
   say("front-status", "The front waits for the best design: its band is measured at half power of that peak.");
   await designed;
-  return mine === studies && begin("pareto");
+  const body = mine === studies && withTags(bodyOf("pareto"), tags);
+  return body && begin("pareto", bandAt === null ? body : { ...body, limit: bandAt });
 }
 
-// The front again, with the amplitude at which the band is measured and as many designs as are asked for.
-function front({ limit, points }) {
-  if (!readSettings()) return;
-  const before = computedFor("pareto");
-  const several = Object.keys(before?.variables ?? {}).length > 1 ? { variables: before.variables } : {};
-  begin("pareto", { ...bodyOf("pareto"), limit: undefined, ...several, ...ofTheFront({ limit, points }) });
-}
-
-const ofTheFront = ({ limit, points }) => Object.fromEntries(Object.entries({ limit, points }).filter(([, value]) => value !== undefined && value !== null));
-
-// One study again, with what is set now. A problem that the form can not say, as of several variables or with limits, stays as it was.
+// One study again, with what is set now; those with a form elsewhere are asked as it stands.
 function renew(kind) {
-  // Kinds with a form of their own are asked again as it stands.
-  if (OWN_FORM.includes(kind)) return tell("resubmit", kind);
-  if (!readSettings()) return undefined;
-  const before = computedFor(kind);
-  const own = Object.fromEntries(Object.entries(before ?? {}).filter(([key]) => !NOT_ASKED_AGAIN.includes(key)));
-  const further = Object.keys(before?.variables ?? {}).length > 1 || (kind === "design" && Object.keys(own).some((key) => !OF_THE_FORM.includes(key) || key === "speeds_rpm"));
-  begin(kind, further ? { ...asked(), ...own } : { ...bodyOf(kind), ...(kind === "pareto" && before ? { limit: undefined, ...ofTheFront(own) } : {}) });
-  return undefined;
+  if (!forms.has(kind)) return tell("resubmit", kind);
+  const body = readSettings() && bodyOf(kind);
+  return body && begin(kind, { ...body, ...several(kind) });
 }

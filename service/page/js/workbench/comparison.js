@@ -1,29 +1,26 @@
-// Two runs side by side: what differs in what they computed, then the figures of their results.
+// Two runs: their responses over one another, then the quantities that differ, each in one unit, with the difference.
 
 import { request } from "../network/api.js";
+import { chart } from "../charts/chart.js";
 import { byId, el, show, table } from "../base/dom.js";
 import { tell } from "../base/events.js";
-import { length, number, quantity, seconds, when } from "../base/format.js";
+import { lengthUnit, number, unitOf, when } from "../base/format.js";
+import { kindOf } from "../scene/kinds.js";
+import { titleOf } from "./run_list.js";
+import { valuesIn } from "./runs.js";
 
-const MOST = 60, LONGEST = 48;
-// Units of settings and results, which may have the names of parameters of contacts but are others.
-const LENGTH = /(^|\.)(peak\.value|limit|max_peak|error_estimate|max_abs|half_peak_to_peak)$/;
-const HERTZ = /_hz$/, SECONDS = /(^|[._])seconds$/, PARAMETERS = /^(optimum|start|set)\./;
-
-export async function compareRuns(a, b) {
-  const host = byId("runs-compare");
-  try {
-    const found = await request(`/v1/runs/compare?a=${encodeURIComponent(a)}&b=${encodeURIComponent(b)}`);
-    show(byId("runs-compare-body"), body(found));
-    host.hidden = false;
-    host.scrollIntoView({ block: "nearest" });
-    byId("runs-compare-title").focus();
-  } catch (error) {
-    tell("notice", error.message);
-  }
-}
+const LONGEST = 48;
+const POINTS = 600;
+const FACTOR = 3; // from which on a ratio is said as such
+// Said by the summaries, or of no use beside another run.
+const SAID = /^(peak|peak_at|optimum|values|set|variables)(\.|$)|^(band_hz|error_estimate|harmonics|n_harmonics|scene|kind|status)$/;
+const UNIT = /\[([^\]]+)\]/;
+const TIMES = /(^|[._])seconds$/;
+let plot = null;
+let asked = 0;
 
 export function startComparison() {
+  plot = chart(byId("runs-compare-figure"), { label: "Responses of two runs", file: "compare", height: 260 });
   byId("runs-compare-close").addEventListener("click", () => {
     byId("runs-compare").hidden = true;
     show(byId("runs-compare-body"));
@@ -31,48 +28,105 @@ export function startComparison() {
   });
 }
 
-const heading = (run) => `${run.name || `${run.kind} of ${run.scene ?? "a scene"}`}, ${when(run.created)}`;
+export async function compareRuns(a, b) {
+  const mine = (asked += 1);
+  try {
+    const [found, ...summaries] = await Promise.all([
+      request(`/v1/runs/compare?a=${encodeURIComponent(a)}&b=${encodeURIComponent(b)}`), ...[a, b].map((id) => request(`/v1/runs/${id}/summary?points=${POINTS}`)),
+    ]);
+    if (mine !== asked) return;
+    byId("runs-compare").hidden = false;
+    overlay([found.a, found.b], summaries);
+    show(byId("runs-compare-body"), differences(found, summaries));
+    byId("runs-compare").scrollIntoView({ block: "nearest" });
+    byId("runs-compare-title").focus();
+  } catch (error) {
+    tell("notice", error.message);
+  }
+}
 
-function body({ a, b, inputs, more_inputs: further, results }) {
-  const heads = (first) => [first, { text: heading(a), number: true }, { text: heading(b), number: true }];
-  const differing = results.filter((one) => one.a !== one.b);
-  const equal = results.length - differing.length;
-  const others = a.scene === b.scene ? inputs : inputs.filter((one) => !ofAScene(one));
-  const scenes = a.scene === b.scene ? [] : inputs.filter(ofAScene);
-  const inputTable = (label, found) => scrolled(label, table(heads("input"), found.map((one) => [one.path, toldInput(one, one.a), toldInput(one, one.b)]), "Inputs that differ"));
-  const rows = (figures) => figures.slice(0, MOST).map((one) => [one.name, told(one.name, one.a), told(one.name, one.b)]);
+// Two with the same name are told apart by their values, or by when they were handed in.
+function headings(both, summaries) {
+  const told = both.map((run, i) => [titleOf(run), ...valuesIn(summaries[i], 1)].join(", "));
+  return told[0] === told[1] ? both.map((run) => `${titleOf(run)}, ${when(run.created)}`) : told;
+}
+
+function overlay(runs, summaries) {
+  const drawn = summaries.map(({ curve, peak }, i) => ({ curve, peak, i })).filter(({ curve }) => curve);
+  if (!drawn.length) return plot.clear("Neither run has stored a response over the frequency.");
+  const names = headings(runs, summaries);
+  const unit = lengthUnit(Math.max(...drawn.flatMap(({ curve }) => curve.amplitude)));
+  plot.draw({
+    x: { name: "frequency [Hz]" }, y: { name: `amplitude [${unit.name}]`, unit, zero: true, pad: 0.1 },
+    series: drawn.map(({ curve, i }) => ({ name: names[i], x: curve.frequency_hz, y: curve.amplitude.map((v) => v * unit.perMetre), colour: 1 + i, dash: i ? "dashed" : undefined })),
+    marks: drawn.filter(({ peak }) => peak?.at).map(({ peak, i }) => ({ x: peak.at, y: peak.value * unit.perMetre, colour: 1 + i, text: `${number(peak.value * unit.perMetre)} ${unit.name}` })),
+  });
+  return undefined;
+}
+
+// {name, unit, a, b} of everything that is known of both, what people look for first.
+function quantities({ a, b, inputs, results }, [one, other]) {
+  const pair = (name, unit, of) => ({ name, unit, a: of(one), b: of(other) });
+  const paths = [...new Set([one, other].flatMap(({ values }) => Object.keys(values)))];
+  const told = { ...(kindOf(b.kind)?.result?.properties ?? {}), ...(kindOf(a.kind)?.result?.properties ?? {}) };
+  const settings = Object.fromEntries([a, b].flatMap(({ kind }) => kindOf(kind)?.fields ?? []).map((field) => [field.key, field]));
+  const worst = [one, other].some((summary) => summary.worst);
   return [
-    el("h3", {}, "What differs in the inputs"),
-    scenes.length ? el("p", { class: "note" }, `The scenes are different ones: ${a.scene ?? "none"} and ${b.scene ?? "none"}.`) : null,
-    inputs.length ? null : el("p", { class: "note" }, "Nothing: both computed the same."),
-    others.length ? inputTable("Inputs of two runs", others) : null,
-    scenes.length ? el("details", {}, el("summary", {}, `${scenes.length} values of the scenes`), inputTable("Values of two scenes", scenes)) : null,
-    further ? el("p", { class: "note" }, `${further} further inputs differ.`) : null,
-    el("h3", {}, "Results"),
-    differing.length ? scrolled("Results of two runs", table(heads("figure"), rows(differing), "Results that differ")) : el("p", { class: "note" }, "No figure differs."),
-    differing.length > MOST ? el("p", { class: "note" }, `The first ${MOST} of ${differing.length}.`) : null,
-    equal ? el("details", {}, el("summary", {}, `${equal} figures are equal`), scrolled("Equal results of two runs", table(heads("figure"), rows(results.filter((one) => one.a === one.b)), "Results that are equal"))) : null,
+    pair(worst ? "Highest peak, of a robust design the worst" : "Highest peak", "m", ({ peak }) => peak?.value ?? null), pair("at", "Hz", ({ peak }) => peak?.at || null),
+    pair("Resonance band", "Hz", ({ band_hz: band }) => band), pair("Error estimate of the peak", "m", ({ error_estimate: error }) => error), pair("Harmonics", "", ({ harmonics }) => harmonics),
+    ...paths.map((path) => pair(path, unitOf(path), ({ values }) => values[path] ?? null)),
+    ...inputs.filter(({ path }) => !SAID.test(path) && !paths.includes(path)).map(({ path, a: x, b: y, part }) => {
+      const field = settings[path.split(".")[0]];
+      return { name: field ? path.replace(field.key, field.label) : path, unit: part === "scene" ? unitOf(path) : field?.unit ?? "", a: x, b: y, scene: part === "scene" };
+    }),
+    ...results.filter(({ name }) => !SAID.test(name)).map(({ name, a: x, b: y }) => {
+      const words = told[name]?.description ?? "";
+      return { name: nameIn(words) || name.replaceAll("_", " ").replaceAll(".", ", "), unit: UNIT.exec(words)?.[1] ?? (TIMES.test(name) ? "s" : name.endsWith("_hz") ? "Hz" : ""), a: x, b: y };
+    }),
   ];
 }
 
-const scrolled = (label, node) => el("div", { class: "scroll", role: "region", "aria-label": label, tabindex: 0 }, node);
+// What words call a quantity, unless they only go on from the name of the key.
+const nameIn = (words) => (/^(Of|With|At|In) /.test(words) ? "" : words.split(/[.,;:[]/)[0].trim());
 
-// The values of two different scenes fill the table without telling much.
-const ofAScene = ({ part }) => part === "scene";
-
-function told(path, value) {
-  if (value === null || value === undefined) return { text: "not given", number: true };
-  if (typeof value === "number") return { text: figure(path, value), number: true };
-  const words = typeof value === "object" ? JSON.stringify(value) : String(value);
-  if (words.length <= LONGEST) return { text: words, number: true };
-  return { text: `${words.slice(0, LONGEST)}…`, title: words.slice(0, 2000), number: true };
+function differences(found, summaries) {
+  const { a, b, more_inputs: further } = found;
+  const all = quantities(found, summaries);
+  const same = a.scene === b.scene;
+  const differing = all.filter((each) => !isEqual(each) && (same || !each.scene));
+  const equal = all.filter((each) => isEqual(each) && each.a !== null);
+  const ofScenes = same ? [] : all.filter((each) => each.scene && !isEqual(each));
+  const heads = ["quantity", ...headings([a, b], summaries).map((text) => ({ text, number: true })), { text: "difference", number: true }];
+  const part = (label, list) => el("div", { class: "scroll", role: "region", "aria-label": label, tabindex: 0 }, table(heads, list.map(row), label));
+  return [
+    same ? null : el("p", { class: "note" }, `The scenes are different ones: ${a.scene ?? "none"} and ${b.scene ?? "none"}.`),
+    differing.length ? part("Differences of two runs", differing) : el("p", { class: "note" }, "Nothing differs: both computed the same."),
+    further ? el("p", { class: "note" }, `${further} further inputs differ.`) : null,
+    ofScenes.length ? el("details", {}, el("summary", {}, `${ofScenes.length} values of the scenes`), part("Values of two scenes", ofScenes)) : null,
+    equal.length ? el("details", {}, el("summary", {}, `${equal.length} of ${all.length} quantities are equal`), part("Equal quantities of two runs", equal)) : null,
+  ];
 }
 
-const toldInput = (one, value) => (ofAScene(one) && typeof value === "number" ? { text: quantity(one.path, value), number: true } : told(one.path, value));
+const isEqual = ({ a, b }) => JSON.stringify(a ?? null) === JSON.stringify(b ?? null);
 
-function figure(path, value) {
-  if (PARAMETERS.test(path)) return quantity(path, value);
-  if (LENGTH.test(path)) return length(value);
-  if (HERTZ.test(path)) return `${number(value, 5)} Hz`;
-  return SECONDS.test(path) ? seconds(value) : number(value, 5);
+const isNumber = (value) => typeof value === "number";
+
+function row({ name, unit, a, b }) {
+  const { name: told, perMetre } = unit === "m" ? lengthUnit(Math.max(...[a, b].filter(isNumber).map(Math.abs), 0)) : { name: unit, perMetre: 1 };
+  const said = (value) => (isNumber(value) ? `${number(value * perMetre, 5)} ${told}`.trim() : words(value));
+  return [name, ...[a, b].map((value) => ({ text: said(value), title: typeof value === "string" ? value : undefined, number: true })), { text: isNumber(a) && isNumber(b) ? change(a * perMetre, b * perMetre, told) : "", number: true }];
+}
+
+// The second against the first: as a ratio where it is another size, else in per cent.
+function change(a, b, unit) {
+  if (a === b) return "";
+  if (!(a > 0 && b > 0)) return `${b > a ? "+" : "−"}${number(Math.abs(b - a), 3)} ${unit}`.trim();
+  if (b / a >= FACTOR || a / b >= FACTOR) return b > a ? `× ${number(b / a, 3)}` : `÷ ${number(a / b, 3)}`;
+  return `${b > a ? "+" : "−"}${number(100 * Math.abs(b / a - 1), 2)} %`;
+}
+
+function words(value) {
+  if (value === null || value === undefined) return "–";
+  const text = typeof value === "object" ? JSON.stringify(value) : String(value);
+  return text.length > LONGEST ? `${text.slice(0, LONGEST)}…` : text;
 }

@@ -1,14 +1,16 @@
 // What is said of a run: name, notes, tags, project; its sweeps; its results as a file; into the bin.
 
 import { request } from "../network/api.js";
-import { el, show } from "../base/dom.js";
+import { el } from "../base/dom.js";
 import { tell } from "../base/events.js";
 import { saveFrom } from "../base/exports.js";
-import { length, number, quantity } from "../base/format.js";
 import { projectsKnown } from "./projects.js";
+import { isUnderWay, PINNED, PRESS } from "./run_list.js";
+import { sweepsOf } from "./sweeps.js";
 import { undoable } from "./undo.js";
 
-const UNDER_WAY = ["accepted", "running"];
+// Tags that say something to this page and nothing to people.
+export const isHidden = (tag) => tag.startsWith(PRESS) || tag === PINNED;
 
 export function runForm(run, title) {
   const field = (name, words, input) => [el("label", { for: `run-${name}-${run.id}` }, words), input];
@@ -19,22 +21,22 @@ export function runForm(run, title) {
   const wrong = el("p", { class: "bad", role: "alert" });
   const form = el("form", { class: "run-form" },
     field("name", "Name", input("name", run.name)), field("notes", "Notes", notes),
-    field("tags", "Tags, with commas", input("tags", run.tags.join(", "))), field("project", "Project", project), wrong,
+    field("tags", "Tags, with commas", input("tags", run.tags.filter((tag) => !isHidden(tag)).join(", "))), field("project", "Project", project), wrong,
     el("div", { class: "row tight" }, el("button", { type: "submit" }, "Save"),
       el("button", { type: "button", "aria-label": `Results of run ${title} as JSON`, onclick: () => saveFrom(`/v1/jobs/${run.id}/results`, "application/json", `${run.kind}-${run.id}.json`) }, "JSON"),
-      UNDER_WAY.includes(run.status) ? null : el("button", { type: "button", "aria-label": `Delete run ${title}`, onclick: () => remove(run, title) }, "Delete")));
+      isUnderWay(run) ? null : el("button", { type: "button", "aria-label": `Delete run ${title}`, onclick: () => remove(run, title) }, "Delete")));
   form.addEventListener("submit", (event) => {
     event.preventDefault();
     save(run, form, wrong);
   });
-  return [form, run.sweeps ? sweeps(run, title) : null];
+  return [form, run.sweeps ? sweepsOf(run, title) : null];
 }
 
 async function save(run, form, wrong) {
   const given = new FormData(form);
   const body = {
     name: given.get("name").trim(), notes: given.get("notes"), project: given.get("project") || null,
-    tags: given.get("tags").split(",").map((tag) => tag.trim()).filter(Boolean),
+    tags: [...given.get("tags").split(",").map((tag) => tag.trim()).filter(Boolean), ...run.tags.filter(isHidden)],
   };
   try {
     await request(`/v1/runs/${run.id}`, { method: "PATCH", body, headers: { "If-Match": `"${run.revision}"` } });
@@ -48,24 +50,3 @@ async function save(run, form, wrong) {
 
 const remove = (run, title) =>
   undoable(`Run “${title}” is in the bin.`, `/v1/runs/${run.id}`, () => tell("runs-changed"));
-
-// The sweeps of a run stand below it, and nowhere else unless they are asked for.
-function sweeps(run, title) {
-  const list = el("div", {}, el("p", { class: "note" }, "…"));
-  const node = el("details", {}, el("summary", { "aria-label": `Sweeps of run ${title}` }, "Its sweeps"), list);
-  node.addEventListener("toggle", async () => {
-    if (!node.open) return;
-    try {
-      const { items, next } = await request(`/v1/sweeps?of=${run.id}&limit=50`);
-      show(list, el("ul", { class: "plain run-sweeps" }, items.map((sweep) => el("li", {}, describe(sweep)))),
-        next ? el("p", { class: "note" }, `The first 50 of ${run.sweeps}.`) : null);
-    } catch (error) {
-      show(list, el("p", { class: "bad" }, error.message));
-    }
-  });
-  return node;
-}
-
-const describe = (sweep) =>
-  [Object.entries(sweep.contacts).map(([name, contact]) => (contact.N0 === null ? "" : `${name} ${number(contact.N0)} N`)).filter(Boolean).join(", "),
-    sweep.peak ? `${length(sweep.peak.value)} at ${quantity(sweep.parameter, sweep.peak.at)}` : "no peak"].filter(Boolean).join(": ");

@@ -4,12 +4,12 @@ import { FIRST_TAB, state, step, write } from "../base/address.js";
 import { byId, el, show } from "../base/dom.js";
 import { on } from "../base/events.js";
 
-const TABS = [["response", "Response"], ["map", "Map"], ["design", "Design"], ["disk", "Disk"], ["modes", "Modes"], ["identify", "Identification"], ["accuracy", "Accuracy"], ["data", "Data"], ["all", "All"]];
+const TABS = [["response", "Response"], ["map", "Map"], ["design", "Design"], ["disk", "Disk"], ["modes", "Modes"], ["identify", "Identification"], ["accuracy", "Accuracy"], ["runs", "Runs"], ["all", "All"]];
 const OF_KIND = { sweep: "response", march: "response", map: "map", pareto: "map", design: "design", accuracy: "accuracy", campbell: "disk", interference: "disk", modes: "modes", identify: "identify" };
 const MOVES = { ArrowRight: 1, ArrowLeft: -1 };
 
 // The tab that shows what a kind of job found.
-export const tabOf = (kind) => OF_KIND[kind] ?? "data";
+export const tabOf = (kind) => OF_KIND[kind] ?? "runs";
 
 const known = (name) => TABS.some(([each]) => each === name);
 

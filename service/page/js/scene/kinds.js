@@ -1,0 +1,44 @@
+// The studies of the service: the keys of each by the schema of its body, and what the scene suggests for it.
+
+import { request } from "../network/api.js";
+import { fieldsOf } from "../forms/fields.js";
+import { state } from "../base/address.js";
+import { tell } from "../base/events.js";
+import { asked, current, variable } from "./scenes.js";
+
+// The scene, the run and the queue are asked for elsewhere on the page.
+const OF_THE_PAGE = ["kind", "scene", "set", "fresh", "priority", "max_seconds", "project", "name", "notes", "tags"];
+let kinds = new Map();
+
+export async function loadKinds() {
+  kinds = new Map((await request("/v1/kinds")).items.map((kind) => [kind.name, { ...kind, fields: fieldsOf(kind.body).filter(({ key, kind: what }) => !OF_THE_PAGE.includes(key) && !(key === "harmonics" && what === "number")) }]));
+  tell("kinds");
+}
+
+export const kindNames = () => [...kinds.keys()];
+
+export const kindOf = (name) => kinds.get(name);
+
+const takes = (name, key) => kinds.get(name)?.fields.find((field) => field.key === key);
+
+// What a request of a kind says of the scene.
+export function askedFor(name) {
+  const { harmonics, ...body } = asked();
+  return kinds.get(name)?.body.properties.harmonics?.type === "integer" ? { ...body, harmonics } : body;
+}
+
+// The variable of the bar with its range, in the keys that a kind has for it.
+export function ofTheBar(name) {
+  if (!state.range) return {};
+  const [from, to] = state.range;
+  if (takes(name, "variables")) return { variables: { [variable()]: [from, to] } };
+  return takes(name, "parameter")?.required ? { parameter: variable(), from, to } : {};
+}
+
+const proposal = (name) => current.studies?.get(name);
+
+// The keys of a body that the scene itself suggests.
+export const proposed = (name) => proposal(name)?.body ?? {};
+
+// Why the scene has no such study; empty if it has.
+export const refusedFor = (name) => proposal(name)?.refused ?? "";
