@@ -121,11 +121,12 @@ def _rows(
 
 
 def _sorted(found: SensitivityResult, begun: float) -> SensitivityResult:
-    """Return the result with what matters most first."""
+    """Return the result with what matters most first, of equals what the scene names first."""
 
     def rank(row: ParameterSensitivity) -> tuple[bool, float]:
         share = found.peak_elasticities(row)[0]
-        return math.isnan(share), -abs(share) if math.isfinite(share) else 0.0
+        # μ and N0 of a contact matter alike: rounding would put now one first, now the other.
+        return math.isnan(share), -float(f"{abs(share):.6g}") if math.isfinite(share) else 0.0
 
     return SensitivityResult(
         scene=found.scene, status=found.status, branch=found.branch, peaks=found.peaks,

@@ -306,7 +306,7 @@ class Sensitivities:
     def _add_other_law(self, e: int, u: Real, omega: float, weights: Real, slopes: Real) -> None:
         """Add w·∂F/∂p of an element that follows another law: its force once for each path that acts."""
         ports = slice(*self.balance.system.first_port[e : e + 2].tolist())
-        motions = u.reshape(weights.shape)[ports]
+        motions = u[: weights.size].reshape(weights.shape)[ports]
         for i in np.flatnonzero(np.any(self._slopes[:, e] != 0.0, axis=1)):
             along = self._slopes[i, e], self._loads[i, e]
             _, dF_dp, _ = force_along(self.balance, self._point, e, motions, omega, *along)
