@@ -175,7 +175,9 @@ def test_a_template_asks_and_makes_a_scene_that_answers(
     page.get_by_label("Friction coefficient").fill("-1")
     page.get_by_role("button", name="Make the scene").click()
     expect(page.locator("#wizard-mu")).to_be_focused()
-    expect(page.locator(".field:has(#wizard-mu) .message")).to_contain_text("must be a number above 0 to 2, got -1")
+    expect(page.locator(".field:has(#wizard-mu) .message")).to_contain_text(
+        "must be a number above 0 to 2, got -1"
+    )
     page.get_by_label("Friction coefficient").fill("0.25")
     for label, text in answers.items():
         page.locator("#wizard-form").get_by_label(label).fill(text)
