@@ -1,4 +1,4 @@
-"""Two blades from finite elements with a wedge under their platforms: the files that somebody brings along."""
+"""Two blades from finite elements with a wedge under their platforms, as files."""
 
 from __future__ import annotations
 

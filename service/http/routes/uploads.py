@@ -61,7 +61,7 @@ class UploadQuery(ListQuery):
     cursor: Cursor = None
 
 
-_TOO_LARGE = "raise STICKSLIP_MAX_UPLOAD_BYTES of the service, or reduce the model first, stickslip import FILES --reduce"
+_TOO_LARGE = "raise STICKSLIP_MAX_UPLOAD_BYTES, or reduce the model first: stickslip import FILES --reduce"
 
 
 @router.post(

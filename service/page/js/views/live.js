@@ -4,10 +4,11 @@ import { state, write } from "../base/address.js";
 import { chart } from "../charts/chart.js";
 import { byId, el, show } from "../base/dom.js";
 import { on, tell } from "../base/events.js";
-import { length, number, quantity, unitOf } from "../base/format.js";
+import { length, number, quantity, seconds, unitOf } from "../base/format.js";
 import { previewer } from "../network/previews.js";
 import { responseOf, throughPeak } from "../charts/curves.js";
 import { sameValues } from "../scene/inputs.js";
+import { pointsOf } from "../scene/kinds.js";
 import { ghosts, pinned } from "./pins.js";
 import { asked, current, ownValue, sliders as ranges, value, variedParts } from "../scene/scenes.js";
 
@@ -22,6 +23,8 @@ let slow = 0;
 let latest = null;
 // The response of the study, with what it was computed for and its linear limits.
 let study = null;
+// Of a point of the response, by the plan [s].
+let cost = 0;
 
 export const rate = () => (times.length > 1 ? (1000 * (times.length - 1)) / (times[times.length - 1] - times[0]) : 0);
 
@@ -36,6 +39,7 @@ export function startLive() {
   ask = previewer("sweep", drawn, refused);
   pinned(() => shown());
   on("pins", redraw);
+  on("cost", (found) => { cost = found; });
   on("study-curve", (found) => {
     study = found;
     redraw();
@@ -60,7 +64,7 @@ export function startLive() {
 export function refresh() {
   if (!current.body) return;
   clearTimeout(slow);
-  slow = setTimeout(() => { byId("live-status").textContent = "The response is being computed …"; }, SLOW_MS);
+  slow = setTimeout(() => { byId("live-status").textContent = `The response is being computed${cost ? `, about ${seconds(cost * pointsOf("sweep"))}` : ""} …`; }, SLOW_MS);
   ask({ kind: "sweep", ...asked() }, state.scene);
 }
 
@@ -102,7 +106,7 @@ const lineOf = (answer, look) => {
 
 function redraw() {
   const answer = shown() ?? study?.answer;
-  if (!answer || !current.body) return study?.line && plot.draw(responseOf({ parameter: study.line.x, amplitude: study.line.y, peak: { value: Math.max(...study.line.y), at: NaN } }));
+  if (!answer || !current.body) return study?.line && plot.draw({ ...responseOf({ parameter: study.line.x, amplitude: study.line.y, peak: { value: Math.max(...study.line.y), at: study.line.x[0] } }), marks: [] });
   const { limits, line } = study ?? {};
   const others = [...ghosts(), ...(line ? [line] : []), ...(study?.answer && answer !== study.answer ? [lineOf(study.answer, { name: "of the study", colour: 7, dash: "dashed" })] : [])];
   // The linear limits rise far above, and narrow resonances lie between their points: the frame stays with friction.
