@@ -133,7 +133,7 @@ def top(page: Any) -> None:
 def follow_mode(page: Any) -> None:
     """Follow a nonlinear mode, with whole responses beside the peaks of its curve."""
     page.fill("#modes-exact_peaks", "5")
-    page.click("#modes-submit")
+    page.click("#study")
     page.locator("#modes-status").get_by_text("points in").wait_for()
 
 
@@ -145,7 +145,7 @@ def identify(page: Any) -> None:
     page.click("#identify-paste-take")
     page.locator("#identify-files").get_by_text("30 points").wait_for()
     page.get_by_role("button", name="Remove unknown 1").click()
-    page.click("#identify-submit")
+    page.click("#study")
     page.locator("#identify-result").wait_for()
 
 

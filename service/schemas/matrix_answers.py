@@ -61,6 +61,7 @@ class FormatsAnswer(AnswerModel):
     """The formats that can be uploaded."""
 
     items: list[FormatAnswer]
+    most_bytes: int = Field(description="Largest file accepted, the setting STICKSLIP_MAX_UPLOAD_BYTES.")
 
 
 class MatrixAnswer(AnswerModel):

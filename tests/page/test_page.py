@@ -47,13 +47,13 @@ def the_map_zooms(page: Page) -> None:
     def drawn(figure: str) -> str:
         return page.locator(f"#{figure}-figure g[clip-path] path.series").first.get_attribute("d") or ""
 
-    whole = drawn("map"), drawn("response")
+    whole = drawn("map"), drawn("live")
     page.locator("#map-figure svg.chart").focus()
     page.keyboard.press("+")
     assert drawn("map") != whole[0]
-    assert drawn("response") != whole[1]
+    assert drawn("live") != whole[1]
     page.keyboard.press("0")
-    assert (drawn("map"), drawn("response")) == whole
+    assert (drawn("map"), drawn("live")) == whole
     button = page.get_by_role("button", name="Map of amplitude over frequency and load: logarithmic y")
     expect(button).to_have_attribute("aria-pressed", "true")
     button.click()
@@ -81,7 +81,7 @@ def test_a_newcomer_presses_one_button_and_takes_results_away(profile: Profile, 
     expect(page.locator("#plan-facts")).to_contain_text("left out")
     expect(page.locator("#march-status")).to_contain_text("% apart")
     expect(page.locator("#map-facts")).to_contain_text("least peak2.346 m at 104.79 N")
-    has_paths(page, "response-figure", 3)
+    has_paths(page, "live-figure", 3)
     has_paths(page, "front-figure", 1)
     # At half power of each peak the highest peaks would have the narrowest bands: designs that damp nothing.
     expect(page.locator("#front-status")).to_contain_text("the band at 1.659 m")
@@ -142,10 +142,10 @@ def check_files(page: Page) -> None:
     assert downloaded(page, "#response-facts button:text-is('Parquet')").startswith(b"PAR1")
     scene = tomllib.loads(downloaded(page, "#response-facts button:has-text('TOML')").decode())
     assert solver.Scene.from_dict(scene) == solver.load_scene("two-dof")
-    drawing = downloaded(page, "#response-figure button:text-is('SVG')")
+    drawing = downloaded(page, "#live-figure button:text-is('SVG')")
     assert b"<svg" in drawing
     assert b"class=" not in drawing
-    for figure in ("response", "map"):
+    for figure in ("live", "map"):
         png = downloaded(page, f"#{figure}-figure button:text-is('PNG')")
         assert png.startswith(b"\x89PNG")
         assert len(png) > 10_000

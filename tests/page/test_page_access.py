@@ -155,9 +155,9 @@ def test_by_keyboard_alone(profile: Profile, site: Site, studied: str) -> None:
     assert reached == page.locator(FOCUSABLE).evaluate_all(
         "all => all.filter(e => e.checkVisibility()).length"
     )
-    page.locator("#response-figure svg.chart").focus()
+    page.locator("#live-figure svg.chart").focus()
     page.keyboard.press("End")
-    expect(page.locator("#response-figure .chart-read")).to_contain_text("2.6 Hz")
+    expect(page.locator("#live-figure .chart-read")).to_contain_text("2.6 Hz")
     page.keyboard.press("Enter")
     expect(page.locator("#point-at")).to_have_value("2.6")
     page.locator("#map-figure svg.chart").focus()

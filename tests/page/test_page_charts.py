@@ -58,7 +58,7 @@ def path(page: Page, figure: str, index: int = 0) -> list[tuple[float, float]]:
 def test_a_curve_goes_through_its_peak(profile: Profile, site: Site, swept: str) -> None:
     page = visit(profile[0], site, swept)
     expect(page.locator("#response-facts")).to_contain_text("highest peak")
-    for figure in ("response", "live"):
+    for figure in ("live",):
         expect(page.locator(f"#{figure}-figure circle.f2")).to_have_count(1)
         mark = page.locator(f"#{figure}-figure circle.f2")
         at = tuple(float(mark.get_attribute(name) or "nan") for name in ("cx", "cy"))
@@ -88,16 +88,16 @@ def test_zoom_is_linked_and_comes_back(profile: Profile, site: Site, swept: str)
     page = visit(profile[0], site, swept)
     expect(page.locator("#response-facts")).to_contain_text("highest peak")
     expect(page.locator("#live-status")).to_contain_text("peak")
-    whole = ends(page, "response")
-    page.locator("#response-figure svg.chart").focus()
+    whole = ends(page, "live")
+    page.locator("#live-figure svg.chart").focus()
     page.keyboard.press("+")
-    low, high = ends(page, "response")
+    low, high = ends(page, "live")
     assert whole[0] < low < high < whole[1]
     assert ends(page, "live") == pytest.approx((low, high), rel=1e-3)
     page.keyboard.press("0")
-    assert ends(page, "response") == pytest.approx(whole)
+    assert ends(page, "live") == pytest.approx(whole)
     assert ends(page, "live") == pytest.approx(whole, rel=1e-3)
-    box = page.locator("#response-figure svg.chart").bounding_box()
+    box = page.locator("#live-figure svg.chart").bounding_box()
     assert box is not None
     y = box["y"] + 0.5 * box["height"]
     point = page.input_value("#point-at")
@@ -119,7 +119,7 @@ def test_an_axis_is_logarithmic_on_request(profile: Profile, site: Site, swept: 
     page = visit(profile[0], site, swept)
     expect(page.locator("#live-status")).to_contain_text("peak")
     before = path(page, "live")
-    button = page.get_by_role("button", name="Live frequency response: logarithmic", exact=True)
+    button = page.get_by_role("button", name="Frequency response: logarithmic", exact=True)
     button.click()
     expect(button).to_have_attribute("aria-pressed", "true")
     after = path(page, "live")
@@ -179,9 +179,9 @@ def test_numbers_of_an_axis_do_not_overlap(profile: Profile, site: Site) -> None
     expect(page.locator("#live-status")).to_contain_text("peak")
     page.set_viewport_size({"width": 640, "height": 900})
     page.wait_for_timeout(300)
-    page.get_by_role("button", name="Live frequency response: zoom in", exact=True).click()
+    page.get_by_role("button", name="Frequency response: zoom in", exact=True).click()
     for _ in range(6):
-        page.get_by_role("button", name="Live frequency response: zoom in", exact=True).click()
+        page.get_by_role("button", name="Frequency response: zoom in", exact=True).click()
         labels = [tuple(box) for box in page.locator("#live-figure svg.chart").evaluate(LABELS)]
         assert len(labels) >= 2
         for (_, right, _), (left, _, _) in pairwise(labels):

@@ -50,7 +50,7 @@ def test_two_variables_two_cases_and_a_limit(profile: Profile, site: Site) -> No
     for case, level in (("low", ""), ("high", "1.5")):
         page.click("#problem-cases-add")
         fill(page, f"case {1 if case == 'low' else 2}", name=case, **{"excitation.amplitude": level})
-    page.click("#problem-submit")
+    page.click("#study")
     expect(page.locator("#design-status")).to_contain_text("wider bounds would do better", timeout=LONG_MS)
     keys = {
         "variables": {"damper.N0": [20, 500], "damper.kt": [0.5, 50]},
@@ -91,7 +91,7 @@ def test_a_robust_design_is_shown_beside_the_nominal_one(profile: Profile, site:
     fill(page, "uncertain parameter 1", path="damper.mu", how="between", to="0.4")
     fill(page, "uncertain parameter 1", **{"from": "0.2"})
     page.fill("#problem-samples", "4")
-    page.click("#problem-submit")
+    page.click("#study")
     expect(page.locator("#design-status")).to_contain_text("over the uncertainty", timeout=LONG_MS)
     assert asked(site, page)["uncertain"] == {"damper.mu": [0.2, 0.4]}
     rows = page.get_by_role("region", name="Nominal and robust design").locator("tbody tr")
@@ -128,7 +128,7 @@ def test_what_is_wrong_with_a_problem_is_said_at_its_field(
     page = visit(context, site, "?scene=two-dof&tab=design")
     page.click(f"#problem-{fold}-fold summary")
     page.fill(f"#problem-{field}", text)
-    page.click("#problem-submit")
+    page.click("#study")
     expect(page.locator(f".field:has(#problem-{field}) .message")).to_contain_text(words)
     expect(page.locator(f"#problem-{field}")).to_have_attribute("aria-invalid", "true")
     expect(page.locator(f"#problem-{field}")).to_be_focused()
@@ -144,7 +144,7 @@ def test_rows_are_added_and_removed_by_keyboard(profile: Profile, site: Site) ->
     expect(page.get_by_role("button", name="Remove variable 1")).to_be_hidden()
     page.locator("#problem-variables [name=path]").select_option("damper.kt")
     fill(page, "variable 1", low="30", high="20")
-    page.click("#problem-submit")
+    page.click("#study")
     expect(page.locator("#settings-wrong")).to_contain_text("30 < 20 is not so")
 
 
@@ -163,11 +163,11 @@ def test_from_nothing_to_a_compared_named_and_reported_design(profile: Profile, 
     for number in (1, 2, 3):
         page.click("#problem-cases-add")
         fill(page, f"case {number}", name=f"order {number}", engine_order=str(number))
-    page.click("#problem-submit")
+    page.click("#study")
     expect(page.locator("#design-status")).to_contain_text("Found in", timeout=LONG_MS)
     page.click("#problem-limits-fold summary")
     page.fill("#problem-max_band_hz", "120")
-    page.click("#problem-submit")
+    page.click("#study")
     expect(page.locator("#design-status")).to_contain_text("waits")
     expect(page.locator("#design-status")).to_contain_text("Found in", timeout=LONG_MS)
     page.click("#tab-runs")

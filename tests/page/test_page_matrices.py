@@ -128,3 +128,47 @@ def test_files_that_do_not_fit_are_told_beside_them(profile: Profile, site: Site
     expect(page.get_by_label("What looks wrong")).to_contain_text("units that go together")
     page.get_by_label("mass.mas (").select_option("C")
     expect(page.locator("#matrix-status")).to_contain_text("`M`, the mass matrix, is missing")
+
+
+def test_a_scene_that_refers_to_a_file_asks_for_it(profile: Profile, site: Site) -> None:
+    """The scene alone, then its matrices; both at once; and one that is larger than the service takes."""
+    buffer = io.BytesIO()
+    np.savez(buffer, M=M, K=K)
+    matrices = file("blade.npz", buffer.getvalue())
+    text = f"""
+name = "referring"
+[structure]
+kind = "matrices"
+M = "models/blade.npz"
+K = "models/blade.npz"
+damping_ratio = 0.001
+dofs = {{ tip = {len(M) - 2}, middle = 20 }}
+[[contacts]]
+name = "damper"
+between = ["tip", "ground"]
+kt = 1e5
+mu = 0.3
+N0 = 10.0
+[excitation]
+dof = "middle"
+amplitude = 1.0
+[observe]
+dof = "tip"
+band = [800.0, 1600.0]
+"""
+    scene = {"name": "referring.toml", "mimeType": "application/toml", "buffer": text.encode()}
+    page = visit(profile[0], site)
+    page.set_input_files("#file", [scene])
+    expect(page.locator("#editor")).to_contain_text("The scene refers to blade.npz: choose it too")
+    page.set_input_files("#scene-files", [matrices])
+    expect(page.locator("#editor-status")).to_contain_text("Nothing is wrong with this scene.")
+    page.set_input_files("#file", [scene, matrices])
+    expect(page.locator("#editor-status")).to_contain_text("Nothing is wrong with this scene.")
+    page.get_by_role("button", name="Use this scene").click()
+    expect(page.locator("#live-status")).to_contain_text("peak")
+    page.route("**/v1/matrices/formats", lambda route: route.fulfill(json={"items": [], "most_bytes": 1000}))
+    page.set_input_files("#file", [scene, matrices])
+    expect(page.locator("#editor")).to_contain_text(
+        "raise STICKSLIP_MAX_UPLOAD_BYTES there, or reduce the model first"
+    )
+    expect(page.locator("#editor")).to_contain_text("--reduce")

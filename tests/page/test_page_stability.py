@@ -35,5 +35,5 @@ def test_a_stretch_that_is_not_stable_is_dashed(profile: tuple[BrowserContext, W
 def test_so_it_is_in_the_response_of_a_job(profile: tuple[BrowserContext, Watch], site: Site) -> None:
     page = visit(profile[0], site, f"?scene={stored(site)}")
     page.click("#study")
-    expect(page.locator(f"#response-figure {DASHED}")).to_have_count(1, timeout=180_000)
+    expect(page.locator(f"#live-figure {DASHED}")).to_have_count(1, timeout=180_000)
     expect(page.locator("#response-facts")).to_contain_text("fold")

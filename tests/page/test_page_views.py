@@ -38,11 +38,11 @@ def test_a_mode_is_followed_and_its_points_are_looked_at(profile: Profile, site:
     page.fill("#modes-from", "400")
     page.fill("#modes-to", "300")
     watch.allowed += ("422",)
-    page.click("#modes-submit")
+    page.click("#study")
     expect(page.locator(".field:has(#modes-to) .message")).to_contain_text("must be above")
     page.fill("#modes-from", "0.1")
     page.fill("#modes-exact_peaks", "3")
-    page.click("#modes-submit")
+    page.click("#study")
     mode = solver.nonlinear_mode(solver.load_scene("two-dof"), 1, amplitudes=(0.1, 300.0), harmonics=3)
     expect(page.locator("#modes-status")).to_contain_text(f"{mode.amplitude.size} points in")
     expect(page.locator("#modes-facts")).to_contain_text(f"{mode.frequency_hz[0]:.6g} Hz")
@@ -99,7 +99,7 @@ def test_parameters_are_identified_from_what_is_pasted(profile: Profile, site: S
     expect(page.locator("#identify-files")).to_contain_text("2 runs, 18 points")
     page.get_by_role("button", name="Remove unknown 1").click()
     expect(page.locator("#identify-unknowns [name=path]")).to_have_value("damper.mu")
-    page.click("#identify-submit")
+    page.click("#study")
     expect(page.locator("#identify-status")).to_contain_text("The data tell every unknown.")
     row = page.get_by_role("region", name="Estimates").locator("tbody tr").first
     assert float(row.locator("td").nth(1).text_content() or "nan") == pytest.approx(0.27, rel=1e-3)
@@ -130,10 +130,10 @@ def test_what_was_identified_becomes_a_robust_design(profile: Profile, site: Sit
     file = {"name": "rig.csv", "mimeType": "text/csv", "buffer": text.encode()}
     page.set_input_files("#identify-file", [file])
     expect(page.locator("#identify-files")).to_contain_text("rig.csv")
-    page.click("#identify-submit")
+    page.click("#study")
     expect(page.locator("#identify-result")).to_be_visible()
     page.click("#identify-robust-design")
-    page.click("#problem-submit")
+    page.click("#study")
     expect(page.locator("#design-facts")).to_contain_text("Nominal and robust design", timeout=90_000)
     assert set(request_of(site, page, "design")["uncertain"]) >= {"centre", "covariance"}
 

@@ -27,7 +27,7 @@ Data = Annotated[
 Columns = Annotated[
     list[str] | None,
     typer.Option(
-        "--column", metavar="HEADING=QUANTITY:UNIT",
+        "--column", metavar="HEAD=KEY:UNIT",
         help='What a column of a rig\'s export is, such as "Weg [µm]=amplitude:um"; repeatable. Then the '
         "others are left out, and any separator, decimal commas and lines above the headings are read.",
     ),

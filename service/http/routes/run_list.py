@@ -123,7 +123,7 @@ def _answers(service: Service, ids: set[str], sees: str | None) -> list[RunAnswe
 
 
 @router.get("/events", response_class=EventSourceResponse)
-async def run_events(listened: Annotated[_Listened, Depends(_listened)]) -> AsyncIterator[ServerSentEvent]:
+async def run_updates(listened: Annotated[_Listened, Depends(_listened)]) -> AsyncIterator[ServerSentEvent]:
     """Follow all runs: an event `run` with the run whenever one is handed in, goes on or ends.
 
     At most three times a second, a comment after a long silence. What is said of a run, and the bin, are not

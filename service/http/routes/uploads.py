@@ -12,7 +12,7 @@ from fastapi.responses import JSONResponse
 from pydantic import BaseModel, ConfigDict, Field, GetJsonSchemaHandler
 from pydantic_core import CoreSchema
 
-from service.errors import InvalidRequestError
+from service.errors import BodyTooLargeError, InvalidRequestError
 from service.http.dependencies import LISTED, InContext, JsonBody, TypedRoute, listing, saved
 from service.http.in_lane import computed, reading, writing
 from service.jobs import answering
@@ -68,6 +68,9 @@ class UploadQuery(ListQuery):
     cursor: Cursor = None
 
 
+_TOO_LARGE = "raise STICKSLIP_MAX_UPLOAD_BYTES, or reduce the model first: stickslip import FILES --reduce"
+
+
 @router.post(
     "",
     status_code=201,
@@ -87,7 +90,10 @@ async def upload(context: InContext, name: FileName = "matrices", form: Format =
     with tempfile.TemporaryDirectory(prefix="stickslip-") as folder:
         path = Path(folder) / file_name(name, known)
         with path.open("wb") as file:
-            size, sha256 = await saved(request, file, settings.max_upload_bytes, settings.upload_seconds)
+            try:
+                size, sha256 = await saved(request, file, settings.max_upload_bytes, settings.upload_seconds)
+            except BodyTooLargeError as error:
+                raise BodyTooLargeError(f"{error.detail}: {_TOO_LARGE}") from error
         arrived = Arrived(path=path, name=name, format=known, size=size, sha256=sha256)
         row, found, added = await service.lanes.uploads.run(
             caller.owner, service.uploads.add, arrived, caller
@@ -190,7 +196,7 @@ class MatricesRequest(_Strict):
 
 
 @matrices.get("/formats")
-def formats() -> FormatsAnswer:
+def formats(context: InContext) -> FormatsAnswer:
     """The formats that can be uploaded."""
     # Loaded here: a service that only lists does not need SciPy.
     from solver.matrices.readers.registry import readers
@@ -202,7 +208,8 @@ def formats() -> FormatsAnswer:
                 help=reader.help.replace("`", ""),
             )
             for reader in readers()
-        ]
+        ],
+        most_bytes=context.service.settings.max_upload_bytes,
     )  # fmt: skip
 
 

@@ -31,6 +31,7 @@ class StudyProposal(BaseModel):
     ----------
     kind : of the job.
     body : keys beside the scene; what is left out has the default of the schema.
+    points : of the response that it solves, about; times the cost of a point in the plan its time.
     refused : why this scene has no such study.
     """
 
@@ -38,17 +39,21 @@ class StudyProposal(BaseModel):
 
     kind: str
     body: dict[str, Any] = Field(description="Keys beside the scene that the scene itself suggests.")
+    points: int | None = Field(description="Points of the response that are solved, about; null: not known.")
     refused: str | None = Field(description="Why the scene has no such study; null: it has.")
 
 
 def proposals(scene: Scene) -> list[StudyProposal]:
     """Return what a scene suggests for the studies that it can suggest anything for."""
     found = []
-    for kind, propose in _PROPOSED.items():
-        keys = propose(scene)
+    for kind in dict.fromkeys((*_PROPOSED, *_POINTS)):
+        keys = _PROPOSED[kind](scene) if kind in _PROPOSED else {}
         refused = keys if isinstance(keys, str) else None
         body = {} if isinstance(keys, str) else dict(keys)
-        found.append(StudyProposal(kind=kind, body=body, refused=refused))
+        points = _POINTS.get(kind)
+        if points is not None and "orders" in body:
+            points *= len(body["orders"])
+        found.append(StudyProposal(kind=kind, body=body, points=points, refused=refused))
     return found
 
 
@@ -163,6 +168,10 @@ def _at_one_frequency(scene: Scene) -> Proposed:
     return {"frequency_hz": _rounded(_middle(scene), 4)}
 
 
+_SWEEP = 200  # points of a response, about
+_POINTS: Mapping[str, int] = {
+    "sweep": _SWEEP, "design": 4 * _SWEEP, "map": 60 * 400, "campbell": _SWEEP, "pareto": 25 * _SWEEP,
+}  # fmt: skip
 _PROPOSED: Mapping[str, Callable[[Scene], Proposed]] = {
     "map": _map, "campbell": _campbell, "interference": _interference, "modes": _modes,
     "identify": _identify,

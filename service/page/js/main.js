@@ -6,7 +6,7 @@ import { byId, el, show } from "./base/dom.js";
 import { startInterference } from "./disk/interference.js";
 import { startAnswer } from "./views/answer.js";
 import { startDesign } from "./views/design.js";
-import { edit, editCurrent, newScene, openText } from "./editor/editor.js";
+import { edit, editCurrent, newScene } from "./editor/editor.js";
 import { on, tell } from "./base/events.js";
 import { startFront } from "./views/front.js";
 import { loadKinds } from "./scene/kinds.js";
@@ -18,7 +18,7 @@ import { startIdentify } from "./identify/view.js";
 import { startModes } from "./modes/view.js";
 import { startMap } from "./views/map.js";
 import { openMatrices } from "./scene/matrices.js";
-import { SCENES } from "./scene/matrix_files.js";
+import { filesOf, openScene, sceneIn } from "./scene/scene_files.js";
 import { startNotices } from "./base/notices.js";
 import { showOther, startOthers } from "./views/others.js";
 import { startPoint } from "./views/point.js";
@@ -196,8 +196,8 @@ function controls() {
 
 // Files that were chosen or dropped: a scene is opened, anything else is taken for matrices.
 async function take(files) {
-  const scene = files.find(({ name }) => SCENES.test(name));
-  if (scene) await openText(await scene.text(), scene.name.toLowerCase().endsWith(".json") ? "json" : "toml");
+  const scene = sceneIn(files);
+  if (scene) await openScene(scene, files);
   else if (files.length) openMatrices(files);
 }
 
@@ -212,7 +212,7 @@ function startDrops() {
   card.addEventListener("dragleave", (event) => over(event, false));
   card.addEventListener("drop", (event) => {
     over(event, false);
-    take([...event.dataTransfer.files]).catch(failed);
+    filesOf(event.dataTransfer).then(take).catch(failed);
   });
 }
 

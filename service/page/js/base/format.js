@@ -43,7 +43,7 @@ export const withUnit = (path) => (unitOf(path) ? `${path} [${unitOf(path)}]` : 
 
 export const quantity = (path, value) => `${number(value, 5)} ${unitOf(path)}`.trim();
 
-export const seconds = (value) => (value < 1 ? `${number(value * 1e3, 3)} ms` : `${number(value, 3)} s`);
+export const seconds = (value) => (value < 1 ? `${number(value * 1e3, 3)} ms` : value < 100 ? `${number(value, 3)} s` : `${number(value / 60, 2)} min`);
 
 // Of today the time alone, over 24 hours.
 export function when(text) {

@@ -124,7 +124,7 @@ function robust() {
   const confidence = uncertain.confidence === undefined ? "" : `, ${percent(uncertain.confidence)}`;
   tell("uncertain-given", { uncertain, words: `identified: ${estimates.map(({ name }) => name).join(", ")}${confidence}` });
   tell("tab", "design");
-  byId("problem-submit").focus();
+  byId("study").focus();
 }
 
 const fitColumns = ({ runs }) => runs.flatMap((one, i) => ["x", "data", "fit", "fit_sd", "phase_deg", "fit_phase_deg"].filter((key) => one[key]).map((key) => [`run ${i + 1} ${Object.entries(one.conditions).map(([path, v]) => `${path} = ${v}`).join(" ")}: ${key}`, one[key]]));

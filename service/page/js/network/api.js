@@ -61,6 +61,20 @@ export async function request(path, options) {
   return answer.status === 204 ? null : answer.json();
 }
 
+// Sends a file and tells the share of it that is on its way: `fetch` does not say that.
+export function sent(path, file, onProgress) {
+  return new Promise((resolve, reject) => {
+    const sending = new XMLHttpRequest();
+    sending.open("POST", path);
+    if (key()) sending.setRequestHeader("Authorization", `Bearer ${key()}`);
+    sending.responseType = "json";
+    sending.upload.addEventListener("progress", ({ loaded, total }) => onProgress(loaded / total));
+    sending.addEventListener("load", () => (sending.status < 300 ? resolve(sending.response) : reject(new Problem(sending.status, sending.response ?? {}))));
+    sending.addEventListener("error", () => { lost(); reject(new Offline()); });
+    sending.send(file);
+  });
+}
+
 export const post = (path, body, options = {}) => request(path, { ...options, method: "POST", body });
 
 // The service went away: ask until it is back, ever less often.

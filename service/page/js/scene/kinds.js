@@ -40,5 +40,8 @@ const proposal = (name) => current.studies?.get(name);
 // The keys of a body that the scene itself suggests.
 export const proposed = (name) => proposal(name)?.body ?? {};
 
+// How many points of the response a study solves, about; null where nobody knows.
+export const pointsOf = (name) => proposal(name)?.points ?? null;
+
 // Why the scene has no such study; empty if it has.
 export const refusedFor = (name) => proposal(name)?.refused ?? "";

@@ -1,6 +1,6 @@
 // Files of matrices: sent to the service one by one, each with what it is and what is wrong beside it.
 
-import { Problem, request } from "../network/api.js";
+import { Problem, request, sent } from "../network/api.js";
 import { el, show } from "../base/dom.js";
 
 export const SCENES = /\.(toml|json)$/i;
@@ -11,6 +11,15 @@ const LONGEST_NAME = 200;
 const plainName = (name) => name.replaceAll(/[^A-Za-z0-9_.\- ]/g, "_").replace(/^[^A-Za-z0-9_]+/, "").slice(-LONGEST_NAME) || "matrices";
 
 const size = (bytes) => (bytes < 1e6 ? `${Math.max(1, Math.round(bytes / 1e3))} kB` : `${(bytes / 1e6).toPrecision(3)} MB`);
+
+// Stores a file; one that is too large is not sent at all.
+export async function uploaded(file, name, onProgress = () => undefined) {
+  const { most_bytes: most } = await request("/v1/matrices/formats");
+  if (file.size > most) {
+    throw new Error(`It has ${size(file.size)}, the service takes ${size(most)}: raise STICKSLIP_MAX_UPLOAD_BYTES there, or reduce the model first, stickslip import ${file.name} --reduce.`);
+  }
+  return sent(`/v1/uploads?name=${encodeURIComponent(plainName(name))}`, file, onProgress);
+}
 
 // The files of one model. `changed` is told when what was sent, or what a file is, changed.
 export function matrixFiles(host, changed) {
@@ -28,7 +37,10 @@ export function matrixFiles(host, changed) {
 
   async function send(entry) {
     try {
-      const found = await request(`/v1/uploads?name=${encodeURIComponent(entry.name)}`, { method: "POST", raw: entry.file });
+      const found = await uploaded(entry.file, entry.name, (share) => {
+        const words = document.getElementById(`matrix-file-${entry.key}-words`);
+        if (words) words.textContent = `${Math.round(100 * share)} % is sent, then it is read …`;
+      });
       entry.id = found.id;
       entry.words = found.contents.map(contentsOf).join("; ");
     } catch (error) {

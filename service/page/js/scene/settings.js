@@ -26,7 +26,6 @@ export function fillSettings() {
   show(byId("variable"), variables().map((each) => el("option", { value: each }, each)));
   byId("variable").value = path;
   byId("variable-unit").textContent = unitOf(path);
-  byId("study").disabled = !path;
   if (!path) say("study-status", "The scene has no contact to design.");
   state.range ??= path ? defaultRange() : null;
   if (state.range) [byId("low").value, byId("high").value] = state.range.map(String);

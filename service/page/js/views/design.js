@@ -116,6 +116,7 @@ async function plan() {
 }
 
 function describe({ effects, unknowns, linear_dofs: dofs, estimated_seconds_a_point: cost }) {
+  tell("cost", cost);
   const item = ({ name, used, reason, others = [] }) =>
     el("li", { class: used ? "used" : "left" },
       el("span", { class: "sign", "aria-hidden": "true" }, used ? "✓" : "–"),

@@ -4,37 +4,49 @@ import { state, write } from "../base/address.js";
 import { chart } from "../charts/chart.js";
 import { byId, el, show } from "../base/dom.js";
 import { on, tell } from "../base/events.js";
-import { length, number, quantity, unitOf } from "../base/format.js";
+import { length, number, quantity, seconds, unitOf } from "../base/format.js";
 import { previewer } from "../network/previews.js";
-import { responseOf } from "../charts/curves.js";
+import { responseOf, throughPeak } from "../charts/curves.js";
+import { sameValues } from "../scene/inputs.js";
+import { pointsOf } from "../scene/kinds.js";
 import { ghosts, pinned } from "./pins.js";
 import { asked, current, ownValue, sliders as ranges, value, variedParts } from "../scene/scenes.js";
 
 const STEPS = 400;
 const RATE_WINDOW = 20;
 const SLOW_MS = 600;
+const ROOM = 1.3; // above the response, where its limits rise
 const times = [];
 let plot = null;
 let ask = null;
 let slow = 0;
 let latest = null;
+// The response of the study, with what it was computed for and its linear limits.
+let study = null;
+// Of a point of the response, by the plan [s].
+let cost = 0;
 
 export const rate = () => (times.length > 1 ? (1000 * (times.length - 1)) / (times[times.length - 1] - times[0]) : 0);
 
 export function startLive() {
   plot = chart(byId("live-figure"), {
-    label: "Live frequency response",
-    file: "live-response",
+    label: "Frequency response",
+    file: "response",
     height: 260,
     link: "frequency",
     onPick: ({ x }) => tell("point", x),
   });
   ask = previewer("sweep", drawn, refused);
-  pinned(() => latest);
+  pinned(() => shown());
   on("pins", redraw);
+  on("cost", (found) => { cost = found; });
+  on("study-curve", (found) => {
+    study = found;
+    redraw();
+  });
   // The curve of another scene is not shown under the name of this one, whether its own comes or not.
   on("scene-left", () => {
-    latest = null;
+    [latest, study] = [null, null];
     plot.clear();
   });
   on("scene", () => {
@@ -52,7 +64,7 @@ export function startLive() {
 export function refresh() {
   if (!current.body) return;
   clearTimeout(slow);
-  slow = setTimeout(() => { byId("live-status").textContent = "The response is being computed …"; }, SLOW_MS);
+  slow = setTimeout(() => { byId("live-status").textContent = `The response is being computed${cost ? `, about ${seconds(cost * pointsOf("sweep"))}` : ""} …`; }, SLOW_MS);
   ask({ kind: "sweep", ...asked() }, state.scene);
 }
 
@@ -82,8 +94,26 @@ const words = ({ peak, band_hz: band, status, peak_certificate: certificate }) =
   + (band === null ? "" : `, band ${number(band)} Hz`)
   + (peak && certificate && !certificate.known ? `; ${certificate.reason}` : "");
 
+// What the sliders are set to: the response that follows them, or that of the study where it is of the same values.
+const ofStudy = () => study?.answer && sameValues(study.request, { set: state.set, harmonics: state.harmonics });
+
+const shown = () => (ofStudy() ? study.answer : latest);
+
+const lineOf = (answer, look) => {
+  const { parameter: x, amplitude: y } = throughPeak(answer);
+  return { x, y, ...look };
+};
+
 function redraw() {
-  if (latest) plot.draw(responseOf(latest, ghosts()));
+  const answer = shown() ?? study?.answer;
+  if (!answer || !current.body) return study?.line && plot.draw({ ...responseOf({ parameter: study.line.x, amplitude: study.line.y, peak: { value: Math.max(...study.line.y), at: study.line.x[0] } }), marks: [] });
+  const { limits, line } = study ?? {};
+  const others = [...ghosts(), ...(line ? [line] : []), ...(study?.answer && answer !== study.answer ? [lineOf(study.answer, { name: "of the study", colour: 7, dash: "dashed" })] : [])];
+  // The linear limits rise far above, and narrow resonances lie between their points: the frame stays with friction.
+  const linear = limits ? [lineOf(limits.free, { name: "removed (linear)", colour: 7, dash: "dotted", bare: true }), lineOf(limits.stuck, { name: "stuck (linear)", colour: 3, dash: "dashed", bare: true })] : [];
+  const drawing = responseOf(answer, [...others, ...linear]);
+  if (linear.length) drawing.y.high = drawing.series.filter(({ bare }) => !bare).flatMap(({ y }) => y).reduce((a, b) => Math.max(a, b), 0) * ROOM;
+  return plot.draw(drawing);
 }
 
 function drawn(answer, { milliseconds, token }) {

@@ -1,32 +1,22 @@
-// The frequency response of the study: points as they come, then peak, band, linear limits, files.
+// The frequency response of the study, drawn with the live one: points as they come, then peak, band, limits, files.
 
-import { chart } from "../charts/chart.js";
 import { byId, el, facts, say, show } from "../base/dom.js";
 import { on, tell } from "../base/events.js";
 import { saveFrom } from "../base/exports.js";
 import { length, number, seconds } from "../base/format.js";
-import { responseOf, throughPeak } from "../charts/curves.js";
 import { previewer } from "../network/previews.js";
-import { chosenContact, current } from "../scene/scenes.js";
+import { chosenContact } from "../scene/scenes.js";
 import { state } from "../base/address.js";
 import { saveToml } from "../base/toml.js";
 import { betweenPoints, notes } from "../base/words.js";
 
 const FORMS = [["CSV", "text/csv", "csv"], ["npz", "application/x-npz", "npz"], ["Parquet", "application/vnd.apache.parquet", "parquet"]];
-let plot = null;
 let limits = null;
 let last = null;
 let asking = null;
 let points = [];
 
 export function startResponse() {
-  plot = chart(byId("response-figure"), {
-    label: "Frequency response",
-    file: "response",
-    height: 320,
-    link: "frequency",
-    onPick: ({ x }) => tell("point", x),
-  });
   asking = previewer("limits", (answer, { token }) => {
     if (token !== state.scene) return;
     limits = answer;
@@ -35,9 +25,9 @@ export function startResponse() {
   }, () => undefined);
   on("scene", () => {
     [limits, last, points] = [null, null, []];
-    say("response-status", "Press the button above: the sweep arrives here point by point.");
+    say("response-status", "No sweep yet: it is drawn with the live response, point by point, and stored.");
     show(byId("response-facts"));
-    plot.clear();
+    redraw();
   });
 }
 
@@ -54,8 +44,8 @@ export const sweepView = {
     points.push(...more);
     partly();
   },
-  result(result, sweeps) {
-    last = { result, sweep: sweeps[0] };
+  result(result, sweeps, job) {
+    last = { result, sweep: sweeps[0], request: job.request };
     say("response-status", `${result.points} points in ${seconds(result.seconds)}. ${result.status}`);
     redraw();
     describe();
@@ -64,34 +54,13 @@ export const sweepView = {
   failed: (text) => say("response-status", text, true),
 };
 
+// A line until it is done; then a response with its peak, its band and its linear limits.
 function partly() {
-  if (points.length < 2) return;
-  const amplitude = points.map((p) => p[1]);
-  const highest = Math.max(...amplitude);
-  const at = points[amplitude.indexOf(highest)][0];
-  plot.draw({ ...responseOf({ parameter: points.map((p) => p[0]), amplitude, peak: { value: highest, at } }), marks: [] });
+  if (points.length > 1) tell("study-curve", { answer: null, line: { name: "on its way", x: points.map(([at]) => at), y: points.map(([, amplitude]) => amplitude), colour: 7 } });
 }
 
-// A narrow resonance may lie between two points of a linear response: the line goes to its top all the same.
-function lineOf(answer) {
-  const { parameter: x, amplitude: y } = throughPeak(answer);
-  return { x, y };
-}
-
-// The linear limits rise far above: the frame stays with the response with friction.
 function redraw() {
-  if (!last || !current.body) return;
-  const { result } = last;
-  const more = limits
-    ? [
-        { name: "removed (linear)", ...lineOf(limits.free), colour: 7, dash: "dotted", bare: true },
-        { name: "stuck (linear)", ...lineOf(limits.stuck), colour: 3, dash: "dashed", bare: true },
-      ]
-    : [];
-  const shown = responseOf(result, more);
-  const own = shown.series.filter((line) => !line.bare).flatMap((line) => line.y);
-  const top = own.reduce((a, b) => Math.max(a, b), 0) * (more.length ? 1.7 : 1.15);
-  plot.draw({ ...shown, y: { ...shown.y, high: top } });
+  tell("study-curve", last ? { answer: last.result, request: last.request, limits } : null);
 }
 
 function describe() {

@@ -3,9 +3,11 @@
 import { state, write } from "../base/address.js";
 import { byId, say } from "../base/dom.js";
 import { on, tell } from "../base/events.js";
+import { seconds } from "../base/format.js";
 import { schemaForm } from "../forms/form.js";
 import { run } from "../network/jobs.js";
-import { askedFor, ofTheBar, proposed, refusedFor } from "../scene/kinds.js";
+import { askedFor, ofTheBar, pointsOf, proposed, refusedFor } from "../scene/kinds.js";
+import { variable } from "../scene/scenes.js";
 import { readSettings } from "../scene/settings.js";
 import { VIEWS } from "../views.js";
 import { PRESS } from "../workbench/run_list.js";
@@ -25,6 +27,9 @@ const FORMS = {
   interference: { id: "interference", words: "Show", top: ["speed_rpm", "within"], groups: [{ legend: "Orders, families, frequencies", id: "more" }] },
   modes: { id: "modes", words: "Follow the mode", primary: true, top: ["mode", "from", "to", "nodal_diameter", "aero_damping", "exact_peaks"], groups: [{ legend: "Loops, peaks, disturbances, phase resonance", id: "more" }] },
 };
+// Where a view is about one study, the button of the bar is that of its form.
+const OF_TAB = { design: ["problem-form", "Search this design"], identify: ["identify-form", "Identify"], modes: ["modes-form", "Follow the mode"] };
+const WITHOUT_VARIABLE = ["identify", "modes"];
 const OF_THE_BUTTON = ["map", "accuracy", "campbell", "interference"];
 const forms = new Map();
 let studies = 0;
@@ -36,7 +41,16 @@ export function startStudy() {
     const submit = (body) => ask(kind, body);
     forms.set(kind, schemaForm(byId(`${id}-form`), kind, { id, submit, keys: (key) => !hide.includes(key), ...how }));
   }
-  byId("study").addEventListener("click", study);
+  byId("study").addEventListener("click", () => (OF_TAB[state.tab] ? byId(OF_TAB[state.tab][0]).requestSubmit() : study()));
+  const named = () => {
+    byId("study").textContent = OF_TAB[state.tab]?.[1] ?? "Find the best damper";
+    byId("study").disabled = !variable() && !WITHOUT_VARIABLE.includes(state.tab);
+  };
+  for (const event of ["tab-shown", "scene", "scene-contact"]) on(event, named);
+  // What a study takes is said beside its button, by the plan of the scene.
+  on("cost", (cost) => {
+    for (const [kind, { id }] of Object.entries(FORMS)) if (pointsOf(kind)) byId(`${id}-takes`).textContent = `about ${seconds(pointsOf(kind) * cost)}`;
+  });
   on("renew", renew);
   on("computed", ({ kind, request, result }) => {
     if (kind === "design" && result.limit) bandAt = Number(result.limit.toPrecision(4));

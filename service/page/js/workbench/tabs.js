@@ -2,7 +2,7 @@
 
 import { FIRST_TAB, state, step, write } from "../base/address.js";
 import { byId, el, show } from "../base/dom.js";
-import { on } from "../base/events.js";
+import { on, tell } from "../base/events.js";
 
 const TABS = [["response", "Response"], ["map", "Map"], ["design", "Design"], ["disk", "Disk"], ["modes", "Modes"], ["identify", "Identification"], ["accuracy", "Accuracy"], ["runs", "Runs"], ["all", "All"]];
 const OF_KIND = { sweep: "response", march: "response", map: "map", pareto: "map", design: "design", accuracy: "accuracy", campbell: "disk", interference: "disk", modes: "modes", identify: "identify" };
@@ -43,5 +43,6 @@ export function openTab(name) {
   byId("panel").setAttribute("aria-labelledby", `tab-${name}`);
   byId("panel").dataset.view = name;
   for (const card of byId("panel").querySelectorAll("[data-tabs]")) card.classList.toggle("off", name !== "all" && !card.dataset.tabs.split(" ").includes(name));
+  tell("tab-shown", name);
   if (state.scene) write();
 }
