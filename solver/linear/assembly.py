@@ -17,16 +17,16 @@ from solver.linear.extra_terms import (
     own_terms,
     terms_of_line,
 )
-from solver.linear.lumped_matrices import (
-    Matrices,
-    elements_of,
-    matrices_of_elements,
-    slopes_of_elements,
-)
-from solver.linear.matrix_model import mass_of_bodies
 from solver.linear.model import ForceTerm, Identity, LinearModel, LinearModelDerivative
 from solver.linear.moving_base import base_motions, derivative_with_base, with_base
 from solver.linear.sector_matrices import ProportionalDamping, sector_matrices
+from solver.linear.structure_matrices import (
+    Matrices,
+    elements_of,
+    mass_of_bodies,
+    matrices_of_elements,
+    slopes_of_elements,
+)
 from solver.matrices.values import frozen
 from solver.scene.bodies.kinematics import Form, static
 from solver.scene.cyclic.annulus import written_out

@@ -135,35 +135,30 @@ def reduce_model(
     no_modes = model.prescribed > 0 or model.line is not None
     dense_asked = whole_matrices or derivative is not None or no_modes
     apart = dense_asked or (model.extra is not None and not model.extra.is_real)
-    which, diameters, moving = _structures(model, ks, apart=apart)
     forces = force_amplitudes(model, ks)
-    L = model.ports_at(diameters)
-    held = matrices_of(model, diameters, moving)
-    shift, loose = np.zeros(kt.size), np.zeros((0, kt.size))
-    if 0 in ks:
-        loose = _loose(model, held.K[which[0]], L[which[0]], kt)
+    which, diameters, moving, L, held = _structures(model, ks, apart=apart)
+    shift, nothing = np.zeros(kt.size), np.zeros((0, kt.size))
+    loose = _loose(model, held.K[which[0]], L[which[0]], kt) if 0 in ks else nothing
     if len(loose) or not (model.prescribed or held_alone(held)):
         # Also without a mean: of a light part A is 1/(m ω²) else, 1e9 times what its contacts let it move.
         shift, held = kt.copy(), held_by(held, L, kt)
     found = None if dense_asked else decompose(held, poles=poles)
     if found is None and not apart:
-        which, diameters, moving = _structures(model, ks, apart=True)
-        L = model.ports_at(diameters)
-        held = matrices_of(model, diameters, moving)
+        which, diameters, moving, L, held = _structures(model, ks, apart=True)
         held = held_by(held, L, kt) if np.any(shift) else held
+    modes: dict[str, Any]
+    dense: dict[str, Any]
     if found is None:
-        modes: dict[str, Any] = _no_modes(diameters.size, ks.size, kt.size)
-        inertia = model.inertia(diameters, _first_of(ks, which))
-        dense: dict[str, Any] = _dense(held, diameters, moving, L, model, forces, derivative) | {
-            "M": _contiguous(inertia * (1.0 if model.line is not None else moving[:, None, None]))
-        }
-        given = ((), ()) if derivative is None else (derivative.forces, derivative.second_forces)
-        dense["dforces"] = np.array([term_amplitudes(each, model.observe.size, ks) for each in given])
+        modes, least, seen = _no_modes(diameters.size, ks.size, kt.size), 0.0, (L, L.conj())
+        dense = _dense(held, diameters, moving, L, model, forces, derivative)
+        dense |= _of_harmonics(model, ks, which, diameters, moving, derivative)
     else:
-        modes = _projected(found, L, model.observe, forces, which)
+        modes, least = (
+            _projected(found, L, model.observe, forces, which),
+            _least_size(found, L, forces, which),
+        )
+        seen = modes["contact_modes"], modes["contact_duals"]
         dense = {name: np.zeros((0,) * axes, np.complex128) for name, axes in _DENSE_AXES.items()}
-    least = 0.0 if found is None else _least_size(found, L, forces, which)
-    seen = (L, L.conj()) if found is None else (modes["contact_modes"], modes["contact_duals"])
     ports = every_port(kt.size) if each_port else leading_ports(*seen)
     return CondensedStructure(
         which=which.astype(np.int64), shift=shift, loose=loose, least_size=least, **ports._asdict(), **modes,
@@ -171,25 +166,37 @@ def reduce_model(
     )  # fmt: skip
 
 
-def _structures(model: LinearModel, ks: Integer, *, apart: bool) -> tuple[Integer, Integer, Flags]:
-    """Return the structure of each harmonic, and the nodal diameter of each; (False) the one of the mean.
+def _structures(
+    model: LinearModel, ks: Integer, *, apart: bool
+) -> tuple[Integer, Integer, Flags, Complex, HeldMatrices]:
+    """Return the structure of each harmonic; of each the nodal diameter, whether it moves, L and matrices.
 
-    There is one for each nodal diameter in play; the mean has its own where `apart`.
+    There is one for each nodal diameter in play; the mean, which does not move, has its own where `apart`.
     """
-    diameters = model.diameters(ks)
-    still = (ks == 0) & apart
+    diameters, moving = model.diameters(ks), ks > 0
+    still, which = ~moving & apart, np.arange(ks.size)
     if model.line is not None:  # each harmonic has an inertia of its own
-        return np.arange(ks.size), diameters, ks > 0
-    if not still.any() and not diameters.any():
-        return np.zeros(ks.size, np.int64), np.zeros(1, np.int64), np.ones(1, np.bool_)
-    found, which = np.unique(np.where(still, -1, diameters), return_inverse=True)
-    return which, np.maximum(found, 0), found >= 0
+        pass
+    elif not still.any() and not diameters.any():
+        which, diameters, moving = np.zeros(ks.size, np.int64), np.zeros(1, np.int64), np.ones(1, np.bool_)
+    else:
+        found, which = np.unique(np.where(still, -1, diameters), return_inverse=True)
+        diameters, moving = np.maximum(found, 0), found >= 0
+    return which, diameters, moving, model.ports_at(diameters), matrices_of(model, diameters, moving)
 
 
-def _first_of(ks: Integer, which: Integer) -> Integer:
-    """Return a harmonic of each structure."""
+def _of_harmonics(
+    model: LinearModel, ks: Integer, which: Integer, diameters: Integer, moving: Flags,
+    derivative: LinearModelDerivative | None,
+) -> dict[str, Complex]:  # fmt: skip
+    """Return the inertia of each structure and the derivatives of the forces on each harmonic."""
     _, first = np.unique(which, return_index=True)
-    return np.asarray(ks[first])
+    still = 1.0 if model.line is not None else moving[:, None, None]
+    given = ((), ()) if derivative is None else (derivative.forces, derivative.second_forces)
+    return {
+        "M": _contiguous(model.inertia(diameters, ks[first]) * still),
+        "dforces": np.array([term_amplitudes(each, model.observe.size, ks) for each in given]),
+    }
 
 
 def _least_size(found: Decomposition, L: Complex, forces: Complex, which: Integer) -> float:
@@ -325,7 +332,7 @@ def _dense(
             ddK = _contiguous(derivative.second_extra.at(model.turns(diameters), moving, lambda: dK)[0])
     moves = moving[:, None, None]
     return {
-        "K": _contiguous(held.K), "C": _contiguous(moves * held.C), "M": _contiguous(moves * held.M),
+        "K": _contiguous(held.K), "C": _contiguous(moves * held.C),
         "dK": _contiguous(dK), "dC": _contiguous(moves * dC), "dM": _contiguous(moves * dM), "ddK": ddK,
         "L": _contiguous(L), "observe": _contiguous(model.observe), "forces": forces,
     }  # fmt: skip

@@ -14,7 +14,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.linear.matrix_model import block_diag, bodies_mass, modal_damping, ratio_of_modes
+from solver.linear.structure_matrices import block_diag, bodies_mass, modal_damping, ratio_of_modes
 from solver.matrices.normal_modes import hermitian
 from solver.matrices.sectors.blocks import at_diameter, full_elimination
 from solver.matrices.values import frozen

@@ -51,7 +51,6 @@ def refuse(found: MatrixSet, *, reduced: bool, gone: Elimination | None = None) 
         raise FieldError(
             ("M",), "and `K` are the same matrix: give the mass and the stiffness, in the order M K C"
         )
-    mass, stiffness = M.diagonal(), K.diagonal()
     empty = np.flatnonzero((abs(M).sum(axis=1) == 0.0) & (abs(K).sum(axis=1) == 0.0))
     if empty.size:
         raise FieldError(
@@ -60,27 +59,8 @@ def refuse(found: MatrixSet, *, reduced: bool, gone: Elimination | None = None) 
             "export, or hold them by a boundary condition",
             named=False,
         )
-    if mass.min() < 0.0:
-        at = int(mass.argmin())
-        raise FieldError(
-            ("M",),
-            f"has {mass[at]:g} on the diagonal of {found.name(at)}, where a mass must be: are the "
-            "files in the order M K C?",
-        )
-    if stiffness.min() < 0.0:
-        at = int(stiffness.argmin())
-        raise FieldError(
-            ("K",),
-            f"has {stiffness[at]:g} on the diagonal of {found.name(at)}: a stiffness must be >= 0 there; "
-            "export K at a state of equilibrium, before it buckles",
-        )
-    penalties = np.flatnonzero(stiffness >= _PENALTY)
-    if penalties.size:
-        raise FieldError(
-            ("K",),
-            f"has {stiffness[penalties[0]]:g} on the diagonal, {_rows(found, penalties)} held by a "
-            "penalty: leave such DOFs out of the export (Abaqus: FORMAT=MATRIX INPUT, which tells them)",
-        )
+    mass, stiffness = M.diagonal(), K.diagonal()
+    _diagonals(found, mass, stiffness)
     bare = np.flatnonzero(mass == 0.0)
     if gone is not None:
         bare = gone.kept[gone.of(M).own.diagonal() == 0.0]
@@ -96,6 +76,25 @@ def refuse(found: MatrixSet, *, reduced: bool, gone: Elimination | None = None) 
             ("M",),
             f"must be positive definite, got {least:.3g} as its least eigenvalue when scaled to a unit "
             "diagonal: is a triangle missing, or the file not M?",
+        )
+
+
+def _diagonals(found: MatrixSet, mass: FloatArray, stiffness: FloatArray) -> None:
+    """Raise for masses and stiffnesses on the diagonal that cannot be."""
+    at = int(mass.argmin())
+    if mass[at] < 0.0:
+        where = f"has {mass[at]:g} on the diagonal of {found.name(at)}, where a mass must be"
+        raise FieldError(("M",), f"{where}: are the files in the order M K C?")
+    at = int(stiffness.argmin())
+    if stiffness[at] < 0.0:
+        where = f"has {stiffness[at]:g} on the diagonal of {found.name(at)}: a stiffness must be >= 0 there"
+        raise FieldError(("K",), f"{where}; export K at a state of equilibrium, before it buckles")
+    penalties = np.flatnonzero(stiffness >= _PENALTY)
+    if penalties.size:
+        raise FieldError(
+            ("K",),
+            f"has {stiffness[penalties[0]]:g} on the diagonal, {_rows(found, penalties)} held by a "
+            "penalty: leave such DOFs out of the export (Abaqus: FORMAT=MATRIX INPUT, which tells them)",
         )
 
 

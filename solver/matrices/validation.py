@@ -60,6 +60,11 @@ class DofTable(Named):
         return dict(zip(self, self.rows, strict=True))
 
 
+def differs(array: NDArray[Any], turned: NDArray[Any]) -> bool:
+    """Whether an array differs from what it should be when turned over, by more than rounding."""
+    return bool(np.abs(array - turned).max() > ASYMMETRY * np.abs(array).max())
+
+
 def one_triangle(array: Any) -> str | None:
     """What to do about a matrix, dense or sparse, of which one triangle alone is there; None if both are."""
     rows, columns = array.nonzero()

@@ -52,6 +52,14 @@ class ByContent(Tabled):
     __slots__ = ()
     digest: str
 
+    def _hold(self, arrays: Mapping[str, NDArray[Any]], *besides: object) -> None:
+        """Keep checked arrays as fields, read-only, and the hash of them and of what is `besides`."""
+        found = hashlib.sha256(repr(besides).encode())
+        for key, array in arrays.items():
+            object.__setattr__(self, key, frozen(array))
+            found.update(f"{key}{array.shape}".encode() + array.tobytes())
+        object.__setattr__(self, "digest", found.hexdigest())
+
     def __eq__(self, other: object) -> bool:
         return isinstance(other, type(self)) and self.digest == other.digest
 
@@ -86,15 +94,8 @@ def frozen(array: ArrayOf) -> ArrayOf:
     return array
 
 
-def _frozen(array: FloatArray) -> FloatArray:
-    return frozen(np.ascontiguousarray(array, dtype=np.float64))
-
-
-def _digest(*arrays: FloatArray) -> str:
-    found = hashlib.sha256()
-    for array in arrays:
-        found.update(repr(array.shape).encode() + array.tobytes())
-    return found.hexdigest()
+def _real(array: Any) -> FloatArray:
+    return np.ascontiguousarray(array, dtype=np.float64)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -126,8 +127,7 @@ class Matrix(ByContent):
         if bad.size:
             i, j = bad[0]
             raise ValueError(f"a matrix must be finite, got {array[i, j]} in row {i}, column {j}")
-        object.__setattr__(self, "array", _frozen(array))
-        object.__setattr__(self, "digest", _digest(self.array))
+        self._hold({"array": _real(array)})
 
     def __repr__(self) -> str:
         return f"Matrix({self.size} x {self.size}, {self.digest[:12]})"
@@ -211,9 +211,7 @@ class NormalModes(ByContent):
             raise ValueError("`modes` must be finite, frequencies and shapes alike")
         if omega2.min() < 0.0:
             raise ValueError(f"`omega2` must be >= 0, got {omega2.min():g}")
-        object.__setattr__(self, "omega2", _frozen(omega2))
-        object.__setattr__(self, "modes", _frozen(modes))
-        ratio = self.damping_ratio
+        kept, ratio = {"omega2": _real(omega2), "modes": _real(modes)}, self.damping_ratio
         if ratio is not None:
             given = np.asarray(ratio, dtype=np.float64)
             if given.ndim > 1 or given.size not in (1, omega2.size):
@@ -222,9 +220,8 @@ class NormalModes(ByContent):
                 raise ValueError(
                     f"`damping_ratio` must be from 0 to 10, got {given.min():g} to {given.max():g}"
                 )
-            object.__setattr__(self, "damping_ratio", _frozen(np.broadcast_to(given, omega2.shape).copy()))
-        kept = [a for a in (self.omega2, self.modes, self.damping_ratio) if a is not None]
-        object.__setattr__(self, "digest", _digest(*kept))
+            kept["damping_ratio"] = np.broadcast_to(given, omega2.shape).copy()
+        self._hold(kept)
 
     def __repr__(self) -> str:
         return f"Modes({self.modes.shape[0]} DOFs, {self.omega2.size} modes, {self.digest[:12]})"

@@ -23,7 +23,7 @@ from solver.jit import fourier
 from solver.jit.fourier import from_full, to_full
 from solver.linear.contact_table import port_counts
 from solver.scene.scene import Scene
-from solver.sensitivity.loops import LoopSensitivities
+from solver.sensitivity.observed import LoopSensitivities
 
 FEWEST = 16
 _HIGHEST = 63  # harmonics of a loop that are compared

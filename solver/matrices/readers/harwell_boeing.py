@@ -14,10 +14,12 @@ characters that columns would cut off a number stay in the field before it, whic
 
 from __future__ import annotations
 
+import contextlib
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -175,9 +177,21 @@ def _fields(
         yield lines[line][place : place + form.width], line + 1, place + 1
 
 
-def _parsed(fields: Iterator[tuple[str, int, int]], parse: Callable[[str], float], what: str) -> list[float]:
+def _section(
+    lines: list[str], first: int, n_lines: int, form: _Format, count: int, what: str,
+    parse: Callable[[str], float], quick: Callable[[NDArray[np.bytes_]], NDArray[Any] | None],
+) -> list[float] | NDArray[Any]:  # fmt: skip
+    """The numbers of a section: all at once where `quick` can, else field by field, which names a bad one."""
+    if (
+        -(-count // form.count) <= n_lines
+        and (fields := _quick_fields(lines, first, form, count)) is not None
+    ):
+        with contextlib.suppress(ValueError, OverflowError):
+            found = quick(fields)
+            if found is not None:
+                return found
     numbers = []
-    for text, line, column in fields:
+    for text, line, column in _fields(lines, first, n_lines, form, count, what):
         try:
             numbers.append(parse(text))
         except (ValueError, OverflowError):
@@ -188,16 +202,12 @@ def _parsed(fields: Iterator[tuple[str, int, int]], parse: Callable[[str], float
 def _integers(
     lines: list[str], first: int, n_lines: int, form: _Format, count: int, what: str
 ) -> NDArray[np.int64]:
-    quick = _quick_fields(lines, first, form, count) if -(-count // form.count) <= n_lines else None
-    if quick is not None:
-        try:
-            numbers = quick.astype(np.int64)
-        except (ValueError, OverflowError):
-            numbers = np.array([-1])  # the slow way names the field
-        if numbers.min(initial=0) >= 0 and numbers.max(initial=0) <= LARGEST:
-            return numbers
-    fields = _fields(lines, first, n_lines, form, count, what)
-    return np.array(_parsed(fields, _bounded, what), dtype=np.int64)
+    def quick(fields: NDArray[np.bytes_]) -> NDArray[np.int64] | None:
+        numbers = fields.astype(np.int64)
+        good = numbers.min(initial=0) >= 0 and numbers.max(initial=0) <= LARGEST
+        return numbers if good else None
+
+    return np.array(_section(lines, first, n_lines, form, count, what, _bounded, quick), dtype=np.int64)
 
 
 def _quick_fields(lines: list[str], first: int, form: _Format, count: int) -> NDArray[np.bytes_] | None:
@@ -219,21 +229,17 @@ def _bounded(text: str) -> int:
 
 
 def _reals(lines: list[str], first: int, n_lines: int, form: _Format, count: int) -> NDArray[np.float64]:
-    if -(-count // form.count) <= n_lines:
-        quick = _quick_fields(lines, first, form, count)
-        if quick is not None and _plain(quick):
-            try:
-                return quick.astype(np.float64)
-            except ValueError:
-                quick = None  # the slow way names the field
-    fields = _fields(lines, first, n_lines, form, count, "value")
+    def quick(fields: NDArray[np.bytes_]) -> NDArray[np.float64] | None:
+        return fields.astype(np.float64) if _plain(fields) else None
+
     try:
-        return np.array(_parsed(fields, lambda text: _real(text, form), "value"), dtype=np.float64)
+        found = _section(lines, first, n_lines, form, count, "value", lambda text: _real(text, form), quick)
     except FormatError:
         written_out = _written_out(lines[first : first + n_lines], form, count)
         if written_out is None:
             raise
         return written_out
+    return np.array(found, dtype=np.float64)
 
 
 def _written_out(lines: list[str], form: _Format, count: int) -> NDArray[np.float64] | None:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
 
-from solver.matrices.readers.numbers_in_text import LARGEST, FormatError, ascii_lines
+from solver.matrices.readers.numbers_in_text import LARGEST, FormatError, ascii_lines, no_number
 from solver.matrices.readers.reader import Reader
 
 _FIELDS = {"real": 1, "integer": 1, "complex": 2}
@@ -84,17 +84,9 @@ def _numbers(lines: list[str], first: int, count: int) -> NDArray[np.float64]:
     try:
         return np.array(words, dtype=np.float64)
     except ValueError as error:
-        raise FormatError(_first_bad(lines, first)) from error
-
-
-def _first_bad(lines: list[str], first: int) -> str:
-    for number, line in enumerate(lines[first:], start=first + 1):
-        for word in () if line.startswith("%") else line.split():
-            try:
-                float(word)
-            except ValueError:
-                return f"line {number}: {word[:40]!r} is not a number"
-    return "a number cannot be read"
+        rows = ((line, n) for n, line in enumerate(lines[first:], first + 1) if not line.startswith("%"))
+        bad = next(filter(None, (no_number(line.split(), n) for line, n in rows)), "a number cannot be read")
+        raise FormatError(bad) from error
 
 
 def _indices(values: NDArray[np.float64], most: int, lines: list[str], first: int) -> NDArray[np.int64]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import re
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -91,11 +92,18 @@ def _first_bad(lines: list[str], columns: tuple[int, ...], what: str, comment: s
         if len(words) not in ((count,) if count else columns):
             return f"line {number} must hold {what}, got {line.strip()[:80]!r}"
         count = len(words)
-        for word in words:
-            try:
-                float(word)
-            except ValueError:
-                return f"line {number}: {word[:40]!r} is not a number"
+        if (bad := no_number(words, number)) is not None:
+            return bad
+    return None
+
+
+def no_number(words: Sequence[str], line: int) -> str | None:
+    """The message about the first word of a line that is no number; None if all are."""
+    for word in words:
+        try:
+            float(word)
+        except ValueError:
+            return f"line {line}: {word[:40]!r} is not a number"
     return None
 
 

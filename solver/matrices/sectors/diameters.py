@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -11,11 +10,11 @@ from numpy.typing import NDArray
 
 from solver.errors import SettingError
 from solver.matrices.sectors.parts import PartsAcross
-from solver.matrices.values import MOST_DOFS, ByContent, Matrix, frozen
+from solver.matrices.validation import differs
+from solver.matrices.values import MOST_DOFS, ByContent, Matrix
 
 ComplexArray = NDArray[np.complex128]
 _KEYS = ("diameters", "M", "K", "C", "parts")
-_ASYMMETRY = 1e-8  # largest difference from the conjugate transpose, relative to the largest entry
 _MOST = 5001  # nodal diameters of the largest disk
 
 
@@ -51,7 +50,7 @@ class DiameterMatrices(ByContent):
             raise ValueError(
                 f"`diameters` must be ascending whole numbers >= 0, at least one, got {self.diameters}"
             )
-        found = hashlib.sha256(repr(self.diameters).encode())
+        kept = {}
         for key, value in given.items():
             array = np.array(value, dtype=np.complex128)
             wanted = (len(self.diameters), array.shape[-1], array.shape[-1])
@@ -65,11 +64,10 @@ class DiameterMatrices(ByContent):
             if not np.isfinite(array).all():
                 raise ValueError(f"`{key}` must hold finite numbers")
             turned = np.swapaxes(array.conj(), 1, 2)
-            if np.abs(array - turned).max() > _ASYMMETRY * np.abs(array).max():
+            if differs(array, turned):
                 raise ValueError(f"`{key}` must be Hermitian at each nodal diameter")
-            array = frozen(0.5 * (array + turned))
-            object.__setattr__(self, key, array)
-            found.update(key.encode() + array.tobytes())
+            kept[key] = 0.5 * (array + turned)
+        self._hold(kept, self.diameters, None if self.parts is None else self.parts.digest)
         for n, mass in zip(self.diameters, self.M, strict=True):
             try:
                 np.linalg.cholesky(mass)
@@ -77,8 +75,6 @@ class DiameterMatrices(ByContent):
                 raise ValueError(f"`M` must be positive definite at nodal diameter {n}") from error
         if self.parts is not None:
             self.parts.check(len(self.diameters), self.size)
-            found.update(b"parts" + self.parts.digest.encode())
-        object.__setattr__(self, "digest", found.hexdigest())
 
     def __repr__(self) -> str:
         listed = ", ".join(map(str, self.diameters))

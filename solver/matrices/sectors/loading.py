@@ -165,21 +165,15 @@ def sector_kept(
     SceneError
         Anything that cannot be used; the pointer is that of the key.
     """
-    sectors = tables["sectors"]
-    joined = tables.get("cyclic") or {}
-    if (
-        isinstance(sectors, bool)
-        or not isinstance(sectors, int)
-        or not 1 <= sectors <= MOST_SECTORS
-        or not isinstance(joined, dict)
-    ):
+    sectors, joined = tables["sectors"], tables.get("cyclic") or {}
+    whole = isinstance(sectors, int) and not isinstance(sectors, bool)
+    if not whole or not 1 <= sectors <= MOST_SECTORS or not isinstance(joined, dict):
         return tables, None  # what is wrong is said with the rest of the scene
     if isinstance(tables.get("diameters"), str):
         if found.matrices:
-            raise SceneError.of(
-                ("structure", "diameters"),
-                f"stands in place of {', '.join(found.matrices)}: remove one or the other",
-            )
+            given = ", ".join(found.matrices)
+            said = f"stands in place of {given}: remove one or the other"
+            raise SceneError.of(("structure", "diameters"), said)
         return _from_file(tables, folder), None
     if not found.matrices:
         return tables, None
@@ -188,33 +182,35 @@ def sector_kept(
     kept = {key: value for key, value in joined.items() if key not in FILE_KEYS}
     if "low_rows" in joined or "high_rows" in joined:
         return {**tables, **_dense(found), "cyclic": kept}, None
-    ends = boundaries(joined, found, sectors, folder, metres)
-    drawn = {} if ends.outline is None else {"outline": ends.outline}
-    keep = joined.get("keep_modes")
+    ends, keep = boundaries(joined, found, sectors, folder, metres), joined.get("keep_modes")
+    drawn = tables if ends.outline is None else {**tables, "outline": ends.outline}
     if keep is None:
-        return {**tables, **_dense(found), **drawn, "cyclic": {**kept, **ends.table()}}, None
+        return {**drawn, **_dense(found), "cyclic": {**kept, **ends.table()}}, None
     if isinstance(keep, bool) or not isinstance(keep, int) or not 0 <= keep <= MOST_DOFS:
         raise _refusal("keep_modes", f"must be a whole number from 0 to {MOST_DOFS}", keep)
     _refuse_unreduced(tables, found)
-    matrices = {key: csr_array(matrix) for key, matrix in found.matrices.items()}
+    reduced = _reduced(tables, found, ends, keep, orders)
+    was = {"dofs": reduced.full, "modes": reduced.modes, "highest_hz": reduced.highest_hz}
+    rest = {key: value for key, value in drawn.items() if key not in found.matrices and key != "parts"}
+    return {
+        **rest, "diameters": reduced.matrices, "dofs": reduced.rows,
+        "cyclic": {**kept, "axis": list(ends.axis)}, "reduction": was,
+    }, reduced  # fmt: skip
+
+
+def _reduced(
+    tables: Mapping[str, Any], found: MatrixSet, ends: Boundaries, keep: int, orders: list[int]
+) -> ReducedSector:
+    """The sector at the nodal diameters that its engine orders meet, or all where parts may be mistuned."""
+    sectors, matrices = tables["sectors"], {key: csr_array(each) for key, each in found.matrices.items()}
     try:
         dofs = DofTable.read(tables.get("dofs")).write()
         gone = ends.elimination(matrices["M"].shape[0], sectors)
         parts = parts_to_reduce(tables.get("mistuning"), found)
         met = tuple(range(sectors // 2 + 1)) if parts else diameters_met(orders, sectors)
-        reduced = reduce_sector(matrices, gone, dofs, keep, met, sectors, parts)
+        return reduce_sector(matrices, gone, dofs, keep, met, sectors, parts)
     except ValueError as error:
         raise SceneError.of(("structure", "dofs"), str(error), named=False) from error
-    return {
-        **{key: value for key, value in tables.items() if key not in matrices and key != "parts"},
-        **drawn,
-        "diameters": reduced.matrices,
-        "dofs": reduced.rows,
-        "cyclic": {**kept, "axis": list(ends.axis)},
-        "reduction": {
-            "dofs": matrices["M"].shape[0], "modes": reduced.modes, "highest_hz": reduced.highest_hz,
-        },
-    }, reduced  # fmt: skip
 
 
 def parts_to_reduce(mistuning: object, found: MatrixSet) -> dict[str, Any]:

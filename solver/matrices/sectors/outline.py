@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -12,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.matrices.sectors.elements import drawn_edges
-from solver.matrices.values import ByContent, frozen
+from solver.matrices.values import ByContent
 
 if TYPE_CHECKING:
     from solver.matrices.decks.deck import Deck
@@ -51,7 +50,7 @@ class SectorOutline(ByContent):
     digest: str = field(init=False)
 
     def __post_init__(self) -> None:
-        found = hashlib.sha256()
+        kept: dict[str, NDArray[Any]] = {}
         for key, kind, shape, most in (
             ("points", np.float64, (-1, 3), MOST_POINTS), ("edges", np.int64, (-1, 2), MOST_EDGES),
             ("low", np.int64, (-1,), MOST_POINTS), ("high", np.int64, (-1,), MOST_POINTS),
@@ -67,13 +66,12 @@ class SectorOutline(ByContent):
             array = np.array(given, dtype=kind)
             if kind is np.float64 and not np.isfinite(array).all():
                 raise ValueError(f"`{key}` of the outline must hold finite numbers")
-            object.__setattr__(self, key, frozen(array))
-            found.update(key.encode() + repr(array.shape).encode() + array.tobytes())
+            kept[key] = array
+        self._hold(kept)
         for key in KEYS[1:]:
-            rows = getattr(self, key)
+            rows = kept[key]
             if rows.size and not 0 <= rows.min() <= rows.max() < len(self.points):
                 raise ValueError(f"`{key}` of the outline must name points from 0 to {len(self.points) - 1}")
-        object.__setattr__(self, "digest", found.hexdigest())
 
     def __repr__(self) -> str:
         return f"SectorOutline({len(self.points)} points, {len(self.edges)} edges, {self.digest[:12]})"

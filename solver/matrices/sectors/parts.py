@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -11,12 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.matrices.values import Matrix, Named, frozen
+from solver.matrices.validation import differs
+from solver.matrices.values import ByContent, Matrix, Named
 
 ComplexArray = NDArray[np.complex128]
 WHOLE = ("K", "M")  # names for the stiffness and the mass of a whole sector
 _NAME = re.compile(r"[A-Za-z0-9_-]{1,80}")
-_ASYMMETRY = 1e-8
 
 
 def check_part_names(names: Sequence[object]) -> None:
@@ -52,8 +51,7 @@ class PartMatrices(Named):
                 table[name] = Matrix.read(given)
             except ValueError as error:
                 raise ValueError(f"`parts`: {name!r}: {error}") from error
-            array = table[name].array
-            if np.abs(array - array.T).max() > _ASYMMETRY * np.abs(array).max():
+            if differs(table[name].array, table[name].array.T):
                 raise ValueError(f"`parts`: {name!r} must be symmetric")
         return cls(table)
 
@@ -63,7 +61,7 @@ class PartMatrices(Named):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PartsAcross:
+class PartsAcross(ByContent):
     """Parts P of a sector that was reduced with a basis T(n) at each nodal diameter: P between all of them.
 
     A mistuned disk is no wave: its nodal diameters move together. Of a part with the factor 1 + δ_j in sector
@@ -91,7 +89,7 @@ class PartsAcross:
         if not self.names or len(set(self.names)) < len(self.names):
             raise ValueError("`parts` must have names, each once")
         check_part_names([name for name in self.names if name not in WHOLE])
-        found = hashlib.sha256(repr(self.names).encode())
+        kept = {}
         for key, given in (("ahead", self.ahead), ("back", self.back)):
             array = np.array(given, dtype=np.complex128)
             shape = array.shape
@@ -101,13 +99,12 @@ class PartsAcross:
                 raise ValueError(f"`parts`: `{key}` must hold finite numbers")
             turned = array.transpose(0, 2, 1, 4, 3)
             turned = turned.conj() if key == "ahead" else turned
-            if np.abs(array - turned).max() > _ASYMMETRY * np.abs(array).max():
+            if differs(array, turned):
                 raise ValueError(f"`parts`: `{key}` must be that of a symmetric matrix")
-            object.__setattr__(self, key, frozen(array))
-            found.update(key.encode() + array.tobytes())
+            kept[key] = array
         if self.ahead.shape != self.back.shape:
             raise ValueError("`parts`: `ahead` and `back` must be of one size")
-        object.__setattr__(self, "digest", found.hexdigest())
+        self._hold(kept, self.names)
 
     def check(self, diameters: int, size: int) -> None:
         """Raise ValueError unless they are of so many nodal diameters and coordinates."""
