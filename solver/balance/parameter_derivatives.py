@@ -155,10 +155,15 @@ def modal_dampings(balance: Balance, parameters: Sequence[Parameter]) -> dict[in
     return {i: values[which][system.which] for i, which in of.items() if which is not None}
 
 
-def matrices_of_paths(balance: Balance, parameters: Sequence[Parameter]) -> HarmonicMatrices | None:
-    """Return the linear part as matrices where a parameter needs them, one of the structure, else None."""
+def matrices_of_paths(
+    balance: Balance, parameters: Sequence[Parameter], *, whole: bool = False
+) -> HarmonicMatrices | None:
+    """Return the linear part as matrices where a parameter needs them, one of the structure, else None.
+
+    `whole`: also where modes carry it, see `modal_dampings`.
+    """
     structural = {i: p.path for i, p in enumerate(parameters) if p.kind is Kind.STRUCTURE}
-    if not structural or modal_dampings(balance, parameters):
+    if not structural or (modal_dampings(balance, parameters) and not whole):
         return None
     scene, ks = balance.scene, balance.system.ks
     model = linear_model(scene)

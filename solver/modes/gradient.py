@@ -14,13 +14,18 @@ from typing import Annotated, cast
 
 import numpy as np
 
-from solver.balance.parameter import Kind, Parameter
-from solver.balance.parameter_derivatives import contact_slopes, excitation_slopes, force_along, resolved
+from solver.balance.parameter import Kind
+from solver.balance.parameter_derivatives import (
+    HarmonicMatrices,
+    contact_slopes,
+    excitation_slopes,
+    force_along,
+    matrices_of_paths,
+    resolved,
+)
 from solver.balance.speed_line import check_no_line
 from solver.errors import SettingError
 from solver.jit.fourier import Complex, Real
-from solver.linear.assembly import linear_model, structure_derivative
-from solver.linear.condensation import term_amplitudes
 from solver.linear.model import dynamic_stiffness
 from solver.modes.corrector import ModeState, scales
 from solver.modes.equations import Equations, Evaluated
@@ -97,6 +102,7 @@ class ModeSensitivities:
         check_no_line(balance.scene)
         self._parameters = resolved(balance, paths)
         self._slopes, self._loads = contact_slopes(balance, self._parameters)
+        self._matrices = matrices_of_paths(balance, self._parameters, whole=True)
 
     def at(self, state: ModeState) -> tuple[Real, Real]:
         """Return the derivatives of ω [rad/s] and ζ by the paths at a point."""
@@ -148,7 +154,7 @@ class ModeSensitivities:
         """Return what path i changes."""
         parameter, s = self._parameters[i], self._equations.structure
         if parameter.kind is Kind.STRUCTURE:
-            return self._of_structure(parameter, state, at)
+            return self._of_structure(i, state, at)
         pushes = np.zeros(at.x.shape, np.complex128)
         system = self._equations.balance.system
         if parameter.kind is Kind.LEVEL:
@@ -176,46 +182,35 @@ class ModeSensitivities:
             )
         return found
 
-    def _of_structure(self, parameter: Parameter, state: ModeState, at: Evaluated) -> _Change:
+    def _of_structure(self, i: int, state: ModeState, at: Evaluated) -> _Change:
         """Return what a parameter of the structure, of bodies or of places changes."""
-        s, scene, ks = self._equations.structure, self._equations.balance.scene, self._equations.structure.ks
-        model, d = linear_model(scene), structure_derivative(scene, parameter.path)
-        diameters = model.diameters(ks)
-        dK, dC, dM = d.at(diameters, s.moving)
+        s, given = self._equations.structure, cast(HarmonicMatrices, self._matrices)
         omega, zeta = float(state.y[-2]), float(state.y[-1])
+        dK, dC, dM = given.by[i]
         x = (s.shapes @ at.x[:, :, None])[:, :, 0]
-        dZ, *_ = dynamic_stiffness(dK, dC - 2.0 * zeta * omega * dM, dM, ks[:, None, None], omega)
-        pushes = -(dZ @ x[:, :, None])[:, :, 0]
-        moved = None
-        if d.contact_here is not None and d.contact_next is not None:
-            pushes, moved = self._of_places(parameter, pushes, x)
-        if d.forces and ks[0] == 0:
-            pushes[0] += term_amplitudes(d.forces, x.shape[1], ks)[0]
+        dZ, *_ = dynamic_stiffness(dK, dC - 2.0 * zeta * omega * dM, dM, s.ks[:, None, None], omega)
+        pushes, moved = -(dZ @ x[:, :, None])[:, :, 0], None
+        if i in given.forces_by:
+            pushes += given.forces_by[i]
+        if i in given.motions_by:
+            pushes, moved = self._of_places(given, given.motions_by[i], pushes, x)
         back = np.swapaxes(s.shapes, 1, 2).conj()
-        whole = np.where(s.moving[:, None, None], dM, 0.0)
-        amplitude = float(np.vdot(x, (whole @ x[:, :, None])[:, :, 0]).real)
+        amplitude = float(np.vdot(x, (dM @ x[:, :, None])[:, :, 0]).real)
         return _Change(pushes=(back @ pushes[:, :, None])[:, :, 0], moved=moved, amplitude=amplitude)
 
-    def _of_places(self, parameter: Parameter, pushes: Complex, x: Complex) -> tuple[Complex, Complex]:
+    def _of_places(
+        self, given: HarmonicMatrices, dL: Complex, pushes: Complex, x: Complex
+    ) -> tuple[Complex, Complex]:
         """Return the pushes with those of moved contacts, and the motions ∂L x of the leading ports."""
-        equations, s = self._equations, self._equations.structure
-        balance = equations.balance
-        model = linear_model(balance.scene)
-        d = structure_derivative(balance.scene, parameter.path)
-        here, beyond = cast(Real, d.contact_here), cast(Real, d.contact_next)
-        turn = model.turns(model.diameters(s.ks))[:, None, None]
-        dL = here + beyond * turn
-        forces = equations.amplitudes.of(equations.point.F)
-        pushes = pushes - (np.swapaxes(dL, 1, 2).conj() @ forces.T[:, :, None])[:, :, 0]
-        moved = (dL @ x[:, :, None])[:, :, 0]
-        # The stiffness moved into the structure stays where the contacts were: its force follows L x.
-        extra = balance.system.shift[:, None] * moved.T
-        led = moved[:, balance.system.leading]
+        equations, system = self._equations, self._equations.balance.system
+        hat, moved = equations.amplitudes, np.einsum("kcn,kn->ck", dL, x)
+        # The stiffness moved into the structure is in ∂Z, where it follows the contacts.
+        forces = hat.of(equations.point.F) - system.shift[:, None] * np.einsum("kcn,kn->ck", given.L, x)
+        pushes = pushes - np.einsum("kcn,ck->kn", dL.conj(), forces)
+        led = moved[system.leading]
         if equations.span is not None:
             # The other ports no longer follow from the leading ones as they did.
-            off = equations.amplitudes.coefficients(moved.T - equations.span @ led.T)
-            turned = np.einsum("cdij,dj->ci", equations.port_slopes(), off)
-            extra = extra + equations.amplitudes.of(turned)
-        L = model.ports_at(model.diameters(s.ks))
-        pushes = pushes - (np.swapaxes(L, 1, 2).conj() @ extra.T[:, :, None])[:, :, 0]
-        return pushes, led
+            off = hat.coefficients(moved - equations.span @ led)
+            turned = hat.of(np.einsum("cdij,dj->ci", equations.port_slopes(), off))
+            pushes = pushes - np.einsum("kcn,ck->kn", given.L.conj(), turned)
+        return pushes, led.T

@@ -115,11 +115,6 @@ def matrices(model: LinearModel, k: int) -> tuple[Complex, Complex, Complex]:
     return K, C, model.ports_at(n)[0]
 
 
-def mass(model: LinearModel, k: int) -> Complex:
-    """Return M [kg] as harmonic k sees it."""
-    return np.asarray(model.plain(model.diameters(np.array([k], dtype=np.int64)))[2][0])
-
-
 def _check_converged(solution: Solution) -> None:
     if not solution.converged:
         raise SettingError("solution", solution.status.value, "must have converged")

@@ -23,7 +23,6 @@ from solver.balance.contact_hessian import (
     check_measure,
     contact_forces,
 )
-from solver.balance.dynamic_stiffness import WholeMotion, times, whole_motion
 from solver.balance.kernels.jacobian import factorise, step_back
 from solver.balance.parameter import Kind
 from solver.balance.parameter_derivatives import (
@@ -36,6 +35,7 @@ from solver.balance.parameter_derivatives import (
     resolved,
 )
 from solver.balance.speed_line import check_no_line
+from solver.balance.whole_motion import WholeMotion, times, whole_motion
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.columns import KT, MU
 from solver.contacts.kernels.system import evaluation_by_value
@@ -305,8 +305,8 @@ class Sensitivities:
 
     def _add_other_law(self, e: int, u: Real, omega: float, weights: Real, slopes: Real) -> None:
         """Add w·∂F/∂p of an element that follows another law: its force once for each path that acts."""
-        ports = slice(*self.balance.system.first_port[e : e + 2].tolist())
-        motions = u[: weights.size].reshape(weights.shape)[ports]
+        ports, n = slice(*self.balance.system.first_port[e : e + 2].tolist()), self.balance.n_coefficients
+        motions = u[ports.start * n : ports.stop * n].reshape(-1, n)
         for i in np.flatnonzero(np.any(self._slopes[:, e] != 0.0, axis=1)):
             along = self._slopes[i, e], self._loads[i, e]
             _, dF_dp, _ = force_along(self.balance, self._point, e, motions, omega, *along)

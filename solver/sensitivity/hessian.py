@@ -19,7 +19,7 @@ from typing import Annotated
 import numpy as np
 
 from solver.balance.contact_hessian import ContactForces, second_forces
-from solver.balance.dynamic_stiffness import WholeMotion, times, times_transposed
+from solver.balance.whole_motion import WholeMotion, times, times_transposed
 from solver.contacts.load_derivatives import second_loads
 from solver.jit.fourier import Complex, Integer, Real
 from solver.results.told import Piece

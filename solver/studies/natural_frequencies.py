@@ -10,7 +10,6 @@ from solver.jit.fourier import Complex, Real
 from solver.linear.assembly import linear_model
 from solver.linear.model import LinearModel
 from solver.matrices.normal_modes import undamped_modes
-from solver.response.time_history import mass, matrices
 from solver.scene.cyclic.annulus import written_out
 from solver.scene.scene import Scene
 
@@ -26,14 +25,16 @@ def natural_frequencies(scene: Scene, *, stuck: bool) -> Real:
     """
     scene = written_out(scene)
     model = linear_model(scene)
-    (K, _, L), M = matrices(model, 1), mass(model, 1)
+    one = np.ones(1, np.int64)
+    n = model.diameters(one)
+    (K,), _, (M,) = model.at(n, one > 0)
+    (L,) = model.ports_at(n)
     if stuck:
         stiffness = np.array([k for contact in scene.contacts for k in contact.stiffnesses])
         K = K + L.conj().T @ (stiffness[:, None] * L)
     if model.line is not None:
         return _along_line(K, model)
     if model.extra is not None:
-        n = model.diameters(np.ones(1, np.int64))
         C = model.extra.at(model.turns(n), np.ones(1, np.bool_), lambda: model.plain(n)[0])[1][0]
         free = model.free
         return _of_poles(K[free][:, free], C[free][:, free], M[free][:, free])
