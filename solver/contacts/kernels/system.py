@@ -26,9 +26,10 @@ from typing import NamedTuple, cast
 import numpy as np
 from numba.experimental import structref
 
-from solver.contacts.kernels.stick_slip_events import SEGMENT_COLUMNS, segment_capacity
+from solver.contacts.kernels.stick_slip_events import new_segments
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Complex, Index, Integer, Real, coefficient_count
+from solver.jit.records import Records
 from solver.jit.reference import Reference
 
 # What λ is, where it is no column of the contact table.
@@ -135,7 +136,7 @@ class Evaluation(NamedTuple):
     states: Integer  # (ne,)
     pieces: Integer  # (ne,) which smooth piece of its law a contact is on, see `events.piece_of`
     slopes: Real  # (nc,) ∂F/∂U of a port whose force is a spring's (stuck, pressed, separated), else NaN
-    segments: Real  # scratch
+    segments: Records  # scratch
     jacobian: Real  # (nt, nt) dr/du
     lu: Real  # (nt + 1, nt + 1) factors of the condensed, perhaps bordered, Jacobian in their leading block
     pivots: Index  # (nt + 1,)
@@ -303,7 +304,7 @@ def _new_evaluation(system: System, spanned: bool) -> Evaluation:
         np.zeros(nt), np.zeros(nt), np.zeros((nc, n)), np.zeros((blocks, n, n)), np.zeros((nc, n)),
         np.zeros(n), np.zeros(n), np.zeros((n, coefficient_count(system.load_ks))), np.zeros(ne, np.int64),
         np.zeros(ne, np.int64), np.zeros(nc),
-        np.zeros((segment_capacity(max(system.ks[-1], system.load_ks[-1])), SEGMENT_COLUMNS)),
+        new_segments(max(system.ks[-1], system.load_ks[-1])),
         np.empty((whole, whole)),
         np.empty((size + 1, size + 1)), np.zeros(nt + 1, np.int32), np.zeros(nc, np.int64),
         np.zeros(nc, np.int64), np.zeros(COUNTS, np.int64), np.zeros((blocks, n, n)),

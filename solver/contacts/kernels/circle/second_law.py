@@ -11,7 +11,7 @@ import numpy as np
 
 from solver.contacts.kernels.circle.hessian import circle_second
 from solver.contacts.kernels.circle.law import whole_path
-from solver.contacts.kernels.circle.state import FOUND_SIZE, INTERVALS
+from solver.contacts.kernels.circle.state import FOUND
 from solver.contacts.kernels.columns import KT, KT_SECOND, MU
 from solver.contacts.kernels.coulomb.law import with_second
 from solver.contacts.kernels.coulomb.second_law import tie_second
@@ -52,14 +52,14 @@ def circle_law_second(
     if not rubs:
         motion, direction, weights = _without_friction(U, dU, w, given, moved)
     top = merged(ks, load_ks)[-1]
-    intervals, found = np.empty((top + 2, 2)), np.zeros(FOUND_SIZE)
+    intervals, found = np.empty((top + 2, 2)), np.zeros(1, FOUND)
     state, pieces, panels = whole_path(
         motion, ks, load, load_ks, given, cos_table, sin_table, found, intervals
     )
     if state < 0 or state == FAILED:
         return FAILED
     circle_second(
-        motion, ks, load, load_ks, given, state, found, pieces, panels, intervals[: int(found[INTERVALS])],
+        motion, ks, load, load_ks, given, state, found, pieces, panels, intervals[: found[0].intervals],
         weights, direction, moved, dload, out_U, out_row, out_load,
     )  # fmt: skip
     tie_second(row, out_row)

@@ -21,17 +21,15 @@ from solver.contacts.kernels.coulomb.force import add_moments, bases_at, contact
 from solver.contacts.kernels.coulomb.hessian import second_along
 from solver.contacts.kernels.coulomb.law import with_second
 from solver.contacts.kernels.stick_slip_events import (
-    BEGIN,
-    END,
     FAILED,
     LIFTING,
-    SEGMENT_COLUMNS,
     SEPARATED,
-    segment_capacity,
+    new_segments,
 )
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Integer, Real, coefficient_count, merged, positions
 from solver.jit.lapack import dot, fill, fill_block
+from solver.jit.records import Records
 from solver.jit.separate import apart
 
 
@@ -45,8 +43,8 @@ def weight_at(ks: Integer, w: Real, e: Real) -> float:
 @apart
 def _along_line(
     u: Real, ks: Integer, N: Real, all_ks: Integer, kt: float, mu: float, cos_table: Real, sin_table: Real,
-    w: Real, du: Real, dN: Real, dkt: float, dmu: float, segments: Real, out_u: Real, by_N: Real, g_N: Real,
-    rates: Real,
+    w: Real, du: Real, dN: Real, dkt: float, dmu: float, segments: Records, out_u: Real, by_N: Real,
+    g_N: Real, rates: Real,
 ) -> tuple[int, int]:  # fmt: skip
     """Differentiate the gradient of w·T of one direction; return its state and how many segments it has.
 
@@ -90,7 +88,7 @@ def _along_line(
 
 @apart
 def _pressing(
-    N: Real, all_ks: Integer, ks: Integer, state: int, segments: Real, count: int, w: Real, dN: Real,
+    N: Real, all_ks: Integer, ks: Integer, state: int, segments: Records, count: int, w: Real, dN: Real,
     of_motion: Integer, by_N: Real, g_N: Real,
 ) -> None:  # fmt: skip
     """Add the same of w·P, P the coefficients of max(N, 0)."""
@@ -105,12 +103,12 @@ def _pressing(
     cosines, sines, block = np.zeros(top + 1), np.zeros(top + 1), np.empty((n, size))
     over, slopes, e, de = np.empty(size), np.empty(size), np.empty(n), np.empty(n)
     for index in range(count):
-        begin, end = segments[index, BEGIN], segments[index, END]
+        begin, end = segments[index].begin, segments[index].end
         add_moments(begin, end, 1.0, cosines, sines)
         for side in range(2):
-            if side == 0 and index > 0 and segments[index - 1, END] == begin:
+            if side == 0 and index > 0 and segments[index - 1].end == begin:
                 continue
-            if side == 1 and index + 1 < count and segments[index + 1, BEGIN] == end:
+            if side == 1 and index + 1 < count and segments[index + 1].begin == end:
                 continue
             tau = begin if side == 0 else end
             bases_at(tau, all_ks, over, slopes)
@@ -150,7 +148,7 @@ def _rubbing(
             dN[of_motion[i]] += drow[KN] * v[i] + row[KN] * dv[i]
     fill_block(out_U, 0.0)
     fill(out_row, 0.0)
-    segments = np.zeros((segment_capacity(max(ks[-1], all_ks[-1])), SEGMENT_COLUMNS))
+    segments = new_segments(max(ks[-1], all_ks[-1]))
     rates, state, count = np.zeros(2), 0, 0
     for a in range(directions):
         column = KT if a == 0 else second
