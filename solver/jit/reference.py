@@ -7,6 +7,8 @@ from typing import Any
 
 import numba
 
+from solver.jit.setting import PLAIN
+
 
 class Reference(numba.types.StructRef):
     """A record by reference.
@@ -17,5 +19,7 @@ class Reference(numba.types.StructRef):
 
     def __init__(self, fields: Any) -> None:
         super().__init__(fields)
+        if PLAIN:
+            return
         long: str = self.name
         self.name: str = f"{type(self).__name__}.{zlib.crc32(long.encode()):08x}"

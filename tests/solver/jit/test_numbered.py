@@ -11,7 +11,7 @@ from numba import types
 
 from solver.contacts.kernels.columns import KERNELS
 from solver.contacts.kernels.laws import call_law, law_number
-from solver.jit.separate import watched
+from solver.jit.slots import watched
 
 
 class Noted:
