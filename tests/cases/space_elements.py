@@ -9,9 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from solver.contacts.kernels.circle import hessian as circle_hessian
-from solver.contacts.kernels.circle.law import circle_path, coulomb_circle
-from solver.contacts.kernels.circle.state import FOUND, new_tables
+from solver.contacts.kernels.circle.law import coulomb_circle
+from solver.contacts.kernels.circle.second_law import circle_law_second
 from solver.contacts.kernels.columns import COLUMNS, KN, KT, KT_SECOND, MU, PRESTRESSED
 from solver.contacts.kernels.coulomb.law import coulomb_box
 from solver.contacts.kernels.stick_slip_events import new_segments
@@ -99,18 +98,10 @@ def gradient(element: Element, w: np.ndarray) -> tuple[np.ndarray, int]:
 
 def second(element: Element, w: np.ndarray, direction: Element) -> np.ndarray:
     """Derivative of `gradient` along a direction, by the kernel."""
-    m, n = element.U.shape
-    found, intervals = np.zeros(1, FOUND), np.empty((element.top + 2, 2))
-    pieces, panels = new_tables(element.top, 16)
-    state = circle_path(
-        element.U, element.ks, element.load, LOAD_KS, element.row, *element.tables, pieces, panels, found,
-        intervals,
-    )  # fmt: skip
-    by_U, by_row, by_load = np.empty((m, n)), np.empty(COLUMNS), np.empty(3)
-    circle_hessian.circle_second(
-        element.U, element.ks, element.load, LOAD_KS, element.row, state, found, pieces, panels,
-        intervals[: int(found["intervals"][0])], w, direction.U, direction.row, direction.load, by_U, by_row,
-        by_load,
+    by_U, by_row, by_load = np.empty(element.U.shape), np.empty(COLUMNS), np.empty(3)
+    circle_law_second(
+        element.U, element.ks, element.load, LOAD_KS, element.row, *element.tables, w, direction.U,
+        direction.row, direction.load, by_U, by_row, by_load,
     )  # fmt: skip
     return np.concatenate([by_U.ravel(), by_row[list(NUMBERS)], by_load])
 

@@ -32,20 +32,6 @@ STUCK_COS, STUCK_SIN, ALONG_COS, ALONG_SIN, ACROSS_COS, ACROSS_SIN = 0, 1, 2, 3,
 
 
 @compiled
-def moments_between(begin: Number, end: Number, cosines: Array, sines: Array) -> None:
-    """Set ∫cos qτ and ∫sin qτ over [begin, end]; see `solver.contacts.kernels.coulomb.force.add_moments`."""
-    half, middle = 0.5 * (end - begin), 0.5 * (end + begin)
-    cm1, sm1, ch1, sh1 = np.cos(middle), np.sin(middle), np.cos(half), np.sin(half)
-    cm, sm, ch, sh = cm1, sm1, ch1, sh1
-    cosines[0], sines[0] = end - begin, 0.0
-    for q in range(1, cosines.size):
-        factor = 2.0 * sh / q
-        cosines[q], sines[q] = factor * cm, factor * sm
-        cm, sm = cm * cm1 - sm * sm1, sm * cm1 + cm * sm1
-        ch, sh = ch * ch1 - sh * sh1, sh * ch1 + ch * sh1
-
-
-@compiled
 def _slip_moments(cosines: Array, sines: Array, along: Array, across: Array, sums: Array) -> None:
     """Add along·(cos qτ, sin qτ) and across·(…) at the nodes to the sums over slips, two nodes at once.
 

@@ -10,11 +10,11 @@ import math
 
 import numpy as np
 
-from solver.contacts.kernels.circle.adjoint import STUCK_COS, STUCK_SIN, moments_between
+from solver.contacts.kernels.circle.adjoint import STUCK_COS, STUCK_SIN
 from solver.contacts.kernels.circle.panels import Array, X, Y, curves_at
 from solver.contacts.kernels.circle.radau import NODES, STAGES, WEIGHTS
 from solver.contacts.kernels.circle.state import SETTLES
-from solver.contacts.kernels.coulomb.force import basis_at, moment_rows, products
+from solver.contacts.kernels.coulomb.force import add_moments, basis_at, moment_rows, products
 from solver.contacts.kernels.stick_slip_events import STICK
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Integer, Real, coefficient_count
@@ -57,7 +57,8 @@ def circle_force(
             for p in range(row.first, row.first + row.count):
                 _add_panel(waves, ks, panels[p], moment, F)
             continue
-        moments_between(row.begin, row.end, here[0], here[1])
+        fill_block(here, 0.0)
+        add_moments(row.begin, row.end, 1.0, here[0], here[1])
         moment_rows(here[0], here[1], ks, moment)
         for q in range(sums.shape[1]):
             sums[STUCK_COS, q] += here[0, q]

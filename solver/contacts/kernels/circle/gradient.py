@@ -21,7 +21,6 @@ import numpy as np
 from solver.contacts.kernels.circle.adjoint import (
     STUCK_COS,
     STUCK_SIN,
-    moments_between,
     panel_back,
 )
 from solver.contacts.kernels.circle.force import pack
@@ -34,7 +33,7 @@ from solver.contacts.kernels.circle.panels import (
 from solver.contacts.kernels.circle.path import projection
 from solver.contacts.kernels.circle.radau import STAGES
 from solver.contacts.kernels.circle.state import CLOSES, SETTLES
-from solver.contacts.kernels.coulomb.force import bases_at, moment_rows, products
+from solver.contacts.kernels.coulomb.force import add_moments, bases_at, moment_rows, products
 from solver.contacts.kernels.stick_slip_events import AFTER_SEPARATION, STICK, UNLOADED
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Integer
@@ -70,8 +69,8 @@ def _stick_back(
     at = curves_at(waves, row.begin)
     bases_at(row.begin, all_ks, e, de)
     if active:
-        here = np.empty((2, sums.shape[1]), dtype)
-        moments_between(row.begin, row.end, here[0], here[1])
+        here = np.zeros((2, sums.shape[1]), dtype)
+        add_moments(row.begin, row.end, 1.0, here[0], here[1])
         moment_rows(here[0], here[1], ks, moment)
         for q in range(sums.shape[1]):
             sums[STUCK_COS, q] += here[0, q]

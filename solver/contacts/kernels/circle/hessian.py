@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from solver.contacts.kernels.circle.adjoint import moments_between
 from solver.contacts.kernels.circle.gradient import circle_gradient
 from solver.contacts.kernels.circle.law import curves_of
 from solver.contacts.kernels.circle.panels import (
@@ -27,12 +26,10 @@ from solver.contacts.kernels.circle.panels import (
 from solver.contacts.kernels.circle.path import CARRIED_PANEL, CARRIED_PIECE
 from solver.contacts.kernels.circle.radau import SLOPES, STAGES
 from solver.contacts.kernels.circle.state import CLOSES, OPENS, SETTLES
-from solver.contacts.kernels.columns import KN, KT, KT_SECOND, MU
-from solver.contacts.kernels.coulomb.force import products
-from solver.contacts.kernels.coulomb.law import load_of
-from solver.contacts.kernels.stick_slip_events import LIFTING, SEPARATED, SLIP, STICK, UNLOADED
+from solver.contacts.kernels.columns import KT, KT_SECOND, MU
+from solver.contacts.kernels.stick_slip_events import SLIP, STICK, UNLOADED
 from solver.jit.decorators import compiled
-from solver.jit.fourier import Integer, Real, coefficient_count, merged, positions
+from solver.jit.fourier import Integer, Real
 from solver.jit.records import Records, Row
 from solver.jit.separate import apart
 
@@ -201,71 +198,28 @@ def _carried(
 
 
 @apart
-def circle_second(
-    U: Real, ks: Integer, load: Real, load_ks: Integer, row: Real, state: int, found: Records,
-    pieces: Records, panels: Records, intervals: Real, w: Real, dU: Real, drow: Real, dload: Real,
-    out_U: Real, out_row: Real, out_load: Real,
+def carried_gradient(
+    U: Array, ks: Integer, all_ks: Integer, of_motion: Integer, N: Array, row: Array, found: Records,
+    pieces: Records, panels: Records, w: Real, by_U: Array, by_row: Array, by_N: Array,
 ) -> None:  # fmt: skip
-    """Differentiate the gradient of w·F by (U, row, load) along a direction (dU, drow, dload).
+    """Add the gradient of the weighted friction by the two motions, the row and the load, at complex numbers.
 
-    Parameters
-    ----------
-    U (m, n), ks, load, load_ks, row : the contact, as for `solver.contacts.kernels.circle.law`.
-    state, found, pieces, panels, intervals : what `solver.contacts.kernels.circle.law.circle_path` left.
-    w : (m, n) weights of the force coefficients.
-    dU (m, n), drow (COLUMNS,), dload : the direction; of the columns KT, KT_SECOND, MU and KN count.
-    out_U (m, n), out_row (COLUMNS,), out_load : filled with Σ w ∂²F along the direction.
+    `found`, `pieces` and `panels` are the real ones of `solver.contacts.kernels.circle.law.circle_path`.
     """
-    m, n = U.shape
-    turned, moved = np.empty((m, n), np.complex128), np.empty(row.size, np.complex128)
-    pressed = np.empty(load.size, np.complex128)
-    for a in range(m):
-        for i in range(n):
-            turned[a, i] = U[a, i] + 1j * TINY * dU[a, i]
-    for j in range(row.size):
-        moved[j] = row[j] + 1j * TINY * drow[j]
-    for j in range(load.size):
-        pressed[j] = load[j] + 1j * TINY * dload[j]
-    by_U, by_row = np.zeros((m, n), np.complex128), np.zeros(row.size, np.complex128)
-    by_load = np.zeros(load.size, np.complex128)
-    if state != SEPARATED:
-        _gradient_of(
-            turned, ks, pressed, load_ks, moved, state, found, pieces, panels, intervals, w, by_U, by_row,
-            by_load,
-        )  # fmt: skip
-    for a in range(m):
-        for i in range(n):
-            out_U[a, i] = by_U[a, i].imag / TINY
-    for j in range(row.size):
-        out_row[j] = by_row[j].imag / TINY
-    for j in range(load.size):
-        out_load[j] = by_load[j].imag / TINY
-
-
-@apart
-def _gradient_of(
-    U: Array, ks: Integer, load: Array, load_ks: Integer, row: Array, state: int, found: Records,
-    pieces: Records, panels: Records, intervals: Real, w: Real, by_U: Array, by_row: Array, by_load: Array,
-) -> None:  # fmt: skip
-    """Fill the gradient of w·F by motions, columns and load at complex numbers."""
-    m, n = U.shape
-    all_ks = merged(ks, load_ks)
-    size, of_motion, of_load = coefficient_count(all_ks), positions(ks, all_ks), positions(load_ks, all_ks)
-    N, by_N = np.empty(size, np.complex128), np.zeros(size, np.complex128)
-    load_of(U, 2, load, row[KN], of_motion, of_load, N)
+    n, size = U.shape[1], N.size
     waves = np.empty((3, 2, all_ks[-1] + 1), np.complex128)
     kt, second, mu = row[KT], row[KT_SECOND], row[MU]
     curves_of(U, ks, N, all_ks, kt, mu, waves)
     kappa = kt / second
     carried = np.empty(found[0].pieces, CARRIED_PIECE)
-    over = np.empty(found[0].panels, CARRIED_PANEL)
-    _carried(waves, kappa, found, pieces, panels, carried, over)
+    turned = np.empty(found[0].panels, CARRIED_PANEL)
+    _carried(waves, kappa, found, pieces, panels, carried, turned)
     weights = np.empty((1, 2, n), np.complex128)
     for a in range(2):
         for i in range(n):
             weights[0, a, i] = w[a, i]
     F, G = np.empty((2, n), np.complex128), np.empty((3, 3 * size + 1), np.complex128)
-    circle_gradient(waves, kappa, ks, all_ks, of_motion, found, carried, over, weights, F, G)
+    circle_gradient(waves, kappa, ks, all_ks, of_motion, found, carried, turned, weights, F, G)
     line = G[0]
     by_row[KT] += line[3 * size] / second
     by_row[KT_SECOND] -= line[3 * size] * kt / (second * second)
@@ -276,39 +230,4 @@ def _gradient_of(
         by_row[KT] += by_u * U[0, i] + by_w * U[1, i]
     for j in range(size):
         by_row[MU] += line[2 * size + j] * N[j]
-        by_N[j] = mu * line[2 * size + j]
-    if m > 2 and state == LIFTING:
-        _pressing(waves, ks, all_ks, intervals, w, N, by_N)
-    elif m > 2:
-        for i in range(n):
-            by_N[of_motion[i]] += w[2, i]
-    for j in range(load.size):
-        by_load[j] += by_N[of_load[j]]
-    if m > 2:
-        for i in range(n):
-            by_U[2, i] += row[KN] * by_N[of_motion[i]]
-            by_row[KN] += U[2, i] * by_N[of_motion[i]]
-
-
-@apart
-def _pressing(
-    waves: Array, ks: Integer, all_ks: Integer, intervals: Real, w: Real, N: Array, by_N: Array
-) -> None:
-    """Add the gradient of the weighted normal force of a contact that opens."""
-    n, size = w.shape[1], N.size
-    here, total = (
-        np.empty((2, ks[-1] + all_ks[-1] + 1), np.complex128),
-        np.zeros((2, ks[-1] + all_ks[-1] + 1), np.complex128),
-    )
-    for i in range(intervals.shape[0]):
-        begin = _zero_of_limit(waves, intervals[i, 0] + 0.0j)
-        end = _zero_of_limit(waves, intervals[i, 1] + 0.0j)
-        moments_between(begin, end, here[0], here[1])
-        for q in range(here.shape[1]):
-            total[0, q] += here[0, q]
-            total[1, q] += here[1, q]
-    block: Array = np.zeros((n, size), np.complex128)
-    products(total[0], total[1], ks, all_ks, 1.0, block)
-    for i in range(n):
-        for j in range(size):
-            by_N[j] += w[2, i] * block[i, j]
+        by_N[j] += mu * line[2 * size + j]

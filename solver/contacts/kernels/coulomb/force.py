@@ -39,15 +39,15 @@ from solver.jit.separate import apart
 
 
 @apart
-def add_moments(begin: float, end: float, weight: float, cosines: Real, sines: Real) -> None:
-    """Add weight·∫cos qτ and weight·∫sin qτ over [begin, end] for q = 0 … len − 1.
+def add_moments(begin: Any, end: Any, weight: float, cosines: NDArray[Any], sines: NDArray[Any]) -> None:
+    """Add weight·∫cos qτ and weight·∫sin qτ over [begin, end] for q = 0 … len − 1, real or complex.
 
     Written with half-length and middle, ∫cos qτ = (2/q) sin(q·half) cos(q·middle), which keeps full relative
     precision on the very short segments of stiff contacts.
     """
     half, middle = 0.5 * (end - begin), 0.5 * (end + begin)
-    cm1, sm1 = math.cos(middle), math.sin(middle)
-    ch1, sh1 = math.cos(half), math.sin(half)
+    cm1, sm1 = np.cos(middle), np.sin(middle)
+    ch1, sh1 = np.cos(half), np.sin(half)
     cm, sm, ch, sh = cm1, sm1, ch1, sh1
     cosines[0] += weight * (end - begin)
     for q in range(1, cosines.size):
