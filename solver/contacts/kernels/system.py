@@ -30,7 +30,7 @@ from solver.contacts.kernels.stick_slip_events import new_segments
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Complex, Index, Integer, Real, coefficient_count
 from solver.jit.records import Records
-from solver.jit.reference import Reference
+from solver.jit.reference import referenced
 
 # What λ is, where it is no column of the contact table.
 FREQUENCY, LEVEL, FORCE_PHASE, STRUCTURE = 0, 1, 2, 3
@@ -165,26 +165,7 @@ class Evaluation(NamedTuple):
 # than the work itself, and minutes of compilation.
 
 
-@structref.register
-class _SystemType(Reference):
-    """Numba's type of a `System` by reference."""
-
-
-@structref.register
-class _ReceptanceType(Reference):
-    """Numba's type of a `Receptance` by reference."""
-
-
-@structref.register
-class _EvaluationType(Reference):
-    """Numba's type of an `Evaluation` by reference."""
-
-
-class _SystemReference(structref.StructRefProxy):
-    """A `System` by reference."""
-
-
-class _ReceptanceReference(structref.StructRefProxy):
+class _ReceptanceProxy(structref.StructRefProxy):
     """A `Receptance` by reference."""
 
     @cached_property
@@ -193,7 +174,7 @@ class _ReceptanceReference(structref.StructRefProxy):
         return receptance_arrays(cast(Receptance, self))
 
 
-class _EvaluationReference(structref.StructRefProxy):
+class _EvaluationProxy(structref.StructRefProxy):
     """An `Evaluation` by reference."""
 
     @cached_property
@@ -202,13 +183,13 @@ class _EvaluationReference(structref.StructRefProxy):
         return evaluation_arrays(cast(Evaluation, self))
 
 
-structref.define_proxy(_SystemReference, _SystemType, list(System._fields))
-structref.define_proxy(_ReceptanceReference, _ReceptanceType, [*Receptance._fields, "filled"])
-structref.define_proxy(_EvaluationReference, _EvaluationType, list(Evaluation._fields))
-
-_new_system: Callable[..., System] = _SystemReference
-_receptance_of: Callable[..., Receptance] = _ReceptanceReference
-_evaluation_of: Callable[..., Evaluation] = _EvaluationReference
+_new_system: Callable[..., System] = referenced("System", __name__, System._fields)
+_receptance_of: Callable[..., Receptance] = referenced(
+    "Receptance", __name__, [*Receptance._fields, "filled"], _ReceptanceProxy
+)
+_evaluation_of: Callable[..., Evaluation] = referenced(
+    "Evaluation", __name__, Evaluation._fields, _EvaluationProxy
+)
 
 
 @compiled
@@ -219,7 +200,7 @@ def by_reference(system: System) -> System:
 
 def evaluation_by_value(point: Evaluation) -> Evaluation:
     """Return the arrays of an evaluation as a tuple that Python can read (views, not copies)."""
-    return cast(_EvaluationReference, point).arrays
+    return cast(_EvaluationProxy, point).arrays
 
 
 @compiled
@@ -242,7 +223,7 @@ def receptance_over(A: Complex, u_linear: Complex, B: Complex, x_linear: Complex
 
 def receptance_by_value(linear: Receptance) -> Receptance:
     """Return the arrays of a receptance as a tuple that Python can read (views, not copies)."""
-    return cast(_ReceptanceReference, linear).arrays
+    return cast(_ReceptanceProxy, linear).arrays
 
 
 def of_all_ports(system: System, linear: Receptance) -> Receptance:
