@@ -16,7 +16,7 @@ from scipy.linalg import lapack
 
 from solver import Branch
 from solver.contacts.kernels.coulomb.force import contact_force
-from solver.contacts.kernels.stick_slip_events import LIFTING, SEGMENT_COLUMNS, SLIPPING, segment_capacity
+from solver.contacts.kernels.stick_slip_events import LIFTING, SLIPPING, new_segments
 from solver.jit.fourier import Integer, Real
 
 SAMPLES = 12  # points of a branch at which its contacts are timed
@@ -113,7 +113,7 @@ def kernel_seconds(branch: Branch, point: int) -> float:
     table = np.array([(contact.kt, contact.mu) for contact in scene.contacts])
     motions = np.ascontiguousarray(branch.coefficients[point])
     n = motions.shape[1]
-    segments = np.zeros((segment_capacity(max(int(system.ks[-1]), 1)), SEGMENT_COLUMNS))
+    segments = new_segments(max(int(system.ks[-1]), 1))
     scratch = (segments, np.zeros((n, n)), np.zeros((2, n)), np.zeros((n, 3)), np.zeros(n))
     fixed = (motions, system.ks, loads, np.arange(2), table, system.cos_table, system.sin_table, *scratch)
     number = max(1, int(LEAST_SECONDS / (2e-6 * len(scene.contacts))))

@@ -7,7 +7,7 @@ import numpy as np
 from benchmarks.harness import expect, table, timed
 from solver.contacts.kernels.circle.law import KN, KT_SECOND, coulomb_circle
 from solver.contacts.kernels.columns import COLUMNS, KT, MU
-from solver.contacts.kernels.stick_slip_events import SEGMENT_COLUMNS, segment_capacity
+from solver.contacts.kernels.stick_slip_events import new_segments
 from solver.jit import fourier
 from solver.jit.fourier import Real
 from solver.jit.trig_polynomial import grid_size, grid_tables
@@ -33,7 +33,7 @@ def _force(U: Real, load: Real) -> tuple[Real, float]:
     F, dF_dU, dF_dp = np.empty((m, n)), np.empty((m * m, n, n)), np.empty((m, n))
     ks, load_ks = fourier.all_harmonics(top), fourier.all_harmonics(1)
     tables, nothing = grid_tables(grid_size(top), top), np.zeros(COLUMNS)
-    segments = np.zeros((segment_capacity(top), SEGMENT_COLUMNS))
+    segments = new_segments(top)
 
     def call() -> None:
         for _ in range(CALLS if top == HARMONICS else 1):

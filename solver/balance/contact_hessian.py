@@ -15,7 +15,7 @@ from solver.balance.kernels.residual import contact_values
 from solver.balance.parameter import Parameter
 from solver.contacts.kernels.laws import law_force
 from solver.contacts.kernels.second_laws import law_second
-from solver.contacts.kernels.stick_slip_events import FAILED, SEGMENT_COLUMNS, segment_capacity
+from solver.contacts.kernels.stick_slip_events import FAILED, new_segments
 from solver.contacts.kernels.system import System
 from solver.contacts.laws.base import without_second
 from solver.contacts.load_derivatives import contradicting
@@ -76,7 +76,7 @@ class ContactForces:
         system, U = self.system, self.U[self.ports(e)]
         m, n = U.shape
         F, dF_dU, dF_dp = np.empty((m, n)), np.empty((m * m, n, n)), np.empty((m, n))
-        segments = np.zeros((segment_capacity(int(max(system.ks[-1], system.load_ks[-1]))), SEGMENT_COLUMNS))
+        segments = new_segments(int(max(system.ks[-1], system.load_ks[-1])))
         state, _ = law_force(
             system.laws[e], U, system.ks, self.load[e], system.load_ks, self.table[e], slope, dload,
             system.cos_table, system.sin_table, segments, F, dF_dU, dF_dp,

@@ -6,17 +6,7 @@ import math
 
 import numpy as np
 
-from solver.contacts.kernels.stick_slip_events import (
-    AFTER_SLIP,
-    BEGAN,
-    BEGIN,
-    DIRECTION,
-    END,
-    MOTION,
-    ONSET,
-    SLIP,
-    UNLOADED,
-)
+from solver.contacts.kernels.stick_slip_events import AFTER_SLIP, SLIP, UNLOADED
 from solver.contacts.segments import segments_of
 from solver.jit import fourier
 from solver.jit.fourier import Real
@@ -32,14 +22,14 @@ def force_by_segments(slip: Real, load: Real, kt: float, mu: float, tau: Real) -
     force = np.zeros(tau.size)
     for row in segments_of(slip, load, kt, mu).rows:
         # A segment may reach beyond the period it began in.
-        inside = (tau - row[BEGIN]) % (2.0 * math.pi) <= row[END] - row[BEGIN]
-        here, onset = tau[inside], np.array([row[ONSET]])
-        if row[MOTION] == SLIP:
-            force[inside] = row[DIRECTION] * mu * _at(load, here)
-        elif row[BEGAN] == UNLOADED:
+        inside = (tau - row.begin) % (2.0 * math.pi) <= row.end - row.begin
+        here, onset = tau[inside], np.array([row.onset])
+        if row.motion == SLIP:
+            force[inside] = row.direction * mu * _at(load, here)
+        elif row.began == UNLOADED:
             force[inside] = kt * _at(slip, here)
         else:
-            kept = row[DIRECTION] * mu * _at(load, onset) if row[BEGAN] == AFTER_SLIP else 0.0
+            kept = row.direction * mu * _at(load, onset) if row.began == AFTER_SLIP else 0.0
             force[inside] = kt * (_at(slip, here) - _at(slip, onset)) + kept
     return force
 

@@ -3,19 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from solver.contacts.kernels.state_durations import find_segments
-from solver.contacts.kernels.stick_slip_events import (
-    BEGIN,
-    END,
-    MOTION,
-    SEGMENT_COLUMNS,
-    SLIP,
-    segment_capacity,
-)
+from solver.contacts.kernels.stick_slip_events import SLIP, new_segments
 from solver.contacts.laws.parts import ContactMotion
 from solver.jit import fourier
 from solver.jit.fourier import Real
@@ -28,7 +21,7 @@ class Segments(NamedTuple):
     """What a contact does over a period, see `solver.contacts.kernels.stick_slip_events`."""
 
     state: int
-    rows: Real  # (count, SEGMENT_COLUMNS)
+    rows: np.recarray[Any, Any]  # (count,) `solver.contacts.kernels.stick_slip_events.SEGMENT`
 
 
 class Shares(NamedTuple):
@@ -43,25 +36,25 @@ def segments_of(slip: Real, load: Real, kt: float, mu: float) -> Segments:
     """Return the segments for full coefficients of slip motion [m] and normal load [N]."""
     ks, load_ks = (fourier.all_harmonics((q.size - 1) // 2) for q in (slip, load))
     top = max(int(ks[-1]), int(load_ks[-1]), 1)
-    rows = np.zeros((segment_capacity(top), SEGMENT_COLUMNS))
+    rows = new_segments(top)
     tables = grid_tables(grid_size(top), top)
     state, count = find_segments(slip, ks, load, load_ks, float(kt), float(mu), *tables, rows)
-    return Segments(state=int(state), rows=rows[:count].copy())
+    return Segments(state=int(state), rows=rows[:count].copy().view(np.recarray))
 
 
 def shares_of(*found: Segments) -> Shares:
     """Return the shares of one slider, or of several under one load: they slip where any of them does."""
     edges = {0.0, 1.0}
     for each in found:
-        edges |= {float(share) for share in (each.rows[:, [BEGIN, END]] / _TURN % 1.0).ravel()}
+        edges |= {float(share) for share in np.concatenate([each.rows.begin, each.rows.end]) / _TURN % 1.0}
     ends = np.array(sorted(edges))
     middles, lengths = 0.5 * (ends[1:] + ends[:-1]), np.diff(ends)
     touching, slipping = np.zeros(middles.size, bool), np.zeros(middles.size, bool)
     for each in found:
         for row in each.rows:
-            inside = (middles - row[BEGIN] / _TURN) % 1.0 < (row[END] - row[BEGIN]) / _TURN
+            inside = (middles - row.begin / _TURN) % 1.0 < (row.end - row.begin) / _TURN
             touching |= inside
-            slipping |= inside & (row[MOTION] == SLIP)
+            slipping |= inside & (row.motion == SLIP)
     slip, contact = float(lengths[slipping].sum()), float(lengths[touching].sum())
     return Shares(stick=contact - slip, slip=slip, separation=1.0 - contact)
 
@@ -70,6 +63,6 @@ def motion_at(found: Segments, tau: Real) -> list[ContactMotion]:
     """Return what a slider does at every angle."""
     motion = np.full(tau.size, ContactMotion.SEPARATION)
     for row in found.rows:
-        inside = (tau - row[BEGIN]) % _TURN <= row[END] - row[BEGIN]
-        motion[inside] = ContactMotion.SLIP if row[MOTION] == SLIP else ContactMotion.STICK
+        inside = (tau - row.begin) % _TURN <= row.end - row.begin
+        motion[inside] = ContactMotion.SLIP if row.motion == SLIP else ContactMotion.STICK
     return motion.tolist()

@@ -8,33 +8,20 @@ direction of the collocation polynomial.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from solver.contacts.kernels.circle.law import MOST_TABLES, circle_path
-from solver.contacts.kernels.circle.path import (
-    BEGIN,
-    COUNT,
-    END,
-    FIRST,
-    FROM,
-    MOTION,
-    PANEL_COLUMNS,
-    START,
-    TABLE_FULL,
-    TO,
-    TX,
-    TY,
-)
+from solver.contacts.kernels.circle.law import whole_path
 from solver.contacts.kernels.circle.radau import between
-from solver.contacts.kernels.circle.state import FOUND_SIZE, HOW, INTERVALS, PIECES, SETTLES, new_tables
+from solver.contacts.kernels.circle.state import FOUND, SETTLES
 from solver.contacts.kernels.columns import COLUMNS, KT, KT_SECOND, MU
 from solver.contacts.kernels.stick_slip_events import FAILED, SEPARATED, SLIP
 from solver.contacts.segments import Shares
 from solver.errors import SettingError
 from solver.jit import fourier
 from solver.jit.fourier import Real
+from solver.jit.records import Row
 from solver.jit.trig_polynomial import grid_size, grid_tables
 
 _TURN = 2.0 * math.pi
@@ -47,8 +34,8 @@ class SpacePath(NamedTuple):
     load: Real  # full coefficients, not cut at 0 [N]
     kt: tuple[float, float]  # [N/m]
     mu: float
-    pieces: Real
-    panels: Real
+    pieces: np.recarray[Any, Any]
+    panels: np.recarray[Any, Any]
     settles: bool  # it slips no more: the last piece lasts for ever
     contact: float  # share of the period in which the normal load presses
 
@@ -72,22 +59,18 @@ def path_in_space(motions: Real, load: Real, kt: float, second: float, mu: float
     row = np.zeros(COLUMNS)
     row[[KT, KT_SECOND, MU]] = kt, second, mu
     tables = grid_tables(grid_size(top), top)
-    found, intervals, times = np.zeros(FOUND_SIZE), np.empty((top + 2, 2)), 1
-    while True:
-        pieces, panels = new_tables(top, times)
-        state = circle_path(sliding, ks, load, load_ks, row, *tables, pieces, panels, found, intervals)
-        if state != TABLE_FULL or times >= MOST_TABLES:
-            break
-        times *= 4
+    found, intervals = np.zeros(1, FOUND), np.empty((top + 2, 2))
+    state, pieces, panels = whole_path(sliding, ks, load, load_ks, row, *tables, found, intervals)
     if state < 0 or state == FAILED:
         raise SettingError("motions", "of this contact", "must be ones that can be followed")
-    count = 0 if state == SEPARATED else int(found[PIECES])
-    pressed = intervals[: int(found[INTERVALS])]
-    opens = bool(found[INTERVALS] > 0.0)
-    share = float((pressed[:, 1] - pressed[:, 0]).sum()) / _TURN if opens else 1.0
+    (here,) = found.view(np.recarray)
+    count = 0 if state == SEPARATED else here.pieces
+    pressed = intervals[: here.intervals]
+    share = float((pressed[:, 1] - pressed[:, 0]).sum()) / _TURN if len(pressed) else 1.0
     return SpacePath(
-        motions=sliding, load=load, kt=(kt, second), mu=mu, pieces=pieces[:count].copy(), panels=panels,
-        settles=bool(found[HOW] == SETTLES), contact=0.0 if state == SEPARATED else share,
+        motions=sliding, load=load, kt=(kt, second), mu=mu, pieces=pieces[:count].copy().view(np.recarray),
+        panels=panels.view(np.recarray), settles=bool(here.how == SETTLES),
+        contact=0.0 if state == SEPARATED else share,
     )  # fmt: skip
 
 
@@ -95,8 +78,8 @@ def shares_in_space(path: SpacePath) -> Shares:
     """Return the shares of the period in stick, slip and separation."""
     if path.settles or not len(path.pieces):
         return Shares(stick=path.contact, slip=0.0, separation=1.0 - path.contact)
-    slips = path.pieces[path.pieces[:, MOTION] == SLIP]
-    slip = float((slips[:, END] - slips[:, BEGIN]).sum()) / _TURN
+    slips = path.pieces[path.pieces.motion == SLIP]
+    slip = float((slips.end - slips.begin).sum()) / _TURN
     return Shares(stick=max(path.contact - slip, 0.0), slip=slip, separation=1.0 - path.contact)
 
 
@@ -105,27 +88,27 @@ def force_in_space(path: SpacePath, tau: Real) -> Real:
     force = np.zeros((2, tau.size))
     pieces = path.pieces[-1:] if path.settles else path.pieces
     for piece in pieces:
-        since = (tau - piece[BEGIN]) % _TURN
-        inside = np.full(tau.size, True) if path.settles else since <= piece[END] - piece[BEGIN]
-        here = piece[BEGIN] + since[inside]
-        force[:, inside] = (_slip if piece[MOTION] == SLIP else _stick)(path, piece, here)
+        since = (tau - piece.begin) % _TURN
+        inside = np.full(tau.size, True) if path.settles else since <= piece.end - piece.begin
+        here = piece.begin + since[inside]
+        force[:, inside] = (_slip if piece.motion == SLIP else _stick)(path, piece, here)
     return force
 
 
-def _stick(path: SpacePath, piece: Real, tau: Real) -> Real:
-    begin = np.array([piece[BEGIN]])
+def _stick(path: SpacePath, piece: Row, tau: Real) -> Real:
+    begin = np.array([piece.begin])
     moved = _at(path.motions, tau) - _at(path.motions, begin)
-    return np.asarray(piece[[TX, TY], None] + np.array(path.kt)[:, None] * moved)
+    return np.asarray(np.array([[piece.tx], [piece.ty]]) + np.array(path.kt)[:, None] * moved)
 
 
-def _slip(path: SpacePath, piece: Real, tau: Real) -> Real:
-    first = int(piece[FIRST])
-    panels = path.panels[first : first + int(piece[COUNT])]
-    which = np.clip(np.searchsorted(panels[:, TO], tau), 0, len(panels) - 1)
+def _slip(path: SpacePath, piece: Row, tau: Real) -> Real:
+    first = piece.first
+    panels = path.panels[first : first + piece.count].view(np.recarray)
+    which = np.clip(np.searchsorted(panels.end, tau), 0, len(panels) - 1)
     angles = np.empty(tau.size)
     for i, (at, panel) in enumerate(zip(tau, panels[which], strict=True)):
-        place = min(max((at - panel[FROM]) / (panel[TO] - panel[FROM]), 0.0), 1.0)
-        angles[i] = between(panel[START], np.ascontiguousarray(panel[START + 1 : PANEL_COLUMNS]), place)
+        place = min(max((at - panel.begin) / (panel.end - panel.begin), 0.0), 1.0)
+        angles[i] = between(panel.start, np.ascontiguousarray(panel.theta), place)
     limit = path.mu * _at(path.load[None], tau)[0]
     return np.asarray(limit * np.array([np.cos(angles), np.sin(angles)]))
 

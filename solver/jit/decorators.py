@@ -14,7 +14,11 @@ from typing import Any, TypeVar
 
 import numba
 
-from solver.jit.cache import KernelCache
+from solver.jit import plain
+from solver.jit.setting import PLAIN
+
+if not PLAIN:
+    from solver.jit.cache import KernelCache
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
@@ -27,11 +31,13 @@ def compiled(function: _Function, *, linked: bool = True) -> _Function:
     One whose name begins with an underscore is for other kernels alone: without the code by which Python
     would call it, a tenth of the compilation is saved.
     """
+    if PLAIN:
+        return plain.apart(function)
     inner = function.__name__.startswith("_")
     kernel: Any = numba.njit(
         nogil=True,
         error_model="numpy",
-        fastmath={"reassoc", "contract"},
+        fastmath=plain.FASTMATH,
         no_cpython_wrapper=inner,
         no_cfunc_wrapper=True,
     )(function)
@@ -41,6 +47,12 @@ def compiled(function: _Function, *, linked: bool = True) -> _Function:
         kernel._compile_for_args = _refuse
     typed: _Function = kernel
     return typed
+
+
+def kept(kernel: Any, function: Callable[..., Any]) -> None:
+    """Have the machine code of a kernel that Numba compiles as it likes kept on disk."""
+    if not PLAIN:
+        kernel._cache = KernelCache(function)
 
 
 def _refuse(*_: object, **__: object) -> None:

@@ -15,7 +15,10 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 
-from solver.jit.separate import make, watched
+from solver.jit.setting import PLAIN
+
+if not PLAIN:
+    from solver.jit.slots import make, watched
 
 MOST_PROCESSES = 4  # each compiles the short kernels for itself, and takes 600 MB at most
 # A compiler makes many objects that live for long: collected as often as usual they take 8 % of the time.
@@ -44,6 +47,10 @@ def compile_together(
     Exception
         What a call or the compilation of a kernel raised, in whatever process.
     """
+    if PLAIN:  # nothing is kept that another process could use
+        for call in calls:
+            call()
+        return
     count = min(cores(), MOST_PROCESSES) if processes is None else processes
     spawning = multiprocessing.get_context("spawn")
     with contextlib.ExitStack() as stack:

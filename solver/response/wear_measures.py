@@ -26,19 +26,7 @@ import numpy as np
 from solver.balance.balance import Balance
 from solver.balance.kernels.residual import contact_values
 from solver.contacts.kernels.columns import KT, MU
-from solver.contacts.kernels.stick_slip_events import (
-    AFTER_SLIP,
-    BEGAN,
-    BEGIN,
-    DIRECTION,
-    END,
-    LIFTING,
-    MOTION,
-    ONSET,
-    SLIP,
-    UNLOADED,
-    largest,
-)
+from solver.contacts.kernels.stick_slip_events import AFTER_SLIP, LIFTING, SLIP, UNLOADED, largest
 from solver.contacts.kernels.system import Evaluation, System
 from solver.contacts.segments import Segments, segments_of
 from solver.jit import fourier
@@ -247,20 +235,20 @@ def _slip_ends(found: Segments) -> _Ends:
     rows, lifting = found.rows, found.state == LIFTING
     terms: list[tuple[float, float, float, bool]] = []
     for i, row in enumerate(rows):
-        if row[MOTION] != SLIP:
+        if row.motion != SLIP:
             continue
-        xi = float(row[DIRECTION])
-        followed = i + 1 < len(rows) and rows[i + 1, BEGIN] == row[END]
-        terms.append((1.0, xi, float(row[END]), lifting and not followed))
-        follows = i > 0 and rows[i - 1, END] == row[BEGIN]
+        xi = float(row.direction)
+        followed = i + 1 < len(rows) and rows[i + 1].begin == row.end
+        terms.append((1.0, xi, float(row.end), lifting and not followed))
+        follows = i > 0 and rows[i - 1].end == row.begin
         before = rows[i - 1]
-        if not follows or before[MOTION] == SLIP:
-            terms.append((-1.0, xi, float(row[BEGIN]), lifting and not follows))
-        elif before[BEGAN] == AFTER_SLIP:
-            d = float(before[DIRECTION])
-            terms.append((-xi * d, d, float(before[ONSET]), False))
-        elif before[BEGAN] != UNLOADED:
-            terms.append((-1.0, xi, float(before[ONSET]), True))
+        if not follows or before.motion == SLIP:
+            terms.append((-1.0, xi, float(row.begin), lifting and not follows))
+        elif before.began == AFTER_SLIP:
+            d = float(before.direction)
+            terms.append((-xi * d, d, float(before.onset), False))
+        elif before.began != UNLOADED:
+            terms.append((-1.0, xi, float(before.onset), True))
     table = np.array(terms, dtype=np.float64).reshape(-1, 4)
     return _Ends(sign=table[:, 0], direction=table[:, 1], tau=table[:, 2], moves=table[:, 3] > 0.0)
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from solver.contacts.kernels import stick_slip_events as events
 from solver.contacts.kernels.coulomb.force import contact_force
+from solver.contacts.kernels.stick_slip_events import new_segments
 from solver.jit import fourier
 from solver.jit.trig_polynomial import grid_size, grid_tables
 
@@ -56,8 +57,8 @@ class Answer:
 
         A segment as short as rounding (the period need not close on itself to the last bit) does not count.
         """
-        real = self.segments[self.segments[:, events.END] - self.segments[:, events.BEGIN] > 1e-11]
-        kinds = real[:, [events.MOTION, events.BEGAN, events.DIRECTION]].tolist()
+        real = self.segments[self.segments["end"] - self.segments["begin"] > 1e-11]
+        kinds = real[["motion", "began", "direction"]].tolist()
         rows = [
             (motion, began, direction * (began == events.AFTER_SLIP)) for motion, began, direction in kinds
         ]
@@ -73,7 +74,7 @@ def tables(n_harmonics: int) -> tuple[np.ndarray, np.ndarray]:
 def evaluate(case: Case) -> Answer:
     """Call the kernel."""
     n, m, top = case.U.size, case.N.size, max(case.n_harmonics, (case.N.size - 1) // 2)
-    segments = np.zeros((16 * top + 64, events.SEGMENT_COLUMNS))
+    segments = new_segments(top)
     F, dF_dkt, dF_dmu = np.zeros(n), np.zeros(n), np.zeros(n)
     dF_dU, dF_dN = np.zeros((n, n)), np.zeros((n, m))
     state, count = contact_force(

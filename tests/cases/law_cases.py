@@ -9,7 +9,7 @@ from contact_cases import central_difference, tables
 
 from solver.contacts.kernels import columns
 from solver.contacts.kernels.laws import law_force, law_number
-from solver.contacts.kernels.stick_slip_events import SEGMENT_COLUMNS
+from solver.contacts.kernels.stick_slip_events import new_segments
 from solver.jit import fourier
 
 COULOMB_LINE, GAP_SPRING, POLYNOMIAL, _, COULOMB_CIRCLE, COULOMB_BOX, _ = columns.KERNELS
@@ -55,7 +55,7 @@ def evaluate(element: Element, slope: np.ndarray | None = None, dload: np.ndarra
     """Call the kernel; `slope` and `dload` are the derivatives of row and load by λ."""
     m, n = element.U.shape
     top = max(int(element.harmonics[-1]), 1)
-    segments = np.zeros((16 * top + 64, SEGMENT_COLUMNS))
+    segments = new_segments(top)
     F, dF_dU, dF_dp = np.full((m, n), np.nan), np.full((m * m, n, n), np.nan), np.full((m, n), np.nan)
     number = element.law if isinstance(element.law, int) else law_number(element.law)
     state, piece = law_force(

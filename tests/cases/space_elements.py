@@ -9,12 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from solver.contacts.kernels.circle import hessian as circle_hessian
-from solver.contacts.kernels.circle.law import circle_path, coulomb_circle
-from solver.contacts.kernels.circle.state import FOUND_SIZE, INTERVALS, new_tables
+from solver.contacts.kernels.circle.law import coulomb_circle
+from solver.contacts.kernels.circle.second_law import circle_law_second
 from solver.contacts.kernels.columns import COLUMNS, KN, KT, KT_SECOND, MU, PRESTRESSED
 from solver.contacts.kernels.coulomb.law import coulomb_box
-from solver.contacts.kernels.stick_slip_events import SEGMENT_COLUMNS, segment_capacity
+from solver.contacts.kernels.stick_slip_events import new_segments
 from solver.jit import fourier
 from solver.jit.trig_polynomial import grid_size, grid_tables
 
@@ -73,7 +72,7 @@ def evaluate(element: Element, slope: np.ndarray | None = None, dload: np.ndarra
     """Call the kernel; `slope` and `dload` are the derivatives of row and load by λ."""
     m, n = element.U.shape
     F, dF_dU, dF_dp = np.full((m, n), np.nan), np.full((m * m, n, n), np.nan), np.full((m, n), np.nan)
-    segments = np.zeros((segment_capacity(element.top), SEGMENT_COLUMNS))
+    segments = new_segments(element.top)
     kernel: Callable[..., tuple[int, int]] = coulomb_box if element.box else coulomb_circle
     state, piece = kernel(
         element.U, element.ks, element.load, LOAD_KS, element.row,
@@ -99,18 +98,10 @@ def gradient(element: Element, w: np.ndarray) -> tuple[np.ndarray, int]:
 
 def second(element: Element, w: np.ndarray, direction: Element) -> np.ndarray:
     """Derivative of `gradient` along a direction, by the kernel."""
-    m, n = element.U.shape
-    found, intervals = np.zeros(FOUND_SIZE), np.empty((element.top + 2, 2))
-    pieces, panels = new_tables(element.top, 16)
-    state = circle_path(
-        element.U, element.ks, element.load, LOAD_KS, element.row, *element.tables, pieces, panels, found,
-        intervals,
-    )  # fmt: skip
-    by_U, by_row, by_load = np.empty((m, n)), np.empty(COLUMNS), np.empty(3)
-    circle_hessian.circle_second(
-        element.U, element.ks, element.load, LOAD_KS, element.row, state, found, pieces, panels,
-        intervals[: int(found[INTERVALS])], w, direction.U, direction.row, direction.load, by_U, by_row,
-        by_load,
+    by_U, by_row, by_load = np.empty(element.U.shape), np.empty(COLUMNS), np.empty(3)
+    circle_law_second(
+        element.U, element.ks, element.load, LOAD_KS, element.row, *element.tables, w, direction.U,
+        direction.row, direction.load, by_U, by_row, by_load,
     )  # fmt: skip
     return np.concatenate([by_U.ravel(), by_row[list(NUMBERS)], by_load])
 

@@ -14,7 +14,7 @@ from solver.balance.kernels.slopes import springs_of
 from solver.contacts.kernels.columns import COLUMN_KIND, KT, N0, N1, OMEGA, RATIO
 from solver.contacts.kernels.laws import call_law
 from solver.contacts.kernels.normal_load import fill_load, tie
-from solver.contacts.kernels.stick_slip_events import BEGAN, FAILED, SEPARATED, STUCK, UNLOADED
+from solver.contacts.kernels.stick_slip_events import FAILED, SEPARATED, STUCK, UNLOADED
 from solver.contacts.kernels.system import FREQUENCY, LEVEL, Evaluation, Receptance, System
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Complex, Real, coefficient_count, cosine_position, magnitude
@@ -144,7 +144,7 @@ def element(
     if system.jenkins[e] == 1:
         if state == SEPARATED:
             out.slopes[c] = 0.0
-        elif state == STUCK and out.segments[0, BEGAN] == UNLOADED:
+        elif state == STUCK and out.segments[0].began == UNLOADED:
             out.slopes[c] = table[KT]
     elif last > block and state != FAILED:
         springs_of(out.dF_dU[block:last], out.slopes[c:end])

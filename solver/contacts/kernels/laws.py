@@ -16,17 +16,20 @@ of their own, `solver.contacts.kernels.second_laws`.
 
 from __future__ import annotations
 
-from numba import types
+from numba import from_dtype, types
 
 from solver.contacts.kernels.columns import KERNELS
+from solver.contacts.kernels.stick_slip_events import SEGMENT
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Integer, Real
 from solver.jit.numbered import numbered
+from solver.jit.records import Records
 
 _VECTOR, _TABLE, _BLOCKS = (types.Array(types.float64, dimensions, "C") for dimensions in (1, 2, 3))
 _HARMONICS = types.Array(types.int64, 1, "C")
+_SEGMENTS = types.Array(from_dtype(SEGMENT), 1, "C")
 _ARGUMENTS = (
-    _TABLE, _HARMONICS, _VECTOR, _HARMONICS, _VECTOR, _VECTOR, _VECTOR, _TABLE, _TABLE, _TABLE, _TABLE,
+    _TABLE, _HARMONICS, _VECTOR, _HARMONICS, _VECTOR, _VECTOR, _VECTOR, _TABLE, _TABLE, _SEGMENTS, _TABLE,
     _BLOCKS, _TABLE,
 )  # fmt: skip
 
@@ -34,7 +37,7 @@ _ARGUMENTS = (
 @numbered(_ARGUMENTS, types.UniTuple(types.int64, 2), KERNELS)
 def call_law(
     number: int, U: Real, ks: Integer, load: Real, load_ks: Integer, row: Real, slope: Real, dload: Real,
-    cos_table: Real, sin_table: Real, segments: Real, F: Real, dF_dU: Real, dF_dp: Real,
+    cos_table: Real, sin_table: Real, segments: Records, F: Real, dF_dU: Real, dF_dp: Real,
 ) -> tuple[int, int]:  # fmt: skip
     """Evaluate the law whose kernel has this number; see the module for the arguments."""
     # What stands here is the contract; a kernel is called in its place.
@@ -44,7 +47,7 @@ def call_law(
 @compiled
 def law_force(
     number: int, U: Real, ks: Integer, load: Real, load_ks: Integer, row: Real, slope: Real, dload: Real,
-    cos_table: Real, sin_table: Real, segments: Real, F: Real, dF_dU: Real, dF_dp: Real,
+    cos_table: Real, sin_table: Real, segments: Records, F: Real, dF_dU: Real, dF_dp: Real,
 ) -> tuple[int, int]:  # fmt: skip
     """Evaluate any law, from Python too; see the module for the arguments."""
     return call_law(

@@ -13,14 +13,8 @@ import numpy as np
 from solver.contacts.kernels.stick_slip_events import (
     AFTER_SEPARATION,
     AFTER_SLIP,
-    BEGAN,
-    BEGIN,
-    DIRECTION,
-    END,
     FAILED,
     LIFTING,
-    MOTION,
-    ONSET,
     ROUNDING,
     SEPARATED,
     SLIP,
@@ -33,6 +27,7 @@ from solver.contacts.kernels.stick_slip_events import (
 )
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Integer, Real
+from solver.jit.records import Records
 from solver.jit.separate import apart
 from solver.jit.trig_polynomial import FALLING, RISING, at_point, bracketed_root, on_grid, unpack
 
@@ -144,7 +139,7 @@ def _turning(c: Real, s: Real, degree: int, lo: float, hi: float, way: float) ->
 @apart
 def find_segments(
     U: Real, ks: Integer, N: Real, load_ks: Integer, kt: float, mu: float, cos_table: Real, sin_table: Real,
-    segments: Real,
+    segments: Records,
 ) -> tuple[int, int]:  # fmt: skip
     """March one period and fill the segment table.
 
@@ -152,7 +147,7 @@ def find_segments(
     ----------
     U : coefficients of the slip motion u [m] for harmonics `ks`; N : of the normal load [N] for `load_ks`.
     cos_table, sin_table : of `solver.jit.trig_polynomial.grid_tables`.
-    segments : (capacity, SEGMENT_COLUMNS), overwritten.
+    segments : (capacity,), overwritten.
 
     Returns
     -------
@@ -213,7 +208,7 @@ def is_symmetric(ks: Integer, N: Real) -> bool:
 
 
 @compiled
-def _plain(U: Real, ks: Integer, N: Real, load_ks: Integer, kt: float, mu: float, segments: Real) -> int:
+def _plain(U: Real, ks: Integer, N: Real, load_ks: Integer, kt: float, mu: float, segments: Records) -> int:
     """Return STUCK or SEPARATED where the sums of the amplitudes alone show it, else −1."""
     reach, swing, mean, here = 0.0, 0.0, 0.0, 0
     for i in range(ks.size):
@@ -235,22 +230,22 @@ def _plain(U: Real, ks: Integer, N: Real, load_ks: Integer, kt: float, mu: float
         return SEPARATED
     if swing <= mean and kt * reach <= mu * (mean - swing):
         row = segments[0]
-        row[MOTION], row[BEGIN], row[END] = STICK, 0.0, 2.0 * math.pi
-        row[DIRECTION], row[ONSET], row[BEGAN] = 1.0, 0.0, UNLOADED
+        row.motion, row.begin, row.end = STICK, 0.0, 2.0 * math.pi
+        row.direction, row.onset, row.began = 1.0, 0.0, UNLOADED
         return STUCK
     return -1
 
 
 @compiled
 def _march_half(
-    c: Real, s: Real, degree: int, value: Real, slope: Real, tol: float, segments: Real
+    c: Real, s: Real, degree: int, value: Real, slope: Real, tol: float, segments: Records
 ) -> tuple[int, int]:
     """March half a period of a half-wave symmetric contact: the other half mirrors it, limits exchanged."""
     high, begin = largest(c[1], s[1], degree, value[1], slope[1])
     if 2.0 * high <= tol:
         row = segments[0]
-        row[MOTION], row[BEGIN], row[END] = STICK, 0.0, 2.0 * math.pi
-        row[DIRECTION], row[ONSET], row[BEGAN] = 1.0, 0.0, UNLOADED
+        row.motion, row.begin, row.end = STICK, 0.0, 2.0 * math.pi
+        row.direction, row.onset, row.began = 1.0, 0.0, UNLOADED
         return STUCK, 1
     none = int(np.int64(0))
     end = begin + math.pi
@@ -259,16 +254,16 @@ def _march_half(
         return FAILED, 0
     for i in range(count):
         row, mirrored = segments[i], segments[count + i]
-        mirrored[MOTION], mirrored[BEGAN], mirrored[DIRECTION] = row[MOTION], row[BEGAN], -row[DIRECTION]
-        mirrored[BEGIN], mirrored[END] = row[BEGIN] + math.pi, row[END] + math.pi
-        mirrored[ONSET] = row[ONSET] + math.pi
+        mirrored.motion, mirrored.began, mirrored.direction = row.motion, row.began, -row.direction
+        mirrored.begin, mirrored.end = row.begin + math.pi, row.end + math.pi
+        mirrored.onset = row.onset + math.pi
     return SLIPPING, 2 * count
 
 
 @compiled
 def _march_intervals(
     c: Real, s: Real, degree: int, value: Real, slope: Real, tol: float, intervals: Real, n_intervals: int,
-    segments: Real,
+    segments: Records,
 ) -> tuple[int, int]:  # fmt: skip
     """March every interval of contact from its beginning, where the force is 0."""
     count = 0
@@ -290,20 +285,20 @@ def _march_intervals(
 
 @compiled
 def _march_circle(
-    c: Real, s: Real, degree: int, value: Real, slope: Real, tol: float, segments: Real
+    c: Real, s: Real, degree: int, value: Real, slope: Real, tol: float, segments: Records
 ) -> tuple[int, int]:
     """March a contact that never separates: stuck for ever, or one period from the largest w_−."""
     high_minus, at_minus = largest(c[1], s[1], degree, value[1], slope[1])
     high_plus, at_plus = largest(c[0], s[0], degree, value[0], slope[0])
     if high_minus + high_plus <= tol:
         row = segments[0]
-        row[MOTION], row[BEGIN], row[END] = STICK, 0.0, 2.0 * math.pi
+        row.motion, row.begin, row.end = STICK, 0.0, 2.0 * math.pi
         if high_minus > 0.0:
-            row[DIRECTION], row[ONSET], row[BEGAN] = -1.0, at_minus, AFTER_SLIP
+            row.direction, row.onset, row.began = -1.0, at_minus, AFTER_SLIP
         elif high_plus > 0.0:
-            row[DIRECTION], row[ONSET], row[BEGAN] = 1.0, at_plus, AFTER_SLIP
+            row.direction, row.onset, row.began = 1.0, at_plus, AFTER_SLIP
         else:
-            row[DIRECTION], row[ONSET], row[BEGAN] = 1.0, 0.0, UNLOADED
+            row.direction, row.onset, row.began = 1.0, 0.0, UNLOADED
         return STUCK, 1
     begin, end = at_minus, at_minus + 2.0 * math.pi
     none = int(np.int64(0))  # a literal 0 would compile the march a second time

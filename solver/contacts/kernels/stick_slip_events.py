@@ -23,6 +23,7 @@ import numpy as np
 
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Real
+from solver.jit.records import Records, record
 from solver.jit.separate import apart
 from solver.jit.trig_polynomial import FALLING, RISING, at_point, bracketed_root, cubic_root, cubic_turn
 
@@ -31,8 +32,8 @@ SEPARATED, STUCK, SLIPPING, LIFTING, FAILED = 0, 1, 2, 3, 4
 # A segment's motion and what its stick began after; columns of the segment table.
 STICK, SLIP = 0.0, 1.0
 UNLOADED, AFTER_SLIP, AFTER_SEPARATION = 0.0, 1.0, 2.0
-MOTION, DIRECTION, BEGIN, END, ONSET, BEGAN = 0, 1, 2, 3, 4, 5
-SEGMENT_COLUMNS = 6
+# ξ of a slip, or of that before a stick; when it begins and ends; when the stick's offset was fixed.
+SEGMENT = record(motion=float, direction=float, begin=float, end=float, onset=float, began=float)
 
 NO_LENGTH = 1e-11  # rad
 ROUNDING = 2e-14  # relative to kt max|u| + μ max|N|: below it a limit is not crossed
@@ -44,6 +45,12 @@ ROUNDING = 2e-14  # relative to kt max|u| + μ max|N|: below it a limit is not c
 def segment_capacity(degree: int) -> int:
     """Return how many segments a period may have; each event is a root of a polynomial of this degree."""
     return 16 * degree + 64
+
+
+@compiled
+def new_segments(degree: int) -> Records:
+    """Return an empty table of segments."""
+    return np.zeros(segment_capacity(degree), SEGMENT)
 
 
 @apart
@@ -276,7 +283,7 @@ def leave_slip(
 @apart
 def march(
     c: Real, s: Real, degree: int, value: Real, slope: Real, begin: float, end: float,
-    motion: float, direction: float, offset: float, began: float, tol: float, segments: Real, count: int,
+    motion: float, direction: float, offset: float, began: float, tol: float, segments: Records, count: int,
 ) -> int:  # fmt: skip
     """Append the segments of the contact interval [begin, end] to the table; return their number or −1.
 
@@ -292,27 +299,27 @@ def march(
         if count >= segments.shape[0]:
             return -1
         row = segments[count]
-        row[BEGIN] = tau
-        row[ONSET] = tau
-        row[MOTION], row[DIRECTION] = motion, direction
+        row.begin = tau
+        row.onset = tau
+        row.motion, row.direction = motion, direction
         if motion == STICK:
-            row[BEGAN] = began
+            row.began = began
             tau, hit = leave_stick(c, s, degree, value, slope, offset, tau, end, tol)
             if hit >= 0:
                 motion, direction = SLIP, 1.0 - 2.0 * hit
         else:
-            row[BEGAN] = AFTER_SLIP
+            row.began = AFTER_SLIP
             x = 0 if direction > 0.0 else 1
             tau = leave_slip(c[x], s[x], degree, value[x], slope[x], tau, end, tol)
             offset = -direction * at_point(c[x], s[x], degree, tau)[0]
             motion, began = STICK, AFTER_SLIP
-        row[END] = tau
+        row.end = tau
         count += 1
     return count
 
 
 @compiled
-def piece_of(segments: Real, count: int) -> int:
+def piece_of(segments: Records, count: int) -> int:
     """Return a number for what happens over the period: how many segments there are of each kind.
 
     The law is smooth where it stays the same. A segment as short as rounding does not count: the period need
@@ -321,12 +328,12 @@ def piece_of(segments: Real, count: int) -> int:
     piece = 0
     for i in range(count):
         row = segments[i]
-        if row[END] - row[BEGIN] <= NO_LENGTH:
+        if row.end - row.begin <= NO_LENGTH:
             continue
-        kind = 2 if row[DIRECTION] > 0.0 else 3
-        if row[MOTION] == STICK and row[BEGAN] != AFTER_SLIP:
-            kind = 0 if row[BEGAN] == UNLOADED else 1
-        elif row[MOTION] == SLIP:
+        kind = 2 if row.direction > 0.0 else 3
+        if row.motion == STICK and row.began != AFTER_SLIP:
+            kind = 0 if row.began == UNLOADED else 1
+        elif row.motion == SLIP:
             kind += 2
         piece += 1 << (8 * kind)
     return piece

@@ -26,10 +26,11 @@ from typing import NamedTuple, cast
 import numpy as np
 from numba.experimental import structref
 
-from solver.contacts.kernels.stick_slip_events import SEGMENT_COLUMNS, segment_capacity
+from solver.contacts.kernels.stick_slip_events import new_segments
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Complex, Index, Integer, Real, coefficient_count
-from solver.jit.reference import Reference
+from solver.jit.records import Records
+from solver.jit.reference import referenced
 
 # What λ is, where it is no column of the contact table.
 FREQUENCY, LEVEL, FORCE_PHASE, STRUCTURE = 0, 1, 2, 3
@@ -135,7 +136,7 @@ class Evaluation(NamedTuple):
     states: Integer  # (ne,)
     pieces: Integer  # (ne,) which smooth piece of its law a contact is on, see `events.piece_of`
     slopes: Real  # (nc,) ∂F/∂U of a port whose force is a spring's (stuck, pressed, separated), else NaN
-    segments: Real  # scratch
+    segments: Records  # scratch
     jacobian: Real  # (nt, nt) dr/du
     lu: Real  # (nt + 1, nt + 1) factors of the condensed, perhaps bordered, Jacobian in their leading block
     pivots: Index  # (nt + 1,)
@@ -164,26 +165,7 @@ class Evaluation(NamedTuple):
 # than the work itself, and minutes of compilation.
 
 
-@structref.register
-class _SystemType(Reference):
-    """Numba's type of a `System` by reference."""
-
-
-@structref.register
-class _ReceptanceType(Reference):
-    """Numba's type of a `Receptance` by reference."""
-
-
-@structref.register
-class _EvaluationType(Reference):
-    """Numba's type of an `Evaluation` by reference."""
-
-
-class _SystemReference(structref.StructRefProxy):
-    """A `System` by reference."""
-
-
-class _ReceptanceReference(structref.StructRefProxy):
+class _ReceptanceProxy(structref.StructRefProxy):
     """A `Receptance` by reference."""
 
     @cached_property
@@ -192,7 +174,7 @@ class _ReceptanceReference(structref.StructRefProxy):
         return receptance_arrays(cast(Receptance, self))
 
 
-class _EvaluationReference(structref.StructRefProxy):
+class _EvaluationProxy(structref.StructRefProxy):
     """An `Evaluation` by reference."""
 
     @cached_property
@@ -201,13 +183,13 @@ class _EvaluationReference(structref.StructRefProxy):
         return evaluation_arrays(cast(Evaluation, self))
 
 
-structref.define_proxy(_SystemReference, _SystemType, list(System._fields))
-structref.define_proxy(_ReceptanceReference, _ReceptanceType, [*Receptance._fields, "filled"])
-structref.define_proxy(_EvaluationReference, _EvaluationType, list(Evaluation._fields))
-
-_new_system: Callable[..., System] = _SystemReference
-_receptance_of: Callable[..., Receptance] = _ReceptanceReference
-_evaluation_of: Callable[..., Evaluation] = _EvaluationReference
+_new_system: Callable[..., System] = referenced("System", __name__, System._fields)
+_receptance_of: Callable[..., Receptance] = referenced(
+    "Receptance", __name__, [*Receptance._fields, "filled"], _ReceptanceProxy
+)
+_evaluation_of: Callable[..., Evaluation] = referenced(
+    "Evaluation", __name__, Evaluation._fields, _EvaluationProxy
+)
 
 
 @compiled
@@ -218,7 +200,7 @@ def by_reference(system: System) -> System:
 
 def evaluation_by_value(point: Evaluation) -> Evaluation:
     """Return the arrays of an evaluation as a tuple that Python can read (views, not copies)."""
-    return cast(_EvaluationReference, point).arrays
+    return cast(_EvaluationProxy, point).arrays
 
 
 @compiled
@@ -241,7 +223,7 @@ def receptance_over(A: Complex, u_linear: Complex, B: Complex, x_linear: Complex
 
 def receptance_by_value(linear: Receptance) -> Receptance:
     """Return the arrays of a receptance as a tuple that Python can read (views, not copies)."""
-    return cast(_ReceptanceReference, linear).arrays
+    return cast(_ReceptanceProxy, linear).arrays
 
 
 def of_all_ports(system: System, linear: Receptance) -> Receptance:
@@ -303,7 +285,7 @@ def _new_evaluation(system: System, spanned: bool) -> Evaluation:
         np.zeros(nt), np.zeros(nt), np.zeros((nc, n)), np.zeros((blocks, n, n)), np.zeros((nc, n)),
         np.zeros(n), np.zeros(n), np.zeros((n, coefficient_count(system.load_ks))), np.zeros(ne, np.int64),
         np.zeros(ne, np.int64), np.zeros(nc),
-        np.zeros((segment_capacity(max(system.ks[-1], system.load_ks[-1])), SEGMENT_COLUMNS)),
+        new_segments(max(system.ks[-1], system.load_ks[-1])),
         np.empty((whole, whole)),
         np.empty((size + 1, size + 1)), np.zeros(nt + 1, np.int32), np.zeros(nc, np.int64),
         np.zeros(nc, np.int64), np.zeros(COUNTS, np.int64), np.zeros((blocks, n, n)),

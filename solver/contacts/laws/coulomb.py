@@ -11,7 +11,6 @@ from solver.errors import SettingError
 
 if TYPE_CHECKING:
     from solver.contacts.pieces.piece import ContactPart
-    from solver.contacts.segments import Shares
 
 
 class SlidesOnALine(FrictionContact):
@@ -22,23 +21,12 @@ class SlidesOnALine(FrictionContact):
         """Whether it has one slider with the events of `solver.contacts.segments`."""
         return True
 
-    def shares(self, motions: Real, load: Real) -> Shares:
-        """Return the shares of the period in stick, slip and separation."""
-        from solver.contacts.segments import segments_of, shares_of
-
-        return shares_of(segments_of(motions[0], load, self.kt, self.mu))
-
     def perturbed(self, motions: Real, load: Real) -> tuple[ContactPart, ...]:
         """Return how it follows small perturbations of a motion."""
-        from solver.contacts.pieces.line import friction_pieces
-        from solver.contacts.pieces.piece import ContactPart
-
         if self.is_rigid:
             wanted = "must be finite here: what is known of the stability of a rigid contact is in the answer"
             raise SettingError(f"{self.name}.kt", self.kt, wanted)
-        kn = None if self.normal_port is None else self.stiffnesses[self.normal_port]
-        pieces = friction_pieces(motions[0], load, self.kt, self.mu, kn=kn)
-        return (ContactPart(tuple(range(len(motions))), pieces),)
+        return super().perturbed(motions, load)
 
 
 class Contact(SlidesOnALine):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any, ClassVar, Self, cast
+from typing import TYPE_CHECKING, Any, ClassVar, Self, cast
 
 import numpy as np
 from pydantic import ConfigDict, Field, field_validator, model_validator
@@ -15,6 +15,10 @@ from solver.contacts.laws.base import AnyContact
 from solver.contacts.laws.harmonics import LoadHarmonic, as_harmonics, higher_quantity, named_apart, order_of
 from solver.contacts.laws.parts import LawQuantity, NormalLoad, RestStiffness, Slider, Span
 from solver.errors import SettingError
+
+if TYPE_CHECKING:
+    from solver.contacts.pieces.piece import ContactPart
+    from solver.contacts.segments import Shares
 
 _LEAST_FRICTION = 0.1  # in a linear limit: what must stick does so with a load of reason
 _VARIATION = "changes the variation of a normal load"
@@ -281,6 +285,29 @@ class FrictionContact(AnyContact):
         slider = self.friction
         pairs = zip(slider.ports, slider.stiffnesses, strict=True)
         return np.array([force_by_segments(motions[port], load, kt, self.mu, tau) for port, kt in pairs])
+
+    def shares(self, motions: Real, load: Real) -> Shares:
+        """Return the shares of the period in stick, slip and separation, by its segments."""
+        from solver.contacts.segments import segments_of, shares_of
+
+        slider = self.friction
+        pairs = zip(slider.ports, slider.stiffnesses, strict=True)
+        return shares_of(*(segments_of(motions[port], load, kt, self.mu) for port, kt in pairs))
+
+    def perturbed(self, motions: Real, load: Real) -> tuple[ContactPart, ...]:
+        """Return how it follows small perturbations of a motion: each direction by itself."""
+        from solver.contacts.pieces.line import friction_pieces
+        from solver.contacts.pieces.piece import ContactPart
+
+        slider, normal = self.friction, self.normal_port
+        behind, kn = ((), None) if normal is None else ((normal,), slider.normal_stiffness)
+        return tuple(
+            ContactPart(
+                (port, *behind),
+                friction_pieces(motions[port], load, kt, self.mu, kn=kn, presses=port == slider.ports[0]),
+            )
+            for port, kt in zip(slider.ports, slider.stiffnesses, strict=True)
+        )
 
     def utilisation(self, forces: Real, load: Real) -> float:
         """Return the largest share of its limit that it carries while it sticks."""

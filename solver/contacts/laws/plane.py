@@ -87,33 +87,22 @@ class SlidesInAPlane(FrictionContact):
     def shares(self, motions: Real, load: Real) -> Shares:
         """Return the shares of the period in stick, slip and separation."""
         if self.limits_apart:
-            from solver.contacts.segments import segments_of, shares_of
-
-            pairs = zip(motions[:2], self.tangential, strict=True)
-            return shares_of(*(segments_of(slip, load, kt, self.mu) for slip, kt in pairs))
+            return super().shares(motions, load)
         from solver.contacts.space_path import path_in_space, shares_in_space
 
         return shares_in_space(path_in_space(motions, load, *self.tangential, self.mu))
 
     def perturbed(self, motions: Real, load: Real) -> tuple[ContactPart, ...]:
         """Return how it follows small perturbations of a motion."""
+        if self.limits_apart:
+            return super().perturbed(motions, load)
         from solver.contacts.pieces.circle import circle_pieces
-        from solver.contacts.pieces.line import friction_pieces
         from solver.contacts.pieces.piece import ContactPart
         from solver.contacts.space_path import path_in_space
 
         kn = None if self.normal_port is None else self.stiffnesses[self.normal_port]
-        if not self.limits_apart:
-            path = path_in_space(motions, load, *self.tangential, self.mu)
-            return (ContactPart(tuple(range(len(motions))), circle_pieces(path, kn)),)
-        behind = () if self.normal_port is None else (self.normal_port,)
-        return tuple(
-            ContactPart(
-                (port, *behind),
-                friction_pieces(motions[port], load, kt, self.mu, kn=kn, presses=port == 0),
-            )
-            for port, kt in enumerate(self.tangential)
-        )
+        path = path_in_space(motions, load, *self.tangential, self.mu)
+        return (ContactPart(tuple(range(len(motions))), circle_pieces(path, kn)),)
 
     def rows(self) -> tuple[Row, ...]:
         """Return its rows of the time march, one for each direction; the first has the normal force."""

@@ -22,22 +22,12 @@ from collections.abc import Callable
 import numpy as np
 
 from solver.contacts.fields import Real
-from solver.contacts.kernels.circle.path import (
-    BEGIN,
-    COUNT,
-    END,
-    FIRST,
-    FROM,
-    MOTION,
-    PANEL_COLUMNS,
-    START,
-    TO,
-)
 from solver.contacts.kernels.circle.radau import between
 from solver.contacts.kernels.stick_slip_events import SLIP
 from solver.contacts.pieces.piece import SHORTEST, TURN, Rates, StateEntry, StatePiece, spring, steady
 from solver.contacts.space_path import SpacePath
 from solver.jit import fourier
+from solver.jit.records import Row
 
 _TOGETHER = 1e-8  # rad: two states no further apart follow each other
 _LEAST = 1e-300
@@ -60,16 +50,16 @@ class _Motion:
         here = fourier.basis(tau, self._highest) @ self._curves.T
         return here[:, :2], here[:, 2], here[:, 3]
 
-    def direction(self, piece: Real, tau: float) -> float:
+    def direction(self, piece: Row, tau: float) -> float:
         """Return θ in a slip."""
-        first = int(piece[FIRST])
-        panels = self.path.panels[first : first + int(piece[COUNT])]
-        here = piece[BEGIN] + (tau - piece[BEGIN]) % TURN
-        if here - piece[END] > 0.5 * (TURN - (piece[END] - piece[BEGIN])):
-            here = piece[BEGIN]  # rounding has put the begin a period later
-        panel = panels[min(int(np.searchsorted(panels[:, TO], here)), len(panels) - 1)]
-        place = min(max((here - panel[FROM]) / (panel[TO] - panel[FROM]), 0.0), 1.0)
-        return float(between(panel[START], np.ascontiguousarray(panel[START + 1 : PANEL_COLUMNS]), place))
+        first = piece.first
+        panels = self.path.panels[first : first + piece.count].view(np.recarray)
+        here = piece.begin + (tau - piece.begin) % TURN
+        if here - piece.end > 0.5 * (TURN - (piece.end - piece.begin)):
+            here = piece.begin  # rounding has put the begin a period later
+        panel = panels[min(int(np.searchsorted(panels.end, here)), len(panels) - 1)]
+        place = min(max((here - panel.begin) / (panel.end - panel.begin), 0.0), 1.0)
+        return float(between(panel.start, np.ascontiguousarray(panel.theta), place))
 
 
 def circle_pieces(path: SpacePath, kn: float | None) -> tuple[StatePiece, ...]:
@@ -79,13 +69,13 @@ def circle_pieces(path: SpacePath, kn: float | None) -> tuple[StatePiece, ...]:
     motion = _Motion(path)
     if path.settles:
         row = path.pieces[-1]
-        return (_stick(path, kn, float(row[BEGIN]), float(row[BEGIN]) + TURN, None),)
-    rows = [row for row in path.pieces if row[END] - row[BEGIN] > SHORTEST]
+        return (_stick(path, kn, float(row.begin), float(row.begin) + TURN, None),)
+    rows = [row for row in path.pieces if row.end - row.begin > SHORTEST]
     pieces = []
     for i, row in enumerate(rows):
         before = rows[i - 1]
-        apart = (row[BEGIN] - before[END] + _TOGETHER) % TURN > 2.0 * _TOGETHER
-        slips, begin, end = row[MOTION] == SLIP, float(row[BEGIN]), float(row[END])
+        apart = (row.begin - before.end + _TOGETHER) % TURN > 2.0 * _TOGETHER
+        slips, begin, end = row.motion == SLIP, float(row.begin), float(row.end)
         entry = _entry(motion, kn, row, None if apart else before)
         if slips:
             pieces.append(_slip(motion, kn, row, entry))
@@ -129,23 +119,23 @@ def _stick(
     return StatePiece(begin=begin, end=end, rates=rates, entry=entry, carried=carried)
 
 
-def _entry(motion: _Motion, kn: float | None, row: Real, before: Real | None) -> StateEntry:
+def _entry(motion: _Motion, kn: float | None, row: Row, before: Row | None) -> StateEntry:
     """Return what is remembered where a state begins, after another or after separation."""
-    path, begin = motion.path, float(row[BEGIN])
+    path, begin = motion.path, float(row.begin)
     K, by_load = np.diag(path.kt), path.mu * (kn or 0.0)
     m = 2 if kn is None else 3
     rate, limit_rate = motion.at(np.array([begin]))[::2]
-    slips = row[MOTION] == SLIP
+    slips = row.motion == SLIP
     if before is None:
         if slips:
             return StateEntry(np.zeros((1, m)), None)
         return StateEntry(_padded(np.eye(2), kn, -rate[0] * by_load / limit_rate[0] if kn else None), None)
-    slipped = before[MOTION] == SLIP
+    slipped = before.motion == SLIP
     if slipped and slips:
         return StateEntry(np.zeros((1, m)), np.eye(1))
     if not slipped and not slips:
         return StateEntry(np.zeros((2, m)), np.eye(2))
-    n, m_way = _ways(motion.direction(row if slips else before, begin if slips else float(before[END])))
+    n, m_way = _ways(motion.direction(row if slips else before, begin if slips else float(before.end)))
     if slips:
         along = float(m_way @ K @ n) / float(n @ K @ n)
         onto = (m_way - along * n) / path.kt[0]
@@ -161,11 +151,11 @@ def _ways(theta: float | Real) -> tuple[Real, Real]:
     return np.stack([c, s], axis=-1), np.stack([-s, c], axis=-1)
 
 
-def _slip(motion: _Motion, kn: float | None, row: Real, entry: StateEntry) -> StatePiece:
+def _slip(motion: _Motion, kn: float | None, row: Row, entry: StateEntry) -> StatePiece:
     path = motion.path
-    begin, end = float(row[BEGIN]), float(row[END])
-    panels = path.panels[int(row[FIRST]) : int(row[FIRST]) + int(row[COUNT])]
-    edges = tuple(float(edge) for edge in panels[:-1, TO])
+    begin, end = float(row.begin), float(row.end)
+    panels = path.panels[row.first : row.first + row.count].view(np.recarray)
+    edges = tuple(float(edge) for edge in panels.end[:-1])
     size = 2 if kn is None else 3
     return StatePiece(
         begin=begin, end=end, rates=_slip_rates(motion, kn, row), entry=entry, carried=np.zeros((1, size)),
@@ -173,7 +163,7 @@ def _slip(motion: _Motion, kn: float | None, row: Real, entry: StateEntry) -> St
     )  # fmt: skip
 
 
-def _slip_rates(motion: _Motion, kn: float | None, row: Real) -> Callable[[Real], Rates]:
+def _slip_rates(motion: _Motion, kn: float | None, row: Row) -> Callable[[Real], Rates]:
     """Return the rates in a slip as a function of angles."""
     (k1, k2), by_load = motion.path.kt, motion.path.mu * (kn or 0.0)
     more = 1.0 / k2 - 1.0 / k1

@@ -20,16 +20,7 @@ from __future__ import annotations
 import numpy as np
 
 from solver.contacts.fields import Real
-from solver.contacts.kernels.stick_slip_events import (
-    AFTER_SLIP,
-    BEGAN,
-    BEGIN,
-    DIRECTION,
-    END,
-    FAILED,
-    MOTION,
-    STICK,
-)
+from solver.contacts.kernels.stick_slip_events import AFTER_SLIP, FAILED, STICK
 from solver.contacts.pieces.piece import SHORTEST, TURN, StateEntry, StatePiece, spring, steady
 from solver.contacts.segments import segments_of
 from solver.errors import SettingError
@@ -60,17 +51,17 @@ def friction_pieces(
     m = 1 if kn is None else 2
     pieces = []
     for row in found.rows:
-        begin, end = float(row[BEGIN]), float(row[END])
+        begin, end = float(row.begin), float(row.end)
         if end - begin <= SHORTEST:
             continue
         tangent = pressed.copy()
-        if row[MOTION] != STICK or mu == 0.0:
-            tangent[0, 1] = row[DIRECTION] * mu * by_load
+        if row.motion != STICK or mu == 0.0:
+            tangent[0, 1] = row.direction * mu * by_load
             pieces.append(spring(begin, end, tangent[:m, :m]))
             continue
         tangent[0, 0] = kt
-        follows = -row[DIRECTION] * mu * by_load / kt
-        if row[BEGAN] != AFTER_SLIP and by_load > 0.0 and end - begin < TURN - SHORTEST:
+        follows = -row.direction * mu * by_load / kt
+        if row.began != AFTER_SLIP and by_load > 0.0 and end - begin < TURN - SHORTEST:
             follows = -_slope(slip, begin) * by_load / _slope(load, begin)
         always = end - begin >= TURN - SHORTEST
         entry = None if always else StateEntry(np.array([[1.0, follows]])[:, :m], None)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from solver.contacts.fields import Real
-from solver.contacts.kernels.stick_slip_events import BEGIN, END
 from solver.contacts.pieces.piece import SHORTEST, TURN, Rates, StatePiece, spring
 from solver.contacts.segments import segments_of
 from solver.jit import fourier
@@ -16,7 +15,7 @@ def gap_pieces(motion: Real, stiffness: float, gap: float) -> tuple[StatePiece, 
     opening = motion.copy()
     opening[0] -= gap
     rows = segments_of(np.zeros(opening.size), opening, 1.0, 1.0).rows
-    closed = ((float(row[BEGIN]), float(row[END])) for row in rows)
+    closed = ((float(row.begin), float(row.end)) for row in rows)
     return tuple(spring(*when, np.array([[stiffness]])) for when in closed if when[1] - when[0] > SHORTEST)
 
 

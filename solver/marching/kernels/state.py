@@ -7,11 +7,10 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numba.experimental import structref
 from numpy.typing import NDArray
 
 from solver.jit.decorators import compiled
-from solver.jit.reference import Reference
+from solver.jit.reference import referenced
 
 Real = NDArray[np.float64]
 Whole = NDArray[np.int64]
@@ -122,51 +121,10 @@ class Record(NamedTuple):
 # Inside the compiled loops each of them is one pointer, as in `solver.contacts.kernels.system`.
 
 
-@structref.register
-class _MarchSystemType(Reference):
-    """Numba's type of a `System` by reference."""
-
-
-class _SystemReference(structref.StructRefProxy):
-    """A `System` by reference."""
-
-
-@structref.register
-class _MarchStateType(Reference):
-    """Numba's type of a `State` by reference."""
-
-
-class _StateReference(structref.StructRefProxy):
-    """A `State` by reference."""
-
-
-@structref.register
-class _MarchSeriesType(Reference):
-    """Numba's type of a `Series` by reference."""
-
-
-class _SeriesReference(structref.StructRefProxy):
-    """A `Series` by reference."""
-
-
-@structref.register
-class _MarchRecordType(Reference):
-    """Numba's type of a `Record` by reference."""
-
-
-class _RecordReference(structref.StructRefProxy):
-    """A `Record` by reference."""
-
-
-structref.define_proxy(_SystemReference, _MarchSystemType, list(System._fields))
-structref.define_proxy(_StateReference, _MarchStateType, list(State._fields))
-structref.define_proxy(_SeriesReference, _MarchSeriesType, list(Series._fields))
-structref.define_proxy(_RecordReference, _MarchRecordType, list(Record._fields))
-
-new_system: Callable[..., System] = _SystemReference
-new_state: Callable[..., State] = _StateReference
-new_series: Callable[..., Series] = _SeriesReference
-new_record: Callable[..., Record] = _RecordReference
+new_system: Callable[..., System] = referenced("MarchSystem", __name__, System._fields)
+new_state: Callable[..., State] = referenced("MarchState", __name__, State._fields)
+new_series: Callable[..., Series] = referenced("MarchSeries", __name__, Series._fields)
+new_record: Callable[..., Record] = referenced("MarchRecord", __name__, Record._fields)
 
 
 @compiled

@@ -49,7 +49,7 @@ class Sampled:
 
 def by_samples(case: Case, samples: int) -> Sampled:
     n, m = case.U.size, case.N.size
-    segments = np.zeros((2 * samples, events.SEGMENT_COLUMNS))
+    segments = np.zeros(2 * samples, events.SEGMENT)
     F, dF_dkt, dF_dmu = np.zeros(n), np.zeros(n), np.zeros(n)
     dF_dU, dF_dN = np.zeros((n, n)), np.zeros((n, m))
     state, count = sampled_force(

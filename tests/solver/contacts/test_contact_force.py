@@ -145,11 +145,10 @@ def test_the_onset_after_separation_counts(name: str):
     answer = evaluate(case)
     term = np.zeros_like(answer.dF_dN)
     after = answer.segments[
-        (answer.segments[:, events.MOTION] == events.STICK)
-        & (answer.segments[:, events.BEGAN] == events.AFTER_SEPARATION)
+        (answer.segments["motion"] == events.STICK) & (answer.segments["began"] == events.AFTER_SEPARATION)
     ]
     assert len(after) == 1
-    begin, end = after[0, [events.BEGIN, events.END]]
+    begin, end = after[0][["begin", "end"]]
     at = np.array([begin])
     rate = case.kt * values(fourier.derivative(case.U), at) / values(fourier.derivative(case.N), at)
     nodes, weights = np.polynomial.legendre.leggauss(200)

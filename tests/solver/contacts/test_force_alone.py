@@ -9,11 +9,10 @@ from solver.contacts.kernels.circle.law import coulomb_circle
 from solver.contacts.kernels.columns import COLUMNS, KN, KT, KT_SECOND, MU
 from solver.contacts.kernels.stick_slip_events import (
     LIFTING,
-    SEGMENT_COLUMNS,
     SEPARATED,
     SLIPPING,
     STUCK,
-    segment_capacity,
+    new_segments,
 )
 from solver.jit import fourier
 from solver.jit.trig_polynomial import grid_size, grid_tables
@@ -40,7 +39,7 @@ def test_the_force_is_the_same(ports: int, size: float, N0: float, state: int) -
     forces = []
     for blocks in (ports * ports, 0):
         F, dF_dU, dF_dp = np.full((ports, n), np.nan), np.empty((blocks, n, n)), np.empty((ports, n))
-        segments = np.zeros((segment_capacity(TOP), SEGMENT_COLUMNS))
+        segments = new_segments(TOP)
         found = coulomb_circle(
             U, fourier.all_harmonics(TOP), load, fourier.all_harmonics(1), row, np.zeros(COLUMNS),
             np.zeros(3), *tables, segments, F, dF_dU, dF_dp,

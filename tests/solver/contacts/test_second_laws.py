@@ -21,7 +21,7 @@ from space_elements import random_elements
 from solver.contacts.kernels.columns import A_1, COLUMNS, GAP, K_GAP, KN, KT, KT_SECOND, MU
 from solver.contacts.kernels.laws import law_force, law_number
 from solver.contacts.kernels.second_laws import law_second, second_number
-from solver.contacts.kernels.stick_slip_events import FAILED, SEGMENT_COLUMNS, segment_capacity
+from solver.contacts.kernels.stick_slip_events import FAILED, new_segments
 from solver.jit import fourier
 from solver.jit.trig_polynomial import grid_size, grid_tables
 
@@ -97,7 +97,7 @@ class Point:
 def gradient(law: Law, at: Point, w: np.ndarray) -> tuple[np.ndarray, tuple[int, int]]:
     """Gradient of w·F by motions, columns and load, by the law's own kernel; state and piece."""
     (m, n), tables = at.U.shape, grid_tables(grid_size(at.top), at.top)
-    segments = np.zeros((segment_capacity(at.top), SEGMENT_COLUMNS))
+    segments = new_segments(at.top)
     F, dF_dU, dF_dp = np.empty((m, n)), np.empty((m * m, n, n)), np.empty((m, n))
     parts, here = [], (0, 0)
     ways = [(np.eye(COLUMNS)[c], np.zeros(3)) for c in law.columns]

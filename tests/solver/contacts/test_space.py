@@ -37,11 +37,10 @@ from solver.contacts.kernels.columns import COLUMNS, KN, KT, KT_SECOND, MU
 from solver.contacts.kernels.stick_slip_events import (
     FAILED,
     LIFTING,
-    SEGMENT_COLUMNS,
     SEPARATED,
     SLIPPING,
     STUCK,
-    segment_capacity,
+    new_segments,
 )
 from solver.jit import fourier
 from solver.jit.trig_polynomial import grid_size, grid_tables
@@ -357,7 +356,7 @@ def test_harmonics_that_are_left_out_are_as_if_they_were_zero():
         for motion, ks in ((U, odd), (fourier.to_full(U, odd, top), fourier.all_harmonics(top))):
             n = motion.shape[1]
             F, dF_dU = np.full((2, n), np.nan), np.full((4, n, n), np.nan)
-            segments = np.zeros((segment_capacity(top), SEGMENT_COLUMNS))
+            segments = new_segments(top)
             coulomb_circle(
                 motion, ks, np.array([0.8, 0.0, 0.0]), fourier.all_harmonics(1), row_of(2.0, 3.0, 0.2),
                 np.zeros(COLUMNS), np.zeros(3), *tables, segments, F, dF_dU, np.empty((2, n)),

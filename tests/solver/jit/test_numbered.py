@@ -11,7 +11,8 @@ from numba import types
 
 from solver.contacts.kernels.columns import KERNELS
 from solver.contacts.kernels.laws import call_law, law_number
-from solver.jit.separate import watched
+from solver.contacts.kernels.stick_slip_events import SEGMENT
+from solver.jit.slots import watched
 
 
 class Noted:
@@ -36,7 +37,7 @@ def place(name: bytes) -> str:
 
 def test_compiling_a_call_announces_every_law_of_the_package() -> None:
     one, two, three = (types.Array(types.float64, dimensions, "C") for dimensions in (1, 2, 3))
-    ks = types.Array(types.int64, 1, "C")
+    ks, segments = types.Array(types.int64, 1, "C"), types.Array(numba.from_dtype(SEGMENT), 1, "C")
 
     @numba.njit
     def caller(e: int, *rest: Any) -> tuple[int, int]:
@@ -44,7 +45,7 @@ def test_compiling_a_call_announces_every_law_of_the_package() -> None:
 
     noted = Noted()
     with watched(noted):
-        rest = types.Tuple([two, ks, one, ks, one, one, one, two, two, two, two, three, two])
+        rest = types.Tuple([two, ks, one, ks, one, one, one, two, two, segments, two, three, two])
         caller.compile((types.int64, rest))
     assert set(KERNELS) <= set(noted.names)
     assert not set(KERNELS) & set(noted.called_ones), "which of them are called nobody knows yet"

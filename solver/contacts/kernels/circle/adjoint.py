@@ -10,42 +10,25 @@ import math
 import numpy as np
 
 from solver.contacts.kernels.circle.panels import (
-    CURVES,
-    DLIMIT,
-    DX,
-    DY,
     LIMIT,
     Array,
+    Curves,
     Number,
     X,
     Y,
     solve_columns,
     turning_by,
 )
-from solver.contacts.kernels.circle.path import FROM, START, TO
 from solver.contacts.kernels.circle.radau import NODES, SLOPES, STAGES, WEIGHTS
 from solver.contacts.kernels.coulomb.force import bases_by
 from solver.jit.angles import cosines_and_sines
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Integer
+from solver.jit.records import Row
 from solver.jit.separate import apart
 
 # Sums over sticks (1), and over slips weighted by cos θ and sin θ, of cos qτ and sin qτ.
 STUCK_COS, STUCK_SIN, ALONG_COS, ALONG_SIN, ACROSS_COS, ACROSS_SIN = 0, 1, 2, 3, 4, 5
-
-
-@compiled
-def moments_between(begin: Number, end: Number, cosines: Array, sines: Array) -> None:
-    """Set ∫cos qτ and ∫sin qτ over [begin, end]; see `solver.contacts.kernels.coulomb.force.add_moments`."""
-    half, middle = 0.5 * (end - begin), 0.5 * (end + begin)
-    cm1, sm1, ch1, sh1 = np.cos(middle), np.sin(middle), np.cos(half), np.sin(half)
-    cm, sm, ch, sh = cm1, sm1, ch1, sh1
-    cosines[0], sines[0] = end - begin, 0.0
-    for q in range(1, cosines.size):
-        factor = 2.0 * sh / q
-        cosines[q], sines[q] = factor * cm, factor * sm
-        cm, sm = cm * cm1 - sm * sm1, sm * cm1 + cm * sm1
-        ch, sh = ch * ch1 - sh * sh1, sh * ch1 + ch * sh1
 
 
 @compiled
@@ -69,15 +52,16 @@ def _slip_moments(cosines: Array, sines: Array, along: Array, across: Array, sum
 
 
 @compiled
-def _curves_of_basis(packed: Array, e: Array, de: Array, at: Array) -> None:
-    """Fill `at` with L and the slopes of X, Y and L from the basis at a point."""
+def _curves_of_basis(packed: Array, e: Array, de: Array) -> Curves:
+    """Return L and the slopes of X, Y and L from the basis at a point; the rest is 0."""
     x, y, load, rise = 0.0 * packed[0, 0], 0.0 * packed[0, 0], 0.0 * packed[0, 0], 0.0 * packed[0, 0]
     for j in range(e.size):
         x += packed[X, j] * de[j]
         y += packed[Y, j] * de[j]
         load += packed[LIMIT, j] * e[j]
         rise += packed[LIMIT, j] * de[j]
-    at[DX], at[DY], at[LIMIT], at[DLIMIT] = x, y, load, rise
+    none = 0.0 * packed[0, 0]
+    return Curves(none, none, load, x, y, rise, none, none, none)
 
 
 @compiled
@@ -112,7 +96,7 @@ def _weigh(kept: Array, c: Number, s: Number, weights: Array, F: Array, line: Ar
 
 @apart
 def panel_back(
-    packed: Array, kappa: Number, all_ks: Integer, panel: Array, weights: Array, of_motion: Integer,
+    packed: Array, kappa: Number, all_ks: Integer, panel: Row, weights: Array, of_motion: Integer,
     active: bool, eta: Array, sums: Array, F: Array, table: Array, adjoint: Array,
 ) -> None:  # fmt: skip
     """Go back over a panel of a slip: η (of θ) at its begin from that at its end.
@@ -122,31 +106,31 @@ def panel_back(
     """
     dtype, m, n = packed.dtype, eta.size, of_motion.size
     size = packed.shape[1]
-    basis, at = np.empty((3, size), dtype), np.empty(CURVES, dtype)
+    basis = np.empty((3, size), dtype)
     e, de, kept = basis[0], basis[1], basis[2, :n]
     matrix, first = np.empty((STAGES, STAGES), dtype), np.empty(STAGES, dtype)
-    begin, h = panel[FROM], panel[TO] - panel[FROM]
+    begin, h = panel.begin, panel.end - panel.begin
     times, waves = np.empty((3, STAGES), dtype), np.empty((4, STAGES), dtype)
     for i in range(STAGES):
         times[0, i] = begin + h * NODES[i]
     cosines_and_sines(times[0], times[1], times[2])
-    cosines_and_sines(panel[START + 1 : START + 1 + STAGES], waves[0], waves[1])
+    cosines_and_sines(panel.theta, waves[0], waves[1])
     for i in range(STAGES):
         c, s = waves[0, i], waves[1, i]
         bases_by(times[1, i], times[2, i], all_ks, e, de)
-        _curves_of_basis(packed, e, de, at)
+        at = _curves_of_basis(packed, e, de)
         _, slope, g, dg = turning_by(at, kappa, c, s)
-        rate = SLOPES[i, 0] * panel[START]
+        rate = SLOPES[i, 0] * panel.start
         for j in range(STAGES):
-            rate += SLOPES[i, j + 1] * panel[START + 1 + j]
+            rate += SLOPES[i, j + 1] * panel.theta[j]
         rate /= h
-        factor = at[LIMIT] * g / h
+        factor = at.limit * g / h
         for j in range(STAGES):
             matrix[j, i] = factor * SLOPES[i, j + 1]
-        matrix[i, i] += at[LIMIT] * dg * rate - slope
+        matrix[i, i] += at.limit * dg * rate - slope
         first[i] = factor * SLOPES[i, 0]
         _table_row(e, de, c, s, g * rate, (kappa - 1.0) * s * c, table[i])
-        table[i, 3 * size] = -at[LIMIT] * c * c * rate - s * c * at[DLIMIT]
+        table[i, 3 * size] = -at.limit * c * c * rate - s * c * at.dlimit
         line = adjoint[i]
         for r in range(m):
             line[r] = 0.0 * eta[r]
@@ -154,7 +138,7 @@ def panel_back(
             continue
         share = h * WEIGHTS[i]
         waves[2, i], waves[3, i] = share * c, share * s
-        norm = share * at[LIMIT] / math.pi
+        norm = share * at.limit / math.pi
         for j in range(n):
             kept[j] = norm * e[of_motion[j]]
         if all_ks[0] == 0 and of_motion[0] == 0:

@@ -10,16 +10,16 @@ import math
 
 import numpy as np
 
-from solver.contacts.kernels.circle.adjoint import STUCK_COS, STUCK_SIN, moments_between
-from solver.contacts.kernels.circle.panels import CURVES, LIMIT, Array, X, Y, curves_at
-from solver.contacts.kernels.circle.path import BEGIN, COUNT, END, FIRST, FROM, MOTION, START, TO, TX, TY
+from solver.contacts.kernels.circle.adjoint import STUCK_COS, STUCK_SIN
+from solver.contacts.kernels.circle.panels import Array, X, Y, curves_at
 from solver.contacts.kernels.circle.radau import NODES, STAGES, WEIGHTS
-from solver.contacts.kernels.circle.state import HOW, PIECES, SETTLES
-from solver.contacts.kernels.coulomb.force import basis_at, moment_rows, products
+from solver.contacts.kernels.circle.state import SETTLES
+from solver.contacts.kernels.coulomb.force import add_moments, basis_at, moment_rows, products
 from solver.contacts.kernels.stick_slip_events import STICK
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Integer, Real, coefficient_count
 from solver.jit.lapack import fill_block
+from solver.jit.records import Records, Row
 from solver.jit.separate import apart
 
 
@@ -37,26 +37,34 @@ def pack(wave: Array, ks: Integer, q: Array) -> None:
 
 @apart
 def circle_force(
-    waves: Real, kappa: float, ks: Integer, all_ks: Integer, found: Real, pieces: Real, panels: Real, F: Real
+    waves: Real,
+    kappa: float,
+    ks: Integer,
+    all_ks: Integer,
+    found: Records,
+    pieces: Records,
+    panels: Records,
+    F: Real,
 ) -> None:
     """Fill F (2, n); arguments as of `solver.contacts.kernels.circle.gradient.circle_gradient`."""
-    n, size, count = F.shape[1], coefficient_count(all_ks), int(found[PIECES])
+    n, size, count = F.shape[1], coefficient_count(all_ks), found[0].pieces
     sums, here = np.zeros((2, ks[-1] + all_ks[-1] + 1)), np.empty((2, ks[-1] + all_ks[-1] + 1))
-    moment, at, block, packed = np.empty(n), np.empty(CURVES), np.empty((n, size)), np.empty((2, size))
+    moment, block, packed = np.empty(n), np.empty((n, size)), np.empty((2, size))
     fill_block(F, 0.0)
-    for index in range(count - 1 if found[HOW] == SETTLES else 0, count):
+    for index in range(count - 1 if found[0].how == SETTLES else 0, count):
         row = pieces[index]
-        if row[MOTION] != STICK:
-            for p in range(int(row[FIRST]), int(row[FIRST]) + int(row[COUNT])):
-                _add_panel(waves, ks, panels[p], moment, at, F)
+        if row.motion != STICK:
+            for p in range(row.first, row.first + row.count):
+                _add_panel(waves, ks, panels[p], moment, F)
             continue
-        moments_between(row[BEGIN], row[END], here[0], here[1])
+        fill_block(here, 0.0)
+        add_moments(row.begin, row.end, 1.0, here[0], here[1])
         moment_rows(here[0], here[1], ks, moment)
         for q in range(sums.shape[1]):
             sums[STUCK_COS, q] += here[0, q]
             sums[STUCK_SIN, q] += here[1, q]
-        curves_at(waves, row[BEGIN], at)
-        offset_x, offset_y = row[TX] - at[X], row[TY] - at[Y] / kappa
+        at = curves_at(waves, row.begin)
+        offset_x, offset_y = row.tx - at.x, row.ty - at.y / kappa
         for i in range(n):
             F[0, i] += offset_x * moment[i]
             F[1, i] += offset_y * moment[i]
@@ -73,16 +81,16 @@ def circle_force(
 
 
 @compiled
-def _add_panel(waves: Real, ks: Integer, panel: Real, e: Real, at: Real, F: Real) -> None:
+def _add_panel(waves: Real, ks: Integer, panel: Row, e: Real, F: Real) -> None:
     """Add the integrals of L (cos θ, sin θ) over a panel."""
-    begin, h = panel[FROM], panel[TO] - panel[FROM]
+    begin, h = panel.begin, panel.end - panel.begin
     for i in range(STAGES):
-        tau, theta = begin + h * NODES[i], panel[START + 1 + i]
-        curves_at(waves, tau, at)
+        tau, theta = begin + h * NODES[i], panel.theta[i]
+        at = curves_at(waves, tau)
         basis_at(tau, ks, e)
         if ks[0] == 0:
             e[0] *= 0.5
-        share = h * WEIGHTS[i] * at[LIMIT] / math.pi
+        share = h * WEIGHTS[i] * at.limit / math.pi
         along, across = share * math.cos(theta), share * math.sin(theta)
         for j in range(e.size):
             F[0, j] += along * e[j]

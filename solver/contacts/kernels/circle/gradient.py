@@ -21,45 +21,24 @@ import numpy as np
 from solver.contacts.kernels.circle.adjoint import (
     STUCK_COS,
     STUCK_SIN,
-    moments_between,
     panel_back,
 )
 from solver.contacts.kernels.circle.force import pack
 from solver.contacts.kernels.circle.panels import (
-    CURVES,
-    DDLIMIT,
-    DDX,
-    DDY,
-    DLIMIT,
-    DX,
-    DY,
-    LIMIT,
     Array,
     Number,
-    X,
-    Y,
     curves_at,
     turning,
 )
-from solver.contacts.kernels.circle.path import (
-    BEGAN,
-    BEGIN,
-    COUNT,
-    END,
-    FIRST,
-    MOTION,
-    START,
-    TX,
-    TY,
-    projection,
-)
+from solver.contacts.kernels.circle.path import projection
 from solver.contacts.kernels.circle.radau import STAGES
-from solver.contacts.kernels.circle.state import CLOSES, HOW, PANELS, PIECES, SETTLES
-from solver.contacts.kernels.coulomb.force import bases_at, moment_rows, products
+from solver.contacts.kernels.circle.state import CLOSES, SETTLES
+from solver.contacts.kernels.coulomb.force import add_moments, bases_at, moment_rows, products
 from solver.contacts.kernels.stick_slip_events import AFTER_SEPARATION, STICK, UNLOADED
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Integer
 from solver.jit.lapack import fill_block
+from solver.jit.records import Records, Row
 from solver.jit.separate import apart
 
 
@@ -74,30 +53,29 @@ def _add_row(G: Array, column: int, psi: Array, factor: Number, e: Array) -> Non
 
 @apart
 def _stick_back(
-    waves: Array, kappa: Number, ks: Integer, all_ks: Integer, row: Array, active: bool, weights: Array,
+    waves: Array, kappa: Number, ks: Integer, all_ks: Integer, row: Row, active: bool, weights: Array,
     of_motion: Integer, psi: Array, sums: Array, F: Array, G: Array,
 ) -> None:  # fmt: skip
     """Go back over a stick: ψ at its begin from ψ at its end."""
     m, n, dtype = psi.shape[1], of_motion.size, waves.dtype
     size = all_ks.size * 2 - (1 if all_ks[0] == 0 else 0)
     e, de, moment = np.empty(size, dtype), np.empty(size, dtype), np.empty(n, dtype)
-    at = np.empty(CURVES, dtype)
-    curves_at(waves, row[END], at)
-    bases_at(row[END], all_ks, e, de)
+    at = curves_at(waves, row.end)
+    bases_at(row.end, all_ks, e, de)
     _add_row(G, 0, psi[0], 1.0, e)
     _add_row(G, size, psi[1], 1.0 / kappa, e)
     for r in range(m):
-        G[r, 3 * size] -= psi[1, r] * at[Y] / (kappa * kappa)
-    curves_at(waves, row[BEGIN], at)
-    bases_at(row[BEGIN], all_ks, e, de)
+        G[r, 3 * size] -= psi[1, r] * at.y / (kappa * kappa)
+    at = curves_at(waves, row.begin)
+    bases_at(row.begin, all_ks, e, de)
     if active:
-        here = np.empty((2, sums.shape[1]), dtype)
-        moments_between(row[BEGIN], row[END], here[0], here[1])
+        here = np.zeros((2, sums.shape[1]), dtype)
+        add_moments(row.begin, row.end, 1.0, here[0], here[1])
         moment_rows(here[0], here[1], ks, moment)
         for q in range(sums.shape[1]):
             sums[STUCK_COS, q] += here[0, q]
             sums[STUCK_SIN, q] += here[1, q]
-        offset_x, offset_y = row[TX] - at[X], row[TY] - at[Y] / kappa
+        offset_x, offset_y = row.tx - at.x, row.ty - at.y / kappa
         for i in range(n):
             F[0, i] += offset_x * moment[i]
             F[1, i] += offset_y * moment[i]
@@ -113,10 +91,10 @@ def _stick_back(
     _add_row(G, 0, psi[0], -1.0, e)
     _add_row(G, size, psi[1], -1.0 / kappa, e)
     for r in range(m):
-        G[r, 3 * size] += psi[1, r] * at[Y] / (kappa * kappa)
-    if row[BEGAN] == AFTER_SEPARATION:
-        _add_row(G, 2 * size, psi[0], at[DX] / at[DLIMIT], e)
-        _add_row(G, 2 * size, psi[1], at[DY] / (kappa * at[DLIMIT]), e)
+        G[r, 3 * size] += psi[1, r] * at.y / (kappa * kappa)
+    if row.began == AFTER_SEPARATION:
+        _add_row(G, 2 * size, psi[0], at.dx / at.dlimit, e)
+        _add_row(G, 2 * size, psi[1], at.dy / (kappa * at.dlimit), e)
 
 
 @apart
@@ -126,20 +104,19 @@ def _contact_back(
     """Go back over the begin of a slip where contact begins: δθ of the regular solution."""
     size = (G.shape[1] - 1) // 3
     e, de = np.empty(size, waves.dtype), np.empty(size, waves.dtype)
-    at = np.empty(CURVES, waves.dtype)
-    curves_at(waves, tau, at)
+    at = curves_at(waves, tau)
     bases_at(tau, all_ks, e, de)
     _, slope, g, _ = turning(at, kappa, theta)
     c, s = np.cos(theta), np.sin(theta)
     more = (kappa - 1.0) * s * c
     # L θ' g = F, differentiated where L = 0.
-    rate = (c * at[DDY] - s * at[DDX] - more * at[DDLIMIT]) / (at[DLIMIT] * g - slope)
+    rate = (c * at.ddy - s * at.ddx - more * at.ddlimit) / (at.dlimit * g - slope)
     _add_row(G, 0, eta, s / slope, de)
     _add_row(G, size, eta, -c / slope, de)
     _add_row(G, 2 * size, eta, g * rate / slope, e)
     _add_row(G, 2 * size, eta, more / slope, de)
     for r in range(eta.size):
-        G[r, 3 * size] += eta[r] * s * c * at[DLIMIT] / slope
+        G[r, 3 * size] += eta[r] * s * c * at.dlimit / slope
 
 
 @apart
@@ -148,18 +125,17 @@ def _slip_begin(
     psi: Array, G: Array,
 ) -> None:  # fmt: skip
     """Turn η at the begin of a slip into ψ of the force before it."""
-    at = np.empty(CURVES, waves.dtype)
-    curves_at(waves, tau, at)
+    at = curves_at(waves, tau)
     px, py, along = projection(kappa, theta)
     if not after_stick:
         px, py = -np.sin(theta), np.cos(theta)
     for r in range(eta.size):
-        psi[0, r], psi[1, r] = px * eta[r] / at[LIMIT], py * eta[r] / at[LIMIT]
+        psi[0, r], psi[1, r] = px * eta[r] / at.limit, py * eta[r] / at.limit
     if after_stick and kappa != 1.0:
         size = (G.shape[1] - 1) // 3
         e, de = np.empty(size, waves.dtype), np.empty(size, waves.dtype)
         bases_at(tau, all_ks, e, de)
-        _add_row(G, 2 * size, eta, along / at[LIMIT], e)
+        _add_row(G, 2 * size, eta, along / at.limit, e)
 
 
 @apart
@@ -169,12 +145,11 @@ def _slip_end(
     """Turn ψ of the force L n at the end of a slip into η of its direction; L has its own part."""
     size = (G.shape[1] - 1) // 3
     e, de = np.empty(size, waves.dtype), np.empty(size, waves.dtype)
-    at = np.empty(CURVES, waves.dtype)
-    curves_at(waves, tau, at)
+    at = curves_at(waves, tau)
     bases_at(tau, all_ks, e, de)
     c, s = np.cos(theta), np.sin(theta)
     for r in range(eta.size):
-        eta[r] = at[LIMIT] * (c * psi[1, r] - s * psi[0, r])
+        eta[r] = at.limit * (c * psi[1, r] - s * psi[0, r])
     _add_row(G, 2 * size, psi[0], c, e)
     _add_row(G, 2 * size, psi[1], s, e)
 
@@ -184,14 +159,13 @@ def _unloaded_back(waves: Array, kappa: Number, all_ks: Integer, cut: bool, psi:
     """Go back over τ = 0, where the force is that of the unloaded state, cut to the limit if it is beyond."""
     size = (G.shape[1] - 1) // 3
     e, de = np.empty(size, waves.dtype), np.empty(size, waves.dtype)
-    at = np.empty(CURVES, waves.dtype)
-    curves_at(waves, 0.0 * waves[0, 0, 0], at)
+    at = curves_at(waves, 0.0 * waves[0, 0, 0])
     bases_at(0.0 * waves[0, 0, 0], all_ks, e, de)
-    tx, ty = at[X], at[Y] / kappa
+    tx, ty = at.x, at.y / kappa
     if cut:
         length = np.sqrt(tx * tx + ty * ty)
         nx, ny = tx / length, ty / length
-        share = at[LIMIT] / length
+        share = at.limit / length
         for r in range(psi.shape[1]):
             along = nx * psi[0, r] + ny * psi[1, r]
             for j in range(size):
@@ -200,7 +174,7 @@ def _unloaded_back(waves: Array, kappa: Number, all_ks: Integer, cut: bool, psi:
     _add_row(G, 0, psi[0], 1.0, e)
     _add_row(G, size, psi[1], 1.0 / kappa, e)
     for r in range(psi.shape[1]):
-        G[r, 3 * size] -= psi[1, r] * at[Y] / (kappa * kappa)
+        G[r, 3 * size] -= psi[1, r] * at.y / (kappa * kappa)
 
 
 @apart
@@ -262,8 +236,8 @@ def _close(psi: Array, rows: int, G: Array) -> None:
 
 @apart
 def circle_gradient(
-    waves: Array, kappa: Number, ks: Integer, all_ks: Integer, of_motion: Integer, found: Array,
-    pieces: Array, panels: Array, weights: Array, F: Array, G: Array,
+    waves: Array, kappa: Number, ks: Integer, all_ks: Integer, of_motion: Integer, found: Records,
+    pieces: Records, panels: Records, weights: Array, F: Array, G: Array,
 ) -> None:  # fmt: skip
     """Fill the force coefficients and their gradient from a path.
 
@@ -279,48 +253,48 @@ def circle_gradient(
         rows are scratch.
     """
     dtype, size = waves.dtype, (G.shape[1] - 1) // 3
-    rows, count = G.shape[0] - 2, int(found[PIECES])
+    rows, count = G.shape[0] - 2, found[0].pieces
     psi, eta = np.zeros((2, rows + 2), dtype), np.zeros(rows + 2, dtype)
     sums = np.zeros((6, ks[-1] + all_ks[-1] + 1), dtype)
-    nodes, used = STAGES * int(found[PANELS].real), 0
+    nodes, used = STAGES * found[0].panels, 0
     table, adjoint = np.empty((nodes, 3 * size + 1), dtype), np.empty((nodes, rows + 2), dtype)
     packed = np.empty((3, size), dtype)
     for x in range(3):
         pack(waves[x], all_ks, packed[x])
     fill_block(G, 0.0)
     fill_block(F, 0.0)
-    if found[HOW] == CLOSES:
+    if found[0].how == CLOSES:
         psi[0, rows], psi[1, rows + 1] = 1.0, 1.0
     for index in range(count - 1, -1, -1):
         row = pieces[index]
-        active = found[HOW] != SETTLES or index == count - 1
-        if index + 1 < count and pieces[index + 1, BEGIN] != row[END]:
+        active = found[0].how != SETTLES or index == count - 1
+        if index + 1 < count and pieces[index + 1].begin != row.end:
             fill_block(psi, 0.0)
-        follows = index > 0 and pieces[index - 1, END] == row[BEGIN]
-        if row[MOTION] == STICK:
+        follows = index > 0 and pieces[index - 1].end == row.begin
+        if row.motion == STICK:
             _stick_back(waves, kappa, ks, all_ks, row, active, weights, of_motion, psi, sums, F, G)
             continue
-        last = int(row[FIRST].real) + int(row[COUNT].real) - 1
-        if last < int(row[FIRST].real):
+        last = row.first + row.count - 1
+        if last < row.first:
             continue
-        _slip_end(waves, all_ks, row[END], panels[last, START + STAGES], psi, eta, G)
-        for p in range(last, int(row[FIRST].real) - 1, -1):
+        _slip_end(waves, all_ks, row.end, panels[last].theta[STAGES - 1], psi, eta, G)
+        for p in range(last, row.first - 1, -1):
             here = slice(used, used + STAGES)
             panel_back(
                 packed, kappa, all_ks, panels[p], weights, of_motion, active, eta, sums, F, table[here],
                 adjoint[here],
             )  # fmt: skip
             used += STAGES
-        theta = panels[int(row[FIRST].real), START]
-        if not follows and row[BEGAN] == AFTER_SEPARATION:
-            _contact_back(waves, kappa, all_ks, row[BEGIN], theta, eta, G)
+        theta = panels[row.first].start
+        if not follows and row.began == AFTER_SEPARATION:
+            _contact_back(waves, kappa, all_ks, row.begin, theta, eta, G)
             fill_block(psi, 0.0)
             continue
-        after_stick = follows and pieces[index - 1, MOTION] == STICK
-        _slip_begin(waves, kappa, all_ks, row[BEGIN], theta, after_stick, eta, psi, G)
+        after_stick = follows and pieces[index - 1].motion == STICK
+        _slip_begin(waves, kappa, all_ks, row.begin, theta, after_stick, eta, psi, G)
     G += np.dot(adjoint[:used].T, table[:used])
     _linear_parts(packed, kappa, ks, all_ks, of_motion, weights, sums, F, G)
-    if found[HOW] == CLOSES:
+    if found[0].how == CLOSES:
         _close(psi, rows, G)
-    elif found[HOW] == SETTLES:
-        _unloaded_back(waves, kappa, all_ks, pieces[0, BEGAN] != UNLOADED, psi, G)
+    elif found[0].how == SETTLES:
+        _unloaded_back(waves, kappa, all_ks, pieces[0].began != UNLOADED, psi, G)

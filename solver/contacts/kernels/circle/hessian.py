@@ -10,63 +10,27 @@ from __future__ import annotations
 
 import numpy as np
 
-from solver.contacts.kernels.circle.adjoint import moments_between
 from solver.contacts.kernels.circle.gradient import circle_gradient
 from solver.contacts.kernels.circle.law import curves_of
 from solver.contacts.kernels.circle.panels import (
-    CURVES,
-    DDLIMIT,
-    DDX,
-    DDY,
-    DLIMIT,
-    DX,
-    DY,
-    LIMIT,
-    NODE_ROWS,
+    CARRIED_CURVES,
     PANEL_MATRIX,
     Array,
     Number,
-    X,
-    Y,
+    PanelWork,
     curves_at,
     slip_rate,
     solve_panel,
     turning,
 )
-from solver.contacts.kernels.circle.path import (
-    BEGAN,
-    BEGIN,
-    COUNT,
-    END,
-    FIRST,
-    FROM,
-    MOTION,
-    PANEL_COLUMNS,
-    START,
-    TO,
-    TX,
-    TY,
-)
+from solver.contacts.kernels.circle.path import CARRIED_PANEL, CARRIED_PIECE
 from solver.contacts.kernels.circle.radau import SLOPES, STAGES
-from solver.contacts.kernels.circle.state import (
-    CLOSES,
-    FACTOR,
-    HOW,
-    MX,
-    MY,
-    OPENS,
-    PANELS,
-    PIECES,
-    PX,
-    PY,
-    SETTLES,
-)
-from solver.contacts.kernels.columns import KN, KT, KT_SECOND, MU
-from solver.contacts.kernels.coulomb.force import products
-from solver.contacts.kernels.coulomb.law import load_of
-from solver.contacts.kernels.stick_slip_events import LIFTING, SEPARATED, SLIP, STICK, UNLOADED
+from solver.contacts.kernels.circle.state import CLOSES, OPENS, SETTLES
+from solver.contacts.kernels.columns import KT, KT_SECOND, MU
+from solver.contacts.kernels.stick_slip_events import SLIP, STICK, UNLOADED
 from solver.jit.decorators import compiled
-from solver.jit.fourier import Integer, Real, coefficient_count, merged, positions
+from solver.jit.fourier import Integer, Real
+from solver.jit.records import Records, Row
 from solver.jit.separate import apart
 
 TINY = 1e-30  # of the direction
@@ -83,24 +47,22 @@ def over(part: Number, whole: Number) -> Number:
 
 
 @compiled
-def _zero_of_limit(waves: Array, tau: Number, at: Array) -> Number:
+def _zero_of_limit(waves: Array, tau: Number) -> Number:
     """Move a time to where L is 0."""
     for _ in range(3):
-        curves_at(waves, tau, at)
-        tau -= over(at[LIMIT], at[DLIMIT])
+        at = curves_at(waves, tau)
+        tau -= over(at.limit, at.dlimit)
     return tau
 
 
 @compiled
-def _end_of_stick(
-    waves: Array, kappa: Number, offset_x: Number, offset_y: Number, tau: Number, at: Array
-) -> Number:
+def _end_of_stick(waves: Array, kappa: Number, offset_x: Number, offset_y: Number, tau: Number) -> Number:
     """Move a time to where |t|² is L²."""
     for _ in range(ROUNDS):
-        curves_at(waves, tau, at)
-        tx, ty = offset_x + at[X], offset_y + at[Y] / kappa
-        excess = tx * tx + ty * ty - at[LIMIT] * at[LIMIT]
-        rise = 2.0 * (tx * at[DX] + ty * at[DY] / kappa - at[LIMIT] * at[DLIMIT])
+        at = curves_at(waves, tau)
+        tx, ty = offset_x + at.x, offset_y + at.y / kappa
+        excess = tx * tx + ty * ty - at.limit * at.limit
+        rise = 2.0 * (tx * at.dx + ty * at.dy / kappa - at.limit * at.dlimit)
         tau -= over(excess, rise)
     return tau
 
@@ -114,188 +76,150 @@ def _direction(theta: float, tx: Number, ty: Number) -> Number:
 
 @apart
 def _carry_slip(
-    waves: Array, kappa: Number, row: Array, before: Real, panels: Array, given: Real, sticks: bool
+    waves: Array, kappa: Number, row: Row, before: Row, panels: Records, given: Records, sticks: bool
 ) -> None:
     """Carry the panels of a slip, whose begin, first direction and first guess of the end are in place.
 
     `before` is the real piece, `given` has the real panels. Where it `sticks` the end moves to q = 0.
     """
-    nodes, matrix = np.empty((NODE_ROWS, STAGES), np.complex128), np.empty(PANEL_MATRIX, np.complex128)
-    first, count, length = int(before[FIRST]), int(before[COUNT]), before[END] - before[BEGIN]
+    work = PanelWork(
+        np.empty(STAGES, CARRIED_CURVES), np.empty((3, STAGES), np.complex128),
+        np.empty(PANEL_MATRIX, np.complex128),
+    )  # fmt: skip
+    first, count, length = before.first, before.count, before.end - before.begin
     for _ in range(ROUNDS):
-        theta = panels[first, START]
-        stretch = (row[END] - row[BEGIN]) / length
+        theta = panels[first].start
+        stretch = (row.end - row.begin) / length
         for p in range(first, first + count):
             panel = panels[p]
-            panel[FROM] = row[BEGIN] + stretch * (given[p, FROM] - before[BEGIN])
-            panel[TO] = row[BEGIN] + stretch * (given[p, TO] - before[BEGIN])
-            panel[START] = theta
-            solve_panel(waves, kappa, panel[FROM], panel[TO], theta, False, panel[START + 1 :], nodes, matrix)
-            theta = panel[START + STAGES]
+            panel.begin = row.begin + stretch * (given[p].begin - before.begin)
+            panel.end = row.begin + stretch * (given[p].end - before.begin)
+            panel.start = theta
+            solve_panel(waves, kappa, panel.begin, panel.end, theta, False, panel.theta, work)
+            theta = panel.theta[STAGES - 1]
         if not sticks:
             break
-        panel, last = panels[first + count - 1], nodes[:, STAGES - 1]
-        slope = SLOPES[STAGES - 1, 0] * panel[START]
+        panel, last = panels[first + count - 1], work.nodes[STAGES - 1]
+        slope = SLOPES[STAGES - 1, 0] * panel.start
         for j in range(STAGES):
-            slope += SLOPES[STAGES - 1, j + 1] * panel[START + 1 + j]
-        slope = over(slope, panel[TO] - panel[FROM])
+            slope += SLOPES[STAGES - 1, j + 1] * panel.theta[j]
+        slope = over(slope, panel.end - panel.begin)
         c, s = np.cos(theta), np.sin(theta)
-        fall = c * last[DDX] + s * last[DDY] / kappa - last[DDLIMIT]
-        fall += (c * last[DY] / kappa - s * last[DX]) * slope
-        row[END] -= over(slip_rate(last, kappa, theta), fall)
+        fall = c * last.ddx + s * last.ddy / kappa - last.ddlimit
+        fall += (c * last.dy / kappa - s * last.dx) * slope
+        row.end -= over(slip_rate(last, kappa, theta), fall)
 
 
 @apart
 def _carry(
-    waves: Array, kappa: Number, found: Real, pieces: Array, panels: Array, given: Real, whole: Real,
-    start: Array,
+    waves: Array, kappa: Number, found: Records, pieces: Records, panels: Records, given: Records,
+    whole: Records,     start: Array,
 ) -> None:  # fmt: skip
     """Carry a path into the complex plane, the force at its begin `start` (2,); it ends as that at the end.
 
     `given` has the real panels, `whole` the real pieces.
     """
-    at = np.empty(CURVES, np.complex128)
-    count = int(found[PIECES])
+    count = found[0].pieces
     tx, ty = start[0], start[1]
     for i in range(count):
         row, before = pieces[i], whole[i]
-        follows = i > 0 and whole[i - 1, END] == before[BEGIN]
-        followed = i + 1 < count and whole[i + 1, BEGIN] == before[END]
-        row[BEGIN] = pieces[i - 1, END] if follows else before[BEGIN] + 0.0j
-        row[END] = before[END] + 0.0j
-        if not follows and found[HOW] == OPENS:
-            row[BEGIN] = _zero_of_limit(waves, row[BEGIN], at)
+        follows = i > 0 and whole[i - 1].end == before.begin
+        followed = i + 1 < count and whole[i + 1].begin == before.end
+        row.begin = pieces[i - 1].end if follows else before.begin + 0.0j
+        row.end = before.end + 0.0j
+        if not follows and found[0].how == OPENS:
+            row.begin = _zero_of_limit(waves, row.begin)
             tx, ty = 0.0j, 0.0j
-        if not followed and found[HOW] == OPENS:
-            row[END] = _zero_of_limit(waves, row[END], at)
-        row[TX], row[TY] = tx, ty
-        curves_at(waves, row[BEGIN], at)
-        if before[MOTION] == STICK:
-            offset_x, offset_y = tx - at[X], ty - at[Y] / kappa
-            if not follows and found[HOW] == OPENS and before[END] - before[BEGIN] < SHORTEST:
-                row[END] += row[BEGIN] - before[BEGIN]
-            elif followed and whole[i + 1, MOTION] == SLIP:
-                row[END] = _end_of_stick(waves, kappa, offset_x, offset_y, row[END], at)
-            curves_at(waves, row[END], at)
-            tx, ty = offset_x + at[X], offset_y + at[Y] / kappa
+        if not followed and found[0].how == OPENS:
+            row.end = _zero_of_limit(waves, row.end)
+        row.tx, row.ty = tx, ty
+        at = curves_at(waves, row.begin)
+        if before.motion == STICK:
+            offset_x, offset_y = tx - at.x, ty - at.y / kappa
+            if not follows and found[0].how == OPENS and before.end - before.begin < SHORTEST:
+                row.end += row.begin - before.begin
+            elif followed and whole[i + 1].motion == SLIP:
+                row.end = _end_of_stick(waves, kappa, offset_x, offset_y, row.end)
+            at = curves_at(waves, row.end)
+            tx, ty = offset_x + at.x, offset_y + at.y / kappa
             continue
-        first = int(before[FIRST])
-        if before[COUNT] == 0.0:
+        first = before.first
+        if before.count == 0:
             continue
-        if not follows and found[HOW] == OPENS:
-            theta = given[first, START] + 0.0j
+        if not follows and found[0].how == OPENS:
+            theta = given[first].start + 0.0j
             for _ in range(ROUNDS):
                 F, slope, _, _ = turning(at, kappa, theta)
                 theta -= over(F, slope)
-            panels[first, START] = theta
+            panels[first].start = theta
         else:
-            panels[first, START] = _direction(given[first, START], tx, ty)
-        sticks = followed and whole[i + 1, MOTION] == STICK
+            panels[first].start = _direction(given[first].start, tx, ty)
+        sticks = followed and whole[i + 1].motion == STICK
         _carry_slip(waves, kappa, row, before, panels, given, sticks)
-        theta = panels[first + int(before[COUNT]) - 1, START + STAGES]
-        curves_at(waves, row[END], at)
-        tx, ty = at[LIMIT] * np.cos(theta), at[LIMIT] * np.sin(theta)
+        theta = panels[first + before.count - 1].theta[STAGES - 1]
+        at = curves_at(waves, row.end)
+        tx, ty = at.limit * np.cos(theta), at.limit * np.sin(theta)
     start[0], start[1] = tx, ty
 
 
 @apart
 def _carried(
-    waves: Array, kappa: Number, found: Real, pieces: Real, panels: Real, out_pieces: Array,
-    out_panels: Array,
+    waves: Array, kappa: Number, found: Records, pieces: Records, panels: Records,
+    out_pieces: Records, out_panels: Records,
 ) -> None:  # fmt: skip
     """Fill the complex pieces and panels of a path; where it closes, its begin goes with its end."""
-    count, filled = int(found[PIECES]), int(found[PANELS])
+    count, filled = found[0].pieces, found[0].panels
     for i in range(count):
-        for j in range(pieces.shape[1]):
-            out_pieces[i, j] = pieces[i, j]
+        row, given = out_pieces[i], pieces[i]
+        row.motion, row.began, row.first, row.count = given.motion, given.began, given.first, given.count
+        row.begin, row.end, row.tx, row.ty = given.begin, given.end, given.tx, given.ty
     for i in range(filled):
-        for j in range(panels.shape[1]):
-            out_panels[i, j] = panels[i, j]
-    at, start = np.empty(CURVES, np.complex128), np.empty(2, np.complex128)
-    if found[HOW] == SETTLES:
-        curves_at(waves, 0.0j, at)
-        start[0], start[1] = at[X], at[Y] / kappa
-        if pieces[0, BEGAN] != UNLOADED:
-            share = over(at[LIMIT], np.sqrt(start[0] * start[0] + start[1] * start[1]))
+        panel, known = out_panels[i], panels[i]
+        panel.begin, panel.end, panel.start = known.begin, known.end, known.start
+        for j in range(STAGES):
+            panel.theta[j] = known.theta[j]
+    start = np.empty(2, np.complex128)
+    if found[0].how == SETTLES:
+        at = curves_at(waves, 0.0j)
+        start[0], start[1] = at.x, at.y / kappa
+        if pieces[0].began != UNLOADED:
+            share = over(at.limit, np.sqrt(start[0] * start[0] + start[1] * start[1]))
             start[0], start[1] = share * start[0], share * start[1]
-    tx, ty = pieces[0, TX] + 0.0j, pieces[0, TY] + 0.0j
-    rounds = ROUNDS if found[HOW] == CLOSES else 1
+    tx, ty = pieces[0].tx + 0.0j, pieces[0].ty + 0.0j
+    rounds = ROUNDS if found[0].how == CLOSES else 1
     for _ in range(rounds):
-        if found[HOW] == CLOSES:
+        if found[0].how == CLOSES:
             start[0], start[1] = tx, ty
         _carry(waves, kappa, found, out_pieces, out_panels, panels, pieces, start)
-        memory = found[FACTOR] * (found[PX] * found[MX] + found[PY] * found[MY])
-        along = found[FACTOR] * (found[PX] * (start[0] - tx) + found[PY] * (start[1] - ty))
+        memory = found[0].factor * (found[0].px * found[0].mx + found[0].py * found[0].my)
+        along = found[0].factor * (found[0].px * (start[0] - tx) + found[0].py * (start[1] - ty))
         step = over(along, 1.0 - memory)
-        tx, ty = start[0] + step * found[MX], start[1] + step * found[MY]
+        tx, ty = start[0] + step * found[0].mx, start[1] + step * found[0].my
 
 
 @apart
-def circle_second(
-    U: Real, ks: Integer, load: Real, load_ks: Integer, row: Real, state: int, found: Real, pieces: Real,
-    panels: Real, intervals: Real, w: Real, dU: Real, drow: Real, dload: Real, out_U: Real, out_row: Real,
-    out_load: Real,
+def carried_gradient(
+    U: Array, ks: Integer, all_ks: Integer, of_motion: Integer, N: Array, row: Array, found: Records,
+    pieces: Records, panels: Records, w: Real, by_U: Array, by_row: Array, by_N: Array,
 ) -> None:  # fmt: skip
-    """Differentiate the gradient of w·F by (U, row, load) along a direction (dU, drow, dload).
+    """Add the gradient of the weighted friction by the two motions, the row and the load, at complex numbers.
 
-    Parameters
-    ----------
-    U (m, n), ks, load, load_ks, row : the contact, as for `solver.contacts.kernels.circle.law`.
-    state, found, pieces, panels, intervals : what `solver.contacts.kernels.circle.law.circle_path` left.
-    w : (m, n) weights of the force coefficients.
-    dU (m, n), drow (COLUMNS,), dload : the direction; of the columns KT, KT_SECOND, MU and KN count.
-    out_U (m, n), out_row (COLUMNS,), out_load : filled with Σ w ∂²F along the direction.
+    `found`, `pieces` and `panels` are the real ones of `solver.contacts.kernels.circle.law.circle_path`.
     """
-    m, n = U.shape
-    turned, moved = np.empty((m, n), np.complex128), np.empty(row.size, np.complex128)
-    pressed = np.empty(load.size, np.complex128)
-    for a in range(m):
-        for i in range(n):
-            turned[a, i] = U[a, i] + 1j * TINY * dU[a, i]
-    for j in range(row.size):
-        moved[j] = row[j] + 1j * TINY * drow[j]
-    for j in range(load.size):
-        pressed[j] = load[j] + 1j * TINY * dload[j]
-    by_U, by_row = np.zeros((m, n), np.complex128), np.zeros(row.size, np.complex128)
-    by_load = np.zeros(load.size, np.complex128)
-    if state != SEPARATED:
-        _gradient_of(
-            turned, ks, pressed, load_ks, moved, state, found, pieces, panels, intervals, w, by_U, by_row,
-            by_load,
-        )  # fmt: skip
-    for a in range(m):
-        for i in range(n):
-            out_U[a, i] = by_U[a, i].imag / TINY
-    for j in range(row.size):
-        out_row[j] = by_row[j].imag / TINY
-    for j in range(load.size):
-        out_load[j] = by_load[j].imag / TINY
-
-
-@apart
-def _gradient_of(
-    U: Array, ks: Integer, load: Array, load_ks: Integer, row: Array, state: int, found: Real,
-    pieces: Real, panels: Real, intervals: Real, w: Real, by_U: Array, by_row: Array, by_load: Array,
-) -> None:  # fmt: skip
-    """Fill the gradient of w·F by motions, columns and load at complex numbers."""
-    m, n = U.shape
-    all_ks = merged(ks, load_ks)
-    size, of_motion, of_load = coefficient_count(all_ks), positions(ks, all_ks), positions(load_ks, all_ks)
-    N, by_N = np.empty(size, np.complex128), np.zeros(size, np.complex128)
-    load_of(U, 2, load, row[KN], of_motion, of_load, N)
+    n, size = U.shape[1], N.size
     waves = np.empty((3, 2, all_ks[-1] + 1), np.complex128)
     kt, second, mu = row[KT], row[KT_SECOND], row[MU]
     curves_of(U, ks, N, all_ks, kt, mu, waves)
     kappa = kt / second
-    carried = np.empty((int(found[PIECES]), pieces.shape[1]), np.complex128)
-    over = np.empty((int(found[PANELS]), PANEL_COLUMNS), np.complex128)
-    _carried(waves, kappa, found, pieces, panels, carried, over)
+    carried = np.empty(found[0].pieces, CARRIED_PIECE)
+    turned = np.empty(found[0].panels, CARRIED_PANEL)
+    _carried(waves, kappa, found, pieces, panels, carried, turned)
     weights = np.empty((1, 2, n), np.complex128)
     for a in range(2):
         for i in range(n):
             weights[0, a, i] = w[a, i]
     F, G = np.empty((2, n), np.complex128), np.empty((3, 3 * size + 1), np.complex128)
-    circle_gradient(waves, kappa, ks, all_ks, of_motion, found, carried, over, weights, F, G)
+    circle_gradient(waves, kappa, ks, all_ks, of_motion, found, carried, turned, weights, F, G)
     line = G[0]
     by_row[KT] += line[3 * size] / second
     by_row[KT_SECOND] -= line[3 * size] * kt / (second * second)
@@ -306,40 +230,4 @@ def _gradient_of(
         by_row[KT] += by_u * U[0, i] + by_w * U[1, i]
     for j in range(size):
         by_row[MU] += line[2 * size + j] * N[j]
-        by_N[j] = mu * line[2 * size + j]
-    if m > 2 and state == LIFTING:
-        _pressing(waves, ks, all_ks, intervals, w, N, by_N)
-    elif m > 2:
-        for i in range(n):
-            by_N[of_motion[i]] += w[2, i]
-    for j in range(load.size):
-        by_load[j] += by_N[of_load[j]]
-    if m > 2:
-        for i in range(n):
-            by_U[2, i] += row[KN] * by_N[of_motion[i]]
-            by_row[KN] += U[2, i] * by_N[of_motion[i]]
-
-
-@apart
-def _pressing(
-    waves: Array, ks: Integer, all_ks: Integer, intervals: Real, w: Real, N: Array, by_N: Array
-) -> None:
-    """Add the gradient of the weighted normal force of a contact that opens."""
-    n, size = w.shape[1], N.size
-    at = np.empty(CURVES, np.complex128)
-    here, total = (
-        np.empty((2, ks[-1] + all_ks[-1] + 1), np.complex128),
-        np.zeros((2, ks[-1] + all_ks[-1] + 1), np.complex128),
-    )
-    for i in range(intervals.shape[0]):
-        begin = _zero_of_limit(waves, intervals[i, 0] + 0.0j, at)
-        end = _zero_of_limit(waves, intervals[i, 1] + 0.0j, at)
-        moments_between(begin, end, here[0], here[1])
-        for q in range(here.shape[1]):
-            total[0, q] += here[0, q]
-            total[1, q] += here[1, q]
-    block: Array = np.zeros((n, size), np.complex128)
-    products(total[0], total[1], ks, all_ks, 1.0, block)
-    for i in range(n):
-        for j in range(size):
-            by_N[j] += w[2, i] * block[i, j]
+        by_N[j] += mu * line[2 * size + j]

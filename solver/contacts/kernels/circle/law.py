@@ -20,41 +20,14 @@ import numpy as np
 from solver.contacts.kernels.circle.force import circle_force
 from solver.contacts.kernels.circle.gradient import circle_gradient
 from solver.contacts.kernels.circle.panels import LIMIT, Array, Number, X, Y
-from solver.contacts.kernels.circle.path import BEGAN as PIECE_BEGAN
-from solver.contacts.kernels.circle.path import BEGIN as PIECE_BEGIN
-from solver.contacts.kernels.circle.path import (
-    COUNT,
-    FIRST,
-    TABLE_FULL,
-    TX,
-    TY,
-)
-from solver.contacts.kernels.circle.path import END as PIECE_END
-from solver.contacts.kernels.circle.path import MOTION as PIECE_MOTION
-from solver.contacts.kernels.circle.state import (
-    CLOSES,
-    FOUND_SIZE,
-    HOW,
-    INTERVALS,
-    PANELS,
-    PIECES,
-    SETTLES,
-    TURN,
-    find_path,
-    new_tables,
-)
+from solver.contacts.kernels.circle.path import TABLE_FULL
+from solver.contacts.kernels.circle.state import CLOSES, FOUND, SETTLES, TURN, find_path, new_tables
 from solver.contacts.kernels.columns import KN, KT, KT_SECOND, MU
 from solver.contacts.kernels.coulomb.law import load_of, press, with_second
 from solver.contacts.kernels.stick_slip_events import (
     AFTER_SEPARATION,
-    BEGAN,
-    BEGIN,
-    DIRECTION,
-    END,
     FAILED,
-    MOTION,
     NO_LENGTH,
-    ONSET,
     SEPARATED,
     SLIP,
     SLIPPING,
@@ -65,6 +38,7 @@ from solver.contacts.kernels.stick_slip_events import (
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Integer, Real, coefficient_count, merged, positions
 from solver.jit.lapack import fill_block
+from solver.jit.records import Records
 from solver.jit.separate import apart
 from solver.jit.trig_polynomial import unpack
 
@@ -103,7 +77,7 @@ def plainly_stuck(waves: Real, kappa: float) -> bool:
 @apart
 def circle_path(
     U: Real, ks: Integer, load: Real, load_ks: Integer, row: Real, cos_table: Real, sin_table: Real,
-    pieces: Real, panels: Real, found: Real, intervals: Real,
+    pieces: Records, panels: Records, found: Records, intervals: Real,
 ) -> int:  # fmt: skip
     """Find what the contact does over a period; see `solver.contacts.kernels.circle.state.find_path`."""
     all_ks = merged(ks, load_ks)
@@ -113,14 +87,14 @@ def circle_path(
     curves_of(U, ks, N, all_ks, row[KT], row[MU], waves)
     kappa = row[KT] / row[KT_SECOND]
     if plainly_stuck(waves, kappa):
-        found[HOW], found[PIECES], found[PANELS], found[INTERVALS] = SETTLES, 1.0, 0.0, 0.0
+        found[0].how, found[0].pieces, found[0].panels, found[0].intervals = SETTLES, 1, 0, 0
         first = pieces[0]
-        first[PIECE_MOTION], first[PIECE_BEGIN], first[PIECE_END] = STICK, 0.0, TURN
-        first[PIECE_BEGAN], first[FIRST], first[COUNT] = UNLOADED, 0.0, 0.0
-        first[TX], first[TY] = 0.0, 0.0
+        first.motion, first.begin, first.end = STICK, 0.0, TURN
+        first.began, first.first, first.count = UNLOADED, 0, 0
+        first.tx, first.ty = 0.0, 0.0
         for k in range(waves.shape[2]):
-            first[TX] += waves[X, 0, k]
-            first[TY] += waves[Y, 0, k] / kappa
+            first.tx += waves[X, 0, k]
+            first.ty += waves[Y, 0, k] / kappa
         return STUCK
     return find_path(waves, kappa, cos_table, sin_table, pieces, panels, found, intervals)
 
@@ -128,8 +102,8 @@ def circle_path(
 @compiled
 def whole_path(
     U: Real, ks: Integer, load: Real, load_ks: Integer, row: Real, cos_table: Real, sin_table: Real,
-    found: Real, intervals: Real,
-) -> tuple[int, Real, Real]:  # fmt: skip
+    found: Records, intervals: Real,
+) -> tuple[int, Records, Records]:  # fmt: skip
     """Return the state of `circle_path` with its pieces and panels, in tables as long as it takes."""
     top, times = merged(ks, load_ks)[-1], 1
     pieces, panels = new_tables(top, times)
@@ -144,7 +118,7 @@ def whole_path(
 @apart
 def coulomb_circle(
     U: Real, ks: Integer, load: Real, load_ks: Integer, row: Real, slope: Real, dload: Real,
-    cos_table: Real, sin_table: Real, segments: Real, F: Real, dF_dU: Real, dF_dp: Real,
+    cos_table: Real, sin_table: Real, segments: Records, F: Real, dF_dU: Real, dF_dp: Real,
 ) -> tuple[int, int]:  # fmt: skip
     """Fill the force of two or three ports, its Jacobian and its derivative by λ; circular limit.
 
@@ -161,7 +135,7 @@ def coulomb_circle(
         fill_block(dF_dU[block], 0.0)
     fill_block(F, 0.0)
     fill_block(dF_dp, 0.0)
-    intervals, found = np.empty((all_ks[-1] + 2, 2)), np.zeros(FOUND_SIZE)
+    intervals, found = np.empty((all_ks[-1] + 2, 2)), np.zeros(1, FOUND)
     rubs = row[MU] > 0.0 and row[KT] > 0.0 and row[KT_SECOND] > 0.0
     motion, given = U, row
     if not rubs:
@@ -177,13 +151,13 @@ def coulomb_circle(
         return FAILED, 0
     if not rubs and state == STUCK:
         state = SLIPPING
-    elif rubs and state == STUCK and pieces[0, PIECE_BEGAN] == UNLOADED and int(found[PIECES]) == 1:
+    elif rubs and state == STUCK and pieces[0].began == UNLOADED and found[0].pieces == 1:
         _stuck(U, row[KT], row[KT_SECOND], slope, F, dF_dU, dF_dp)
     elif rubs and state != SEPARATED:
         _friction(U, ks, all_ks, of_motion, row, slope, N, dN, found, pieces, panels, F, dF_dU, dF_dp)
     if m > 2:
         press(
-            state, intervals[: int(found[INTERVALS])], ks, all_ks, of_motion, row, N, dN, load[0], dload[0],
+            state, intervals[: found[0].intervals], ks, all_ks, of_motion, row, N, dN, load[0], dload[0],
             F[2], dF_dU[8:], dF_dp[2],
         )  # fmt: skip
     return state, _write_segments(state, found, pieces, segments)
@@ -203,7 +177,7 @@ def _stuck(U: Real, kt: float, second: float, slope: Real, F: Real, dF_dU: Real,
 @apart
 def _friction(
     U: Real, ks: Integer, all_ks: Integer, of_motion: Integer, row: Real, slope: Real, N: Real, dN: Real,
-    found: Real, pieces: Real, panels: Real, F: Real, dF_dU: Real, dF_dp: Real,
+    found: Records, pieces: Records, panels: Records, F: Real, dF_dU: Real, dF_dp: Real,
 ) -> None:  # fmt: skip
     """Fill the two friction forces from the path."""
     m, n = U.shape
@@ -233,38 +207,38 @@ def _friction(
 
 
 @compiled
-def _write_segments(state: int, found: Real, pieces: Real, segments: Real) -> int:
+def _write_segments(state: int, found: Records, pieces: Records, segments: Records) -> int:
     """Copy the pieces of the period to the table of segments; return the number of the smooth piece.
 
     It counts the sticks and slips that have a length. One that the begin of the period cuts is one.
     """
-    count, first = int(found[PIECES]), 0
+    count, first = found[0].pieces, 0
     if state == SEPARATED:
         return 0
-    onset = pieces[count - 1, PIECE_BEGIN]
-    if found[HOW] == SETTLES:
+    onset = pieces[count - 1].begin
+    if found[0].how == SETTLES:
         first = count - 1
-        while count > 1 and onset > 0.0 and pieces[first - 1, PIECE_MOTION] == STICK:
+        while count > 1 and onset > 0.0 and pieces[first - 1].motion == STICK:
             first -= 1
-            onset = pieces[first, PIECE_BEGIN]
+            onset = pieces[first].begin
         first = count - 1
     piece, written = 0, 0
     for i in range(first, count):
-        begin, end = pieces[i, PIECE_BEGIN], pieces[i, PIECE_END]
+        begin, end = pieces[i].begin, pieces[i].end
         if written < segments.shape[0]:
             row = segments[written]
-            row[MOTION], row[DIRECTION], row[BEGIN], row[END] = pieces[i, PIECE_MOTION], 1.0, begin, end
-            row[ONSET], row[BEGAN] = begin, pieces[i, PIECE_BEGAN]
-            if found[HOW] == SETTLES:
-                row[BEGIN], row[END], row[ONSET] = 0.0, TURN, onset % TURN
+            row.motion, row.direction, row.begin, row.end = pieces[i].motion, 1.0, begin, end
+            row.onset, row.began = begin, pieces[i].began
+            if found[0].how == SETTLES:
+                row.begin, row.end, row.onset = 0.0, TURN, onset % TURN
             written += 1
         if end - begin <= NO_LENGTH:
             continue
         kind = 3
-        if pieces[i, PIECE_MOTION] == STICK:
-            kind = 0 if pieces[i, PIECE_BEGAN] == UNLOADED else 1
-            kind = 2 if pieces[i, PIECE_BEGAN] == AFTER_SEPARATION else kind
+        if pieces[i].motion == STICK:
+            kind = 0 if pieces[i].began == UNLOADED else 1
+            kind = 2 if pieces[i].began == AFTER_SEPARATION else kind
         piece += 1 << (8 * kind)
-    if found[HOW] == CLOSES and count > 1 and pieces[0, PIECE_MOTION] == pieces[count - 1, PIECE_MOTION]:
-        piece -= 1 << (8 * (3 if pieces[0, PIECE_MOTION] == SLIP else 1))
+    if found[0].how == CLOSES and count > 1 and pieces[0].motion == pieces[count - 1].motion:
+        piece -= 1 << (8 * (3 if pieces[0].motion == SLIP else 1))
     return piece

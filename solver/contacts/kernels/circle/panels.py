@@ -18,7 +18,7 @@ direction (complex step: W. Squire, G. Trapp, SIAM Rev. 40 (1998) 110).
 from __future__ import annotations
 
 import math
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,20 +26,13 @@ from numpy.typing import NDArray
 from solver.contacts.kernels.circle.radau import NODES, SLOPES, STAGES
 from solver.jit.angles import cosines_and_sines
 from solver.jit.decorators import compiled
-from solver.jit.fourier import Real
+from solver.jit.records import Records, Row, record
 from solver.jit.separate import apart
 
 Array: TypeAlias = NDArray[Any]  # of real or of complex numbers
 Number: TypeAlias = Any  # a real or a complex one
 
-# Rows of `waves`, and columns of what is evaluated at a point: values, slopes, curvatures.
-X, Y, LIMIT = 0, 1, 2
-DX, DY, DLIMIT = 3, 4, 5
-DDX, DDY, DDLIMIT = 6, 7, 8
-CURVES = 9
-# Rows of `nodes` (NODE_ROWS, STAGES): the curves at the nodes of a panel, and room for angles.
-COSINES, SINES, ANGLES = CURVES, CURVES + 1, CURVES + 2
-NODE_ROWS = CURVES + 3
+X, Y, LIMIT = 0, 1, 2  # rows of `waves`
 # Columns of the matrix of a panel behind ∂R/∂θ: −R, which becomes Newton's step, and −∂R/∂θ0, which becomes
 # ∂θ/∂θ0.
 STEP, BY_START = STAGES, STAGES + 1
@@ -48,28 +41,70 @@ NEWTON_STEPS = 14
 SMALL_TURN = 3e-6  # rad: Newton's step after which what is left is its square
 
 
+class Curves(NamedTuple):
+    """X, Y and L at a point, their slopes and curvatures by τ."""
+
+    x: Number
+    y: Number
+    limit: Number
+    dx: Number
+    dy: Number
+    dlimit: Number
+    ddx: Number
+    ddy: Number
+    ddlimit: Number
+
+
+CURVES = record(**dict.fromkeys(Curves._fields, np.float64))
+CARRIED_CURVES = record(**dict.fromkeys(Curves._fields, np.complex128))
+
+
+class PanelWork(NamedTuple):
+    """Where a panel is solved."""
+
+    nodes: Records  # (STAGES,) the curves at the nodes, `Curves` each
+    angles: Array  # (3, STAGES) scratch: angles, their cosines and sines
+    matrix: Array  # (PANEL_MATRIX)
+
+
 @compiled
-def curves_at(waves: Array, tau: Number, out: Array) -> None:
-    """Fill `out` (CURVES,) with X, Y, L, their slopes and curvatures; `waves` is (3, 2, degree + 1)."""
+def new_panel_work() -> PanelWork:
+    """Return room for a panel of real numbers."""
+    return PanelWork(np.empty(STAGES, CURVES), np.empty((3, STAGES)), np.empty(PANEL_MATRIX))
+
+
+@compiled
+def curves_at(waves: Array, tau: Number) -> Curves:
+    """Return X, Y and L, their slopes and curvatures; `waves` is (3, 2, degree + 1)."""
     cos1, sin1 = np.cos(tau), np.sin(tau)
     cosine, sine = cos1, sin1
-    for x in range(3):
-        out[x], out[3 + x], out[6 + x] = waves[x, 0, 0], 0.0, 0.0
+    x, y, limit = waves[X, 0, 0], waves[Y, 0, 0], waves[LIMIT, 0, 0]
+    dx = dy = dlimit = ddx = ddy = ddlimit = 0.0 * x
     for k in range(1, waves.shape[2]):
-        for x in range(3):
-            c, s = waves[x, 0, k], waves[x, 1, k]
-            a = c * cosine + s * sine
-            b = s * cosine - c * sine
-            out[x] += a
-            out[3 + x] += k * b
-            out[6 + x] -= k * k * a
+        a, b = waves[X, 0, k], waves[X, 1, k]
+        a, b = a * cosine + b * sine, b * cosine - a * sine
+        x, dx, ddx = x + a, dx + k * b, ddx - k * k * a
+        a, b = waves[Y, 0, k], waves[Y, 1, k]
+        a, b = a * cosine + b * sine, b * cosine - a * sine
+        y, dy, ddy = y + a, dy + k * b, ddy - k * k * a
+        a, b = waves[LIMIT, 0, k], waves[LIMIT, 1, k]
+        a, b = a * cosine + b * sine, b * cosine - a * sine
+        limit, dlimit, ddlimit = limit + a, dlimit + k * b, ddlimit - k * k * a
         cosine, sine = cosine * cos1 - sine * sin1, sine * cos1 + cosine * sin1
+    return Curves(x, y, limit, dx, dy, dlimit, ddx, ddy, ddlimit)
 
 
 @compiled
-def _slopes_at_nodes(waves: Array, begin: Number, h: Number, nodes: Array) -> None:
+def _keep(at: Curves, row: Row) -> None:
+    """Write what the curves are at a point to a record."""
+    row.x, row.y, row.limit, row.dx, row.dy, row.dlimit = at.x, at.y, at.limit, at.dx, at.dy, at.dlimit
+    row.ddx, row.ddy, row.ddlimit = at.ddx, at.ddy, at.ddlimit
+
+
+@compiled
+def _slopes_at_nodes(waves: Array, begin: Number, h: Number, work: PanelWork) -> None:
     """Fill in what directions turn by at the nodes of a panel: L and the slopes of X, Y and L."""
-    angles, cosines, sines = nodes[ANGLES], nodes[COSINES], nodes[SINES]
+    nodes, angles, cosines, sines = work.nodes, work.angles[0], work.angles[1], work.angles[2]
     for i in range(STAGES):
         angles[i] = begin + h * NODES[i]
     cosines_and_sines(angles, cosines, sines)
@@ -93,38 +128,38 @@ def _slopes_at_nodes(waves: Array, begin: Number, h: Number, nodes: Array) -> No
             a, b = a * a1 - b * b1, b * a1 + a * b1
             c, d = c * c1 - d * d1, d * c1 + c * d1
         j = i + 1
-        nodes[LIMIT, i], nodes[DX, i], nodes[DY, i], nodes[DLIMIT, i] = load, dx, dy, rise
-        nodes[LIMIT, j], nodes[DX, j], nodes[DY, j], nodes[DLIMIT, j] = more_load, more_dx, more_dy, more_rise
+        nodes[i].limit, nodes[i].dx, nodes[i].dy, nodes[i].dlimit = load, dx, dy, rise
+        nodes[j].limit, nodes[j].dx, nodes[j].dy, nodes[j].dlimit = more_load, more_dx, more_dy, more_rise
 
 
 @compiled
-def turning(at: Array, kappa: Number, theta: Number) -> tuple[Number, Number, Number, Number]:
+def turning(at: Curves, kappa: Number, theta: Number) -> tuple[Number, Number, Number, Number]:
     """Return F, ∂F/∂θ, g and ∂g/∂θ with the curves `at` a point."""
     return turning_by(at, kappa, np.cos(theta), np.sin(theta))
 
 
 @compiled
-def turning_by(at: Array, kappa: Number, c: Number, s: Number) -> tuple[Number, Number, Number, Number]:
+def turning_by(at: Curves, kappa: Number, c: Number, s: Number) -> tuple[Number, Number, Number, Number]:
     """Return the same from cos θ and sin θ."""
-    more = (kappa - 1.0) * at[DLIMIT]
-    F = c * at[DY] - s * at[DX] - more * s * c
-    slope = -s * at[DY] - c * at[DX] - more * (c * c - s * s)
+    more = (kappa - 1.0) * at.dlimit
+    F = c * at.dy - s * at.dx - more * s * c
+    slope = -s * at.dy - c * at.dx - more * (c * c - s * s)
     return F, slope, kappa * c * c + s * s, -2.0 * (kappa - 1.0) * s * c
 
 
 @compiled
-def slip_rate(at: Array, kappa: Number, theta: Number) -> Number:
+def slip_rate(at: Curves, kappa: Number, theta: Number) -> Number:
     """Return q; the force slips on while it is positive."""
-    return np.cos(theta) * at[DX] + np.sin(theta) * at[DY] / kappa - at[DLIMIT]
+    return np.cos(theta) * at.dx + np.sin(theta) * at.dy / kappa - at.dlimit
 
 
 @compiled
-def onset_direction(at: Real, kappa: float) -> float:
+def onset_direction(at: Curves, kappa: float) -> float:
     """Return the direction in which a force begins to slip where contact begins, from the curves there.
 
     There t' = L' n, so n = (X'/(L' + Λ), Y'/(κL' + Λ)) with Λ > 0 from |n| = 1.
     """
-    rise, dx, dy = at[DLIMIT], at[DX], at[DY]
+    rise, dx, dy = at.dlimit, at.dx, at.dy
     if kappa == 1.0:
         return math.atan2(dy, dx)
     more = 0.0
@@ -209,32 +244,31 @@ def _solve_panel_matrix(matrix: Array) -> bool:
 
 
 @compiled
-def _fill_panel_matrix(
-    nodes: Array, kappa: Number, h: Number, theta0: Number, theta: Array, matrix: Array
-) -> None:
-    """Fill the matrix (PANEL_MATRIX) of a step of Newton's method from the curves at `nodes`."""
-    inverse, cosines, sines = 1.0 / h, nodes[COSINES], nodes[SINES]
+def _fill_panel_matrix(work: PanelWork, kappa: Number, h: Number, theta0: Number, theta: Array) -> None:
+    """Fill the matrix of a step of Newton's method from the curves at the nodes."""
+    nodes, matrix, inverse = work.nodes, work.matrix, 1.0 / h
+    cosines, sines = work.angles[1], work.angles[2]
     cosines_and_sines(theta, cosines, sines)
     for i in range(STAGES):
-        F, slope, g, dg = turning_by(nodes[:, i], kappa, cosines[i], sines[i])
+        F, slope, g, dg = turning_by(nodes[i], kappa, cosines[i], sines[i])
         rate = SLOPES[i, 0] * theta0
         for j in range(STAGES):
             rate += SLOPES[i, j + 1] * theta[j]
-        row, factor = matrix[i], nodes[LIMIT, i] * g * inverse
+        row, factor = matrix[i], nodes[i].limit * g * inverse
         for j in range(STAGES):
             row[j] = factor * SLOPES[i, j + 1]
-        row[i] += nodes[LIMIT, i] * dg * rate * inverse - slope
+        row[i] += nodes[i].limit * dg * rate * inverse - slope
         row[STEP], row[BY_START] = F - factor * rate, -factor * SLOPES[i, 0]
 
 
 @compiled
-def _guess(nodes: Array, kappa: Number, h: Number, theta0: Number, theta: Array) -> None:
+def _guess(nodes: Records, kappa: Number, h: Number, theta0: Number, theta: Array) -> None:
     """Fill `theta` with one linearly implicit step from node to node, backward where L is 0."""
     before, rate, place = theta0, 0.0 * theta0, 0.0
     for i in range(STAGES):
-        F, slope, g, _ = turning(nodes[:, i], kappa, before)
+        F, slope, g, _ = turning(nodes[i], kappa, before)
         half = 0.5 * h * (NODES[i] - place)
-        scale = nodes[LIMIT, i] * g
+        scale = nodes[i].limit * g
         if i == 0:
             half *= 2.0
         moved = half * (rate * scale + F) / (scale - half * slope) if slope.real < 0.0 else half * 0.0
@@ -246,20 +280,20 @@ def _guess(nodes: Array, kappa: Number, h: Number, theta0: Number, theta: Array)
 @apart
 def solve_panel(
     waves: Array, kappa: Number, begin: Number, end: Number, theta0: Number, fresh: bool, theta: Array,
-    nodes: Array, matrix: Array,
+    work: PanelWork,
 ) -> bool:  # fmt: skip
     """Solve R = 0 at the nodes of [begin, end] by Newton's method from `theta`, or a `fresh` guess.
 
-    On return `nodes` has L and the slopes of X, Y and L at the nodes, all curves at the last one, and
-    `matrix` (PANEL_MATRIX) ∂θ/∂θ0 as its column BY_START. False if it fails.
+    On return the nodes have L and the slopes of X, Y and L, all curves at the last one, and the matrix has
+    ∂θ/∂θ0 as its column BY_START. False if it fails.
     """
-    h = end - begin
-    _slopes_at_nodes(waves, begin, h, nodes)
-    curves_at(waves, end, nodes[:CURVES, STAGES - 1])
+    h, nodes, matrix = end - begin, work.nodes, work.matrix
+    _slopes_at_nodes(waves, begin, h, work)
+    _keep(curves_at(waves, end), nodes[STAGES - 1])
     if fresh:
         _guess(nodes, kappa, h, theta0, theta)
     for _ in range(NEWTON_STEPS):
-        _fill_panel_matrix(nodes, kappa, h, theta0, theta, matrix)
+        _fill_panel_matrix(work, kappa, h, theta0, theta)
         if not _solve_panel_matrix(matrix):
             return False
         most = 0.0

@@ -8,24 +8,17 @@ polynomial through a panel's nodes has small last terms, until the rate of slip 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from solver.contacts.kernels.circle.panels import (
     BY_START,
-    CURVES,
-    DDLIMIT,
-    DDX,
-    DDY,
-    DX,
-    DY,
-    LIMIT,
-    NODE_ROWS,
-    PANEL_MATRIX,
+    Curves,
     Number,
-    X,
-    Y,
+    PanelWork,
     curves_at,
+    new_panel_work,
     onset_direction,
     slip_rate,
     solve_panel,
@@ -36,23 +29,41 @@ from solver.contacts.kernels.circle.stick import leave_stick
 from solver.contacts.kernels.stick_slip_events import AFTER_SEPARATION, AFTER_SLIP, NO_LENGTH, SLIP, STICK
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Real
+from solver.jit.records import Records, record
 from solver.jit.separate import apart
 
-# Columns of the pieces of a path. A stick begins with the force (TX, TY); a slip has COUNT panels from FIRST.
-MOTION, BEGIN, END, BEGAN, FIRST, COUNT, TX, TY = 0, 1, 2, 3, 4, 5, 6, 7
-PIECE_COLUMNS = 8
-# Columns of the panels: begin, end, θ at the begin and at the nodes.
-FROM, TO, START = 0, 1, 2
-PANEL_COLUMNS = 3 + STAGES
+
+def _piece(number: type) -> np.dtype[np.void]:
+    """Return a piece of a path: a stick begins with the force (tx, ty), a slip has `count` panels."""
+    return record(
+        motion=float, begin=number, end=number, began=float, first=int, count=int, tx=number, ty=number
+    )
+
+
+def _panel(number: type) -> np.dtype[np.void]:
+    """Return a panel: begin, end, θ at the begin and at the nodes."""
+    return record(begin=number, end=number, start=number, theta=(number, STAGES))
+
+
+PIECE, CARRIED_PIECE = _piece(float), _piece(complex)
+PANEL, CARRIED_PANEL = _panel(float), _panel(complex)
 # The state a march begins with and ends in: motion, force, its direction, what a stick began after. Once it
-# slipped, a change δt of the force at the begin is (S_MX, S_MY)·S_FACTOR·(S_PX, S_PY)·δt at the end.
-S_MOTION, S_TX, S_TY, S_THETA, S_BEGAN, S_SLIPPED, S_FACTOR, S_PX, S_PY, S_MX, S_MY = (
-    0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10,
+# slipped, a change δt of the force at the begin is (mx, my)·factor·(px, py)·δt at the end.
+MARCH = record(
+    motion=float, tx=float, ty=float, theta=float, began=float, slipped=float, factor=float, px=float,
+    py=float, mx=float, my=float,
 )  # fmt: skip
-STATE_SIZE = 11
-# Numbers of a march: tolerance of force and of its rate, size of the limit, longest panel, and the largest
-# last Legendre terms in a panel.
-TOL, TOL_RATE, SCALE, LONGEST, TAIL_SIZE = 0, 1, 2, 3, 4
+
+
+class Numbers(NamedTuple):
+    """What a march goes by."""
+
+    tol: float  # of the force [N]
+    tol_rate: float  # of its rate
+    scale: float  # size of the limit [N]
+    longest: float  # panel [rad]
+    tail_size: float  # the largest last Legendre terms in a panel
+
 
 # How a march fails.
 TABLE_FULL, UNSOLVED = -1, -2
@@ -70,19 +81,19 @@ BLIND = 1e-7  # rad, for so long
 
 
 @compiled
-def _falls(nodes: Real, kappa: float, theta: Real, first: float, tol: float, past: int) -> int:
+def _falls(nodes: Records, kappa: float, theta: Real, first: float, tol: float, past: int) -> int:
     """Return the number of the node (from 1) at or before which the rate of slip q falls below 0, or 0.
 
     Negative if it may do so in a dip about that node. Nodes up to `past` are known not to be in one.
     """
-    before = first if past == 0 else slip_rate(nodes[:, past - 1], kappa, theta[past - 1])
-    here = slip_rate(nodes[:, past], kappa, theta[past])
+    before = first if past == 0 else slip_rate(nodes[past - 1], kappa, theta[past - 1])
+    here = slip_rate(nodes[past], kappa, theta[past])
     for i in range(past, STAGES):
         if here < -tol:
             return i + 1
         if i + 1 == STAGES:
             break
-        after = slip_rate(nodes[:, i + 1], kappa, theta[i + 1])
+        after = slip_rate(nodes[i + 1], kappa, theta[i + 1])
         # A dip between nodes: below 0 if as deep as the parabola through three of them, and twice that.
         if before > here < after and here < 0.25 * max(before - here, after - here):
             return -(i + 1)
@@ -92,17 +103,16 @@ def _falls(nodes: Real, kappa: float, theta: Real, first: float, tol: float, pas
 
 @apart
 def _dense_rate(
-    waves: Real, kappa: float, begin: float, h: float, theta0: float, theta: Real, place: float, at: Real
+    waves: Real, kappa: float, begin: float, h: float, theta0: float, theta: Real, place: float
 ) -> float:
     """Return q at a place in [0, 1] of a panel."""
-    curves_at(waves, begin + h * place, at)
+    at = curves_at(waves, begin + h * place)
     return slip_rate(at, kappa, between(theta0, theta, place))
 
 
 @apart
 def _where_it_falls(
-    waves: Real, kappa: float, begin: float, h: float, theta0: float, theta: Real, node: int, tol: float,
-    at: Real,
+    waves: Real, kappa: float, begin: float, h: float, theta0: float, theta: Real, node: int, tol: float
 ) -> float:  # fmt: skip
     """Return the place in [0, 1] where q falls below 0 before `node` (about it if negative), or NOWHERE."""
     hi = NODES[abs(node) - 1]
@@ -112,30 +122,30 @@ def _where_it_falls(
         a, b = lo, NODES[-node]
         ratio = 0.6180339887498949
         c, d = b - ratio * (b - a), a + ratio * (b - a)
-        fc = _dense_rate(waves, kappa, begin, h, theta0, theta, c, at)
-        fd = _dense_rate(waves, kappa, begin, h, theta0, theta, d, at)
+        fc = _dense_rate(waves, kappa, begin, h, theta0, theta, c)
+        fd = _dense_rate(waves, kappa, begin, h, theta0, theta, d)
         for _ in range(40):
             if min(fc, fd) < -tol:
                 break
             if fc < fd:
                 b, d, fd = d, c, fc
                 c = b - ratio * (b - a)
-                fc = _dense_rate(waves, kappa, begin, h, theta0, theta, c, at)
+                fc = _dense_rate(waves, kappa, begin, h, theta0, theta, c)
             else:
                 a, c, fc = c, d, fd
                 d = a + ratio * (b - a)
-                fd = _dense_rate(waves, kappa, begin, h, theta0, theta, d, at)
+                fd = _dense_rate(waves, kappa, begin, h, theta0, theta, d)
         if min(fc, fd) >= -tol:
             return NOWHERE
         hi = c if fc < fd else d
-    rate_lo = _dense_rate(waves, kappa, begin, h, theta0, theta, lo, at)
-    rate_hi = _dense_rate(waves, kappa, begin, h, theta0, theta, hi, at)
+    rate_lo = _dense_rate(waves, kappa, begin, h, theta0, theta, lo)
+    rate_hi = _dense_rate(waves, kappa, begin, h, theta0, theta, hi)
     place, side = hi, 0
     for turn in range(50):
         # Illinois, with a bisection now and then; `_end_of_slip` closes in from there.
         share = rate_lo / (rate_lo - rate_hi) if rate_lo > 0.0 > rate_hi and turn % 4 != 3 else 0.5
         last, place = place, lo + share * (hi - lo)
-        rate = _dense_rate(waves, kappa, begin, h, theta0, theta, place, at)
+        rate = _dense_rate(waves, kappa, begin, h, theta0, theta, place)
         if rate < 0.0:
             hi, rate_hi, rate_lo, side = place, rate, rate_lo * (0.5 if side < 0 else 1.0), -1
         else:
@@ -147,23 +157,22 @@ def _where_it_falls(
 
 @apart
 def _end_of_slip(
-    waves: Real, kappa: float, begin: float, guess: float, theta0: float, theta: Real, nodes: Real,
-    matrix: Real,
+    waves: Real, kappa: float, begin: float, guess: float, theta0: float, theta: Real, work: PanelWork
 ) -> float:  # fmt: skip
     """Move the end of a panel to where q is 0, solving it anew; return the end, or −1 if that fails."""
     end = guess
     for turn in range(12):
-        if not solve_panel(waves, kappa, begin, end, theta0, False, theta, nodes, matrix):
+        if not solve_panel(waves, kappa, begin, end, theta0, False, theta, work):
             return -1.0
-        last = nodes[:, STAGES - 1]
+        last = work.nodes[STAGES - 1]
         angle = theta[STAGES - 1]
         slope = SLOPES[STAGES - 1, 0] * theta0
         for j in range(STAGES):
             slope += SLOPES[STAGES - 1, j + 1] * theta[j]
         slope /= end - begin
         c, s = math.cos(angle), math.sin(angle)
-        fall = c * last[DDX] + s * last[DDY] / kappa - last[DDLIMIT]
-        fall += (c * last[DY] / kappa - s * last[DX]) * slope
+        fall = c * last.ddx + s * last.ddy / kappa - last.ddlimit
+        fall += (c * last.dy / kappa - s * last.dx) * slope
         step = -slip_rate(last, kappa, angle) / fall if fall < 0.0 else 0.0
         step = min(max(step, -0.5 * (end - begin)), 0.5 * (end - begin))
         if abs(step) < CLOSED_IN * (1.0 + abs(end)) or turn == 11:
@@ -177,22 +186,22 @@ def _end_of_slip(
 
 
 @compiled
-def _error_of(limit0: float, nodes: Real, theta0: float, theta: Real, scale: float, limits: Real) -> float:
+def _error_of(limit0: float, nodes: Records, theta0: float, theta: Real, scale: float, limits: Real) -> float:
     """Return the last Legendre terms of a panel, of the direction weighted with the limit, or of the limit.
 
     What the force is integrated with has waves of its own: its size counts as much as its direction.
     """
     most = 0.0
     for i in range(STAGES):
-        limits[i] = nodes[LIMIT, i] / scale
+        limits[i] = nodes[i].limit / scale
         most = max(most, limits[i])
     return max(tail(theta0, theta) * min(most, 1.0), tail(limit0 / scale, limits))
 
 
 @apart
 def _stop_in(
-    waves: Real, kappa: float, begin: float, h: float, theta0: float, theta: Real, nodes: Real, first: float,
-    tol: float, at: Real,
+    waves: Real, kappa: float, begin: float, h: float, theta0: float, theta: Real, nodes: Records,
+    first: float, tol: float,
 ) -> float:  # fmt: skip
     """Return the place in [0, 1] of a panel where the rate of slip falls below 0, or NOWHERE."""
     past = 0
@@ -200,7 +209,7 @@ def _stop_in(
         node = _falls(nodes, kappa, theta, first, tol, past)
         if node == 0:
             return NOWHERE
-        place = _where_it_falls(waves, kappa, begin, h, theta0, theta, node, tol, at)
+        place = _where_it_falls(waves, kappa, begin, h, theta0, theta, node, tol)
         if place < NOWHERE:
             return place
         # A dip that does not reach 0; it may fall below 0 behind it.
@@ -209,12 +218,12 @@ def _stop_in(
 
 
 @compiled
-def _keep(panels: Real, filled: int, begin: float, end: float, theta0: float, theta: Real) -> None:
+def _keep(panels: Records, filled: int, begin: float, end: float, theta0: float, theta: Real) -> None:
     """Write a panel to the table."""
     row = panels[filled]
-    row[FROM], row[TO], row[START] = begin, end, theta0
+    row.begin, row.end, row.start = begin, end, theta0
     for i in range(STAGES):
-        row[START + 1 + i] = theta[i]
+        row.theta[i] = theta[i]
 
 
 @compiled
@@ -227,8 +236,8 @@ def _shortened(theta0: float, theta: Real, place: float) -> None:
 
 @apart
 def slip_on(
-    waves: Real, kappa: float, begin: float, end: float, theta0: float, blind: float, numbers: Real,
-    panels: Real, filled: int,
+    waves: Real, kappa: float, begin: float, end: float, theta0: float, blind: float, numbers: Numbers,
+    panels: Records, filled: int,
 ) -> tuple[float, float, float, int, int]:  # fmt: skip
     """Follow a slip from `begin` until it sticks, at most to `end`; append its panels.
 
@@ -237,29 +246,30 @@ def slip_on(
     (place, direction there, its derivative by theta0, panels filled, 1 if it sticks there, 0 at the end,
     TABLE_FULL or UNSOLVED).
     """
-    nodes, matrix = np.empty((NODE_ROWS, STAGES)), np.empty(PANEL_MATRIX)
-    theta, at = np.empty(STAGES), np.empty(CURVES)
-    tau, factor, tol, small = begin, 1.0, numbers[TOL_RATE], numbers[TAIL_SIZE]
-    curves_at(waves, begin, at)
-    first, limit0, limits = slip_rate(at, kappa, theta0), at[LIMIT], np.empty(STAGES)
+    work = new_panel_work()
+    nodes = work.nodes
+    theta = np.empty(STAGES)
+    tau, factor, tol, small = begin, 1.0, numbers.tol_rate, numbers.tail_size
+    at = curves_at(waves, begin)
+    first, limit0, limits = slip_rate(at, kappa, theta0), at.limit, np.empty(STAGES)
     h, decay = _first_panel(at, kappa, theta0, numbers)
     while tau < end:
         rest = end - tau
         share = rest if h > 0.95 * rest else (0.5 * rest if h > 0.5 * rest else h)
         to = end if share == rest else tau + share
-        if not solve_panel(waves, kappa, tau, to, theta0, True, theta, nodes, matrix):
+        if not solve_panel(waves, kappa, tau, to, theta0, True, theta, work):
             if share <= LEAST_PANEL:
                 return tau, theta0, factor, filled, UNSOLVED
             h = 0.2 * share
             continue
-        error = _error_of(limit0, nodes, theta0, theta, numbers[SCALE], limits)
+        error = _error_of(limit0, nodes, theta0, theta, numbers.scale, limits)
         change = 3.0 if to - begin < DECAYED * decay else 64.0
         if error > 0.0:
             change = min(change, max(0.15, 0.9 * (small / error) ** (1.0 / STAGES)))
         if error > 3.0 * small and share > LEAST_PANEL:
             h = change * share
             continue
-        place = _stop_in(waves, kappa, tau, share, theta0, theta, nodes, first, tol, at)
+        place = _stop_in(waves, kappa, tau, share, theta0, theta, nodes, first, tol)
         stops = place < NOWHERE and tau + place * share >= begin + blind
         if stops and place < 0.02 and first > tol and share > SHORT_PANEL:
             h = 0.1 * share  # perhaps the solution against the motion
@@ -268,7 +278,7 @@ def slip_on(
             return tau, theta0, factor, filled, 1
         if stops:
             _shortened(theta0, theta, place)
-            to = _end_of_slip(waves, kappa, tau, tau + place * share, theta0, theta, nodes, matrix)
+            to = _end_of_slip(waves, kappa, tau, tau + place * share, theta0, theta, work)
             if to < 0.0:
                 h = 0.5 * share
                 continue
@@ -277,20 +287,20 @@ def slip_on(
         _keep(panels, filled, tau, to, theta0, theta)
         filled += 1
         tau, theta0 = to, theta[STAGES - 1]
-        factor *= matrix[STAGES - 1, BY_START]
-        first, limit0 = slip_rate(nodes[:, STAGES - 1], kappa, theta0), nodes[LIMIT, STAGES - 1]
+        factor *= work.matrix[STAGES - 1, BY_START]
+        first, limit0 = slip_rate(nodes[STAGES - 1], kappa, theta0), nodes[STAGES - 1].limit
         if stops:
             return tau, theta0, factor, filled, 1
-        h = min(change * share, numbers[LONGEST])
+        h = min(change * share, numbers.longest)
     return end, theta0, factor, filled, 0
 
 
 @compiled
-def _first_panel(at: Real, kappa: float, theta0: float, numbers: Real) -> tuple[float, float]:
+def _first_panel(at: Curves, kappa: float, theta0: float, numbers: Numbers) -> tuple[float, float]:
     """Return the length of a slip's first panel, and that in which its direction decays (none: 0)."""
     F, stiff, g, _ = turning(at, kappa, theta0)
-    longest, scale = numbers[LONGEST], at[LIMIT] * g
-    if not (at[LIMIT] > 1e-12 * numbers[SCALE] and abs(stiff) * longest > FIRST_PANEL * scale):
+    longest, scale = numbers.longest, at.limit * g
+    if not (at.limit > 1e-12 * numbers.scale and abs(stiff) * longest > FIRST_PANEL * scale):
         return longest, 0.0
     decay = scale / abs(stiff)
     aligned = stiff < 0.0 and abs(F) <= -ALIGNED * stiff
@@ -307,8 +317,8 @@ def projection(kappa: Number, theta: Number) -> tuple[Number, Number, Number]:
 
 @apart
 def march_path(
-    waves: Real, kappa: float, grid: Real, begin: float, end: float, state: Real, numbers: Real,
-    pieces: Real, panels: Real, count: int, filled: int,
+    waves: Real, kappa: float, grid: Real, begin: float, end: float, state: Records, numbers: Numbers,
+    pieces: Records, panels: Records, count: int, filled: int,
 ) -> tuple[int, int]:  # fmt: skip
     """Follow the force over [begin, end] from `state`, which is moved on; append pieces and panels.
 
@@ -317,44 +327,44 @@ def march_path(
     Numbers of pieces and panels, or (TABLE_FULL, 0) or (UNSOLVED, 0).
     """
     tau, idle, first = begin, 0, count
-    at, opens = np.empty(CURVES), state[S_BEGAN] == AFTER_SEPARATION
+    opens = state[0].began == AFTER_SEPARATION
     while tau < end:
         if count >= pieces.shape[0]:
             return TABLE_FULL, 0
         row = pieces[count]
-        row[MOTION], row[BEGIN], row[BEGAN] = state[S_MOTION], tau, state[S_BEGAN]
-        row[TX], row[TY], row[FIRST], row[COUNT] = state[S_TX], state[S_TY], filled, 0.0
-        if state[S_MOTION] == STICK:
-            curves_at(waves, tau, at)
-            offset_x, offset_y = state[S_TX] - at[X], state[S_TY] - at[Y] / kappa
-            tau, leaves = leave_stick(waves, kappa, grid, offset_x, offset_y, tau, end, numbers[TOL])
+        row.motion, row.begin, row.began = state[0].motion, tau, state[0].began
+        row.tx, row.ty, row.first, row.count = state[0].tx, state[0].ty, filled, 0.0
+        if state[0].motion == STICK:
+            at = curves_at(waves, tau)
+            offset_x, offset_y = state[0].tx - at.x, state[0].ty - at.y / kappa
+            tau, leaves = leave_stick(waves, kappa, grid, offset_x, offset_y, tau, end, numbers.tol)
             if leaves and opens and tau - begin <= NO_LENGTH:
                 # At the margin of stick and slip neither has a length: contact begins with a slip.
                 tau, count, idle = begin, first, IDLE
-                _slip_from_contact(waves, kappa, tau, at, state)
+                _slip_from_contact(waves, kappa, tau, state)
                 continue
-            curves_at(waves, tau, at)
-            state[S_TX], state[S_TY] = offset_x + at[X], offset_y + at[Y] / kappa
+            at = curves_at(waves, tau)
+            state[0].tx, state[0].ty = offset_x + at.x, offset_y + at.y / kappa
             if leaves:
                 _begin_slip(at, kappa, state)
         else:
             blind = BLIND if idle >= IDLE else 0.0
             tau, theta, factor, now, how = slip_on(
-                waves, kappa, tau, end, state[S_THETA], blind, numbers, panels, filled
+                waves, kappa, tau, end, state[0].theta, blind, numbers, panels, filled
             )
             if how < 0:
                 return how, 0
-            row[COUNT] = now - filled
+            row.count = now - filled
             filled = now
-            curves_at(waves, tau, at)
-            state[S_THETA] = theta
-            state[S_TX], state[S_TY] = at[LIMIT] * math.cos(theta), at[LIMIT] * math.sin(theta)
-            state[S_FACTOR] *= factor * at[LIMIT]
-            state[S_MX], state[S_MY] = -math.sin(theta), math.cos(theta)
+            at = curves_at(waves, tau)
+            state[0].theta = theta
+            state[0].tx, state[0].ty = at.limit * math.cos(theta), at.limit * math.sin(theta)
+            state[0].factor *= factor * at.limit
+            state[0].mx, state[0].my = -math.sin(theta), math.cos(theta)
             if how == 1:
-                state[S_MOTION], state[S_BEGAN] = STICK, AFTER_SLIP
-        row[END] = tau
-        idle = idle + 1 if tau - row[BEGIN] <= NO_LENGTH else 0
+                state[0].motion, state[0].began = STICK, AFTER_SLIP
+        row.end = tau
+        idle = idle + 1 if tau - row.begin <= NO_LENGTH else 0
         if idle > 40:
             return UNSOLVED, 0
         count += 1
@@ -362,21 +372,21 @@ def march_path(
 
 
 @compiled
-def _slip_from_contact(waves: Real, kappa: float, tau: float, at: Real, state: Real) -> None:
+def _slip_from_contact(waves: Real, kappa: float, tau: float, state: Records) -> None:
     """Begin a slip where contact begins at τ; nothing depends on the force before it, which is 0."""
-    curves_at(waves, tau, at)
-    state[S_MOTION], state[S_BEGAN], state[S_THETA] = SLIP, AFTER_SEPARATION, onset_direction(at, kappa)
-    state[S_TX], state[S_TY], state[S_SLIPPED], state[S_FACTOR] = 0.0, 0.0, 1.0, 0.0
+    at = curves_at(waves, tau)
+    state[0].motion, state[0].began, state[0].theta = SLIP, AFTER_SEPARATION, onset_direction(at, kappa)
+    state[0].tx, state[0].ty, state[0].slipped, state[0].factor = 0.0, 0.0, 1.0, 0.0
 
 
 @compiled
-def _begin_slip(at: Real, kappa: float, state: Real) -> None:
+def _begin_slip(at: Curves, kappa: float, state: Records) -> None:
     """Turn a stick whose force has reached the limit into a slip."""
-    theta = math.atan2(state[S_TY], state[S_TX])
+    theta = math.atan2(state[0].ty, state[0].tx)
     px, py, _ = projection(kappa, theta)
-    if state[S_SLIPPED] == 0.0:
-        state[S_SLIPPED], state[S_FACTOR] = 1.0, 1.0 / at[LIMIT]
-        state[S_PX], state[S_PY] = px, py
+    if state[0].slipped == 0.0:
+        state[0].slipped, state[0].factor = 1.0, 1.0 / at.limit
+        state[0].px, state[0].py = px, py
     else:
-        state[S_FACTOR] *= (px * state[S_MX] + py * state[S_MY]) / at[LIMIT]
-    state[S_MOTION], state[S_THETA] = SLIP, theta
+        state[0].factor *= (px * state[0].mx + py * state[0].my) / at.limit
+    state[0].motion, state[0].theta = SLIP, theta

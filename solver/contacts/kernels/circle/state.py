@@ -14,43 +14,13 @@ import math
 import numpy as np
 
 from solver.contacts.kernels.circle.panels import (
-    CURVES,
-    DLIMIT,
-    DX,
-    DY,
     LIMIT,
-    X,
-    Y,
+    Curves,
     curves_at,
     onset_direction,
     slip_rate,
 )
-from solver.contacts.kernels.circle.path import (
-    BEGIN,
-    END,
-    LONGEST,
-    MOTION,
-    PANEL_COLUMNS,
-    PIECE_COLUMNS,
-    S_BEGAN,
-    S_FACTOR,
-    S_MOTION,
-    S_MX,
-    S_MY,
-    S_PX,
-    S_PY,
-    S_SLIPPED,
-    S_THETA,
-    S_TX,
-    S_TY,
-    SCALE,
-    SMALL_TAIL,
-    STATE_SIZE,
-    TAIL_SIZE,
-    TOL,
-    TOL_RATE,
-    march_path,
-)
+from solver.contacts.kernels.circle.path import MARCH, PANEL, PIECE, SMALL_TAIL, Numbers, march_path
 from solver.contacts.kernels.state_durations import contact_intervals, one_wave
 from solver.contacts.kernels.stick_slip_events import (
     AFTER_SEPARATION,
@@ -67,6 +37,7 @@ from solver.contacts.kernels.stick_slip_events import (
 )
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Real
+from solver.jit.records import Records, record
 from solver.jit.separate import apart
 from solver.jit.trig_polynomial import on_grid
 
@@ -91,10 +62,11 @@ WAVES_PER_PANEL = 9.0  # rad that the highest harmonic turns in one panel, at mo
 # How the path was found, and so how its derivatives go on: each interval from no force, one period that
 # repeats, or from the unloaded state to a last period that sticks (or sticks from the first).
 OPENS, CLOSES, SETTLES = 0, 1, 2
-# Numbers of a path found: these, how many intervals of contact it has, and, where it closes, how a change of
-# the force at the begin comes back: (MX, MY)·FACTOR·(PX, PY)·δt.
-HOW, PIECES, PANELS, INTERVALS, FACTOR, PX, PY, MX, MY = 0, 1, 2, 3, 4, 5, 6, 7, 8
-FOUND_SIZE = 9
+# What is found of a path: these, how many pieces, panels and intervals of contact it has, and, where it
+# closes, how a change of the force at the begin comes back: (mx, my)·factor·(px, py)·δt.
+FOUND = record(
+    how=int, pieces=int, panels=int, intervals=int, factor=float, px=float, py=float, mx=float, my=float
+)
 
 
 @apart
@@ -105,28 +77,28 @@ def contact_grid(waves: Real, degree: int, cos_table: Real, sin_table: Real, gri
 
 
 @compiled
-def _fresh(state: Real, motion: float, tx: float, ty: float, theta: float, began: float) -> None:
+def _fresh(state: Records, motion: float, tx: float, ty: float, theta: float, began: float) -> None:
     """Begin a march: nothing depends on its begin yet, but for a slip on its direction."""
-    state[S_MOTION], state[S_TX], state[S_TY], state[S_THETA] = motion, tx, ty, theta
-    state[S_BEGAN], state[S_SLIPPED], state[S_FACTOR] = began, 0.0, 0.0
+    state[0].motion, state[0].tx, state[0].ty, state[0].theta = motion, tx, ty, theta
+    state[0].began, state[0].slipped, state[0].factor = began, 0.0, 0.0
     if motion == SLIP:
         size = math.hypot(tx, ty)
-        state[S_SLIPPED], state[S_FACTOR] = 1.0, (1.0 / size if size > 0.0 else 0.0)
-        state[S_PX], state[S_PY] = -math.sin(theta), math.cos(theta)
+        state[0].slipped, state[0].factor = 1.0, (1.0 / size if size > 0.0 else 0.0)
+        state[0].px, state[0].py = -math.sin(theta), math.cos(theta)
 
 
 @apart
 def _march_intervals(
-    waves: Real, kappa: float, grid: Real, intervals: Real, n_intervals: int, numbers: Real, pieces: Real,
-    panels: Real, found: Real,
+    waves: Real, kappa: float, grid: Real, intervals: Real, n_intervals: int, numbers: Numbers,
+    pieces: Records, panels: Records, found: Records,
 ) -> int:  # fmt: skip
     """March every interval of contact from its beginning, where the force is 0."""
-    state, at = np.empty(STATE_SIZE), np.empty(CURVES)
+    state = np.empty(1, MARCH)
     count, filled = 0, 0
     for i in range(n_intervals):
         begin, end = intervals[i, 0], intervals[i, 1]
-        curves_at(waves, begin, at)
-        motion = SLIP if math.hypot(at[DX], at[DY] / kappa) > at[DLIMIT] else STICK
+        at = curves_at(waves, begin)
+        motion = SLIP if math.hypot(at.dx, at.dy / kappa) > at.dlimit else STICK
         theta = onset_direction(at, kappa) if motion == SLIP else 0.0
         _fresh(state, motion, 0.0, 0.0, theta, AFTER_SEPARATION)
         count, filled = march_path(
@@ -134,7 +106,7 @@ def _march_intervals(
         )
         if count < 0:
             return count
-    found[HOW], found[PIECES], found[PANELS] = OPENS, count, filled
+    found[0].how, found[0].pieces, found[0].panels = OPENS, count, filled
     return LIFTING
 
 
@@ -211,90 +183,88 @@ def _rough(grid: Real, kappa: float, force: Real, history: Real) -> tuple[int, i
 
 
 @compiled
-def _start_at(at: Real, kappa: float, tx: float, ty: float, state: Real) -> None:
+def _start_at(at: Curves, kappa: float, tx: float, ty: float, state: Records) -> None:
     """Begin with the force (tx, ty), cut to the limit; there it slips if the rate of slip says so."""
     size, theta = math.hypot(tx, ty), math.atan2(ty, tx)
-    if size > at[LIMIT] * (1.0 - 1e-12) and slip_rate(at, kappa, theta) > 0.0:
-        _fresh(state, SLIP, at[LIMIT] * math.cos(theta), at[LIMIT] * math.sin(theta), theta, AFTER_SLIP)
+    if size > at.limit * (1.0 - 1e-12) and slip_rate(at, kappa, theta) > 0.0:
+        _fresh(state, SLIP, at.limit * math.cos(theta), at.limit * math.sin(theta), theta, AFTER_SLIP)
         return
-    share = at[LIMIT] / size if size > at[LIMIT] else 1.0
+    share = at.limit / size if size > at.limit else 1.0
     _fresh(state, STICK, share * tx, share * ty, theta, AFTER_SLIP)
 
 
 @apart
 def _repeat(
     waves: Real, kappa: float, grid: Real, begin: float, force: Real, may_end: bool, rounds: int,
-    numbers: Real, pieces: Real, panels: Real, found: Real,
+    numbers: Numbers, pieces: Records, panels: Records, found: Records,
 ) -> int:  # fmt: skip
     """Find the force at `begin` that is the same a period later; STUCK means that the slipping ended.
 
     Where it may not end, because many periods from the unloaded state slip, a step of Newton's method that
     ends it is too long.
     """
-    state, at = np.empty(STATE_SIZE), np.empty(CURVES)
+    state = np.empty(1, MARCH)
     tx, ty = force[0], force[1]
     last_x, last_y = tx, ty
     before, plain = np.inf, False
-    curves_at(waves, begin, at)
+    at = curves_at(waves, begin)
     for _ in range(rounds):
         _start_at(at, kappa, tx, ty, state)
-        tx, ty = state[S_TX], state[S_TY]
+        tx, ty = state[0].tx, state[0].ty
         count, filled = march_path(
             waves, kappa, grid, begin, begin + TURN, state, numbers, pieces, panels, 0, 0
         )
         if count < 0:
             return count
-        rx, ry = state[S_TX] - tx, state[S_TY] - ty
-        if state[S_SLIPPED] == 0.0 and may_end:
+        rx, ry = state[0].tx - tx, state[0].ty - ty
+        if state[0].slipped == 0.0 and may_end:
             return STUCK
-        memory = state[S_FACTOR] * (state[S_PX] * state[S_MX] + state[S_PY] * state[S_MY])
-        ended = state[S_SLIPPED] == 0.0 or (memory >= NEUTRAL and not may_end)
+        memory = state[0].factor * (state[0].px * state[0].mx + state[0].py * state[0].my)
+        ended = state[0].slipped == 0.0 or (memory >= NEUTRAL and not may_end)
         if ended and (tx != last_x or ty != last_y):
             tx, ty = tx + NEARER * (last_x - tx), ty + NEARER * (last_y - ty)
             continue
         last_x, last_y = tx, ty
-        along = state[S_FACTOR] * (state[S_PX] * rx + state[S_PY] * ry)
+        along = state[0].factor * (state[0].px * rx + state[0].py * ry)
         change = math.hypot(rx, ry)
         plain = (change > 0.5 * before and not plain) or memory >= 1.0
         before = change
         step = 0.0 if plain else along / (1.0 - memory)
-        if math.hypot(rx + step * state[S_MX], ry + step * state[S_MY]) <= REPEATS * numbers[SCALE]:
-            found[HOW], found[PIECES], found[PANELS] = CLOSES, count, filled
-            found[FACTOR], found[PX], found[PY] = state[S_FACTOR], state[S_PX], state[S_PY]
-            found[MX], found[MY] = state[S_MX], state[S_MY]
+        if math.hypot(rx + step * state[0].mx, ry + step * state[0].my) <= REPEATS * numbers.scale:
+            found[0].how, found[0].pieces, found[0].panels = CLOSES, count, filled
+            found[0].factor, found[0].px, found[0].py = state[0].factor, state[0].px, state[0].py
+            found[0].mx, found[0].my = state[0].mx, state[0].my
             return SLIPPING
-        tx, ty = state[S_TX] + step * state[S_MX], state[S_TY] + step * state[S_MY]
+        tx, ty = state[0].tx + step * state[0].mx, state[0].ty + step * state[0].my
     return FAILED
 
 
 @compiled
-def _lasts(pieces: Real, found: Real) -> bool:
+def _lasts(pieces: Records, found: Records) -> bool:
     """Return whether the slips of a path that repeats go on for ever, or fade away very slowly."""
     slipped = 0.0
-    for i in range(int(found[PIECES])):
-        if pieces[i, MOTION] == SLIP:
-            slipped += pieces[i, END] - pieces[i, BEGIN]
-    left = found[FACTOR] * (found[PX] * found[MX] + found[PY] * found[MY])
+    for i in range(found[0].pieces):
+        if pieces[i].motion == SLIP:
+            slipped += pieces[i].end - pieces[i].begin
+    left = found[0].factor * (found[0].px * found[0].mx + found[0].py * found[0].my)
     return bool(slipped >= LASTING or left >= SLOWLY)
 
 
 @apart
 def _settle(
-    waves: Real, kappa: float, grid: Real, periods: int, numbers: Real, pieces: Real, panels: Real,
-    found: Real, force: Real,
+    waves: Real, kappa: float, grid: Real, periods: int, numbers: Numbers, pieces: Records, panels: Records,
+    found: Records, force: Real,
 ) -> int:  # fmt: skip
     """March from the unloaded state until a period passes without slip; SLIPPING if none does."""
-    state, at = np.empty(STATE_SIZE), np.empty(CURVES)
-    curves_at(waves, 0.0, at)
-    tx, ty = at[X], at[Y] / kappa
+    state = np.empty(1, MARCH)
+    at = curves_at(waves, 0.0)
+    tx, ty = at.x, at.y / kappa
     size = math.hypot(tx, ty)
-    if size <= at[LIMIT]:
+    if size <= at.limit:
         _fresh(state, STICK, tx, ty, 0.0, UNLOADED)
     else:
         _start_at(at, kappa, tx, ty, state)
-        state[S_SLIPPED] = 0.0
-    # What a transient leaves stays: it is not averaged over a period as a motion that repeats.
-    numbers[TAIL_SIZE] = 1e-2 * SMALL_TAIL
+        state[0].slipped = 0.0
     count, filled = 0, 0
     for period in range(periods):
         before = filled
@@ -304,24 +274,24 @@ def _settle(
         )  # fmt: skip
         if count < 0:
             return count
-        if filled == before and state[S_MOTION] == STICK:
-            found[HOW], found[PIECES], found[PANELS] = SETTLES, count, filled
+        if filled == before and state[0].motion == STICK:
+            found[0].how, found[0].pieces, found[0].panels = SETTLES, count, filled
             return STUCK
-    force[0], force[1] = state[S_TX], state[S_TY]
+    force[0], force[1] = state[0].tx, state[0].ty
     return SLIPPING
 
 
 @apart
 def _closed(
-    waves: Real, kappa: float, grid: Real, numbers: Real, pieces: Real, panels: Real, found: Real
+    waves: Real, kappa: float, grid: Real, numbers: Numbers, pieces: Records, panels: Records, found: Records
 ) -> int:
     """Find the path of a contact that never opens."""
     force, history, n = np.zeros(2), np.empty((3, grid.shape[1])), grid.shape[1]
     begin, place = _rough(grid, kappa, force, history)
     if place >= 0:
-        at, state = np.empty(CURVES), np.empty(STATE_SIZE)
+        state = np.empty(1, MARCH)
         tau = TURN * begin / n
-        curves_at(waves, tau, at)
+        at = curves_at(waves, tau)
         _start_at(at, kappa, force[0], force[1], state)
         if place > begin:
             count, _ = march_path(
@@ -329,30 +299,32 @@ def _closed(
             )
             if count < 0:
                 return count
-            force[0], force[1] = state[S_TX], state[S_TY]
+            force[0], force[1] = state[0].tx, state[0].ty
         how = _repeat(
             waves, kappa, grid, TURN * place / n, force, True, MOST_ROUNDS, numbers, pieces, panels, found
         )
         if how != STUCK:
             return how
-    how = _settle(waves, kappa, grid, EARLY, numbers, pieces, panels, found, force)
+    # What a transient leaves stays: it is not averaged over a period as a motion that repeats.
+    finer = Numbers(numbers.tol, numbers.tol_rate, numbers.scale, numbers.longest, 1e-2 * SMALL_TAIL)
+    how = _settle(waves, kappa, grid, EARLY, finer, pieces, panels, found, force)
     if how != SLIPPING:
         return how
-    how = _repeat(waves, kappa, grid, 0.0, force, False, EARLY_ROUNDS, numbers, pieces, panels, found)
+    how = _repeat(waves, kappa, grid, 0.0, force, False, EARLY_ROUNDS, finer, pieces, panels, found)
     if how == SLIPPING and _lasts(pieces, found):
         return how
-    how = _settle(waves, kappa, grid, MOST_TRANSIENT, numbers, pieces, panels, found, force)
+    how = _settle(waves, kappa, grid, MOST_TRANSIENT, finer, pieces, panels, found, force)
     if how == SLIPPING:
-        how = _repeat(waves, kappa, grid, 0.0, force, False, MOST_ROUNDS, numbers, pieces, panels, found)
+        how = _repeat(waves, kappa, grid, 0.0, force, False, MOST_ROUNDS, finer, pieces, panels, found)
     return how
 
 
 @apart
 def find_path(
-    waves: Real, kappa: float, cos_table: Real, sin_table: Real, pieces: Real, panels: Real, found: Real,
-    intervals: Real,
+    waves: Real, kappa: float, cos_table: Real, sin_table: Real, pieces: Records, panels: Records,
+    found: Records, intervals: Real,
 ) -> int:  # fmt: skip
-    """Find what the contact does; fill pieces, panels and `found` (FOUND_SIZE,).
+    """Find what the contact does; fill pieces, panels and `found` (1,).
 
     Parameters
     ----------
@@ -374,7 +346,7 @@ def find_path(
         load = max(load, grid[2, j])
     if not math.isfinite(total):
         return FAILED
-    found[INTERVALS] = 0.0
+    found[0].intervals = 0.0
     if load <= 0.0:
         return SEPARATED
     top = 0
@@ -388,18 +360,18 @@ def find_path(
         n_intervals = contact_intervals(waves[LIMIT, 0], waves[LIMIT, 1], top, grid[2], grid[5], intervals)
     if n_intervals == 0:
         return SEPARATED
-    numbers = np.empty(5)
-    numbers[TOL], numbers[TOL_RATE] = ROUNDING * (motion + load), 5.0 * ROUNDING * (rate + load)
-    numbers[TAIL_SIZE] = SMALL_TAIL
-    numbers[SCALE], numbers[LONGEST] = load, min(WAVES_PER_PANEL / max(degree, 1), 1.6)
+    numbers = Numbers(
+        ROUNDING * (motion + load), 5.0 * ROUNDING * (rate + load), load,
+        min(WAVES_PER_PANEL / max(degree, 1), 1.6), SMALL_TAIL,
+    )  # fmt: skip
     if n_intervals < 0:
         return _closed(waves, kappa, grid, numbers, pieces, panels, found)
-    found[INTERVALS] = n_intervals
+    found[0].intervals = n_intervals
     return _march_intervals(waves, kappa, grid, intervals, n_intervals, numbers, pieces, panels, found)
 
 
 @compiled
-def new_tables(degree: int, times: int) -> tuple[Real, Real]:
+def new_tables(degree: int, times: int) -> tuple[Records, Records]:
     """Return empty tables for pieces and panels, `times` as large as is nearly always enough."""
     most = times * (48 + 6 * degree)
-    return np.empty((most, PIECE_COLUMNS)), np.empty((2 * most, PANEL_COLUMNS))
+    return np.empty(most, PIECE), np.empty(2 * most, PANEL)

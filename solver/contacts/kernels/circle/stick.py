@@ -8,19 +8,8 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from solver.contacts.kernels.circle.panels import (
-    CURVES,
-    DDLIMIT,
-    DDX,
-    DDY,
-    DLIMIT,
-    DX,
-    DY,
-    LIMIT,
-    X,
-    Y,
+    Curves,
     curves_at,
 )
 from solver.jit.decorators import compiled
@@ -35,35 +24,35 @@ def length(x: float, y: float) -> float:
 
 
 @compiled
-def excess(waves: Real, kappa: float, offset_x: float, offset_y: float, tau: float, at: Real) -> float:
-    """Return |t| − L of a stick with t = offset + (X, Y/κ); fills `at` with the curves."""
-    curves_at(waves, tau, at)
-    return length(offset_x + at[X], offset_y + at[Y] / kappa) - at[LIMIT]
+def excess(waves: Real, kappa: float, offset_x: float, offset_y: float, tau: float) -> tuple[float, Curves]:
+    """Return |t| − L of a stick with t = offset + (X, Y/κ), and the curves there."""
+    at = curves_at(waves, tau)
+    return length(offset_x + at.x, offset_y + at.y / kappa) - at.limit, at
 
 
 @compiled
-def excess_slopes(at: Real, kappa: float, offset_x: float, offset_y: float) -> tuple[float, float]:
+def excess_slopes(at: Curves, kappa: float, offset_x: float, offset_y: float) -> tuple[float, float]:
     """Return slope and curvature of |t| − L from the curves `at` a point, those ahead of it where t is 0."""
-    tx, ty = offset_x + at[X], offset_y + at[Y] / kappa
+    tx, ty = offset_x + at.x, offset_y + at.y / kappa
     size = length(tx, ty)
-    dx, dy = at[DX], at[DY] / kappa
+    dx, dy = at.dx, at.dy / kappa
     if size == 0.0:
         speed = length(dx, dy)
-        turn = (dx * at[DDX] + dy * at[DDY] / kappa) / speed if speed > 0.0 else 0.0
-        return speed - at[DLIMIT], turn - at[DDLIMIT]
+        turn = (dx * at.ddx + dy * at.ddy / kappa) / speed if speed > 0.0 else 0.0
+        return speed - at.dlimit, turn - at.ddlimit
     along = (tx * dx + ty * dy) / size
-    bend = (dx * dx + dy * dy + tx * at[DDX] + ty * at[DDY] / kappa - along * along) / size
-    return along - at[DLIMIT], bend - at[DDLIMIT]
+    bend = (dx * dx + dy * dy + tx * at.ddx + ty * at.ddy / kappa - along * along) / size
+    return along - at.dlimit, bend - at.ddlimit
 
 
 @apart
 def _rising_root(
-    waves: Real, kappa: float, offset_x: float, offset_y: float, order: int, lo: float, hi: float, at: Real
+    waves: Real, kappa: float, offset_x: float, offset_y: float, order: int, lo: float, hi: float
 ) -> float:
     """Return where |t| − L (order 0), or minus its slope (order 1), crosses 0 upward inside [lo, hi]."""
     x = 0.5 * (lo + hi)
     for _ in range(100):
-        f = excess(waves, kappa, offset_x, offset_y, x, at)
+        f, at = excess(waves, kappa, offset_x, offset_y, x)
         slope, bend = excess_slopes(at, kappa, offset_x, offset_y)
         if order == 1:
             f, slope = -slope, -bend
@@ -83,24 +72,23 @@ def _rising_root(
 
 @compiled
 def _inside(
-    waves: Real, kappa: float, offset_x: float, offset_y: float, lo: float, hi: float, tol: float, at: Real
+    waves: Real, kappa: float, offset_x: float, offset_y: float, lo: float, hi: float, tol: float
 ) -> float:
     """Return a place soon after `lo` where |t| is below the limit, −1 if none is found before `hi`."""
     width = (hi - lo) / 16.0
     for part in range(1, 16):
-        if excess(waves, kappa, offset_x, offset_y, lo + part * width, at) < -tol:
+        if excess(waves, kappa, offset_x, offset_y, lo + part * width)[0] < -tol:
             return lo + part * width
     for _ in range(30):
         width *= 0.5
-        if excess(waves, kappa, offset_x, offset_y, lo + width, at) < -tol:
+        if excess(waves, kappa, offset_x, offset_y, lo + width)[0] < -tol:
             return lo + width
     return -1.0
 
 
 @compiled
 def _behind_a_dip(
-    waves: Real, kappa: float, offset_x: float, offset_y: float, start: float, until: float, tol: float,
-    at: Real,
+    waves: Real, kappa: float, offset_x: float, offset_y: float, start: float, until: float, tol: float
 ) -> tuple[float, bool]:  # fmt: skip
     """Return a place from which |t| − L rises, −1 if it does not dip first, and whether the stick ends there.
 
@@ -108,14 +96,14 @@ def _behind_a_dip(
     at its level after −2 times slope over curvature; what falls again afterwards is lower there, and still
     rises. Where the stick begins at the limit and dips as deep as rounding, it ends there.
     """
-    begins = excess(waves, kappa, offset_x, offset_y, start, at)
+    begins, at = excess(waves, kappa, offset_x, offset_y, start)
     rate, bend = excess_slopes(at, kappa, offset_x, offset_y)
     if rate > 0.0 or bend <= 0.0 or start - 2.0 * rate / bend >= until:
         return -1.0, False
     place, rise = start, 0.0
     for share in (1.0, 0.75):
         place = start - 2.0 * share * rate / bend
-        low = excess(waves, kappa, offset_x, offset_y, place, at)
+        low, at = excess(waves, kappa, offset_x, offset_y, place)
         rise, _ = excess_slopes(at, kappa, offset_x, offset_y)
         if low < -tol and rise > 0.0:
             return place, False
@@ -135,21 +123,21 @@ def leave_stick(
     """
     n = grid.shape[1]
     delta = 2.0 * math.pi / n
-    at = np.empty(CURVES)
     j = math.floor(start / delta) + 1
     lo = start
-    low = excess(waves, kappa, offset_x, offset_y, start, at)
+    low, at = excess(waves, kappa, offset_x, offset_y, start)
     rate, _ = excess_slopes(at, kappa, offset_x, offset_y)
-    dipped, ends = _behind_a_dip(waves, kappa, offset_x, offset_y, start, min(j * delta, end), tol, at)
+    dipped, ends = _behind_a_dip(waves, kappa, offset_x, offset_y, start, min(j * delta, end), tol)
     if ends:
         return dipped, True
     if dipped > 0.0:
-        lo, low = dipped, excess(waves, kappa, offset_x, offset_y, dipped, at)
+        lo = dipped
+        low, at = excess(waves, kappa, offset_x, offset_y, dipped)
         rate, _ = excess_slopes(at, kappa, offset_x, offset_y)
     while lo < end:
         hi = min(j * delta, end)
         if hi == end:
-            high = excess(waves, kappa, offset_x, offset_y, end, at)
+            high, at = excess(waves, kappa, offset_x, offset_y, end)
             rate_high, _ = excess_slopes(at, kappa, offset_x, offset_y)
         else:
             g = j % n
@@ -162,19 +150,19 @@ def leave_stick(
             begin = lo
             if low >= -tol:
                 # The limit just left, or a touch: only after it was below can it reach it.
-                begin = _inside(waves, kappa, offset_x, offset_y, lo, hi, tol, at)
+                begin = _inside(waves, kappa, offset_x, offset_y, lo, hi, tol)
                 if begin < 0.0 and high > tol:
                     return lo, True
                 if begin >= 0.0:
-                    excess(waves, kappa, offset_x, offset_y, begin, at)
+                    _, at = excess(waves, kappa, offset_x, offset_y, begin)
                     rate, _ = excess_slopes(at, kappa, offset_x, offset_y)
             if begin >= 0.0:
                 top = hi
                 if high <= tol and rate > 0.0 and rate_high < 0.0:
-                    top = _rising_root(waves, kappa, offset_x, offset_y, 1, begin, hi, at)
-                    high = max(high, excess(waves, kappa, offset_x, offset_y, top, at))
+                    top = _rising_root(waves, kappa, offset_x, offset_y, 1, begin, hi)
+                    high = max(high, excess(waves, kappa, offset_x, offset_y, top)[0])
                 if high > tol:
-                    return _rising_root(waves, kappa, offset_x, offset_y, 0, begin, top, at), True
+                    return _rising_root(waves, kappa, offset_x, offset_y, 0, begin, top), True
         lo, low, rate = hi, min(high, 0.0), rate_high
         if hi < end and high < -tol:
             low = high

@@ -20,14 +20,8 @@ from solver.contacts.kernels.coulomb.force import basis_at, moment_rows, product
 from solver.contacts.kernels.stick_slip_events import (
     AFTER_SEPARATION,
     AFTER_SLIP,
-    BEGAN,
-    BEGIN,
-    DIRECTION,
-    END,
     FAILED,
     LIFTING,
-    MOTION,
-    ONSET,
     SEPARATED,
     SLIP,
     SLIPPING,
@@ -38,6 +32,7 @@ from solver.contacts.kernels.stick_slip_events import (
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Integer, Real, coefficient_count
 from solver.jit.lapack import dot, fill, fill_block
+from solver.jit.records import Records
 from solver.jit.separate import apart
 
 # What a contact does at a sample.
@@ -104,7 +99,7 @@ def _march(u: Real, load: Real, kt: float, mu: float, kind: Integer, onset: Inte
 
 
 @apart
-def _segments(kind: Integer, onset: Integer, segments: Real) -> int:
+def _segments(kind: Integer, onset: Integer, segments: Records) -> int:
     """Fill the table of stick and slip segments; return their number, −1 if there are too many."""
     n = kind.size
     delta = 2.0 * math.pi / n
@@ -123,20 +118,20 @@ def _segments(kind: Integer, onset: Integer, segments: Real) -> int:
         if count >= segments.shape[0]:
             return -1
         row = segments[count]
-        row[BEGIN], row[END] = begin * delta, j * delta
-        row[MOTION] = STICK if here == _STICKS else SLIP
-        row[ONSET], row[BEGAN], row[DIRECTION] = begin * delta, AFTER_SLIP, 1.0
+        row.begin, row.end = begin * delta, j * delta
+        row.motion = STICK if here == _STICKS else SLIP
+        row.onset, row.began, row.direction = begin * delta, AFTER_SLIP, 1.0
         if here == _SLIPS_DOWN:
-            row[DIRECTION] = -1.0
+            row.direction = -1.0
         elif here == _STICKS:
             since = onset[begin % n]
-            row[ONSET] = (since // 4) * delta
+            row.onset = (since // 4) * delta
             if since < 0:
-                row[BEGAN] = UNLOADED
+                row.began = UNLOADED
             elif since % 4 == _OPEN:
-                row[BEGAN] = AFTER_SEPARATION
+                row.began = AFTER_SEPARATION
             elif since % 4 == _SLIPS_DOWN:
-                row[DIRECTION] = -1.0
+                row.direction = -1.0
         count += 1
     return count
 
@@ -187,7 +182,7 @@ def _fill_wave(wave: Real) -> None:
 
 @apart
 def _accumulate(
-    segments: Real, count: int, delta: float, U: Real, ks: Integer, N: Real, load_ks: Integer, kt: float,
+    segments: Records, count: int, delta: float, U: Real, ks: Integer, N: Real, load_ks: Integer, kt: float,
     mu: float, dF_dU: Real, dF_dkt: Real, dF_dmu: Real, dF_dN: Real,
 ) -> None:  # fmt: skip
     """Fill the derivatives from the sums over the samples of every segment."""
@@ -202,9 +197,9 @@ def _accumulate(
     fill(dF_dmu, 0.0)
     for index in range(count):
         row = segments[index]
-        begin, end = round(row[BEGIN] / delta), round(row[END] / delta)
-        if row[MOTION] == SLIP:
-            _add_sums(begin, end, delta, delta * row[DIRECTION], slip_cos, slip_sin)
+        begin, end = round(row.begin / delta), round(row.end / delta)
+        if row.motion == SLIP:
+            _add_sums(begin, end, delta, delta * row.direction, slip_cos, slip_sin)
             continue
         fill(own_cos, 0.0)
         fill(own_sin, 0.0)
@@ -212,14 +207,14 @@ def _accumulate(
         for q in range(top + 1):
             stick_cos[q] += own_cos[q]
             stick_sin[q] += own_sin[q]
-        if row[BEGAN] == UNLOADED:
+        if row.began == UNLOADED:
             continue
         moment_rows(own_cos, own_sin, ks, moment)
-        basis_at(row[ONSET], ks, e_u)
-        basis_at(row[ONSET], load_ks, e_n)
+        basis_at(row.onset, ks, e_u)
+        basis_at(row.onset, load_ks, e_n)
         u_onset = dot(e_u, U)
-        load_onset = dot(e_n, N) if row[BEGAN] == AFTER_SLIP else 0.0
-        turn = row[DIRECTION] if row[BEGAN] == AFTER_SLIP else 0.0
+        load_onset = dot(e_n, N) if row.began == AFTER_SLIP else 0.0
+        turn = row.direction if row.began == AFTER_SLIP else 0.0
         for i in range(n):
             dF_dkt[i] -= u_onset * moment[i]
             dF_dmu[i] += turn * load_onset * moment[i]
@@ -240,7 +235,7 @@ def _accumulate(
 
 @apart
 def sampled_force(
-    U: Real, ks: Integer, N: Real, load_ks: Integer, kt: float, mu: float, samples: int, segments: Real,
+    U: Real, ks: Integer, N: Real, load_ks: Integer, kt: float, mu: float, samples: int, segments: Records,
     dF_dU: Real, dF_dkt: Real, dF_dmu: Real, dF_dN: Real, F: Real,
 ) -> tuple[int, int]:  # fmt: skip
     """Compute force coefficients and every derivative of one contact from equally spaced samples.

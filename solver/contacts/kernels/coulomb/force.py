@@ -24,13 +24,7 @@ from numpy.typing import NDArray
 from solver.contacts.kernels.state_durations import find_segments, is_symmetric
 from solver.contacts.kernels.stick_slip_events import (
     AFTER_SLIP,
-    BEGAN,
-    BEGIN,
-    DIRECTION,
-    END,
     FAILED,
-    MOTION,
-    ONSET,
     SEPARATED,
     SLIP,
     STICK,
@@ -40,19 +34,20 @@ from solver.contacts.kernels.stick_slip_events import (
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Integer, Real, coefficient_count, cosine_position
 from solver.jit.lapack import dot, fill, fill_block
+from solver.jit.records import Records
 from solver.jit.separate import apart
 
 
 @apart
-def add_moments(begin: float, end: float, weight: float, cosines: Real, sines: Real) -> None:
-    """Add weight·∫cos qτ and weight·∫sin qτ over [begin, end] for q = 0 … len − 1.
+def add_moments(begin: Any, end: Any, weight: float, cosines: NDArray[Any], sines: NDArray[Any]) -> None:
+    """Add weight·∫cos qτ and weight·∫sin qτ over [begin, end] for q = 0 … len − 1, real or complex.
 
     Written with half-length and middle, ∫cos qτ = (2/q) sin(q·half) cos(q·middle), which keeps full relative
     precision on the very short segments of stiff contacts.
     """
     half, middle = 0.5 * (end - begin), 0.5 * (end + begin)
-    cm1, sm1 = math.cos(middle), math.sin(middle)
-    ch1, sh1 = math.cos(half), math.sin(half)
+    cm1, sm1 = np.cos(middle), np.sin(middle)
+    ch1, sh1 = np.cos(half), np.sin(half)
     cm, sm, ch, sh = cm1, sm1, ch1, sh1
     cosines[0] += weight * (end - begin)
     for q in range(1, cosines.size):
@@ -128,14 +123,14 @@ def products(
 @apart
 def contact_force(
     U: Real, ks: Integer, N: Real, load_ks: Integer, kt: float, mu: float, cos_table: Real, sin_table: Real,
-    segments: Real, dF_dU: Real, dF_dkt: Real, dF_dmu: Real, dF_dN: Real, F: Real,
+    segments: Records, dF_dU: Real, dF_dkt: Real, dF_dmu: Real, dF_dN: Real, F: Real,
 ) -> tuple[int, int]:  # fmt: skip
     """Compute force coefficients and every derivative of one contact.
 
     Parameters
     ----------
     U : (n,) slip motion [m] for harmonics `ks`; N : (m,) normal load [N] for harmonics `load_ks`.
-    segments : scratch table (capacity, SEGMENT_COLUMNS); on return the segments found.
+    segments : scratch table (capacity,); on return the segments found.
     dF_dU (n, n), dF_dkt (n,), dF_dmu (n,), dF_dN (n, m), F (n,) : filled.
 
     Returns
@@ -152,7 +147,7 @@ def contact_force(
         fill_block(dF_dU, value)
         fill_block(dF_dN, value)
         return state, count
-    if state == STUCK and segments[0, BEGAN] == UNLOADED:
+    if state == STUCK and segments[0].began == UNLOADED:
         fill_block(dF_dU, 0.0)
         fill_block(dF_dN, 0.0)
         fill(dF_dmu, 0.0)
@@ -166,10 +161,10 @@ def contact_force(
     moments = np.zeros((4, top + 1))
     for i in range(marched):
         row = segments[i]
-        if row[MOTION] == STICK:
-            add_moments(row[BEGIN], row[END], weight, moments[0], moments[1])
+        if row.motion == STICK:
+            add_moments(row.begin, row.end, weight, moments[0], moments[1])
         else:
-            add_moments(row[BEGIN], row[END], weight * row[DIRECTION], moments[2], moments[3])
+            add_moments(row.begin, row.end, weight * row.direction, moments[2], moments[3])
     products(moments[2], moments[3], ks, load_ks, 1.0, dF_dN)
     products(moments[0], moments[1], ks, ks, 1.0, dF_dU)
     for i in range(n):
@@ -222,7 +217,7 @@ def bases_by(cos1: Any, sin1: Any, ks: Integer, e: NDArray[Any], de: NDArray[Any
 
 @apart
 def _add_onsets(
-    segments: Real, count: int, weight: float, U: Real, ks: Integer, N: Real, load_ks: Integer, kt: float,
+    segments: Records, count: int, weight: float, U: Real, ks: Integer, N: Real, load_ks: Integer, kt: float,
     mu: float, dF_dU: Real, dF_dkt: Real, dF_dmu: Real, dF_dN: Real,
 ) -> None:  # fmt: skip
     """Add the rank-one terms of every stick segment: its offset, fixed at its onset."""
@@ -231,17 +226,17 @@ def _add_onsets(
     cosines, sines, moment, e_u, e_n = waves[0], waves[1], rows[:n], rows[n : 2 * n], rows[2 * n :]
     for index in range(count):
         row = segments[index]
-        if row[MOTION] == SLIP or row[BEGAN] == UNLOADED:
+        if row.motion == SLIP or row.began == UNLOADED:
             continue
         fill(cosines, 0.0)
         fill(sines, 0.0)
-        add_moments(row[BEGIN], row[END], weight, cosines, sines)
+        add_moments(row.begin, row.end, weight, cosines, sines)
         moment_rows(cosines, sines, ks, moment)
-        tau = row[ONSET]
+        tau = row.onset
         basis_at(tau, ks, e_u)
         basis_at(tau, load_ks, e_n)
         u_onset, load_onset = dot(e_u, U), dot(e_n, N)
-        slipped = row[BEGAN] == AFTER_SLIP
+        slipped = row.began == AFTER_SLIP
         rate = 0.0
         if not slipped:
             rate = kt * _slope_at(e_u, ks, U) / _slope_at(e_n, load_ks, N)
@@ -252,8 +247,8 @@ def _add_onsets(
             for j in range(n):
                 dF_dU[i, j] -= step * e_u[j]
             if slipped:
-                dF_dmu[i] += row[DIRECTION] * load_onset * here
-                step = row[DIRECTION] * mu * here
+                dF_dmu[i] += row.direction * load_onset * here
+                step = row.direction * mu * here
             else:
                 step = rate * here
             for j in range(m):

@@ -22,14 +22,8 @@ import numpy as np
 from solver.contacts.kernels.coulomb.force import bases_at
 from solver.contacts.kernels.stick_slip_events import (
     AFTER_SLIP,
-    BEGAN,
-    BEGIN,
-    DIRECTION,
-    END,
     LIFTING,
-    MOTION,
     NO_LENGTH,
-    ONSET,
     SEPARATED,
     SLIP,
     STUCK,
@@ -38,6 +32,7 @@ from solver.contacts.kernels.stick_slip_events import (
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Integer, Real
 from solver.jit.lapack import dot, fill
+from solver.jit.records import Records, Row
 from solver.jit.separate import apart
 
 # Derivatives by the two numbers of the law, and wᵀ ∂F/∂N dN without the sticks after separation, which is the
@@ -80,7 +75,7 @@ def _weight_of(begin: float, end: float, weights: Real, ks: Integer) -> float:
 
 @apart
 def second_along(
-    U: Real, ks: Integer, N: Real, load_ks: Integer, kt: float, mu: float, state: int, segments: Real,
+    U: Real, ks: Integer, N: Real, load_ks: Integer, kt: float, mu: float, state: int, segments: Records,
     count: int, dF_dU: Real, dF_dN: Real, w: Real, dU: Real, dN: Real, out_U: Real, out_N: Real,
 ) -> tuple[float, float]:  # fmt: skip
     """Differentiate the gradient of w·F by (U, N, kt, μ) along a direction (dU, dN).
@@ -102,7 +97,7 @@ def second_along(
     if state == SEPARATED:
         return 0.0, 0.0
     n, m = U.size, N.size
-    if state == STUCK and segments[0, BEGAN] == UNLOADED:
+    if state == STUCK and segments[0].began == UNLOADED:
         return dot(w, dU), 0.0
     weights = np.empty(n)
     for i in range(n):
@@ -120,29 +115,29 @@ def second_along(
     at, over = np.empty((4, n)), np.empty((4, m))
     for index in range(count):
         row = segments[index]
-        if row[END] - row[BEGIN] <= NO_LENGTH or row[BEGAN] == UNLOADED:
+        if row.end - row.begin <= NO_LENGTH or row.began == UNLOADED:
             continue
-        follows = index > 0 and segments[index - 1, END] == row[BEGIN]
-        followed = index + 1 < count and segments[index + 1, BEGIN] == row[END]
-        bases_at(row[ONSET], ks, at[0], at[1])
-        bases_at(row[ONSET], load_ks, over[0], over[1])
-        bases_at(row[END], ks, at[2], at[3])
-        bases_at(row[END], load_ks, over[2], over[3])
-        if row[MOTION] == SLIP:
+        follows = index > 0 and segments[index - 1].end == row.begin
+        followed = index + 1 < count and segments[index + 1].begin == row.end
+        bases_at(row.onset, ks, at[0], at[1])
+        bases_at(row.onset, load_ks, over[0], over[1])
+        bases_at(row.end, ks, at[2], at[3])
+        bases_at(row.end, load_ks, over[2], over[3])
+        if row.motion == SLIP:
             if state == LIFTING:
-                _ends_of_slip(N, mu * row[DIRECTION], follows, followed, weights, at, over, dN, out_N)
+                _ends_of_slip(N, mu * row.direction, follows, followed, weights, at, over, dN, out_N)
             continue
-        held = _weight_of(row[BEGIN], row[END], weights, ks)
-        if row[BEGAN] == AFTER_SLIP:
+        held = _weight_of(row.begin, row.end, weights, ks)
+        if row.began == AFTER_SLIP:
             _onset_after_slip(
-                U, ks, N, load_ks, kt, mu, row[DIRECTION], held, at, over, dU, dN, out_U, out_N, rates
+                U, ks, N, load_ks, kt, mu, row.direction, held, at, over, dU, dN, out_U, out_N, rates
             )
         else:
             _onset_after_separation(
                 U, ks, N, load_ks, kt, held, dot(weights, at[0]), at, over, dU, dN, out_U, out_N, rates
             )
-        if followed and segments[index + 1, MOTION] == SLIP:
-            way = segments[index + 1, DIRECTION]
+        if followed and segments[index + 1].motion == SLIP:
+            way = segments[index + 1].direction
             _end_of_stick(U, N, kt, mu, row, way, dot(weights, at[2]), at, over, dU, dN, out_U, out_N, rates)
     if rates[_LOAD] != 0.0:
         rates[_MU] += rates[_LOAD] / mu
@@ -208,7 +203,7 @@ def _onset_after_separation(
 
 @compiled
 def _end_of_stick(
-    U: Real, N: Real, kt: float, mu: float, row: Real, way: float, weight: float,
+    U: Real, N: Real, kt: float, mu: float, row: Row, way: float, weight: float,
     at: Real, over: Real, dU: Real, dN: Real, out_U: Real, out_N: Real, rates: Real,
 ) -> None:  # fmt: skip
     """Add −J J' W/D where the force of a stick reaches the limit ξ = `way`."""
@@ -217,9 +212,9 @@ def _end_of_stick(
     slope = kt * dot(deb, U) - way * mu * dot(denb, N)
     along = kt * (dot(eb, dU) - dot(e, dU)) - way * mu * dot(enb, dN)
     at_onset, by_friction = 0.0, -way * dot(enb, N)
-    if row[BEGAN] == AFTER_SLIP:
-        at_onset = row[DIRECTION] * mu
-        by_friction += row[DIRECTION] * dot(en, N)
+    if row.began == AFTER_SLIP:
+        at_onset = row.direction * mu
+        by_friction += row.direction * dot(en, N)
     else:
         at_onset = kt * dot(de, U) / dot(den, N)
     along += at_onset * dot(en, dN)

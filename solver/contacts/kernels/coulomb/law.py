@@ -23,17 +23,11 @@ from numpy.typing import NDArray
 from solver.contacts.kernels.columns import KN, KT, KT_SECOND, MU, PRESTRESSED, SAMPLES
 from solver.contacts.kernels.coulomb.aft import sampled_force
 from solver.contacts.kernels.coulomb.force import add_moments, contact_force, products
-from solver.contacts.kernels.stick_slip_events import (
-    BEGIN,
-    END,
-    FAILED,
-    LIFTING,
-    SEPARATED,
-    piece_of,
-)
+from solver.contacts.kernels.stick_slip_events import FAILED, LIFTING, SEPARATED, piece_of
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Integer, Real, coefficient_count, merged, positions
 from solver.jit.lapack import dot, fill, fill_block
+from solver.jit.records import Records
 from solver.jit.separate import apart
 
 _PIECES = 1_000_003  # more than there are pieces of one direction that differ in practice
@@ -66,14 +60,14 @@ def load_of(
 
 
 @compiled
-def contact_of(segments: Real, count: int, intervals: Real) -> int:
+def contact_of(segments: Records, count: int, intervals: Real) -> int:
     """Fill `intervals` with [begin, end] of every interval of contact of a march; return their number."""
     found = 0
     for i in range(count):
-        if found > 0 and segments[i, BEGIN] == intervals[found - 1, 1]:
-            intervals[found - 1, 1] = segments[i, END]
+        if found > 0 and segments[i].begin == intervals[found - 1, 1]:
+            intervals[found - 1, 1] = segments[i].end
             continue
-        intervals[found, 0], intervals[found, 1] = segments[i, BEGIN], segments[i, END]
+        intervals[found, 0], intervals[found, 1] = segments[i].begin, segments[i].end
         found += 1
     return found
 
@@ -133,7 +127,7 @@ def _along_parameter(
 @compiled
 def _rub(
     directions: int, second: int, U: Real, ks: Integer, load: Real, load_ks: Integer, row: Real, slope: Real,
-    dload: Real, cos_table: Real, sin_table: Real, segments: Real, F: Real, dF_dU: Real, dF_dp: Real,
+    dload: Real, cos_table: Real, sin_table: Real, segments: Records, F: Real, dF_dU: Real, dF_dp: Real,
 ) -> tuple[int, int]:  # fmt: skip
     """Fill the forces of `directions` ports, and of the normal one if there is one more.
 
@@ -182,7 +176,7 @@ def _rub(
 @apart
 def coulomb_line(
     U: Real, ks: Integer, load: Real, load_ks: Integer, row: Real, slope: Real, dload: Real,
-    cos_table: Real, sin_table: Real, segments: Real, F: Real, dF_dU: Real, dF_dp: Real,
+    cos_table: Real, sin_table: Real, segments: Records, F: Real, dF_dU: Real, dF_dp: Real,
 ) -> tuple[int, int]:  # fmt: skip
     """Fill the friction along one line, and the normal force where the load moves."""
     return _rub(
@@ -193,7 +187,7 @@ def coulomb_line(
 @apart
 def coulomb_box(
     U: Real, ks: Integer, load: Real, load_ks: Integer, row: Real, slope: Real, dload: Real,
-    cos_table: Real, sin_table: Real, segments: Real, F: Real, dF_dU: Real, dF_dp: Real,
+    cos_table: Real, sin_table: Real, segments: Records, F: Real, dF_dU: Real, dF_dp: Real,
 ) -> tuple[int, int]:  # fmt: skip
     """Fill the friction along two lines with a limit each, and the normal force where the load moves."""
     row, slope = with_second(row, slope)
@@ -205,7 +199,7 @@ def coulomb_box(
 @apart
 def coulomb_sampled(
     U: Real, ks: Integer, load: Real, load_ks: Integer, row: Real, slope: Real, dload: Real,
-    cos_table: Real, sin_table: Real, segments: Real, F: Real, dF_dU: Real, dF_dp: Real,
+    cos_table: Real, sin_table: Real, segments: Records, F: Real, dF_dU: Real, dF_dp: Real,
 ) -> tuple[int, int]:  # fmt: skip
     """Fill the friction along one line under a given load by `row[SAMPLES]` samples of a period instead."""
     n = U.shape[1]

@@ -19,19 +19,17 @@ import numpy as np
 from solver.contacts.kernels.columns import KN, KT, KT_SECOND, MU
 from solver.contacts.kernels.coulomb.force import add_moments, bases_at, contact_force, products
 from solver.contacts.kernels.coulomb.hessian import second_along
-from solver.contacts.kernels.coulomb.law import with_second
+from solver.contacts.kernels.coulomb.law import contact_of, load_of, with_second
 from solver.contacts.kernels.stick_slip_events import (
-    BEGIN,
-    END,
     FAILED,
     LIFTING,
-    SEGMENT_COLUMNS,
     SEPARATED,
-    segment_capacity,
+    new_segments,
 )
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Integer, Real, coefficient_count, merged, positions
 from solver.jit.lapack import dot, fill, fill_block
+from solver.jit.records import Records
 from solver.jit.separate import apart
 
 
@@ -45,8 +43,8 @@ def weight_at(ks: Integer, w: Real, e: Real) -> float:
 @apart
 def _along_line(
     u: Real, ks: Integer, N: Real, all_ks: Integer, kt: float, mu: float, cos_table: Real, sin_table: Real,
-    w: Real, du: Real, dN: Real, dkt: float, dmu: float, segments: Real, out_u: Real, by_N: Real, g_N: Real,
-    rates: Real,
+    w: Real, du: Real, dN: Real, dkt: float, dmu: float, segments: Records, out_u: Real, by_N: Real,
+    g_N: Real, rates: Real,
 ) -> tuple[int, int]:  # fmt: skip
     """Differentiate the gradient of w·T of one direction; return its state and how many segments it has.
 
@@ -90,10 +88,10 @@ def _along_line(
 
 @apart
 def _pressing(
-    N: Real, all_ks: Integer, ks: Integer, state: int, segments: Real, count: int, w: Real, dN: Real,
+    N: Real, all_ks: Integer, ks: Integer, state: int, intervals: Real, w: Real, dN: Real,
     of_motion: Integer, by_N: Real, g_N: Real,
 ) -> None:  # fmt: skip
-    """Add the same of w·P, P the coefficients of max(N, 0)."""
+    """Add the same of w·P, P the coefficients of max(N, 0), from the intervals of contact."""
     n, size = w.size, N.size
     if state == SEPARATED:
         return
@@ -104,17 +102,11 @@ def _pressing(
     top = ks[-1] + all_ks[-1]
     cosines, sines, block = np.zeros(top + 1), np.zeros(top + 1), np.empty((n, size))
     over, slopes, e, de = np.empty(size), np.empty(size), np.empty(n), np.empty(n)
-    for index in range(count):
-        begin, end = segments[index, BEGIN], segments[index, END]
-        add_moments(begin, end, 1.0, cosines, sines)
+    for index in range(intervals.shape[0]):
+        add_moments(intervals[index, 0], intervals[index, 1], 1.0, cosines, sines)
         for side in range(2):
-            if side == 0 and index > 0 and segments[index - 1, END] == begin:
-                continue
-            if side == 1 and index + 1 < count and segments[index + 1, BEGIN] == end:
-                continue
-            tau = begin if side == 0 else end
-            bases_at(tau, all_ks, over, slopes)
-            bases_at(tau, ks, e, de)
+            bases_at(intervals[index, side], all_ks, over, slopes)
+            bases_at(intervals[index, side], ks, e, de)
             # The begin of contact moves by −dN/N' and leaves out what it passes, the end takes it in.
             factor = weight_at(ks, w, e) * dot(over, dN) / abs(dot(slopes, N))
             for j in range(size):
@@ -123,6 +115,23 @@ def _pressing(
     for i in range(n):
         for j in range(size):
             g_N[j] += w[i] * block[i, j]
+
+
+@compiled
+def through_load(
+    directions: int, U: Real, dU: Real, ks: Integer, all_ks: Integer, of_motion: Integer, of_load: Integer,
+    row: Real, drow: Real, w: Real, state: int, intervals: Real, N: Real, dN: Real, by_N: Real, g_N: Real,
+    out_U: Real, out_row: Real, out_load: Real,
+) -> None:  # fmt: skip
+    """Fill what a change of the load does: to the given one, and where it moves to the normal port and kn."""
+    if U.shape[0] > directions:
+        _pressing(N, all_ks, ks, state, intervals, w[directions], dN, of_motion, by_N, g_N)
+        for i in range(U.shape[1]):
+            j = of_motion[i]
+            out_U[directions, i] = row[KN] * by_N[j] + drow[KN] * g_N[j]
+            out_row[KN] += U[directions, i] * by_N[j] + dU[directions, i] * g_N[j]
+    for j in range(of_load.size):
+        out_load[j] = by_N[of_load[j]]
 
 
 @apart
@@ -136,21 +145,18 @@ def _rubbing(
     `second` is the column of the stiffness of all directions but the first.
     """
     m, n = U.shape
-    moves = m > directions
-    all_ks = merged(ks, load_ks) if moves else load_ks.copy()
+    all_ks = merged(ks, load_ks) if m > directions else load_ks.copy()
     size, of_load = coefficient_count(all_ks), positions(load_ks, all_ks)
-    of_motion = positions(ks, all_ks) if moves else np.empty(0, np.int64)
-    N, dN, by_N, g_N = np.zeros(size), np.zeros(size), np.zeros(size), np.zeros(size)
-    for j in range(load.size):
-        N[of_load[j]], dN[of_load[j]] = load[j], dload[j]
-    if moves:
-        v, dv = U[directions], dU[directions]
+    of_motion = positions(ks, all_ks) if m > directions else np.empty(0, np.int64)
+    N, dN, by_N, g_N = np.empty(size), np.empty(size), np.zeros(size), np.zeros(size)
+    load_of(U, directions, load, row[KN], of_motion, of_load, N)
+    load_of(U, directions, dload, drow[KN], of_motion, of_load, dN)
+    if m > directions:
         for i in range(n):
-            N[of_motion[i]] += row[KN] * v[i]
-            dN[of_motion[i]] += drow[KN] * v[i] + row[KN] * dv[i]
+            dN[of_motion[i]] += row[KN] * dU[directions, i]
     fill_block(out_U, 0.0)
     fill(out_row, 0.0)
-    segments = np.zeros((segment_capacity(max(ks[-1], all_ks[-1])), SEGMENT_COLUMNS))
+    segments = new_segments(max(ks[-1], all_ks[-1]))
     rates, state, count = np.zeros(2), 0, 0
     for a in range(directions):
         column = KT if a == 0 else second
@@ -162,14 +168,11 @@ def _rubbing(
             return FAILED
         out_row[column] += rates[0]
         out_row[MU] += rates[1]
-    if moves:
-        _pressing(N, all_ks, ks, state, segments, count, w[directions], dN, of_motion, by_N, g_N)
-        for i in range(n):
-            j = of_motion[i]
-            out_U[directions, i] = row[KN] * by_N[j] + drow[KN] * g_N[j]
-            out_row[KN] += U[directions, i] * by_N[j] + dU[directions, i] * g_N[j]
-    for j in range(load.size):
-        out_load[j] = by_N[of_load[j]]
+    intervals = np.empty((count, 2))
+    through_load(
+        directions, U, dU, ks, all_ks, of_motion, of_load, row, drow, w, state,
+        intervals[: contact_of(segments, count, intervals)], N, dN, by_N, g_N, out_U, out_row, out_load,
+    )  # fmt: skip
     return state
 
 

@@ -44,6 +44,7 @@ from solver.contacts.kernels.stick_slip_events import FAILED
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Integer, Real, coefficient_count
 from solver.jit.lapack import fill, fill_block
+from solver.jit.records import Records
 from solver.jit.separate import apart
 
 # Bits of the form of a law.
@@ -217,7 +218,7 @@ def _carry_repeating(course: Course, state: Real, F: Real, dF: Real) -> float:
 @apart
 def history_law(
     U: Real, ks: Integer, load: Real, load_ks: Integer, row: Real, slope: Real, dload: Real,
-    cos_table: Real, sin_table: Real, segments: Real, F: Real, dF_dU: Real, dF_dp: Real,
+    cos_table: Real, sin_table: Real, segments: Records, F: Real, dF_dU: Real, dF_dp: Real,
 ) -> tuple[int, int]:  # fmt: skip
     """Fill the force of a law with a history, its Jacobian and its derivative by λ (as in the contract)."""
     n, count = U.shape[1], int(row[NODES])

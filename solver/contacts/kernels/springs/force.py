@@ -18,6 +18,7 @@ from solver.contacts.kernels.coulomb.force import add_moments, moment_rows, prod
 from solver.contacts.kernels.state_durations import contact_intervals, one_wave
 from solver.contacts.kernels.stick_slip_events import SEPARATED, largest
 from solver.jit.fourier import Integer, Real, coefficient_count
+from solver.jit.records import Records
 from solver.jit.separate import apart
 from solver.jit.trig_polynomial import on_grid, unpack
 
@@ -46,7 +47,7 @@ def positive_intervals(c: Real, s: Real, degree: int, cos_table: Real, sin_table
 @apart
 def gap_spring(
     U: Real, ks: Integer, load: Real, load_ks: Integer, row: Real, slope: Real, dload: Real,
-    cos_table: Real, sin_table: Real, segments: Real, F: Real, dF_dU: Real, dF_dp: Real,
+    cos_table: Real, sin_table: Real, segments: Records, F: Real, dF_dU: Real, dF_dp: Real,
 ) -> tuple[int, int]:  # fmt: skip
     """Fill the force of a gap spring, its Jacobian and its derivative by λ (arguments as in the contract)."""
     n, top = coefficient_count(ks), max(ks[-1], 1)
@@ -79,7 +80,7 @@ def gap_spring(
 @apart
 def polynomial_spring(
     U: Real, ks: Integer, load: Real, load_ks: Integer, row: Real, slope: Real, dload: Real,
-    cos_table: Real, sin_table: Real, segments: Real, F: Real, dF_dU: Real, dF_dp: Real,
+    cos_table: Real, sin_table: Real, segments: Records, F: Real, dF_dU: Real, dF_dp: Real,
 ) -> tuple[int, int]:  # fmt: skip
     """Fill the force of a polynomial spring, its Jacobian and its derivative by λ (as in the contract)."""
     top, degree = max(ks[-1], 1), 1

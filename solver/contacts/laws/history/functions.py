@@ -21,7 +21,7 @@ from solver.contacts.kernels.columns import MOST_OWN
 from solver.contacts.kernels.history.partials import BY_COMPLEX_STEP, BY_DIFFERENCES, BY_HAND
 from solver.contacts.laws.history.definition import Derivatives, HistoryLaw
 from solver.errors import SettingError
-from solver.jit.cache import KernelCache
+from solver.jit.decorators import kept
 from solver.jit.law_functions import FORMS, TABLES
 
 WAYS = {
@@ -70,8 +70,7 @@ def _ready(law: _Same) -> Ready:
     if derivatives is None or (derivatives is not Derivatives.BY_HAND and kernels.keys() == made.keys()):
         derivatives = Derivatives.DIFFERENCES
     for place, kernel in kernels.items():
-        code = kernel.overloads[FORMS[place][0]]
-        TABLES[place].put(number, code.library.get_pointer_to_function(code.fndesc.llvm_func_name))
+        TABLES[place].put(number, kernel)
     return Ready(number=number, derivatives=derivatives, compiled=compiled, kept=tuple(kernels.values()))
 
 
@@ -115,9 +114,9 @@ def _compiled(place: str, function: Callable[..., Any]) -> Any:
     if not hasattr(function, "py_func"):
         kernel = numba.njit(nogil=True, error_model="numpy")(function)
         if Path(function.__code__.co_filename).is_file():
-            kernel._cache = KernelCache(function)
+            kept(kernel, function)
     kernel.compile(arguments)
-    found = kernel.overloads[arguments].signature.return_type
+    found = next(one.return_type for one in kernel.nopython_signatures if one.args == arguments)
     if found != result:
         wanted = "must return a float on every way" if result != numba.types.none else "must return nothing"
         raise SettingError(place.removeprefix("complex_"), str(found), wanted)

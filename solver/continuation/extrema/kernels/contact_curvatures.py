@@ -14,7 +14,7 @@ from solver.contacts.kernels.coulomb.force import contact_force
 from solver.contacts.kernels.coulomb.hessian import second_along
 from solver.contacts.kernels.laws import call_law
 from solver.contacts.kernels.second_laws import call_second
-from solver.contacts.kernels.stick_slip_events import BEGAN, FAILED, SEPARATED, STUCK, UNLOADED
+from solver.contacts.kernels.stick_slip_events import FAILED, SEPARATED, STUCK, UNLOADED
 from solver.contacts.kernels.system import System
 from solver.continuation.extrema.kernels.peak_state import Summit
 from solver.jit.decorators import compiled
@@ -51,7 +51,7 @@ def _jenkins_at(system: System, e: int, u: Real, at: Summit) -> bool:
         return False
     if state == SEPARATED:
         at.point.slopes[c] = 0.0
-    elif state == STUCK and at.segments[e, 0, BEGAN] == UNLOADED:
+    elif state == STUCK and at.segments[e, 0].began == UNLOADED:
         at.point.slopes[c] = row[KT]
     for i in range(n):
         total = at.slope[e, KT] * at.dF_dkt[e, i] + at.slope[e, MU] * at.dF_dmu[e, i]

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numba.experimental import structref
 
-from solver.contacts.kernels.stick_slip_events import SEGMENT_COLUMNS, segment_capacity
+from solver.contacts.kernels.stick_slip_events import SEGMENT, segment_capacity
 from solver.contacts.kernels.system import (
     Evaluation,
     Receptance,
@@ -19,6 +19,7 @@ from solver.contacts.kernels.system import (
 )
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Integer, Real, coefficient_count
+from solver.jit.records import Records
 from solver.jit.reference import Reference
 from solver.linear.kernels.receptance_derivatives import Jets, new_jets
 
@@ -44,7 +45,7 @@ class Summit(NamedTuple):
     dF_dmu: Real  # (ne, n)
     states: Integer  # (ne,)
     counts: Integer  # (ne,) segments of each
-    segments: Real  # (ne, capacity, columns)
+    segments: Records  # (ne, capacity)
     table: Real  # (ne, ·) contacts at p, their loads, and both differentiated by p
     load: Real  # (ne, 3)
     slope: Real  # (ne, ·)
@@ -84,7 +85,7 @@ def new_summit(system: System) -> Summit:
     return _new(
         jets, linear, point, np.zeros((nc, n)), point.dF_dU, np.zeros((nc, n)), np.full(ne, -1, np.int64),
         np.zeros((ne, n, m)), np.zeros((ne, n)), np.zeros((ne, n)), np.zeros(ne, np.int64),
-        np.zeros(ne, np.int64), np.zeros((ne, capacity, SEGMENT_COLUMNS)), np.zeros((ne, columns)),
+        np.zeros(ne, np.int64), np.zeros((ne, capacity), SEGMENT), np.zeros((ne, columns)),
         np.zeros((ne, m)), np.zeros((ne, columns)), np.zeros((ne, m)), np.zeros((3, nt)), np.zeros(nt),
         np.zeros(nt), np.zeros(n), np.zeros(n), np.zeros((nc, n)), np.zeros((5, nc, n)), np.zeros(NUMBERS),
     )  # fmt: skip
