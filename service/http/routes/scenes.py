@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+from functools import reduce
+from operator import or_
 from typing import Annotated, Any, ClassVar, Literal
 
 from fastapi import APIRouter, Body, Query, Response
@@ -22,7 +24,6 @@ from service.jobs.studies.plan import EXAMPLE, Plan, PlanResult
 from service.queue.scene_store import shipped
 from service.schemas.answers import SceneAnswer, SceneDetail, SceneList
 from service.schemas.pages import Cursor, Limit, ListQuery, page_of
-from service.schemas.preview_answers import LimitsPreview, PointPreview, SensitivitiesPreview, SweepPreview
 from solver.scene.descriptions import DAMPER_LOAD
 
 texts = APIRouter(prefix="/v1/scenes", tags=["scenes"], route_class=TypedRoute)
@@ -218,5 +219,5 @@ previews.add_api_route(
     "",
     preview,
     methods=["POST"],
-    response_model=SweepPreview | SensitivitiesPreview | LimitsPreview | PointPreview,
+    response_model=reduce(or_, (kind.answers for kind in PREVIEWS)),
 )

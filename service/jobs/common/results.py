@@ -5,7 +5,7 @@ from __future__ import annotations
 import builtins
 import inspect
 import sys
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from enum import Enum
 from types import NoneType, UnionType
 from typing import TYPE_CHECKING, Annotated, Any, Union, get_args, get_origin
@@ -83,13 +83,16 @@ class ReachedResult(KindResult):
     status: str = Field(description="How it ended, and what to try if it fell short.")
 
 
-def result_model(kind: type[Told], name: str, **types: Any) -> type[KindResult]:
+def result_model(
+    kind: type[Told], name: str, *, only: Collection[str] = (), **types: Any
+) -> type[KindResult]:
     """Return the schema of the JSON of a class of results, by the types and words of its fields.
 
     Parameters
     ----------
     kind : the class; how well responses are known, and how a result ended, is said in all alike.
     name : of the schema.
+    only : the keys that are given, all if left out.
     types : of keys whose JSON has another one than the attribute, or none that is known here; with a default
         as a pair where results may be without. Of further keys their fields, as of `pydantic.create_model`.
     """
@@ -97,9 +100,9 @@ def result_model(kind: type[Told], name: str, **types: Any) -> type[KindResult]:
     from solver.results.base import MadeOfResponses
     from solver.results.told import json_keys
 
-    keys = json_keys(kind)
+    keys = {key: path for key, path in json_keys(kind).items() if not only or key in only}
     parts: dict[type[KindResult], bool] = {
-        KnownResult: issubclass(kind, MadeOfResponses),
+        KnownResult: issubclass(kind, MadeOfResponses) and not only,
         EndedResult: "completed" in keys, ReachedResult: "reached" in keys,
     }  # fmt: skip
     bases = tuple(part for part, has in parts.items() if has)

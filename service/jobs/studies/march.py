@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field
 
 from service.jobs.common.results import Table, result_model
 from service.jobs.common.scenes import FrequencyHz
@@ -29,6 +29,34 @@ if TYPE_CHECKING:
 
 
 FloatArray = NDArray[np.float64]
+
+
+class Shares(BaseModel):
+    """Shares of the period."""
+
+    stick: float
+    slip: float
+    separation: float
+
+
+class ContactPeriod(BaseModel):
+    """A contact over one period; the first instant is repeated at the end of `slip`, `force` and `load`."""
+
+    name: str
+    state: str
+    slip: list[float] = Field(description="Slip motion [m].")
+    force: list[float] = Field(description="Force [N].")
+    load: list[float] = Field(description="Normal load [N], 0 while open.")
+    motion: list[int] | None = Field(description="0 stick, 1 slip, 2 separation; null for other laws.")
+    shares: Shares | None
+
+
+class Period(BaseModel):
+    """One period."""
+
+    time: list[float] = Field(description="Instants [s].")
+    displacement: list[float] = Field(description="Of the observed DOF [m].")
+    contacts: list[ContactPeriod]
 
 
 def period_of(solution: Solution, samples: int) -> dict[str, Any]:

@@ -110,10 +110,8 @@ _Diameter = Annotated[int, Field(strict=True, ge=-10_000, le=10_000)]
 _Ratio = Annotated[Number, Field(ge=-10.0, le=10.0)]
 
 
-NonlinearModeResult = result_model(
-    NonlinearMode, "NonlinearModeResult",
-    **dict.fromkeys(("performance", "limit_cycles", "motions"), (Table | None, None)),
-)  # fmt: skip
+_FURTHER: dict[str, Any] = dict.fromkeys(("performance", "limit_cycles", "motions"), (Table | None, None))
+NonlinearModeResult = result_model(NonlinearMode, "NonlinearModeResult", **_FURTHER)
 PhaseResonanceResult = result_model(PhaseResonance, "PhaseResonanceResult")
 
 
