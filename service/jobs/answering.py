@@ -49,7 +49,6 @@ def read_measurements(scene: Scene, files: Sequence[Mapping[str, str]]) -> dict[
     `detail`.
     """
     # Loaded here: it brings SciPy along, which a service that only lists does not need.
-    from optim.errors import DesignError
     from optim.identification.readers.csv_text import described
     from optim.identification.reading import read_data
 
@@ -61,13 +60,11 @@ def read_measurements(scene: Scene, files: Sequence[Mapping[str, str]]) -> dict[
             from_text = described(file["text"], name, paths)
             runs = read_data(scene, [from_text])
             read.append({"name": name, "table": from_text.job_table, "runs": [_shown(run) for run in runs]})
-        except DesignError as error:
+        except (SceneError, SettingError) as error:
             issues.append({
                 "file": name, "line": getattr(error, "line", None),
                 "column": getattr(error, "column", "") or None, "detail": str(error),
             })  # fmt: skip
-        except (SceneError, SettingError) as error:
-            issues.append({"file": name, "line": None, "column": None, "detail": str(error)})
     return {"files": read, "issues": issues}
 
 

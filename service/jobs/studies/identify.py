@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 from pydantic import BeforeValidator, ConfigDict, Field
 
 from optim.criteria.key import Pair
-from optim.errors import DesignError
 from optim.identification.result import Estimate, Identification
 from optim.problem.keys import MAX_VARIABLES, VariableName
 from optim.problem.words import ScalingWord
@@ -130,7 +129,7 @@ class Identify(Study, HarmonicRequest):
             read_candidates(scene, runs, known, self.candidates)
         except SceneError as error:
             return [issue.at("data") for issue in error.issues]
-        except (DesignError, SettingError) as error:
+        except SettingError as error:
             return [error.issue.at(*(error.place or ("data",)))]
         return []
 
