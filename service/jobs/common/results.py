@@ -5,13 +5,16 @@ from __future__ import annotations
 import builtins
 import inspect
 import sys
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from enum import Enum
+from functools import cache
 from types import NoneType, UnionType
 from typing import TYPE_CHECKING, Annotated, Any, Union, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, Field, create_model
 from pydantic.fields import FieldInfo
+
+from solver.results.views import on_demand
 
 if TYPE_CHECKING:
     from solver.results.told import Told
@@ -116,6 +119,20 @@ def result_model(
             own[key] = given, field
     about = (kind.__doc__ or "").partition("\n")[0]
     return create_model(name, __base__=bases or (KindResult,), __doc__=about, **own, **types)
+
+
+def answered(place: str, name: str, **types: Any) -> Callable[[], type[KindResult]]:
+    """Return what makes the schema of a class, ``"module:Class"``, when it is asked for.
+
+    The help of a command needs no schema of results, nor what computes them. Arguments as of `result_model`.
+    """
+
+    @cache
+    def made() -> type[KindResult]:
+        kind: Any = on_demand(place)
+        return result_model(kind, name, **types)
+
+    return made
 
 
 def _described(kind: Any, path: str) -> tuple[Any, str | None]:

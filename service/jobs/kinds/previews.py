@@ -12,6 +12,7 @@ from pydantic import ConfigDict, Field
 
 import solver
 from optim.studies.sensitivity_result import ParameterSensitivity, SensitivityResult
+from service.jobs.common.periods import Period, period_of
 from service.jobs.common.results import KindResult, PeakAt, result_model
 from service.jobs.common.scenes import (
     FrequencyHz,
@@ -32,7 +33,6 @@ from service.jobs.common.sizes import (
 )
 from service.jobs.outputs import JobOutput, Progress, ShouldStop, Silent
 from service.jobs.registry import JobKind, Registry, Resolved, SceneSource
-from service.jobs.studies.march import Period, period_of
 from service.jobs.studies.solve import solve_result
 from solver.continuation.branch import AnyBranch
 from solver.continuation.certificate import PeakCertificate
