@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from solver.errors import Issue, Place, written
+from solver.errors import Issue, Place, SettingError
 
 
-class DesignError(Exception):
+class DesignError(SettingError):
     """A design problem that cannot be posed; the message names the argument and what would be right.
 
     Parameters
@@ -20,12 +20,9 @@ class DesignError(Exception):
     def __init__(
         self, name: str | Place, value: object, wanted: str, *, place: Place | None = None
     ) -> None:  # fmt: skip
-        steps = (name,) if isinstance(name, str) else name
-        self.name = written(steps)
-        self.value = value
-        self.place: Place = steps if place is None else place
-        self.issue = Issue(steps, wanted, value)
-        super().__init__(self.issue.said(self.name))
+        super().__init__(name, value, wanted)
+        self.place = self.issue.subject if place is None else place
+        self.args = (self.issue.said(self.name),)
 
 
 class DataError(DesignError):

@@ -92,19 +92,23 @@ def solve_problem(
     tally = Tally(on_progress)
     measured, told = by_first_response(problem, should_stop)
     found = _solved(measured, tally.searching, should_stop, on_best, told=told)
-    if measured is not problem and not _free_at_its_best(found):
-        # The best design has a mean of its own, or there is none: max|x| is what was asked for.
+
+    def by_max_abs() -> DesignResult:
+        """Search by what was asked for, from what the other measure has seen."""
         seen = (*told, *found.looked_at, *found.history)
         asked = _solved(problem, tally.again(found.evaluations), should_stop, on_best, told=seen)
-        measured, found = problem, _counted(asked, found.evaluations)
+        return _counted(asked, found.evaluations)
+
+    if measured is not problem and not _free_at_its_best(found):
+        # The best design has a mean of its own, or there is none.
+        measured, found = problem, by_max_abs()
     found = _counted(found, sum(one.computed for one in told))
     most = most_harmonics(problem.harmonics)
     found, more = _with_enough_harmonics(found, most, tally, should_stop, on_best)
     if measured is not problem and not _known_by(found):
-        seen = (*told, *found.looked_at, *found.history)
-        asked = _solved(problem, tally.again(found.evaluations), should_stop, on_best, told=seen)
+        asked = by_max_abs()
         if asked.evaluation is not None and asked.status is not DesignStatus.STOPPED:
-            found = by_the_better_known(_counted(asked.with_errors(), found.evaluations), found)
+            found = by_the_better_known(asked.with_errors(), found)
     if problem.method is Method.PERFORMANCE_CURVE:
         return honest(found)  # it stands for no other design
     chosen = looked_after(found, should_stop, tally.further, more)

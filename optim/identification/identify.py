@@ -273,7 +273,7 @@ def uncertain_table(
     if told:
         try:
             read_uncertain(scene, (), ellipsoid)
-        except (DesignError, SettingError, SceneError):
+        except (SettingError, SceneError):
             pass  # it reaches beyond what a parameter may have: intervals do not
         else:
             return ellipsoid

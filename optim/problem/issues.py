@@ -11,7 +11,6 @@ from typing import Any
 
 from optim.criteria.criterion import CriterionContext
 from optim.criteria.registry import criteria
-from optim.errors import DesignError
 from optim.problem.cases import read_case, read_cases
 from optim.problem.numbers import positive
 from optim.problem.problem import READERS, pose, read_start
@@ -20,7 +19,7 @@ from optim.problem.variables import check_variables
 from solver.errors import Issue, Place, SceneError, SettingError
 from solver.scene.scene import Scene
 
-Refusal = DesignError | SettingError | SceneError
+Refusal = SettingError | SceneError
 Piece = tuple[Place, Callable[[], object]]
 ANY_LIMIT = 1.0  # [m], for what is refused without one: which it is does not matter to them
 
@@ -109,7 +108,7 @@ def _refusal(where: Place, read: Callable[[], object]) -> Refusal | None:
     """Return the exception that `read` raises, which speaks of `where` at least; None without one."""
     try:
         read()
-    except (DesignError, SettingError, SceneError) as error:
+    except (SettingError, SceneError) as error:
         if error.place == where[: len(error.place)]:
             error.place = where
         return error

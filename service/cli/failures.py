@@ -6,7 +6,6 @@ import re
 import sys
 from collections.abc import Iterable, Mapping
 
-from optim.errors import DesignError
 from service import errors
 from solver.errors import Issue, SceneError, SettingError, SolverError
 
@@ -59,7 +58,7 @@ def end(reached: bool, status: str) -> None:
         raise ShortfallError(status)
 
 
-REPORTED = (SolverError, DesignError, errors.ServiceError, errors.InputError, ShortfallError)
+REPORTED = (SolverError, errors.ServiceError, errors.InputError, ShortfallError)
 
 
 def report(error: Exception) -> int:
@@ -70,7 +69,7 @@ def report(error: Exception) -> int:
 
 
 def _status(error: Exception) -> int:
-    if isinstance(error, (SceneError, SettingError, DesignError, errors.InputError)):
+    if isinstance(error, (SceneError, SettingError, errors.InputError)):
         return BAD_INPUT
     if isinstance(error, errors.ServiceProblem):
         return BAD_INPUT if 400 <= error.status < 500 and error.status != 409 else FELL_SHORT

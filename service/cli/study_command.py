@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any, Protocol, Self
 import typer
 from typer.core import TyperGroup
 
-from optim.errors import DesignError
 from service.cli.failures import end, refused
 from service.cli.options import inputs
 from service.cli.options import shared as options
@@ -143,7 +142,7 @@ class Keys:
         """Name options in what is refused inside."""
         try:
             yield
-        except (SettingError, DesignError) as error:
+        except SettingError as error:
             raise refused([error.issue], self.flags) from error
 
     def command(

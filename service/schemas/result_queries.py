@@ -21,9 +21,11 @@ from service.jobs.figures import (
     DESIGN,
     RECORDS,
     SWEEP,
+    DesignRecord,
     KindRecord,
     Quantity,
     Record,
+    SweepRecord,
     part_names,
     quantities_of_model,
     quantities_of_record,
@@ -46,7 +48,6 @@ from solver.wording import nearest
 
 Bound = Annotated[float | None, Field(ge=-1e30, le=1e30)]
 Count = Annotated[int | None, Field(ge=0, le=10**9)]
-Name = Annotated[str | None, Field(max_length=210)]
 LongName = Annotated[str | None, Field(max_length=500)]
 _COLUMNS = {"owner": "owner", "scene": "scene_name", "scene_hash": "scene_hash", "job": "job_id"}
 _OWNER = Field(default=None, description="For keys with the scope admin: whose.")
@@ -92,85 +93,52 @@ class StoredQuery(ListQuery):
 _ENDS = ("min", "max")
 
 
-class DesignQuery(StoredQuery):
+def _keys(record: type[Record], known: Mapping[str, Quantity]) -> dict[str, Any]:
+    """The keys that figures add to a query, with what they must be."""
+    keys: dict[str, Any] = {}
+    inside = {} if record.PART_TYPE is None else quantities_of_record(record.PART_TYPE)
+    for name, quantity in {**known, **inside}.items():
+        if quantity.kind in (int, float):
+            keys |= {f"{name}_{end}": (Bound, None) for end in _ENDS}
+        else:
+            keys[name] = (LongName if quantity.kind is str else bool | None, None)
+    return keys | ({record.PART: (LongName, None)} if record.PART else {})
+
+
+def _listing(record: type[Record], name: str, columns: Mapping[str, Any], *renamed: str) -> Any:
+    """Root of the queries of one kind of records: every figure is a key, every number one to sort by."""
+    known = quantities_of_record(record)
+    keys = _keys(record, known) | {f"{key}_{end}": (Bound, None) for key in renamed for end in _ENDS}
+    said = known | ({} if record.PART_TYPE is None else quantities_of_record(record.PART_TYPE))
+    for key, (kind, _) in keys.items():
+        one = said.get(key) or said.get(key.removesuffix("_min"))
+        keys[key] = kind, Field(None, description=None if one is None else one.words)
+    numbers = (key for key, one in known.items() if one.kind in (int, float))
+    words = [sign + key for key in (CREATED, *numbers, *renamed) for sign in ("", "-")]
+    sort: Any = Literal[tuple(words)]
+    about = {"owner": (LongName, _OWNER), "scene": (LongName, None), "scene_hash": (LongName, None)}
+    return create_model(
+        name, __base__=StoredQuery, **{**about, **columns, **keys}, harmonics=(Count, None),
+        sort=(sort, "-created"), limit=(Limit, 100), cursor=(Cursor, None),
+    )  # fmt: skip
+
+
+_Designs: Any = _listing(DesignRecord, "Designs", {}, "band")
+_Sweeps: Any = _listing(SweepRecord, "Sweeps", {"job": (LongName, None), "of": (LongName, _RUN)})
+
+
+class DesignQuery(_Designs):  # type: ignore[misc]
     """Which designs to list. `…_min` and `…_max` are inclusive; `-` before a sort means largest first."""
 
     path: ClassVar[str] = "/v1/designs"
     FIGURES: ClassVar[Mapping[str, str]] = {"band": "band_hz"}
 
-    owner: LongName = _OWNER
-    scene: LongName = None
-    scene_hash: LongName = None
-    variable: LongName = Field(default=None, description="Name of a variable it must have.")
-    value_min: Bound = Field(default=None, description="Of the best value of `variable`, or of any.")
-    value_max: Bound = None
-    method: LongName = None
-    robust: bool | None = None
-    reached: bool | None = None
-    feasible: bool | None = None
-    harmonics: Count = None
-    objective_min: Bound = None
-    objective_max: Bound = None
-    peak_min: Bound = Field(default=None, description="Of the highest peak [m].")
-    peak_max: Bound = None
-    peak_at_min: Bound = Field(default=None, description="Of the frequency of the highest peak [Hz].")
-    peak_at_max: Bound = None
-    band_min: Bound = Field(default=None, description="Of the width of the resonance band [Hz].")
-    band_max: Bound = None
-    work_min: Bound = None
-    work_max: Bound = None
-    seconds_min: Bound = None
-    seconds_max: Bound = None
-    sort: Literal[
-        "created", "-created", "objective", "-objective", "peak", "-peak", "peak_at", "-peak_at", "band",
-        "-band", "work", "-work", "seconds", "-seconds",
-    ] = "-created"  # fmt: skip
-    limit: Limit = 100
-    cursor: Cursor = None
 
-
-class SweepQuery(StoredQuery):
+class SweepQuery(_Sweeps):  # type: ignore[misc]
     """Which sweeps to list. `…_min` and `…_max` are inclusive; `-` before a sort means largest first."""
 
     path: ClassVar[str] = "/v1/sweeps"
     RUN: ClassVar[str] = "of"
-
-    owner: Name = _OWNER
-    scene: Name = None
-    scene_hash: Name = None
-    parameter: Name = None
-    harmonics: Count = None
-    job: Name = None
-    of: Name = _RUN
-    completed: bool | None = None
-    intermediate: bool | None = Field(
-        default=None, description="Whether it was computed on the way to another result; both if left out."
-    )
-    peak_min: Bound = None
-    peak_max: Bound = None
-    peak_at_min: Bound = None
-    peak_at_max: Bound = None
-    band_hz_min: Bound = None
-    band_hz_max: Bound = None
-    points_min: Count = None
-    points_max: Count = None
-    seconds_min: Bound = None
-    seconds_max: Bound = None
-    contact: Name = Field(default=None, description="The contact N0_min and so on are about; any if unset.")
-    N0_min: Bound = None
-    N0_max: Bound = None
-    N1_min: Bound = None
-    N1_max: Bound = None
-    kt_min: Bound = None
-    kt_max: Bound = None
-    mu_min: Bound = None
-    mu_max: Bound = None
-    sort: Literal[
-        "created", "-created", "peak", "-peak", "peak_at", "-peak_at", "band_hz", "-band_hz",
-        "points", "-points", "harmonics", "-harmonics", "seconds", "-seconds",
-    ] = "-created"  # fmt: skip
-    limit: Limit = 100
-    cursor: Cursor = None
 
 
 class ResultQuery(StoredQuery):
@@ -214,18 +182,6 @@ def quantities(of: str, registry: Registry) -> dict[str, Quantity]:
         raise InvalidRequestError.of(("of",), wanted, of, source="query")
     apart = ResultQuery.model_fields.keys() - {"limit"} | {"status"}
     return {name: one for name, one in quantities_of_model(known[of]).items() if name not in apart}
-
-
-def _keys(record: type[Record], known: Mapping[str, Quantity]) -> dict[str, Any]:
-    """The keys that figures add to a query, with what they must be."""
-    keys: dict[str, Any] = {}
-    inside = {} if record.PART_TYPE is None else quantities_of_record(record.PART_TYPE)
-    for name, quantity in {**known, **inside}.items():
-        if quantity.kind in (int, float):
-            keys |= {f"{name}_{end}": (Bound, None) for end in _ENDS}
-        else:
-            keys[name] = (LongName if quantity.kind is str else bool | None, None)
-    return keys | ({record.PART: (LongName, None)} if record.PART else {})
 
 
 def result_page(

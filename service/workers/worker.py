@@ -22,7 +22,6 @@ from multiprocessing.connection import Connection
 from types import FrameType
 from typing import Any
 
-from optim.errors import DesignError
 from service.errors import UnknownKindError
 from service.jobs import strict_json
 from service.jobs.checkpoints import Checkpoints, KeptPieces
@@ -270,7 +269,7 @@ def failure_of(task: Task, error: Exception) -> JobFailure:
     """A deterministic error, as the job keeps it."""
     if isinstance(error, SceneError):
         return JobFailure(kind=FailureKind.SCENE, detail=str(error), issues=error.issues)
-    if isinstance(error, SettingError | DesignError | UnknownKindError):
+    if isinstance(error, SettingError | UnknownKindError):
         return JobFailure(kind=FailureKind.SETTING, detail=str(error))
     if isinstance(error, SolverError):
         return JobFailure(kind=FailureKind.GOAL, detail=str(error))

@@ -86,8 +86,6 @@ def schema(
     ] = "scene",
 ) -> None:
     """Print the JSON Schema of scene files, design problems or jobs, for editors."""
-    from service.cli.commands.scenes import Described, schema_of
-
     words = [one.value for one in Described]
     if what not in words:
         raise InputError(f"`schema` takes {', '.join(words)}, got {what!r}")

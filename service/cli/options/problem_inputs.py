@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from optim.criteria.key import Form, Option
-from optim.errors import DesignError
 from optim.problem.keys import DesignKeys, FrontKeys, options
 from service.cli import completion
 from service.cli.failures import refused
@@ -143,7 +142,7 @@ class Description:
         """Name options and keys in what is refused inside."""
         try:
             yield
-        except (SettingError, DesignError) as error:
+        except SettingError as error:
             raise self.refusal([error.issue.at(*(error.place or error.issue.subject))]) from error
 
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+from functools import reduce
+from operator import or_
 from typing import Annotated, Any, ClassVar, Literal
 
 from fastapi import APIRouter, Body, Query, Response
@@ -18,11 +20,10 @@ from service.jobs.common.scene_parameters import SceneParameterList
 from service.jobs.common.scenes import SceneRequest
 from service.jobs.kinds.bodies import KIND, any_body, examples, request_of
 from service.jobs.kinds.previews import PREVIEWS, PreviewRequest
-from service.jobs.studies.plan import EXAMPLE, Plan, PlanResult
+from service.jobs.studies.plan import EXAMPLE, Plan, plan_result
 from service.queue.scene_store import shipped
 from service.schemas.answers import SceneAnswer, SceneDetail, SceneList
 from service.schemas.pages import Cursor, Limit, ListQuery, page_of
-from service.schemas.preview_answers import LimitsPreview, PointPreview, SensitivitiesPreview, SweepPreview
 from solver.scene.descriptions import DAMPER_LOAD
 
 texts = APIRouter(prefix="/v1/scenes", tags=["scenes"], route_class=TypedRoute)
@@ -183,7 +184,7 @@ plans = APIRouter(prefix="/v1/plan", tags=["scenes"], route_class=TypedRoute)
 PlanBody = Annotated[Plan, Body(openapi_examples={"plan": {"value": EXAMPLE}})]
 
 
-@plans.post("", response_model=PlanResult)
+@plans.post("", response_model=plan_result())
 async def plan(body: PlanBody, context: InContext) -> Any:
     """The effects this scene calls for and those left out, each with the reason; sizes and cost."""
     return await computed(context, PLAN, {"request": body})
@@ -218,5 +219,5 @@ previews.add_api_route(
     "",
     preview,
     methods=["POST"],
-    response_model=SweepPreview | SensitivitiesPreview | LimitsPreview | PointPreview,
+    response_model=reduce(or_, (kind.answers for kind in PREVIEWS)),
 )

@@ -29,7 +29,6 @@ def read_measurements(scene: Scene, files: Sequence[Mapping[str, Any]]) -> dict[
     `detail`.
     """
     # Loaded here: it brings SciPy along, which a service that only lists does not need.
-    from optim.errors import DesignError
     from optim.identification.readers.csv_text import described
     from optim.identification.readers.export import Choice, read_export
     from optim.identification.reading import read_data
@@ -44,10 +43,8 @@ def read_measurements(scene: Scene, files: Sequence[Mapping[str, Any]]) -> dict[
             from_text = read_as(file["text"], name, paths)
             runs = read_data(scene, [from_text])
             read.append({"name": name, "table": from_text.job_table, "runs": [_shown(run) for run in runs]})
-        except DesignError as error:
-            issues.append(_issue(name, error))
         except (SceneError, SettingError) as error:
-            issues.append({"file": name, "line": None, "column": None, "detail": str(error)})
+            issues.append(_issue(name, error))
     return {"files": read, "issues": issues}
 
 

@@ -5,13 +5,16 @@ from __future__ import annotations
 import builtins
 import inspect
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Collection, Mapping
 from enum import Enum
+from functools import cache
 from types import NoneType, UnionType
 from typing import TYPE_CHECKING, Annotated, Any, Union, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, Field, create_model
 from pydantic.fields import FieldInfo
+
+from solver.results.views import on_demand
 
 if TYPE_CHECKING:
     from solver.results.told import Told
@@ -83,13 +86,16 @@ class ReachedResult(KindResult):
     status: str = Field(description="How it ended, and what to try if it fell short.")
 
 
-def result_model(kind: type[Told], name: str, **types: Any) -> type[KindResult]:
+def result_model(
+    kind: type[Told], name: str, *, only: Collection[str] = (), **types: Any
+) -> type[KindResult]:
     """Return the schema of the JSON of a class of results, by the types and words of its fields.
 
     Parameters
     ----------
     kind : the class; how well responses are known, and how a result ended, is said in all alike.
     name : of the schema.
+    only : the keys that are given, all if left out.
     types : of keys whose JSON has another one than the attribute, or none that is known here; with a default
         as a pair where results may be without. Of further keys their fields, as of `pydantic.create_model`.
     """
@@ -97,9 +103,9 @@ def result_model(kind: type[Told], name: str, **types: Any) -> type[KindResult]:
     from solver.results.base import MadeOfResponses
     from solver.results.told import json_keys
 
-    keys = json_keys(kind)
+    keys = {key: path for key, path in json_keys(kind).items() if not only or key in only}
     parts: dict[type[KindResult], bool] = {
-        KnownResult: issubclass(kind, MadeOfResponses),
+        KnownResult: issubclass(kind, MadeOfResponses) and not only,
         EndedResult: "completed" in keys, ReachedResult: "reached" in keys,
     }  # fmt: skip
     bases = tuple(part for part, has in parts.items() if has)
@@ -113,6 +119,20 @@ def result_model(kind: type[Told], name: str, **types: Any) -> type[KindResult]:
             own[key] = given, field
     about = (kind.__doc__ or "").partition("\n")[0]
     return create_model(name, __base__=bases or (KindResult,), __doc__=about, **own, **types)
+
+
+def answered(place: str, name: str, **types: Any) -> Callable[[], type[KindResult]]:
+    """Return what makes the schema of a class, ``"module:Class"``, when it is asked for.
+
+    The help of a command needs no schema of results, nor what computes them. Arguments as of `result_model`.
+    """
+
+    @cache
+    def made() -> type[KindResult]:
+        kind: Any = on_demand(place)
+        return result_model(kind, name, **types)
+
+    return made
 
 
 def _described(kind: Any, path: str) -> tuple[Any, str | None]:

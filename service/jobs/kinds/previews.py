@@ -11,6 +11,9 @@ from typing import Annotated, Any
 from pydantic import ConfigDict, Field
 
 import solver
+from optim.studies.sensitivity_result import ParameterSensitivity, SensitivityResult
+from service.jobs.common.periods import Period, period_of
+from service.jobs.common.results import KindResult, PeakAt, result_model
 from service.jobs.common.scenes import (
     FrequencyHz,
     HarmonicRequest,
@@ -30,6 +33,9 @@ from service.jobs.common.sizes import (
 )
 from service.jobs.outputs import JobOutput, Progress, ShouldStop, Silent
 from service.jobs.registry import JobKind, Registry, Resolved, SceneSource
+from service.jobs.studies.solve import solve_result
+from solver.continuation.branch import AnyBranch
+from solver.continuation.certificate import PeakCertificate
 from solver.errors import Issue
 from solver.scene.descriptions import DAMPER_LOAD
 from solver.scene.scene import Scene
@@ -46,6 +52,51 @@ FEW_MOTIONS = 8
 SAMPLES = 400
 LEAST_HZ = 1e-9
 _EXAMPLE: dict[str, Any] = {"scene": "two-dof", "set": {DAMPER_LOAD: 80}, "client": "a1b2"}
+
+
+_OF_A_LIMIT = ("parameter", "amplitude", "peak", "peaks", "peak_certificate", "completed")
+_OF_A_SWEEP = (
+    *_OF_A_LIMIT, "band_hz", "band_limit", "band_intervals_hz", "points", "band_known", "error_estimate",
+    "mean_undetermined", "unstable", "flags", "seconds", "status",
+)  # fmt: skip
+_OF_SENSITIVITIES = (
+    "peaks", "band_hz", "limit", "left_out", "peak_certificate", "seconds", "reached", "status",
+)  # fmt: skip
+_CERTIFICATE: dict[str, Any] = {"peak_certificate": result_model(PeakCertificate, "PeakCertificate")}
+_PEAKS: dict[str, Any] = {"peak": PeakAt | None, "peaks": list[PeakAt], **_CERTIFICATE}
+_KEPT: Any = (int, Field(description="Kept; fewer than asked for where a whole disk takes too long."))
+SweepPreview = result_model(
+    AnyBranch, "SweepPreview", only=_OF_A_SWEEP, **_PEAKS, points=int,  # type: ignore[type-abstract]
+    unstable=(list[list[int]], Field(description="First and last point of what is not stable.")),
+    n_harmonics=_KEPT,
+    states=(dict[str, str], Field(description="What every contact does at the highest peak.")),
+)  # fmt: skip
+LinearResponse: Any = result_model(
+    AnyBranch, "LinearResponse", only=_OF_A_LIMIT, **_PEAKS,  # type: ignore[type-abstract]
+)  # fmt: skip
+ParameterEffect = result_model(
+    ParameterSensitivity, "ParameterEffect", only=("path", "unit", "value"),
+    peaks_percent=(list[float | None], Field(description="Of every competing peak, in their order [%].")),
+    band_percent=(float | None, Field(description="Of the width of the resonance band [%].")),
+)  # fmt: skip
+SensitivitiesPreview = result_model(
+    SensitivityResult, "SensitivitiesPreview", only=_OF_SENSITIVITIES, peaks=list[PeakAt], n_harmonics=_KEPT,
+    **_CERTIFICATE,
+    rows=(list[ParameterEffect], ...),  # type: ignore[valid-type]
+)  # fmt: skip
+
+
+class LimitsPreview(KindResult):
+    """The linear responses between which friction works."""
+
+    free: LinearResponse
+    stuck: LinearResponse
+
+
+class PointPreview(solve_result()):  # type: ignore[misc]
+    """A periodic response at one frequency; `period` is left out if there is no solution."""
+
+    period: Period | None = None
 
 
 class PreviewRequest(HarmonicRequest):
@@ -152,12 +203,7 @@ def run_sweep(spec: Mapping[str, Any], _progress: Progress, should_stop: ShouldS
     scene = stored_scene(spec)
     branch = _response(scene, spec["harmonics"], spec["limit"], should_stop)
     found = branch.to_json()
-    kept = (
-        "parameter", "amplitude", "peak", "peaks", "band_hz", "band_limit", "band_intervals_hz", "points",
-        "peak_certificate", "band_known", "error_estimate", "mean_undetermined", "unstable", "flags",
-        "seconds", "completed", "status",
-    )  # fmt: skip
-    result = {key: found[key] for key in kept}
+    result = {key: found[key] for key in _OF_A_SWEEP}
     result |= {"n_harmonics": spec["harmonics"], "states": {}}
     if len(branch.values):
         at = int(branch.amplitude.argmax())
@@ -172,11 +218,9 @@ def run_sensitivities(spec: Mapping[str, Any], _progress: Progress, _should_stop
     import optim
 
     found = optim.sensitivities(stored_scene(spec), limit=spec["limit"], harmonics=spec["harmonics"])
-    kept = ("peaks", "band_hz", "limit", "left_out", "peak_certificate", "seconds", "reached", "status")
     told = found.to_json()
-    of_a_row = ("path", "unit", "value", "peaks_percent", "band_percent")
-    result = {key: told[key] for key in kept} | {
-        "rows": [{key: row[key] for key in of_a_row} for row in told["rows"]],
+    result = {key: told[key] for key in _OF_SENSITIVITIES} | {
+        "rows": [{key: row[key] for key in ParameterEffect.model_fields} for row in told["rows"]],
         "n_harmonics": spec["harmonics"],
     }
     return JobOutput(result=result, shortfall=None if found.reached else found.status.value)
@@ -188,17 +232,14 @@ def run_limits(spec: Mapping[str, Any], _progress: Progress, should_stop: Should
     result: dict[str, Any] = {}
     one = spec["contact"]
     freed = [contact.name for contact in scene.contacts] if one is None else [one]
-    kept = ("parameter", "amplitude", "peak", "peaks", "peak_certificate", "completed")
     for name, removed in (("free", freed), ("stuck", [])):
         found = _response(linear_limit(scene, removed), 1, None, should_stop).to_json()
-        result[name] = {key: found[key] for key in kept}
+        result[name] = {key: found[key] for key in _OF_A_LIMIT}
     return JobOutput(result=result)
 
 
 def run_point(spec: Mapping[str, Any], _progress: Progress, _should_stop: ShouldStop) -> JobOutput:
     """Solve the balance, and look at one period of it."""
-    from service.jobs.studies.march import period_of
-
     solution = solver.solve(
         stored_scene(spec), frequency_hz=spec["frequency_hz"], harmonics=spec["harmonics"]
     )
@@ -239,18 +280,22 @@ PREVIEWS = Registry(
         JobKind(
             name="sweep", summary="The frequency response over the scene's band.",
             request=SweepPreviewRequest, resolve=resolve_sweep, run=run_sweep,
+            result=SweepPreview,
         ),
         JobKind(
             name="sensitivities", summary="Per cent of peaks and band for one per cent of each parameter.",
             request=SensitivitiesPreviewRequest, resolve=resolve_sweep, run=run_sensitivities,
+            result=SensitivitiesPreview,
         ),
         JobKind(
             name="limits", summary="The linear responses with a contact removed and stuck.",
             request=LimitsPreviewRequest, resolve=resolve_limits, run=run_limits,
+            result=LimitsPreview,
         ),
         JobKind(
             name="point", summary="One period at a frequency, with loops and states of the contacts.",
             request=PointPreviewRequest, resolve=resolve_point, run=run_point,
+            result=PointPreview,
         ),
     ],
     warm_up,

@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import ConfigDict, Field
 
-from service.jobs.common.results import result_model
+from service.jobs.common.results import answered
 from service.jobs.common.scenes import FrequencyHz, Harmonics, check
 from service.jobs.figures import SweepRecord
 from service.jobs.registry import Flag
 from service.jobs.study import Study
 from solver.errors import Issue
-from solver.studies.study_results import AccuracyStudy
 
 if TYPE_CHECKING:
     from solver.scene.scene import Scene
+    from solver.studies.study_results import AccuracyStudy
 
 _EXAMPLE: dict[str, Any] = {"scene": "two-dof", "frequency_hz": 1.2, "harmonics": [1, 3, 7], "samples": [64]}
 _MOST_WAYS = 30
@@ -34,7 +34,7 @@ class Accuracy(Study):
 
     model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE]})
     NAME, FUNCTION = "accuracy", "solver:accuracy_study"
-    RESULT = result_model(AccuracyStudy, "AccuracyResult")
+    RESULT = answered("solver.studies.study_results:AccuracyStudy", "AccuracyResult")
     SHOWS, SWEEPS, COUNTED = (
         "error against time ([accuracy](accuracy.md))",
         "the one that found the peak",

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from pydantic import ConfigDict, Field
 
 from optim.criteria.key import Pair, PositiveNumber, Ranges
-from optim.studies.crossings import CampbellDiagram
-from service.jobs.common.results import result_model
+from service.jobs.common.results import answered
 from service.jobs.common.scenes import HarmonicRequest
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
 from service.jobs.figures import SweepRecord
@@ -21,6 +20,7 @@ from solver.errors import Issue
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from optim.studies.crossings import CampbellDiagram
     from solver.scene.scene import Scene
     from solver.views.plots.curves import Response
 
@@ -43,7 +43,7 @@ class Campbell(Study, HarmonicRequest):
 
     model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE]})
     NAME, FUNCTION = "campbell", "optim:campbell_diagram"
-    RESULT = result_model(CampbellDiagram, "CampbellResult")
+    RESULT = answered("optim.studies.crossings:CampbellDiagram", "CampbellResult")
     SHOWS = "crossings and speeds above the limit ([Campbell diagrams](campbell.md))"
     EMPTY = ("orders", "it stored no sweep to draw")
     SWEEPS = "one an order; one for all without sectors"

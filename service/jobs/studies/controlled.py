@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 from pydantic import ConfigDict, Field
 
 from optim.criteria.key import Name
-from service.jobs.common.results import Table, result_model
+from service.jobs.common.results import Table, answered
 from service.jobs.common.scenes import HarmonicRequest, PositiveNumber
 from service.jobs.common.sizes import balance_issues
 from service.jobs.common.study_keys import band_issues
 from service.jobs.registry import Flag
 from service.jobs.study import Answer, Study, Watch
 from solver.errors import Issue
-from solver.modes.driven.results import HeldAmplitude
 
 if TYPE_CHECKING:
     from solver.scene.scene import Scene
@@ -31,7 +30,12 @@ class Controlled(Study, HarmonicRequest):
 
     model_config = ConfigDict(json_schema_extra={"examples": [{"scene": "two-dof", "amplitude": 1.0}]})
     NAME, FUNCTION = "controlled", "solver:held_amplitude"
-    RESULT = result_model(HeldAmplitude, "ControlledResult", changes=list[Table], least=Table | None)
+    RESULT = answered(
+        "solver.modes.driven.results:HeldAmplitude",
+        "ControlledResult",
+        changes=list[Table],
+        least=Table | None,
+    )
     SHOWS = "force and phase over the frequency ([a held amplitude](modes.md#a-held-amplitude))"
     EMPTY = ("frequency", "no response with this amplitude was found")
     FIGURE = "solver.views.plots.modes:held_figure"

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
-from pydantic import ConfigDict, Field, RootModel
+from pydantic import BaseModel, ConfigDict, Field, RootModel
 
 import optim
 from optim.problem.keys import ROBUST, NominalAndRobustKeys, of_design
 from service.jobs.common.problem import ProblemRequest, arguments
-from service.jobs.common.results import PeakAt, Table, result_model
+from service.jobs.common.results import PeakAt, Table, answered
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
 from service.jobs.figures import SweepRecord
 from service.jobs.outputs import JobOutput
@@ -44,23 +45,29 @@ _EXAMPLE: dict[str, Any] = {
 
 _Rows = list[Table]
 _HARMONICS = "Highest harmonic kept; more than asked for where the peak needs them."
-OptimumResult = result_model(
-    optim.DesignResult, "OptimumResult", peak=PeakAt | None, peaks=_Rows, bands=_Rows, rows=_Rows,
-    errors=_Rows, looked_at=_Rows, tried=_Rows, broken=_Rows, plateau=Table, conditions=Table | None,
-    objective=float | None, limit=float | None, stable=str, stable_ground=str, newton_iterations=int,
-    multipliers=list[float | None], n_harmonics=(int, Field(description=_HARMONICS)),
-)  # fmt: skip
-RobustResult = result_model(
-    optim.RobustResult, "RobustResult", scene=str, quantile=float | None, nominal=Table | None,
-    robust=Table | None, optimality=float | None, violation=float | None, inner_look=bool | None,
-    nominal_status=str, warnings=list[str],
-)  # fmt: skip
 
 
-class DesignResult(RootModel[OptimumResult | RobustResult]):  # type: ignore[valid-type]
-    """A design; with `uncertain` a robust one."""
+@cache
+def design_result() -> type[BaseModel]:
+    """Return the schema of a design, or of a robust one."""
+    optimum: Any = answered(
+        "optim:DesignResult", "OptimumResult", peak=PeakAt | None, peaks=_Rows, bands=_Rows, rows=_Rows,
+        errors=_Rows, looked_at=_Rows, tried=_Rows, broken=_Rows, plateau=Table, conditions=Table | None,
+        objective=float | None, limit=float | None, stable=str, stable_ground=str, newton_iterations=int,
+        multipliers=list[float | None], n_harmonics=(int, Field(description=_HARMONICS)),
+    )()  # fmt: skip
+    robust: Any = answered(
+        "optim:RobustResult", "RobustResult", scene=str, quantile=float | None, nominal=Table | None,
+        robust=Table | None, optimality=float | None, violation=float | None, inner_look=bool | None,
+        nominal_status=str, warnings=list[str],
+    )()  # fmt: skip
 
-    model_config = ConfigDict(defer_build=True)
+    class DesignResult(RootModel[optimum | robust]):
+        """A design; with `uncertain` a robust one."""
+
+        model_config = ConfigDict(defer_build=True)
+
+    return DesignResult
 
 
 class _Design(NominalAndRobustKeys, ProblemRequest):
@@ -71,7 +78,7 @@ class _Design(NominalAndRobustKeys, ProblemRequest):
     """
 
     model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE]})
-    NAME, FUNCTION, RESULT = "design", "optim:design", DesignResult
+    NAME, FUNCTION, RESULT = "design", "optim:design", design_result
     KEYS = "those of [a design problem](design.md)"
     SHOWS, SWEEPS = "the optimum and what holds it", "every response computed"
 
@@ -98,7 +105,6 @@ class _Design(NominalAndRobustKeys, ProblemRequest):
     @classmethod
     def compute(cls, scene: Scene, asked: Mapping[str, Any], watch: Watch) -> Answer:
         """Search, over the uncertainty if there is one."""
-        import optim
 
         best = getattr(watch.on_progress, "best", None)
         on_best = None if best is None else lambda found: best(found.to_json())

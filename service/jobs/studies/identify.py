@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cache
 from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import BeforeValidator, ConfigDict, Field
 
 from optim.criteria.key import Pair
-from optim.errors import DesignError
-from optim.identification.result import Estimate, Identification
 from optim.problem.keys import MAX_VARIABLES, VariableName
 from optim.problem.words import ScalingWord
-from service.jobs.common.results import Table, result_model
+from service.jobs.common.results import KindResult, Table, answered
 from service.jobs.common.scenes import HarmonicRequest, Number, ParameterPath
 from service.jobs.common.sizes import balance_issues
 from service.jobs.registry import Flag
@@ -53,11 +52,14 @@ def _small(value: object) -> object:
     return value
 
 
-EstimateResult = result_model(Estimate, "EstimateResult")
-IdentifyResult = result_model(
-    Identification, "IdentifyResult", correlated=list[Table], covariance=list[list[float]],
-    correlation=list[list[float]], estimates=list[EstimateResult],  # type: ignore[valid-type]
-)  # fmt: skip
+@cache
+def identify_result() -> type[KindResult]:
+    """Return the schema of an identification."""
+    estimate: Any = answered("optim.identification.result:Estimate", "EstimateResult")()
+    return answered(
+        "optim.identification.result:Identification", "IdentifyResult", correlated=list[Table],
+        covariance=list[list[float]], correlation=list[list[float]], estimates=list[estimate],
+    )()  # fmt: skip
 
 
 class Identify(Study, HarmonicRequest):
@@ -68,7 +70,7 @@ class Identify(Study, HarmonicRequest):
     """
 
     model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE]})
-    NAME, FUNCTION, RESULT = "identify", "optim:identify", IdentifyResult
+    NAME, FUNCTION, RESULT = "identify", "optim:identify", identify_result
     SHOWS = "estimates, intervals, what the data do not tell ([identification](identification.md))"
     EMPTY, COUNTED = ("runs", "there is no fit to draw"), "places"
     FIGURE = "optim.views.plots.designs:identification_figure"
@@ -130,7 +132,7 @@ class Identify(Study, HarmonicRequest):
             read_candidates(scene, runs, known, self.candidates)
         except SceneError as error:
             return [issue.at("data") for issue in error.issues]
-        except (DesignError, SettingError) as error:
+        except SettingError as error:
             return [error.issue.at(*(error.place or ("data",)))]
         return []
 

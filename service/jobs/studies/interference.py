@@ -7,13 +7,12 @@ from typing import TYPE_CHECKING, Annotated
 
 from pydantic import ConfigDict, Field
 
-from service.jobs.common.results import result_model
+from service.jobs.common.results import answered
 from service.jobs.common.scenes import PositiveNumber, check
 from service.jobs.common.sizes import memory_issues
 from service.jobs.registry import Flag, Json
 from service.jobs.study import Study
 from solver.errors import Issue
-from solver.studies.study_results import InterferenceDiagram
 
 if TYPE_CHECKING:
     from solver.scene.scene import Scene
@@ -33,7 +32,7 @@ class Interference(Study):
 
     model_config = ConfigDict(json_schema_extra={"examples": [{"scene": "bladed-disk", "speed_rpm": 11000}]})
     NAME, FUNCTION = "interference", "solver:interference_diagram"
-    RESULT = result_model(InterferenceDiagram, "InterferenceResult")
+    RESULT = answered("solver.studies.study_results:InterferenceDiagram", "InterferenceResult")
     SHOWS = "frequencies at each nodal diameter, orders that meet them ([interference](disks.md))"
     FIGURE = "solver.views.plots.disks:interference_figure"
     COUNTED = "nodal diameters"

@@ -4,22 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import cache
 from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import ConfigDict, Field
 
-from service.jobs.common.results import Curve, result_model
+from service.jobs.common.results import Curve, KindResult, answered
 from service.jobs.common.scenes import CHECKED_BY, SCENE, stored_scene
 from service.jobs.common.sizes import MOST_POINTS, balance_issues
 from service.jobs.common.study_keys import RangeRequest, law_issues, range_issues
 from service.jobs.outputs import JobOutput, OnProgress, ShouldStop
 from service.jobs.parts import Division, JobPart, PartOutput, PartStoppedError
 from service.jobs.registry import Flag, JobKind, Json
-from service.jobs.studies.peaks import PeaksResult
+from service.jobs.studies.peaks import peaks_result
 from service.jobs.study import Study
 from solver.errors import Issue
 from solver.scene.descriptions import DISK_LOAD
-from solver.studies.study_results import ResponseMap
 
 if TYPE_CHECKING:
     from solver.scene.scene import Scene
@@ -31,17 +31,20 @@ _EXAMPLE: dict[str, Any] = {
 _Count = Annotated[int, Field(strict=True, ge=2, le=MOST_POINTS // 2)]
 
 
-MapResult = result_model(
-    ResponseMap, "MapResult", amplitude=list[Curve], half_peak_to_peak=list[Curve], ridge=PeaksResult | None,
-    largest_residual=float | None,
-)  # fmt: skip
+@cache
+def map_result() -> type[KindResult]:
+    """Return the schema of a map."""
+    return answered(
+        "solver.studies.study_results:ResponseMap", "MapResult", amplitude=list[Curve],
+        half_peak_to_peak=list[Curve], ridge=peaks_result() | None, largest_residual=float | None,
+    )()  # fmt: skip
 
 
 class Map(Study, RangeRequest):
     """Map the response over frequency and a parameter, with the ridge of its peaks."""
 
     model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE]})
-    NAME, FUNCTION, RESULT = "map", "solver:response_map", MapResult
+    NAME, FUNCTION, RESULT = "map", "solver:response_map", map_result
     SHOWS, SWEEPS = "the amplitude on the grid, the ridge of its peaks", "those that look for peaks"
     FIGURE = "service.jobs.drawing:map_of"
 

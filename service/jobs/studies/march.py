@@ -1,108 +1,22 @@
-"""The study `march`: time marching, the independent referee; and one period of a response in numbers."""
+"""The study `march`: time marching, the independent referee."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import ConfigDict, Field
 
-from service.jobs.common.results import Table, result_model
+from service.jobs.common.results import Table, answered
 from service.jobs.common.scenes import FrequencyHz
 from service.jobs.common.sizes import march_issues
 from service.jobs.registry import Flag
 from service.jobs.study import Answer, Study, Watch
-from solver.contacts.laws.parts import ContactMotion
 from solver.errors import Issue
-from solver.marching.result import MarchResult
-from solver.scene.scene import AnyContact
 
 if TYPE_CHECKING:
-    from solver.marching.result import MarchResult
-    from solver.response.contact_response import ContactResponse
-    from solver.response.solution import Solution
     from solver.scene.scene import Scene
-
-
-FloatArray = NDArray[np.float64]
-
-
-def period_of(solution: Solution, samples: int) -> dict[str, Any]:
-    """One period of a converged balance.
-
-    Parameters
-    ----------
-    samples : of the period; the first is repeated at its end.
-
-    Returns
-    -------
-    ``time`` [s], ``displacement`` of the observed DOF [m], and for each contact its name, state, ``slip``
-    [m], ``force`` [N], ``load`` [N], ``motion`` (0 stick, 1 slip, 2 separation; null where the law has no
-    such) and ``shares`` of the period.
-    """
-    from solver.jit import fourier
-
-    tau = np.linspace(0.0, 2.0 * math.pi, samples + 1)
-    displacement = fourier.basis(tau, solution.highest_harmonic) @ solution.observed
-    omega = 2.0 * math.pi * solution.frequency_hz
-    given = [contact.at_frequency(omega) for contact in solution.scene.contacts]
-    pairs = zip(given, solution.contacts, strict=True)
-    return {
-        "time": (tau / (2.0 * math.pi * solution.frequency_hz)).tolist(),
-        "displacement": displacement.tolist(),
-        "contacts": [_contact(given, found, tau) for given, found in pairs],
-    }
-
-
-def history_of(march: MarchResult, samples: int) -> dict[str, Any]:
-    """The last period of a march, thinned out to about `samples`; of an annulus its first sector."""
-    step = max(1, len(march.time) // samples)
-    first = [i for i, name in enumerate(march.contacts) if name.partition("@")[2] in ("", "0")]
-    return {
-        "time": [*march.time[::step].tolist(), 1.0 / march.frequency_hz],
-        "displacement": _closed(march.displacement[::step]),
-        "contacts": [
-            {
-                "name": march.contacts[i].partition("@")[0],
-                "slip": _closed(march.slip[i, ::step]),
-                "force": _closed(march.contact_force[i, ::step]),
-                "load": _closed(march.normal_load[i, ::step]),
-            }
-            for i in first
-        ],
-    }
-
-
-def _contact(given: AnyContact, found: ContactResponse, tau: FloatArray) -> dict[str, Any]:
-    from solver.jit import fourier
-
-    slip = fourier.basis(tau, (found.slip.size - 1) // 2) @ found.slip
-    load = fourier.basis(tau, (found.load.size - 1) // 2) @ found.load
-    motions = np.array(found.motions)
-    force = found.force_over(given, tau[:-1])
-    motion = None if given.is_rigid else given.motion_at(motions, found.load, force, tau[:-1])
-    shares = None
-    if motion is not None:
-        shares = {each.name.lower(): motion.count(each) / len(motion) for each in ContactMotion}
-    return {
-        "name": found.name,
-        "state": found.state.value,
-        "slip": slip.tolist(),
-        "force": _closed(force),
-        "load": np.maximum(load, 0.0).tolist(),
-        "motion": None if motion is None else [each.value for each in motion],
-        "shares": shares,
-    }
-
-
-def _closed(samples: FloatArray) -> list[float]:
-    """Samples of a period with the first repeated at its end."""
-    closed: list[float] = np.append(samples, samples[:1]).tolist()
-    return closed
 
 
 SAMPLES = 512
@@ -117,9 +31,10 @@ class March(Study):
 
     model_config = ConfigDict(json_schema_extra={"examples": [{"scene": "two-dof", "frequency_hz": 1.2}]})
     NAME, FUNCTION = "march", "solver:march"
-    RESULT = result_model(
-        MarchResult, "MarchResult", harmonics=list[float | None] | None, history=(Table | None, None)
-    )
+    RESULT = answered(
+        "solver.marching.result:MarchResult", "MarchResult", harmonics=list[float | None] | None,
+        history=(Table | None, None),
+    )  # fmt: skip
     SHOWS, COUNTED = "amplitude and periods marched", "periods"
     EMPTY = ("harmonics", "no response was found")
     FIGURE = "service.jobs.drawing:harmonics_of"
@@ -153,7 +68,7 @@ class March(Study):
         found = solver.march(scene, **given, **watch._asdict())
         result = found.to_json()
         if asked.get("history"):
-            from service.jobs.studies.march import history_of
+            from service.jobs.common.periods import history_of
 
             result["history"] = history_of(found, SAMPLES)
         shown = found if found.converged else None

@@ -8,12 +8,10 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
 from pydantic import BeforeValidator, ConfigDict, Field, WithJsonSchema
 
 from optim.criteria.key import Name
-from service.jobs.arrays import decode, encode
-from service.jobs.common.results import Table, result_model
+from service.jobs.common.results import Table, answered
 from service.jobs.common.scenes import FrequencyHz, HarmonicRequest, stored_scene
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
 from service.jobs.common.study_keys import band_issues
@@ -23,7 +21,6 @@ from service.jobs.registry import Flag, JobKind
 from service.jobs.study import Study
 from solver.errors import Issue, SceneError, SettingError
 from solver.results.known import Known
-from solver.studies.mistuning_result import MistuningStudy
 
 if TYPE_CHECKING:
     from solver import BladePeaks
@@ -65,8 +62,9 @@ PartNames = Annotated[
 ]
 
 
-MistuningResult = result_model(
-    MistuningStudy, "MistuningResult", dof=str, samples=list[Table], quantiles=list[Table],
+mistuning_result = answered(
+    "solver.studies.mistuning_result:MistuningStudy", "MistuningResult", dof=str, samples=list[Table],
+    quantiles=list[Table],
     worst=Table | None,
 )  # fmt: skip
 
@@ -78,7 +76,7 @@ class Mistuning(Study, HarmonicRequest):
     """
 
     model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE]})
-    NAME, FUNCTION, RESULT = "mistuning", "solver:mistuning_study", MistuningResult
+    NAME, FUNCTION, RESULT = "mistuning", "solver:mistuning_study", mistuning_result
     SHOWS = "the magnification over many disks and the worst of them ([disks](disks.md))"
     SWEEPS, COUNTED = "the tuned disk's, and that of the worst blade", "disks"
     EMPTY = ("worst", "the peaks of no disk are known")
@@ -161,7 +159,10 @@ def run_part(
     spec: Mapping[str, Any], part: Mapping[str, Any], progress: OnProgress, should_stop: ShouldStop
 ) -> PartOutput:
     """Find the peaks of all blades of the tuned disk, or of some others."""
+    import numpy as np
+
     import solver
+    from service.jobs.arrays import encode
     from service.jobs.common.records import packed, sweep_records
     from solver.studies.mistuning import without_mistuning, worst_branch
 
@@ -235,6 +236,7 @@ def join(spec: Mapping[str, Any], outputs: Mapping[int, PartOutput]) -> JobOutpu
 def _peaks(part: PartOutput) -> list[BladePeaks]:
     """The peaks that a part found, a disk each."""
     import solver
+    from service.jobs.arrays import decode
 
     value, at_hz = (decode(part.arrays[key]) for key in _OF_THE_PEAKS)
     return [

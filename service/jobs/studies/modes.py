@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cache
 from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
-from pydantic import ConfigDict, Field, RootModel
+from pydantic import BaseModel, ConfigDict, Field, RootModel
 
 import solver
-from service.jobs.common.results import Table, result_model
+from service.jobs.common.results import Table, answered
 from service.jobs.common.scenes import HarmonicRequest, Number, PositiveNumber, check
 from service.jobs.common.sizes import MOST_MOTIONS, POINTS_OF_A_SWEEP, balance_issues
 from service.jobs.registry import Flag, Json, ReadSweep, StoredSweep
 from service.jobs.study import Answer, Study, Watch
 from solver.errors import Issue, Naming
-from solver.modes.driven.results import PhaseResonance
-from solver.modes.results import NonlinearMode
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -42,6 +40,9 @@ def motions_of(found: solver.NonlinearMode) -> dict[str, Any]:
     imaginary parts of harmonic 1 of the degrees of freedom `dofs` over the amplitude [1/√kg]. Of more
     contacts or degrees of freedom than fit, the first are given.
     """
+    # Loaded here: the help of the command needs no numbers.
+    import numpy as np
+
     count = found.amplitude.size
     points = [int(i) for i in np.unique(np.linspace(0, max(count - 1, 0), min(count, MOST_MOTIONS)).round())]
     points = points if count else []
@@ -67,6 +68,8 @@ def excitations(curve: solver.PerformanceCurve, band: Sequence[float], count: in
 
     At most a hundred times more or less than the scene's own, as far as the curve has that.
     """
+    import numpy as np
+
     inside = (curve.excitation > 0.0) & (curve.frequency_hz > band[0]) & (curve.frequency_hz < band[1])
     near = inside & (curve.excitation >= 1.0 / FAR) & (curve.excitation <= FAR)
     inside = near if near.any() else inside
@@ -110,15 +113,19 @@ _Diameter = Annotated[int, Field(strict=True, ge=-10_000, le=10_000)]
 _Ratio = Annotated[Number, Field(ge=-10.0, le=10.0)]
 
 
-NonlinearModeResult = result_model(
-    NonlinearMode, "NonlinearModeResult",
-    **dict.fromkeys(("performance", "limit_cycles", "motions"), (Table | None, None)),
-)  # fmt: skip
-PhaseResonanceResult = result_model(PhaseResonance, "PhaseResonanceResult")
+_FURTHER: dict[str, Any] = dict.fromkeys(("performance", "limit_cycles", "motions"), (Table | None, None))
 
 
-class ModesResult(RootModel[NonlinearModeResult | PhaseResonanceResult]):  # type: ignore[valid-type]
-    """A nonlinear mode; with `phase_resonance` the forced responses."""
+@cache
+def modes_result() -> type[BaseModel]:
+    """Return the schema of a nonlinear mode, or of the forced responses with `phase_resonance`."""
+    one: Any = answered("solver.modes.results:NonlinearMode", "NonlinearModeResult", **_FURTHER)()
+    other: Any = answered("solver.modes.driven.results:PhaseResonance", "PhaseResonanceResult")()
+
+    class ModesResult(RootModel[one | other]):
+        """A nonlinear mode; with `phase_resonance` the forced responses."""
+
+    return ModesResult
 
 
 class Modes(Study, HarmonicRequest):
@@ -130,7 +137,7 @@ class Modes(Study, HarmonicRequest):
     model_config = ConfigDict(
         json_schema_extra={"examples": [{"scene": "two-dof", "mode": 1, "from": 0.01, "to": 100}]}
     )
-    NAME, FUNCTION, RESULT = "modes", "solver:nonlinear_mode", ModesResult
+    NAME, FUNCTION, RESULT = "modes", "solver:nonlinear_mode", modes_result
     SHOWS = "frequency and damping ratio over the amplitude ([modes](modes.md))"
     EMPTY = ("amplitude", "no point of the mode was found")
 
@@ -214,16 +221,12 @@ class Modes(Study, HarmonicRequest):
             curve = solver.performance_curve(found)
             answer = answer.beside(curve, performance=curve.to_json())
             if of_peaks:
-                from service.jobs.studies.modes import exact_peaks
-
                 rest = watch.part(_OF_THE_CURVE, 1.0, len(found.amplitude))
                 answer.json["performance"]["exact"] = exact_peaks(found, curve, of_peaks, rest)
         if (ratio := asked.get("aero_damping")) is not None:
             cycles = solver.limit_cycles(found, ratio, mode_alone=asked.get("mode_alone", False))
             answer.json["limit_cycles"] = cycles.to_json(asked.get("disturbance"))
         if asked.get("motions"):
-            from service.jobs.studies.modes import motions_of
-
             answer.json["motions"] = motions_of(found)
         return answer
 

@@ -10,7 +10,7 @@ from pydantic import ConfigDict
 import optim
 from optim.problem.keys import PointsOfFront, of_front
 from service.jobs.common.problem import ProblemRequest
-from service.jobs.common.results import result_model
+from service.jobs.common.results import answered
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
 from service.jobs.figures import SweepRecord
 from service.jobs.study import Answer, Watch
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 _EXAMPLE: dict[str, Any] = {"scene": "bladed-disk", "variables": {DISK_LOAD: [20, 3000]}, "limit": 8e-5}
 
 
-ParetoResult = result_model(optim.ParetoResult, "ParetoResult", scene=str, dof=str, limit=float | None)
+pareto_result = answered("optim:ParetoResult", "ParetoResult", scene=str, dof=str, limit=float | None)
 
 
 class _Pareto(PointsOfFront, ProblemRequest):
@@ -35,7 +35,7 @@ class _Pareto(PointsOfFront, ProblemRequest):
     """
 
     model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE]})
-    NAME, FUNCTION, RESULT = "pareto", "optim:pareto_front", ParetoResult
+    NAME, FUNCTION, RESULT = "pareto", "optim:pareto_front", pareto_result
     KEYS = "those of a design problem, `points`"
     SHOWS, SWEEPS = "the front of peak against band ([trade-offs](trade-offs.md))", "those of its points"
     EMPTY, FIGURE = ("points", "its front has no point"), "optim.views.plots.designs:pareto_figure"
@@ -49,7 +49,6 @@ class _Pareto(PointsOfFront, ProblemRequest):
     @classmethod
     def compute(cls, scene: Scene, asked: Mapping[str, Any], watch: Watch) -> Answer:
         """Follow the front."""
-        import optim
 
         found = optim.pareto_front(scene, **asked, **watch._asdict())
         return Answer.of(found)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from pydantic import ConfigDict, Field
 
-from service.jobs.common.results import result_model
+from service.jobs.common.results import answered
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
 from service.jobs.common.study_keys import RangeRequest, law_issues, range_issues
 from service.jobs.figures import SweepRecord
@@ -15,15 +15,15 @@ from service.jobs.registry import Flag, Json, ReadSweep, StoredSweep
 from service.jobs.study import Study
 from solver.errors import Issue
 from solver.scene.descriptions import DISK_LOAD
-from solver.studies.peaks.results import PeakTrack
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from solver.scene.scene import Scene
+    from solver.studies.peaks.results import PeakTrack
 
 
-PeaksResult = result_model(PeakTrack, "PeaksResult")
+peaks_result = answered("solver.studies.peaks.results:PeakTrack", "PeaksResult")
 
 
 class Peaks(Study, RangeRequest):
@@ -37,7 +37,7 @@ class Peaks(Study, RangeRequest):
             "examples": [{"scene": "bladed-disk", "parameter": DISK_LOAD, "from": 20, "to": 3000}]
         }
     )
-    NAME, FUNCTION, RESULT = "peaks", "solver:track_peak", PeaksResult
+    NAME, FUNCTION, RESULT = "peaks", "solver:track_peak", peaks_result
     SHOWS = "the highest peak over the parameter, where it is least ([peaks](peaks.md))"
     EMPTY = ("parameter", "no peak was tracked")
     SWEEPS, COUNTED = "those that look for peaks", "sweeps"

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from pydantic import ConfigDict
 
-from service.jobs.common.results import result_model
+from service.jobs.common.results import KindResult, answered
 from service.jobs.common.scenes import HarmonicRequest
 from service.jobs.common.study_keys import AUTO, EffectsWord, effects_issues, solved_issues, with_effects
 from service.jobs.study import Answer, Study, Watch
 from solver.errors import Issue
 from solver.scene.descriptions import DISK_LOAD
-from solver.studies import study_results
 
 if TYPE_CHECKING:
     from solver.scene.scene import Scene
@@ -21,17 +21,18 @@ if TYPE_CHECKING:
 EXAMPLE: dict[str, Any] = {"scene": "bladed-disk", "set": {DISK_LOAD: 150}}
 
 
-EffectResult = result_model(study_results.Effect, "EffectResult")
-PlanResult = result_model(
-    study_results.Plan, "PlanResult", effects=list[EffectResult],  # type: ignore[valid-type]
-)  # fmt: skip
+@cache
+def plan_result() -> type[KindResult]:
+    """Return the schema of a plan."""
+    effect: Any = answered("solver.studies.study_results:Effect", "EffectResult")()
+    return answered("solver.studies.study_results:Plan", "PlanResult", effects=list[effect])()
 
 
 class Plan(Study, HarmonicRequest):
     """Say which effects a scene calls for, and why."""
 
     model_config = ConfigDict(json_schema_extra={"examples": [EXAMPLE]})
-    NAME, FUNCTION, RESULT = "plan", "solver:plan", PlanResult
+    NAME, FUNCTION, RESULT = "plan", "solver:plan", plan_result
     SHOWS = "the effects in use and left out, sizes and estimated cost"
 
     effects: EffectsWord = AUTO

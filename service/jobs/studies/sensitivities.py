@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import ConfigDict, Field
 
-from optim.studies.sensitivity_result import SensitivityResult
-from service.jobs.common.results import PeakAt, result_model
+from service.jobs.common.results import PeakAt, answered
 from service.jobs.common.scenes import HarmonicRequest, PositiveNumber
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
 from service.jobs.figures import SweepRecord
@@ -17,6 +16,7 @@ from service.jobs.study import Answer, Study, Watch
 from solver.errors import Issue
 
 if TYPE_CHECKING:
+    from optim.studies.sensitivity_result import SensitivityResult
     from solver.scene.scene import Scene
 
 
@@ -28,7 +28,9 @@ class Sensitivities(Study, HarmonicRequest):
 
     model_config = ConfigDict(json_schema_extra={"examples": [{"scene": "two-dof", "harmonics": 5}]})
     NAME, FUNCTION = "sensitivities", "optim:sensitivities"
-    RESULT = result_model(SensitivityResult, "SensitivitiesResult", peaks=list[PeakAt])
+    RESULT = answered(
+        "optim.studies.sensitivity_result:SensitivityResult", "SensitivitiesResult", peaks=list[PeakAt]
+    )
     SHOWS = "the change of peaks and band by one per cent of each parameter ([sensitivities](trade-offs.md))"
     SWEEPS, FIGURE = "the response", "optim.views.plots.designs:sensitivities_figure"
 

@@ -39,7 +39,7 @@ def solve_result() -> type[KindResult]:
     # Loaded here: the help of the command needs no numbers.
     from solver.response.solution import Solution
 
-    further = {
+    further: dict[str, Any] = {
         "solutions": (list[Table], "Of a search for all: each solution with its stability, largest first."),
         "complete": (bool, "Whether these are proven to be all."),
         "missing_by_signs": (int, "How many are missing at least, by the signs of the determinants."),
@@ -47,12 +47,14 @@ def solve_result() -> type[KindResult]:
         "stopped": (bool, "Whether the search was ended before its end."),
         "note": (str, "What is known of the list."),
     }
+    beside: dict[str, Any] = {
+        key: (kind | None, Field(None, description=words)) for key, (kind, words) in further.items()
+    }
     return result_model(
         Solution, "SolveResult", harmonics=list[float] | None, contacts=dict[str, str],
         unique=(str, Field(description="Whether it is the only response: proven or not known.")),
         unique_ground=(str, Field(description="Why.")), mean_range=(Curve | None, None),
-        drift_per_period=(float | None, None),
-        **{key: (kind | None, Field(None, description=words)) for key, (kind, words) in further.items()},
+        drift_per_period=(float | None, None), **beside,
     )  # fmt: skip
 
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import cache, partial
+from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import ConfigDict, Field
 
 from service.jobs.checkpoints import Checkpoints
-from service.jobs.common.results import KindResult, PeakAt, Table, result_model
+from service.jobs.common.results import PeakAt, Table, answered
 from service.jobs.common.scenes import (
     FrequencyHz,
     HarmonicRequest,
@@ -48,22 +48,15 @@ _OVER_A_LOAD: dict[str, Any] = {
 }  # fmt: skip
 
 
-@cache
-def sweep_result() -> type[KindResult]:
-    """Return the schema of a branch: its points, its peaks and its resonance band."""
-    # Loaded here: the help of the command needs no numbers.
-    from solver.continuation.branch import AnyBranch
-
-    leaving = "At each branch point its tangents and the branches that leave there."
-    return result_model(
-        AnyBranch,  # type: ignore[type-abstract]
-        "SweepResult", peak=PeakAt | None, peaks=list[PeakAt], points=int,
-        unstable=(list[list[int]], Field([], description="First and last point of what is not stable.")),
-        marks=(list[Table], Field([], description="Folds, branch points, an early end; behind which point.")),
-        stability_known_by=(str, Field("", description="uniqueness, determinant, multipliers or nothing.")),
-        branches=(list[Table] | None, Field(None, description=leaving)),
-        drift_per_period=(float | None, None),
-    )  # fmt: skip
+_LEAVING = "At each branch point its tangents and the branches that leave there."
+sweep_result = answered(
+    "solver.continuation.branch:AnyBranch", "SweepResult", peak=PeakAt | None, peaks=list[PeakAt], points=int,
+    unstable=(list[list[int]], Field([], description="First and last point of what is not stable.")),
+    marks=(list[Table], Field([], description="Folds, branch points, an early end; behind which point.")),
+    stability_known_by=(str, Field("", description="uniqueness, determinant, multipliers or nothing.")),
+    branches=(list[Table] | None, Field(None, description=_LEAVING)),
+    drift_per_period=(float | None, None),
+)  # fmt: skip
 
 
 class Sweep(Study, HarmonicRequest):

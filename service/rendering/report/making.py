@@ -173,7 +173,6 @@ def _main(connection: Connection, argument: Mapping[str, Any], seconds: float) -
 
 def _answer(given: Mapping[str, Any]) -> dict[str, str]:
     from service.errors import InputError
-    from service.rendering.report.making import report_of
     from service.rendering.report.sections import Designed
     from solver.errors import SolverError
     from solver.scene.scene import Scene

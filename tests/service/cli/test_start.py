@@ -9,6 +9,7 @@ import sys
 import pytest
 
 from service.cli.table import TOP, CommandEntry, CommandGroup, Deferred
+from service.jobs.kinds import studies
 
 SERVICE = {"fastapi", "sqlalchemy", "alembic", "httpx", "uvicorn", "pydantic_settings", "prometheus_client"}
 PICTURES = {"matplotlib", "pandas", "xarray", "pyarrow"}
@@ -39,9 +40,10 @@ def test_the_list_of_kinds_loads_no_service() -> None:
     assert loaded_by("submit", "--help") & (SERVICE | PICTURES | DESIGN | {"rich", "numba", "scipy"}) == set()
 
 
-def test_help_of_a_command_loads_no_numbers() -> None:
+@pytest.mark.parametrize("study", sorted(studies()))
+def test_help_of_a_command_loads_no_numbers(study: str) -> None:
     """Options follow from a model of Pydantic's; nothing that computes is needed for them."""
-    assert loaded_by("solve", "--help") & (SERVICE | PICTURES | DESIGN | NUMBERS) == {"pydantic"}
+    assert loaded_by(study, "--help") & (SERVICE | PICTURES | DESIGN | NUMBERS) == {"pydantic"}
 
 
 @pytest.mark.parametrize("scene", ["two-dof --frequency 1", "bladed-disk --frequency 755"])
