@@ -1,10 +1,9 @@
-from __future__ import annotations
-
 import gc
 import os
 import zlib
 from collections import Counter
 from collections.abc import Collection, Generator, Iterator
+from typing import Any
 
 import pytest
 from launch import served
@@ -13,6 +12,25 @@ from launch import served
 # last bits, and two processes of pytest have no more than two cores between them.
 for _library in ("OMP", "OPENBLAS", "MKL"):
     os.environ[f"{_library}_NUM_THREADS"] = "1"
+
+
+WHOLE = ("tests/page/", "tests/extensions/", "tests/service/attacks/")
+"""Folders whose tests share a service of their own: one process of pytest runs all of such a folder."""
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
+    """With `--dist loadscope`: files stay together, so that what they share is made once, and these folders."""
+    if config.getoption("dist") != "loadscope":
+        return None
+    from xdist.scheduler import LoadScopeScheduling
+
+    class Together(LoadScopeScheduling):
+        def _split_scope(self, nodeid: str) -> str:
+            file = nodeid.partition("::")[0]
+            return next((folder for folder in WHOLE if file.startswith(folder)), file)
+
+    return Together(config, log)
 
 
 @pytest.hookimpl(wrapper=True)

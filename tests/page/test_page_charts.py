@@ -138,6 +138,7 @@ def test_an_axis_is_logarithmic_on_request(profile: Profile, site: Site, swept: 
     assert min(y for _, y in after) - after[0][1] == pytest.approx(rise, abs=2.0)
 
 
+@pytest.mark.long
 def test_what_the_cursor_reads_follows_the_sliders(profile: Profile, site: Site) -> None:
     page = visit(profile[0], site, "?scene=two-dof&tab=response")
     expect(page.locator("#live-status")).to_contain_text("peak 2.35 m")

@@ -111,6 +111,7 @@ def test_a_chip_says_what_differs_from_the_scene_and_puts_it_back(profile: Profi
     expect(page.locator(".slider.changed")).to_have_count(0)
 
 
+@pytest.mark.long
 def test_what_is_done_with_a_scene_is_in_its_menu(profile: Profile, site: Site) -> None:
     page = visit(profile[0], site, "?scene=two-dof")
     expect(page.locator("#new-scene")).to_be_hidden()

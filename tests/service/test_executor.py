@@ -1,7 +1,5 @@
 """Worker processes and the attempts that wait in their pipes."""
 
-from __future__ import annotations
-
 import os
 import signal
 import sys

@@ -1,7 +1,5 @@
 """Every stored result is listed by any of its figures, as a plain filter over all of them would."""
 
-from __future__ import annotations
-
 import random
 from dataclasses import fields, replace
 from typing import Any

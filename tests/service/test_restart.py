@@ -1,7 +1,5 @@
 """Nothing that was accepted is lost, however the service ends."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import signal

@@ -1,7 +1,5 @@
 """A sweep over rigid contacts as a job and as a command."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path

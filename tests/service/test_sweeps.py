@@ -1,7 +1,5 @@
 """Stored sweeps are there to be queried."""
 
-from __future__ import annotations
-
 import random
 import time
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """JSON that is made to be costly is read in linear time and little memory, or refused."""
 
-from __future__ import annotations
-
 import pytest
 from attack_site import Attack, Site
 

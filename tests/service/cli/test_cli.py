@@ -1,7 +1,5 @@
 """The command: what it prints, its exit statuses, bad input, and what it does not load."""
 
-from __future__ import annotations
-
 import json
 import os
 import pty
