@@ -20,7 +20,7 @@ WHOLE = ("tests/page/", "tests/extensions/", "tests/service/attacks/")
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
-    """With `--dist loadscope`: files stay together, so that what they share is made once, and these folders."""
+    """With `--dist loadscope` files stay together, and these folders: what they share is made once."""
     if config.getoption("dist") != "loadscope":
         return None
     from xdist.scheduler import LoadScopeScheduling
