@@ -84,6 +84,7 @@ def test_a_curve_whose_points_miss_its_peak_is_drawn_to_it(profile: Profile, sit
     assert found["unstable"] == [[5, 6]], "the stretches stay where they were on the curve"
 
 
+@pytest.mark.long
 def test_zoom_is_linked_and_comes_back(profile: Profile, site: Site, swept: str) -> None:
     page = visit(profile[0], site, swept)
     expect(page.locator("#response-facts")).to_contain_text("highest peak")

@@ -80,6 +80,7 @@ def test_the_rail_is_a_drawer_where_there_is_no_room(profile: Profile, site: Sit
         expect(page.locator("#rail")).to_be_visible()
 
 
+@pytest.mark.long
 def test_on_a_phone_scene_button_and_answer_come_before_the_curve(browser: Browser, site: Site) -> None:
     with opened(browser, site) as (context, _):
         page = visit(context, site, "?scene=two-dof")
