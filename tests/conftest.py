@@ -14,13 +14,17 @@ for _library in ("OMP", "OPENBLAS", "MKL"):
     os.environ[f"{_library}_NUM_THREADS"] = "1"
 
 
-WHOLE = ("tests/page/", "tests/extensions/", "tests/service/attacks/")
-"""Folders whose tests share a service of their own: one process of pytest runs all of such a folder."""
+SHARED = {
+    "page": ("tests/page/",), "extensions": ("tests/extensions/",), "attacks": ("tests/service/attacks/",),
+    "server": ("tests/project/test_readme.py", "tests/service/rendering/test_report.py",
+               "tests/service/cli/test_submit.py"),
+}  # fmt: skip
+"""Tests that share a service in a process of its own: one process of pytest runs all of these."""
 
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
-    """With `--dist loadscope` files stay together, and these folders: what they share is made once."""
+    """With `--dist loadscope` files stay together, and these tests: what they share is made once."""
     if config.getoption("dist") != "loadscope":
         return None
     from xdist.scheduler import LoadScopeScheduling
@@ -28,7 +32,7 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
     class Together(LoadScopeScheduling):
         def _split_scope(self, nodeid: str) -> str:
             file = nodeid.partition("::")[0]
-            return next((folder for folder in WHOLE if file.startswith(folder)), file)
+            return next((name for name, files in SHARED.items() if file.startswith(files)), file)
 
     return Together(config, log)
 
