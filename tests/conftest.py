@@ -1,10 +1,9 @@
-from __future__ import annotations
-
 import gc
 import os
 import zlib
 from collections import Counter
 from collections.abc import Collection, Generator, Iterator
+from typing import Any
 
 import pytest
 from launch import served
@@ -13,6 +12,29 @@ from launch import served
 # last bits, and two processes of pytest have no more than two cores between them.
 for _library in ("OMP", "OPENBLAS", "MKL"):
     os.environ[f"{_library}_NUM_THREADS"] = "1"
+
+
+SHARED = {
+    "page": ("tests/page/",), "extensions": ("tests/extensions/",), "attacks": ("tests/service/attacks/",),
+    "server": ("tests/project/test_readme.py", "tests/service/rendering/test_report.py",
+               "tests/service/cli/test_submit.py"),
+}  # fmt: skip
+"""Tests that share a service in a process of its own: one process of pytest runs all of these."""
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
+    """With `--dist loadscope` files stay together, and these tests: what they share is made once."""
+    if config.getoption("dist") != "loadscope":
+        return None
+    from xdist.scheduler import LoadScopeScheduling
+
+    class Together(LoadScopeScheduling):
+        def _split_scope(self, nodeid: str) -> str:
+            file = nodeid.partition("::")[0]
+            return next((name for name, files in SHARED.items() if file.startswith(files)), file)
+
+    return Together(config, log)
 
 
 @pytest.hookimpl(wrapper=True)

@@ -1,7 +1,5 @@
 """Scenes with rigid bodies between platforms."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -4,8 +4,6 @@ Damping ratios from 1e-5 to 0.1, loads from slipping always to sticking always, 
 and ones that open, bands down to a tenth of the lowest resonance: super-harmonic resonances included.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

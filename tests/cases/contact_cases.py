@@ -1,7 +1,5 @@
 """Contacts for the kernel's tests: a way to call it, random ones, and a crude march to judge it by."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cache

@@ -1,7 +1,5 @@
 """Hessians beside differences of the gradient through the whole solve."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

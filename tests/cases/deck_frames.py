@@ -3,8 +3,6 @@
 What a frame is, is said here anew: directions by trigonometry at each node, from the manuals.
 """
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Files of matrices in every layout."""
 
-from __future__ import annotations
-
 import numpy as np
 from fe_files import abaqus_input, coordinate, dmig, hbmat, op4_binary, op4_text
 

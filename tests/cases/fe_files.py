@@ -1,7 +1,5 @@
 """Files as finite-element programs lay them out, written after their documentation, for the tests."""
 
-from __future__ import annotations
-
 import struct
 from typing import Any
 

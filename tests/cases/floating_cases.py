@@ -1,7 +1,5 @@
 """Bodies that contacts alone hold."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -6,8 +6,6 @@ Normal loads go from slipping all the time to sticking all the time; some vary, 
 force besides, on a blade or on the body itself.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

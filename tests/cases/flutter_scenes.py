@@ -1,7 +1,5 @@
 """Scenes whose flutter friction holds: one mass, random chains, and two bodies with much friction."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

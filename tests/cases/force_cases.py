@@ -1,7 +1,5 @@
 """Contacts in every state, for tests of their force."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Scenes that are hard: limits of every parameter, kinks, ill-conditioned and badly scaled structures."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -3,8 +3,6 @@
 Nothing of the solver is used: matrices and laws are written out here from the numbers of the scene.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

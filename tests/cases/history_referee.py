@@ -4,8 +4,6 @@ Newmark's average acceleration with a return of the force to its limit in every 
 the solver but the matrices of the scene. Its error is of first order in the step where the force turns.
 """
 
-from __future__ import annotations
-
 import math
 
 import numba

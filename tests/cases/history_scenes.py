@@ -1,7 +1,5 @@
 """Random scenes whose contacts go from slipping always to sticking always, for what depends on history."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Two masses on a joint of Iwan's law, which comes from outside the package."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from lumped_structure import lumped

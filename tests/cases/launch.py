@@ -1,7 +1,5 @@
 """How tests start the command in a process of its own."""
 
-from __future__ import annotations
-
 import http.client
 import socket
 import subprocess

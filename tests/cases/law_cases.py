@@ -1,7 +1,5 @@
 """Elements of every contact law for the kernel's tests: a way to call them, and to judge derivatives."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 
 import numpy as np

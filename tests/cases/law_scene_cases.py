@@ -1,7 +1,5 @@
 """Scenes with a contact of each law."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from lumped_structure import lumped

@@ -1,7 +1,5 @@
 """What a sweep says of a scene beside what is true by brute force over points."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from enum import Enum
 

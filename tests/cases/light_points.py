@@ -4,8 +4,6 @@ The motion is found from the matrices of all degrees of freedom under the contac
 value by samples and Newton's method, in numpy: of the solver there are the forces of the contacts alone.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

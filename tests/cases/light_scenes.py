@@ -5,8 +5,6 @@ contact and observed DOF may be near nodes, loads go from slipping always to sti
 unique wherever its mean is: the loads do not move with the parts and every mode is damped.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any, NamedTuple

@@ -7,8 +7,6 @@ foretells what comes. A resonance of contacts that slip lies off those frequenci
 proportional to (friction that moves it damps it), so the geometric spacing finds it as well.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 from itertools import combinations

@@ -1,7 +1,5 @@
 """Scenes whose normal loads have several harmonics, for every law with a given load."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Masses and springs, as the table of a scene."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Scenes in which few modes or one body move many contacts."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

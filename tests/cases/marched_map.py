@@ -3,8 +3,6 @@
 The motion is found by Newton's method on the map itself, from the state a balance gives at τ = 0.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

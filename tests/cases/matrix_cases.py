@@ -1,7 +1,5 @@
 """Beams and files of matrices for the tests."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

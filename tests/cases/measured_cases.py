@@ -1,7 +1,5 @@
 """Measurements made by computation: responses with far more harmonics than a fit keeps, and noise on them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Any

@@ -1,7 +1,5 @@
 """Disks that are not quite equal."""
 
-from __future__ import annotations
-
 import copy
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Scenes of nonlinear modes, and a slider's first harmonic in closed form."""
 
-from __future__ import annotations
-
 import math
 
 from solver import Scene

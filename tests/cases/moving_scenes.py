@@ -1,7 +1,5 @@
 """Random scenes in space whose contacts have loads that move, open, slide in circles, or bend."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A kernel that takes what a contact law takes, and gives something else."""
 
-from __future__ import annotations
-
 from solver.jit.fourier import Integer, Real
 from solver.jit.separate import apart
 

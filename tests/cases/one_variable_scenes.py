@@ -4,8 +4,6 @@ Damping ratios are those of the first mode with the contacts open. The range of 
 decades of a load, two of a stiffness, one and a half of a friction coefficient.
 """
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 from typing import Any, NamedTuple

@@ -1,7 +1,5 @@
 """A scene in other units."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from solver import (

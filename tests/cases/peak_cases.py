@@ -1,7 +1,5 @@
 """Scenes whose highest peak is followed, and that peak by a sweep."""
 
-from __future__ import annotations
-
 import math
 from functools import cache
 

@@ -3,8 +3,6 @@
 The limits are closed forms that no code of the solver computes: sums of μ times mean loads.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, NamedTuple
 

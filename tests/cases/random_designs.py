@@ -1,7 +1,5 @@
 """Random design problems, and what brute force finds: a grid over the bounds, refined at its best points."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence

@@ -1,7 +1,5 @@
 """Random scenes in every regime: stuck, slipping, separating, resonant, at a fraction of a resonance."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Random scenes in space: lumped points with x, y and z, and contacts whose load is given or moves."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from enum import Enum

@@ -4,8 +4,6 @@ Nothing of the compiled loops is used: the force comes from the incremental law 
 the motion from the matrices of all degrees of freedom.
 """
 
-from __future__ import annotations
-
 import math
 
 import numba

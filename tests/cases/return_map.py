@@ -1,7 +1,5 @@
 """The return map of a marched motion."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

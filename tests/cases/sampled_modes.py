@@ -1,7 +1,5 @@
 """The extended periodic motion by samples in time: full matrices, an incremental slider, numpy alone."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

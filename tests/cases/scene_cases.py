@@ -1,7 +1,5 @@
 """Scenes the tests of the balance share."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

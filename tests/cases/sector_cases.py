@@ -1,7 +1,5 @@
 """A lumped disk as the matrices of one sector, with its disk on a boundary that the next sector shares."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The files of a small sector of a ring of bars: matrices and labels of CalculiX, and the deck."""
 
-from __future__ import annotations
-
 import math
 from itertools import combinations
 from typing import Any

@@ -1,7 +1,5 @@
 """Scenes whose derivatives are compared with differences."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import solver

@@ -1,7 +1,5 @@
 """Scenes of three motions with a contact in space."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from lumped_structure import lumped

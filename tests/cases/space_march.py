@@ -1,7 +1,5 @@
 """One mass-point lump of three DOFs on one contact in space, marched by the kernels of time marching."""
 
-from __future__ import annotations
-
 import json
 import math
 from dataclasses import dataclass

@@ -5,8 +5,6 @@ of the force's direction (DOP853) that ends where its rate of slip is 0, Fourier
 included.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

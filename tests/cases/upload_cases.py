@@ -1,7 +1,5 @@
 """Files that are uploaded."""
 
-from __future__ import annotations
-
 import io
 from collections.abc import Callable
 from typing import Any

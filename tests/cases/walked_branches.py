@@ -1,7 +1,5 @@
 """Branches walked for several tests."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from itertools import islice
 

@@ -1,7 +1,5 @@
 """A format of matrix files from outside the package: the diagonals of a symmetric matrix, a line each."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

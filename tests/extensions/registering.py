@@ -1,7 +1,5 @@
 """A law from outside that is registered where its module is imported."""
 
-from __future__ import annotations
-
 from own_laws import PARAMETERS, analytic
 
 import solver

@@ -4,8 +4,6 @@ W. D. Iwan, J. Appl. Mech. 33 (1966) 893, doi:10.1115/1.3625199, with `SLIDERS` 
 the stiffness `k`, and the force `limit` where all slip. The force rounds off from one to the other.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import ClassVar, Literal
 

@@ -3,8 +3,6 @@
 Its sum can be had from responses at single frequencies, without any of the design layer.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path

@@ -3,8 +3,6 @@
 Time marching of its sliders, each by itself, is the referee: it shares nothing with the kernel.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Iterator
 from pathlib import Path

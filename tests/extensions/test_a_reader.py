@@ -1,7 +1,5 @@
 """A format of matrix files of this folder (`banded_text`): named once, it is read wherever files are."""
 
-from __future__ import annotations
-
 import json
 import tomllib
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """`register_law`: functions plain, compiled, complex or interpreted; what fails, and where a law is known."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

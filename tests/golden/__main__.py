@@ -1,7 +1,5 @@
 """The golden files: ``python -m tests.golden --write`` makes them anew, without it they are compared."""
 
-from __future__ import annotations
-
 import argparse
 import os
 import sys

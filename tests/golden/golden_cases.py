@@ -1,7 +1,5 @@
 """What the golden files are made of: scenes, and a command line for each study."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """Bodies and what the service answers, in this process: no server, no workers."""
 
-from __future__ import annotations
-
 import asyncio
 import json
 from collections.abc import Iterator, Sequence

@@ -1,7 +1,5 @@
 """What users see is what it was: ``python -m tests.golden --write`` after a change that is meant."""
 
-from __future__ import annotations
-
 from functools import cache
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Campbell diagrams: crossings, bands and natural frequencies against solves; the command and its picture."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path

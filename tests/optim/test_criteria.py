@@ -1,7 +1,5 @@
 """Peak amplitude and resonance band: their gradients against differences through the whole solve."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

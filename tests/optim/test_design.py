@@ -1,7 +1,5 @@
 """The design problem on the paper's scenes: optimum, shape, limits, every status, bad input."""
 
-from __future__ import annotations
-
 import math
 from functools import cache
 

@@ -1,7 +1,5 @@
 """Every row a design is judged by: gradient and second derivatives against differences of the whole solve."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cache

@@ -1,7 +1,5 @@
 """The methods of the design layer: they agree, with brute force too, and say which conditions hold."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

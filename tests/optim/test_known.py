@@ -1,7 +1,5 @@
 """Known errors reach the user: every result made of responses says how well its numbers are known."""
 
-from __future__ import annotations
-
 import importlib
 import json
 import pkgutil
@@ -192,6 +190,7 @@ def test_quantiles_of_a_robust_design_come_with_their_confidence(capsys: pytest.
     assert "at least 20 samples are needed" in " ".join(told.split())
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("harmonics", [1, 3])
 def test_harmonics_rise_until_the_peak_of_a_design_is_known(harmonics: int) -> None:
     """Three leave the peak of the disk open by more than its size: harmonics 3 and 5 meet its resonances."""

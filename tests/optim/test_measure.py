@@ -1,7 +1,5 @@
 """What is minimised is what the result is judged by: max|x|, or half peak to peak where the mean is free."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

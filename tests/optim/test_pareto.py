@@ -1,7 +1,5 @@
 """The Pareto front of peak against band: brute force, its slope, its ends, statuses, bad input."""
 
-from __future__ import annotations
-
 import itertools
 import json
 import math

@@ -1,7 +1,5 @@
 """Designs on the performance curve of one mode, beside exact designs and what they say of themselves."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

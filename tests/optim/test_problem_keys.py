@@ -1,7 +1,5 @@
 """The keys of a design problem as arguments, options and places of what is wrong."""
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Callable
 from typing import Any, get_args, get_type_hints

@@ -1,7 +1,5 @@
 """Robust design: worst case against brute force, mean and quantiles against sampling, statuses, bad input."""
 
-from __future__ import annotations
-
 import itertools
 import json
 import math
@@ -47,7 +45,7 @@ def test_the_worst_case_is_that_of_a_grid_over_the_intervals() -> None:
     assert result.robust is not None
     grid = [
         peak_at({"damper.N0": result.optimum["damper.N0"], "damper.kt": kt, "damper.mu": mu})
-        for kt, mu in itertools.product(np.linspace(24.0, 36.0, 7), np.linspace(0.2, 0.4, 7))
+        for kt, mu in itertools.product(np.linspace(24.0, 36.0, 5), np.linspace(0.2, 0.4, 5))
     ]
     assert result.robust.worst_peak == pytest.approx(max(grid), rel=1e-6)
     assert result.objective == pytest.approx(result.robust.worst_peak, rel=1e-6)
@@ -304,7 +302,7 @@ def test_a_single_nominal_scenario_gives_the_nominal_optimum() -> None:
 
 
 def test_it_can_be_stopped_at_any_time() -> None:
-    for after in (3, 60, 120):
+    for after in (3, 60):
         asked = itertools.count()
         result = optim.robust_design(
             TWO, uncertain=KT_AND_MU, variables=N0, should_stop=lambda: next(asked) > after  # noqa: B023

@@ -1,7 +1,5 @@
 """Sensitivities in engineering form: Euler's theorem, differences, order, what has no per cent."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """What is known of a design is not computed again: by another case, measure or number of harmonics."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Cases and limits with types say what tables and keys say."""
 
-from __future__ import annotations
-
 from dataclasses import fields
 
 import pytest

@@ -1,7 +1,5 @@
 """What is not known: the sets read from a description, their samples, bad input."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Designs of the platform wedge against points that are solved one by one, without a sweep."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -164,6 +164,7 @@ def check_clicks(page: Page) -> None:
     assert "set=damper.N0:" in page.url
 
 
+@pytest.mark.long
 def test_sweeps_are_filtered_compared_and_shared(profile: Profile, site: Site) -> None:
     for load, friction in ((50, 0.3), (80, 0.3), (120, 0.3), (110, 0.3), (110, 0.2)):
         values = {"damper.N0": load, "damper.mu": friction}

@@ -84,6 +84,7 @@ def test_a_curve_whose_points_miss_its_peak_is_drawn_to_it(profile: Profile, sit
     assert found["unstable"] == [[5, 6]], "the stretches stay where they were on the curve"
 
 
+@pytest.mark.long
 def test_zoom_is_linked_and_comes_back(profile: Profile, site: Site, swept: str) -> None:
     page = visit(profile[0], site, swept)
     expect(page.locator("#response-facts")).to_contain_text("highest peak")
@@ -138,6 +139,7 @@ def test_an_axis_is_logarithmic_on_request(profile: Profile, site: Site, swept: 
     assert min(y for _, y in after) - after[0][1] == pytest.approx(rise, abs=2.0)
 
 
+@pytest.mark.long
 def test_what_the_cursor_reads_follows_the_sliders(profile: Profile, site: Site) -> None:
     page = visit(profile[0], site, "?scene=two-dof&tab=response")
     expect(page.locator("#live-status")).to_contain_text("peak 2.35 m")

@@ -39,6 +39,7 @@ def asked(site: Site, page: Page) -> dict[str, Any]:
     return request
 
 
+@pytest.mark.long
 def test_two_variables_two_cases_and_a_limit(profile: Profile, site: Site) -> None:
     page = visit(profile[0], site, "?scene=two-dof&tab=design&harmonics=3")
     fill(page, "variable 1", path="damper.N0", low="20", high="500")

@@ -83,6 +83,7 @@ def test_the_rail_is_a_drawer_where_there_is_no_room(profile: Profile, site: Sit
         expect(page.locator("#rail")).to_be_visible()
 
 
+@pytest.mark.long
 def test_on_a_phone_scene_button_and_answer_come_before_the_curve(browser: Browser, site: Site) -> None:
     with opened(browser, site) as (context, _):
         page = visit(context, site, "?scene=two-dof")
@@ -114,6 +115,7 @@ def test_a_chip_says_what_differs_from_the_scene_and_puts_it_back(profile: Profi
     expect(page.locator(".slider.changed")).to_have_count(0)
 
 
+@pytest.mark.long
 def test_what_is_done_with_a_scene_is_in_its_menu(profile: Profile, site: Site) -> None:
     page = visit(profile[0], site, "?scene=two-dof")
     expect(page.locator("#new-scene")).to_be_hidden()

@@ -25,6 +25,7 @@ def stored(site: Site) -> str:
     return scene.name
 
 
+@pytest.mark.long
 def test_a_stretch_that_is_not_stable_is_dashed(profile: tuple[BrowserContext, Watch], site: Site) -> None:
     page = visit(profile[0], site, f"?scene={stored(site)}")
     expect(page.locator(f"#live-figure {DASHED}")).to_have_count(1)

@@ -79,6 +79,7 @@ def test_a_mode_is_followed_and_its_points_are_looked_at(profile: Profile, site:
     expect(page.locator("#modes-to")).to_have_value("300")
 
 
+@pytest.mark.long
 def test_parameters_are_identified_from_what_is_pasted(profile: Profile, site: Site) -> None:
     truth = solver.load_scene("two-dof").with_values({"damper.mu": 0.27})
     lines = ["damper.N0,frequency [Hz],amplitude [mm]"]

@@ -1,7 +1,5 @@
 """The page for users of other codes: the example in ours gives what the page says, and theirs is complete."""
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess

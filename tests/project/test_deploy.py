@@ -1,7 +1,5 @@
 """What stands in deploy/ and docs/operations.md fits the program."""
 
-from __future__ import annotations
-
 import re
 import shlex
 import shutil

@@ -1,7 +1,5 @@
 """The page on a disk from a mesh to its damper: every line of it, in order, and the numbers it quotes."""
 
-from __future__ import annotations
-
 import re
 import shlex
 import shutil

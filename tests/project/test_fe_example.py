@@ -1,7 +1,5 @@
 """The page on a blade from a mesh to its damper: every line of it, in order, and the numbers it quotes."""
 
-from __future__ import annotations
-
 import importlib.util
 import json
 import re

@@ -1,7 +1,5 @@
 """The page on identification: rig, parameters, robust design and report; its tables are up to date."""
 
-from __future__ import annotations
-
 import re
 import shlex
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What others read of the project beside pyproject.toml: how to cite it, and its environment for conda."""
 
-from __future__ import annotations
-
 import re
 import tomllib
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What other codes are given of a nonlinear mode, and what is said of those that are not there."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The benchmark of a new user: what it reads off the pages is what the pages say."""
 
-from __future__ import annotations
-
 import shlex
 from pathlib import Path
 

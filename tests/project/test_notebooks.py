@@ -1,7 +1,5 @@
 """The notebooks of docs/notebooks run from their first cell to the last, each in a kernel of its own."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """The repository itself: layers, pinned versions, no machine's addresses, the shape of the code."""
 
-from __future__ import annotations
-
 import ast
 import re
 import shutil

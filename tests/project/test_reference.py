@@ -1,7 +1,5 @@
 """The documentation site builds without a warning, and every public name has a docstring."""
 
-from __future__ import annotations
-
 import inspect
 import os
 import re

@@ -1,7 +1,5 @@
 """`import stickslip`: every public name under one, loaded on first use, with types and short texts."""
 
-from __future__ import annotations
-
 import pickle
 import subprocess
 import sys

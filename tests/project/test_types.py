@@ -1,7 +1,5 @@
 """Types as a user's checker sees them: packages marked as typed, a script clean under the strictest rules."""
 
-from __future__ import annotations
-
 import inspect
 import os
 import subprocess

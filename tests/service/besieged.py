@@ -1,7 +1,5 @@
 """A service in a process of its own under attack: its memory, the latency of others, its end by SIGTERM."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import signal

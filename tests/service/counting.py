@@ -1,7 +1,5 @@
 """Read-modify-writes from several processes, as a process of their own runs them."""
 
-from __future__ import annotations
-
 import sys
 
 from sqlalchemy import text

@@ -1,7 +1,5 @@
 """The faults that may happen to a site."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import random

@@ -1,7 +1,5 @@
 """A site with services, workers and clients as real processes, and the faults that happen to it."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import random

@@ -1,7 +1,5 @@
 """Matrix files for uploads."""
 
-from __future__ import annotations
-
 
 def matrix_market(size: int) -> str:
     """A diagonal matrix as MatrixMarket."""

@@ -1,7 +1,5 @@
 """Kinds of job for these tests only: real computations whose length and obedience a test can choose."""
 
-from __future__ import annotations
-
 import os
 import time
 from collections.abc import Mapping

@@ -3,8 +3,6 @@
 WHAT is a port, `work` or `dispatch`.
 """
 
-from __future__ import annotations
-
 import sys
 
 from private_kinds import PRIVATE

@@ -1,7 +1,5 @@
 """A long job that is interrupted goes on from what it kept, and computes what it would have computed."""
 
-from __future__ import annotations
-
 import multiprocessing as mp
 import os
 import signal

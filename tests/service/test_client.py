@@ -1,7 +1,5 @@
 """The client: every route, typed; a connection that fails is made again without doing anything twice."""
 
-from __future__ import annotations
-
 import inspect
 import io
 import socket

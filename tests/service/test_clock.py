@@ -1,7 +1,5 @@
 """Clocks that jump or disagree cost no job an attempt."""
 
-from __future__ import annotations
-
 import random
 import time
 from collections.abc import Callable

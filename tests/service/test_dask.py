@@ -1,7 +1,5 @@
 """Jobs on a real Dask cluster: the same results, whatever happens to workers and scheduler."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

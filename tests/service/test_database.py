@@ -1,7 +1,5 @@
 """The database: its transactions, its lock, its revisions."""
 
-from __future__ import annotations
-
 import sqlite3
 import subprocess
 import sys

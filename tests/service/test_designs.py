@@ -1,7 +1,5 @@
 """Stored designs are there to be queried."""
 
-from __future__ import annotations
-
 import json
 import random
 import time

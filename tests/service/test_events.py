@@ -1,7 +1,5 @@
 """Jobs as server-sent events, over a real server and from a service beside the one that runs them."""
 
-from __future__ import annotations
-
 import asyncio
 import json
 import threading

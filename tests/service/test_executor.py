@@ -1,7 +1,5 @@
 """Worker processes and the attempts that wait in their pipes."""
 
-from __future__ import annotations
-
 import os
 import signal
 import sys
@@ -190,6 +188,7 @@ def forked(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(processes, "_settings_of_the_first", None)
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("forked")
 def test_workers_whose_fork_server_is_killed_compute_on_and_are_ended(heard: Heard, tmp_path: Path) -> None:
     """Another start, which makes a new fork server, looks at all of them: they are not taken for dead."""

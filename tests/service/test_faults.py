@@ -3,8 +3,6 @@
 ``pytest -m long tests/service/test_faults.py -s`` makes more than 200 of them and prints what happened.
 """
 
-from __future__ import annotations
-
 import random
 import sys
 import time

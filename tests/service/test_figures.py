@@ -1,15 +1,13 @@
 """Every stored result is listed by any of its figures, as a plain filter over all of them would."""
 
-from __future__ import annotations
-
 import random
 from dataclasses import fields, replace
-from typing import Any
+from typing import Any, get_args
 
 import pytest
 from private_kinds import A_SWEEP, PRIVATE
 from pydantic import BaseModel, Field
-from service_helpers import ServedClient, is_problem, listed
+from service_helpers import ServedClient, is_problem, listed, within
 
 from service.auth.callers import KEYLESS
 from service.client.embedded import EmbeddedService
@@ -28,7 +26,7 @@ from service.jobs.figures import (
 )
 from service.jobs.kinds import SHIPPED
 from service.schemas.answers import StoredResult
-from service.schemas.result_queries import ResultQuery, result_page
+from service.schemas.result_queries import ResultQuery, SweepQuery, result_page, sweep_page
 from service.settings.settings import load_settings
 
 NEW = NewJob(kind="sweep", request={}, spec={}, spec_hash="", request_hash="", max_attempts=1, fresh=True)
@@ -36,6 +34,10 @@ OWNERS = ("", "alice", "bob")
 PARTS = ("kt", "mu", "N0", "N1", "N1_phase")
 NUMBERS = [name for name, one in quantities_of_record(SweepRecord).items() if one.kind in (int, float)]
 TRUTHS = [name for name, one in quantities_of_record(SweepRecord).items() if one.kind is bool]
+
+# What `/v1/sweeps` knows of them, beside `/v1/results`.
+OF_SWEEPS = [name for name in (*NUMBERS, *PARTS) if f"{name}_max" in SweepQuery.model_fields]
+SORTS = get_args(SweepQuery.model_fields["sort"].annotation)
 
 Owned = tuple[str, SweepRecord]
 
@@ -78,10 +80,12 @@ def filled(module_database: Database) -> tuple[Database, list[Owned]]:
     return module_database, known
 
 
-def random_query(chance: random.Random) -> dict[str, Any]:
+def random_query(chance: random.Random, of_sweeps: bool) -> dict[str, Any]:
     query: dict[str, Any] = {}
-    for name in chance.sample((*NUMBERS, *PARTS), chance.choice((0, 1, 1, 2, 3))):
+    for name in chance.sample(OF_SWEEPS if of_sweeps else (*NUMBERS, *PARTS), chance.choice((0, 1, 1, 2, 3))):
         low, high = sorted((chance.uniform(-1.0, 11.0), chance.choice((5.0, chance.uniform(0.0, 11.0)))))
+        if of_sweeps and name == "points":
+            low, high = (float(max(1, round(end))) for end in (low, high))
         query |= chance.choice(
             ({f"{name}_min": low}, {f"{name}_max": high}, {f"{name}_min": low, f"{name}_max": high})
         )
@@ -89,43 +93,41 @@ def random_query(chance: random.Random) -> dict[str, Any]:
         "scene": ("disk", "two", "nothing"), "parameter": ("frequency", "speed", "nothing"),
         "contact": ("damper", "root", "nothing"), **dict.fromkeys(TRUTHS, (True, False)),
     }  # fmt: skip
+    if of_sweeps:
+        words = {name: found for name, found in words.items() if name in SweepQuery.model_fields}
+        words["harmonics"] = tuple(range(1, 10))
     query |= {name: chance.choice(words[name]) for name in words if chance.random() < 0.1}
     if chance.random() < 0.7:
-        query["sort"] = chance.choice(("", "-")) + chance.choice(("created", *NUMBERS, *TRUTHS))
+        sorts = SORTS if of_sweeps else ("created", *NUMBERS, *TRUTHS)
+        query["sort"] = chance.choice(("", "-")) + chance.choice(sorts).removeprefix("-")
     return query
-
-
-def inside(value: float | None, query: dict[str, Any], name: str) -> bool:
-    low, high = query.get(f"{name}_min"), query.get(f"{name}_max")
-    if low is None and high is None:
-        return True
-    return value is not None and (low is None or value >= low) and (high is None or value <= high)
 
 
 def meets(record: SweepRecord, query: dict[str, Any]) -> bool:
     """The same conditions in plain Python, over all that is known of a sweep."""
     columns = {"scene": record.scene_name, "parameter": record.parameter}
-    columns |= {name: getattr(record, name) for name in TRUTHS}
+    columns |= {name: getattr(record, name) for name in (*TRUTHS, "harmonics")}
     if any(query[name] != value for name, value in columns.items() if name in query):
         return False
-    if not all(inside(getattr(record, name), query, name) for name in NUMBERS):
+    if not all(within(getattr(record, name), query, name) for name in NUMBERS):
         return False
     asked = [name for name in PARTS if {f"{name}_min", f"{name}_max"} & query.keys()]
     if not asked and "contact" not in query:
         return True
     there = [one for one in record.contacts if query.get("contact") in (None, one.name)]
-    return any(all(inside(getattr(one, name), query, name) for name in asked) for one in there)
+    return any(all(within(getattr(one, name), query, name) for name in asked) for one in there)
 
 
-@pytest.mark.parametrize("queries", [40, pytest.param(500, marks=pytest.mark.long)])
+@pytest.mark.parametrize("of_sweeps", [False, True], ids=["results", "sweeps"])
+@pytest.mark.parametrize("queries", [30, pytest.param(500, marks=pytest.mark.long)])
 def test_random_queries_are_answered_as_by_a_plain_filter(
-    filled: tuple[Database, list[Owned]], queries: int
+    filled: tuple[Database, list[Owned]], queries: int, of_sweeps: bool
 ) -> None:
     database, known = filled
     repository, chance, answers = ResultRepository(database), random.Random(11), 0
     places = {record.from_value: index for index, (_, record) in enumerate(known)}
     for _ in range(queries):
-        query, sees = random_query(chance), chance.choice((None, *OWNERS, "nobody"))
+        query, sees = random_query(chance, of_sweeps), chance.choice((None, *OWNERS, "nobody"))
         sort = query.get("sort", "-created")
         name = sort.removeprefix("-")
         values = [0 if name == "created" else getattr(record, name) for _, record in known]
@@ -135,12 +137,16 @@ def test_random_queries_are_answered_as_by_a_plain_filter(
         ]  # fmt: skip
         wanted.sort(key=lambda index: (values[index], index), reverse=sort.startswith("-"))
 
-        def page(held: ResultRepository, asked: ResultQuery, settings: Any, sees: Any = sees) -> Any:
+        def page(held: ResultRepository, asked: Any, settings: Any, sees: Any = sees) -> Any:
+            if of_sweeps:
+                return sweep_page(held, asked, settings, sees)
             return result_page(held, asked, SHIPPED, settings, sees)
 
-        asked = ResultQuery(of="sweep", limit=chance.choice((7, 100, 1000)), **query)
+        query["limit"] = chance.choice((7, 100, 1000))
+        asked = SweepQuery(**query) if of_sweeps else ResultQuery(of="sweep", **query)
         found = listed(page, repository, asked)
-        assert [place(item, places, known) for item in found] == wanted, (query, sees)
+        got = [places[one.from_] if of_sweeps else place(one, places, known) for one in found]
+        assert got == wanted, (query, sees)
         answers += bool(found)
     assert queries // 4 < answers < queries, "some are met and some are not"
 

@@ -1,7 +1,5 @@
 """One service an SQLite file, by whatever name it is called, and files that nobody else can read."""
 
-from __future__ import annotations
-
 import os
 import stat
 import subprocess

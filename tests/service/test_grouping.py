@@ -1,7 +1,5 @@
 """Writes that share a transaction: each caller has its own result, and one that fails harms no other."""
 
-from __future__ import annotations
-
 import threading
 from concurrent.futures import ThreadPoolExecutor
 from datetime import timedelta

@@ -1,7 +1,5 @@
 """Hostile requests over raw connections: each is refused within limits, and the service lives on."""
 
-from __future__ import annotations
-
 import asyncio
 import json
 import socket

@@ -1,7 +1,5 @@
 """The REST API over a real server: what it answers and what it refuses."""
 
-from __future__ import annotations
-
 import json
 import re
 import socket

@@ -1,7 +1,5 @@
 """The kind `identify`: what it refuses, with the pointer of the field; that data are tables, never files."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """`stickslip db check` and `db backup`: a sound database, and each kind of damage."""
 
-from __future__ import annotations
-
 import json
 import sqlite3
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The kinds that come with the service, on the real solver."""
 
-from __future__ import annotations
-
 import re
 from typing import Any
 

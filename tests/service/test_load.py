@@ -1,7 +1,5 @@
 """Many small jobs of many clients on a real service: none lost, none twice."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 from typing import Any
@@ -22,8 +20,8 @@ def job(number: int) -> dict[str, Any]:
     return {"kind": "iteration", "seed": number, "sweeps": 1}
 
 
-@pytest.mark.few(keep=("postgresql",))
-@pytest.mark.parametrize("number", [20, pytest.param(96, marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("number", [40, 96])
 def test_every_job_of_many_clients_is_done_once(url: str, tmp_path: Path, number: int) -> None:
     with serving(url, workers=2, log=tmp_path / "log", command=words) as service:
         handed_in = run_load(service, number, 16, wait=False, job=job)

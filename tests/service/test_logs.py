@@ -1,7 +1,5 @@
 """The log: lines for people or for programs, with the job and the request they are about."""
 
-from __future__ import annotations
-
 import io
 import json
 import logging

@@ -1,7 +1,5 @@
 """Uploaded matrices looked at: what was read, what is wrong beside its key, and the scene they begin."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

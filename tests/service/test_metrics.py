@@ -1,7 +1,5 @@
 """`/metrics`: requests by route, jobs and workers, in the format monitors read."""
 
-from __future__ import annotations
-
 import httpx
 from prometheus_client.parser import text_string_to_metric_families
 

@@ -1,7 +1,5 @@
 """A database written by the first version, with data, goes up, down and up again on both databases."""
 
-from __future__ import annotations
-
 import gzip
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """What jobs of nonlinear modes give besides the curve: loops, shapes, and whole responses to compare with."""
 
-from __future__ import annotations
-
 import httpx
 import numpy as np
 import pytest

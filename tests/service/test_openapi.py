@@ -1,7 +1,5 @@
 """The description of the API: bodies and errors have examples, answers types; a page without scripts."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from typing import Any

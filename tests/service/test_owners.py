@@ -1,7 +1,5 @@
 """What one owner made is not there for another."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 

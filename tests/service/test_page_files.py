@@ -1,7 +1,5 @@
 """The page as files: its policy, what is kept for how long, nothing from elsewhere, nothing dangerous."""
 
-from __future__ import annotations
-
 import gzip
 import re
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Kinds whose work is divided: the parts, in any order and after a trip through JSON, give the same job."""
 
-from __future__ import annotations
-
 import copy
 import json
 import random

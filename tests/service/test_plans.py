@@ -1,7 +1,5 @@
 """The busy statements stay quick in a long table: SQLite, which plans without counts, goes by their index."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """Several dispatchers and several services on one PostgreSQL database."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

@@ -1,7 +1,5 @@
 """Previews: computed at once, nothing stored, the newest of each client first."""
 
-from __future__ import annotations
-
 import asyncio
 import time
 from collections.abc import Callable, Mapping

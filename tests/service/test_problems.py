@@ -1,7 +1,5 @@
 """The description of a design problem: every key, what is wrong with it, and where that is told."""
 
-from __future__ import annotations
-
 import inspect
 import math
 from typing import Any

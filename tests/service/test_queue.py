@@ -1,7 +1,5 @@
 """Jobs survive the death of workers; what is cancelled stops; nobody writes what is not theirs."""
 
-from __future__ import annotations
-
 import os
 import signal
 import time

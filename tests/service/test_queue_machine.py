@@ -5,8 +5,6 @@ every step the rows equal a model of a few lines, one attempt at a time owns a j
 is and its result exists if and only if it was successful (or failed with what it had computed).
 """
 
-from __future__ import annotations
-
 import importlib
 from collections.abc import Iterator
 from dataclasses import dataclass, field

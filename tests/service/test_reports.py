@@ -1,7 +1,5 @@
 """Reports that the service makes of designs, and measured data that it reads."""
 
-from __future__ import annotations
-
 import re
 
 import httpx

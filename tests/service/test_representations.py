@@ -1,7 +1,5 @@
 """Sweeps and lists in every form they come in, and how the form is chosen."""
 
-from __future__ import annotations
-
 import csv
 import importlib.util
 import io

@@ -1,7 +1,5 @@
 """Nothing that was accepted is lost, however the service ends."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import signal
@@ -69,6 +67,7 @@ def alive(pid: int) -> bool:
         return False
 
 
+@pytest.mark.long
 def test_a_service_killed_loses_nothing_and_leaves_no_worker(
     tmp_path: Path, port: int, client: Client, start: Start
 ) -> None:

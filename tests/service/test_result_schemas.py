@@ -1,7 +1,5 @@
 """Every kind says what its result is: what it computes has these keys and no others."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from typing import Any

@@ -1,7 +1,5 @@
 """What is old is deleted a little at a time; what others need is not."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager

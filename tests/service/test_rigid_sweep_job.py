@@ -1,7 +1,5 @@
 """A sweep over rigid contacts as a job and as a command."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path
@@ -41,6 +39,7 @@ def test_a_job_gives_the_result_and_the_stored_sweep() -> None:
     assert {"coefficients", "observed", "states", "residual"} <= record.arrays.keys()
 
 
+@pytest.mark.long
 def test_the_command_prints_draws_and_writes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     scene = tmp_path / "scene.toml"
     scene.write_text(toml_text(Scene.from_dict(SCENE).to_dict()))

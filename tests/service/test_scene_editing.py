@@ -1,7 +1,5 @@
 """Text and tables of a scene side by side, templates and the schema, over REST."""
 
-from __future__ import annotations
-
 import tomllib
 
 import httpx

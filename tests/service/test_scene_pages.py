@@ -1,7 +1,5 @@
 """The list of scenes comes in pages, and no scene is read for it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 

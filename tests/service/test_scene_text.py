@@ -1,7 +1,5 @@
 """Scenes from and to the text of a file."""
 
-from __future__ import annotations
-
 import json
 import tomllib
 from pathlib import Path

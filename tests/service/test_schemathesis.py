@@ -1,7 +1,5 @@
 """The description of the API against a real service: no error of the program, no answer out of form."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Iterator
 from typing import Any

@@ -1,7 +1,5 @@
 """One sector of a disk by uploads: the same scene as from files, and refusals that name field and remedy."""
 
-from __future__ import annotations
-
 import json
 import shutil
 import subprocess

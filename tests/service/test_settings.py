@@ -1,7 +1,5 @@
 """Settings, and the sentences they are refused with."""
 
-from __future__ import annotations
-
 import socket
 
 import pytest

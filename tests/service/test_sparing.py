@@ -1,7 +1,5 @@
 """The collector of cycles leaves loaded modules alone, and nothing else."""
 
-from __future__ import annotations
-
 import gc
 import sys
 import types

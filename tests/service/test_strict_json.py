@@ -1,7 +1,5 @@
 """JSON of a request: what is measured before it is read, and what is said of it."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

@@ -1,7 +1,5 @@
 """The kinds that compute many responses: map, peaks, accuracy, campbell and mistuning, over REST."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import httpx

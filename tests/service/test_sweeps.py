@@ -1,7 +1,5 @@
 """Stored sweeps are there to be queried."""
 
-from __future__ import annotations
-
 import random
 import time
 from dataclasses import replace
@@ -11,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from private_kinds import A_SWEEP
-from service_helpers import analyse, in_order, listed, promptly, within
+from service_helpers import analyse, promptly
 
 from service.db.clock import utc_now
 from service.db.engine import Database
@@ -53,68 +51,6 @@ def random_sweep(generator: random.Random) -> SweepRecord:
     )
 
 
-@pytest.fixture(scope="module")
-def filled(module_database: Database) -> tuple[Database, list[SweepRecord]]:
-    """A database with enough sweeps that some conditions lead a query and others do not."""
-    generator = random.Random(5)
-    records = [random_sweep(generator) for _ in range(600)]
-    job, _ = JobRepository(module_database).submit(NEW, queue_limit=10)
-    with module_database.writing() as connection:
-        insert_results(connection, job.id, records, utc_now())
-    return module_database, records
-
-
-def meets(record: SweepRecord, query: dict[str, Any]) -> bool:
-    """The same conditions in plain Python."""
-    same = {
-        "scene": "scene_name",
-        "parameter": "parameter",
-        "harmonics": "harmonics",
-        "completed": "completed",
-    }
-    ranges = ("peak", "peak_at", "band_hz", "points", "seconds")
-    loads = [c.N0 for c in record.contacts if query.get("contact") in (None, c.name)]
-    return (
-        all(getattr(record, column) == query[name] for name, column in same.items() if name in query)
-        and all(within(getattr(record, name), query, name) for name in ranges)
-        and any(within(load, query, "N0") for load in loads)
-    )
-
-
-@pytest.mark.few(3)
-@pytest.mark.parametrize(
-    "query",
-    [
-        {},
-        {"scene": "two"},
-        {"scene": "nothing"},
-        {"scene": "disk", "peak_max": 0.3, "sort": "peak"},
-        {"peak_max": 0.05},
-        {"peak_min": 1.0, "peak_max": 1.0, "sort": "-peak"},
-        {"peak_min": 0.5, "sort": "-peak", "completed": True},
-        {"N0_min": 100.0, "N0_max": 101.0},
-        {"N0_min": 100.0, "N0_max": 700.0, "contact": "root", "sort": "points"},
-        {"N0_min": 100.0, "N0_max": 200.0, "contact": "nothing"},
-        {"contact": "damper", "sort": "created"},
-        {"N0_min": 100.0, "sort": "peak"},
-        {"N0_max": 500.0, "band_hz_max": 0.2, "sort": "band_hz", "parameter": "damper.N0"},
-        {"harmonics": 7, "completed": False, "sort": "-seconds"},
-        {"points_min": 499, "points_max": 499},
-        {"peak_at_min": 1.2, "peak_at_max": 1.21, "sort": "-peak_at"},
-        {"seconds_max": 0.01, "sort": "seconds"},
-        {"sort": "harmonics", "scene": "three", "limit": 1000},
-    ],
-)
-def test_filters_sorts_and_pages(filled: tuple[Database, list[SweepRecord]], query: dict[str, Any]) -> None:
-    database, records = filled
-    repository = ResultRepository(database)
-    positions = {row.id: row.position for row in repository.of_job(JobRepository(database).page()[0].id)}
-    found = listed(sweep_page, repository, SweepQuery(**{"limit": 97, **query}))
-    sort = query.get("sort", "-created")
-    wanted = in_order(dict(enumerate(records)), sort, {}, lambda record: meets(record, query))
-    assert [positions[item.id] for item in found] == wanted
-
-
 def test_a_range_is_met_by_one_contact_alone(database: Database) -> None:
     jobs, repository = JobRepository(database), ResultRepository(database)
     new = NewJob(kind="sweep", request={}, spec={}, spec_hash="", request_hash="", max_attempts=1, fresh=True)
@@ -144,9 +80,9 @@ def test_a_range_is_met_by_one_contact_alone(database: Database) -> None:
 @pytest.mark.parametrize(
     "cursor", ["", "x", "eA", "W10", "WzEsMl0", "W3RydWUsICJhIl0", "W051bGwsICJhIl0", "é", "WyJhIiwgImEiXQ"]
 )
-def test_a_cursor_that_is_none(filled: tuple[Database, list[SweepRecord]], cursor: str) -> None:
+def test_a_cursor_that_is_none(module_database: Database, cursor: str) -> None:
     with pytest.raises(InvalidRequestError, match="must come from the `next` link"):
-        sweep_page(ResultRepository(filled[0]), SweepQuery(cursor=cursor), load_settings())
+        sweep_page(ResultRepository(module_database), SweepQuery(cursor=cursor), load_settings())
 
 
 def test_an_unknown_filter_is_refused() -> None:

@@ -1,7 +1,5 @@
 """Owners take turns in the queue, on both databases; and in the threads of a service."""
 
-from __future__ import annotations
-
 import asyncio
 import random
 import threading

@@ -1,7 +1,5 @@
 """Files of matrices: stored after a look at them in a process of its own, referred to by scenes."""
 
-from __future__ import annotations
-
 import io
 import signal
 import threading

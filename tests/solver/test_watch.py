@@ -1,7 +1,5 @@
 """The bar that long computations show where somebody watches, and only there."""
 
-from __future__ import annotations
-
 import os
 import pty
 import subprocess

@@ -1,7 +1,5 @@
 """Derivatives of all residuals, what data cannot tell, what to measure next, what stays uncertain."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Curves of nonlinear modes as data: truth comes back, derivatives are those of differences."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What a fit leaves over of a wrong model is said to be no noise; of a right one it is noise."""
 
-from __future__ import annotations
-
 import copy
 from typing import Any
 
@@ -90,7 +88,7 @@ def doubted(found: optim.Identification) -> bool:
 CASES = [(kind, seed, phase) for kind in KINDS for seed in range(20) for phase in (True, False)]
 
 
-@pytest.mark.few(27)
+@pytest.mark.few(67)
 @pytest.mark.parametrize(("kind", "seed", "phase"), CASES)
 def test_a_wrong_model_is_doubted(kind: str, seed: int, phase: bool) -> None:
     found, values = identified(seed, kind, phase=phase)

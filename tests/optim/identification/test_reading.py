@@ -1,7 +1,5 @@
 """Files of measurements: units, conditions, formats; what is wrong is told with its line."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """What a stranger has computed for an answer ends within limits, and beside the service."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

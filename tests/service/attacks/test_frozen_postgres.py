@@ -1,7 +1,5 @@
 """PostgreSQL stands still, its connections open: requests end in time, and so does the service."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

@@ -1,7 +1,5 @@
 """A full disk: nothing is written, readiness says so, what can be read is, and the service stops."""
 
-from __future__ import annotations
-
 import time
 from pathlib import Path
 

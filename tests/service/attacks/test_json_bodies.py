@@ -1,7 +1,5 @@
 """JSON that is made to be costly is read in linear time and little memory, or refused."""
 
-from __future__ import annotations
-
 import pytest
 from attack_site import Attack, Site
 
@@ -47,6 +45,7 @@ def test_a_costly_body_hurts_nobody_else(site: Site, name: str) -> None:
     assert figures.answers[0].seconds < 2.0
 
 
+@pytest.mark.long
 def test_many_large_bodies_at_once_hurt_nobody_else(site: Site) -> None:
     """As many values as are read at all, from several connections."""
     body = b'{"scene": {"a": [' + b"0.1234," * 490_000 + b"1]}}"

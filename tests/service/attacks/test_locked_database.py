@@ -1,7 +1,5 @@
 """A foreign program holds SQLite's file: requests end in time, readiness says so, and the service stops."""
 
-from __future__ import annotations
-
 import sqlite3
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor

@@ -1,7 +1,5 @@
 """Owners apart: what one of them hands in, uploads or draws does not keep another one waiting."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Callable, Sequence
 from pathlib import Path

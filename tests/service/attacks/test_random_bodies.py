@@ -1,7 +1,5 @@
 """Bodies of random shapes, depths, lengths and numbers over all routes: none is an error of the program."""
 
-from __future__ import annotations
-
 import json
 import random
 from collections.abc import Callable, Iterator

@@ -1,7 +1,5 @@
 """Clients that read nothing, connections that say nothing, and event streams: each many, and all at once."""
 
-from __future__ import annotations
-
 import contextlib
 import resource
 import socket

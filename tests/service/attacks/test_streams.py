@@ -1,7 +1,5 @@
 """Event streams: limited in total and for each key, and so cheap that nobody else notices them."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

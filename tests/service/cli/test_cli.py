@@ -1,13 +1,10 @@
 """The command: what it prints, its exit statuses, bad input, and what it does not load."""
 
-from __future__ import annotations
-
 import json
 import os
 import pty
 import re
 import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -373,17 +370,6 @@ def test_pictures(run: Run, tmp_path: Path, arguments: str) -> None:
     (picture,) = tmp_path.iterdir()
     beginnings = {".png": b"\x89PNG", ".svg": b"<?xml", ".pdf": b"%PDF"}
     assert picture.read_bytes().startswith(beginnings[picture.suffix])
-
-
-@pytest.mark.parametrize("arguments", [["--help"], ["scenes"], ["solve", "two-dof", "--frequency", "1.2"]])
-def test_small_commands_load_nothing_heavy(arguments: list[str]) -> None:
-    heavy = ["cvxpy", "matplotlib", "fastapi", "sqlalchemy", "alembic", "httpx", "uvicorn"]
-    code = (
-        f"import sys; from service.cli import main; main({arguments!r}); "
-        f"sys.stderr.write(' '.join(set({heavy!r}) & set(sys.modules)))"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert done.stderr == ""
 
 
 def test_a_pipe_gets_no_progress() -> None:

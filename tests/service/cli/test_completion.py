@@ -1,17 +1,19 @@
 """Completion in the shell: what is offered behind a half-written line, and the script that asks for it."""
 
-from __future__ import annotations
-
+import contextlib
+import io
 import os
 import shutil
 import subprocess
 from pathlib import Path
+from unittest.mock import patch
 
 import pytest
 from launch import COMMAND
 
 import solver
 from optim.problem.problem import Method
+from service.cli import main
 from service.jobs.common.study_keys import WORDS
 from solver.scene.parameter_paths import parameter_paths
 
@@ -22,20 +24,17 @@ def run(line: str, instruction: str, folder: Path) -> str:
     """What the command prints for a shell; `line` ends where the cursor is."""
     words = f"stickslip {line}x".split()
     environment = {
-        **os.environ, "_STICKSLIP_COMPLETE": instruction, "COMP_WORDS": f"stickslip {line}",
-        "COMP_CWORD": str(len(words) - 1), "PYTHONPATH": str(ROOT),
+        "_STICKSLIP_COMPLETE": instruction, "COMP_WORDS": f"stickslip {line}",
+        "COMP_CWORD": str(len(words) - 1),
     }  # fmt: skip
-    done = subprocess.run(
-        COMMAND,
-        capture_output=True,
-        text=True,
-        cwd=folder,
-        env=environment,
-        check=False,
-        stdin=subprocess.DEVNULL,
-    )
-    assert (done.stderr, done.returncode) == ("", 0)
-    return done.stdout
+    out, said = io.StringIO(), io.StringIO()
+    with (
+        patch.dict(os.environ, environment), contextlib.chdir(folder),
+        contextlib.redirect_stdout(out), contextlib.redirect_stderr(said),
+    ):  # fmt: skip
+        assert main([]) == 0
+    assert said.getvalue() == ""
+    return out.getvalue()
 
 
 def offered(line: str, folder: Path) -> list[str]:

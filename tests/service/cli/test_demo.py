@@ -1,7 +1,5 @@
 """The demonstration, on a small case: a design and sweeps through the service, read back, drawn."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """`modes` with its questions, and `controlled`."""
 
-from __future__ import annotations
-
 import pytest
 
 from service.cli import main

@@ -1,7 +1,5 @@
 """`stickslip runs` and `stickslip projects` against a service."""
 
-from __future__ import annotations
-
 import json
 from typing import Any
 

@@ -40,6 +40,11 @@ def test_the_list_of_kinds_loads_no_service() -> None:
     assert loaded_by("submit", "--help") & (SERVICE | PICTURES | DESIGN | {"rich", "numba", "scipy"}) == set()
 
 
+def test_the_list_of_scenes_loads_no_service() -> None:
+    assert loaded_by("scenes") & (SERVICE | PICTURES | DESIGN) == set()
+
+
+@pytest.mark.few(5)
 @pytest.mark.parametrize("study", sorted(studies()))
 def test_help_of_a_command_loads_no_numbers(study: str) -> None:
     """Options follow from a model of Pydantic's; nothing that computes is needed for them."""

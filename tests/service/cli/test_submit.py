@@ -1,7 +1,5 @@
 """The commands that talk to a service, against one that runs as `stickslip serve`."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -81,6 +79,7 @@ def test_a_problem_file_goes_with_the_job_and_the_design_is_listed(run: Run, tmp
     assert "/sort" in run("results --sort colour")[2]
 
 
+@pytest.mark.long
 def test_a_front_is_submitted_and_drawn(run: Run, tmp_path: Path) -> None:
     status, out, _ = run("submit pareto two-dof --limit 1.5 --points 3 --harmonics 3 --wait --json")
     assert status == 0
@@ -125,6 +124,7 @@ def _without_time(report: str) -> list[str]:
     return [line for line in lines if line and not line.startswith("time")]
 
 
+@pytest.mark.long
 def test_a_study_of_accuracy_is_submitted_and_drawn(run: Run, tmp_path: Path) -> None:
     status, out, err = run("submit accuracy two-dof --frequency 1.2 --wait --json")
     assert (status, err) == (0, "")

@@ -1,7 +1,5 @@
 """`stickslip peaks` and `stickslip map`: JSON keys, words, pictures, bad input."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Tables in the docs, and sources that are generated, say what the code says."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """The report of an identification: what it says is what was found."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Design reports: complete, without anything from elsewhere, and enough to have the same again."""
 
-from __future__ import annotations
-
 import html
 import re
 import socket
@@ -171,6 +169,7 @@ def test_a_report_keeps_the_matrices_of_a_job_when_the_upload_is_gone(
     assert "damper.N0" in (tmp_path / "report.html").read_text("utf-8")
 
 
+@pytest.mark.long
 def test_a_report_of_several_cases_is_of_the_one_with_the_highest_peak() -> None:
     from service.rendering.report.design import design_report
     from service.rendering.report.sections import Designed
@@ -302,7 +301,7 @@ band = [0.5, 2.2]
 """
 
 
-@pytest.mark.few(2)
+@pytest.mark.long
 @pytest.mark.parametrize(("load", "bounded"), [((0.2, 6.0), True), ((5e5, 1e6), False)])
 def test_a_design_without_damping_is_reported_with_the_right_word(
     load: tuple[float, float], bounded: bool, server: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]

@@ -1,7 +1,5 @@
 """The condensed balance: residual against a direct evaluation, derivatives against central differences."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The condensed Jacobian solves what the whole one does, directly and transposed, by one factorisation."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

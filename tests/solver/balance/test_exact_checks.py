@@ -1,7 +1,5 @@
 """Checks to rounding: energy, scaling, symmetry, linear limits, one sector and the annulus, time marching."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

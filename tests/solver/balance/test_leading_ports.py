@@ -1,7 +1,5 @@
 """Steps in leading motions are those of all motions; solutions are those of full matrices and the march."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The judge of every answer: it passes what full matrices pass, and refuses what is a little off."""
 
-from __future__ import annotations
-
 import math
 import time
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Random scenes of a seeded generator: everything is solved, and what is solved is right."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What the plan leaves out changes nothing: every shipped scene with everything forced on, and one by one."""
 
-from __future__ import annotations
-
 from dataclasses import fields
 from functools import cache
 

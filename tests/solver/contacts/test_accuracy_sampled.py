@@ -1,7 +1,5 @@
 """Contact forces by samples: their own derivatives, their error, and their place in the balance."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass, replace
 from pathlib import Path

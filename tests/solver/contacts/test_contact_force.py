@@ -1,7 +1,5 @@
 """The closed-form contact force: reference values, a crude march, every derivative on every smooth piece."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The kernel of the circular limit finds the force alone as it does with all derivatives."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

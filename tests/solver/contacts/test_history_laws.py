@@ -5,8 +5,6 @@ quadrature for a regularised force, and time marching, which follows Iwan's slid
 integrates the rates of the others in its own steps.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What every registered law says of itself fits together, and a scene is read from it without Numba."""
 
-from __future__ import annotations
-
 import ast
 import math
 import runpy

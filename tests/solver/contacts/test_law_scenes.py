@@ -1,7 +1,5 @@
 """Scenes with every contact law: reading, the balance against time marching, continuation through folds."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Contact laws beside Coulomb with a given load: brute force, every derivative, limits, symmetries."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Normal loads of any harmonics: against the march, differences, the whole annulus, and the names N0, N1."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

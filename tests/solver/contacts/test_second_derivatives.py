@@ -1,7 +1,5 @@
 """Exact second derivatives: of the contact force, and of the amplitude by frequency and parameter."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from dataclasses import replace

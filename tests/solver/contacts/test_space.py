@@ -1,7 +1,5 @@
 """Friction in two directions under a load that moves: the law, limits, symmetries, every derivative."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Sequence

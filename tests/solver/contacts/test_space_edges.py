@@ -1,7 +1,5 @@
 """Friction in two directions at the edges of its pieces: dips of the rate of slip, begins of contact."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import replace

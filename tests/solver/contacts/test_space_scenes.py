@@ -1,7 +1,5 @@
 """Scenes with the law coulomb-3d beside the reference values, time marching and their own limits."""
 
-from __future__ import annotations
-
 import copy
 import json
 from pathlib import Path

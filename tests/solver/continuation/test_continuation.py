@@ -5,8 +5,6 @@ velocity, and the closed form keeps that for any number of harmonics. So these b
 folds are wanted, the structure is given negative damping, which friction holds.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

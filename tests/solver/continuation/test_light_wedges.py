@@ -1,8 +1,6 @@
 """Wedges so light that some of their points slip and others stick: responses that fold where a point begins
 to slip, and branches that pass there."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

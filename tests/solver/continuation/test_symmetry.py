@@ -1,7 +1,5 @@
 """Responses that lean to one side though nothing breaks their symmetry, and waves that are assumed."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Cosines and sines of several angles, against the C library and in the complex plane."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Eigenvalues by NumPy where small: held against SciPy's LAPACK, with rows of very different size."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 

@@ -1,7 +1,5 @@
 """The Fourier basis and the order of its coefficients."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """How kernels are compiled: one at a time, in several processes, and kept on disk for the next."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

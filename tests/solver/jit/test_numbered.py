@@ -1,7 +1,5 @@
 """Kernels called by number: a call announces those its contract knows, others load when asked for."""
 
-from __future__ import annotations
-
 import pickle
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Kernels are compiled for one type of system: whatever scene it is of, and however it was made."""
 
-from __future__ import annotations
-
 import numba
 import pytest
 

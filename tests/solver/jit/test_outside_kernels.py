@@ -1,7 +1,5 @@
 """A kernel from outside the package is kept on disk, and compiled anew after its file changed."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Influence of the gas between blades, against modal damping ratios, the annulus and the time march."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Bodies in the matrices: by hand, as lumped masses, beside matrices, and their derivatives."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Every parameter path of every scene: what it reads it sets, and its slopes are those of differences."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Large linear parts: sums over modes to rounding, decompositions kept, reduction, import, marching."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Structural damping of an unsymmetric stiffness: K (1 + iη), the antisymmetric part with it."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Receptances of many ports against plain sums and full matrices, and what is kept of them."""
 
-from __future__ import annotations
-
 import math
 
 import numba

@@ -1,7 +1,5 @@
 """The way through the modes against the receptance between all pairs, which shares none of its sums."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

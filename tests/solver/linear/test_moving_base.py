@@ -1,7 +1,5 @@
 """A base that moves, against forces in absolute motion, the march, differences; forces on many DOFs."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """The linear model of a scene: known frequencies, exact derivatives, caching."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Stresses and other sums of DOFs as what is observed."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

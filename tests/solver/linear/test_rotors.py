@@ -1,7 +1,5 @@
 """Gyroscopic, unsymmetric and hysteretic terms against closed forms, the time march and differences."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

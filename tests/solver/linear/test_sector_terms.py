@@ -1,7 +1,5 @@
 """Couplings, gas, structural damping and speed on a sector given by its matrices, against the lumped disk."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A sector given by its matrices against the same disk given otherwise."""
 
-from __future__ import annotations
-
 import math
 import re
 from typing import Any

@@ -1,7 +1,5 @@
 """An engine-order line, along which the speed follows the frequency, against each speed on its own."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

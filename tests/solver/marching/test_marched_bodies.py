@@ -1,7 +1,5 @@
 """Bodies held by contacts: the balance beside time marching, and what no frame may change."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

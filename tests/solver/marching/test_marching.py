@@ -1,7 +1,5 @@
 """Time marching against closed forms, a crude return map, energy, and the reference values."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Contacts in space marched in time: the reference values, the box, one direction."""
 
-from __future__ import annotations
-
 import copy
 import math
 

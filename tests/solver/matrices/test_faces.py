@@ -1,7 +1,5 @@
 """Faces of meshes that lie on each other: pairs, areas, and what `stickslip import --patch` makes of them."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any

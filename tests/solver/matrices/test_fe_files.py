@@ -1,7 +1,5 @@
 """Matrices of finite-element programs: every layout read, damaged files told by line or byte, rows named."""
 
-from __future__ import annotations
-
 from contextlib import suppress
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Harwell-Boeing files as other programs write them: every number comes back, or the file is refused."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

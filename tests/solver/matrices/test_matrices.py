@@ -1,7 +1,5 @@
 """Structures from matrices: files, inline values, refusals, and answers against other descriptions."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path

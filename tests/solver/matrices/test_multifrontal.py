@@ -1,7 +1,5 @@
 """The factor of a large matrix against the dense solution of the same equations."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

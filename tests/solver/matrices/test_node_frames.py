@@ -1,7 +1,5 @@
 """Nodes with frames of their own: decks of three programs against matrices written in the global frame."""
 
-from __future__ import annotations
-
 import json
 import math
 from functools import lru_cache

@@ -1,7 +1,5 @@
 """The outline of a sector's mesh: edges counted by hand, files that keep it, what is wrong with one."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any

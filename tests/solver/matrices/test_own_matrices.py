@@ -1,7 +1,5 @@
 """A user's own matrices: what may be wrong with them, each with a message that says what to do."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

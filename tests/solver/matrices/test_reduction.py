@@ -1,7 +1,5 @@
 """Large models reduced: how good it is, free bodies, files of reduced models, checks of what is imported."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

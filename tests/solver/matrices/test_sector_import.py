@@ -1,7 +1,5 @@
 """Sectors of finite-element programs: decks, boundaries, reduction, the command; CalculiX beside them."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

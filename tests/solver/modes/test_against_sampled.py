@@ -1,7 +1,5 @@
 """Nonlinear modes against the extended periodic motion by samples in time, which shares no code with them."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Nonlinear modes whose frequency and damping are formulas."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

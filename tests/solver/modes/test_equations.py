@@ -1,7 +1,5 @@
 """The equations of nonlinear modes: their Jacobian against differences of their residual."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Gas that feeds one mode alone: its cycles move a structure that has 2ζω(Mφ)(Mφ)ᵀ in its damping."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Derivatives of frequency and damping at an amplitude against central differences."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Any

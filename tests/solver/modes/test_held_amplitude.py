@@ -1,7 +1,5 @@
 """Responses at a held amplitude against responses solved, swept and marched at the force found."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Flutter held by friction against the march in time and the closed form of one slider."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

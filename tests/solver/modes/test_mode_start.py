@@ -1,7 +1,5 @@
 """A mode begins as the one asked for, also where dashpots at rest hold what the undamped mode moves."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The estimated error of a performance curve against whole responses, and its gradient by differences."""
 
-from __future__ import annotations
-
 import math
 import sys
 

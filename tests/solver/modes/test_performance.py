@@ -1,7 +1,5 @@
 """Performance curves against peaks of whole responses, and the curves they come from."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

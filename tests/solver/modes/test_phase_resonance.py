@@ -1,7 +1,5 @@
 """Responses in phase resonance against responses solved at their frequency and force."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

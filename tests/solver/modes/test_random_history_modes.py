@@ -5,8 +5,6 @@ period give its ω and ζ, and whether the motion, marched freely with −2ζωM
 harmonics miss may differ by what the result says of it.
 """
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

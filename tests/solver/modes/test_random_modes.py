@@ -4,8 +4,6 @@ With the damping −2ζωM of a point added as dashpots, the point is a motion o
 the march, which shares no code with the balance, has to repeat it.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -5,8 +5,6 @@ force works π P A a period and the slider takes 4F (A − F/k_d), so A = 4F² /
 πP/k_d, at F = μN₀ = πP/2: A is twice the motion from which it slips, and m ω² = k + k_d/2.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

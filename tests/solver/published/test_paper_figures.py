@@ -1,7 +1,5 @@
 """The figures of the paper: every script of docs/paper runs, and the page quotes the numbers it prints."""
 
-from __future__ import annotations
-
 import re
 import runpy
 import sys

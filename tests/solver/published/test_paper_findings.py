@@ -1,7 +1,5 @@
 """What the paper found with its two scenes (DOI 10.1177/1461348419834759), each finding a test."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

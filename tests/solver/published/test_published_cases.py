@@ -1,7 +1,5 @@
 """Values that others published, with their laws: three masses, one Jenkins element, a lumped bladed disk."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """All solutions, uniqueness, branch switching and residual forces: against the march and brute force."""
 
-from __future__ import annotations
-
 import json
 import math
 from typing import Any

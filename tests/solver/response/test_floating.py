@@ -1,7 +1,5 @@
 """Bodies that nothing but contacts holds: dampers that float between blades, and those that ratchet away."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from floating_cases import DAMPER, pulled, two_blades, underplatform

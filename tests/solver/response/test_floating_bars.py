@@ -1,7 +1,5 @@
 """Bars that sliders alone hold: light masses, far below any resonance, of the static size of their loads."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

@@ -1,7 +1,5 @@
 """Stability: multipliers against closed forms, the marched return map, folds, growth in time."""
 
-from __future__ import annotations
-
 import json
 import math
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """What of a response depends on how it began: the flags and bounds against marches from several starts."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Multipliers by collocation beside exponentials and an integrator, of a share of a wave; stops."""
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 from typing import Any

@@ -1,7 +1,5 @@
 """Mean loads on what contacts alone hold: within friction, above it, or creeping under what vibrates."""
 
-from __future__ import annotations
-
 import json
 import math
 

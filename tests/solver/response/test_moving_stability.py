@@ -1,7 +1,5 @@
 """Stability under loads that move, in space, with gaps and springs that bend, against the march."""
 
-from __future__ import annotations
-
 import time
 
 import numpy as np

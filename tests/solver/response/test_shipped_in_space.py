@@ -1,7 +1,5 @@
 """The shipped scenes in space: responses beside time marching, from rest and from the response itself."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from cases.random_space import Outcome, judge

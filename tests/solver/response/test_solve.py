@@ -1,7 +1,5 @@
 """One periodic response: the reference values, the error estimate, flags, states and refusals."""
 
-from __future__ import annotations
-
 import json
 import math
 from typing import Any

@@ -1,7 +1,5 @@
 """A structure without damping at its resonances: the word is damping, not harmonics."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

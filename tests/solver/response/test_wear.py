@@ -1,7 +1,5 @@
 """Wear: friction work, least load and travel against power balance, time march and the whole solve."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any

@@ -1,7 +1,5 @@
 """Ctrl-C ends a computation with what it has so far; a second one ends it at once."""
 
-from __future__ import annotations
-
 import _thread
 import signal
 import threading

@@ -1,7 +1,5 @@
 """The annulus written out has the motion of its sector."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

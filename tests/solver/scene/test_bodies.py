@@ -1,7 +1,5 @@
 """Bodies, nodes and frames: kinematics against finite rotations, and what is refused."""
 
-from __future__ import annotations
-
 import copy
 import math
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Scenes from code are those of files, and what is wrong with them is told at its place."""
 
-from __future__ import annotations
-
 import tomllib
 
 import pytest

@@ -1,7 +1,5 @@
 """Changed TOML holds exactly what is wanted and keeps the words of everything else."""
 
-from __future__ import annotations
-
 import json
 import random
 import tomllib

@@ -1,7 +1,5 @@
 """Damaged scenes and files of matrices: the documented errors and no other, in bounded time and memory."""
 
-from __future__ import annotations
-
 import copy
 import io
 import json

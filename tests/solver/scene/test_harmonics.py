@@ -1,7 +1,5 @@
 """Harmonics of forces and loads are kept whatever number is asked for, and everything built on them fits."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Scenes: what they accept, how they report what is wrong, parameter paths."""
 
-from __future__ import annotations
-
 import copy
 import json
 import math

@@ -1,7 +1,5 @@
 """Dampers by their shape: the bodies and contacts they make, their parameters, what is refused."""
 
-from __future__ import annotations
-
 import copy
 import math
 from typing import Any

@@ -1,7 +1,5 @@
 """Groups of masses, springs and dashpots: one value for many parts, each with its factor."""
 
-from __future__ import annotations
-
 import copy
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Templates: the natural frequency, damping and stuck resonance that were asked for; random answers."""
 
-from __future__ import annotations
-
 import math
 import random
 from typing import Any

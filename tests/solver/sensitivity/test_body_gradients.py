@@ -1,7 +1,5 @@
 """Derivatives by mass, inertia, loads and speed, and continuation in them."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

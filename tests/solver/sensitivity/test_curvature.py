@@ -1,7 +1,5 @@
 """The exact Hessian of amplitudes, peaks and band edges: against differences through the whole solve."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Hessians and gradients of amplitudes and peaks for the laws beside `coulomb`: against the whole solve."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from curvature_cases import (

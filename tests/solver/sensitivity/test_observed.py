@@ -1,7 +1,5 @@
 """Measured quantities: values as `solve` reports them, derivatives as central differences of it."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

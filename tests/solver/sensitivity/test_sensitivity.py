@@ -1,7 +1,5 @@
 """Derivatives by many parameters from one adjoint: against one at a time, and against differences."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

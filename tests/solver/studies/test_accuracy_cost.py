@@ -1,7 +1,5 @@
 """What accuracy costs: the rows, which of them lead, the table and the picture."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path

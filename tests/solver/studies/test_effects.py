@@ -1,7 +1,5 @@
 """The plan of a scene: what is computed, what is left out, and why."""
 
-from __future__ import annotations
-
 import json
 import re
 from typing import Any

@@ -1,7 +1,5 @@
 """Interference diagrams against the matrices of the whole annulus, and against orders by hand."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

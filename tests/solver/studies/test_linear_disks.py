@@ -1,7 +1,5 @@
 """Mistuned disks without friction against a direct solve of all sectors, and Whitehead's bound."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The memory that dense matrices are said to take, against that of real solves in processes of their own."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Mistuned disks and standing waves: the whole annulus against one sector, time marching and symmetries."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Studies of many mistuned disks: each disk against the same disk on its own."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from typing import Any

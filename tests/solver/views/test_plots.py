@@ -1,7 +1,5 @@
 """Pictures: what is on them, their units, and that a file is whole or not there."""
 
-from __future__ import annotations
-
 import contextlib
 from itertools import pairwise
 from pathlib import Path

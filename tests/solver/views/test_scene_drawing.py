@@ -1,7 +1,5 @@
 """The drawing of a scene: every mass, contact and force is on it, and nothing stands on anything else."""
 
-from __future__ import annotations
-
 from itertools import combinations
 from math import dist
 

@@ -1,7 +1,5 @@
 """Error estimates against true errors, of random scenes in every regime and of peaks."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Resonance bands that end in a fold: where they end, and how the end moves."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any

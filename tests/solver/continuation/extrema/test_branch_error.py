@@ -1,7 +1,5 @@
 """The estimate of a branch covers its highest peak, also where more harmonics put it elsewhere."""
 
-from __future__ import annotations
-
 import math
 import time
 from pathlib import Path

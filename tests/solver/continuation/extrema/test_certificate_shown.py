@@ -1,7 +1,5 @@
 """What a response knows between its points is told, and nothing is claimed of what it does not know."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

@@ -1,7 +1,5 @@
 """Error estimates of stiff friction and of bars that slip bit by bit, by marches and a closed form."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Lightly damped scenes: sweeps, maps, tracks and Campbell diagrams judged by brute force over points."""
 
-from __future__ import annotations
-
 import math
 import sys
 from collections import Counter

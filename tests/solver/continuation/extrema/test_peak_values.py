@@ -1,7 +1,5 @@
 """Peaks: the same on every way along a branch, and those published for another chain."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Peaks and bands of a branch: against brute force, against values of other codes and of time marching."""
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 

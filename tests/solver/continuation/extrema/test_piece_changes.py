@@ -1,7 +1,5 @@
 """Small maxima where contacts change the pieces of their laws, judged by points solved each by itself."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from light_points import PointSolver

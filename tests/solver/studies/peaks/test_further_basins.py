@@ -1,7 +1,5 @@
 """Further basins by the coarse stage: what they cost, against sweeps, and that the proof stays as it is."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 

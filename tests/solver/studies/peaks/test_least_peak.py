@@ -1,7 +1,5 @@
 """The least highest peak against brute force, its cost, its basins, and every way to end."""
 
-from __future__ import annotations
-
 import inspect
 import math
 from functools import cache

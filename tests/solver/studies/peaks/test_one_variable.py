@@ -1,7 +1,5 @@
 """One variable: random problems against brute force, intervals of equal optima, and bounded work."""
 
-from __future__ import annotations
-
 import math
 import time
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Tracked peaks against sweeps, differences, the design search and published optima; every way to end."""
 
-from __future__ import annotations
-
 import math
 from functools import cache
 

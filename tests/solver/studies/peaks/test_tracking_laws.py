@@ -1,7 +1,5 @@
 """Peaks followed over a parameter for the laws beside `coulomb`: against sweeps and brute force over them."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
