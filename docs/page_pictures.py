@@ -219,10 +219,10 @@ def compare(page: Any) -> None:
     """Show two runs side by side."""
     anew(page)
     page.click("#tab-runs")
-    runs = page.locator("#runs-table tr[data-run]")
+    runs = page.locator("#runs-table tr[data-run]", has_text="design")
     runs.first.wait_for()
-    # The last but one is that of the smaller range.
-    for one in (runs.first, runs.nth(runs.count() - 2)):
+    # The second is that of the smaller range.
+    for one in (runs.first, runs.nth(1)):
         one.locator("input[type=checkbox]").first.check()
     page.locator("#runs-compare-body table").first.wait_for()
     page.locator("#runs-compare").evaluate("card => card.scrollIntoView()")
