@@ -219,10 +219,10 @@ def compare(page: Any) -> None:
     """Show two runs side by side."""
     anew(page)
     page.click("#tab-runs")
-    runs = page.locator("#runs-table tr[data-run]")
+    runs = page.locator("#runs-table tr[data-run]", has_text="design")
     runs.first.wait_for()
-    # The last but one is that of the smaller range.
-    for one in (runs.first, runs.nth(runs.count() - 2)):
+    # That of the smaller range ends at its bound.
+    for one in (runs.first, runs.filter(has_text="shroud.N0 60 N").first):
         one.locator("input[type=checkbox]").first.check()
     page.locator("#runs-compare-body table").first.wait_for()
     page.locator("#runs-compare").evaluate("card => card.scrollIntoView()")

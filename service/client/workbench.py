@@ -16,6 +16,7 @@ from service.schemas.workbench_answers import (
     ProjectPage,
     RunAnswer,
     RunPage,
+    RunSummary,
     ShareAnswer,
     SharedRun,
     ShareList,
@@ -113,6 +114,10 @@ class Workbench(Asking):
     def compare(self, a: str, b: str) -> Comparison:
         """Two runs: the inputs that differ, and the figures of their results."""
         return self._get(Comparison, "/v1/runs/compare", a=a, b=b)
+
+    def summary(self, run_id: str, points: int = 60) -> RunSummary:
+        """What was asked of a run, its figures, and its response in at most so many points."""
+        return self._get(RunSummary, f"{_run(run_id)}/summary", points=points)
 
     def share_run(self, run_id: str, days: float | None = None) -> NewShareAnswer:
         """Make a link to a run that needs no key, for so many days or until it is ended."""

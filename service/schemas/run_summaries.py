@@ -6,51 +6,19 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from pydantic import Field
 
 from service.db.models import JobState
 from service.db.repositories.runs import RunRow
 from service.jobs.arrays import decode
 from service.jobs.figures import SweepRecord
 from service.queue.core import Service
-from service.schemas.answers import AnswerModel, Peak
+from service.schemas.answers import Peak
+from service.schemas.workbench_answers import RunSummary, SmallCurve
 
 _FREQUENCY = "frequency"
 _STATES = (JobState.SUCCESSFUL, JobState.FAILED)
 
 Json = Mapping[str, Any]
-
-
-class SmallCurve(AnswerModel):
-    """A response in few points: the highest amplitude [m] of each stretch, and the frequency [Hz] there."""
-
-    sweep: str = Field(description="Id of the stored sweep.")
-    frequency_hz: list[float]
-    amplitude: list[float]
-
-
-class RunSummary(AnswerModel):
-    """What was asked of a run and what came out, in figures; null where there is none.
-
-    Attributes
-    ----------
-    values : at the optimum, else those that were identified or set.
-    """
-
-    id: str
-    request: dict[str, Any] | None
-    values: dict[str, float | None]
-    peak: Peak | None = Field(
-        description="The highest peak [m] and its frequency [Hz]; of a robust design the worst."
-    )
-    worst: bool = Field(description="Whether that is the worst of uncertain cases.")
-    band_hz: float | None
-    error_estimate: float | None = Field(description="Of the highest peak [m].")
-    harmonics: int | None
-    found: list[str] = Field(
-        description="What else there is to say: how many optima, modes, designs of a front."
-    )
-    curve: SmallCurve | None
 
 
 def run_summary(service: Service, run: RunRow, points: int) -> RunSummary:

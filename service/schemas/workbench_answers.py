@@ -12,7 +12,7 @@ from service.db.models import JobState, Project, Share
 from service.db.repositories.runs import RunFilter, RunRow
 from service.jobs.outputs import AttemptProgress
 from service.jobs.registry import LONGEST_TAG, MOST_TAGS, Notes, ProjectName, RunName, Tags
-from service.schemas.answers import AnswerModel, JobAnswer, Page
+from service.schemas.answers import AnswerModel, JobAnswer, Page, Peak
 from service.schemas.pages import Cursor, Limit, ListQuery
 
 _REVISION = "Counts the changes; the `ETag`, for `If-Match` of a change."
@@ -150,6 +150,38 @@ class Comparison(AnswerModel):
     inputs: list[InputDifference] = Field(description="What differs, as it was computed.")
     more_inputs: int = Field(description="How many more differ than are listed.")
     results: list[Figure] = Field(description="The main figures of both, equal ones too.")
+
+
+class SmallCurve(AnswerModel):
+    """A response in few points: the highest amplitude [m] of each stretch, and the frequency [Hz] there."""
+
+    sweep: str = Field(description="Id of the stored sweep.")
+    frequency_hz: list[float]
+    amplitude: list[float]
+
+
+class RunSummary(AnswerModel):
+    """What was asked of a run and what came out, in figures; null where there is none.
+
+    Attributes
+    ----------
+    values : at the optimum, else those that were identified or set.
+    """
+
+    id: str
+    request: dict[str, Any] | None
+    values: dict[str, float | None]
+    peak: Peak | None = Field(
+        description="The highest peak [m] and its frequency [Hz]; of a robust design the worst."
+    )
+    worst: bool = Field(description="Whether that is the worst of uncertain cases.")
+    band_hz: float | None
+    error_estimate: float | None = Field(description="Of the highest peak [m].")
+    harmonics: int | None
+    found: list[str] = Field(
+        description="What else there is to say: how many optima, modes, designs of a front."
+    )
+    curve: SmallCurve | None
 
 
 _CHANGES = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)

@@ -154,3 +154,13 @@ def test_back_and_forward_go_through_scenes_and_tabs(profile: Profile, site: Sit
     expect(page.locator("#scene")).to_have_value("bladed-disk")
     expect(page.locator("#live-status")).to_contain_text("0.1016 mm")
     expect(page.locator("#chips li")).to_have_count(0)
+
+
+def test_every_name_in_the_page_is_said_once(profile: Profile, site: Site) -> None:
+    """Fields that schemas name do not take the names of figures."""
+    page = visit(profile[0], site, "?scene=bladed-disk&tab=all")
+    twice = page.evaluate(
+        """() => Object.entries(Object.groupBy([...document.querySelectorAll("[id]")], ({ id }) => id))
+          .filter(([, all]) => all.length > 1).map(([id]) => id)"""
+    )
+    assert twice == []

@@ -29,7 +29,6 @@ TRIES = 5
 VIEWS = (
     "structure",
     "live",
-    "response",
     "problem",
     "design",
     "map",

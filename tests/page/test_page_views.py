@@ -47,7 +47,7 @@ def test_a_mode_is_followed_and_its_points_are_looked_at(profile: Profile, site:
     expect(page.locator("#modes-status")).to_contain_text(f"{mode.amplitude.size} points in")
     expect(page.locator("#modes-facts")).to_contain_text(f"{mode.frequency_hz[0]:.6g} Hz")
     expect(page.locator("#modes-facts")).to_contain_text(f"ζ {100 * mode.damping_ratio.max():.4g} %")
-    expect(page.locator("#modes-performance path.f2")).to_have_count(4)  # three responses, and their name
+    expect(page.locator("#modes-peaks path.f2")).to_have_count(4)  # three responses, and their name
     best = page.locator("#modes-loop path.series").get_attribute("d")
     page.locator("#modes-frequency svg.chart").focus()
     page.keyboard.press("Home")

@@ -46,14 +46,19 @@ def test_a_scene_that_is_not_there_is_refused(shipped: httpx.Client) -> None:
 def test_a_study_is_taken_as_it_is_proposed(shipped: httpx.Client, name: str) -> None:
     """Every proposal goes through the checks of a job; what is refused is refused there too."""
     told = shipped.post("/v1/scenes/parameters", json={"scene": name}).json()
-    contacts = {contact.name for contact in solver.load_scene(name).contacts}
+    scene = solver.load_scene(name)
+    contacts = {contact.name for contact in scene.contacts}
     assert {one for joint in told["joints"] for one in joint["contacts"]} == contacts
     designed = {one["path"]: one["bounds"] for one in told["items"] if one["bounds"]}
     assert designed
     path, bounds = next(iter(designed.items()))
     assert 0.0 <= bounds[0] < bounds[1]
-    further = {"map": {"parameter": path, "from": bounds[0], "to": bounds[1]}, "mistuning": {"of": "nothing"},
-               "identify": {"data": [{"frequency": [1.0], "amplitude": [1.0]}]}}  # fmt: skip
+    varied = {"variables": {path: bounds}}
+    measured = {"frequency": list(scene.observe.band), "amplitude": [1.0, 1.0]}
+    further: dict[str, dict[str, object]] = {
+        "map": {"parameter": path, "from": bounds[0], "to": bounds[1]}, "mistuning": {"of": "nothing"},
+        "identify": {"data": [measured]}, "design": varied, "pareto": varied,
+    }  # fmt: skip
     for study in told["studies"]:
         body = {"kind": study["kind"], "scene": name, **study["body"], **further.get(study["kind"], {})}
         answer = shipped.post("/v1/jobs", json=body)

@@ -169,9 +169,7 @@ def _at_one_frequency(scene: Scene) -> Proposed:
 
 
 _SWEEP = 200  # points of a response, about
-_POINTS: Mapping[str, int] = {
-    "sweep": _SWEEP, "design": 4 * _SWEEP, "map": 60 * 400, "campbell": _SWEEP, "pareto": 25 * _SWEEP,
-}  # fmt: skip
+_POINTS: Mapping[str, int] = {"sweep": _SWEEP, "campbell": _SWEEP}  # of a search nobody knows it before
 _PROPOSED: Mapping[str, Callable[[Scene], Proposed]] = {
     "map": _map, "campbell": _campbell, "interference": _interference, "modes": _modes,
     "identify": _identify,

@@ -3,6 +3,8 @@
 const UNIT = /\[([^\]]+)\]/;
 // A unit that the name of a key ends with is said beside its field.
 const SUFFIXES = { _hz: "Hz", _rpm: "1/min" };
+// A bound that stands for 0, which is out.
+const TINY = 1e-6;
 const RANGE = /^\s*(\S+?)\s*(?:to|–|…|:)\s*(\S+)\s*$/;
 
 // What can not be read as what it should be, with the pointer to it.
@@ -48,6 +50,7 @@ export const fieldsOf = ({ properties, required = [], $defs = {} }) =>
 
 function endsOf({ minimum, exclusiveMinimum: above, maximum, exclusiveMaximum: below }) {
   const far = (end) => end === undefined || Math.abs(end) >= 1e9;
+  if (minimum > 0 && minimum < TINY) return endsOf({ exclusiveMinimum: 0, maximum, exclusiveMaximum: below });
   return [above !== undefined && !far(above) ? `above ${above}` : far(minimum) ? "" : `from ${minimum}`,
     below !== undefined && !far(below) ? `below ${below}` : far(maximum) ? "" : `to ${maximum}`].filter(Boolean).join(" ");
 }

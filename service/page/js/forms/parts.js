@@ -77,7 +77,7 @@ export function fieldPart(id, field) {
   const per = () => (isLength ? 1 / METRES[unit.value] : 1);
   const sized = (metres) => { if (isLength && lengthUnit(metres).name in METRES) unit.value = lengthUnit(metres).name; };
   const [key, inside] = field.at ?? [field.key];
-  const about = [field.words, field.kind === "number" && field.ends && hintOf(field) !== field.ends ? `(${field.ends})` : ""].filter(Boolean).join(" ");
+  const about = [field.words, field.kind === "number" && field.ends && field.ends !== "above 0" && hintOf(field) !== field.ends ? `(${field.ends})` : ""].filter(Boolean).join(" ");
   return {
     key: field.key, input, sized: (metres) => input.value === "" && sized(metres),
     node: el("div", { class: field.kind === "truth" ? "field check" : "field" }, el("label", { for: name }, field.required ? `${field.label} (needed)` : field.label), el("span", { class: "pair" }, input, unit),

@@ -25,7 +25,7 @@ export function startModes() {
   plots = {
     frequency: chart(byId("modes-frequency"), { label: "Frequency over amplitude", file: "mode-frequency", height: 280, link: "amplitude", onPick: pick }),
     damping: chart(byId("modes-damping"), { label: "Damping ratio over amplitude", file: "mode-damping", height: 280, link: "amplitude", onPick: pick }),
-    performance: chart(byId("modes-performance"), { label: "Peak of the mode", file: "mode-peaks", height: 280 }),
+    performance: chart(byId("modes-peaks"), { label: "Peak of the mode", file: "mode-peaks", height: 280 }),
     loop: chart(byId("modes-loop"), { label: "Loop at the amplitude", file: "mode-loop", height: 280 }),
     shape: chart(byId("modes-shape"), { label: "Shape at the amplitude", file: "mode-shape", height: 280 }),
   };
@@ -42,7 +42,7 @@ function clear() {
   plots.loop.clear("Hysteresis loops of a chosen amplitude.");
   plots.shape.clear("Shape at a chosen amplitude.");
   say("modes-status", "The free motion of a mode changes with its amplitude: stuck contacts are springs, sliding ones dampers.");
-  for (const id of ["modes-tools", "modes-facts", "modes-loop-more", "modes-performance-more"]) show(byId(id));
+  for (const id of ["modes-tools", "modes-facts", "modes-loop-more", "modes-peaks-more"]) show(byId(id));
 }
 
 export const modesView = {
@@ -80,7 +80,7 @@ function drawPerformance() {
   plots.performance.draw(performanceChart(last.result, by));
   const choices = performance.scales ? [["load", "over the loads"], ["excitation", "over the excitation"]] : [];
   const loads = loadsAt(performance.least?.load);
-  show(byId("modes-performance-more"), el("div", { class: "row" },
+  show(byId("modes-peaks-more"), el("div", { class: "row" },
     choices.map(([key, words]) => el("button", { type: "button", "aria-pressed": String(key === by), onclick: () => { by = key; drawPerformance(); } }, words)),
     Object.keys(loads).length ? el("button", { type: "button", onclick: () => putAll({ ...state.set, ...loads }) }, `Use the loads × ${number(performance.least.load, 3)}`) : null),
     performance.scales ? null : el("p", { class: "note" }, "Forces, loads and motions do not grow together here: peaks over the loads are not known."));

@@ -118,8 +118,8 @@ function certificate({ reached, status, optimality, warnings = [], basins = [] }
   if (changedSince("design").length) return ["Certificate", "for earlier values", "not for those set now", "answer-certificate"];
   const residual = typeof optimality === "number" ? ` Optimality residual ${number(optimality, 2)}.` : "";
   const doubts = warnings.length ? ` ${warnings.length === 1 ? "A warning" : `${warnings.length} warnings`}, on the tab Design.` : "";
-  const best = basins.length > 1 ? `best of ${basins.length} optima found` : "optimum found";
-  return ["Certificate", reached ? `${best}${warnings.length ? ", with warnings" : ""}` : "not reached", `${status}${residual}${doubts}`, "answer-certificate"];
+  const [best, more] = basins.length > 1 ? [`best of ${basins.length}`, " optima found"] : ["optimum", " found"];
+  return ["Certificate", reached ? [best, el("span", { class: "beside" }, `${more}${warnings.length ? ", with warnings" : ""}`)] : "not reached", `${status}${residual}${doubts}`, "answer-certificate"];
 }
 
 // In spite of what is not known: the worst case of the best nominal design, and of this one.

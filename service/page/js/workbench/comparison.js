@@ -68,7 +68,8 @@ function overlay(runs, summaries) {
 function quantities({ a, b, inputs, results }, [one, other]) {
   const pair = (name, unit, of) => ({ name, unit, a: of(one), b: of(other) });
   const paths = [...new Set([one, other].flatMap(({ values }) => Object.keys(values)))];
-  const told = { ...(kindOf(b.kind)?.result?.properties ?? {}), ...(kindOf(a.kind)?.result?.properties ?? {}) };
+  // What the schemas of the results say, of those that have several forms of each.
+  const told = Object.assign({}, ...[b, a].flatMap(({ kind }) => [...Object.values(kindOf(kind)?.result?.$defs ?? {}), kindOf(kind)?.result ?? {}]).map(({ properties }) => properties ?? {}));
   const settings = Object.fromEntries([a, b].flatMap(({ kind }) => kindOf(kind)?.fields ?? []).map((field) => [field.key, field]));
   const worst = [one, other].some((summary) => summary.worst);
   return [

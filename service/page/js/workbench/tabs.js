@@ -33,7 +33,10 @@ export function startTabs() {
 export const restoreTab = () => openTab(known(state.tab) ? state.tab : FIRST_TAB);
 
 export function openTab(name) {
-  if (name !== state.tab) step();
+  if (name !== state.tab) {
+    step();
+    byId("panel").scrollTop = 0;
+  }
   state.tab = name;
   for (const [each] of TABS) {
     const tab = byId(`tab-${each}`);
