@@ -18,7 +18,8 @@ Elsewhere the motions are, φ = G δ_f and (I + R_ff G) δ_f = (T b)_f, which lo
 nothing damps: there T b and R φ cancel. Both have the sign of det dr/du.
 
 Nothing is approximated: a contact that begins to slip is free at the next evaluation. Where fewer leading
-ports move all others, `solver.balance.kernels.coordinates` takes its place.
+ports move all others, `solver.balance.kernels.coordinates` takes its place, and
+`solver.balance.kernels.banded` where many contacts feel few others each.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ import math
 
 import numpy as np
 
+from solver.balance.kernels.banded import factorise_banded, step_banded, step_banded_transposed
 from solver.balance.kernels.coordinates import (
     factorise_coordinates,
     is_reduced,
@@ -37,6 +39,7 @@ from solver.balance.kernels.gauge import keep_means
 from solver.balance.kernels.slopes import slopes_times, take_slopes
 from solver.contacts.kernels.system import (
     AT_BRANCH_POINT,
+    BANDED,
     FREE,
     HELD,
     MIXED,
@@ -313,6 +316,10 @@ def factorise(
     """
     if is_reduced(system, linear):
         return factorise_coordinates(system, linear, point, tangent, weight_u, weight_p)
+    point.counts[AT_BRANCH_POINT] = 0
+    sign = factorise_banded(system, linear, point, tangent, weight_u, weight_p)
+    if not math.isnan(sign):
+        return sign
     _part(system, point)
     take_slopes(system, point)
     if not _eliminate(system, linear, point):
@@ -322,7 +329,6 @@ def factorise(
     else:
         _assemble_mixed(system, point)
     size = point.counts[FREE] * coefficient_count(system.ks)
-    point.counts[AT_BRANCH_POINT] = 0
     if weight_p > 0.0:
         _border(system, point, tangent, weight_u, weight_p)
         size += 1
@@ -378,6 +384,9 @@ def step_back(system: System, point: Evaluation, x: Real) -> None:
     if point.pushed.shape[1] > 0:
         step_in_coordinates(system, point, x)
         return
+    if point.counts[BANDED] > 0:
+        step_banded(system, point, x)
+        return
     n, nt, size = coefficient_count(system.ks), point.border.size, point.counts[SIZE]
     kept, gone = point.free[: point.counts[FREE]], point.held[: point.counts[HELD]]
     end, motions, forces, rhs = kept.size * n, point.work[0, :nt], point.work[1, :nt], point.work[2]
@@ -423,6 +432,9 @@ def step_back_transposed(system: System, point: Evaluation, x: Real) -> None:
     """
     if point.pushed.shape[1] > 0:
         step_in_coordinates_transposed(system, point, x)
+        return
+    if point.counts[BANDED] > 0:
+        step_banded_transposed(system, point, x)
         return
     n, nt, size = coefficient_count(system.ks), x.size, point.counts[SIZE]
     kept, gone = point.free[: point.counts[FREE]], point.held[: point.counts[HELD]]

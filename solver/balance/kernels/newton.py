@@ -27,8 +27,12 @@ from solver.linear.kernels.receptance import receptance
 
 TARGET = 1e-11  # relative residual aimed at
 ACCEPTED = 1e-9  # relative residual still a solution when rounding allows no better
-# Factors serve another step where they are at least this large and the last one left this share at most.
-_KEPT_FROM, _KEPT = 100, 0.02
+# Factors serve another step where they are at least this large and the last one left this share at most; the
+# second share where forces cost more than factors, which is below so many unknowns.
+_KEPT_FROM, _KEPT, _KEPT_BY_DEAR_FORCES = 100, 0.02, 0.005
+DEAR_FORCES_BELOW = 400
+# An arc is given up where from this iteration on more than this share of the first residual is left.
+_HOPELESS_FROM, _HOPELESS = 2, 0.5
 # Steps in a row that leave more than this share of the least residual, after which one along an arc is given
 # up: between pieces that contacts change to and fro it would go round in circles.
 _IN_VAIN, _NO_NEARER = 3, 0.7
@@ -123,13 +127,13 @@ def arc_newton(
     rhs, best = np.empty(n + 1), np.empty(n)
     before, norm, stalls, vain, kept = np.inf, np.inf, 0, 0, False
     best_p, best_norm, nearer = p, np.inf, np.inf
-    iteration = 0
+    first, iteration, dear = np.inf, 0, system.alone.sum() > 0
     for iteration in range(most + 1):
         receptance(system, p, linear)
         norm = evaluate(system, linear, u, p, 0.0, point)
         if not math.isfinite(norm):
             break
-        vain += 1
+        vain, first = vain + 1, norm if iteration == 0 else first
         if norm <= _NO_NEARER * nearer:
             nearer, vain = norm, 0
         if norm < best_norm:
@@ -140,9 +144,12 @@ def arc_newton(
         settled = norm <= 0.1 * ACCEPTED or stalls > 1
         if norm <= TARGET or (norm <= ACCEPTED and stalls > 0 and settled):
             return True, iteration, p, norm
-        if iteration == most or vain >= _IN_VAIN or norm > 1e3 * max(before, 1e-3):
+        hopeless = vain >= _IN_VAIN or (iteration >= _HOPELESS_FROM and norm > _HOPELESS * first)
+        if iteration == most or hopeless or norm > 1e3 * max(before, 1e-3):
             break
-        serves = _is_close(norm, before) or (norm <= _KEPT * before and point.counts[SIZE] >= _KEPT_FROM)
+        size = point.counts[SIZE]
+        share = _KEPT_BY_DEAR_FORCES if dear and size < DEAR_FORCES_BELOW else _KEPT
+        serves = _is_close(norm, before) or (norm <= share * before and size >= _KEPT_FROM)
         if not (kept and serves):
             if factorise(system, linear, point, tangent, weight_u, weight_p) == 0.0:
                 break

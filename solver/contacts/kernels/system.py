@@ -37,8 +37,8 @@ FREQUENCY, LEVEL, FORCE_PHASE, STRUCTURE = 0, 1, 2, 3
 # How Z⁻¹ is kept.
 MODES, POLES, DENSE = 0, 1, 2
 # Numbers in `Evaluation.counts`.
-FREE, HELD, SIZE, AT_BRANCH_POINT, UNHELD, PINNED, MIXED = 0, 1, 2, 3, 4, 5, 6
-COUNTS = 7
+FREE, HELD, SIZE, AT_BRANCH_POINT, UNHELD, PINNED, MIXED, BANDED = range(8)
+COUNTS = 8
 # Numbers that say where and of what a receptance's A was filled.
 PLACE = 5
 
@@ -144,7 +144,8 @@ class Evaluation(NamedTuple):
     held: Integer  # (nc,) ports eliminated
     counts: Integer  # (COUNTS,) numbers of both, size of the factors, whether they belong to a branch point,
     # the number of directions in which nothing holds a part, and that at the factors' point; whether an
-    # element has both ports kept and eliminated
+    # element has both ports kept and eliminated; 1: the factors are those of
+    # `solver.balance.kernels.banded`, −1: they cannot be
     G: Real  # (blocks, n, n) dF_dU less the shift, at the factors' point
     responses: Complex  # (nk, nc, nc) R in the columns of ports kept, V and D⁻¹ in those of ports eliminated,
     # likewise below; see `solver.balance.kernels.jacobian`. Of leading ports (nk, r, r), Â

@@ -7,10 +7,49 @@ import math
 import numpy as np
 
 from solver.contacts.kernels.system import System
-from solver.continuation.kernels.state import COUNT, CUBIC, ROUGH, SECANT, SMOOTH, Control, P, Walk, weights
+from solver.continuation.kernels.state import (
+    COUNT,
+    CUBIC,
+    ROUGH,
+    SECANT,
+    SMOOTH,
+    Control,
+    P,
+    Walk,
+    distance,
+    weights,
+)
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Real
 from solver.jit.lapack import copy_to, set_to
+from solver.jit.separate import apart
+
+# A quintic and a cubic that are farther apart than this share of the step do not lead to a solution.
+_AGREE = 0.2
+_SHORTENED = 6  # times at most
+# By what a step is shortened at most, and a little more than both need.
+_LEAST, _MARGIN = 0.5, 0.95
+
+
+@compiled
+def foreseen_step(system: System, walk: Walk, control: Control, step: float) -> float:
+    """Return the step, or a shorter one that is foreseen to lead to a solution.
+
+    The distance of the predictions by two and by three points is an estimate of how far off they are.
+    """
+    smooth = walk.numbers[SMOOTH] >= 2.0 and walk.numbers[ROUGH] == 0.0
+    if control.predictor != CUBIC or not smooth:
+        return step
+    weight_u, weight_p = weights(system, walk, control)
+    cubic, quintic = np.empty(walk.u.size), np.empty(walk.u.size)
+    for _ in range(_SHORTENED):
+        p = _extrapolate(system, walk, control, step, 2, cubic)
+        q = _extrapolate(system, walk, control, step, 3, quintic)
+        off = distance(cubic, p, quintic, q, weight_u, weight_p) / step
+        if not off > _AGREE:
+            break
+        step *= max(_LEAST, _MARGIN * (_AGREE / off) ** (1.0 / 3.0))
+    return step
 
 
 @compiled
@@ -29,14 +68,14 @@ def predict(system: System, walk: Walk, control: Control, step: float, guess: Re
                 guess[i] = walk.u[i] + scale * (walk.u[i] - walk.before[i])
             return p + scale * (p - walk.before[n])
     if control.predictor == CUBIC and walk.numbers[SMOOTH] > 0.0 and walk.numbers[ROUGH] == 0.0:
-        return extrapolate(system, walk, control, step, guess)
+        return _extrapolate(system, walk, control, step, 3 if walk.numbers[SMOOTH] >= 2.0 else 2, guess)
     set_to(guess, walk.u, step, walk.tangent)
     return p + step * walk.tangent[n]
 
 
-@compiled
-def extrapolate(system: System, walk: Walk, control: Control, step: float, guess: Real) -> float:
-    """Predict by the polynomial through the last points and their tangents; return the predicted λ.
+@apart
+def _extrapolate(system: System, walk: Walk, control: Control, step: float, count: int, guess: Real) -> float:
+    """Predict by the polynomial through the last 2 or 3 points and their tangents; return the predicted λ.
 
     It is a cubic through two points, a quintic through three that are on one smooth piece. They stand at
     their arc lengths: with chords in their place the quintic would be no better than the cubic.
@@ -55,9 +94,8 @@ def extrapolate(system: System, walk: Walk, control: Control, step: float, guess
     if not step < -3.0 * at[1]:
         set_to(guess, walk.u, step, walk.tangent)
         return walk.numbers[P] + step * walk.tangent[n]
-    count = 2
-    if walk.numbers[SMOOTH] >= 2.0:
-        count, sizes[2] = 3, _size(walk.earlier_tangent, weight_u, weight_p)
+    if count == 3:
+        sizes[2] = _size(walk.earlier_tangent, weight_u, weight_p)
         at[2] = at[1] - _arc(
             walk.before,
             walk.before_tangent,

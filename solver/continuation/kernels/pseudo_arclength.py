@@ -16,11 +16,11 @@ import numpy as np
 from solver.balance.kernels.broyden import frozen_arc
 from solver.balance.kernels.jacobian import factorise, step_back
 from solver.balance.kernels.linearised_contacts import fill_springs
-from solver.balance.kernels.newton import ACCEPTED, arc_newton, newton
+from solver.balance.kernels.newton import ACCEPTED, DEAR_FORCES_BELOW, arc_newton, newton
 from solver.balance.kernels.output import RESIDUAL, measure, piece
 from solver.balance.kernels.residual import evaluate
 from solver.contacts.kernels.system import AT_BRANCH_POINT, SIZE, Evaluation, Receptance, System
-from solver.continuation.kernels.predictor import predict
+from solver.continuation.kernels.predictor import foreseen_step, predict
 from solver.continuation.kernels.state import (
     COUNT,
     CUBIC,
@@ -62,8 +62,7 @@ _SHARP = 2.0**-8  # of the first step: a step longer than this does not turn bac
 STRAIGHT_ON = 0.98  # cosine of the turn at a branch point; more than that is a step across a sharp peak
 CLEARLY = 0.1  # share of the accepted residual below which a point is more than nearly a solution
 TOO_LONG = -1  # of a step: a shorter one is to be tried
-# Sizes from which old factors beat new ones (measured), the second where forces cost more than factors.
-FROZEN_FROM, FROZEN_FROM_WITH_DEAR_FORCES = 150, 400
+FROZEN_FROM = 150  # size from which old factors beat new ones (measured) where forces are not dear
 
 
 @apart
@@ -135,7 +134,7 @@ def _correct(
     """
     copy_to(trial, guess)
     p = p_guess
-    least = FROZEN_FROM if system.alone.sum() == 0 else FROZEN_FROM_WITH_DEAR_FORCES
+    least = FROZEN_FROM if system.alone.sum() == 0 else DEAR_FORCES_BELOW
     if point.counts[AT_BRANCH_POINT] == 1 and point.counts[SIZE] >= least:
         good, solves, p, norm = frozen_arc(
             system, linear, trial, p_guess, walk.tangent, weight_u, weight_p, point
@@ -179,7 +178,7 @@ def _step(system: System, linear: Receptance, point: Evaluation, control: Contro
     forward = 1.0 if control.stop >= control.start else -1.0
     weight_u, weight_p = weights(system, walk, control)
     while walk.numbers[STEP] >= control.smallest_step:
-        step = walk.numbers[STEP]
+        step = walk.numbers[STEP] = foreseen_step(system, walk, control, walk.numbers[STEP])
         p_guess = predict(system, walk, control, step, guess)
         last = (p_guess - control.stop) * forward >= 0.0
         good, iterations, p, norm = False, 0, p_guess, np.inf
