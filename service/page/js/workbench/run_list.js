@@ -91,6 +91,13 @@ async function learn() {
   }
 }
 
+const keyGiven = () => new Promise((resolve) => {
+  const off = on("key", () => {
+    off();
+    resolve();
+  });
+});
+
 // One stream for all runs, taken up again when it breaks.
 async function follow() {
   for (;;) {
@@ -100,8 +107,9 @@ async function follow() {
       for await (const { event, data } of eventsOf(answer.body)) if (event === "run") told(data);
       await pause(0.5);
     } catch (error) {
-      if (error instanceof Problem) await pause(5);
-      else await lost();
+      if (!(error instanceof Problem)) await lost();
+      else if (error.status === 401) await keyGiven();
+      else await pause(5);
     }
   }
 }
