@@ -13,13 +13,12 @@ from sqlalchemy import insert, text
 
 from benchmarks.harness import expect, table
 from service.db import revisions
-from service.db.clock import utc_now
+from service.db.clock import new_id, utc_now
 from service.db.engine import Database
 from service.db.models import Job, JobState
 from service.db.repositories import ResultRepository
 from service.db.repositories.results import insert_results
 from service.jobs.figures import SWEEP, ContactValues, SweepRecord, part_names, quantities_of_record
-from service.jobs.ids import new_id
 from service.jobs.kinds import SHIPPED
 from service.schemas.result_queries import ResultQuery, result_page
 from service.settings.settings import load_settings

@@ -89,15 +89,18 @@ def campbell_diagram(
         stopped = should_stop is not None and should_stop()
         if stopped:
             break
-    status = CampbellStatus.COMPLETED
-    if stopped and not (len(found) == len(chosen) and found[-1].branch.reached):
-        status = CampbellStatus.STOPPED
-    elif not all(one.branch.reached for one in found):
-        status = CampbellStatus.INCOMPLETE
     return CampbellDiagram(
         scene=scene, speeds_rpm=speeds, limit=limit, orders=tuple(found), n_harmonics=harmonics,
-        status=status, seconds=time.perf_counter() - begun,
+        status=_status(found, len(chosen), stopped=stopped), seconds=time.perf_counter() - begun,
     )  # fmt: skip
+
+
+def _status(found: Sequence[OrderResponse], asked: int, *, stopped: bool) -> CampbellStatus:
+    """Return how a diagram of so many orders ended."""
+    if stopped and not (len(found) == asked and found[-1].branch.reached):
+        return CampbellStatus.STOPPED
+    whole = all(one.branch.reached for one in found)
+    return CampbellStatus.COMPLETED if whole else CampbellStatus.INCOMPLETE
 
 
 def forbidden_hz(speeds_rpm: Sequence[float] | Sequence[Sequence[float]], order: int) -> Ranges:

@@ -17,12 +17,16 @@ from service.client.transport import Transport, pauses, segment, words
 from service.client.workbench import Workbench
 from service.errors import ServiceProblem
 from service.schemas.answers import (
+    END,
     DesignAnswer,
     DesignDetail,
     DesignPage,
+    EventData,
     FinishedJob,
     JobAnswer,
     JobPage,
+    JobPoints,
+    JobProgress,
     JobScene,
     KindAnswer,
     KindList,
@@ -35,8 +39,8 @@ from service.schemas.answers import (
     SweepAnswer,
     SweepDetail,
     SweepPage,
+    told,
 )
-from service.schemas.event_answers import END, EventData, JobPoints, JobProgress, told
 from service.schemas.law_answers import LawAnswer, LawList
 from service.schemas.matrix_answers import (
     FormatAnswer,

@@ -7,7 +7,7 @@ from typing import Any, Self
 
 from service.jobs.outputs import OnProgress
 from service.jobs.registry import Registry
-from service.jobs.validation import validated
+from service.jobs.strict_json import validated
 from service.queue.core import Service
 from service.schemas.answers import (
     DesignAnswer,

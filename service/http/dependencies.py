@@ -33,8 +33,7 @@ from service.errors import (
     UnsupportedMediaError,
 )
 from service.jobs import strict_json
-from service.jobs.strict_json import MOST_TOLD
-from service.jobs.validation import issues_of
+from service.jobs.strict_json import MOST_TOLD, issues_of
 from service.queue.core import Service
 from service.queue.running import Event
 from service.rendering.representations import JSON, LIST_MEDIA, chosen, csv_of_items

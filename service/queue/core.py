@@ -38,7 +38,7 @@ from service.jobs.figures import DESIGN, SWEEP, DesignRecord, SweepRecord
 from service.jobs.kinds.bodies import KIND
 from service.jobs.outputs import OnProgress
 from service.jobs.registry import ABOUT_THE_RUN, JobKind, JobRequest, Registry
-from service.jobs.validation import validated
+from service.jobs.strict_json import validated
 from service.queue.lanes import Lanes
 from service.queue.queue import JobQueue
 from service.queue.retention import Retention

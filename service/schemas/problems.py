@@ -20,7 +20,7 @@ from starlette.routing import Match
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service import errors
-from service.jobs.validation import issues_of
+from service.jobs.strict_json import issues_of
 from solver.errors import Issue
 
 log = logging.getLogger("stickslip.http")

@@ -31,7 +31,7 @@ from service.jobs.figures import (
     quantities_of_record,
 )
 from service.jobs.registry import Registry
-from service.jobs.validation import validated
+from service.jobs.strict_json import validated
 from service.schemas.answers import (
     DesignAnswer,
     DesignPage,

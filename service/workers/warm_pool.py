@@ -11,8 +11,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
+from service.db.clock import new_id
 from service.db.repositories import Attempt
-from service.jobs.ids import new_id
 from service.jobs.outputs import Pace
 from service.jobs.registry import RunOn, WarmUp
 from service.workers.base import Outcome, Stopped, Unwatched

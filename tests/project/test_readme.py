@@ -26,8 +26,8 @@ from service.cli import main
 from service.cli.app import command
 from service.cli.options.problem_inputs import OPTIONS
 from service.jobs.registry import ABOUT_THE_RUN
+from service.jobs.strict_json import validated
 from service.jobs.studies.design import Design
-from service.jobs.validation import validated
 from service.settings.settings import Settings
 from solver.contacts.laws.registry import laws, unregister
 

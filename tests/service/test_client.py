@@ -17,8 +17,7 @@ from service.client import workbench
 from service.client.client import Client
 from service.db.models import JobState
 from service.errors import ServiceProblem
-from service.schemas.answers import FinishedJob, JobAnswer
-from service.schemas.event_answers import JobPoints, JobProgress
+from service.schemas.answers import FinishedJob, JobAnswer, JobPoints, JobProgress
 
 SLOW = {"kind": "iteration", "seconds": 60.0, "fresh": True}
 

@@ -28,7 +28,7 @@ from service.jobs import strict_json
 from service.jobs.kinds import SHIPPED
 from service.jobs.outputs import Silent
 from service.jobs.registry import Registry
-from service.jobs.validation import validated
+from service.jobs.strict_json import validated
 from service.queue.health import check
 from service.settings.settings import Settings, load_settings
 from service.workers.executors import executor_of

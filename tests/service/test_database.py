@@ -18,14 +18,13 @@ from sqlalchemy.exc import DBAPIError, StatementError
 
 from service.client.embedded import EmbeddedService
 from service.db import revisions
-from service.db.clock import utc_now
+from service.db.clock import new_id, utc_now
 from service.db.engine import Database, backup, is_sqlite, migrating, sqlite_note, write_engine
 from service.db.models import NOBODY, Job, JobState, TableBase
 from service.db.repositories import Attempt, JobRepository, SceneRepository
 from service.errors import DatabaseError, DatabaseInUseError, WrongRevisionError
 from service.jobs.arrays import decode, encode
 from service.jobs.figures import StoredArray
-from service.jobs.ids import new_id
 from service.jobs.outputs import FailureKind, JobFailure, JobOutput
 from service.queue.core import Service
 

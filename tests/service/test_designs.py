@@ -19,7 +19,7 @@ import optim
 import solver
 from service.client.client import Client
 from service.db import revisions
-from service.db.clock import utc_now
+from service.db.clock import new_id, utc_now
 from service.db.engine import Database, migrating
 from service.db.models import Job, JobState, TableBase
 from service.db.repositories import ResultRepository
@@ -27,8 +27,7 @@ from service.db.repositories.results import insert_results
 from service.errors import InvalidRequestError
 from service.jobs.common.records import design_record
 from service.jobs.figures import DESIGN, DesignRecord, VariableValues
-from service.jobs.ids import new_id
-from service.jobs.validation import validated
+from service.jobs.strict_json import validated
 from service.schemas.answers import DesignDetail
 from service.schemas.result_queries import DesignQuery, design_page
 from service.settings.settings import load_settings

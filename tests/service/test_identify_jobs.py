@@ -10,9 +10,9 @@ from service.cli.commands.client import submit
 from service.cli.options.inputs import join_words
 from service.errors import InvalidRequestError
 from service.jobs.outputs import Silent
+from service.jobs.strict_json import validated
 from service.jobs.studies.identify import Identify
 from service.jobs.study import resolve
-from service.jobs.validation import validated
 
 BODY: Mapping[str, Any] = {
     "scene": "two-dof",

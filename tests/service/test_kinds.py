@@ -12,7 +12,7 @@ import solver
 from service.jobs.common.records import contact_values
 from service.jobs.common.scenes import MAX_HARMONICS
 from service.jobs.kinds import SHIPPED
-from service.jobs.validation import validated
+from service.jobs.strict_json import validated
 
 
 class Shipped:

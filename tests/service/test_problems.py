@@ -14,10 +14,10 @@ from optim.problem.problem import Method, pose
 from service.errors import InvalidRequestError
 from service.jobs.common.problem import arguments
 from service.jobs.registry import ABOUT_THE_RUN
+from service.jobs.strict_json import validated
 from service.jobs.studies.design import Design
 from service.jobs.studies.pareto import Pareto
 from service.jobs.study import resolve
-from service.jobs.validation import validated
 from solver.errors import Issue
 from solver.scene.validation import cross_issues
 

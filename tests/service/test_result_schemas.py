@@ -9,7 +9,7 @@ import pytest
 import solver
 from service.jobs.kinds import SHIPPED
 from service.jobs.outputs import Silent
-from service.jobs.validation import validated
+from service.jobs.strict_json import validated
 
 TWO = {"scene": "two-dof", "harmonics": 3}
 DISK = solver.load_scene("bladed-disk").to_dict()

@@ -19,12 +19,11 @@ from sqlalchemy import insert
 
 from service.auth import authenticator
 from service.auth.callers import Scope
-from service.db.clock import utc_now
+from service.db.clock import new_id, utc_now
 from service.db.models import Job, JobResult, JobState
 from service.db.repositories.results import insert_results
 from service.http.routes import page
 from service.jobs.figures import DesignRecord
-from service.jobs.ids import new_id
 from solver.scene.scene import load_scene
 
 ROLES = ("none", "wrong", "another", "revoked", "expired", "read", "submit", "admin")

@@ -36,9 +36,9 @@ OTHERWISE: Mapping[str, set[str]] = {
 }  # fmt: skip
 # Arguments of Python alone: objects and callbacks, and what keys say in other words.
 REQUIRED = inspect.Parameter.empty
-WATCHED = {"scene", "limits", "on_progress", "should_stop", "on_best", "on_points", "on_stretch"}
+WATCHED = {"scene", "limits", "on_progress", "should_stop", "on_best"}
 OF_PYTHON: Mapping[str, set[str]] = {
-    "sweep": {"settings", "errors", "peaks", "guess", "resume"},
+    "sweep": {"settings", "course"},
     "sensitivities": {"values"},
     "map": {"effects"},
     "peaks": {"effects"},

@@ -20,7 +20,7 @@ from service.errors import InvalidRequestError
 from service.jobs.arrays import encode
 from service.jobs.figures import SWEEP, ContactValues, SweepRecord
 from service.jobs.outputs import JobOutput
-from service.jobs.validation import validated
+from service.jobs.strict_json import validated
 from service.schemas.answers import SweepDetail
 from service.schemas.result_queries import SweepQuery, sweep_page
 from service.settings.settings import load_settings

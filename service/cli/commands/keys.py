@@ -133,7 +133,7 @@ def _scopes(names: Sequence[str]) -> list[Scope]:
 def _limits(words: Sequence[str]) -> KeyLimits:
     from service.auth.callers import KeyLimits
     from service.errors import InvalidRequestError
-    from service.jobs.validation import validated
+    from service.jobs.strict_json import validated
 
     given: dict[str, Any] = {}
     for word in words:

@@ -10,7 +10,7 @@ from typing import Any
 
 from sqlalchemy import ColumnElement, Connection, Executable, and_, func, select
 
-from service.db.clock import Clock, SharedClock, utc_now
+from service.db.clock import Clock, SharedClock, new_id, utc_now
 from service.db.engine import Database
 from service.db.models import NOBODY, Job, JobState
 from service.db.pagination import met, owner_condition, plain_conditions
@@ -33,7 +33,6 @@ from service.db.repositories.rows import Attempt, JobRow, NewJob, RecoveredJobs
 from service.db.repositories.runs import in_the_bin, insert_words, require_project
 from service.db.repositories.waiting import Room, Turns, require_share
 from service.errors import IdempotencyError
-from service.jobs.ids import new_id
 from service.jobs.outputs import Best, JobFailure, JobOutput, ResultPiece
 from service.jobs.strict_json import JsonText, encoded
 

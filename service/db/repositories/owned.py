@@ -25,12 +25,11 @@ from sqlalchemy import (
 )
 from sqlalchemy.orm import Session, defer
 
-from service.db.clock import Clock, utc_now
+from service.db.clock import Clock, new_id, utc_now
 from service.db.engine import Database
 from service.db.models import ApiKey, Job, Project, StoredScene, Upload
 from service.db.tokens import Made, Tokens, digest_of
 from service.errors import ChangedMeanwhileError, ConflictError, NotFoundError, StorageFullError
-from service.jobs.ids import new_id
 from service.jobs.strict_json import encoded
 
 

@@ -28,6 +28,7 @@ from sqlalchemy import (
 from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.orm import aliased
 
+from service.db.clock import new_id
 from service.db.engine import Database
 from service.db.models import NOBODY, Figure, Job, Quantity, Result, SweepArray
 from service.db.pagination import (
@@ -48,7 +49,6 @@ from service.db.pagination import (
 from service.db.postgresql import lock_quantities
 from service.db.repositories.runs import in_the_bin
 from service.jobs.figures import RECORDS, SWEEP, KindRecord, Record, StoredArray
-from service.jobs.ids import new_id
 
 Name = tuple[str, str]
 """Name and label of a quantity."""

@@ -19,8 +19,7 @@ from service.http.dependencies import InContext
 from service.http.middleware.every_answer import HEADERS_ONLY
 from service.queue.core import Service
 from service.queue.running import Event, Live
-from service.schemas.answers import JobAnswer
-from service.schemas.event_answers import END, PARTIAL, PROGRESS, JobPoints, JobProgress
+from service.schemas.answers import END, PARTIAL, PROGRESS, JobAnswer, JobPoints, JobProgress
 
 _LEAST_SECONDS = 0.1
 _EVENTS_A_SECOND = 200.0

@@ -326,7 +326,7 @@ def shared_run(context: OfLink) -> Response:
     kind = chosen(context.request.headers.get("accept"), (JSON, _PAGE))
     if kind == JSON:
         return as_json(told, headers={"Vary": "Accept"})
-    from service.rendering.shared import POLICY, shared_page
+    from service.rendering.report.about import POLICY, shared_page
 
     result, sweeps = None, []
     if run.job.state is JobState.SUCCESSFUL:

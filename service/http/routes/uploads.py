@@ -17,7 +17,7 @@ from service.http.dependencies import LISTED, InContext, JsonBody, TypedRoute, l
 from service.http.in_lane import computed, reading, writing
 from service.jobs import answering
 from service.jobs.common.scenes import SceneRequest
-from service.jobs.validation import validated
+from service.jobs.strict_json import validated
 from service.schemas.matrix_answers import (
     FormatAnswer,
     FormatsAnswer,

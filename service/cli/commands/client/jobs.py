@@ -15,7 +15,7 @@ from service.cli.options import inputs, problem_inputs
 from service.cli.options import shared as options
 from service.cli.options.inputs import amount, count
 from service.cli.options.parameters import given_key
-from service.cli.options.scene_files import scene_to_submit, uploaded
+from service.cli.options.problem_inputs import scene_to_submit, uploaded
 from service.cli.progress import bar
 from service.errors import InputError
 from service.rendering.plain import print_result
