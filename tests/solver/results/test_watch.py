@@ -35,7 +35,7 @@ def test_a_sweep_ends_with_its_points_so_far() -> None:
 
 
 def test_a_design_ends_with_the_best_so_far(capsys: pytest.CaptureFixture[str]) -> None:
-    def interrupt(_: optim.DesignEvaluation) -> None:
+    def interrupt(_: object) -> None:
         if signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
             signal.raise_signal(signal.SIGINT)
 
