@@ -15,7 +15,6 @@ from service.cli.importing.files import (
     dof_table,
     existing_file,
     read_sources,
-    relative,
     rows_of,
     sources,
 )
@@ -31,7 +30,7 @@ from service.cli.importing.sector import (
     found_by_position,
     reduce_disk,
 )
-from service.cli.options.inputs import new_file
+from service.cli.options.inputs import new_file, relative
 from service.cli.options.parameters import taking
 from service.errors import InputError
 from service.rendering.tables.text import print_json, print_pairs

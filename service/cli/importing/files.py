@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from service.cli.options.inputs import relative
 from service.errors import InputError
 
 if TYPE_CHECKING:
@@ -48,11 +48,6 @@ class Sources:
         if self.units != "SI":
             table["units"] = self.units
         return table
-
-
-def relative(path: Path, target: Path) -> str:
-    """The name of a file as a scene at `target` refers to it."""
-    return Path(os.path.relpath(path.absolute(), target.absolute().parent)).as_posix()
 
 
 def sources(asked: ImportOptions) -> Sources:

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from service.cli.importing.files import relative
-from service.cli.options.inputs import amount, count, new_file, text
+from service.cli.options.inputs import amount, count, new_file, relative, text
 from service.cli.options.shared import Json
 from service.errors import InputError
 from service.rendering.tables.text import print_pairs

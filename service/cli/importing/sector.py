@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from service.cli.failures import refused
-from service.cli.importing.files import relative
+from service.cli.options.inputs import relative
 from service.errors import InputError
 from solver.results.files import whole
 

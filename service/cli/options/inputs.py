@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -199,3 +200,8 @@ def part(option: str, text: str, word: str) -> float:
         return float(word)
     except ValueError:
         raise InputError(f"`{option}` needs a number where {word.strip()!r} stands, got {text!r}") from None
+
+
+def relative(path: Path, target: Path) -> str:
+    """The name of a file as a scene at `target` refers to it."""
+    return Path(os.path.relpath(path.absolute(), target.absolute().parent)).as_posix()
