@@ -1,5 +1,7 @@
 """What a field says once is in the docstring, the JSON, its schema and the text."""
 
+from __future__ import annotations
+
 import inspect
 import json
 import math
