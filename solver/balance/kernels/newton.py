@@ -31,8 +31,10 @@ ACCEPTED = 1e-9  # relative residual still a solution when rounding allows no be
 # second share where forces cost more than factors, which is below so many unknowns.
 _KEPT_FROM, _KEPT, _KEPT_BY_DEAR_FORCES = 100, 0.02, 0.005
 DEAR_FORCES_BELOW = 400
-# An arc is given up where from this iteration on more than this share of the first residual is left.
+# An arc is given up where from this iteration on more than this share of the first residual is left, with so
+# many unknowns: where points cost little a shorter step may lose a small maximum on the way.
 _HOPELESS_FROM, _HOPELESS = 2, 0.5
+MANY_UNKNOWNS = 400
 # Steps in a row that leave more than this share of the least residual, after which one along an arc is given
 # up: between pieces that contacts change to and fro it would go round in circles.
 _IN_VAIN, _NO_NEARER = 3, 0.7
@@ -144,8 +146,8 @@ def arc_newton(
         settled = norm <= 0.1 * ACCEPTED or stalls > 1
         if norm <= TARGET or (norm <= ACCEPTED and stalls > 0 and settled):
             return True, iteration, p, norm
-        hopeless = vain >= _IN_VAIN or (iteration >= _HOPELESS_FROM and norm > _HOPELESS * first)
-        if iteration == most or hopeless or norm > 1e3 * max(before, 1e-3):
+        hopeless = n >= MANY_UNKNOWNS and iteration >= _HOPELESS_FROM and norm > _HOPELESS * first
+        if iteration == most or hopeless or vain >= _IN_VAIN or norm > 1e3 * max(before, 1e-3):
             break
         size = point.counts[SIZE]
         share = _KEPT_BY_DEAR_FORCES if dear and size < DEAR_FORCES_BELOW else _KEPT

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from solver.balance.kernels.newton import MANY_UNKNOWNS
 from solver.contacts.kernels.system import System
 from solver.continuation.kernels.state import (
     COUNT,
@@ -27,7 +28,6 @@ from solver.jit.separate import apart
 # A quintic and a cubic that are farther apart than this share of the step do not lead to a solution.
 _AGREE = 0.2
 _SHORTENED = 6  # times at most
-_FORESEEN_FROM = 400  # unknowns: with fewer, two more predictions cost more than the steps that fail
 # By what a step is shortened at most, and a little more than both need.
 _LEAST, _MARGIN = 0.5, 0.95
 
@@ -39,7 +39,8 @@ def foreseen_step(system: System, walk: Walk, control: Control, step: float) -> 
     The distance of the predictions by two and by three points is an estimate of how far off they are.
     """
     smooth = walk.numbers[SMOOTH] >= 2.0 and walk.numbers[ROUGH] == 0.0
-    if control.predictor != CUBIC or not smooth or walk.u.size < _FORESEEN_FROM:
+    # With fewer unknowns two more predictions cost more than the steps that fail.
+    if control.predictor != CUBIC or not smooth or walk.u.size < MANY_UNKNOWNS:
         return step
     weight_u, weight_p = weights(system, walk, control)
     cubic, quintic = np.empty(walk.u.size), np.empty(walk.u.size)
