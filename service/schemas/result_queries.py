@@ -48,6 +48,7 @@ from solver.wording import nearest
 
 Bound = Annotated[float | None, Field(ge=-1e30, le=1e30)]
 Count = Annotated[int | None, Field(ge=0, le=10**9)]
+Name = Annotated[str | None, Field(max_length=210)]
 LongName = Annotated[str | None, Field(max_length=500)]
 _COLUMNS = {"owner": "owner", "scene": "scene_name", "scene_hash": "scene_hash", "job": "job_id"}
 _OWNER = Field(default=None, description="For keys with the scope admin: whose.")
@@ -116,7 +117,7 @@ def _listing(record: type[Record], name: str, columns: Mapping[str, Any], *renam
     numbers = (key for key, one in known.items() if one.kind in (int, float))
     words = [sign + key for key in (CREATED, *numbers, *renamed) for sign in ("", "-")]
     sort: Any = Literal[tuple(words)]
-    about = {"owner": (LongName, _OWNER), "scene": (LongName, None), "scene_hash": (LongName, None)}
+    about = {"owner": (LongName, _OWNER), "scene": (Name, None), "scene_hash": (Name, None)}
     return create_model(
         name, __base__=StoredQuery, **{**about, **columns, **keys}, harmonics=(Count, None),
         sort=(sort, "-created"), limit=(Limit, 100), cursor=(Cursor, None),

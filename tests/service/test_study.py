@@ -74,8 +74,8 @@ def test_every_face_has_the_same_keys(name: str) -> None:
     flags = {made[key].flag for key in own}
     command = TOP[name].function()
     taken = set(options_of(command)) - OF_THE_COMMAND
-    if name == "identify":  # measured data are files, an argument of the command
-        flags -= {"--data"}
+    if name == "identify":  # measured data are files, an argument of the command, and what their columns are
+        flags = flags - {"--data"} | {"--column"}
     if issubclass(study, ProblemRequest):  # tables stand in the problem file alone
         flags = {one.flag for one in options(study).values()}
     assert taken == flags

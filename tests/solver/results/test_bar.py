@@ -13,7 +13,7 @@ import solver
 from solver.results import watch
 from solver.results.watch import Bar, is_watched, shows_progress
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 
 
 def test_nobody_watches_a_pipe(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
