@@ -12,6 +12,7 @@ is the scene at one point of it.
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from functools import reduce
 from operator import or_
@@ -22,9 +23,7 @@ from pydantic import Discriminator, Field, GetCoreSchemaHandler, Tag, model_vali
 from pydantic_core import CoreSchema
 
 from solver.contacts.fields import DofName, Name, NonNegative, Part, Signed
-from solver.contacts.laws.registry import announce
-from solver.errors import SettingError
-from solver.extensions import extension_classes
+from solver.extensions import Kinds
 
 Offset = Annotated[int, Field(strict=True, ge=-10_000, le=10_000)]
 _ROUNDING = 1e-14  # of the largest coefficient: less is what a Fourier transform leaves
@@ -57,7 +56,7 @@ class Entry(NamedTuple):
         return self.g != 0.0 or self.k_omega2 != 0.0
 
 
-class LinearTerm(Part):
+class LinearTerm(Part, ABC):
     """What adds entries to K and C.
 
     Attributes
@@ -77,9 +76,9 @@ class LinearTerm(Part):
 
     name: Name | None = None
 
+    @abstractmethod
     def entries(self, sectors: int) -> tuple[Entry, ...]:
         """What it adds to the matrices of a disk of so many sectors, or (1) of no disk."""
-        raise NotImplementedError
 
     def slope(self, key: str, sectors: int) -> tuple[Entry, ...]:
         """What a unit of a parameter adds."""
@@ -156,43 +155,8 @@ class Coupling(LinearTerm):
         return self.model_copy(update={**ends, "offset": 0})
 
 
-_added: list[type[LinearTerm]] = []
-
-
-def coupling_kinds() -> dict[str, type[LinearTerm]]:
-    """Every kind of ``[[couplings]]`` by its word: the one of the package, then those from outside.
-
-    Raises
-    ------
-    SettingError
-        A kind from outside has the word of another.
-    """
-    found: dict[str, type[LinearTerm]] = {Coupling.KIND: Coupling}
-    for kind in (*extension_classes(LinearTerm), *_added):
-        if found.setdefault(kind.KIND, kind) is not kind:
-            raise SettingError("kind", kind.KIND, f"must be the word of one kind, not of {kind.__name__} too")
-    return found
-
-
-def register(kind: type[LinearTerm]) -> type[LinearTerm]:
-    """Add a kind in this process; what starts processes of its own, as the service does, needs extensions.
-
-    Raises
-    ------
-    ValueError
-        There is one of this word.
-    """
-    if kind.KIND in coupling_kinds():
-        raise ValueError(f"there is a kind {kind.KIND!r} already")
-    _added.append(kind)
-    announce()
-    return kind
-
-
-def unregister(kind: type[LinearTerm]) -> None:
-    """Take back what `register` added."""
-    _added.remove(kind)
-    announce()
+COUPLINGS: Kinds[LinearTerm] = Kinds(LinearTerm, "KIND", "kind", lambda: (Coupling,))  # type: ignore[type-abstract]
+coupling_kinds, register, unregister = COUPLINGS.known, COUPLINGS.register, COUPLINGS.unregister
 
 
 def kind_of(data: object) -> str:
@@ -292,6 +256,7 @@ class Aerodynamics(LinearTerm):
             )
         return self
 
+    @abstractmethod
     def entries(self, sectors: int) -> tuple[Entry, ...]:
         """What it adds to the matrices of a disk of so many sectors."""
         given = self.influence or _of_diameters(self.nodal_diameters, sectors)

@@ -23,8 +23,8 @@ from solver.contacts.laws.elastic_normal import ElasticNormalContact
 from solver.contacts.laws.friction import FrictionContact
 from solver.contacts.laws.gap import GapSpring
 from solver.contacts.laws.polynomial import PolynomialSpring
-from solver.contacts.laws.registry import on_change
 from solver.errors import SceneError, SettingError
+from solver.extensions import on_change
 from solver.results.told import Summary, html_table
 from solver.results.units import number
 from solver.scene import parameter_paths as scene_paths

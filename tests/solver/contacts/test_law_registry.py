@@ -102,7 +102,7 @@ def test_two_laws_of_one_word_are_refused(monkeypatch: pytest.MonkeyPatch) -> No
 
     with pytest.raises(ValueError, match="gap"):
         register(Another)
-    monkeypatch.setattr(registry, "_added", [Another])
+    monkeypatch.setattr(registry.LAWS, "added", [Another])
     with pytest.raises(SettingError, match=r"`law` must be the word of one law, not of Another too"):
         laws()
 
