@@ -23,6 +23,7 @@ from authlib.integrations.httpx_client import AsyncOAuth2Client
 from joserfc import jwt
 from joserfc.errors import JoseError
 from joserfc.jwk import KeySet, OctKey
+from starlette.concurrency import run_in_threadpool
 
 from service.auth.authenticator import create
 from service.auth.callers import Scope
@@ -37,6 +38,7 @@ BEGIN_SECONDS = 600
 """Time a person has to log in at the provider."""
 _KNOWN_SECONDS = 3600.0
 _TIMEOUT = 10.0
+_ADDRESSES = frozenset({"authorization_endpoint", "token_endpoint", "jwks_uri"})
 _LEEWAY = 60  # s by which clocks may differ
 
 
@@ -120,12 +122,12 @@ class Login:
         kept = self._kept(cookie)
         if "code" not in answer:
             raise LoginError(Refusal.REFUSED, f"the provider answered {answer.get('error', 'nothing')!r:.80}")
-        if not secrets.compare_digest(answer.get("state", ""), kept["state"]):
+        if not secrets.compare_digest(answer.get("state", "").encode(), kept["state"].encode()):
             raise LoginError(Refusal.EXPIRED, "the answer is to another log-in")
         async with self._client() as client:
             provider = await self._metadata(client)
             claims = await self._claims(client, provider, answer["code"], kept)
-        return self._key_for(self._owner(claims))
+        return await run_in_threadpool(self._key_for, self._owner(claims))
 
     def _client(self) -> Any:
         return AsyncOAuth2Client(
@@ -138,12 +140,9 @@ class Login:
         """What the provider says of itself, at most an hour old."""
         known = self._provider
         if known is None or self._steady() - known[1] > _KNOWN_SECONDS:
-            issuer = str(self._settings.oidc_issuer)
-            found = await _fetched(client, f"{issuer.rstrip('/')}/.well-known/openid-configuration")
-            if found.get("issuer") != issuer:
-                told = (
-                    f"the provider calls itself {found.get('issuer')!r:.200}, `oidc_issuer` says {issuer!r}"
-                )
+            found = await _fetched(client, f"{self._issuer.rstrip('/')}/.well-known/openid-configuration")
+            if found.get("issuer") != self._issuer or not found.keys() >= _ADDRESSES:
+                told = f"what {self._issuer} says of itself lacks that issuer or one of {sorted(_ADDRESSES)}"
                 raise LoginError(Refusal.UNREACHABLE, told)
             self._provider = known = (found, self._steady())
         return known[0]
@@ -179,7 +178,9 @@ class Login:
             lacks = f"the provider gives no claim {name}" if owner is None else f"{name} is not verified"
             raise LoginError(Refusal.NOT_ALLOWED, lacks)
         allowed = settings.oidc_allowed
-        if allowed and not any(owner == one or (one[0] == "@" and owner.endswith(one)) for one in allowed):
+        if allowed and not any(
+            owner == one or (one.startswith("@") and owner.endswith(one)) for one in allowed
+        ):
             raise LoginError(Refusal.NOT_ALLOWED, f"{owner:.100} is not in `oidc_allowed`")
         return owner
 

@@ -121,7 +121,7 @@ def test_who_may_not_come_in_is_told(
 def test_an_answer_to_another_log_in_is_refused(open_to_some: ServedClient, person: httpx.Client) -> None:
     base = open_to_some.base_url
     assert ended(person.get(f"{base}/v1/login/callback?state=x&code=c")) == "expired"
-    for query in ("?state=&code=c", "?state=x&code=c", "?code=c"):
+    for query in ("?state=&code=c", "?state=x&code=c", "?code=c", "?state=%C3%A9&code=c"):
         person.get(f"{base}/v1/login/begin")
         assert ended(person.get(f"{base}/v1/login/callback{query}")) == "expired"
     person.cookies.set("stickslip-login", "e30.e30.e30")

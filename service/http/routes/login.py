@@ -47,6 +47,11 @@ def _set(context: InContext, answer: Response, of: str, value: str, seconds: int
     )  # fmt: skip
 
 
+def _forget(context: InContext, answer: Response, of: str) -> None:
+    https = context.service.settings.https
+    answer.delete_cookie(_cookie(context, of), secure=https, httponly=True, samesite="lax")
+
+
 def _count(context: InContext) -> None:
     authenticator: Authenticator = context.request.app.state.authenticator
     authenticator.count_login(address_of(context.request.scope))
@@ -73,15 +78,16 @@ async def begin(context: InContext) -> Response:
 async def callback(context: InContext) -> Response:
     """Whom the provider sends back goes on to the page, which fetches the key, or says what went wrong."""
     _count(context)
-    request, name = context.request, _cookie(context, "login")
+    request = context.request
+    cookie = request.cookies.get(_cookie(context, "login"), "")
     try:
-        key = await _login(request).finish(request.cookies.get(name, ""), request.query_params)
+        key = await _login(request).finish(cookie, request.query_params)
     except LoginError as error:
         answer = _failed(error)
     else:
         answer = _sent_to("/?login=done")
         _set(context, answer, "key", key, _EXCHANGE_SECONDS)
-    answer.delete_cookie(name, secure=context.service.settings.https, httponly=True, samesite="lax")
+    _forget(context, answer, "login")
     return answer
 
 
@@ -99,10 +105,9 @@ async def key(context: InContext, response: Response) -> NewKey:
     UnauthorizedError
         Nobody has.
     """
-    name = _cookie(context, "key")
-    found = context.request.cookies.get(name)
+    found = context.request.cookies.get(_cookie(context, "key"))
     if found is None:
         raise UnauthorizedError("nobody has just logged in here")
-    response.delete_cookie(name, secure=context.service.settings.https, httponly=True, samesite="lax")
+    _forget(context, response, "key")
     response.headers["Cache-Control"] = "no-store"
     return NewKey(key=found)
