@@ -40,13 +40,10 @@ class Explorer(anywidget.AnyWidget):
     before = traitlets.Dict(help="The curve of the scene as it was given.").tag(sync=True)
 
     def __init__(self, scene: Scene, variables: tuple[BoundedVariable, ...], harmonics: int) -> None:
-        self._given, self._variables, self._harmonics = scene, variables, harmonics
-        values = {variable.name: scene.value(variable.paths[0]) for variable in variables}
         super().__init__()
-        self.scene, self.branch = scene, sweep(scene, harmonics=harmonics)
-        self._turn = 0
-        self.curve = self.before = self._shown()
-        self.sliders = [_slider(scene, variable, values[variable.name]) for variable in variables]
+        self._given, self._variables, self._harmonics, self._turn = scene, variables, harmonics, 0
+        self._show(scene)
+        self.before = self.curve
         self.observe(self._moved, names="places")
 
     @property
@@ -58,26 +55,26 @@ class Explorer(anywidget.AnyWidget):
         """Compute the response again; every slider that was never moved stays where the scene has it."""
         moved = {v: v.outside(float(self.places[v.name])) for v in self._variables if v.name in self.places}
         values = {path: value for variable, value in moved.items() for path in variable.paths}
-        self.scene = self._given.with_values(values)
-        self.branch = sweep(self.scene, harmonics=self._harmonics)
-        self.sliders = [_slider(self.scene, v, self.scene.value(v.paths[0])) for v in self._variables]
         self._turn += 1
-        self.curve = self._shown()
+        self._show(self._given.with_values(values))
 
-    def _shown(self) -> dict[str, Any]:
-        """What is drawn; `turn` tells the notebook that an equal curve is a new one."""
+    def _show(self, scene: Scene) -> None:
+        """Compute and draw a scene; `turn` tells the notebook that an equal curve is a new one."""
+        self.scene, self.branch = scene, sweep(scene, harmonics=self._harmonics)
         branch, peak = self.branch, self.branch.peak
-        return {
+        self.sliders = [_slider(scene, variable) for variable in self._variables]
+        self.curve = {
             "hertz": branch.values.tolist(), "amplitude": branch.amplitude.tolist(),
             "peak": None if peak is None else [peak.at, peak.value],
             "told": "" if branch.reached else branch.status.value, "turn": self._turn,
         }  # fmt: skip
 
 
-def _slider(scene: Scene, variable: BoundedVariable, value: float) -> dict[str, Any]:
-    unit = parameter_of(scene, variable.paths[0]).unit
-    place = min(max(variable.inside(min(max(value, variable.low), variable.high)), 0.0), 1.0)
-    return {"name": variable.name, "unit": unit, "value": value, "place": place}
+def _slider(scene: Scene, variable: BoundedVariable) -> dict[str, Any]:
+    parameter = parameter_of(scene, variable.paths[0])
+    value = scene.value(variable.paths[0])
+    place = variable.inside(min(max(value, variable.low), variable.high))
+    return {"name": variable.name, "unit": parameter.unit, "value": value, "place": place}
 
 
 def explore(
