@@ -112,8 +112,6 @@ export async function patiently(attempt) {
   }
 }
 
-export const isOffline = () => offline;
-
 export async function blobOf(path, accept, options = {}) {
   const answer = await fetched(path, { ...options, headers: { ...(options.headers ?? {}), Accept: accept } });
   return answer.blob();

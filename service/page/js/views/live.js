@@ -13,10 +13,8 @@ import { ghosts, pinned } from "./pins.js";
 import { asked, current, ownValue, sliders as ranges, value, variedParts } from "../scene/scenes.js";
 
 const STEPS = 400;
-const RATE_WINDOW = 20;
 const SLOW_MS = 600;
 const ROOM = 1.3; // above the response, where its limits rise
-const times = [];
 let plot = null;
 let ask = null;
 let slow = 0;
@@ -25,8 +23,6 @@ let latest = null;
 let study = null;
 // Of a point of the response, by the plan [s].
 let cost = 0;
-
-export const rate = () => (times.length > 1 ? (1000 * (times.length - 1)) / (times[times.length - 1] - times[0]) : 0);
 
 export function startLive() {
   plot = chart(byId("live-figure"), {
@@ -119,9 +115,6 @@ function redraw() {
 function drawn(answer, { milliseconds, token }) {
   clearTimeout(slow);
   if (token !== state.scene) return;
-  const now = performance.now();
-  times.push(now);
-  if (times.length > RATE_WINDOW) times.shift();
   latest = answer;
   redraw();
   tell("states", { states: answer.states, at: answer.peak?.at });
