@@ -256,7 +256,6 @@ class Aerodynamics(LinearTerm):
             )
         return self
 
-    @abstractmethod
     def entries(self, sectors: int) -> tuple[Entry, ...]:
         """What it adds to the matrices of a disk of so many sectors."""
         given = self.influence or _of_diameters(self.nodal_diameters, sectors)
