@@ -51,12 +51,8 @@ from .response.stability.all_solutions import (
     solve_all as solve_all,
 )
 from .response.stability.bifurcations import bifurcations as bifurcations
-from .response.stability.floquet import (
-    Growth as Growth,
-    Stability as Stability,
-    branch_stability as branch_stability,
-    stability as stability,
-)
+from .response.stability.floquet import branch_stability as branch_stability, stability as stability
+from .response.stability.multipliers import Growth as Growth, Stability as Stability
 from .response.stability.residual_forces import (
     AmplitudeRange as AmplitudeRange,
     amplitude_range as amplitude_range,

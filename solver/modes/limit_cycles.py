@@ -31,7 +31,7 @@ from solver.modes.peaks.performance import grows_together
 from solver.modes.records import PointRecord
 from solver.modes.results import NonlinearMode
 from solver.modes.start import begin
-from solver.response.stability.floquet import GROWS, growth_of
+from solver.response.stability.multipliers import GROWS, growth_of
 from solver.results.told import Piece
 from solver.scene.scene import Scene
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from solver.modes.peaks.performance import PerformanceCurve
     from solver.modes.results import NonlinearMode
     from solver.response.solution import Solution
-    from solver.response.stability.floquet import Stability
+    from solver.response.stability.multipliers import Stability
     from solver.studies.blades import BladeAmplitudes, BladePeaks
     from solver.studies.mistuning_result import MistuningStudy
     from solver.studies.peaks.results import LeastPeak, PeakTrack

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from solver.continuation.branch import AnyBranch
     from solver.jit.fourier import Real
     from solver.response.solution import Solution
-    from solver.response.stability.floquet import Stability
+    from solver.response.stability.multipliers import Stability
     from solver.results.base import Shown
     from solver.scene.scene import Scene
     from solver.studies.study_results import InterferenceDiagram

@@ -18,7 +18,8 @@ from solver.contacts.kernels.system import DENSE
 from solver.continuation.branch import Branch
 from solver.continuation.branches.sweep import surveyed, with_error, with_points
 from solver.continuation.extrema.extrema import Survey
-from solver.continuation.extrema.nodes import NodeSolver, PointRow, Points, numbers_of
+from solver.continuation.extrema.node_table import PointRow, Points
+from solver.continuation.extrema.nodes import NodeSolver, numbers_of
 from solver.continuation.peaks import Peak
 from solver.jit.fourier import Real
 from solver.linear.kernels.receptance import observer_receptance, receptance

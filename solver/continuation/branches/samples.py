@@ -22,7 +22,8 @@ from solver.continuation.branches.point_by_point import is_unique
 from solver.continuation.branches.sweep import check_range, points_of, walk
 from solver.continuation.branches.symmetry_breaking import branch_flags
 from solver.continuation.certificate import uncertain
-from solver.continuation.extrema.nodes import NodeSolver, PointRow
+from solver.continuation.extrema.node_table import PointRow
+from solver.continuation.extrema.nodes import NodeSolver
 from solver.continuation.segment import joined
 from solver.continuation.settings import ContinuationSettings
 from solver.jit.fourier import to_full

@@ -27,7 +27,7 @@ from solver.continuation.certificate import uncertain
 from solver.continuation.endings import AHEAD, MANY, ratchets_ahead, stands_still, taken_up, too_stiff
 from solver.continuation.extrema.branch_error import branch_error
 from solver.continuation.extrema.extrema import Survey, band_limit
-from solver.continuation.extrema.nodes import Points
+from solver.continuation.extrema.node_table import Points
 from solver.continuation.from_nothing import solve_from_nothing
 from solver.continuation.kernels import state as walk_states
 from solver.continuation.kernels.pseudo_arclength import begin_walk, walk_on

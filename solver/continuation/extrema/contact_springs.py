@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise, product
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 
 from solver.balance.kernels.linearised_contacts import linearise, springs_at
+from solver.balance.workspace import Workspace
+from solver.continuation.extrema.node_table import NodeTable, PointRow
 from solver.jit.fourier import Complex, Integer, Real, cosine_position
-
-if TYPE_CHECKING:
-    from solver.continuation.extrema.nodes import NodeSolver, PointRow
 
 _UNKNOWN = -2  # row of a node whose stiffness was not asked for
 
@@ -45,10 +44,18 @@ class Springs:
     stiffness: Complex  # (nk, nc, nc)
 
 
+class OfBranch(Protocol):
+    """Whose nodes they are (`solver.continuation.extrema.nodes.NodeSolver`)."""
+
+    workspace: Workspace
+    table: NodeTable
+    least: float
+
+
 class LocalModel:
     """Contacts linearised at nodes of a branch over the frequency, each once, and predictions between two."""
 
-    def __init__(self, solver: NodeSolver) -> None:
+    def __init__(self, solver: OfBranch) -> None:
         self._solver = solver
         balance = solver.workspace.balance
         self._system = balance.system

@@ -26,7 +26,8 @@ from solver.balance.workspace import Workspace
 from solver.continuation.certificate import PeakCertificate, certified, uncertain
 from solver.continuation.extrema.intervals import CURVES, highest_share, lowest_share, may_cross
 from solver.continuation.extrema.kernels.intervals import IS_BENT, WAVES, WORTH_POLISHING
-from solver.continuation.extrema.nodes import NodeSolver, PointRow, Points, numbers_of
+from solver.continuation.extrema.node_table import PointRow, Points
+from solver.continuation.extrema.nodes import NodeSolver, numbers_of
 from solver.continuation.extrema.resonance_search import ResonanceSearch, Search
 from solver.continuation.extrema.state_changes import ChangeSearch
 from solver.continuation.folds import fold_between, motion_scales

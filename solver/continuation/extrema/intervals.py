@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from solver.balance.kernels.locate import HIGH_PEAK, LOW_PEAK
 from solver.balance.kernels.output import HIGH, HIGH_SLOPE, LOW, LOW_SLOPE, MAX_ABS
-from solver.continuation.extrema.nodes import Between, PointRow
+from solver.continuation.extrema.node_table import PointRow
+from solver.continuation.extrema.nodes import Between
 from solver.jit.hermite import extreme
 
 CURVES = ((HIGH, HIGH_SLOPE, HIGH_PEAK), (LOW, LOW_SLOPE, LOW_PEAK))

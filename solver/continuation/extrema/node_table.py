@@ -1,4 +1,4 @@
-"""The rows of a branch in one table, in which each keeps its number while others come between.
+"""The rows of a branch: all, one, and a table in which each keeps its number while others come between.
 
 A branch is looked at again whenever points were solved between others. Rows are stacked once, and what is
 known between two neighbours stays known.
@@ -6,7 +6,8 @@ known between two neighbours stays known.
 
 from __future__ import annotations
 
-from typing import TypeVar
+from dataclasses import dataclass
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +17,38 @@ from solver.jit.fourier import Integer, Real
 _Number = TypeVar("_Number", np.float64, np.int64)
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Points:
+    """The rows of a branch; see `solver.continuation.branch.Branch`."""
+
+    solutions: Real
+    tangents: Real
+    measures: Real
+    observed: Real
+    states: Integer
+
+
+class PointRow(NamedTuple):
+    """One row of `Points`; the tangent points onward along the branch, and slopes are along it.
+
+    A tuple, because hundreds are made of every branch; nodes are told apart by identity.
+    """
+
+    solution: Real
+    tangent: Real
+    measures: list[float]  # the row as a list: they are looked at one by one
+    observed: Real
+    states: Integer
+    number: int  # of its row in `NodeSolver.table`
+
+    @property
+    def at(self) -> float:
+        """λ, in the unit inside."""
+        return float(self.solution[-1])
+
+
 class NodeTable:
-    """Rows of `solver.continuation.extrema.nodes.Points`; arrays are longer than there are rows.
+    """Rows of `Points`; arrays are longer than there are rows.
 
     Attributes
     ----------

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +30,7 @@ from solver.continuation.extrema.contact_springs import LocalModel
 from solver.continuation.extrema.kernels import intervals
 from solver.continuation.extrema.kernels.intervals import look_between, middles_between
 from solver.continuation.extrema.kernels.state_changes import locate_change
-from solver.continuation.extrema.node_table import NodeTable
+from solver.continuation.extrema.node_table import NodeTable, PointRow, Points
 from solver.continuation.folds import OnBranch
 from solver.jit.fourier import Integer, Real
 
@@ -42,36 +42,6 @@ MOST_TRIALS = 120
 MOST_SOLVES = 12  # of a change of state
 SLOPES = [SLOPE, RANGE_SLOPE, HIGH_SLOPE, LOW_SLOPE]  # measures along the tangent
 NARROW = 1e-13  # relative width at which a place is found
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Points:
-    """The rows of a branch; see `solver.continuation.branch.Branch`."""
-
-    solutions: Real
-    tangents: Real
-    measures: Real
-    observed: Real
-    states: Integer
-
-
-class PointRow(NamedTuple):
-    """One row of `Points`; the tangent points onward along the branch, and slopes are along it.
-
-    A tuple, because hundreds are made of every branch; nodes are told apart by identity.
-    """
-
-    solution: Real
-    tangent: Real
-    measures: list[float]  # the row as a list: they are looked at one by one
-    observed: Real
-    states: Integer
-    number: int  # of its row in `NodeSolver.table`
-
-    @property
-    def at(self) -> float:
-        """λ, in the unit inside."""
-        return float(self.solution[-1])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

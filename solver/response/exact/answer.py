@@ -19,8 +19,7 @@ from solver.response.exact.flow import LiftsError, NoMotionError, exponential, f
 from solver.response.exact.orbit import PERIOD, ROUNDING, Ended, Orbit, find, follow, grazed
 from solver.response.exact.piecewise import STICK, MemberState, Mode, Piecewise
 from solver.response.solution import HISTORY_DEPENDENT, MEAN_UNDETERMINED, Solution, SolutionStatus
-from solver.response.stability.floquet import Stability, growth_of
-from solver.response.stability.verdict import verdict_of
+from solver.response.stability.multipliers import Stability, growth_of, verdict_of
 from solver.scene.scene import Scene
 
 _GAUSS = 12

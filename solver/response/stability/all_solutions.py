@@ -21,11 +21,11 @@ from solver.errors import SettingError
 from solver.response.solution import Solution
 from solver.response.solve import describe
 from solver.response.stability import MOST_STARTS
-from solver.response.stability.floquet import Stability, stability
+from solver.response.stability.floquet import stability
+from solver.response.stability.multipliers import Stability, verdict_of
 from solver.response.stability.residual_forces import AmplitudeRange, amplitude_range
 from solver.response.stability.search import SolutionSearch
 from solver.response.stability.uniqueness import Uniqueness, uniqueness
-from solver.response.stability.verdict import verdict_of
 from solver.results.known import Stable, Verdict
 from solver.results.told import Piece
 from solver.results.watch import shows_progress

@@ -24,11 +24,13 @@ from solver.balance.kernels.output import MAX_ABS
 from solver.balance.workspace import Workspace
 from solver.continuation.branch import AnyBranch, Branch, BranchStatus
 from solver.continuation.branches.point_by_point import is_unique
-from solver.continuation.extrema.nodes import NodeSolver, PointRow, Points
+from solver.continuation.extrema.node_table import PointRow, Points
+from solver.continuation.extrema.nodes import NodeSolver
 from solver.continuation.folds import fold_between, motion_scales
 from solver.continuation.marks import Bifurcations, Mark, MarkKind
 from solver.jit.fourier import Real
-from solver.response.stability.floquet import Growth, branch_stability
+from solver.response.stability.floquet import branch_stability
+from solver.response.stability.multipliers import Growth
 
 LARGE = 1200  # unknowns above which no result looks by itself
 _HALVINGS = 40

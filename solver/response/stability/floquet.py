@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from enum import Enum
-from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
@@ -19,61 +16,12 @@ from solver.linear.assembly import linear_model
 from solver.linear.contact_table import port_counts
 from solver.response.solution import Solution
 from solver.response.stability.monodromy import PERIOD, LinearPart, Monodromy, PeriodElement, monodromy
-from solver.results.base import Drawn
-from solver.results.views import Views
+from solver.response.stability.multipliers import Stability, growth_of
 from solver.results.watch import OnProgress, ShouldStop, shows_progress
 from solver.scene.cyclic.annulus import annulus
 from solver.scene.scene import Scene
 
 Motions = tuple[Real, ...]  # of every contact, (ports, 2H + 1) full coefficients [m]
-GROWS = 1e-9  # a multiplier's modulus beyond 1 that is more than rounding
-REAL = 1e-7  # imaginary part, relative to the modulus, that counts as none
-
-
-class Growth(Enum):
-    """How a perturbation grows, if one does; the value is what a user reads."""
-
-    NONE = "no perturbation grows"
-    FOLD = "a real multiplier is above 1: beyond a fold, or where another branch leaves this one"
-    PERIOD_DOUBLING = "a real multiplier is below -1: the motion goes over to twice the period"
-    TORUS = "a pair of complex multipliers is beyond 1: a second frequency grows (Neimark-Sacker)"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class Stability(Drawn):
-    """Whether small perturbations of a periodic response die out."""
-
-    VIEWS: ClassVar = Views("solver.views", "of_stability", "of_stability", "stability_dataset")
-    JSON: ClassVar = "stable growth radius neutral multipliers frequency_hz seconds"
-
-    multipliers: Annotated[
-        Complex,
-        "Floquet multipliers, largest modulus first, without the neutral ones. Contacts that slip leave "
-        "zeros: friction forgets.",
-    ]
-    neutral: Annotated[
-        int,
-        "Multipliers that are 1 by construction and left out: one for the slider of each contact that "
-        "sticks all the time (its residual force is history), one for each displacement that nothing "
-        "resists.",
-    ]
-    growth: Annotated[Growth, "The kind of the largest multiplier, if it is beyond the unit circle."]
-    frequency_hz: Annotated[float, "Of the response [Hz]."]
-    seconds: Annotated[float, "What it took."]
-
-    @property
-    def radius(self) -> float:
-        """Largest modulus of the multipliers that are not neutral."""
-        return float(np.abs(self.multipliers).max(initial=0.0))
-
-    @property
-    def stable(self) -> bool:
-        """Whether no perturbation grows."""
-        return self.growth is Growth.NONE
-
-    def to_json(self) -> dict[str, Any]:
-        """Return the answer as one JSON object; multipliers as [real, imaginary]."""
-        return self._json(multipliers=np.stack([self.multipliers.real, self.multipliers.imag], axis=1))
 
 
 @shows_progress("stability")
@@ -158,16 +106,6 @@ def motions_stability(
         multipliers=multipliers, neutral=found.neutral, growth=growth_of(multipliers),
         frequency_hz=frequency_hz, seconds=time.perf_counter() - begun,
     )  # fmt: skip
-
-
-def growth_of(multipliers: Complex) -> Growth:
-    """Return how a perturbation grows, from the multipliers with the largest modulus first."""
-    if multipliers.size == 0 or abs(multipliers[0]) <= 1.0 + GROWS:
-        return Growth.NONE
-    largest = complex(multipliers[0])
-    if abs(largest.imag) > REAL * abs(largest):
-        return Growth.TORUS
-    return Growth.FOLD if largest.real > 0.0 else Growth.PERIOD_DOUBLING
 
 
 def scene_monodromy(

@@ -23,7 +23,7 @@ from solver.balance.simplifications import breaks_symmetry
 from solver.balance.workspace import PointSolution, Workspace
 from solver.continuation.branch import BranchStatus
 from solver.continuation.branches.sweep import walk
-from solver.continuation.extrema.nodes import Points
+from solver.continuation.extrema.node_table import Points
 from solver.continuation.marks import MarkKind
 from solver.continuation.segment import Stretch, joined
 from solver.continuation.settings import ContinuationSettings

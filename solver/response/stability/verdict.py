@@ -16,6 +16,7 @@ from solver.errors import SettingError
 from solver.linear.assembly import linear_model
 from solver.linear.contact_table import port_counts
 from solver.response.stability.cost import forecast
+from solver.response.stability.multipliers import verdict_of
 from solver.response.stability.uniqueness import MONOTONE, monotone
 from solver.results import units
 from solver.results.known import Stable, Verdict
@@ -23,33 +24,16 @@ from solver.scene.scene import Scene
 
 if TYPE_CHECKING:
     from solver.response.solution import Solution
-    from solver.response.stability.floquet import Stability
 
 CHEAP = 1.0  # s, forecast, up to which an answer has its multipliers by itself
-NEUTRAL = 1e-7  # of the largest modulus beside 1: nothing is said to grow or to die out so slowly
 _STARTS = 8  # of the search for a stable response beside one that is not
 # Of that search, how many of its parts run: starts, and branches that are followed both ways.
 _PARTS, _UNKNOWNS = 20, 200  # with so many unknowns; with more fewer, by their square
 _NO_SOLUTION = "there is no solution"
 _LONG = "Floquet multipliers would take about {}: stability() computes them"
-_DIES_OUT = "the largest Floquet multiplier is {:.4g}: perturbations die out"
-_BESIDE_ONE = "the largest Floquet multiplier is 1 to within {:.0e}: nothing is said to grow or to die out"
-_GROWS = "{} (largest Floquet multiplier {:.4g}): the motion does not stay as it is"
 _BELOW = Verdict(stable=Stable.NOT_KNOWN, ground="the peaks above it are as much as is judged by itself")
 _ANOTHER = "; a stable response has half peak to peak {} there"
 _NONE_FOUND = "; no stable response was found there"
-
-
-def verdict_of(found: Stability) -> Verdict:
-    """Return what the multipliers of a response say."""
-    from solver.response.stability.floquet import GROWS
-
-    radius = found.radius
-    if abs(radius - 1.0) <= NEUTRAL and len(found.multipliers):
-        return Verdict(stable=Stable.NOT_KNOWN, ground=_BESIDE_ONE.format(NEUTRAL))
-    if radius > 1.0 + GROWS:
-        return Verdict(stable=Stable.NO, ground=_GROWS.format(found.growth.value, radius))
-    return Verdict(stable=Stable.YES, ground=_DIES_OUT.format(radius))
 
 
 def of_solution(solution: Solution) -> Verdict:

@@ -10,7 +10,7 @@ from solver.continuation.branch import AnyBranch
 from solver.marching.result import MarchResult
 from solver.modes.peaks.performance import PerformanceCurve
 from solver.response.solution import Solution
-from solver.response.stability.floquet import Stability
+from solver.response.stability.multipliers import Stability
 from solver.scene.scene import Scene
 from solver.studies.blades import BladeAmplitudes, BladePeaks
 from solver.studies.peaks.results import PeakTrack

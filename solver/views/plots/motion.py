@@ -18,7 +18,7 @@ from solver.views.plots.style import Into
 if TYPE_CHECKING:
     from solver.marching.result import MarchResult
     from solver.response.solution import Solution
-    from solver.response.stability.floquet import Stability
+    from solver.response.stability.multipliers import Stability
 
 MOST_LOOPS = 3
 _SAMPLES = 1000

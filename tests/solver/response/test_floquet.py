@@ -32,8 +32,9 @@ from solver.linear.assembly import linear_model
 from solver.marching.equations import equations_of_motion
 from solver.marching.kernels import taylor as kernel
 from solver.response.solution import Solution
-from solver.response.stability.floquet import Growth, growth_of, scene_monodromy
+from solver.response.stability.floquet import scene_monodromy
 from solver.response.stability.monodromy import PERIOD, LinearPart, Monodromy, PeriodElement, monodromy
+from solver.response.stability.multipliers import Growth, growth_of
 
 UNSTABLE = oscillator({"kt": 0.5, "mu": 0.3, "N0": 5.0}, k=1.0, c=0.05)
 

@@ -5,8 +5,8 @@ import pytest
 
 import solver
 from solver.balance.workspace import Workspace
-from solver.continuation.extrema.node_table import NodeTable
-from solver.continuation.extrema.nodes import NodeSolver, Points
+from solver.continuation.extrema.node_table import NodeTable, Points
+from solver.continuation.extrema.nodes import NodeSolver
 
 
 def test_rows_keep_their_numbers_while_the_table_grows():
