@@ -12,6 +12,7 @@ by this way, which says nothing about whether there is one. It has at most `MOST
 from __future__ import annotations
 
 import math
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -19,16 +20,16 @@ import numpy as np
 from solver.balance.balance import Balance, build, level_scales_all
 from solver.balance.parameter import Kind
 from solver.balance.workspace import PointSolution, Workspace
-from solver.continuation.kernels.pseudo_arclength import begin_walk, walk_on
-from solver.continuation.kernels.state import FINISHED, ITERATIONS, RUNNING, Control, walk_by_value
-from solver.continuation.segment import rows_of
+from solver.continuation.branch import BranchStatus
+from solver.continuation.kernels.pseudo_arclength import begin_walk
 from solver.continuation.settings import ContinuationSettings
+from solver.continuation.stretches import STRETCH, BranchStretches, control_of
+from solver.continuation.walk import walk
 from solver.jit.fourier import Real
 from solver.scene.parameter_paths import AMPLITUDE
 
 LOWEST = 1e-3  # level to begin with, relative to the one given
 MOST_POINTS = 1024  # of the arc; a smooth one takes 70, that of a light wedge some hundred
-_STRETCH = 64  # points between two looks
 
 
 def solve_along_level(workspace: Workspace, p: float) -> tuple[PointSolution | None, int]:
@@ -76,23 +77,20 @@ def _followed(balance: Balance) -> tuple[Real | None, int]:
     -------
     (slip motions there [m], or None if the arc does not lead there, Newton iterations).
     """
-    workspace, settings = Workspace.of(balance), ContinuationSettings()
+    workspace = Workspace.of(balance)
     level = balance.parameter.inside(balance.scene.value(AMPLITUDE))
-    control = Control(
-        start=LOWEST * level, stop=level, first_step=settings.first_step, largest_step=settings.largest_step,
-        smallest_step=settings.smallest_step, wanted_iterations=settings.wanted_iterations,
-        most_iterations=settings.most_iterations, predictor=int(settings.predictor),
-        largest_turn=settings.largest_turn, range_weight=settings.range_length,
-    )  # fmt: skip
+    control = control_of(ContinuationSettings(), LOWEST * level, level)
     least = workspace.solve(control.start)
     if not least.converged:
         return None, least.iterations
-    system, linear, point = workspace.system, workspace.linear, workspace.point
-    code, state = begin_walk(system, linear, point, control, least.u)
-    rows, points = (*rows_of(balance, _STRETCH), workspace.springs.rows(0)), 0
-    while code == RUNNING and points < MOST_POINTS:
-        code, count = walk_on(system, linear, point, control, state, _STRETCH, *rows)
-        points += count
-    walk = walk_by_value(state)
-    spent = least.iterations + int(walk.numbers[ITERATIONS])
-    return (walk.u.copy() if code == FINISHED else None), spent
+    code, state = begin_walk(workspace.system, workspace.linear, workspace.point, control, least.u)
+    arc = BranchStretches(workspace, control, code, state, least.iterations, time.perf_counter())
+    points, last = 0, None
+    for last in walk(arc, STRETCH, 1.0):
+        points += len(last.solutions)
+        if points >= MOST_POINTS:
+            break
+    if last is None:
+        return None, least.iterations
+    there = last.solutions[-1, :-1].copy() if last.status is BranchStatus.COMPLETED else None
+    return there, last.newton_iterations

@@ -14,9 +14,11 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import Enum
+from itertools import chain
 
 import numpy as np
 
+from solver.continuation.walk import walk
 from solver.jit.fourier import Real
 from solver.modes.corrector import Corrected, ModeState, carried_anew, correct, scales
 from solver.modes.equations import Equations
@@ -74,42 +76,27 @@ def follow(
     points: list[Corrected] = []
     if not first.converged:
         return FollowedCurve(points=points, end=CurveEnd.NOT_BEGUN)
-    point, low = first, first.state.log_amplitude
-    farthest = purest = first
-    tangent, size, total = tangent_of(equations, point), FIRST_STEP, 0
-    for count in range(most_points + 1):
+    curve, low, end = (
+        _ModeCurve(equations, first, high, least_share, turns=turns),
+        first.state.log_amplitude,
+        None,
+    )
+    for point in chain([first], walk(curve, FIRST_STEP, LEAST_STEP)):
         at = point.state.log_amplitude
         if at < least:
-            return FollowedCurve(points=points, end=CurveEnd.TURNED_BACK, rejected=total)
+            end = CurveEnd.TURNED_BACK
+            break
         points.append(point)
         if on_progress is not None:
             share = (at - low) / (high - low) if done is None else done(at)
             on_progress(min(max(share, 0.0), 1.0), len(points))
         if should_stop is not None and should_stop():
-            return FollowedCurve(points=points, end=CurveEnd.CANCELLED, rejected=total)
-        if at >= high:
-            return FollowedCurve(points=points, end=CurveEnd.COMPLETED, rejected=total)
-        if count == most_points:
+            end = CurveEnd.CANCELLED
+        elif len(points) > most_points and not curve.ended:
+            end = CurveEnd.TOO_LONG
+        if end is not None:
             break
-        found, rejected, before = None, 0, tangent
-        if tangent is not None and at > low - _FARTHEST:
-            here = _with_phase(equations, point) if turns else point
-            found, size, rejected = _advance(equations, here, tangent, size, high)
-        if found is None or share_of_first(equations, found) < least_share:
-            # From there on toward larger amplitudes.
-            back = tuple(
-                _with_phase(equations, each) if turns else each for each in (point, farthest, purest)
-            )
-            found, size, before = _leap(equations, back, high, least_share), _RESOLVED, None
-        if found is None:
-            end = CurveEnd.TURNED_BACK if at <= low - _FARTHEST else CurveEnd.STOPPED
-            return FollowedCurve(points=points, end=end, rejected=total)
-        tangent, point, total = tangent_of(equations, found, before), found, total + rejected
-        if point.state.log_amplitude > farthest.state.log_amplitude:
-            farthest = point
-        if share_of_first(equations, point) > _PURE:
-            purest = point
-    return FollowedCurve(points=points, end=CurveEnd.TOO_LONG, rejected=total)
+    return FollowedCurve(points=points, end=end or curve.end, rejected=curve.rejected)
 
 
 def share_of_first(equations: Equations, found: Corrected) -> float:
@@ -122,56 +109,104 @@ def share_of_first(equations: Equations, found: Corrected) -> float:
     return s.squared_amplitude(alone) / s.squared_amplitude(x)
 
 
-def _advance(
-    equations: Equations, here: Corrected, tangent: Real, size: float, high: float
-) -> tuple[Corrected | None, float, int]:
-    """Return the next point (None if there is none), the next step size, and how many were rejected."""
-    rejected = 0
-    while size >= LEAST_STEP:
-        left = high - here.state.log_amplitude
+class _ModeCurve:
+    """A curve as it stands at its last point.
+
+    Attributes
+    ----------
+    rejected : steps that were tried again.
+    """
+
+    def __init__(
+        self, equations: Equations, first: Corrected, high: float, least_share: float, *, turns: bool
+    ) -> None:
+        self._equations, self._high, self._least_share, self._turns = equations, high, least_share, turns
+        self._point = self._farthest = self._purest = first
+        self._tangent = tangent_of(equations, first)
+        self._left = first.state.log_amplitude - _FARTHEST  # where it has turned back
+        self.rejected = 0
+
+    @property
+    def ended(self) -> bool:
+        """Whether it has reached the largest amplitude."""
+        return self._point.state.log_amplitude >= self._high
+
+    @property
+    def end(self) -> CurveEnd:
+        """How it ends where it goes no further."""
+        if self.ended:
+            return CurveEnd.COMPLETED
+        back = self._point.state.log_amplitude <= self._left
+        return CurveEnd.TURNED_BACK if back else CurveEnd.STOPPED
+
+    def tried(self, size: float) -> tuple[Corrected | None, float]:
+        """Try a step along the tangent."""
+        equations, tangent = self._equations, self._tangent
+        if tangent is None or self._point.state.log_amplitude <= self._left:
+            return None, 0.0
+        here = self._in_phase(self._point)
+        left = self._high - here.state.log_amplitude
         last = size * tangent[-1] >= left
         guess = _ahead(here.state, tangent, left / tangent[-1] if last else size, equations)
         if last:
-            found = correct(equations, replace(guess, log_amplitude=high))
+            found = correct(equations, replace(guess, log_amplitude=self._high))
         else:
             found = correct(equations, guess, border_of(here.state, tangent, equations.size))
         followed = found.converged and equations.follows(here.state.y, found.state.y)
-        if followed and is_near(here, found, size, equations.size):
-            if size > _RESOLVED and _bends(guess, found.state):
-                size = max(0.4 * size, _RESOLVED)
-                continue
-            if found.iterations <= _EASY:
-                size = min(1.6 * size, LARGEST_STEP)
-            elif found.iterations >= _HARD:
-                size = max(0.5 * size, LEAST_STEP)
-            return carried_anew(equations, found), size, rejected
-        rejected, size = rejected + 1, 0.4 * size
-    return None, size, rejected
+        if not followed or not is_near(here, found, size, equations.size):
+            self.rejected += 1
+            return None, 0.4 * size
+        if size > _RESOLVED and _bends(guess, found.state):
+            return None, max(0.4 * size, _RESOLVED)
+        if found.iterations <= _EASY:
+            size = min(1.6 * size, LARGEST_STEP)
+        elif found.iterations >= _HARD:
+            size = max(0.5 * size, LEAST_STEP)
+        found = carried_anew(equations, found)
+        if share_of_first(equations, found) < self._least_share:
+            return None, 0.0
+        return self._taken(found, tangent), size
 
+    def leapt(self) -> tuple[Corrected | None, float]:
+        """Leap to a larger amplitude than any before, from the shape of one of three points.
 
-def _leap(
-    equations: Equations, points: tuple[Corrected, ...], high: float, least_share: float
-) -> Corrected | None:
-    """Return a point at a larger amplitude than any of `points`, from the shape of one of them; None if none.
+        That is over a kink where no short step ends well, past another mode that moves in a higher harmonic,
+        or where the branch of a sticking contact that once slipped leads back: its force depends on the
+        history, and there is one for each. From there on the curve leads toward larger amplitudes.
+        """
+        equations = self._equations
+        points = [self._in_phase(each) for each in (self._point, self._farthest, self._purest)]
+        farthest = max(point.state.log_amplitude for point in points)
+        for jump in _JUMPS:
+            to = min(farthest + jump, self._high)
+            for here in points:
+                rise, y = to - here.state.log_amplitude, here.state.y.copy()
+                y[: equations.size + 2] *= math.exp(rise)
+                found = correct(equations, replace(here.state, y=y, log_amplitude=to), most=40)
+                if not found.converged or share_of_first(equations, found) < self._least_share:
+                    continue
+                if not equations.follows(here.state.y, found.state.y):
+                    continue
+                if is_near(here, found, rise, equations.size):
+                    return self._taken(carried_anew(equations, found), None), _RESOLVED
+        return None, 0.0
 
-    That is over a kink where no short step ends well, past another mode that moves in a higher harmonic, or
-    where the branch of a sticking contact that once slipped leads back: its force depends on the history, and
-    there is one for each.
-    """
-    farthest = max(point.state.log_amplitude for point in points)
-    for jump in _JUMPS:
-        to = min(farthest + jump, high)
-        for here in points:
-            rise, y = to - here.state.log_amplitude, here.state.y.copy()
-            y[: equations.size + 2] *= math.exp(rise)
-            found = correct(equations, replace(here.state, y=y, log_amplitude=to), most=40)
-            if not found.converged or share_of_first(equations, found) < least_share:
-                continue
-            if not equations.follows(here.state.y, found.state.y):
-                continue
-            if is_near(here, found, rise, equations.size):
-                return carried_anew(equations, found)
-    return None
+    def _taken(self, found: Corrected, before: Real | None) -> Corrected:
+        """Stand at a point, with its tangent onward from the one before."""
+        self._tangent, self._point = tangent_of(self._equations, found, before), found
+        if found.state.log_amplitude > self._farthest.state.log_amplitude:
+            self._farthest = found
+        if share_of_first(self._equations, found) > _PURE:
+            self._purest = found
+        return found
+
+    def _in_phase(self, found: Corrected) -> Corrected:
+        """Return a point with a phase in which its own motion is as it is, where the motion may turn."""
+        if found.at is None or not self._turns:
+            return found
+        s = self._equations.structure
+        phase = 1j * s.momentum(found.at.x[s.first])
+        return replace(found, state=replace(found.state, phase=phase / np.linalg.norm(phase)))
 
 
 def _bends(guess: ModeState, found: ModeState) -> bool:
@@ -238,12 +273,3 @@ def is_near(here: Corrected, found: Corrected, size: float, motions: int) -> boo
     change = np.append(found.state.y - here.state.y, found.state.log_amplitude - here.state.log_amplitude)
     far = float(border_of(here.state, by_shape(here.state, change, motions), motions) @ change)
     return math.sqrt(max(far, 0.0)) <= 3.0 * size + 1e-9
-
-
-def _with_phase(equations: Equations, found: Corrected) -> Corrected:
-    """Return the point with a phase in which its own motion is as it is."""
-    if found.at is None:
-        return found
-    s = equations.structure
-    phase = 1j * s.momentum(found.at.x[s.first])
-    return replace(found, state=replace(found.state, phase=phase / np.linalg.norm(phase)))

@@ -26,6 +26,7 @@ from solver.continuation.extrema.node_table import PointRow
 from solver.continuation.extrema.nodes import NodeSolver
 from solver.continuation.loose_parts import ending
 from solver.continuation.segment import Stretch
+from solver.continuation.walk import walk
 from solver.jit.fourier import Real
 from solver.linear.assembly import linear_model
 
@@ -76,38 +77,67 @@ def walk_by_points(
     stop, span : end and length of the whole range (inside unit).
     begun : time at which the work began.
     """
-    solver = NodeSolver(workspace)
-    onward = float(np.sign(stop - before.solutions[-1, -1])) or 1.0
-    at, step = float(before.solutions[-1, -1]), FIRST * span
-    last: PointRow | None = solver.at(at, [before.solutions[-1, :-1]], onward)
+    curve = _Unique(workspace, before, stop, span)
     nodes: list[PointRow] = []
-    status: BranchStatus | None = None if last is not None else BranchStatus.STALLED
-    rejected = 0
-    while status is None and last is not None:
-        if (stop - at) * onward <= 0.0:
-            status = BranchStatus.COMPLETED
-            break
-        there = stop if (stop - at) * onward <= 1.5 * step else at + onward * step
-        guess = last.solution[:-1] + (there - at) * onward * last.tangent[:-1]
-        node = solver.at(there, [guess, last.solution[:-1]], onward)
-        size = max(_moved(workspace.balance, last.solution[:-1]), solver.least)
-        far = np.inf if node is None else _moved(workspace.balance, node.solution[:-1] - guess)
-        if node is None or (far > _OFF * size and step > SMALLEST * span):
-            rejected += 1
-            step *= 0.5
-            if step < SMALLEST * span and node is None:
-                status = ending(workspace.solve(there), BranchStatus.STALLED)
-            continue
-        if far > _TORN * size:
-            status = BranchStatus.STALLED
-            break
+    for node in walk(curve, FIRST * span, SMALLEST * span):
         nodes.append(node)
-        last, at = node, there
-        step = min(LARGEST * span, step * (_GROWTH if far < 0.3 * _OFF * size else 1.0))
         if len(nodes) == _STRETCH:
-            yield _stretch(before, nodes, None, solver, rejected, begun)
+            yield _stretch(before, nodes, None, curve, begun)
             nodes = []
-    yield _stretch(before, nodes, status, solver, rejected, begun)
+    yield _stretch(before, nodes, curve.status, curve, begun)
+
+
+class _Unique:
+    """The response over the parameter as it stands at its last point.
+
+    Attributes
+    ----------
+    status : how it ended; None as long as it goes on.
+    """
+
+    def __init__(self, workspace: Workspace, before: Stretch, stop: float, span: float) -> None:
+        self._workspace, self._stop, self._span = workspace, stop, span
+        self.solver, self.rejected = NodeSolver(workspace), 0
+        last = before.solutions[-1]
+        self._onward = float(np.sign(stop - last[-1])) or 1.0
+        self._last = self.solver.at(float(last[-1]), [last[:-1]], self._onward)
+        self._there = float(last[-1])  # where it was tried last
+        self.status: BranchStatus | None = None
+        if self._last is None:
+            self.status = BranchStatus.STALLED
+        elif (stop - self._last.at) * self._onward <= 0.0:
+            self.status = BranchStatus.COMPLETED
+
+    @property
+    def ended(self) -> bool:
+        """Whether it goes no further."""
+        return self.status is not None
+
+    def tried(self, size: float) -> tuple[PointRow | None, float]:
+        """Solve at a value of the parameter, from where the tangent leads or from the last point."""
+        last, onward, least = self._last, self._onward, SMALLEST * self._span
+        assert last is not None
+        ahead = (self._stop - last.at) * onward
+        self._there = there = self._stop if ahead <= 1.5 * size else last.at + onward * size
+        guess = last.solution[:-1] + (there - last.at) * onward * last.tangent[:-1]
+        node = self.solver.at(there, [guess, last.solution[:-1]], onward)
+        scale = max(_moved(self._workspace.balance, last.solution[:-1]), self.solver.least)
+        far = np.inf if node is None else _moved(self._workspace.balance, node.solution[:-1] - guess)
+        if node is None or (far > _OFF * scale and size > least):
+            self.rejected += 1
+            return None, 0.5 * size if node is None else max(0.5 * size, least)
+        if far > _TORN * scale:
+            self.status = BranchStatus.STALLED
+            return None, 0.0
+        self._last = node
+        if there == self._stop:
+            self.status = BranchStatus.COMPLETED
+        return node, min(LARGEST * self._span, size * (_GROWTH if far < 0.3 * _OFF * scale else 1.0))
+
+    def leapt(self) -> tuple[None, float]:
+        """Say why nothing was found where it was tried last."""
+        self.status = self.status or ending(self._workspace.solve(self._there), BranchStatus.STALLED)
+        return None, 0.0
 
 
 def _moved(balance: Balance, u: Real) -> float:
@@ -126,9 +156,8 @@ def _moved(balance: Balance, u: Real) -> float:
 
 
 def _stretch(
-    before: Stretch, nodes: list[PointRow], status: BranchStatus | None, solver: NodeSolver, rejected: int,
-    begun: float,
-) -> Stretch:  # fmt: skip
+    before: Stretch, nodes: list[PointRow], status: BranchStatus | None, curve: _Unique, begun: float
+) -> Stretch:
     """Return nodes as points behind others; without the state of a continuation, since there is none."""
     return Stretch(
         solutions=_rows([node.solution for node in nodes], before.solutions),
@@ -136,8 +165,8 @@ def _stretch(
         states=np.array([node.states for node in nodes], np.int64).reshape(-1, before.states.shape[1]),
         observed=_rows([node.observed for node in nodes], before.observed),
         measures=_rows([np.array(node.measures) for node in nodes], before.measures),
-        status=status, newton_iterations=before.newton_iterations + solver.spent,
-        rejected_steps=before.rejected_steps + rejected, stepped_over=before.stepped_over,
+        status=status, newton_iterations=before.newton_iterations + curve.solver.spent,
+        rejected_steps=before.rejected_steps + curve.rejected, stepped_over=before.stepped_over,
         seconds=time.perf_counter() - begun, walk=np.zeros(0),
     )  # fmt: skip
 

@@ -1,7 +1,7 @@
 """Continuation of periodic responses in any parameter: `sweep`, and the walk it is made of.
 
-The steps themselves are compiled (`solver.continuation.kernels.pseudo_arclength`); here they are taken in
-stretches, so that the caller can watch and stop, and the result is put together.
+It is taken in stretches (`solver.continuation.stretches`), so that the caller can watch and stop; here the
+result is put together.
 """
 
 from __future__ import annotations
@@ -24,20 +24,21 @@ from solver.continuation.branches.adaptive_harmonics import sweep_to
 from solver.continuation.branches.point_by_point import is_unique, rows_before_a_turn, walk_by_points
 from solver.continuation.branches.symmetry_breaking import branch_flags
 from solver.continuation.certificate import uncertain
-from solver.continuation.endings import AHEAD, MANY, ratchets_ahead, stands_still, taken_up, too_stiff
+from solver.continuation.endings import AHEAD, too_stiff
 from solver.continuation.extrema.branch_error import branch_error
 from solver.continuation.extrema.extrema import Survey, band_limit
 from solver.continuation.extrema.node_table import Points
 from solver.continuation.from_nothing import solve_from_nothing
 from solver.continuation.kernels import state as walk_states
-from solver.continuation.kernels.pseudo_arclength import begin_walk, walk_on
-from solver.continuation.kernels.state import Control, walk_by_value
-from solver.continuation.loose_parts import balanced_part, ending
+from solver.continuation.kernels.pseudo_arclength import begin_walk
+from solver.continuation.loose_parts import ending
 from solver.continuation.peaks import Peak
-from solver.continuation.segment import Course, Stretch, go_on_from, joined, rows_of, state_of
+from solver.continuation.segment import Course, Stretch, go_on_from, joined, rows_of
 from solver.continuation.settings import ContinuationSettings
+from solver.continuation.stretches import BranchStretches, control_of
+from solver.continuation.walk import walk as along
 from solver.errors import SettingError
-from solver.jit.fourier import Integer, Real, to_full
+from solver.jit.fourier import Real, to_full
 from solver.linear.modal import undamped_resonance
 from solver.results.notes import ABOVE_FRICTION
 from solver.results.watch import OnProgress, ShouldStop, shows_progress
@@ -45,20 +46,10 @@ from solver.scene.bodies.paths import SPEED
 from solver.scene.parameter_paths import FREQUENCY
 from solver.scene.scene import Scene
 
-_STRETCH = 64  # points between two looks at the caller, at most
-_SHORT_STRETCH = 4  # the first of them where a point may take long
-_LARGE = 400  # unknowns from which it may
 # Unknowns from which a point is so dear that the largest step is longer, and how much: the survey adds what
 # it needs. Where fewer motions lead the others so is the first one.
 _DEAR, _LONGER = 1000, 2.5
-_STRETCH_SECONDS = 0.5
 _MOST_FOLLOWED = 500  # points of a look at a resonance beside the branch
-_ENDINGS = {
-    walk_states.FINISHED: BranchStatus.COMPLETED,
-    walk_states.NO_START: BranchStatus.NO_START,
-    walk_states.STALLED: BranchStatus.STALLED,
-    walk_states.LEFT_RANGE: BranchStatus.TURNED_BACK,
-}
 _LOST = (
     BranchStatus.STALLED, BranchStatus.TURNED_BACK, BranchStatus.TOO_MANY_POINTS, BranchStatus.POWER_LOST,
 )  # fmt: skip
@@ -250,55 +241,27 @@ def walk(
     resume : the branch so far, to go on behind its last point; it is the first that is yielded.
     """
     begun = time.perf_counter() - (0.0 if resume is None else resume.seconds)
-    balance, system = workspace.balance, workspace.system
-    control = Control(
-        start=balance.parameter.inside(start), stop=balance.parameter.inside(stop),
-        first_step=settings.first_step, largest_step=settings.largest_step,
-        smallest_step=settings.smallest_step, wanted_iterations=settings.wanted_iterations,
-        most_iterations=settings.most_iterations, predictor=int(settings.predictor),
-        largest_turn=settings.largest_turn, range_weight=settings.range_length,
-    )  # fmt: skip
+    balance, inside = workspace.balance, workspace.balance.parameter.inside
+    control = control_of(settings, inside(start), inside(stop))
     if balance.n_unknowns >= _DEAR:
         control = control._replace(largest_step=_LONGER * control.largest_step)
-        if is_spanned(system):
+        if is_spanned(workspace.system):
             control = control._replace(first_step=_LONGER * control.first_step)
-    linear, point = workspace.linear, workspace.point
     if resume is None:
         found = solve_from_nothing(workspace, control.start, guess)
         spent = found.iterations
         if not found.converged:
             yield _no_start(balance, spent, begun, ending(found, BranchStatus.NO_START))
             return
-        code, state = begin_walk(system, linear, point, control, found.u)
+        code, state = begin_walk(workspace.system, workspace.linear, workspace.point, control, found.u)
+        if code == walk_states.NO_START:
+            yield _no_start(balance, spent, begun, BranchStatus.NO_START)
     else:
         state, spent = go_on_from(workspace, control, resume)
         code = walk_states.RUNNING if resume.status is None else walk_states.FINISHED
         yield resume
-    last = np.zeros((0, balance.n_unknowns + 1))
-    size = _STRETCH if balance.n_unknowns <= _LARGE else _SHORT_STRETCH
-    while code == walk_states.RUNNING:
-        rows, springs, before = rows_of(balance, size), workspace.springs.rows(size), time.perf_counter()
-        code, count = walk_on(system, linear, point, control, state, size, *rows, springs)
-        workspace.springs.keep(rows[0][:count], springs)
-        last = np.concatenate([last, rows[0][:count]])[-MANY:]
-        if code == walk_states.RUNNING and stands_still(last, control):
-            code = walk_states.STALLED
-        status, again = _ENDINGS.get(code), None
-        if status is BranchStatus.STALLED:
-            again = taken_up(workspace, control, state, last)
-        if again is not None:
-            status, code = None, walk_states.RUNNING
-        elif status is BranchStatus.STALLED and ratchets_ahead(workspace, state, control):
-            status = BranchStatus.RATCHETS
-        stretch = balanced_part(workspace, _stretch(rows, count, status, state, spent, begun))
-        yield stretch
-        if stretch.status is not None:
-            return
-        state = state if again is None else again
-        elapsed = time.perf_counter() - before
-        size = min(_STRETCH, max(1, int(size * min(2.0, _STRETCH_SECONDS / max(elapsed, 1e-9)))))
-    if code == walk_states.NO_START:
-        yield _no_start(balance, spent, begun, BranchStatus.NO_START)
+    branch = BranchStretches(workspace, control, code, state, spent, begun)
+    yield from along(branch, branch.size, 1.0)
 
 
 def _no_start(balance: Balance, iterations: int, begun: float, status: BranchStatus) -> Stretch:
@@ -308,21 +271,6 @@ def _no_start(balance: Balance, iterations: int, begun: float, status: BranchSta
         solutions=rows[0], tangents=rows[1], states=rows[2], observed=rows[3], measures=rows[4],
         status=status, newton_iterations=iterations, rejected_steps=0, stepped_over=0,
         seconds=time.perf_counter() - begun, walk=np.zeros(0),
-    )  # fmt: skip
-
-
-def _stretch(
-    rows: tuple[Real, Real, Integer, Real, Real], count: int, status: BranchStatus | None,
-    state: walk_states.Walk, spent: int, begun: float,
-) -> Stretch:  # fmt: skip
-    numbers = walk_by_value(state).numbers
-    return Stretch(
-        solutions=rows[0][:count], tangents=rows[1][:count], states=rows[2][:count], observed=rows[3][:count],
-        measures=rows[4][:count], status=status,
-        newton_iterations=spent + int(numbers[walk_states.ITERATIONS]),
-        rejected_steps=int(numbers[walk_states.REJECTED]),
-        stepped_over=int(numbers[walk_states.STEPPED_OVER]),
-        seconds=time.perf_counter() - begun, walk=state_of(state),
     )  # fmt: skip
 
 

@@ -25,6 +25,7 @@ from solver.continuation.extrema.extrema import band_limit
 from solver.continuation.peaks import Band, Edge, Peak
 from solver.continuation.segment import Course
 from solver.continuation.settings import ContinuationSettings
+from solver.continuation.walk import walk
 from solver.errors import SettingError
 from solver.response.contact_response import code_of
 from solver.response.exact.branch import ExactBranch, Orbits, Point
@@ -84,16 +85,16 @@ def sweep_exactly(
         stop = scene.observe.band[1] if stop is None else stop
     first, last = check_range(orbits.parameter, start, stop)
     check_limit(limit)
-    walk = OrbitWalk(orbits, first, last, (settings or ContinuationSettings()).most_points)
-    for point in walk.points():
+    orbit = OrbitWalk(orbits, first, last, (settings or ContinuationSettings()).most_points)
+    for point in orbit.points():
         if course.on_points is not None:
             course.on_points(np.array([point.value]), np.array([point.height]))
         if on_progress is not None:
-            on_progress((point.value - first) / (last - first), len(walk.found))
+            on_progress((point.value - first) / (last - first), len(orbit.found))
         if should_stop is not None and should_stop():
-            walk.status = BranchStatus.STOPPED
+            orbit.status = BranchStatus.STOPPED
             break
-    branch = _finished(walk, limit, begun)
+    branch = _finished(orbit, limit, begun)
     if on_progress is not None and branch.reached:
         on_progress(1.0, len(branch.values))
     return branch
@@ -116,53 +117,63 @@ class OrbitWalk:
         self.status = BranchStatus.COMPLETED
         self.beyond: Solution | None = None
         self.rejected, self._most = 0, most
-        self._stops, self._undamped = _resonances(orbits, first, last)
+        stops, self._undamped = _resonances(orbits, first, last)
+        self._span = abs(last - first)
+        self._ahead: list[tuple[float, Point | None]] = [(value, None) for value in (last, *stops)]
 
     def points(self) -> Iterator[Point]:
         """Yield the points, until the end of the range or where there is no response."""
-        span = abs(self.last - self.first)
-        ahead: list[tuple[float, Point | None]] = [(value, None) for value in (self.last, *self._stops)]
-        step = _FIRST * span
-        new = self.orbits.at(self.first)
-        while new.solution.converged:
-            self.found.append(new)
-            yield new
-            if not ahead:
-                return
-            if len(self.found) >= self._most:
-                self.status = BranchStatus.TOO_MANY_POINTS
-                return
-            new, gap, off = self._next(ahead, step, span)
-            step = min(_LARGEST * span, gap * (2.0 if off < 0.3 else 1.0))
-            if off > 1.0 and any(_between(pole, self.found[-1], new) for pole in self._undamped):
-                self.status = BranchStatus.UNDAMPED
-                return
-        self.beyond = new.solution
-        nothing = BranchStatus.NO_START if not self.found else BranchStatus.STALLED
-        self.status = _ENDINGS.get(new.solution.status, nothing)
+        first = self.orbits.at(self.first)
+        if not first.solution.converged:
+            self._lost(first, BranchStatus.NO_START)
+            return
+        yield self._kept(first)
+        yield from walk(self, _FIRST * self._span, _SMALLEST * self._span)
 
-    def _next(
-        self, ahead: list[tuple[float, Point | None]], step: float, span: float
-    ) -> tuple[Point, float, float]:
-        """Return the next point, how far it is, how badly it was foreseen; `ahead` is what comes later."""
-        here = self.found[-1]
-        while True:
-            target, known = ahead.pop()
-            gap = abs(target - here.value)
-            if known is None and gap > 1.0001 * step:
-                ahead.append((target, None))
-                target = here.value + math.copysign(step, target - here.value)
-                gap = step
-            new = self.orbits.at(target, here) if known is None else known
-            off = self._off(new) if new.solution.converged else math.inf
-            smallest = _SMALLEST if new.solution.converged else _LAST_TRIED
-            if off <= 1.0 or gap <= smallest * span:
-                if not new.solution.converged:  # only a start from rest says that there is none
-                    new = self.orbits.at(target)
-                return new, gap, off
+    @property
+    def ended(self) -> bool:
+        """Whether it goes no further."""
+        return not self._ahead or self.status is not BranchStatus.COMPLETED
+
+    def tried(self, size: float) -> tuple[Point | None, float]:
+        """Try the next point ahead, no farther than `size`; one not foreseen is kept for later."""
+        here, (target, known) = self.found[-1], self._ahead.pop()
+        gap = abs(target - here.value)
+        if known is None and gap > 1.0001 * size:
+            self._ahead.append((target, None))
+            target, gap = here.value + math.copysign(size, target - here.value), size
+        new = self.orbits.at(target, here) if known is None else known
+        off = self._off(new) if new.solution.converged else math.inf
+        smallest = _SMALLEST if new.solution.converged else _LAST_TRIED
+        if off > 1.0 and gap > smallest * self._span:
             self.rejected += 1
-            ahead += [(target, new), (0.5 * (here.value + target), None)]
-            step = gap
+            self._ahead += [(target, new), (0.5 * (here.value + target), None)]
+            return None, gap
+        if not new.solution.converged:  # only a start from rest says that there is none
+            new = self.orbits.at(target)
+        if off > 1.0 and any(_between(pole, here, new) for pole in self._undamped):
+            self.status = BranchStatus.UNDAMPED
+            return None, 0.0
+        if not new.solution.converged:
+            self._lost(new, BranchStatus.STALLED)
+            return None, 0.0
+        return self._kept(new), min(_LARGEST * self._span, gap * (2.0 if off < 0.3 else 1.0))
+
+    def leapt(self) -> tuple[None, float]:
+        """Go no further: there is no response."""
+        return None, 0.0
+
+    def _kept(self, new: Point) -> Point:
+        """Stand at a point."""
+        self.found.append(new)
+        if self._ahead and len(self.found) >= self._most:
+            self.status = BranchStatus.TOO_MANY_POINTS
+        return new
+
+    def _lost(self, new: Point, otherwise: BranchStatus) -> None:
+        """End where there is no response."""
+        self.beyond = new.solution
+        self.status = _ENDINGS.get(new.solution.status, otherwise)
 
     def _off(self, new: Point) -> float:
         """Return how far a point lies beside what those before foresee, relative to what it may."""

@@ -7,7 +7,6 @@ the highest peak from below everywhere; a sweep shows what no line has reached y
 from __future__ import annotations
 
 import math
-import time
 from collections import Counter, deque
 from collections.abc import Mapping
 from dataclasses import replace
@@ -20,20 +19,16 @@ from solver.balance.speed_line import check_no_line
 from solver.contacts.kernels.system import System, by_reference
 from solver.contacts.laws.base import without_second
 from solver.continuation.extrema.candidates import Rival, rivals
-from solver.continuation.extrema.kernels import peak_continuation as kernel
 from solver.continuation.extrema.kernels.peak_continuation import (
     COLUMNS,
     HEIGHT,
     OMEGA,
     PLACE,
-    PROGRESS,
     Ridge,
     Z,
     polish,
-    track,
 )
 from solver.continuation.extrema.kernels.peak_state import (
-    PAUSE,
     SIGN,
     SPENT,
     Summit,
@@ -42,10 +37,12 @@ from solver.continuation.extrema.kernels.peak_state import (
     summit_seconds,
 )
 from solver.continuation.peaks import Peak
+from solver.continuation.walk import walk
 from solver.errors import SettingError
 from solver.jit.fourier import Integer, Real
 from solver.linear.contact_table import second_numbers
 from solver.scene.scene import Scene
+from solver.studies.peaks.followed_peak import MOST_ROWS, FollowedPeak
 from solver.studies.peaks.seeds import (
     CROSSING,
     BandEndCrossing,
@@ -62,7 +59,6 @@ from solver.studies.peaks.track import EVERYWHERE, Glance, Line, LineEnd, Look, 
 from solver.studies.peaks.work_limit import Allowance
 
 Place = tuple[Real, Real, Real]  # row (COLUMNS,), solution and tangent (n_unknowns,) of a line at one z
-_MOST_ROWS = 600
 SUBDIVIDED = 6  # places between two rows at which the envelope is looked at
 ROUNDING = 1e-12
 ABOUT = 0.01  # relative height that a row that does not fit may lack
@@ -70,17 +66,6 @@ CAREFUL = 3e-4  # share of the range: first step where lines are close
 AGAIN = 8  # times the peaks of one sweep are followed at most
 ENDING = 0.1  # of the first step: as short as steps become before a line ends
 EXACTLY = 1e-6  # relative distance within which a peak is one that was solved at the same place
-_AT_ONCE = 0.1  # s of following between two looks at the caller
-_FIRST_AT_ONCE = 64.0  # evaluations likewise, as long as nothing is known of their time
-
-
-_ENDS = {
-    kernel.ARRIVED: LineEnd.ARRIVED,
-    kernel.VANISHED: LineEnd.VANISHED,
-    kernel.LEFT_BAND: LineEnd.LEFT_BAND,
-    kernel.TOO_LONG: LineEnd.TOO_LONG,
-    kernel.NOT_FOUND: LineEnd.NOT_FOUND,
-}
 
 
 def check_laws(scene: Scene) -> None:
@@ -114,7 +99,6 @@ class Tracker(Looking):
         self._summit: Summit = new_summit(self._system)
         summit_seconds(self._summit)[:] = second_numbers(self.balance.scene)
         self._crossings: list[BandEndCrossing] = []
-        self._at_once = _FIRST_AT_ONCE
         self._asked_at: Counter[float] = Counter()
 
     @property
@@ -349,20 +333,12 @@ class Tracker(Looking):
 
     def _track(self, seed: Seed, stop: float) -> tuple[LineEnd, Real, Real, Real, float]:
         """Follow a peak one way; return why it ended, its rows, solutions, tangents and its sign."""
-        nt, sign = self.balance.n_unknowns, seed.sign
-        rows, progress = np.zeros((_MOST_ROWS, COLUMNS)), np.zeros(PROGRESS)
-        solutions, tangents = np.zeros((_MOST_ROWS, nt)), np.zeros((_MOST_ROWS, nt))
-        ridge, numbers = self._ridge(seed.z, stop, fixed=seed.fixed), summit_numbers(self._summit)
-        code = kernel.PAUSED
-        while code == kernel.PAUSED:
+        self.check()
+        ridge = self._ridge(seed.z, stop, fixed=seed.fixed)
+        peak = FollowedPeak(self._system, self._summit, ridge, seed)
+        for count in walk(peak, ridge.first_step, ridge.smallest_step):
             self.check()
-            begun, before = time.perf_counter(), numbers[SPENT]
-            numbers[PAUSE] = before + self._at_once
-            code, count = track(
-                self._system, ridge, seed.u, seed.omega, seed.place, sign, self._summit, rows, solutions,
-                tangents, progress,
-            )  # fmt: skip
-            sign = float(numbers[SIGN])
-            a_second = (numbers[SPENT] - before) / max(time.perf_counter() - begun, 1e-9)
-            self._at_once = min(max(_AT_ONCE * a_second, 1.0), 4.0 * self._at_once)
-        return _ENDS[code], rows[:count].copy(), solutions[:count].copy(), tangents[:count].copy(), sign
+            if count == MOST_ROWS:
+                break
+        rows, solutions, tangents = (part[: peak.count].copy() for part in peak.found)
+        return peak.end, rows, solutions, tangents, float(summit_numbers(self._summit)[SIGN])

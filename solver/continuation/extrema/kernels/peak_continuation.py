@@ -17,10 +17,8 @@ from solver.continuation.extrema.kernels.peak_state import (
     CORNER,
     CURVE,
     DRIFT,
-    PAUSE,
     RATE,
     SIGN,
-    SPENT,
     TAU,
     G,
     Summit,
@@ -35,11 +33,6 @@ Z, P, OMEGA, HEIGHT, DHEIGHT, DOMEGA, PLACE, SLOPE, BEND, KINK = range(10)
 COLUMNS = 10
 _NEAR = 1e-4  # relative distance to a peak's frequency where only a high amplitude is wanted
 _MOST_SLACK = 0.5  # relative error of the height in a step at most
-# How a track ended.
-ARRIVED, VANISHED, LEFT_BAND, TOO_LONG, NOT_FOUND, PAUSED = range(6)
-# What a track needs to go on after a pause.
-COUNT, STEP, SMOOTH = range(3)
-PROGRESS = 3
 
 
 class Ridge(NamedTuple):
@@ -150,76 +143,51 @@ def _predict(
 
 
 @apart
-def track(
+def begin_track(
     system: System, ridge: Ridge, u: Real, omega: float, tau: float, sign: float, at: Summit,
-    rows: Real, solutions: Real, tangents: Real, progress: Real,
-) -> tuple[int, int]:  # fmt: skip
-    """Follow one peak from `ridge.start` to `ridge.stop`, or go on where a call before was interrupted.
+    rows: Real, solutions: Real, tangents: Real,
+) -> bool:  # fmt: skip
+    """Find the peak at `ridge.start` and write it into the first row; return whether it was found.
 
     Parameters
     ----------
-    u, omega, tau, sign : near the peak at the start; sign 0 lets the larger of max x and −min x be chosen.
-    rows : (most, COLUMNS); solutions, tangents : (most, nt) u and du/dz; filled.
-    progress : (PROGRESS,) zeros at the start; after PAUSED to be given back with `rows` and the sign found.
+    u, omega, tau, sign : near it; sign 0 lets the larger of max x and −min x be chosen.
+    rows : (most, COLUMNS); solutions, tangents : (most, nt) u and du/dz.
+    """
+    at.numbers[SIGN] = sign
+    trial, (p, _) = u.copy(), value_of(ridge.start, ridge.logarithmic)
+    good, _, omega = _correct(system, ridge, trial, omega, p, tau, False, 2e-3 * omega, False, True, at)
+    if good:
+        record(ridge, trial, omega, ridge.start, at, rows[0], solutions[0], tangents[0])
+    return good
+
+
+@apart
+def step_track(
+    system: System, ridge: Ridge, z: float, count: int, smooth: bool, at: Summit,
+    rows: Real, solutions: Real, tangents: Real,
+) -> tuple[float, int, bool]:  # fmt: skip
+    """Find the peak at `z` and write it behind `count` rows; `smooth`: the last two are predicted from.
 
     Returns
     -------
-    (how it ended, number of rows).
+    (how far it is from fitting as `step_error`, infinite if it was not found, Newton steps, whether it left
+    the band).
     """
-    n, most = u.size, rows.shape[0]
-    at.numbers[SIGN] = sign
-    trial, guess = u.copy(), np.empty(n)
-    if progress[COUNT] == 0.0:
-        p, _ = value_of(ridge.start, ridge.logarithmic)
-        good, _, omega = _correct(system, ridge, trial, omega, p, tau, False, 2e-3 * omega, False, True, at)
-        if not good:
-            return NOT_FOUND, 0
-        record(ridge, trial, omega, ridge.start, at, rows[0], solutions[0], tangents[0])
-        if ridge.start == ridge.stop:
-            return ARRIVED, 1
-        progress[COUNT], progress[STEP], progress[SMOOTH] = 1.0, ridge.first_step, 0.0
-    forward = 1.0 if ridge.stop >= ridge.start else -1.0
-    count, step, smooth = int(progress[COUNT]), progress[STEP], progress[SMOOTH] > 0.0
-    while count < most:
-        if 0.0 < at.numbers[PAUSE] <= at.numbers[SPENT]:
-            progress[COUNT], progress[STEP], progress[SMOOTH] = count, step, 1.0 if smooth else 0.0
-            return PAUSED, count
-        here = rows[count - 1]
-        z = here[Z] + forward * step
-        last = (z - ridge.stop) * forward >= 0.0 or abs(z - ridge.stop) < 0.1 * ridge.smallest_step
-        if last:
-            z = ridge.stop
-        length = z - here[Z]
-        predicted = _predict(rows, solutions, tangents, count, smooth, z, guess)
-        p, _ = value_of(z, ridge.logarithmic)
-        reach = 3.0 * abs(predicted - here[OMEGA]) + 1e-3 * here[OMEGA]
-        copy_to(trial, guess)
-        good, iterations, omega = False, MOST, predicted
-        if ridge.low <= predicted <= ridge.high:
-            good, iterations, omega = _correct(
-                system, ridge, trial, predicted, p, here[PLACE], here[KINK] > 0.0, reach,
-                here[HEIGHT] > ridge.enough, abs(length) <= ridge.climb_from, at,
-            )  # fmt: skip
-        error = np.inf
-        if good and ridge.low <= omega <= ridge.high:
-            record(ridge, trial, omega, z, at, rows[count], solutions[count], tangents[count])
-            error = step_error(ridge, here, rows[count])
-        if not error <= 1.0:
-            outside = not (ridge.low <= predicted <= ridge.high) or (
-                good and not ridge.low <= omega <= ridge.high
-            )
-            step, smooth = 0.5 * abs(length), False
-            if step < ridge.smallest_step:
-                return (LEFT_BAND if outside else VANISHED), count
-            continue
-        growth = min(2.0, max(0.5, 0.8 * (error + 1e-3) ** (-1.0 / 3.0)))
-        if iterations > 4:
-            growth = min(growth, 0.8)
-        step, smooth = min(abs(length) * growth, ridge.largest_step), True
-        count += 1
-        if last:
-            return ARRIVED, count
-    return TOO_LONG, count
+    guess, here = np.empty(solutions.shape[1]), rows[count - 1]
+    omega = predicted = _predict(rows, solutions, tangents, count, smooth, z, guess)
+    if not ridge.low <= predicted <= ridge.high:
+        return np.inf, MOST, True
+    p, _ = value_of(z, ridge.logarithmic)
+    reach = 3.0 * abs(predicted - here[OMEGA]) + 1e-3 * here[OMEGA]
+    good, iterations, omega = _correct(
+        system, ridge, guess, predicted, p, here[PLACE], here[KINK] > 0.0, reach,
+        here[HEIGHT] > ridge.enough, abs(z - here[Z]) <= ridge.climb_from, at,
+    )  # fmt: skip
+    if not (good and ridge.low <= omega <= ridge.high):
+        return np.inf, iterations, good
+    record(ridge, guess, omega, z, at, rows[count], solutions[count], tangents[count])
+    return step_error(ridge, here, rows[count]), iterations, False
 
 
 @compiled
@@ -251,7 +219,7 @@ def polish(
 
     Parameters
     ----------
-    rows, solutions, tangents : of `track`.
+    rows, solutions, tangents : of `step_track`.
     row (COLUMNS,), solution (nt,), tangent (nt,) : the peak there, filled.
     """
     at.numbers[SIGN] = sign

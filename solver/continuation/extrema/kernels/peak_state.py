@@ -26,8 +26,7 @@ from solver.linear.kernels.receptance_derivatives import Jets, new_jets
 # Entries of `Summit.numbers`.
 NORM, AMPLITUDE, G, DA_DP, CURVE, DG_DP, TAU, DTAU, SIGN, CORNER, DRIFT, RATE = range(12)
 SPENT = 12  # evaluations of the balance since it was set to 0
-PAUSE = 13  # of those, from which a track is interrupted between two steps; 0: it never is
-NUMBERS = 14
+NUMBERS = 13
 
 
 class Summit(NamedTuple):
