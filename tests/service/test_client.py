@@ -61,7 +61,7 @@ def test_sweeps_designs_scenes_and_plans(shipped_client: Client) -> None:
     client = shipped_client
     assert client.health().ready
     assert "stickslip_http_requests" in client.metrics()
-    body = {"scene": "two-dof", "variables": {"damper.N0": [20, 900]}}
+    body = {"scene": "two-dof", "variables": {"damper.N0": [20, 900]}, "harmonics": 3}
     design = client.submit_design(body, wait=60.0)
     assert client.design(design.id).result["optimum"]
     assert design.id in {one.id for one in client.designs(scene="two-dof")}
