@@ -3,6 +3,7 @@ import os
 import zlib
 from collections import Counter
 from collections.abc import Collection, Generator, Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -13,6 +14,10 @@ from launch import served
 for _library in ("OMP", "OPENBLAS", "MKL"):
     os.environ[f"{_library}_NUM_THREADS"] = "1"
 
+# Certificates of authorities are looked up in an empty folder: to read a list of all takes each client 30 ms,
+# and every service that is asked is on loopback, or shows a certificate of the test's own.
+os.environ.pop("SSL_CERT_FILE", None)
+os.environ["SSL_CERT_DIR"] = str(Path(__file__).parent)
 
 SHARED = {
     "page": ("tests/page/",), "extensions": ("tests/extensions/",), "attacks": ("tests/service/attacks/",),

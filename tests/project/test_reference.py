@@ -19,19 +19,26 @@ from site_pages import MODULES, public_names  # noqa: E402
 NAMES = [(module, name) for module in MODULES for name in public_names(module)]
 
 
-@pytest.mark.parametrize(("module", "name"), NAMES, ids=lambda value: value)
-def test_every_public_name_has_a_docstring(module: str, name: str) -> None:
-    found = getattr(import_module(module), name)
-    assert own_docstring(found), f"{module}.{name} has no docstring"
+def test_every_public_name_has_a_docstring() -> None:
+    assert [f"{module}.{name}" for module, name in NAMES if not own_docstring(named(module, name))] == []
+    assert [member for module, name in NAMES for member in undescribed(named(module, name))] == []
+
+
+def named(module: str, name: str) -> object:
+    return getattr(import_module(module), name)
+
+
+def undescribed(found: object) -> list[str]:
+    """The public functions and properties of a class that have no docstring."""
     if not inspect.isclass(found):
-        return
+        return []
     members = [(key, value) for key, value in vars(found).items() if not key.startswith("_")]
-    described = [
-        (key, value)
+    described = (property, classmethod, staticmethod)
+    return [
+        f"{found.__qualname__}.{key}"
         for key, value in members
-        if inspect.isfunction(value) or isinstance(value, (property, classmethod, staticmethod))
+        if (inspect.isfunction(value) or isinstance(value, described)) and not own_docstring(value)
     ]
-    assert [key for key, value in described if not own_docstring(value)] == []
 
 
 def own_docstring(found: object) -> str:
@@ -124,7 +131,7 @@ def test_what_names_refer_to_exists_in_docstrings() -> None:
     """Names in backquotes that begin with a package of ours can be imported."""
     wrong = []
     for module, name in NAMES:
-        text = own_docstring(getattr(import_module(module), name))
+        text = own_docstring(named(module, name))
         for path in re.findall(r"`((?:solver|optim)\.[\w.]+)`", text):
             owner, _, last = path.rpartition(".")
             if not exists(owner, last):

@@ -15,7 +15,7 @@ from pathlib import Path
 import httpx
 import pytest
 from fault_site import SCRIPT
-from launch import free_port
+from launch import answers, free_port
 
 from service.auth import authenticator
 from service.auth.callers import KeyLimits, Scope
@@ -179,9 +179,8 @@ def besieged(
 def _until_up(service: Besieged, seconds: float) -> None:
     end = time.monotonic() + seconds
     while True:
-        with contextlib.suppress(httpx.TransportError):
-            if httpx.get(f"{service.base}/health/ready", timeout=5.0).status_code == 200:
-                return
+        if answers(service.port, "/health/ready"):
+            return
         if service.process.poll() is not None or time.monotonic() > end:
             pytest.fail(f"the service does not come up:\n{service.log()[-3000:]}")
         time.sleep(0.05)

@@ -5,12 +5,13 @@ WHAT is a port, `work` or `dispatch`.
 
 import sys
 
-from private_kinds import PRIVATE
-
-from service.http.server import serve, work
-from service.settings.settings import load_settings
-
 if __name__ == "__main__":
+    # Every worker imports this file anew, and needs nothing of what serves.
+    from private_kinds import PRIVATE
+
+    from service.http.server import serve, work
+    from service.settings.settings import load_settings
+
     url, what, *workers = sys.argv[1:]
     if what in ("work", "dispatch"):
         work(load_settings(database=url, workers=1), PRIVATE, until_empty=what == "work")

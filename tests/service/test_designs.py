@@ -156,7 +156,7 @@ PROBLEM: dict[str, Any] = {
     "limit": 2.0,
     "max_band_hz": 0.3,
     "contact_states": {"damper": "never-separates"},
-    "harmonics": 5,
+    "harmonics": 3,
 }
 
 

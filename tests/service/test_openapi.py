@@ -1,5 +1,7 @@
 """The description of the API: bodies and errors have examples, answers types; a page without scripts."""
 
+import inspect
+import json
 import re
 from collections.abc import Iterator
 from typing import Any
@@ -7,6 +9,11 @@ from typing import Any
 import httpx
 import pytest
 from service_helpers import ServedClient, is_problem
+
+from service.client import workbench
+from service.client.client import Client
+from service.jobs.kinds import SHIPPED
+from service.jobs.strict_json import validated
 
 WITHOUT_BODY = {"204", "304"}
 
@@ -86,6 +93,36 @@ def test_the_page_needs_neither_scripts_nor_the_internet(shipped: ServedClient) 
     ids = set(re.findall(r'id="([^"]+)"', page.text))
     assert {link[1:] for link in links if link.startswith("#")} <= ids
     assert "Idempotency-Key" in page.text or "MatrixMarket" in page.text
+
+
+def test_the_description_is_whole(shipped: ServedClient, description: dict[str, Any]) -> None:
+    text = shipped.get("/openapi.json").text
+    assert json.loads(text) == description
+    for reference in re.findall(r'"\$ref":\s*"#/([^"]+)"', text):
+        found: Any = description
+        for key in reference.split("/"):
+            found = found[key]
+    body = description["paths"]["/v1/jobs"]["post"]["requestBody"]["content"]["application/json"]["schema"]
+    kinds = {one["properties"]["kind"]["const"]: one for one in body["oneOf"]}
+    assert set(kinds) == {kind.name for kind in SHIPPED}
+    for kind, schema in kinds.items():
+        assert schema["examples"], kind
+        for example in schema["examples"]:
+            assert example["kind"] == kind
+            request = validated(SHIPPED[kind].request, {k: v for k, v in example.items() if k != "kind"})
+            assert SHIPPED[kind].resolve(request, shipped.service.scenes).scene_name == example["scene"]
+    assert {"from", "to", "set", "harmonics", "frequency_hz"} <= set(kinds["sweep"]["properties"])
+    assert "requestBody" in description["paths"]["/v1/designs"]["post"]
+
+
+def test_there_is_a_method_for_every_route(description: dict[str, Any]) -> None:
+    source = inspect.getsource(Client) + inspect.getsource(workbench)
+    for path, operations in description["paths"].items():
+        if path in ("/health/live", "/docs", "/docs/style.css"):
+            continue
+        words = [word for word in path.split("/") if word and not word.startswith("{") and "." not in word]
+        assert "/" + "/".join(words[:2]) in source, path
+        assert all(f"/{word}" in source or word in source for word in words), (path, operations)
 
 
 def test_other_refusals_have_the_form_described(http: httpx.Client) -> None:
