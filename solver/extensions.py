@@ -9,10 +9,10 @@ from __future__ import annotations
 import json
 import os
 import threading
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from functools import cache
 from importlib import import_module
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 from solver.errors import SettingError
 
@@ -27,21 +27,17 @@ class ExtensionError(SettingError):
         super().__init__(VARIABLE, value, f'must be a list such as ["module:NAME"]{reason}')
 
 
-def extensions(kind: type[T]) -> tuple[T, ...]:
-    """The objects of a class that the environment names, in order.
+def extensions(base: type) -> tuple[Any, ...]:
+    """The objects and classes made from a class that the environment names, in order.
 
     Raises
     ------
     ExtensionError
         The variable is no list of ``module:NAME``, or there is no such module or name.
     """
-    return tuple(one for one in _named(os.environ.get(VARIABLE, "")) if isinstance(one, kind))
-
-
-def extension_classes(kind: type[T]) -> tuple[type[T], ...]:
-    """The classes made from a class that the environment names, in order; errors as of `extensions`."""
+    named = _named(os.environ.get(VARIABLE, ""))
     return tuple(
-        one for one in _named(os.environ.get(VARIABLE, "")) if isinstance(one, type) and issubclass(one, kind)
+        one for one in named if isinstance(one, base) or (isinstance(one, type) and issubclass(one, base))
     )
 
 
@@ -79,60 +75,70 @@ def _imported(name: str) -> object:
 
 
 class Kinds(Generic[T]):
-    """The classes of one sort by their words: those of the package, then those from outside.
+    """What there is of one sort, classes or objects: those of the package, then those from outside.
 
     Parameters
     ----------
-    base : what they are made from.
-    attribute : where each has its word.
+    base : what they are, or are made from.
     noun : what messages call one.
-    shipped : gives those of the package.
+    words : those of one; no other has any of them.
+    modules : those of the package, loaded on first use: what only lists endings needs no SciPy.
+    name : where a module has its own, one or a tuple of them.
     """
 
     def __init__(
-        self, base: type[T], attribute: str, noun: str, shipped: Callable[[], Iterable[type[T]]]
+        self, base: type, noun: str, words: Callable[[T], Iterable[str]], modules: Sequence[str], name: str
     ) -> None:
-        self._base, self._attribute, self._noun, self._shipped = base, attribute, noun, shipped
-        self.added: list[type[T]] = []
+        self._base, self._noun, self._words, self._modules, self._name = base, noun, words, modules, name
+        self._shipped: tuple[T, ...] | None = None
+        self.added: list[T] = []
 
-    def known(self) -> dict[str, type[T]]:
-        """Every class by its word.
+    def every(self) -> tuple[T, ...]:
+        """Every one, in order.
 
         Raises
         ------
         SettingError
             One from outside has the word of another.
         """
-        found: dict[str, type[T]] = {}
-        for one in (*self._shipped(), *extension_classes(self._base), *self.added):
-            word = self._word(one)
-            if found.setdefault(word, one) is not one:
-                wanted = f"must be the word of one {self._noun}, not of {one.__name__} too"
-                raise SettingError(self._attribute.lower(), word, wanted)
-        return found
+        if self._shipped is None:
+            found = [getattr(import_module(module), self._name) for module in self._modules]
+            self._shipped = tuple(one for own in found for one in (own if isinstance(own, tuple) else (own,)))
+        outside = (*extensions(self._base), *self.added)
+        taken = {word: one for one in self._shipped for word in self._words(one)} if outside else {}
+        for one in outside:
+            for word in self._words(one):
+                if taken.setdefault(word, one) is not one:
+                    called = getattr(one, "__name__", getattr(one, "name", one))
+                    wanted = f"must be the word of one {self._noun}, not of {called} too"
+                    raise SettingError(self._noun, word, wanted)
+        return (*self._shipped, *outside)
 
-    def register(self, one: type[T]) -> type[T]:
+    def known(self) -> dict[str, T]:
+        """Every one by its words; errors as of `every`."""
+        return {word: one for one in self.every() for word in self._words(one)}
+
+    def register(self, one: T) -> T:
         """Add one in this process; what starts processes of its own, as the service does, needs extensions.
+
+        What was made before, bodies and options of a command, does not know it.
 
         Raises
         ------
         ValueError
-            There is one of this word.
+            One of its words is taken.
         """
-        if self._word(one) in self.known():
-            raise ValueError(f"there is a {self._noun} {self._word(one)!r} already")
+        known = self.known()
+        if twice := [word for word in self._words(one) if word in known]:
+            raise ValueError(f"there is a {self._noun} {', '.join(map(repr, twice))} already")
         self.added.append(one)
         _changed()
         return one
 
-    def unregister(self, one: type[T]) -> None:
+    def unregister(self, one: T) -> None:
         """Take back what `register` added."""
         self.added.remove(one)
         _changed()
-
-    def _word(self, one: type[T]) -> str:
-        word: str = getattr(one, self._attribute)
-        return word
 
 
 _listeners: list[Callable[[], object]] = []

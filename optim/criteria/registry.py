@@ -6,12 +6,9 @@ named by `solver.extensions`, or registered for one process.
 
 from __future__ import annotations
 
-from functools import cache
-from importlib import import_module
-
 from optim.criteria.criterion import Criterion
 from optim.criteria.key import Key
-from solver.extensions import extensions
+from solver.extensions import Kinds
 
 SHIPPED = (
     "optim.criteria.peak",
@@ -20,46 +17,15 @@ SHIPPED = (
     "optim.criteria.friction_work",
     "optim.criteria.separation",
 )
-_added: list[Criterion] = []
 
 
-def criteria() -> tuple[Criterion, ...]:
-    """Every criterion: those that come with the package, then those from outside."""
-    return (*_shipped(), *extensions(Criterion), *_added)
+def _words(criterion: Criterion) -> tuple[str, ...]:
+    flags = [word for key in criterion.keys for word in (key.name, key.flag)]
+    return (criterion.name, *flags, *([f"weights.{criterion.weight}"] if criterion.weight else []))
 
 
-@cache
-def _shipped() -> tuple[Criterion, ...]:
-    return tuple(import_module(module).CRITERION for module in SHIPPED)
-
-
-def register(criterion: Criterion) -> Criterion:
-    """Add a criterion in this process; bodies and options that were made before do not know its words.
-
-    The command and the service with its workers need extensions.
-
-    Raises
-    ------
-    ValueError
-        One of its words is taken.
-    """
-    taken = {word for other in criteria() for word in _words(other)}
-    twice = sorted(taken & _words(criterion))
-    if twice:
-        raise ValueError(f"the criterion {criterion.name!r} has words of another one: {', '.join(twice)}")
-    _added.append(criterion)
-    return criterion
-
-
-def unregister(criterion: Criterion) -> None:
-    """Take back what `register` added."""
-    _added.remove(criterion)
-
-
-def _words(criterion: Criterion) -> set[str]:
-    flags = {key.flag for key in criterion.keys}
-    weights = {f"weights.{criterion.weight}"} if criterion.weight else set()
-    return {criterion.name, *(key.name for key in criterion.keys), *flags, *weights}
+CRITERIA: Kinds[Criterion] = Kinds(Criterion, "criterion", _words, SHIPPED, "CRITERION")
+criteria, register, unregister = CRITERIA.every, CRITERIA.register, CRITERIA.unregister
 
 
 def limit_keys(*, of_fronts: bool | None = None) -> tuple[Key, ...]:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from optim.errors import DataError
-from optim.identification.data.measured import DataKind, MeasuredRows, data_kinds
+from optim.identification.data.measured import KINDS, DataKind, MeasuredRows
 from optim.identification.data.table import Table, check_numbers, runs_of
 from optim.identification.readers.csv_text import FORMAT as CSV
 from optim.identification.readers.csv_text import FromText
@@ -158,7 +158,7 @@ def _runs(scene: Scene, table: Table, paths: frozenset[str], unknown: frozenset[
 
 def _kind(table: Table, varied: Sequence[str]) -> DataKind:
     """Return the kind a table says, or that its columns tell."""
-    kinds = {kind.name: kind for kind in data_kinds()}
+    kinds = KINDS.known()
     word = table.words.get("kind")
     if word is not None and word not in kinds:
         raise table.refusal(word, f"`kind` must be one of {', '.join(kinds)}")

@@ -155,7 +155,9 @@ class Coupling(LinearTerm):
         return self.model_copy(update={**ends, "offset": 0})
 
 
-COUPLINGS: Kinds[LinearTerm] = Kinds(LinearTerm, "KIND", "kind", lambda: (Coupling,))  # type: ignore[type-abstract]
+COUPLINGS: Kinds[type[LinearTerm]] = Kinds(
+    LinearTerm, "kind", lambda term: (term.KIND,), (__name__,), Coupling.__name__
+)
 coupling_kinds, register, unregister = COUPLINGS.known, COUPLINGS.register, COUPLINGS.unregister
 
 

@@ -5,6 +5,7 @@ Its sum can be had from responses at single frequencies, without any of the desi
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,12 +16,13 @@ from rms_amplitude import RMS, WEIGHTS, frequencies
 import optim
 import solver
 from optim.criteria.evaluation import evaluate
-from optim.criteria.registry import criteria, register, unregister
+from optim.criteria.registry import CRITERIA, criteria, register, unregister
 from optim.problem.problem import pose
 from service.client.client import Client
 from service.errors import ServiceProblem
 from service.rendering.docs_tables import TABLES, criteria_table
 from solver import extensions
+from solver.errors import SettingError
 
 HARMONICS = 3
 BOUNDS = {"damper.N0": (20.0, 400.0)}
@@ -173,3 +175,12 @@ def test_registered_for_one_process() -> None:
     finally:
         unregister(RMS)
     assert RMS not in criteria()
+
+
+def test_one_from_outside_does_not_take_words_of_another(monkeypatch: pytest.MonkeyPatch) -> None:
+    taken = replace(RMS, name="another rms")
+    monkeypatch.setattr(CRITERIA, "added", [RMS, taken])
+    with pytest.raises(
+        SettingError, match="`criterion` must be the word of one criterion, not of another rms too"
+    ):
+        criteria()

@@ -1,6 +1,7 @@
 """What every kind of data is to the fit: observations, noise, a model with derivatives; all kinds.
 
-A further kind is one module and one line in `SHIPPED`.
+A further kind is one module and one line in `SHIPPED`; one from outside the package is named by
+`solver.extensions`.
 """
 
 from __future__ import annotations
@@ -8,13 +9,12 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cache
-from importlib import import_module
 
 import numpy as np
 
 from optim.identification.data.table import Dimension, Table
 from optim.problem.variables import Real
+from solver.extensions import Kinds
 from solver.jit.fourier import Integer
 from solver.scene.scene import Scene
 
@@ -168,10 +168,8 @@ SHIPPED = (
 )
 
 
-@cache
-def data_kinds() -> tuple[DataKind, ...]:
-    """Return every kind of data there is."""
-    return tuple(import_module(module).KIND for module in SHIPPED)
+KINDS: Kinds[DataKind] = Kinds(DataKind, "kind of data", lambda kind: (kind.name,), SHIPPED, "KIND")
+data_kinds = KINDS.every
 
 
 def known_columns() -> dict[str, Column]:

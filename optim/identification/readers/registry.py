@@ -1,6 +1,7 @@
 """The formats of files with measured data, and what they share: column heads, lines of a head, their columns.
 
-A further format is one module and one line in `SHIPPED`.
+A further format is one module and one line in `SHIPPED`; one from outside the package is named by
+`solver.extensions`.
 """
 
 from __future__ import annotations
@@ -8,8 +9,6 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
-from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +18,7 @@ from optim.identification.data.measured import known_columns, known_words
 from optim.identification.data.table import Table, Unit, known_units, split_head, unit_of
 from optim.problem.variables import Real
 from solver.errors import Place
+from solver.extensions import Kinds
 from solver.jit.fourier import Integer
 from solver.wording import listing, nearest
 
@@ -51,10 +51,8 @@ class DataFormat:
     read: Callable[[Path, frozenset[str]], list[Table]]
 
 
-@cache
-def data_formats() -> tuple[DataFormat, ...]:
-    """Return every format there is."""
-    return tuple(import_module(module).FORMAT for module in SHIPPED)
+FORMATS: Kinds[DataFormat] = Kinds(DataFormat, "format", lambda one: one.suffixes, SHIPPED, "FORMAT")
+data_formats = FORMATS.every
 
 
 def read_file(path: Path, paths: frozenset[str]) -> list[Table]:
@@ -70,7 +68,7 @@ def read_file(path: Path, paths: frozenset[str]) -> list[Table]:
     DataError
         A file that is not there or has an unknown ending, or what is wrong in it.
     """
-    formats = {suffix: one for one in data_formats() for suffix in one.suffixes}
+    formats = FORMATS.known()
     if path.suffix.lower() not in formats:
         raise DataError(str(path), path.suffix, f"must end in {', '.join(formats)}")
     if not path.is_file():

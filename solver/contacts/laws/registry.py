@@ -6,9 +6,6 @@ To add a law, write a module with `LAW` and name it in `SHIPPED`; one from outsi
 
 from __future__ import annotations
 
-from functools import cache
-from importlib import import_module
-
 from solver.contacts.laws.base import AnyContact
 from solver.extensions import Kinds
 
@@ -26,12 +23,7 @@ SHIPPED = (
 )
 
 
-@cache
-def _shipped() -> tuple[type[AnyContact], ...]:
-    return tuple(import_module(module).LAW for module in SHIPPED)
-
-
-LAWS: Kinds[AnyContact] = Kinds(AnyContact, "LAW", "law", _shipped)
+LAWS: Kinds[type[AnyContact]] = Kinds(AnyContact, "law", lambda law: (law.LAW,), SHIPPED, "LAW")
 laws, register, unregister = LAWS.known, LAWS.register, LAWS.unregister
 
 DEFAULT = "coulomb"

@@ -6,12 +6,10 @@ by `solver.extensions`, or registered for one process.
 
 from __future__ import annotations
 
-from functools import cache
-from importlib import import_module
 from pathlib import Path
 from typing import Literal
 
-from solver.extensions import extensions
+from solver.extensions import Kinds
 from solver.matrices.readers.reader import MatrixFileError, Reader
 
 SHIPPED = (
@@ -24,37 +22,8 @@ SHIPPED = (
     "solver.matrices.sectors.decks",
 )
 _START = 200
-_added: list[Reader] = []
-
-
-def readers() -> tuple[Reader, ...]:
-    """Every reader: those that come with the package, then those from outside."""
-    return (*_shipped(), *extensions(Reader), *_added)
-
-
-@cache
-def _shipped() -> tuple[Reader, ...]:
-    """Loaded on first use: what only lists endings elsewhere does not need SciPy."""
-    return tuple(reader for module in SHIPPED for reader in import_module(module).READERS)
-
-
-def register(reader: Reader) -> Reader:
-    """Add a reader in this process; what starts processes of its own, as the service does, needs extensions.
-
-    Raises
-    ------
-    ValueError
-        There is one of this name.
-    """
-    if any(other.name == reader.name for other in readers()):
-        raise ValueError(f"there is a reader of {reader.name!r} already")
-    _added.append(reader)
-    return reader
-
-
-def unregister(reader: Reader) -> None:
-    """Take back what `register` added."""
-    _added.remove(reader)
+READERS: Kinds[Reader] = Kinds(Reader, "reader", lambda reader: (reader.name,), SHIPPED, "READERS")
+readers, register, unregister = READERS.every, READERS.register, READERS.unregister
 
 
 def suffixes(holding: Literal["matrix", "modes", "labels", "nodes"]) -> tuple[str, ...]:
