@@ -107,6 +107,11 @@ def test_of_a_disk_written_out_every_sector_has_its_states(shipped: httpx.Client
         ({"kind": "limits", "contact": "shroud"}, "/contact"),
         ({"kind": "point"}, "/frequency_hz"),
         ({"kind": "point", "frequency_hz": 5e-324}, "/frequency_hz"),
+        ({"kind": "shape"}, "/frequency_hz"),
+        ({"kind": "shape", "mode": 1, "frequency_hz": 1.0}, "/frequency_hz"),
+        ({"kind": "shape", "frequency_hz": 1.0, "amplitude": 1.0}, "/amplitude"),
+        ({"kind": "shape", "mode": 9}, "/mode"),
+        ({"kind": "shape", "mode": 1, "nodal_diameter": 1}, "/nodal_diameter"),
         ({"kind": "sweep", "client": 5}, "/client"),
         ({"kind": "sweep", "scene": {"name": "x"}}, "/scene/structure"),
     ],
@@ -258,3 +263,21 @@ def test_closing_tells_those_who_wait() -> None:
         closing.close()
         assert all(isinstance(answer, PreviewError) for answer in answers.result())
     assert isinstance(together(closing, ("spend", 0.0, ""))[0], PreviewError)
+
+
+def test_a_shape_is_told_as_arrays_with_what_is_drawn(shipped: httpx.Client) -> None:
+    found = post(shipped, kind="shape", scene="bladed-disk", frequency_hz=740.0, harmonics=5).json()
+    assert found["reached"]
+    drawn = found["shape"]
+    solution = solver.solve(solver.load_scene("bladed-disk"), frequency_hz=740.0, harmonics=5)
+    _, tip = solver.time_history(solution, "tip", samples=32)
+    own = np.array(drawn["real"])[0] + 1j * np.array(drawn["imag"])[0]
+    waves = np.exp(2j * np.pi * np.outer(np.arange(32) / 32, drawn["harmonics"]))
+    told = (waves @ own[:, drawn["names"].index("tip"), 2]).real
+    assert told == pytest.approx(tip, abs=3e-3 * np.abs(tip).max())
+    assert (drawn["sectors"], drawn["nodal_diameter"], drawn["unit"]) == (8, 1, "m")
+    (shroud,) = [contact for contact in drawn["contacts"] if contact["name"] == "shroud"]
+    assert shroud["states"] == ["stick and slip"]
+    assert set(shroud["motions"][0]) == {0, 1}
+    mode = post(shipped, kind="shape", scene="bladed-disk", mode=1, nodal_diameter=-2).json()["shape"]
+    assert (mode["unit"], mode["nodal_diameter"]) == ("1/√kg", -2)

@@ -194,7 +194,7 @@ previews = APIRouter(prefix="/v1/previews", tags=["previews"], route_class=Typed
 
 
 async def preview(body: PreviewRequest, context: InContext) -> Response:
-    """Compute `sweep`, `sensitivities`, `limits` or `point` within seconds.
+    """Compute `sweep`, `sensitivities`, `limits`, `point` or `shape` within seconds.
 
     Nothing is stored, and sizes are limited.
 

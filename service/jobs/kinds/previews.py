@@ -16,20 +16,25 @@ from service.jobs.common.periods import Period, period_of
 from service.jobs.common.results import KindResult, PeakAt, result_model
 from service.jobs.common.scenes import (
     FrequencyHz,
-    HarmonicRequest,
     PositiveNumber,
     linear_limit,
     require,
-    resolve_scene,
     resolved,
     stored_scene,
 )
-from service.jobs.common.sizes import (
-    POINTS_OF_A_SWEEP,
-    balance_issues,
-    coefficients,
-    contact_motions,
-    dofs_solved,
+from service.jobs.common.sizes import POINTS_OF_A_SWEEP
+from service.jobs.kinds.preview_request import (
+    POINT_UNKNOWNS,
+    PreviewRequest,
+    harmonics_in_time,
+    scene_of,
+)
+from service.jobs.kinds.shape_preview import (
+    LEAST_HZ,
+    ShapePreview,
+    ShapePreviewRequest,
+    resolve_shape,
+    run_shape,
 )
 from service.jobs.outputs import JobOutput, Progress, ShouldStop, Silent
 from service.jobs.registry import JobKind, Registry, Resolved, SceneSource
@@ -41,16 +46,9 @@ from solver.scene.descriptions import DAMPER_LOAD
 from solver.scene.scene import Scene
 
 MOST_POINTS = 2000
-MOST_HARMONICS = 41
-MOST_UNKNOWNS = 50_000
 LIVE_UNKNOWNS = 130
 """Of the balance of a response that is followed live: one of more takes longer than a second or two."""
-POINT_UNKNOWNS = 500
-"""Of the balance at one point."""
-FEW_MOTIONS = 8
-"""Of contacts: so few are quick with all harmonics."""
 SAMPLES = 400
-LEAST_HZ = 1e-9
 _EXAMPLE: dict[str, Any] = {"scene": "two-dof", "set": {DAMPER_LOAD: 80}, "client": "a1b2"}
 
 
@@ -99,14 +97,6 @@ class PointPreview(solve_result()):  # type: ignore[misc]
     period: Period | None = None
 
 
-class PreviewRequest(HarmonicRequest):
-    """What every preview takes; `client` names who asks: of its previews only the newest is computed."""
-
-    client: str = Field(
-        default="", max_length=64, description="Who asks: of its previews only the newest is computed."
-    )
-
-
 class SweepPreviewRequest(PreviewRequest):
     """The frequency response over the scene's band; `limit` is the amplitude [m] its band is measured at."""
 
@@ -139,50 +129,16 @@ class PointPreviewRequest(PreviewRequest):
     frequency_hz: FrequencyHz = Field(description="Excitation frequency [Hz].")
 
 
-def _scene(request: PreviewRequest, source: SceneSource, points: int, harmonics: int) -> Scene:
-    """The scene, if it is small enough for so many points."""
-    scene = resolve_scene(request, source)
-    issues: list[Issue] = []
-    if request.harmonics > MOST_HARMONICS:
-        issues.append(
-            Issue(("harmonics",), f"of a preview must be at most {MOST_HARMONICS}", request.harmonics)
-        )
-    unknowns = dofs_solved(scene) * (2 * request.harmonics + 1)
-    if unknowns > MOST_UNKNOWNS:
-        words = "DOFs × coefficients of a preview"
-        issues.append(
-            Issue(
-                ("scene",),
-                f"{words} must be at most {MOST_UNKNOWNS}, got {unknowns}: submit a job",
-                named=False,
-            )
-        )
-    require(issues or balance_issues("harmonics", scene, harmonics, points))
-    return scene
-
-
-def harmonics_in_time(scene: Scene, asked: int, unknowns: int) -> int:
-    """The harmonics asked for; with many contacts those whose balance has at most so many unknowns.
-
-    A disk that is solved whole has the contacts of all its sectors: too many to be followed live with all
-    harmonics.
-    """
-    motions = contact_motions(scene)
-    if motions <= FEW_MOTIONS:
-        return asked
-    return next((h for h in range(asked, 1, -1) if motions * coefficients(scene, h) <= unknowns), 1)
-
-
 def resolve_sweep(request: SweepPreviewRequest, source: SceneSource) -> Resolved:
     """Look up the scene, check its size, and choose the harmonics that can be kept in time."""
-    scene = _scene(request, source, POINTS_OF_A_SWEEP, request.harmonics)
+    scene = scene_of(request, source, POINTS_OF_A_SWEEP, request.harmonics)
     kept = harmonics_in_time(scene, request.harmonics, LIVE_UNKNOWNS)
     return resolved(scene, harmonics=kept, limit=request.limit)
 
 
 def resolve_limits(request: LimitsPreviewRequest, source: SceneSource) -> Resolved:
     """Look up the scene and the contact."""
-    scene = _scene(request, source, 2 * POINTS_OF_A_SWEEP, 1)
+    scene = scene_of(request, source, 2 * POINTS_OF_A_SWEEP, 1)
     names = [contact.name for contact in scene.contacts]
     if request.contact is not None and request.contact not in names:
         require([Issue(("contact",), f"must be one of {', '.join(names)}", request.contact)])
@@ -193,7 +149,7 @@ def resolve_point(request: PointPreviewRequest, source: SceneSource) -> Resolved
     """Look up the scene, check its size, and choose the harmonics that can be kept in time."""
     if request.frequency_hz < LEAST_HZ:
         require([Issue(("frequency_hz",), f"must be at least {LEAST_HZ:g}", request.frequency_hz)])
-    scene = _scene(request, source, 1, request.harmonics)
+    scene = scene_of(request, source, 1, request.harmonics)
     kept = harmonics_in_time(scene, request.harmonics, POINT_UNKNOWNS)
     return resolved(scene, harmonics=kept, frequency_hz=request.frequency_hz)
 
@@ -270,8 +226,15 @@ def warm_up() -> None:
     def nothing(*_: object) -> bool:
         return False
 
-    spec = {"scene": scene.to_dict(), "harmonics": 3, "limit": None, "contact": None, "frequency_hz": 1.05}
-    for run in (run_sweep, run_sensitivities, run_limits, run_point):
+    spec = {
+        "scene": scene.to_dict(),
+        "harmonics": 3,
+        "limit": None,
+        "contact": None,
+        "frequency_hz": 1.05,
+        "mode": None,
+    }
+    for run in (run_sweep, run_sensitivities, run_limits, run_point, run_shape):
         run(spec, Silent(), nothing)
 
 
@@ -296,6 +259,11 @@ PREVIEWS = Registry(
             name="point", summary="One period at a frequency, with loops and states of the contacts.",
             request=PointPreviewRequest, resolve=resolve_point, run=run_point,
             result=PointPreview,
+        ),
+        JobKind(
+            name="shape", summary="How everything moves over a period, at a frequency or in a mode.",
+            request=ShapePreviewRequest, resolve=resolve_shape, run=run_shape,
+            result=ShapePreview,
         ),
     ],
     warm_up,

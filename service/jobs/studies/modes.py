@@ -109,7 +109,7 @@ def exact_peaks(
 _MOST_PEAKS = 40
 _POINTS = 200  # a curve seldom has more
 _OF_THE_CURVE = 0.3  # share of the progress, where exact peaks follow
-_Diameter = Annotated[int, Field(strict=True, ge=-10_000, le=10_000)]
+Diameter = Annotated[int, Field(strict=True, ge=-10_000, le=10_000)]
 _Ratio = Annotated[Number, Field(ge=-10.0, le=10.0)]
 
 
@@ -150,7 +150,7 @@ class Modes(Study, HarmonicRequest):
     stop: Annotated[PositiveNumber, Flag(metavar="B")] = Field(
         alias="to", description="Largest modal amplitude [√kg m]."
     )
-    nodal_diameter: Annotated[_Diameter | None, Flag(metavar="N")] = Field(
+    nodal_diameter: Annotated[Diameter | None, Flag(metavar="N")] = Field(
         default=None, description="Of a disk, negative for a backward wave; that of the engine order."
     )
     performance: Annotated[bool, Field(strict=True)] = Field(

@@ -147,7 +147,7 @@ def placed_forms(
                 Term(dof, ahead, sign * factor)
                 for (place, turn, ahead), sign in zip(ends, (1.0, -1.0), strict=True)
                 if place is not None
-                for dof, factor in _point_motion(place, _turned_back(at, turn), _turned_back(direction, turn))
+                for dof, factor in point_motion(place, _turned_back(at, turn), _turned_back(direction, turn))
             ]
         )
         for direction in directions
@@ -199,7 +199,7 @@ def places(bodies: tuple[Body, ...], nodes: tuple[Node, ...]) -> dict[str, Place
     return {body.name: body.place for body in bodies} | {node.name: node.place for node in nodes}
 
 
-def _point_motion(place: Place, at: Sequence[Any], direction: Sequence[Any]) -> list[tuple[str, Any]]:
+def point_motion(place: Place, at: Sequence[Any], direction: Sequence[Any]) -> list[tuple[str, Any]]:
     """Factor of each DOF of a place in the motion of the point `at` along `direction`."""
     e = (direction[0], direction[1], direction[2])
     arm = (at[0] - place.at[0], at[1] - place.at[1], at[2] - place.at[2])

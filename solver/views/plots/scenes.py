@@ -7,41 +7,20 @@ way. Of a disk one sector is drawn with its neighbour; what moves as one node or
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from itertools import permutations
+from collections.abc import Mapping, Sequence
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from solver.results import units
 from solver.scene.scene import Scene
+from solver.views.layout import GROUND, NEXT, Pair, Parts, Place, parts_of, places_of
 from solver.views.plots import style
 from solver.views.plots.style import Into
 
 MOST_PARTS = 40
 """Circles that can be told apart."""
-_GROUND = "ground"
-_NEXT = "@next"
 _RADIUS, _BOW = 0.16, 0.34
-_GAP = 1.5  # between a sector and its neighbour, in rows
-_FEW = 5  # columns that stand wide apart
-_MOST_ORDERED = 6  # names of a column whose orders are all looked at
 _WHITE = {"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 0.6}
-Place = tuple[float, float]
-Pair = tuple[str, str]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Parts:
-    """What is drawn: circles by name, and the pairs that springs and contacts join."""
-
-    names: tuple[str, ...]
-    springs: tuple[Pair, ...]
-    contacts: Mapping[Pair, tuple[str, ...]]
-    forced: Mapping[str, str]
-    observed: str
-    disk: bool
 
 
 def scene_figure(scene: Scene, *, ax: Into = None) -> Figure | None:
@@ -58,10 +37,10 @@ def scene_figure(scene: Scene, *, ax: Into = None) -> Figure | None:
     The drawing; None of a scene with more than `MOST_PARTS` masses, nodes and bodies, of which nothing could
     be told.
     """
-    parts = _parts_of(scene)
+    parts = parts_of(scene)
     if len(parts.names) > MOST_PARTS:
         return None
-    places = _places(parts)
+    places = places_of(parts)
     rows = 1 + max(y for _, y in places.values())
     with style.styled():
         page, (axes,) = style.figure(7.2, 1.0 + 0.7 * rows, into=ax)
@@ -84,109 +63,13 @@ def scene_figure(scene: Scene, *, ax: Into = None) -> Figure | None:
     return page
 
 
-def _parts_of(scene: Scene) -> _Parts:
-    """Nodes and bodies stand for their DOFs; of a structure of matrices those that are named elsewhere."""
-    groups = {dof: node.name for node in scene.nodes for _, dof in node.dofs}
-
-    def part(end: str) -> str:
-        name, sign, rest = end.partition("@")
-        group = groups.get(name, name.partition(".")[0])
-        return f"{group}{_NEXT}" if sign and rest == "next" else group
-
-    springs = [spring.between for spring in getattr(scene.structure, "springs", ())]
-    contacts: dict[Pair, tuple[str, ...]] = {}
-    for contact in scene.contacts:
-        pair = (part(contact.between[0]), part(contact.between[1]))
-        contacts[pair] = (*contacts.get(pair, ()), contact.name)
-    forced: dict[str, str] = {}
-    for force in scene.excitation:
-        dofs = [dof for dof, *_ in (force.base.shares if force.base else force.parts)]
-        forced |= {part(dof): f"{units.number(force.amplitude, 4)} {force.unit}" for dof in dofs}
-    observed = part(scene.observe.dof)
-    named = [*(end for pair in contacts for end in pair), *forced, observed]
-    if scene.structure.kind != "matrices":
-        named = [*(part(dof) for dof in scene.dofs), *named]
-    names = dict.fromkeys(name.removesuffix(_NEXT) for name in named)
-    names.pop(_GROUND, None)
-    return _Parts(
-        names=tuple(names),
-        springs=tuple(dict.fromkeys((part(a), part(b)) for a, b in springs if part(a) != part(b))),
-        contacts=contacts,
-        forced=forced,
-        observed=observed,
-        disk=scene.structure.has_sectors,
-    )
-
-
-def _layers(parts: _Parts) -> dict[str, int]:
-    """How many springs are between each circle and the ground; what only contacts hold comes after those."""
-    layers = {_GROUND: 0}
-    if not parts.springs:
-        # Matrices tell no chains: one column for each name.
-        return layers | {name: i for i, name in enumerate(parts.names, start=1)}
-    for pairs in (parts.springs, (*parts.springs, *parts.contacts)):
-        _spread(layers, pairs)
-    for name in parts.names:
-        layers.setdefault(name, 1 + max(layers.values()))
-    return layers
-
-
-def _spread(layers: dict[str, int], pairs: Iterable[Pair]) -> None:
-    joined = [(a.removesuffix(_NEXT), b.removesuffix(_NEXT)) for a, b in pairs]
-    while True:
-        found: dict[str, int] = {}
-        for a, b in (*joined, *((b, a) for a, b in joined)):
-            if a in layers and b not in layers:
-                found[b] = min(found.get(b, layers[a] + 1), layers[a] + 1)
-        if not found:
-            return
-        layers |= found
-
-
-def _places(parts: _Parts) -> dict[str, Place]:
-    """Columns by layer; the neighbour of a sector stands above it."""
-    layers = _layers(parts)
-    columns: dict[int, list[str]] = {}
-    for name in parts.names:
-        columns.setdefault(layers[name], []).append(name)
-    joins = (*parts.springs, *parts.contacts)
-    doubled = parts.disk and any(end.endswith(_NEXT) for pair in joins for end in pair)
-    highest = max(len(column) for column in columns.values())
-    up = highest - 1 + _GAP
-    step = 1.6 if max(columns) <= _FEW else 1.2
-    places: dict[str, Place] = {}
-    for layer, column in sorted(columns.items()):
-        low = 0.5 * (highest - len(column))
-        # Beside a neighbour above it a column leans: what joins the two passes between its circles.
-        lean = 0.5 if doubled else 0.0
-        for i, name in enumerate(_ordered(column, places, low, joins)):
-            places[name] = (step * layer + lean * i, low + i)
-    if doubled:
-        places |= {f"{name}{_NEXT}": (x, y + up) for name, (x, y) in places.items()}
-    return places
-
-
-def _ordered(
-    column: Sequence[str], places: Mapping[str, Place], low: float, joins: Sequence[Pair]
-) -> Sequence[str]:
-    """The order of a column in which what is joined is nearest, so that little crosses a circle."""
-    if len(column) > _MOST_ORDERED:
-        return column
-
-    def spread(order: Sequence[str]) -> float:
-        at = {name: low + i for i, name in enumerate(order)} | {name: y for name, (_, y) in places.items()}
-        return sum((at[a] - at[b]) ** 2 for a, b in joins if a in at and b in at)
-
-    return min(permutations(column), key=spread)
-
-
 def _ends(pair: Pair, places: Mapping[str, Place], first: float, hung: dict[str, int]) -> tuple[Place, Place]:
     """Where a spring or a contact begins and ends.
 
     The ground is straight beside a circle of the first column, below one that others stand before.
     """
-    free = next((name for name in pair if name != _GROUND), None)
-    if free is None or _GROUND not in pair:
+    free = next((name for name in pair if name != GROUND), None)
+    if free is None or GROUND not in pair:
         a, b = (places.get(name, (0.0, 0.0)) for name in pair)
         return a, b
     x, y = places[free]
@@ -283,15 +166,15 @@ def _ground(axes: Axes, places: Mapping[str, Place]) -> None:
         _line(axes, [(0.0, y + 0.06), (-0.14, y - 0.06)], style.GREY, 0.7)
 
 
-def _circle(axes: Axes, name: str, place: Place, parts: _Parts) -> None:
+def _circle(axes: Axes, name: str, place: Place, parts: Parts) -> None:
     """A mass, node or body; of the next sector pale, without a name."""
     from matplotlib.patches import Circle
 
-    pale = name.endswith(_NEXT)
+    pale = name.endswith(NEXT)
     color = style.GREY if pale else style.BLUE
     axes.add_patch(Circle(place, _RADIUS, facecolor="white", edgecolor=color, linewidth=1.3, zorder=2))
     if pale:
-        if name == f"{parts.names[0]}{_NEXT}":
+        if name == f"{parts.names[0]}{NEXT}":
             axes.annotate(
                 "next sector", place, xytext=(0, 11), textcoords="offset points", ha="center", fontsize=7.0,
                 color=style.GREY,

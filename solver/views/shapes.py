@@ -1,0 +1,146 @@
+"""Mode shapes and operating deflection shapes, with what is drawn of them (`solver.views.picture`).
+
+The motion of point p in sector j of a disk at the angle τ = ωt is u(τ) = R_j Re Σ_k U_kp e^{ik(τ + jθ)}: R_j
+turns it with its sector, θ is the phase of harmonic 1 from one sector to the next. Where all sectors were
+solved each has motions of its own, and θ = 0.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from solver.arrays import Complex, Integer, Real
+from solver.jit import fourier
+from solver.linear.assembly import linear_model
+from solver.modes.nonlinear_mode import at_nodal_diameter, nonlinear_mode, pose
+from solver.modes.records import diameter_of
+from solver.response.contact_response import state_of
+from solver.response.solution import Solution
+from solver.response.time_history import motion
+from solver.scene.scene import Scene
+from solver.views.picture import Picture, picture_of
+
+FAINT = 1e-3
+"""Harmonics that move every point less than this share of the largest motion are left out."""
+_INSTANTS = 96
+_BELOW = 0.01  # of an amplitude, where the curve to it begins: nearer another mode may be met
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Shape:
+    """How a scene moves over one period.
+
+    Attributes
+    ----------
+    picture : Picture
+        Points at rest, and what is drawn between them.
+    unit : str
+        Of the motions: m, or 1/√kg of a mode that is linear.
+    frequency_hz : float
+        [Hz].
+    nodal_diameter : int or None
+        Of harmonic 1, negative for a wave that travels backward; None where it is no wave.
+    turn : float
+        Phase of harmonic 1 from a sector to the next [rad].
+    harmonics : (nk,) array
+        The mean, if it is there, and those that move something.
+    motions : (ns, nk, n_points, 3) array
+        Complex amplitudes; of one sector, or of each where all were solved.
+    amplitude : (ns, n_points) array
+        Largest motion of each point about its mean over the period.
+    states : dict
+        What every contact does, where it is known.
+    """
+
+    picture: Picture
+    unit: str
+    frequency_hz: float
+    nodal_diameter: int | None
+    turn: float
+    harmonics: Integer
+    motions: Complex
+    amplitude: Real
+    states: dict[str, str]
+
+
+def deflection_shape(scene: Scene, solution: Solution) -> Shape:
+    """Return the operating deflection shape of a converged response of a scene.
+
+    Raises
+    ------
+    SettingError
+        The solution did not converge.
+    """
+    coefficients = motion(solution)
+    states = {contact.name: contact.state.value for contact in solution.contacts}
+    amplitudes = np.array([fourier.to_complex(row) for row in coefficients])
+    return _shape(scene, solution.scene, amplitudes, solution.frequency_hz, "m", states)
+
+
+def mode_shape(
+    scene: Scene, mode: int, *, nodal_diameter: int | None = None, amplitude: float | None = None,
+    harmonics: int = 11,
+) -> Shape | str:  # fmt: skip
+    """Return the shape of a mode, or in words why there is none.
+
+    Parameters
+    ----------
+    scene : what vibrates; its loads count, its excitation gives the phase alone.
+    mode, nodal_diameter, harmonics : as of `solver.modes.nonlinear_mode.nonlinear_mode`.
+    amplitude : modal amplitude [√kg m], at which the mode is followed as one that is not linear; the linear
+        mode with the contacts as they are at rest, mass-normalised, if left out.
+
+    Raises
+    ------
+    SettingError
+        A mode, nodal diameter, amplitude or harmonics that cannot be.
+    """
+    scene = at_nodal_diameter(scene, nodal_diameter)
+    if amplitude is None:
+        problem = pose(scene, mode, None, harmonics)
+        solved = problem.equations.balance.scene
+        moved = linear_model(solved).shapes @ problem.mode.shape
+        both = np.stack([np.zeros_like(moved), moved], axis=1)
+        return _shape(scene, solved, both, problem.mode.omega / (2.0 * math.pi), "1/√kg", {})
+    found = nonlinear_mode(
+        scene, mode, amplitudes=(_BELOW * amplitude, amplitude), harmonics=harmonics, errors=False
+    )
+    if not found.reached:
+        return found.status.value
+    states = {
+        name: state_of(int(code)).value
+        for name, code in zip(found.contact_names, found.states[-1], strict=True)
+    }
+    amplitudes = np.array([fourier.to_complex(row) for row in found.dof_motions[-1]])
+    return _shape(scene, found.scene, amplitudes, float(found.frequency_hz[-1]), "m", states)
+
+
+def _shape(
+    scene: Scene, solved: Scene, amplitudes: Complex, frequency_hz: float, unit: str, states: dict[str, str]
+) -> Shape:
+    """The shape of complex amplitudes of the DOFs of what was solved, (n_dofs, H + 1)."""
+    picture = picture_of(scene)
+    whole = solved.dofs != scene.dofs
+    count = scene.structure.sector_count if whole else 1
+    row = {dof: i for i, dof in enumerate(solved.dofs)}
+    factors = picture.factors(scene.dofs)
+    motions = np.empty((count, amplitudes.shape[1], len(picture.points), 3), np.complex128)
+    for j in range(count):
+        own = amplitudes[[row[f"{dof}@{j}" if whole else dof] for dof in scene.dofs]]
+        motions[j] = np.einsum("pcd,dk->kpc", factors, own)
+    sizes = np.linalg.norm(motions, axis=-1).max(axis=(0, 2), initial=0.0)
+    kept = np.flatnonzero(sizes >= FAINT * sizes.max(initial=0.0))
+    kept = kept if sizes.any() else np.array([1], dtype=np.int64)
+    motions = motions[:, kept]
+    tau = np.linspace(0.0, 2.0 * math.pi, _INSTANTS, endpoint=False)
+    waves = np.where(kept > 0, np.exp(1j * np.outer(tau, kept)), 0.0)
+    over = np.einsum("tk,skpc->stpc", waves, motions).real
+    return Shape(
+        picture=picture, unit=unit, frequency_hz=frequency_hz,
+        nodal_diameter=diameter_of(scene), turn=linear_model(scene).interblade_phase if not whole else 0.0,
+        harmonics=kept.astype(np.int64), motions=motions,
+        amplitude=np.linalg.norm(over, axis=-1).max(axis=1), states=states,
+    )  # fmt: skip
