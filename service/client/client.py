@@ -55,6 +55,7 @@ _SILENCE_SECONDS = 60.0
 
 if TYPE_CHECKING:
     from service.queue.health import Health, Readiness
+    from solver.results.told import Told
 
 
 class Client(Workbench):
@@ -198,6 +199,26 @@ class Client(Workbench):
     def results(self, job_id: str) -> ResultsAnswer:
         """What a job computed."""
         return self._get(ResultsAnswer, f"/v1/jobs/{segment(job_id)}/results")
+
+    def result(self, job_id: str) -> Told:
+        """What a job computed as the class that the function gives, `Branch`, `DesignResult`, …
+
+        It has what the JSON has (`Told.from_json`); `results` has the JSON itself.
+
+        Raises
+        ------
+        ServiceProblem
+            If there is no such job, or it has no result.
+        LookupError
+            If its kind is none that this program knows.
+        """
+        from service.jobs.kinds import studies
+
+        kind, written = self.job(job_id).kind, self.results(job_id).result
+        study = studies().get(kind)
+        if study is None:
+            raise LookupError(f"{kind!r} is no study of this version: `results` has its JSON")
+        return study.result_class(written).from_json(written)
 
     def job_report(self, job_id: str, form: Literal["html", "pdf"] = "pdf") -> bytes:
         """The design report of a job, made by the service: a page or a PDF."""

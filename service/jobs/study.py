@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from solver.results.dataset import Dataset
+    from solver.results.told import Told
     from solver.scene.scene import Scene
 
 
@@ -145,6 +146,13 @@ class Study(SceneRequest):
         """Compute what was asked, by keys that are the function's; left out, its own defaults count."""
         found = on_demand(cls.FUNCTION)(scene, **asked, **watch._asdict())
         return Answer.of(found)
+
+    @classmethod
+    def result_class(cls, _result: Json) -> type[Told]:
+        """Return the class of a stored result: what the function is said to give."""
+        function: Any = inspect.unwrap(on_demand(cls.FUNCTION))
+        found: type[Told] = function.__globals__[function.__annotations__["return"]]
+        return found
 
     @classmethod
     def sweeps(cls, _found: Any) -> tuple[SweepRecord, ...]:

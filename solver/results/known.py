@@ -10,10 +10,9 @@ from typing import Annotated, Any, ClassVar
 
 from solver.results import units
 from solver.results.notes import flag_words
-from solver.results.told import Piece
+from solver.results.told import Piece, json_keys
 
 MAX_ABS, HALF_PEAK_TO_PEAK = "max_abs", "half_peak_to_peak"
-_NUMBERS = ("peak_max_abs", "error_estimate", "peak_half_peak_to_peak", "half_peak_to_peak_error")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
@@ -63,15 +62,9 @@ class Known(Piece):
         return _relative(self.error_estimate, self.peak_max_abs)
 
     @classmethod
-    def of_json(cls, found: Mapping[str, Any]) -> Known:
-        """Return what `to_json` wrote."""
-        numbers: dict[str, Any] = {
-            name: math.nan if found[name] is None else found[name] for name in _NUMBERS
-        }
-        return cls(
-            measure=found["measure"], flags=tuple(found["flags"]), peaks_open=tuple(found["peaks_open"]),
-            **numbers,
-        )  # fmt: skip
+    def of_result(cls, found: Mapping[str, Any]) -> Known:
+        """Return what the JSON of a result says of it."""
+        return cls.from_json({key: found[key] for key in json_keys(cls)})
 
     def pairs(self) -> list[tuple[str, str]]:
         """Return it in words, name and value a line."""

@@ -12,7 +12,7 @@ from enum import Enum
 from functools import cache
 from html import escape
 from inspect import cleandoc
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 _MOST = 30
 _FEW = 6
@@ -126,6 +126,22 @@ class Told(ABC):
         """Return it as one JSON object."""
         return self._json()
 
+    @classmethod
+    def from_json(cls, found: Mapping[str, Any]) -> Self:
+        """Return what `to_json` wrote: the same JSON, its values as the attributes have them.
+
+        What JSON does not hold, such as the arrays of a branch, is not there: asked for, it is an
+        AttributeError that says so. A number that is null was not known and is NaN; a scene is its name.
+
+        Raises
+        ------
+        ValueError
+            If most of the keys are missing: it is the JSON of something else.
+        """
+        from solver.results.read_back import read_back
+
+        return read_back(cls, found)
+
     def _json(self, **others: object) -> dict[str, Any]:
         """The JSON object; `others` are the values of keys that are not those of attributes."""
         paths = json_keys(type(self)).items()
@@ -154,11 +170,16 @@ class Piece(Told):
 
     def summary(self) -> Summary:
         """Every field with its unit."""
-        said = {name: UNIT.search(words) for name, words in self.WORDS.items()}
-        units = {name: unit[1] for name, unit in said.items() if unit is not None}
-        given = [(one.name, getattr(self, one.name)) for one in fields(self)]  # type: ignore[arg-type]
-        pairs = tuple((name, _words(value, units.get(name, ""))) for name, value in given)
-        return Summary(title="", pairs=pairs)
+        return listed(self, {one.name: getattr(self, one.name) for one in fields(self)})  # type: ignore[arg-type]
+
+
+def listed(kind: Told, values: Mapping[str, Any]) -> Summary:
+    """Attributes by their names with the units that a class says of them."""
+    said = {name: UNIT.search(words) for name, words in kind.WORDS.items()}
+    units = {name: unit[1] for name, unit in said.items() if unit is not None}
+    return Summary(
+        title="", pairs=tuple((name, _words(one, units.get(name, ""))) for name, one in values.items())
+    )
 
 
 def _words(value: Any, unit: str) -> str:

@@ -113,7 +113,7 @@ def test_what_is_least_known_stands_for_all_with_every_flag() -> None:
     assert worst_of([bad, good]).peaks_open == ("why",)
     assert worst_of([good, unknown, bad]).to_json()["relative_error"] is None
     assert worst_of([]).pairs() == [("estimated error", "not known")]
-    assert Known.of_json(json.loads(json.dumps(bad.to_json()))) == bad
+    assert Known.from_json(json.loads(json.dumps(bad.to_json()))) == bad
 
 
 def test_a_running_speed_is_clear_only_beyond_the_error() -> None:

@@ -12,6 +12,7 @@ import pytest
 from matrix_cases import beam
 from service_helpers import ServedClient
 
+import solver
 from service.client.client import Client
 from service.db.models import JobState
 from service.errors import ServiceProblem
@@ -183,3 +184,10 @@ def test_scenes_are_drawn_up_and_changed_by_the_client(shipped_client: Client) -
     changed = shipped_client.edit_scene({"text": text, "scene": {**scene, "name": "another"}})
     assert "# of May" in changed["text"]
     assert shipped_client.read_scene(changed["text"])["scene"]["name"] == "another"
+
+
+def test_a_result_comes_as_the_class_that_python_gives(shipped_client: Client) -> None:
+    done = shipped_client.submit({"kind": "sweep", "scene": "two-dof", "harmonics": 1}, wait=60.0)
+    branch = shipped_client.result(done.id)
+    assert isinstance(branch, solver.Branch)
+    assert branch.to_json() == shipped_client.results(done.id).result

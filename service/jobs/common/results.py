@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import builtins
-import inspect
-import sys
 from collections.abc import Callable, Collection, Mapping
 from enum import Enum
 from functools import cache
@@ -101,6 +98,7 @@ def result_model(
     """
     # Loaded here: the help of a command whose model is written out needs no numbers.
     from solver.results.base import MadeOfResponses
+    from solver.results.read_back import declared
     from solver.results.told import json_keys
 
     keys = {key: path for key, path in json_keys(kind).items() if not only or key in only}
@@ -113,9 +111,10 @@ def result_model(
     own: dict[str, Any] = {}
     for key, path in keys.items():
         if key not in shared:
-            kept, words = _described(kind, path)
+            of, words = declared(kind, path)
+            kept = Table if of is None else _json_type(of)
             given, default = one if isinstance(one := types.pop(key, kept), tuple) else (one, ...)
-            field = default if isinstance(default, FieldInfo) else Field(default, description=words)
+            field = default if isinstance(default, FieldInfo) else Field(default, description=words or None)
             own[key] = given, field
     about = (kind.__doc__ or "").partition("\n")[0]
     return create_model(name, __base__=bases or (KindResult,), __doc__=about, **own, **types)
@@ -133,33 +132,6 @@ def answered(place: str, name: str, **types: Any) -> Callable[[], type[KindResul
         return result_model(kind, name, **types)
 
     return made
-
-
-def _described(kind: Any, path: str) -> tuple[Any, str | None]:
-    """Return the type that the JSON of an attribute has, and its description."""
-    name, _, rest = path.partition(".")
-    found_in = (one for one in kind.__mro__ if name in {*inspect.get_annotations(one), *vars(one)})
-    owner = next(found_in, object)
-    made = getattr(vars(owner).get(name), "fget", None)
-    text = inspect.get_annotations(owner).get(name) if made is None else made.__annotations__["return"]
-    if text is None:  # of what is there for type checkers alone, or nothing of ours
-        return Table, None
-    found = eval(text, {}, _Names({**vars(builtins), **vars(sys.modules[owner.__module__])}))
-    if rest:
-        kinds = get_args(found) if get_origin(found) in (Union, UnionType) else (found,)
-        inner, words = _described(next(one for one in kinds if one is not NoneType), rest)
-        return (inner | None if NoneType in kinds else inner), words
-    words = getattr(kind, "WORDS", {}).get(name) if made is None else (made.__doc__ or "").partition("\n")[0]
-    return _json_type(found), words
-
-
-class _Names(dict[str, Any]):
-    """What annotations name; what is there for type checkers alone is a part of a result."""
-
-    def __missing__(self, _name: str) -> type[Told]:
-        from solver.results.told import Told
-
-        return Told
 
 
 def _json_type(given: Any) -> Any:

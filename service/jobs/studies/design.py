@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
     from optim import DesignResult as Optimum
     from optim import RobustResult as Robust
+    from solver.results.told import Told
     from solver.scene.scene import Scene
 
 UNCERTAIN = "uncertain"
@@ -127,6 +128,11 @@ class _Design(NominalAndRobustKeys, ProblemRequest):
 
         record: Any = robust_record if "nominal" in answer.json else design_record
         return replace(super().output(answer, sweeps), design=record(answer.result))
+
+    @classmethod
+    def result_class(cls, result: Json) -> type[Told]:
+        """Return the class of a design, robust or not."""
+        return optim.RobustResult if "nominal" in result else super().result_class(result)
 
     @classmethod
     def empty(cls, result: Json) -> str:

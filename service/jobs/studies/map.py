@@ -124,7 +124,7 @@ def join(spec: Mapping[str, Any], outputs: Mapping[int, PartOutput]) -> JobOutpu
     result = found.to_json()
     if ridge is not None:
         result["ridge"] = ridge.result["ridge"]
-        result |= worst_of([found.known, Known.of_json(ridge.result["ridge"])]).to_json()
+        result |= worst_of([found.known, Known.of_result(ridge.result["ridge"])]).to_json()
         result["seconds"] = found.seconds + ridge.result["ridge"]["seconds"]
     return JobOutput(
         result=result,

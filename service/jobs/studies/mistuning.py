@@ -242,7 +242,7 @@ def _peaks(part: PartOutput) -> list[BladePeaks]:
     return [
         solver.BladePeaks(
             dof=part.result["dof"], value=value[i], at_hz=at_hz[i], branches=(),
-            status=tuple(solver.BranchStatus[name] for name in names), highest=Known.of_json(known),
+            status=tuple(solver.BranchStatus[name] for name in names), highest=Known.from_json(known),
         )
         for i, (names, known) in enumerate(zip(part.result["status"], part.result["known"], strict=True))
     ]  # fmt: skip

@@ -19,6 +19,7 @@ from solver.errors import Issue, Naming
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from solver.results.told import Told
     from solver.scene.scene import Scene
 
 
@@ -229,6 +230,11 @@ class Modes(Study, HarmonicRequest):
         if asked.get("motions"):
             answer.json["motions"] = motions_of(found)
         return answer
+
+    @classmethod
+    def result_class(cls, result: Json) -> type[Told]:
+        """Return the class of a mode, or of phase resonances."""
+        return solver.PhaseResonance if "excitation" in result else super().result_class(result)
 
     @classmethod
     def figure(cls, result: Json, _sweeps: Sequence[StoredSweep], _read: ReadSweep) -> Figure:

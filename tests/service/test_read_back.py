@@ -1,0 +1,118 @@
+"""A result that is read back from its JSON is the result, as far as JSON has it."""
+
+import json
+import pickle
+from collections.abc import Mapping
+from enum import Enum
+from typing import Any
+
+import pytest
+
+import optim
+import solver
+from service.errors import InvalidRequestError
+from service.jobs.kinds import SHIPPED, studies
+from service.jobs.strict_json import validated
+from service.jobs.study import Watch
+from solver.results.told import Told, json_keys, json_value
+
+FORCE = "excitation.amplitude"
+OF_DISKS = ("interference", "mistuning")
+
+
+class Shipped:
+    """The shipped scenes, without a database."""
+
+    def scene_body(self, name: str) -> Mapping[str, object] | None:
+        return solver.load_scene(name).to_dict()
+
+    def with_uploads(self, body: Mapping[str, object]) -> Mapping[str, object]:
+        return body
+
+
+def asked(kind: str, name: str) -> dict[str, Any]:
+    """A small question of a study to a scene."""
+    scene = solver.load_scene(name)
+    low, high = scene.observe.band
+    middle, force = 0.5 * (low + high), scene.excitation[0].amplitude
+    near = {"from": 0.98 * middle, "to": 1.02 * middle}
+    ends = [0.5 * force, 1.5 * force]
+    over = {"parameter": FORCE, "from": 0.99 * force, "to": 1.01 * force}
+    rough = {} if kind in ("accuracy", "interference", "march") else {"harmonics": 1}
+    at = [low, middle, high]
+    own: dict[str, dict[str, Any]] = {
+        "solve": {"frequency_hz": middle}, "sweep": near, "peaks": {**over, "checks": 1},
+        "map": {**over, "steps": 2, "frequencies": 2, "ridge": name == "two-dof"},
+        "design": {"variables": {FORCE: ends}}, "pareto": {"variables": {FORCE: ends}, "points": 3},
+        "march": {"frequency_hz": middle, "max_periods": 3}, "controlled": {"amplitude": 1e-5, **near},
+        "accuracy": {"frequency_hz": middle, "harmonics": [1, 2], "samples": [16], "repeats": 1},
+        "campbell": {"speeds_rpm": [[60 * middle, 61 * middle]]}, "interference": {"speed_rpm": 3000},
+        "mistuning": {"of": [scene.observe.dof], "samples": 1, **near}, "modes": {"from": 1e-5, "to": 2e-5},
+        "identify": {
+            "data": [{"frequency": at, "amplitude": [_height(scene, one) for one in at]}],
+            "unknowns": {FORCE: ends}, "starts": 1,
+        },
+    }  # fmt: skip
+    return {"scene": name, **own.get(kind, {}), **rough}
+
+
+def _height(scene: solver.Scene, frequency_hz: float) -> float:
+    return solver.solve(scene, frequency_hz=frequency_hz, harmonics=1).max_abs
+
+
+def compared(read: Told, found: Told, written: Mapping[str, Any]) -> int:
+    """How many attributes were compared: those by which a result and its parts write their JSON."""
+    count = 0
+    for key, path in json_keys(type(found)).items():
+        if written.get(key) is None or not hasattr(type(found), path):
+            continue
+        one, other = getattr(read, path), getattr(found, path)
+        assert json_value(one) == written[key]
+        if isinstance(other, str | int | float | Enum):
+            assert one == other, path
+            count += 1
+        for of, part, text in zip(*map(_parts, (one, other, written[key])), strict=False):
+            if isinstance(part, Told) and isinstance(of, Told):
+                count += compared(of, part, text)
+    return count
+
+
+def _parts(value: Any) -> list[Any]:
+    if isinstance(value, tuple | list):
+        return [one for one in value if isinstance(one, Told | dict)]
+    return [value] if isinstance(value, Told | dict) else []
+
+
+@pytest.mark.few(keep=("two-dof",))
+@pytest.mark.parametrize("kind", studies())
+@pytest.mark.parametrize("name", solver.shipped_scenes())
+def test_a_result_read_back_is_the_result(kind: str, name: str) -> None:
+    study = studies()[kind]
+    try:
+        resolved = SHIPPED[kind].resolve(validated(study, asked(kind, name)), Shipped())
+    except InvalidRequestError:
+        assert kind in OF_DISKS
+        assert solver.load_scene(name).structure.sector_count == 1
+        return
+    found = study.compute(*study.asked(resolved.spec), Watch())
+    written = json.loads(json.dumps(found.json))
+    read = study.result_class(written).from_json(written)
+    assert read.to_json() == written
+    assert pickle.loads(pickle.dumps(read)).to_json() == written
+    assert repr(read).startswith(f"<{type(read).__name__}")
+    if isinstance(found.result, study.result_class(written)):
+        assert compared(read, found.result, written) >= 4
+
+
+def test_what_json_does_not_hold_is_told() -> None:
+    branch = solver.sweep(solver.load_scene("two-dof"), harmonics=1)
+    read = solver.Branch.from_json(branch.to_json())
+    assert isinstance(read, solver.Branch)
+    assert read.error_estimate == branch.error_estimate
+    assert read.peak is not None
+    assert read.peak.at == branch.interior_peaks[0].at
+    assert read.status is branch.status
+    with pytest.raises(AttributeError, match="'solutions' of Branch is not in the JSON"):
+        _ = read.solutions
+    with pytest.raises(ValueError, match="is no JSON of DesignResult: it lacks method, optimum"):
+        optim.DesignResult.from_json(branch.to_json())
