@@ -350,7 +350,7 @@ def shared_scene(context: OfLink) -> Response:
 def shared_results(context: OfLink) -> Response:
     """What the run of a link computed."""
     run, reader = _shared(context)
-    return results_answer(context.service, run.id, reader)
+    return results_answer(context, run.id, reader)
 
 
 @shares.get("/shared/sweeps/{sweep_id}", response_model=SweepDetail, responses=SWEEP_FORMS)
