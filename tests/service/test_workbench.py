@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 import re
 from datetime import timedelta
 from typing import Any
@@ -9,12 +10,13 @@ from typing import Any
 import httpx
 import pytest
 from service_helpers import ServedClient, is_problem, new_job, until
+from sqlalchemy import delete
 
 from service.auth.allowances import Buckets
 from service.client import Client
 from service.db.clock import utc_now
 from service.db.engine import Database
-from service.db.models import JobState
+from service.db.models import Job, JobState
 from service.db.repositories import JobRepository
 from service.db.repositories.owned import Projects
 from service.db.repositories.rows import RunWords
@@ -342,3 +344,37 @@ def test_every_filter_holds_on_both_databases(database: Database) -> None:
     assert found(deleted=True) == [hard]
     runs.restore(hard, None)
     assert found() == [hard, soft]
+
+
+@pytest.mark.parametrize("counted", [0, 5000], ids=["looked at one by one", "by the index"])
+def test_texts_are_found_as_by_looking_at_every_one(
+    database: Database, counted: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("service.db.repositories.runs._FEW_TEXTS", counted)
+    jobs, runs = JobRepository(database), Runs(database, utc_now, bin_days=7.0)
+    chance = random.Random(5)
+
+    def words() -> RunWords:
+        name, notes = ("".join(chance.choices("aBÜüé%_\"'/* -\n", k=chance.randrange(12))) for _ in range(2))
+        return RunWords(name=name, notes=notes)
+
+    made = [jobs.submit(new_job(owner="ann", words=words()), queue_limit=1000)[0].id for _ in range(60)]
+    said = {one: runs.seen(one, "ann").words for one in made}
+    for one in list(said)[::7]:
+        said[one] = runs.change(one, {"name": f"{said[one].name}new", "notes": "other"}, None, "ann").words
+    deleted = made[3::11]
+    gone = [said.pop(one) for one in deleted]
+    with database.writing() as connection:
+        connection.execute(delete(Job).where(Job.id.in_(deleted)))
+    pieces = {text[i : i + n] for one in said.values() for text in (one.name, one.notes)
+              for n in (1, 2, 3, 4, 6) for i in range(0, len(text) - n + 1, 3)}  # fmt: skip
+    hit = 0
+    for text in sorted(pieces | {one.name for one in gone if one.name}):
+        if len(text) < 3 and not text.isascii():
+            continue  # a piece of one or two letters is compared as the database compares
+        wanted = {one for one, words in said.items()
+                  if text.lower() in words.name.lower() or text.lower() in words.notes.lower()}  # fmt: skip
+        found = {row.id for row in runs.page(RunFilter(sees="ann", text=text), 100)}
+        assert found == wanted, repr(text)
+        hit += bool(wanted)
+    assert hit > 100
