@@ -97,6 +97,8 @@ def test_names_are_no_part_of_what_is_computed(http: ServedClient) -> None:
         ({"name": "x" * 201}, "/name", "`name` must have at most 200 characters"),
         ({"notes": "a\x00"}, "/notes", "besides tabs and ends of lines, it has U+0000"),
         ({"notes": "\u202eevil"}, "/notes", "it has U+202E"),
+        ({"name": "sh\u200broud"}, "/name", "it has U+200B"),
+        ({"tags": ["\U000e0041"]}, "/tags/0", "it has U+E0041"),
         ({"notes": "x" * 10_001}, "/notes", "must have at most 10000 characters"),
         ({"tags": [" "]}, "/tags/0", "must hold more than spaces"),
         ({"tags": [str(n) for n in range(21)]}, "/tags", "must have at most 20 items"),
@@ -213,7 +215,8 @@ def test_differences_have_the_paths_of_parameters() -> None:
 
 
 def test_a_link_shows_its_run_and_nothing_else(http: ServedClient, monkeypatch: pytest.MonkeyPatch) -> None:
-    run, other = (run_of(http, seed=seed, sweeps=1, notes="why", fresh=True) for seed in (1, 2))
+    run, other = (run_of(http, seed=seed, sweeps=1, notes="secret", fresh=True) for seed in (1, 2))
+    http.patch(f"/v1/runs/{run['id']}", json={"notes": "why"})
     path = f"/v1/runs/{run['id']}/shares"
     link = http.post(path, json={"days": 1.0}).json()
     short = http.post(path, json={"days": 0.001}).json()
@@ -227,6 +230,10 @@ def test_a_link_shows_its_run_and_nothing_else(http: ServedClient, monkeypatch: 
 
     shown = http.get(link["link"]).json()
     assert (shown["id"], shown["notes"], shown["request"]["seed"]) == (run["id"], "why", 1)
+    assert "secret" not in str(shown), "what was said of it once is not shown"
+    assert all(ask(what).headers["cache-control"] == "private, no-store" for what in ("", "/results"))
+    with Client(str(http.base_url)) as client:
+        assert [one.id for one in client.all_shares(limit=1)][:2] == [short["id"], link["id"]]
     assert ask("/results").json()["result"] == run["result"]
     browser = {"Accept": "text/html,application/xhtml+xml,application/xml;q=0.9,*/*;q=0.8"}
     page = http.get(link["link"], headers=browser)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, fields
-from datetime import datetime, timedelta
+from datetime import UTC, datetime, timedelta
 from typing import Any
 
 from sqlalchemy import (
@@ -20,6 +20,7 @@ from sqlalchemy import (
     null,
     or_,
     select,
+    tuple_,
 )
 from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.orm import InstrumentedAttribute
@@ -38,7 +39,7 @@ from service.db.models import (
     RunTag,
     Share,
 )
-from service.db.pagination import FEW, Condition, met, owner_condition, plain_conditions
+from service.db.pagination import FEW, Condition, Position, met, owner_condition, plain_conditions
 from service.db.repositories.owned import Binned, Rows
 from service.db.repositories.rows import NO_WORDS, JobRow, RunWords
 from service.db.tokens import Made, Tokens, digest_of, matches
@@ -347,6 +348,18 @@ class Shares(Rows[Share]):
         """The links to a run, without their tokens, oldest first."""
         self._runs.seen(job_id, sees)
         return self._all(self._select.where(Share.job_id == job_id).order_by(Share.created, Share.id))
+
+    def page(
+        self, sees: str | None, limit: int, after: Position | None = None
+    ) -> list[tuple[Share, Position]]:
+        """The links to the runs of an owner, or to everybody's (None), newest first, each with its place."""
+        query = self._select.order_by(Share.created.desc(), Share.id.desc()).limit(limit)
+        if sees is not None:
+            query = query.where(Share.job_id.in_(select(Job.id).where(Job.owner == sees)))
+        if after is not None and after[0] is not None:
+            place = (literal(datetime.fromtimestamp(after[0], UTC), Share.created.type), literal(after[1]))
+            query = query.where(tuple_(Share.created, Share.id) < tuple_(*place))
+        return [(row, (row.created.timestamp(), row.id)) for row in self._all(query)]
 
     def end(self, job_id: str, share_id: str, sees: str | None) -> None:
         """End a link to a run (NotFoundError if there is none)."""
