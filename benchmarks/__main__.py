@@ -10,7 +10,7 @@ from benchmarks.harness import WrongResultError
 
 GROUPS = {
     "chains": ("chain-8", "chain-32", "one-slider"),
-    "service": ("load", "latency", "requests", "lists", "figures", "scale"),
+    "service": ("load", "latency", "requests", "lists", "runs", "figures", "scale"),
 }
 
 
@@ -44,6 +44,7 @@ def _cases() -> dict[str, Callable[[], None]]:
         space_kernel,
         space_peers,
         start,
+        stored_runs,
         stored_sweeps,
         sweep_costs,
         truth,
@@ -84,6 +85,7 @@ def _cases() -> dict[str, Callable[[], None]]:
         "load": service_load.load,
         "latency": service_load.latency,
         "lists": service_load.lists,
+        "runs": stored_runs.stored_runs,
         "requests": service_requests.requests,
         "pruning": service_pruning.pruning,
         "scale": service_scale.scale,

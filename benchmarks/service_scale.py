@@ -219,9 +219,11 @@ def _size(database: Database, connection: Connection) -> float:
 
 
 @contextmanager
-def _postgresql() -> Iterator[Callable[[], str]]:
+def own_postgresql() -> Iterator[Callable[[], str]]:
     """A server of the tests' kind that keeps what it says it has written; makes databases."""
-    path = Path(__file__).resolve().parent.parent / "tests" / "service" / "postgresql_cluster.py"
+    tests = Path(__file__).resolve().parent.parent / "tests"
+    path = tests / "service" / "postgresql_cluster.py"
+    sys.path.append(str(tests / "cases"))  # what it imports
     found = importlib.util.spec_from_file_location("postgresql_cluster", path)
     if found is None or found.loader is None:
         raise WrongResultError(f"there is no {path}")
@@ -235,7 +237,7 @@ def _postgresql() -> Iterator[Callable[[], str]]:
 def scale() -> None:
     """Queue and database with 100 times as many simulated workers as there are cores."""
     rows = []
-    with tempfile.TemporaryDirectory() as folder, _postgresql() as new_database:
+    with tempfile.TemporaryDirectory() as folder, own_postgresql() as new_database:
         names = itertools.count()
         urls: dict[str, Callable[[], str]] = {
             "SQLite": lambda: f"sqlite:///{folder}/{next(names)}.db", "PostgreSQL": new_database,

@@ -20,6 +20,7 @@ from service.schemas.workbench_answers import (
     ShareAnswer,
     SharedRun,
     ShareList,
+    SharePage,
 )
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
@@ -127,6 +128,10 @@ class Workbench(Asking):
     def shares(self, run_id: str) -> list[ShareAnswer]:
         """The links to a run, without their tokens."""
         return self._get(ShareList, f"{_run(run_id)}/shares").items
+
+    def all_shares(self, **filters: Any) -> Iterator[ShareAnswer]:
+        """The links to all runs that the key sees, newest first, page after page."""
+        return self._pages(SharePage, "/v1/shares", filters)
 
     def end_share(self, run_id: str, share_id: str) -> None:
         """End a link to a run."""

@@ -22,8 +22,10 @@ from sqlalchemy import (
     Text,
     TypeDecorator,
     UniqueConstraint,
+    column,
     func,
     select,
+    table,
 )
 from sqlalchemy.orm import DeclarativeBase, Mapped, column_property, mapped_column
 
@@ -305,13 +307,15 @@ TAG_LENGTH = 50
 class Run(TableBase):
     """What is said of a job: the project it belongs to, its name, its notes, whether it is in the bin.
 
-    A job of which nothing was ever said has no row here.
+    A job of which nothing was ever said has no row here. The number is for the index of names and notes that
+    SQLite has (`RUN_TEXT`); to all others a run is known by its job.
     """
 
     __tablename__ = "run"
 
+    number: Mapped[int] = mapped_column(BigInteger().with_variant(Integer(), "sqlite"), primary_key=True)
     job_id: Mapped[str] = mapped_column(
-        String(ID_LENGTH), ForeignKey("job.id", ondelete="CASCADE"), primary_key=True
+        String(ID_LENGTH), ForeignKey("job.id", ondelete="CASCADE"), unique=True
     )
     project_id: Mapped[str | None] = mapped_column(
         String(ID_LENGTH), ForeignKey("project.id", ondelete="SET NULL")
@@ -323,6 +327,11 @@ class Run(TableBase):
     deleted: Mapped[datetime | None]
 
     __table_args__ = (Index(None, "project_id", "job_id"), Index(None, "deleted", "job_id"))
+    __mapper_args__ = {"primary_key": [job_id]}  # noqa: RUF012 - SQLAlchemy reads it from the class
+
+
+RUN_TEXT = table("run_text", column("rowid", Integer), column("run_text", Text))
+"""SQLite's index of the names and notes of runs, kept by triggers; `rowid` is the number of the run."""
 
 
 class Project(TableBase):

@@ -13,6 +13,7 @@ from service.auth.authenticator import Authenticator
 from service.errors import ConfigurationError
 from service.http import metrics, openapi
 from service.http.dependencies import BodyTurns, HostCheck
+from service.http.large_answers import InPieces, LargeAnswers
 from service.http.metrics import Metrics, RequestMetrics
 from service.http.middleware.admission import Admission, ConcurrencyLimits
 from service.http.middleware.connections import Connections
@@ -76,6 +77,7 @@ def create_app(settings: Settings | None = None, registry: Registry | None = Non
     app.state.turns = BodyTurns()
     app.state.probe = Probe(service)
     app.state.looks = Looks(service)
+    app.state.large = LargeAnswers()
     app.state.connections = connections = _connections(service.settings)
     service.lanes.guard(connections.require_taken)
     # The last one added is the outermost.
@@ -90,6 +92,7 @@ def create_app(settings: Settings | None = None, registry: Registry | None = Non
     app.add_middleware(RequestLog)
     problems.install(app)
     app.add_middleware(HeadersAndAudit, settings=service.settings)
+    app.add_middleware(InPieces)
     events.install(app)
     app.include_router(jobs.submissions(service.registry))
     for router in (

@@ -126,16 +126,14 @@ class KindView:
 
 LONGEST_NAME, LONGEST_NOTES, LONGEST_TAG, MOST_TAGS = 200, 10_000, 50, 20
 _LINES = frozenset("\n\r\t")
-# Characters that hide or turn round what stands beside them.
-_TURNING = frozenset("\u200e\u200f\u061c\u2028\u2029") | {
-    chr(code) for code in (*range(0x202A, 0x202F), *range(0x2066, 0x206A))
-}
+# Of Unicode: control, lone halves, ends of lines and paragraphs, and those that nobody sees, which hide or
+# turn round what stands beside them and make two names look the same.
+_UNSEEN = ("Cc", "Cs", "Cf", "Zl", "Zp")
 
 
 def _refuse(text: str, allowed: frozenset[str]) -> None:
     for character in text:
-        control = unicodedata.category(character) in ("Cc", "Cs") or character in _TURNING
-        if control and character not in allowed:
+        if unicodedata.category(character) in _UNSEEN and character not in allowed:
             words = "besides tabs and ends of lines" if allowed else "and be one line"
             raise ValueError(f"must hold no control characters {words}, it has U+{ord(character):04X}")
 

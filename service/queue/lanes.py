@@ -1,24 +1,26 @@
 """The threads of the service, apart by what they do and shared fairly among owners.
 
 Pictures and uploads take long and look-ups do not: with threads of their own, those who want many of the
-first keep nobody waiting for the second. Inside a lane owners take turns.
+first keep nobody waiting for the second. Inside a lane owners take turns, and none has more than a quarter.
 """
 
 from __future__ import annotations
 
 import asyncio
-from collections import OrderedDict, deque
+from collections import Counter, OrderedDict, deque
 from collections.abc import Callable
 from functools import partial
 from typing import ParamSpec, TypeVar
 
 from anyio import CapacityLimiter, to_thread
 
-from service.errors import OverloadedError
+from service.auth.callers import LINK_READERS
+from service.errors import OverloadedError, RetryLaterError, TooManyRequestsError
 
 _P = ParamSpec("_P")
 _T = TypeVar("_T")
 _READING, _WRITING, _FILES, _DRAWING, _UPLOADS = 16, 16, 4, 2, 2
+_LINKS = 2  # requests by links at a time
 _LONG = 3.0
 _RETRY_SECONDS = 2
 
@@ -29,6 +31,8 @@ def _everybody(_owner: str) -> None:
 
 class Lane:
     """Some threads. All but the work itself happens on one event loop, so nothing here needs a lock.
+
+    One owner has at most a quarter of the threads at a time: the others find some free.
 
     Parameters
     ----------
@@ -43,6 +47,8 @@ class Lane:
         self._seconds = seconds
         self._free = threads
         self._threads = threads
+        self._share = max(1, threads // 4)
+        self._running: Counter[str] = Counter()
         self._limiter: CapacityLimiter | None = None
         self._waiting: OrderedDict[str, deque[asyncio.Future[None]]] = OrderedDict()
 
@@ -51,8 +57,8 @@ class Lane:
 
         Raises
         ------
-        OverloadedError
-            If that is not in time.
+        TooManyRequestsError, OverloadedError
+            If that is not in time: the owner has their share of the threads, or others have all of them.
         """
         await self._enter(owner)
         try:
@@ -62,38 +68,57 @@ class Lane:
                 self._limiter = CapacityLimiter(self._threads)
             return await to_thread.run_sync(partial(work, *args, **values), limiter=self._limiter)
         finally:
-            self._leave()
+            self._leave(owner)
+
+    def _most(self, owner: str) -> int:
+        return min(self._share, _LINKS) if owner == LINK_READERS.owner else self._share
 
     async def _enter(self, owner: str) -> None:
-        if self._free:
-            self._free -= 1
-            return
         turn = asyncio.get_running_loop().create_future()
         self._waiting.setdefault(owner, deque()).append(turn)
+        self._give()
+        if turn.done():
+            return
         try:
             async with asyncio.timeout(self._seconds):
                 await turn
         except (TimeoutError, asyncio.CancelledError) as error:
             if turn.done() and not turn.cancelled():
-                self._leave()  # it had just got a thread
+                self._leave(owner)  # it had just got a thread
             else:
                 self._forget(owner, turn)
             if isinstance(error, TimeoutError):
-                words = f"the service did not get to it within {self._seconds:g} s: try again later"
-                raise OverloadedError(words, _RETRY_SECONDS) from error
+                raise self._too_late(owner) from error
             raise
 
-    def _leave(self) -> None:
-        """Give the thread to the owner whose turn is longest ago."""
-        while self._waiting:
-            owner, turns = self._waiting.popitem(last=False)
+    def _too_late(self, owner: str) -> RetryLaterError:
+        if self._running[owner] >= self._most(owner):
+            words = f"the key has as many requests of this kind under way as one may: {self._most(owner)}"
+            return TooManyRequestsError(words, _RETRY_SECONDS)
+        words = f"the service did not get to it within {self._seconds:g} s: try again later"
+        return OverloadedError(words, _RETRY_SECONDS)
+
+    def _leave(self, owner: str) -> None:
+        self._free += 1
+        self._running[owner] -= 1
+        if not self._running[owner]:
+            del self._running[owner]
+        self._give()
+
+    def _give(self) -> None:
+        """Give free threads to those owners with less than their share whose turn is longest ago."""
+        while self._free:
+            owner = next((one for one in self._waiting if self._running[one] < self._most(one)), None)
+            if owner is None:
+                return
+            turns = self._waiting.pop(owner)
             turn = turns.popleft()
             if turns:
                 self._waiting[owner] = turns
             if not turn.done():
+                self._free -= 1
+                self._running[owner] += 1
                 turn.set_result(None)
-                return
-        self._free += 1
 
     def _forget(self, owner: str, turn: asyncio.Future[None]) -> None:
         turns = self._waiting.get(owner)

@@ -96,6 +96,22 @@ class ShareList(AnswerModel):
     items: list[ShareAnswer]
 
 
+class ShareQuery(ListQuery):
+    """Which links to list."""
+
+    path: ClassVar[str] = "/v1/shares"
+
+    limit: Limit = 100
+    cursor: Cursor = None
+
+
+class SharePage(Page[ShareAnswer]):
+    """A page of links, newest first."""
+
+
+_SAID = ("project", "name", "notes", "tags")
+
+
 class SharedRun(AnswerModel):
     """A run as a link shows it: what was asked and how it ended."""
 
@@ -117,8 +133,8 @@ class SharedRun(AnswerModel):
     def of(cls, row: RunRow) -> Self:
         """The answer for a row."""
         job, words = row.job, row.words
-        # The project is not shared with the run.
-        request = {key: value for key, value in (job.request or {}).items() if key != "project"}
+        # Neither its project is shared nor what was said of it before.
+        request = {key: value for key, value in (job.request or {}).items() if key not in _SAID}
         return cls._from(
             job, status=job.state.value, scene=job.scene_name, name=words.name, notes=words.notes,
             tags=list(words.tags), request=request,

@@ -34,6 +34,10 @@ def about(**fields: object) -> Iterator[None]:
 _CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")
 
 
+# Of a key or a link (`service.db.tokens`): its id may be told, its secret may not, wherever it was written.
+_SECRET = re.compile(r"((?:stickslip|share)_[0-9a-f]+_)[0-9a-f]{8,}")
+
+
 def _escaped(found: re.Match[str]) -> str:
     return f"\\x{ord(found[0]):02x}"
 
@@ -48,7 +52,7 @@ class TextFormatter(logging.Formatter):
         """The line of a record."""
         fields = _FIELDS.get()
         shown = "".join(f" [{name} {fields[name]}]" for name in _SHOWN if name in fields)
-        return _CONTROL.sub(_escaped, super().format(record) + shown)
+        return _SECRET.sub(r"\1***", _CONTROL.sub(_escaped, super().format(record) + shown))
 
 
 class JsonFormatter(logging.Formatter):
@@ -66,7 +70,7 @@ class JsonFormatter(logging.Formatter):
         }
         if record.exc_info:
             line["exception"] = self.formatException(record.exc_info)
-        return json.dumps(line, default=str)
+        return _SECRET.sub(r"\1***", json.dumps(line, default=str))
 
 
 FORMATTERS: Mapping[str, type[logging.Formatter]] = {"text": TextFormatter, "json": JsonFormatter}

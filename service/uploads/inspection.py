@@ -12,17 +12,22 @@ import multiprocessing as mp
 import os
 import signal
 import threading
+import zipfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
 from service.errors import InvalidRequestError, QueueFullError, UnreadableUploadError, issues_to_json
+from service.workers.process_limits import address_space
 from service.workers.processes import start
 
 MEMORY_BYTES = 2 * 1024**3
-_AT_ONCE = threading.BoundedSemaphore(2)
-_PATIENCE_SECONDS = 5.0
+"""Most that one reader may take, and all of them together beside what they are born with."""
+_LEAST_BYTES = 512 * 1024**2
+_TIMES = 16
+"""Memory of a reader for each byte of its files: lines, and what is read of them, as Python keeps it."""
+_PATIENCE_SECONDS = 30.0
 _DESCRIBE, _RESOLVE, _LOOK = "describe", "resolve", "look"
 
 
@@ -76,9 +81,10 @@ def look_at(asked: Mapping[str, Any], folder: Path, seconds: float, most_bytes: 
 
 
 def _ask(task: str, folder: Path, argument: Any, seconds: float, most_bytes: int) -> Any:
+    memory = min(_LEAST_BYTES + _TIMES * _size(folder), MEMORY_BYTES)
     ours, theirs = mp.Pipe(duplex=False)
-    with _turn(), ours:
-        process = start(_main, (theirs, task, str(folder), argument, seconds), "reader")
+    with _budget.taken(memory), ours:
+        process = start(_main, (theirs, task, str(folder), argument, seconds, memory), "reader")
         theirs.close()
         try:
             if not ours.poll(seconds):
@@ -101,6 +107,17 @@ def _ask(task: str, folder: Path, argument: Any, seconds: float, most_bytes: int
     return answer["found"]
 
 
+def _size(folder: Path) -> int:
+    """Bytes of the files of a folder, of an archive of arrays as they are inside."""
+    found = 0
+    for file in folder.iterdir():
+        found += file.stat().st_size
+        if zipfile.is_zipfile(file):
+            with contextlib.suppress(zipfile.BadZipFile), zipfile.ZipFile(file) as archive:
+                found += sum(member.file_size for member in archive.infolist())
+    return found
+
+
 def _end(code: int | None) -> str:
     """What is said of a file whose reader ended without an answer."""
     if code is not None and -code in (signal.SIGSEGV, signal.SIGBUS, signal.SIGABRT, signal.SIGFPE):
@@ -108,26 +125,40 @@ def _end(code: int | None) -> str:
     return "reading it takes more memory or time than there is for it"
 
 
-@contextlib.contextmanager
-def _turn() -> Iterator[None]:
-    """One of few processes at a time.
+class _Budget:
+    """What several may take together."""
 
-    Raises
-    ------
-    QueueFullError
-        If others take too long.
-    """
-    if not _AT_ONCE.acquire(timeout=_PATIENCE_SECONDS):
-        raise QueueFullError("other files are being read: try again later", retry_after=5)
-    try:
-        yield
-    finally:
-        _AT_ONCE.release()
+    def __init__(self, most: int) -> None:
+        self._left = most
+        self._changed = threading.Condition()
+
+    @contextlib.contextmanager
+    def taken(self, amount: int) -> Iterator[None]:
+        """Take so much of it inside the block.
+
+        Raises
+        ------
+        QueueFullError
+            If others have it for too long.
+        """
+        with self._changed:
+            if not self._changed.wait_for(lambda: self._left >= amount, _PATIENCE_SECONDS):
+                raise QueueFullError("other files are being read: try again later", retry_after=5)
+            self._left -= amount
+        try:
+            yield
+        finally:
+            with self._changed:
+                self._left += amount
+                self._changed.notify_all()
 
 
-def _main(connection: Connection, task: str, folder: str, argument: Any, seconds: float) -> None:
-    """The life of the process."""
-    limit_process(seconds, MEMORY_BYTES)
+_budget = _Budget(MEMORY_BYTES)
+
+
+def _main(connection: Connection, task: str, folder: str, argument: Any, seconds: float, memory: int) -> None:
+    """The life of the process, which may take `memory` beside what it is born with."""
+    limit_process(seconds, address_space() + memory)
     os.chdir(folder)
     # The other end may have lost its patience.
     with contextlib.suppress(BrokenPipeError):

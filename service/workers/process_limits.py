@@ -43,7 +43,7 @@ class ProcessLimits:
         if self.memory_bytes is None:
             resource.setrlimit(resource.RLIMIT_AS, (hard, hard))
             return
-        limit = _address_space() + self.memory_bytes
+        limit = address_space() + self.memory_bytes
         if hard != resource.RLIM_INFINITY:
             limit = min(limit, hard)
         resource.setrlimit(resource.RLIMIT_AS, (limit, hard))
@@ -55,7 +55,7 @@ class ProcessLimits:
             return
         import resource
 
-        if resource.getrlimit(resource.RLIMIT_AS)[0] - _address_space() > self.memory_bytes / 2:
+        if resource.getrlimit(resource.RLIMIT_AS)[0] - address_space() > self.memory_bytes / 2:
             return
         gc.unfreeze()  # what was loaded before this process was forked off is not looked through otherwise
         for found in gc.get_objects():
@@ -83,7 +83,7 @@ class ProcessLimits:
 UNLIMITED = ProcessLimits()
 
 
-def _address_space() -> int:
+def address_space() -> int:
     """Bytes of address space of this process."""
     import resource
 

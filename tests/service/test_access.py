@@ -186,7 +186,7 @@ def test_wrong_keys_are_limited_and_working_ones_are_not(
 
 def test_what_answers_with_a_key_carry(guarded: ServedClient) -> None:
     answer = guarded.get("/v1/jobs", headers=bearer(token_of(guarded)))
-    assert answer.headers["cache-control"] == "no-store"
+    assert answer.headers["cache-control"] == "private, no-store"
     assert "Authorization" in answer.headers["vary"]
     assert answer.headers["strict-transport-security"].startswith("max-age=")
     refused = is_problem(guarded.get("/v1/jobs"), 401)

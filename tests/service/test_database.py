@@ -227,10 +227,17 @@ def test_the_first_revision_upgraded_is_the_models(url: str) -> None:
     revisions.upgrade(url, "0001")
     revisions.upgrade(url)
     with migrating(url) as connection:
-        context = MigrationContext.configure(connection, opts={"compare_type": True})
-        assert compare_metadata(context, TableBase.metadata) == []
+        # The tables of the index of texts are SQLite's own.
+        options = {
+            "compare_type": True,
+            "include_name": lambda name, *_: not str(name).startswith("run_text"),
+        }
+        context = MigrationContext.configure(connection, opts=options)
+        differences = compare_metadata(context, TableBase.metadata)
+        assert [one for one in differences if one[0] != "remove_index" or one[1].name != "ix_run_text"] == []
         found = inspect(connection)
-        assert set(found.get_table_names()) == {*TableBase.metadata.tables, "alembic_version"}
+        tables = {one for one in found.get_table_names() if not one.startswith("run_text")}
+        assert tables == {*TableBase.metadata.tables, "alembic_version"}
         for table in TableBase.metadata.tables.values():
             named = {check["name"] for check in found.get_check_constraints(table.name)}
             assert named == {c.name for c in table.constraints if isinstance(c, CheckConstraint)}

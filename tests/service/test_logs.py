@@ -9,6 +9,7 @@ import httpx
 import pytest
 
 from service.client.embedded import EmbeddedService
+from service.db.tokens import Tokens
 from service.settings import logs
 from service.settings.logs import JsonFormatter, TextFormatter
 
@@ -126,3 +127,13 @@ def test_every_answer_has_the_number_of_its_request(
 def test_lines_for_people_hold_no_control_characters() -> None:
     record = logging.LogRecord("a", logging.INFO, __file__, 1, "a\x1b[2J\x00b\x9b\tc", None, None)
     assert TextFormatter().format(record).endswith("a\\x1b[2J\\x00b\\x9b\tc")
+
+
+@pytest.mark.parametrize("formatter", [TextFormatter(), JsonFormatter()], ids=["people", "programs"])
+def test_secrets_are_in_no_line_wherever_they_were_written(formatter: logging.Formatter) -> None:
+    for prefix, bytes_of_id in (("stickslip", 6), ("share", 8)):
+        row_id, token = Tokens(prefix, bytes_of_id).new()
+        with logs.about(path=f"/v1/jobs/{token}/x", request="r"):
+            text = written(formatter, "no job '%s' and %s", f"{token}y", token.upper().lower(), error=True)
+        assert token.rpartition("_")[2] not in text
+        assert f"{prefix}_{row_id}_***" in text

@@ -241,15 +241,24 @@ def test_what_another_one_uploaded_is_not_there(shipped: ServedClient) -> None:
         uploads.get(theirs["ring.inp"].removeprefix("upload:"), ben)
 
 
+NBLOCK = b"NBLOCK,6\n(3i9,6e21.13e3)\n        1        0        0 0.0\nN,\n"
 BAD_DECKS = {
     "none": (b"no nodes here\n", "has no nodes"),
     "an archive": (npz(M=np.eye(3)), "has no nodes"),
     "words": (b"*NODE\n1, here\n", "line 2 must hold a node"),
     "not a number": (b"*NODE\n1, nan, 0, 0\n", "finite place"),
-    "too many": (b"*NODE\n1, 0.\n*NSET, NSET=A, GENERATE\n1, 99999999999999\n", "line 4 generates more"),
+    "too many": (b"*NODE\n1, 0.\n*NSET, NSET=A, GENERATE\n1, 99999999999999\n", "line 4: the sets have more"),
+    "many ranges": (b"*NODE\n1, 0.\n*NSET, NSET=A, GENERATE\n" + 30 * b"1, 99999\n", "line 24: the sets"),
+    "sets of sets": (b"*NODE\n1, 0.\n*NSET, NSET=A0\n1,1,1,1,1,1,1,1,1,1\n" + b"".join(
+        b"*NSET, NSET=A%d\n%s\n" % (n + 1, b",".join(10 * [b"A%d" % n])) for n in range(9)), "the sets have"),
+    "another file": (b"*NODE\n1, 0.\n* include , input=/etc/passwd\n", "line 3 includes another file"),
+    "a set elsewhere": (b"*NODE\n1, 0.\n* NSET , NSET=A, INPUT=a.inp\n", "line 3 includes another file"),
+    "no file": (b"*NODE\n1, 0.\n*INCLUDE\n", "line 3 must say which file"),
+    "a wide block": (NBLOCK + b"CMBLOCK,A,NODE,2\n(8i10)\n         1-999999999\n", "line 7: the sets have"),
+    "a block of words": (NBLOCK + b"CMBLOCK,A,NODE,2\n(8i10)\n         1       two\n", "whole numbers"),
+    "a block of nothing": (NBLOCK + b"CMBLOCK,A,NODE,2\n(8i0)\n         1       two\n", "format of CMBLOCK"),
     "no step": (b"*NODE\n1, 0.\n*NSET, NSET=A, GENERATE\n1, 9, 0\n", "line 4 must hold nodes"),
-    "a range of nothing": (b"NBLOCK,6\n(3i9,6e21.13e3)\n        1        0        0 0.0\nN,\n"
-                           b"CMBLOCK,A,NODE,1\n(8i10)\n        -5\n", "is damaged or no deck"),
+    "a range of nothing": (NBLOCK + b"CMBLOCK,A,NODE,1\n(8i10)\n        -5\n", "does not begin: -5"),
 }  # fmt: skip
 
 

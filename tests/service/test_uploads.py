@@ -2,7 +2,6 @@
 
 import io
 import signal
-import threading
 import zipfile
 import zlib
 from collections.abc import Callable
@@ -247,7 +246,7 @@ def test_a_reader_that_takes_too_long_or_dies_is_ended(
     (tmp_path / "M.npz").write_bytes(FILES["M.npz"])
     with pytest.raises(UnreadableUploadError, match=r"longer than 0\.01 s"):
         inspection.contents(tmp_path / "M.npz", 0.01)
-    monkeypatch.setattr(inspection, "_AT_ONCE", threading.BoundedSemaphore(1))
+    monkeypatch.setattr(inspection, "_budget", inspection._Budget(inspection._LEAST_BYTES + 10**6))
     assert inspection.contents(tmp_path / "M.npz", 30.0)[0]["rows"] == len(M), "its place is free again"
     assert "damaged" in inspection._end(-signal.SIGSEGV)
     assert "memory or time" in inspection._end(-signal.SIGKILL)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 import re
 from datetime import timedelta
 from typing import Any
@@ -9,12 +10,13 @@ from typing import Any
 import httpx
 import pytest
 from service_helpers import ServedClient, is_problem, new_job, until
+from sqlalchemy import delete
 
 from service.auth.allowances import Buckets
 from service.client import Client
 from service.db.clock import utc_now
 from service.db.engine import Database
-from service.db.models import JobState
+from service.db.models import Job, JobState
 from service.db.repositories import JobRepository
 from service.db.repositories.owned import Projects
 from service.db.repositories.rows import RunWords
@@ -95,6 +97,8 @@ def test_names_are_no_part_of_what_is_computed(http: ServedClient) -> None:
         ({"name": "x" * 201}, "/name", "`name` must have at most 200 characters"),
         ({"notes": "a\x00"}, "/notes", "besides tabs and ends of lines, it has U+0000"),
         ({"notes": "\u202eevil"}, "/notes", "it has U+202E"),
+        ({"name": "sh\u200broud"}, "/name", "it has U+200B"),
+        ({"tags": ["\U000e0041"]}, "/tags/0", "it has U+E0041"),
         ({"notes": "x" * 10_001}, "/notes", "must have at most 10000 characters"),
         ({"tags": [" "]}, "/tags/0", "must hold more than spaces"),
         ({"tags": [str(n) for n in range(21)]}, "/tags", "must have at most 20 items"),
@@ -211,7 +215,8 @@ def test_differences_have_the_paths_of_parameters() -> None:
 
 
 def test_a_link_shows_its_run_and_nothing_else(http: ServedClient, monkeypatch: pytest.MonkeyPatch) -> None:
-    run, other = (run_of(http, seed=seed, sweeps=1, notes="why", fresh=True) for seed in (1, 2))
+    run, other = (run_of(http, seed=seed, sweeps=1, notes="secret", fresh=True) for seed in (1, 2))
+    http.patch(f"/v1/runs/{run['id']}", json={"notes": "why"})
     path = f"/v1/runs/{run['id']}/shares"
     link = http.post(path, json={"days": 1.0}).json()
     short = http.post(path, json={"days": 0.001}).json()
@@ -225,6 +230,10 @@ def test_a_link_shows_its_run_and_nothing_else(http: ServedClient, monkeypatch: 
 
     shown = http.get(link["link"]).json()
     assert (shown["id"], shown["notes"], shown["request"]["seed"]) == (run["id"], "why", 1)
+    assert "secret" not in str(shown), "what was said of it once is not shown"
+    assert all(ask(what).headers["cache-control"] == "private, no-store" for what in ("", "/results"))
+    with Client(str(http.base_url)) as client:
+        assert [one.id for one in client.all_shares(limit=1)][:2] == [short["id"], link["id"]]
     assert ask("/results").json()["result"] == run["result"]
     browser = {"Accept": "text/html,application/xhtml+xml,application/xml;q=0.9,*/*;q=0.8"}
     page = http.get(link["link"], headers=browser)
@@ -342,3 +351,37 @@ def test_every_filter_holds_on_both_databases(database: Database) -> None:
     assert found(deleted=True) == [hard]
     runs.restore(hard, None)
     assert found() == [hard, soft]
+
+
+@pytest.mark.parametrize("counted", [0, 5000], ids=["looked at one by one", "by the index"])
+def test_texts_are_found_as_by_looking_at_every_one(
+    database: Database, counted: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("service.db.repositories.runs._FEW_TEXTS", counted)
+    jobs, runs = JobRepository(database), Runs(database, utc_now, bin_days=7.0)
+    chance = random.Random(5)
+
+    def words() -> RunWords:
+        name, notes = ("".join(chance.choices("aBÜüé%_\"'/* -\n", k=chance.randrange(12))) for _ in range(2))
+        return RunWords(name=name, notes=notes)
+
+    made = [jobs.submit(new_job(owner="ann", words=words()), queue_limit=1000)[0].id for _ in range(60)]
+    said = {one: runs.seen(one, "ann").words for one in made}
+    for one in list(said)[::7]:
+        said[one] = runs.change(one, {"name": f"{said[one].name}new", "notes": "other"}, None, "ann").words
+    deleted = made[3::11]
+    gone = [said.pop(one) for one in deleted]
+    with database.writing() as connection:
+        connection.execute(delete(Job).where(Job.id.in_(deleted)))
+    pieces = {text[i : i + n] for one in said.values() for text in (one.name, one.notes)
+              for n in (1, 2, 3, 4, 6) for i in range(0, len(text) - n + 1, 3)}  # fmt: skip
+    hit = 0
+    for text in sorted(pieces | {one.name for one in gone if one.name}):
+        if len(text) < 3 and not text.isascii():
+            continue  # a piece of one or two letters is compared as the database compares
+        wanted = {one for one, words in said.items()
+                  if text.lower() in words.name.lower() or text.lower() in words.notes.lower()}  # fmt: skip
+        found = {row.id for row in runs.page(RunFilter(sees="ann", text=text), 100)}
+        assert found == wanted, repr(text)
+        hit += bool(wanted)
+    assert hit > 100

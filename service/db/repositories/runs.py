@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, fields
-from datetime import datetime, timedelta
+from datetime import UTC, datetime, timedelta
 from typing import Any
 
 from sqlalchemy import (
@@ -20,14 +20,26 @@ from sqlalchemy import (
     null,
     or_,
     select,
+    tuple_,
 )
 from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.orm import InstrumentedAttribute
 
 from service.db.clock import Clock
 from service.db.engine import Database
-from service.db.models import ID_LENGTH, NOBODY, Job, JobState, Project, Result, Run, RunTag, Share
-from service.db.pagination import Condition, met, owner_condition, plain_conditions
+from service.db.models import (
+    ID_LENGTH,
+    NOBODY,
+    RUN_TEXT,
+    Job,
+    JobState,
+    Project,
+    Result,
+    Run,
+    RunTag,
+    Share,
+)
+from service.db.pagination import FEW, Condition, Position, met, owner_condition, plain_conditions
 from service.db.repositories.owned import Binned, Rows
 from service.db.repositories.rows import NO_WORDS, JobRow, RunWords
 from service.db.tokens import Made, Tokens, digest_of, matches
@@ -86,6 +98,8 @@ def put_tags(connection: Connection, job_id: str, tags: tuple[str, ...]) -> None
 
 
 _NEVER_LEADS = -1
+_FEW_TEXTS = 5000
+_LETTERS = 3  # of the pieces that the indexes of texts know
 _OF_JOBS = [getattr(Job, field.name) for field in fields(JobRow) if field.name != "request"]
 _OF_RUNS = (Run.project_id, Run.name, Run.notes, Run.revision, Run.changed, Run.deleted)
 _LISTED = select(*_OF_JOBS, *_OF_RUNS).outerjoin(Run, Run.job_id == Job.id)
@@ -173,7 +187,7 @@ class Runs(Binned[RunRow]):
         query = _LISTED.order_by(Job.id.desc()).limit(limit)
         if before is not None:
             query = query.where(Job.id < before)
-        conditions = _conditions(wanted)
+        conditions = _conditions(wanted, sqlite=self._db.backend == "sqlite")
         leads = wanted.kind is None and wanted.scene is None
         if not wanted.deleted:
             query = query.where(~in_the_bin(Job.id))
@@ -211,7 +225,7 @@ class Runs(Binned[RunRow]):
         super()._write(connection, row_id, own)
 
 
-def _conditions(wanted: RunFilter) -> list[Condition]:
+def _conditions(wanted: RunFilter, *, sqlite: bool) -> list[Condition]:
     equal = (
         (Job.kind, wanted.kind),
         (Job.scene_name, wanted.scene),
@@ -230,8 +244,7 @@ def _conditions(wanted: RunFilter) -> list[Condition]:
     if wanted.deleted:
         conditions.append(_said(Run.deleted.is_not(None)))
     if wanted.text is not None:
-        text = or_(*(one.icontains(wanted.text, autoescape=True) for one in (Run.name, Run.notes)))
-        conditions.append(_said(text, few=_NEVER_LEADS))
+        conditions.append(_containing(wanted.text, sqlite=sqlite))
     for tag in wanted.tag:
         ids = select(RunTag.job_id).where(RunTag.tag == tag)
         holds = ids.where(RunTag.job_id == Job.id).correlate(Job).exists()
@@ -239,10 +252,26 @@ def _conditions(wanted: RunFilter) -> list[Condition]:
     return conditions
 
 
-def _said(holds: ColumnElement[bool], **values: Any) -> Condition:
-    """A condition on what is said of a run."""
-    ids = select(Run.job_id).where(holds)
-    return Condition(ids=ids, holds=holds, apart="few" not in values, **values)
+def _containing(text: str, *, sqlite: bool) -> Condition:
+    """The condition that a text stands in the name or the notes of a run, in whatever case.
+
+    PostgreSQL takes its index for this by itself. SQLite's, which knows triples of letters, is asked by name.
+    """
+    holds = or_(*(one.icontains(text, autoescape=True) for one in (Run.name, Run.notes)))
+    if len(text) < _LETTERS:
+        return _said(holds, few=_NEVER_LEADS)
+    held = holds
+    if sqlite:
+        phrase = '"{}"'.format(text.replace('"', '""'))
+        held = Run.number.in_(select(RUN_TEXT.c.rowid).where(RUN_TEXT.c.run_text.match(phrase)))
+    # Of what many runs have a page is soon found by looking at each; but LIKE of SQLite folds ASCII alone.
+    return _said(held, holds if text.isascii() else held, few=_FEW_TEXTS)
+
+
+def _said(held: ColumnElement[bool], holds: ColumnElement[bool] | None = None, few: int = FEW) -> Condition:
+    """A condition on what is said of a run, for its ids, and if it is another one there for a row."""
+    ids = select(Run.job_id).where(held)
+    return Condition(ids=ids, holds=held if holds is None else holds, apart=few >= 0, few=few)
 
 
 def _rows(connection: Connection, query: Select[Any]) -> list[RunRow]:
@@ -319,6 +348,18 @@ class Shares(Rows[Share]):
         """The links to a run, without their tokens, oldest first."""
         self._runs.seen(job_id, sees)
         return self._all(self._select.where(Share.job_id == job_id).order_by(Share.created, Share.id))
+
+    def page(
+        self, sees: str | None, limit: int, after: Position | None = None
+    ) -> list[tuple[Share, Position]]:
+        """The links to the runs of an owner, or to everybody's (None), newest first, each with its place."""
+        query = self._select.order_by(Share.created.desc(), Share.id.desc()).limit(limit)
+        if sees is not None:
+            query = query.where(Share.job_id.in_(select(Job.id).where(Job.owner == sees)))
+        if after is not None and after[0] is not None:
+            place = (literal(datetime.fromtimestamp(after[0], UTC), Share.created.type), literal(after[1]))
+            query = query.where(tuple_(Share.created, Share.id) < tuple_(*place))
+        return [(row, (row.created.timestamp(), row.id)) for row in self._all(query)]
 
     def end(self, job_id: str, share_id: str, sees: str | None) -> None:
         """End a link to a run (NotFoundError if there is none)."""

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+from collections.abc import Iterable
 from typing import Any
 
 from uvicorn.protocols.http.h11_impl import H11Protocol
@@ -106,14 +107,15 @@ class Connections:
         TooManyRequestsError
             If it is too much all the same.
         """
-        held = [one for one in self._paused if one.owner == owner]
-        unsent = sum(one.unsent() for one in held)
-        if unsent <= self._unsent_bytes:
-            return
-        for one in sorted(held, key=lambda one: one.since):
-            if one.stalled() >= _STALLED_SECONDS and unsent > self._unsent_bytes:
-                unsent -= one.unsent()
+        held = sorted((one for one in self._paused if one.owner == owner), key=lambda one: one.since)
+        unsent = _together(held)
+        for one in list(held):
+            if unsent <= self._unsent_bytes:
+                return
+            if one.stalled() >= _STALLED_SECONDS:
+                held.remove(one)
                 self._end(one)
+                unsent = _together(held)
         if unsent > self._unsent_bytes:
             raise TooManyRequestsError(
                 f"{unsent} bytes of answers were not taken yet: read them, then ask again", _RETRY_SECONDS
@@ -140,6 +142,13 @@ class Connections:
         one.transport.abort()
 
 
+def _together(connections: Iterable[Connection]) -> int:
+    """Bytes that these clients have not taken; a body that several of them read is held once."""
+    found = list(connections)
+    bodies = {id(one.held): len(one.held) for one in found}
+    return sum(one.unsent() for one in found) + sum(bodies.values())
+
+
 class Connection(H11Protocol):
     """One connection, closed when its next request does not come in time.
 
@@ -153,7 +162,11 @@ class Connection(H11Protocol):
         self.owner = ""
         self.since = 0.0
         self.all_of_them = all_of_them
-        self._left = 0
+        self.held = b""
+        """The body that is being sent."""
+        self.sent = 0
+        """Bytes of bodies handed to the transport since the connection began."""
+        self._taken = 0
         self._deadline: asyncio.TimerHandle | None = None
         self._heard = False
 
@@ -198,15 +211,16 @@ class Connection(H11Protocol):
         self.all_of_them.paused(self, now=False)
 
     def unsent(self) -> int:
-        """Bytes the client has not taken."""
+        """Bytes handed to the transport that the client has not taken."""
         return self.transport.get_write_buffer_size()
 
     def stalled(self) -> float:
         """For how long the client has taken nothing of what there is for it [s]; looked at now and then."""
         now, unsent = self.loop.time(), self.unsent()
-        if unsent == 0 or unsent < self._left or self._left == 0:
+        taken = self.sent - unsent
+        if unsent == 0 or taken != self._taken:
             self.since = now
-        self._left = unsent
+        self._taken = taken
         return now - self.since
 
     def _wait(self) -> None:

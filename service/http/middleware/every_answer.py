@@ -13,7 +13,7 @@ from typing import Any
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from service.http.middleware.admission import address_of
+from service.http.middleware.admission import address_of, by_link
 from service.settings import logs
 from service.settings.settings import Settings
 
@@ -96,6 +96,7 @@ _HEADERS = {
     "X-Frame-Options": "DENY",
 }
 _YEAR = 365 * 24 * 3600
+_KEPT, _NOT_KEPT = "private, no-cache", "private, no-store"
 _AUDITED = frozenset({400, 401, 403, 413, 421, 429})
 _NOT_FOUND = 404
 _LONGEST = 300
@@ -117,7 +118,10 @@ class HeadersAndAudit:
 
         async def with_headers(message: Message) -> None:
             if message["type"] == "http.response.start":
-                self._add_headers(MutableHeaders(scope=message), keyed="key_id" in state and state["key_id"])
+                headers = MutableHeaders(scope=message)
+                if by_link(scope["path"]):
+                    headers["Cache-Control"] = _NOT_KEPT
+                self._add_headers(headers, keyed="key_id" in state and state["key_id"])
                 _audit(scope, state, message["status"])
             await send(message)
 
@@ -130,7 +134,7 @@ class HeadersAndAudit:
         headers.setdefault("Content-Security-Policy", _PICTURE_POLICY if picture else _POLICY)
         if keyed:
             # What has an ETag may be kept by whoever asked, and is asked for again each time.
-            headers.setdefault("Cache-Control", "private, no-cache" if "etag" in headers else "no-store")
+            headers.setdefault("Cache-Control", _KEPT if "etag" in headers else _NOT_KEPT)
             headers.add_vary_header("Authorization")
         if self._settings.https:
             headers.setdefault("Strict-Transport-Security", f"max-age={_YEAR}")

@@ -28,6 +28,7 @@ from service.http.dependencies import (
     with_raw,
 )
 from service.http.in_lane import prepared, reading
+from service.http.large_answers import LargeAnswers
 from service.jobs.kinds.bodies import (
     DESIGN,
     KIND,
@@ -122,17 +123,23 @@ def scene_of(job_id: str, context: InContext) -> Response:
 @reading
 def results(job_id: str, context: InContext) -> Response:
     """What a job computed."""
-    return results_answer(context.service, job_id, context.caller)
+    return results_answer(context, job_id, context.caller)
 
 
-def results_answer(service: Service, job_id: str, caller: Caller) -> Response:
+def results_answer(context: Context, job_id: str, caller: Caller) -> Response:
     """What a job computed, to a caller."""
-    with service.database.reading():
-        found = service.results(job_id, caller)
-        sweeps = [SweepAnswer.of(one) for one in found.sweeps]
-    about = ResultsHead(job=found.job.id, status=found.job.state)
-    body = with_raw(about, result=found.text.encode(), sweeps=raw_list(sweeps))
-    return Response(body, media_type="application/json")
+    service = context.service
+    service.job(job_id, caller)
+
+    def body() -> bytes:
+        with service.database.reading():
+            found = service.results(job_id, caller)
+            sweeps = [SweepAnswer.of(one) for one in found.sweeps]
+        about = ResultsHead(job=found.job.id, status=found.job.state)
+        return with_raw(about, result=found.text.encode(), sweeps=raw_list(sweeps))
+
+    large: LargeAnswers = context.request.app.state.large
+    return large.answer(job_id, body)
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,6 +10,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
+from operator import itemgetter
 from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Body, Depends, Header, Query, Request, Response
@@ -37,7 +38,7 @@ from service.http.routes.stored import SWEEP_FORMS, SweepForm, sweep_answer
 from service.rendering.representations import JSON, chosen
 from service.schemas.answers import JobScene, ResultsAnswer, SweepAnswer, SweepDetail
 from service.schemas.comparisons import comparison
-from service.schemas.pages import newest
+from service.schemas.pages import newest, page_of
 from service.schemas.workbench_answers import (
     Comparison,
     NewLink,
@@ -54,6 +55,8 @@ from service.schemas.workbench_answers import (
     ShareAnswer,
     SharedRun,
     ShareList,
+    SharePage,
+    ShareQuery,
     changes_of,
 )
 
@@ -276,6 +279,15 @@ def list_shares(job_id: str, context: InContext) -> ShareList:
     return ShareList(items=[ShareAnswer.of(row) for row in rows])
 
 
+@shares.get("/shares", response_model=SharePage, responses=LISTED)
+@reading
+def list_all_shares(context: InContext, query: Annotated[ShareQuery, Query()]) -> Response:
+    """The links to all runs that the key sees, newest first; their tokens are not kept."""
+    find = partial(context.service.shares.page, context.sees)
+    rows, following = page_of(query, context.service.settings, find, itemgetter(1))
+    return listing(context, SharePage(items=[ShareAnswer.of(row) for row, _ in rows], next=following))
+
+
 @shares.post("/runs/{job_id}/shares", status_code=201)
 @writing
 def share_run(job_id: str, body: MadeLink, context: InContext) -> NewShareAnswer:
@@ -350,7 +362,7 @@ def shared_scene(context: OfLink) -> Response:
 def shared_results(context: OfLink) -> Response:
     """What the run of a link computed."""
     run, reader = _shared(context)
-    return results_answer(context.service, run.id, reader)
+    return results_answer(context, run.id, reader)
 
 
 @shares.get("/shared/sweeps/{sweep_id}", response_model=SweepDetail, responses=SWEEP_FORMS)

@@ -11,7 +11,7 @@ import re
 import numpy as np
 
 from solver.matrices.decks.coordinates import GLOBAL, CoordinateKind, CoordinateSystem, ansys_axes
-from solver.matrices.decks.deck import Deck, DeckFile, real
+from solver.matrices.decks.deck import Deck, DeckFile, Members, real
 from solver.matrices.readers.numbers_in_text import FormatError
 
 # Commands, by the four letters that tell them, that make, move or turn nodes in ways that are not read.
@@ -26,7 +26,8 @@ class AnsysDeck:
     """Reads the nodes and components of a deck."""
 
     def __init__(self, file: DeckFile, deck: Deck) -> None:
-        self._lines, self._deck = file.lines(), deck
+        self._lines, self._deck = list(file.lines()), deck
+        self._members = Members()
         cylinder = CoordinateSystem(CoordinateKind.CYLINDRICAL, GLOBAL.origin, GLOBAL.axes)
         self._known: dict[int, CoordinateSystem] = {0: GLOBAL, 1: cylinder}
         self._active = 0
@@ -131,7 +132,7 @@ class AnsysDeck:
         """The numbers in the Fortran format of a block."""
         text = self._lines[at + 1].lower() if at + 1 < len(self._lines) else ""
         form = re.match(pattern, text)
-        if form is None:
+        if form is None or "0" in form.groups():
             raise FormatError(f"line {at + 2} must hold the format of {name}, such as {example}")
         return tuple(int(one) for one in form.groups())
 
@@ -158,14 +159,28 @@ class AnsysDeck:
         if len(parts) < 4 or not parts[2].upper().startswith("NODE"):
             return at + 1
         _, width = self._form(at, r"\s*\((\d+)i(\d+)\)", "CMBLOCK", "(8i10)")
-        count = int(parts[3])
-        at, found = at + 2, list[int]()
-        while len(found) < count and at < len(self._lines):
+        members, left = list[int](), self._whole(parts[3], at)
+        at += 2
+        while left > 0 and at < len(self._lines):
             line = self._lines[at].rstrip()
-            found += [int(line[i : i + width]) for i in range(0, len(line), width)]
+            for begin in range(0, len(line), width):
+                item = self._whole(line[begin : begin + width], at)
+                if item <= 0 and not members:
+                    raise FormatError(f"line {at + 1} ends a range that does not begin: {item}")
+                try:
+                    self._members.add(members, [item] if item > 0 else range(members[-1] + 1, 1 - item))
+                except FormatError as error:
+                    raise FormatError(f"line {at + 1}: {error}") from error
+                left -= 1
             at += 1
-        members: list[int] = []
-        for item in found:  # a negative number closes a range
-            members += [item] if item > 0 else range(members[-1] + 1, -item + 1)
         self._deck.sets[parts[1].upper()] = members
         return at
+
+    @staticmethod
+    def _whole(text: str, at: int) -> int:
+        try:
+            return int(text)
+        except ValueError as error:
+            raise FormatError(
+                f"line {at + 1} of CMBLOCK must hold whole numbers, got {text[:80]!r}"
+            ) from error

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -13,6 +13,7 @@ from solver.matrices.readers.numbers_in_text import FormatError, fortran_real
 from solver.matrices.sectors.elements import ElementShape, Integer
 
 _DEEPEST = 10  # files that include each other
+_MOST_MEMBERS = 2_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,9 +33,11 @@ class DeckFile:
     alone: bool = False
     depth: int = 0
 
-    def lines(self) -> list[str]:
-        """The lines of the file."""
-        return self.path.read_text(encoding="latin-1").splitlines()
+    def lines(self) -> Iterator[str]:
+        """The lines of the file, one after the other."""
+        with self.path.open(encoding="latin-1") as file:
+            for line in file:
+                yield line.rstrip("\n")
 
     def other(self, name: str, line: int) -> DeckFile:
         """The file that a line includes.
@@ -52,6 +55,26 @@ class DeckFile:
         if self.depth == _DEEPEST:
             raise FormatError(f"{self.path.name!r} includes {name!r} too deeply")
         return DeckFile(self.path.parent / name, self.alone, self.depth + 1)
+
+
+class Members:
+    """Counts the members of all sets of a deck: a line can name ranges, and sets that name sets."""
+
+    def __init__(self) -> None:
+        self._count = 0
+
+    def add(self, members: list[int], more: Sequence[int]) -> None:
+        """Add to a set.
+
+        Raises
+        ------
+        FormatError
+            The sets then have more members than those of any deck.
+        """
+        self._count += len(more)
+        if self._count > _MOST_MEMBERS:
+            raise FormatError(f"the sets have more than {_MOST_MEMBERS} members together")
+        members += more
 
 
 def real(text: str) -> float:

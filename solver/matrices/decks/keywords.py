@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Container, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -22,11 +22,10 @@ from solver.matrices.decks.coordinates import (
     axes_by,
     rotation,
 )
-from solver.matrices.decks.deck import Deck, DeckFile, real
+from solver.matrices.decks.deck import Deck, DeckFile, Members, real
 from solver.matrices.readers.numbers_in_text import FormatError
 from solver.matrices.sectors.elements import elements_of, shape_of
 
-_MOST_NODES = 10_000_000
 _MAKERS = ("*NGEN", "*NFILL", "*NCOPY", "*NMAP", "*IMPERFECTION")
 _BARE = re.compile(r',(?=(?:[^"]*"[^"]*")*[^"]*$)')  # a comma outside of quotes
 Data = list[tuple[int, str]]
@@ -70,6 +69,7 @@ class KeywordDeck:
         self._any_instance = False
         self._system = GLOBAL
         self._transforms: list[_Block] = []
+        self._members = Members()
 
     def read(self) -> None:
         """Read all of it.
@@ -84,7 +84,8 @@ class KeywordDeck:
             "*TRANSFORM": self._transforms.append, "*INSTANCE": self._begin, "*END PART": self._end_part,
             "*END INSTANCE": self._end, "*ELEMENT": self._element,
         }  # fmt: skip
-        for block in _blocks(_lines(self._file), self._file):
+        wanted = set(readers) if self._elements else set(readers) - {"*ELEMENT"}
+        for block in _blocks(_lines(self._file), self._file, wanted):
             if block.keyword in _MAKERS:
                 raise block.refusal("makes or moves nodes, which is not read: write all nodes by *NODE")
             if block.keyword in readers:
@@ -97,12 +98,13 @@ class KeywordDeck:
             raise block.refusal(
                 f"has SYSTEM={block.options['SYSTEM']}, which is not read: give SYSTEM=R (x, y, z) or C"
             )
-        found = [_node(number, text) for number, text in block.data]
-        if not found:
+        if not block.data:
             return
-        given = np.array([place for _, place in found])
+        nodes, given = list[int](), np.empty((len(block.data), 3))
+        for i, (number, text) in enumerate(block.data):
+            node, given[i] = _node(number, text)
+            nodes.append(node)
         places = self._system.places(CoordinateSystem(kind, GLOBAL.origin, GLOBAL.axes).places(given))
-        nodes = [node for node, _ in found]
         if self._any_instance and self._here is self._whole:
             both = set(nodes) & set(self._whole.nodes)
             if both:
@@ -120,7 +122,11 @@ class KeywordDeck:
             raise block.refusal(f"{block.options['NSET']!r} is that of elements: list its nodes")
         members = self._here.sets.setdefault(block.options["NSET"].upper(), [])
         for number, text in block.data:
-            members += _members(self._here, text, number, generate="GENERATE" in block.options)
+            for some in _named(self._here, text, number, generate="GENERATE" in block.options):
+                try:
+                    self._members.add(members, some)
+                except FormatError as error:
+                    raise FormatError(f"line {number}: {error}") from error
 
     def _element(self, block: _Block) -> None:
         shape = shape_of(block.options.get("TYPE", "")) if self._elements and block.data else None
@@ -256,10 +262,11 @@ def _lines(file: DeckFile) -> Iterator[tuple[int, str]]:
         if text.startswith("*") and text.endswith(","):
             open_line = number, text
             continue
-        if re.match(r"\*INCLUDE\b", text, re.IGNORECASE):
+        if re.match(r"\*\s*INCLUDE\b", text, re.IGNORECASE):
             _, options = _parsed(text)
-            if "INPUT" in options:
-                yield from _lines(file.other(options["INPUT"], number))
+            if "INPUT" not in options:
+                raise FormatError(f"line {number} must say which file it includes, by INPUT=")
+            yield from _lines(file.other(options["INPUT"], number))
             continue
         yield number, text
     if open_line is not None:
@@ -273,11 +280,12 @@ def _parsed(text: str) -> tuple[str, dict[str, str]]:
     return re.sub(r"\s+", " ", "*" + keyword[1:].strip()).upper(), options
 
 
-def _blocks(lines: Iterator[tuple[int, str]], file: DeckFile) -> Iterator[_Block]:
+def _blocks(lines: Iterator[tuple[int, str]], file: DeckFile, wanted: Container[str]) -> Iterator[_Block]:
+    """The keywords one after the other; the data lines of those that are wanted."""
     current: _Block | None = None
     for number, text in lines:
         if not text.startswith("*"):
-            if current is not None:
+            if current is not None and current.keyword in wanted:
                 current.data.append((number, text))
             continue
         if current is not None:
@@ -308,19 +316,13 @@ def _whole(data: Data) -> list[int]:
     return found
 
 
-def _members(deck: Deck, text: str, number: int, *, generate: bool) -> list[int]:
+def _named(deck: Deck, text: str, number: int, *, generate: bool) -> list[Sequence[int]]:
+    """What a line of a set names: nodes, ranges, other sets."""
     parts = [part.strip().strip('"') for part in _BARE.split(text) if part.strip()]
     try:
         if generate:
             first, last, *step = map(int, parts)
-            if last - first > _MOST_NODES:
-                raise FormatError(f"line {number} generates more than {_MOST_NODES} nodes")
-            return list(range(first, last + 1, step[0] if step else 1))
-        found: list[int] = []
-        for part in parts:
-            found += deck.sets[part.upper()] if part.upper() in deck.sets else [int(part)]
-        return found
-    except FormatError:
-        raise
+            return [range(first, last + 1, step[0] if step else 1)]
+        return [deck.sets[part.upper()] if part.upper() in deck.sets else [int(part)] for part in parts]
     except ValueError as error:
         raise FormatError(f"line {number} must hold nodes or names of sets, got {text[:80]!r}") from error

@@ -137,7 +137,7 @@ def _refusal(entry: _Entry, error: ValueError) -> FormatError:
 
 def _entries(file: DeckFile) -> Iterator[_Entry]:
     """The entries that tell of nodes, continued lines joined to them."""
-    lines = file.lines()
+    lines = list(file.lines())
     begins = [i for i, line in enumerate(lines) if re.match(r"\s*BEGIN\b", line, re.IGNORECASE)]
     if len(begins) > 1:
         raise FormatError(f"line {begins[1] + 1} begins further bulk data: give a deck without superelements")

@@ -65,12 +65,11 @@ def check_alone(path: Path) -> None:
 
 
 def _fill(deck: Deck, file: DeckFile, *, elements: bool) -> None:
-    lines = file.lines()
-    if any(map(_KEYWORDS.match, lines)):
+    if any(map(_KEYWORDS.match, file.lines())):
         KeywordDeck(file, deck, elements=elements).read()
-    elif any(map(_ANSYS.match, lines)):
+    elif any(map(_ANSYS.match, file.lines())):
         AnsysDeck(file, deck).read()
-    elif any(map(_NASTRAN.match, lines)):
+    elif any(map(_NASTRAN.match, file.lines())):
         read_nastran(file, deck)
 
 

@@ -1,0 +1,76 @@
+"""A result of many megabytes, read by many at once: it is held once, and others are served meanwhile."""
+
+import json
+import sqlite3
+import threading
+import time
+from pathlib import Path
+
+from besieged import Besieged, besieged, others_are_served, running
+
+MEGABYTES = 19
+READERS = 16
+ADDED_MB = 100.0
+VICTIM = "/v1/scenes/two-dof"
+
+
+def a_large_result(service: Besieged, owner: str, text: str) -> str:
+    """The id of a job with this result."""
+    with service.client(owner) as client:
+        job = {"kind": "iteration", "seed": len(text), "fresh": True}
+        answer = client.post("/v1/jobs", json=job, headers={"Prefer": "wait=60"})
+        assert answer.json()["status"] == "successful", answer.text
+        job_id = str(answer.json()["id"])
+    with sqlite3.connect(service.folder / "jobs.db") as connection:
+        connection.execute("UPDATE job_result SET body = ? WHERE job_id = ?", (text, job_id))
+    return job_id
+
+
+def numbers(first: float) -> str:
+    """A result of `MEGABYTES`."""
+    value = f"{first:.17f}"
+    return json.dumps({"eigenvalue": first, "steps": 3, "curve": [float(value)] * (MEGABYTES * 10**6 // 20)})
+
+
+def test_many_readers_hold_a_large_result_once(tmp_path: Path) -> None:
+    with besieged(tmp_path, "ann", "bob") as service:
+        job = a_large_result(service, "ann", numbers(1.2345678901234567))
+        highest, lengths, ended = 0.0, [], threading.Event()
+
+        def read(_over: threading.Event) -> None:
+            """As a client behind a slow line."""
+            with service.client("ann") as client, client.stream("GET", f"/v1/jobs/{job}/results") as answer:
+                assert answer.status_code == 200
+                length = 0
+                for piece in answer.iter_bytes(1 << 20):
+                    length += len(piece)
+                    time.sleep(0.05)
+            lengths.append(length)
+
+        def watch(over: threading.Event) -> None:
+            nonlocal highest
+            while not over.is_set():
+                highest = max(highest, service.added())
+                ended.wait(0.005)
+
+        service.idle = service.memory()
+        with running(watch), running(*[read] * READERS):
+            others_are_served(service, VICTIM, "bob")
+        print(f"memory: {highest:.0f} MB more at most, {service.added():.0f} MB at the end")  # noqa: T201
+        assert len(lengths) == READERS
+        assert len(set(lengths)) == 1
+        assert lengths[0] > 0.98e6 * MEGABYTES
+        assert highest < ADDED_MB
+
+
+def test_large_results_are_compared_by_their_figures(tmp_path: Path) -> None:
+    with besieged(tmp_path, "ann", "bob") as service:
+        a, b = (a_large_result(service, "ann", numbers(one)) for one in (1.5, 2.5))
+        service.idle = service.memory()
+        with service.client("ann") as client:
+            begun = time.monotonic()
+            answer = client.get("/v1/runs/compare", params={"a": a, "b": b})
+            took = time.monotonic() - begun
+        print(f"compared in {took:.2f} s, {service.added():.0f} MB")  # noqa: T201
+        assert answer.status_code == 200, answer.text
+        assert service.added() < ADDED_MB
