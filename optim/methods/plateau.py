@@ -10,7 +10,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from optim.criteria.criterion import CriterionRow
 from optim.criteria.evaluation import evaluate, natural_scales
@@ -21,6 +20,7 @@ from optim.methods.kkt import KEPT
 from optim.problem.problem import Problem
 from optim.problem.variables import BoundedVariable, parameter_values
 from optim.results.design import DesignStatus
+from solver.continuation.between import least_between, level_up_to
 from solver.response.solve import solve
 from solver.results.watch import ShouldStop
 
@@ -257,21 +257,7 @@ def _ends(
         if z != bound and _same(along(z), along(first)) and _same(along(z), along(bound)):
             ends.append(bound)
             continue
-        inside, step = z, STEP
-        outside = None
-        while inside != bound and outside is None:
-            trial = max(inside - step, bound) if sign < 0.0 else min(inside + step, bound)
-            if good(along(trial)):
-                inside, step = trial, 2.0 * step
-            else:
-                outside = trial
-        while outside is not None and abs(outside - inside) > END:
-            middle = 0.5 * (inside + outside)
-            if good(along(middle)):
-                inside = middle
-            else:
-                outside = middle
-        ends.append(inside)
+        ends.append(level_up_to(lambda place: good(along(place)), z, bound, STEP, END))
     return ends[0], ends[1]
 
 
@@ -286,12 +272,10 @@ def _least(along: Along, criterion: TieBreak, low: float, high: float) -> tuple[
         return None
     i = int(np.argmin(known))
     best, least = float(places[i]), known[i]
-    found = minimize_scalar(
-        lambda z: criterion(along(float(z))) or 0.0, method="bounded",
-        bounds=(places[max(i - 1, 0)], places[min(i + 1, PLACES - 1)]), options={"xatol": PRECISE},
-    )  # fmt: skip
-    if found.fun < least:
-        best, least = float(found.x), float(found.fun)
+    bounds = float(places[max(i - 1, 0)]), float(places[min(i + 1, PLACES - 1)])
+    found = least_between(lambda z: z, lambda z: criterion(along(z)) or 0.0, *bounds, PRECISE, 500, 0.0)
+    if found is not None and (there := criterion(along(found)) or 0.0) < least:
+        best, least = found, there
     return best, least + LEVEL * 1e-3 * abs(least)
 
 

@@ -15,11 +15,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Protocol, TypeVar
 
+from solver.continuation.between import closing_in
 from solver.jit.fourier import Real
 
 _STATIONARY = 1e-11  # dλ/dshare of a fold, relative to that at the points it lies between
 _SMOOTH = 1e-6  # above: it jumps, the fold is a corner where a contact changes its state
-_MOST_SOLVES = 60
+_NARROW = 1e-13  # share of the way
 
 
 class OnArc(Protocol):
@@ -67,28 +68,13 @@ def fold_between(
     before, after : dλ/dshare at both points, of opposite signs; 0 where the motion is the same at both, which
         then are one but for rounding, with no fold between them.
     """
-    low, high, g_low, g_high = 0.0, 1.0, before, after
     size = max(abs(before), abs(after))
     if size == 0.0:
         return None
-    best: _Point | None = None
-    least = float("inf")
-    for _ in range(_MOST_SOLVES):
-        width = high - low
-        steep = g_high != g_low
-        share = (low * g_high - high * g_low) / (g_high - g_low) if steep else 0.5 * (low + high)
-        share = min(max(share, low + 1e-3 * width), high - 1e-3 * width)
-        point = at_share(share)
-        if point is None:
+    best: tuple[_Point, float] | None = None
+    for point, g, width in closing_in(at_share, lambda point: float(point.tangent[-1]), before, after):
+        if best is None or abs(g) <= best[1]:
+            best = point, abs(g)
+        if abs(g) <= _STATIONARY * size or width <= _NARROW:
             break
-        g = float(point.tangent[-1])
-        if abs(g) <= least:
-            best, least = point, abs(g)
-        if abs(g) <= _STATIONARY * size or width <= 1e-13:
-            break
-        # Illinois: the end that stays counts half the next time.
-        if g * g_low > 0.0:
-            low, g_low, g_high = share, g, 0.5 * g_high
-        else:
-            high, g_high, g_low = share, g, 0.5 * g_low
-    return None if best is None else (best, least <= _SMOOTH * size)
+    return None if best is None else (best[0], best[1] <= _SMOOTH * size)

@@ -19,6 +19,7 @@ from solver.continuation.kernels.state import Control, Walk, walk_by_value
 from solver.continuation.loose_parts import balanced_part
 from solver.continuation.segment import Stretch, rows_of, state_of
 from solver.continuation.settings import ContinuationSettings
+from solver.continuation.walk import Curve
 from solver.jit.fourier import Integer, Real
 
 STRETCH = 64  # points between two looks at the caller, at most
@@ -43,7 +44,7 @@ def control_of(settings: ContinuationSettings, start: float, stop: float) -> Con
     )  # fmt: skip
 
 
-class BranchStretches:
+class BranchStretches(Curve[Stretch]):
     """A branch as it stands behind its last stretch.
 
     Parameters
@@ -93,10 +94,6 @@ class BranchStretches:
         self._code, self._status, self._state = code, stretch.status, state if again is None else again
         longer = min(2.0, _STRETCH_SECONDS / max(time.perf_counter() - before, 1e-9))
         return stretch, min(STRETCH, max(1, int(size * longer)))
-
-    def leapt(self) -> tuple[None, float]:
-        """Go no further: the compiled steps pass what can be passed."""
-        return None, 0.0
 
     def _stretch(
         self, rows: tuple[Real, Real, Integer, Real, Real], count: int, status: BranchStatus | None

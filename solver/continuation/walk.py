@@ -29,6 +29,7 @@ class Curve(Protocol[_Point]):
 
     def leapt(self) -> tuple[_Point | None, float]:
         """Pass what no step is short enough for; return as `tried` does, None if the curve is lost there."""
+        return None, 0.0
 
 
 def walk(curve: Curve[_Point], size: float, least: float) -> Iterator[_Point]:

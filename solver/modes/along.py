@@ -11,8 +11,8 @@ from collections.abc import Callable, Sequence
 from itertools import pairwise
 
 import numpy as np
-from scipy.optimize import brentq
 
+from solver.continuation.between import closing_in
 from solver.jit.fourier import Real
 from solver.modes.corrector import Corrected, ModeState, carried_as, correct
 from solver.modes.curve import BENT, border_of, by_shape, is_near, tangent_of
@@ -22,10 +22,6 @@ from solver.modes.results import NonlinearMode
 _CLOSE = 1e-14  # of the share of a way
 _SHARES = (0.25, 0.5, 0.75)  # where a way is looked at that may hold what is looked for
 _LEVEL = 1e-9  # slope of ζ relative to ζ that counts as none
-
-
-class _LostError(Exception):
-    """A point of a way was not found."""
 
 
 class CurveSegment:
@@ -63,19 +59,15 @@ class CurveSegment:
 
     def root(self, of: Callable[[Corrected], float]) -> Corrected | None:
         """Return where a function of the points is 0; its signs differ at the ends. None if not found."""
-
-        def value(share: float) -> float:
-            point = {0.0: self._one, 1.0: self._other}.get(share) or self.at(share)
-            found = math.nan if point is None else of(point)
-            if math.isnan(found):
-                raise _LostError
-            return found
-
-        try:
-            share = float(brentq(value, 0.0, 1.0, xtol=_CLOSE, rtol=1e-14))
-        except _LostError:
-            return None
-        return {0.0: self._one, 1.0: self._other}.get(share) or self.at(share)
+        ends = of(self._one), of(self._other)
+        if 0.0 in ends or math.isnan(ends[0] + ends[1]):
+            return None if 0.0 not in ends else (self._one, self._other)[ends.index(0.0)]
+        for point, value, width in closing_in(self.at, of, *ends):
+            if math.isnan(value):
+                return None
+            if abs(value) <= _CLOSE * max(map(abs, ends)) or width <= _CLOSE:
+                return point
+        return None
 
 
 def zeta_of(point: Corrected) -> float:

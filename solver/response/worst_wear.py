@@ -18,6 +18,8 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
+from functools import partial
+from operator import attrgetter
 from typing import Annotated
 
 import numpy as np
@@ -28,6 +30,7 @@ from solver.balance.kernels.residual import contact_values, evaluate
 from solver.balance.parameter import Kind
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.system import evaluation_by_value
+from solver.continuation.between import closing_in, dense_between
 from solver.continuation.branch import Branch
 from solver.continuation.extrema.extrema import MOST_HALVINGS, NEAR_THE_TOP, PREDICTED
 from solver.continuation.extrema.nodes import share_scales
@@ -52,7 +55,6 @@ COMPETES = 0.6
 _HALVINGS_BELOW = 2  # of an interval whose maximum could compete, but not lead
 _FLAT = 1e-11  # slope over the whole interval, relative to the value, at which a maximum is found
 _NARROW = 1e-12  # share of the interval at which a corner is found
-_MOST_TRIALS = 100
 _MOST_ITERATIONS = 12
 
 
@@ -141,8 +143,8 @@ class _MaximaSearch:
         self._size = max(abs(node.value) for node in nodes)
         self._nodes = [nodes[0]]
         for right in nodes[1:]:
-            self._nodes.extend(self._halved(self._nodes[-1], right, top, MOST_HALVINGS))
-            self._nodes.append(right)
+            inside = dense_between(self._nodes[-1], right, MOST_HALVINGS, partial(self._halved, top))
+            self._nodes += [*inside, right]
 
     def maxima(self) -> list[WorstWear]:
         """Return all local maxima, highest first."""
@@ -166,53 +168,33 @@ class _MaximaSearch:
         solution = node.solution[:-1].copy()
         return WorstWear(value=self._sign * node.value, at=at, solution=solution, interior=interior)
 
-    def _halved(self, left: _Node, right: _Node, top: float, depth: int) -> list[_Node]:
-        """Return the nodes to be inserted between two, until a cubic predicts what is between."""
+    def _halved(self, top: float, left: _Node, right: _Node, depth: int) -> tuple[_Node | None, bool]:
+        """Return the node between two, and whether a cubic predicts it; None where nothing can compete."""
         below = top - (1.0 - COMPETES) * self._size
-        if depth == 0 or max(left.value, right.value) < below:
-            return []
+        if max(left.value, right.value) < below:
+            return None, True
         by_share = share_scales(left, right, self._workspace.balance.system.least_size)
         g_left, g_right = left.slope * by_share[0], right.slope * by_share[1]
         if g_left == 0.0 == g_right:
-            return []  # a given load does not change with the frequency
+            return None, True  # a given load does not change with the frequency
         reach = max(left.value, right.value) + 0.25 * (max(g_left, 0.0) + max(-g_right, 0.0))
         if reach < top - (1.0 - NEAR_THE_TOP) * self._size and depth <= MOST_HALVINGS - _HALVINGS_BELOW:
-            return []
+            return None, True
         middle = self._between(left, right, 0.5)
-        if middle is None:
-            return []
         cubic = 0.5 * (left.value + right.value) + (g_left - g_right) / 8.0
-        if abs(cubic - middle.value) <= PREDICTED * self._size:
-            return [middle]
-        before = self._halved(left, middle, top, depth - 1)
-        return [*before, middle, *self._halved(middle, right, top, depth - 1)]
+        return middle, middle is None or abs(cubic - middle.value) <= PREDICTED * self._size
 
     def _polished(self, left: _Node, right: _Node, g_left: float, g_right: float) -> _Node:
         """Return the maximum between two nodes: the slope by the share of the chord brought to 0.
 
-        A bracketed secant (Illinois) that halves the bracket where the secant does not; at a corner, where
-        the slope jumps over 0, the bracket closes on it. Where no solution is found the best one stands in.
+        At a corner the slope jumps over 0. Where no solution is found the best one stands in.
         """
-        lo, hi, g_lo, g_hi, side = 0.0, 1.0, g_left, g_right, 0
         best = left if left.value >= right.value else right
-        for trial in range(_MOST_TRIALS):
-            share = lo + (hi - lo) * g_lo / (g_lo - g_hi)
-            if not lo < share < hi or trial % 3 == 2:
-                share = 0.5 * (lo + hi)
-            node = self._between(left, right, share)
-            if node is None:
-                break
+        at = partial(self._between, left, right)
+        for node, slope, width in closing_in(at, attrgetter("slope"), g_left, g_right):
             best = node if node.value >= best.value else best
-            if abs(node.slope) <= _FLAT * self._size or hi - lo <= _NARROW:
+            if abs(slope) <= _FLAT * self._size or width <= _NARROW:
                 break
-            now = -1 if node.slope > 0.0 else 1
-            if now < 0:
-                lo, g_lo = share, node.slope
-                g_hi = 0.5 * g_hi if side == now else g_hi
-            else:
-                hi, g_hi = share, node.slope
-                g_lo = 0.5 * g_lo if side == now else g_lo
-            side = now
         return best
 
     def _on_branch(self, solutions: Real, tangents: Real) -> list[_Node]:

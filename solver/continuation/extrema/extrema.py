@@ -23,6 +23,7 @@ from solver.balance.kernels.locate import EDGE
 from solver.balance.kernels.output import HIGH, HIGH_SLOPE, LOW, LOW_SLOPE, MAX_ABS, PIECE, RESIDUAL
 from solver.balance.parameter import Kind
 from solver.balance.workspace import Workspace
+from solver.continuation.between import dense_between
 from solver.continuation.certificate import PeakCertificate, certified, uncertain
 from solver.continuation.extrema.intervals import CURVES, highest_share, lowest_share, may_cross
 from solver.continuation.extrema.kernels.intervals import IS_BENT, WAVES, WORTH_POLISHING
@@ -292,16 +293,16 @@ class Survey:
     def band(self, limit: float) -> Band:
         """Return where the amplitude exceeds `limit` [m], anywhere on the branch."""
         outside = self._workspace.balance.parameter.outside
-        pieces, crossings = [], []
-        known = True
+        pieces, crossings, unsure = [], [], list[float]()
         turned, folds = self._with_folds(limit)
         nodes = [turned[0]]
         top = max(node.measures[MAX_ABS] for node in turned)
         crosses = may_cross(turned, self._solver.look(turned, top), limit) if len(turned) > 1 else ()
         for right, wanted in zip(turned[1:], crosses, strict=True):
-            found, sure = self._dipped(nodes[-1], right, limit, MOST_DIPS) if wanted else ([], True)
-            known &= sure
-            nodes += [*found, right]
+            if wanted:
+                dips = partial(self._dipped, limit, unsure)
+                nodes += dense_between(nodes[-1], right, MOST_DIPS + 1, dips)
+            nodes.append(right)
         above = np.array([node.measures[MAX_ABS] for node in nodes]) > limit
         for j in np.flatnonzero(above[1:] | above[:-1]).tolist():
             left, right = nodes[j], nodes[j + 1]
@@ -329,7 +330,7 @@ class Survey:
                         Edge(at=at, solution=turned_at, opens=at == low, fold=True, corner=not smooth)
                     )
         width = float(sum(high - low for low, high in merged))
-        return Band(limit=limit, width=width, intervals=tuple(merged), edges=tuple(edges), known=known)
+        return Band(limit=limit, width=width, intervals=tuple(merged), edges=tuple(edges), known=not unsure)
 
     def _with_folds(self, limit: float) -> tuple[list[PointRow], list[tuple[PointRow, bool]]]:
         """Return the nodes with the folds above the limit among them, and these (and whether smooth)."""
@@ -352,30 +353,23 @@ class Survey:
         return nodes, folds
 
     def _dipped(
-        self, left: PointRow, right: PointRow, limit: float, depth: int
-    ) -> tuple[list[PointRow], bool]:
-        """Return nodes where the amplitude crosses the limit and comes back between two, if it does.
+        self, limit: float, unsure: list[float], left: PointRow, right: PointRow, depth: int
+    ) -> tuple[PointRow | None, bool]:
+        """Return a node where the amplitude may cross the limit and come back between two, if it does.
 
-        Returns
-        -------
-        The nodes to be put between, and whether it is known that nothing else crosses.
+        Where it may and no node is found that is added to what is unsure.
         """
         gaps = left.measures[MAX_ABS] - limit, right.measures[MAX_ABS] - limit
-        if (gaps[0] > 0.0) != (gaps[1] > 0.0):
-            return [], True
-        by_share = self._solver.scales(left, right)
-        if gaps[0] > 0.0:
-            share = lowest_share(left, right, by_share, limit)
-        else:
-            share = highest_share(left, right, by_share, limit)
-        if share is None or abs(right.at - left.at) <= 1e-12 * abs(right.at):
-            return [], True
-        middle = self._solver.between(left, right, share) if depth > 0 else None
+        if (gaps[0] > 0.0) != (gaps[1] > 0.0) or abs(right.at - left.at) <= 1e-12 * abs(right.at):
+            return None, True
+        may = lowest_share if gaps[0] > 0.0 else highest_share
+        share = may(left, right, self._solver.scales(left, right), limit)
+        if share is None:
+            return None, True
+        middle = self._solver.between(left, right, share) if depth > 1 else None
         if middle is None:
-            return [], False
-        before, sure = self._dipped(left, middle, limit, depth - 1)
-        after, sure_too = self._dipped(middle, right, limit, depth - 1)
-        return [*before, middle, *after], sure and sure_too
+            unsure.append(left.at)
+        return middle, False
 
     def _edge(self, left: PointRow, right: PointRow, limit: float, gaps: tuple[float, float]) -> Real:
         """Return the point where the amplitude equals the limit."""

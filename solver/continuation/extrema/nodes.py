@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -26,6 +27,7 @@ from solver.balance.kernels.output import (
     measure,
 )
 from solver.contacts.kernels.system import evaluation_by_value
+from solver.continuation.between import closing_in
 from solver.continuation.extrema.contact_springs import LocalModel
 from solver.continuation.extrema.kernels import intervals
 from solver.continuation.extrema.kernels.intervals import look_between, middles_between
@@ -38,7 +40,6 @@ if TYPE_CHECKING:
     from solver.balance.workspace import Workspace
 
 MOST_ITERATIONS = 12
-MOST_TRIALS = 120
 MOST_SOLVES = 12  # of a change of state
 SLOPES = [SLOPE, RANGE_SLOPE, HIGH_SLOPE, LOW_SLOPE]  # measures along the tangent
 NARROW = 1e-13  # relative width at which a place is found
@@ -300,26 +301,25 @@ class NodeSolver:
 
         if left.tangent[-1] * right.tangent[-1] <= 0.0:
             return None
-        low, high, g_low, g_high, side = left, right, off(left), off(right), 0
-        scale = max(abs(g_low), abs(g_high))
+        ends, inside = (off(left), off(right)), [left, right]
         value = {HIGH_PEAK: HIGH, LOW_PEAK: LOW}.get(what, MAX_ABS)
-        best = max((left, right), key=lambda node: node.measures[value])
-        for trial in range(MOST_TRIALS):
-            share = g_low / (g_low - g_high) if g_low != g_high and trial % 3 != 2 else 0.5
-            node = self._aside(low, high, low.at + min(max(share, 1e-3), 1.0 - 1e-3) * (high.at - low.at))
-            if node is None:
-                return None
-            g = off(node)
-            best = node if what == EDGE else max((best, node), key=lambda one: one.measures[value])
-            if abs(g) <= close * scale or abs(high.at - low.at) <= NARROW * abs(node.at):
+        length = right.at - left.at
+
+        def at(share: float) -> PointRow | None:
+            inside.sort(key=lambda node: (node.at - left.at) / length)
+            behind = bisect_left(inside, share, key=lambda node: (node.at - left.at) / length)
+            node = self._aside(inside[behind - 1], inside[behind], left.at + share * length)
+            if node is not None:
+                inside.append(node)
+            return node
+
+        for node, g, width in closing_in(at, off, *ends):
+            best = node if what == EDGE else max(inside, key=lambda one: one.measures[value])
+            if abs(g) <= close * max(map(abs, ends)) or abs(width * length) <= NARROW * abs(node.at):
                 return best
-            left_over = abs(g * ((high if g > 0.0 else low).at - node.at))
+            left_over = abs(g * width * length)
             if what != EDGE and close >= MAY_BE_LOW and left_over <= MAY_BE_LOW * node.measures[value]:
                 return best
-            if (g > 0.0) == (g_low > 0.0):
-                low, g_low, g_high, side = node, g, g_high * (0.5 if side < 0 else 1.0), -1
-            else:
-                high, g_high, g_low, side = node, g, g_low * (0.5 if side > 0 else 1.0), 1
         return None
 
     def at(

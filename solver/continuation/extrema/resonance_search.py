@@ -14,11 +14,13 @@ narrow.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
 
 from solver.balance.kernels.output import HIGH, HIGH_SLOPE, LOW, LOW_SLOPE, MAX_ABS
+from solver.continuation.between import dense_between
 from solver.continuation.extrema.contact_springs import Resonance, unknowns
 from solver.continuation.extrema.kernels.suspects import find_suspects
 from solver.continuation.extrema.node_table import NodeTable, PointRow
@@ -292,7 +294,7 @@ class ResonanceSearch:
         chain = [left, *inside, right]
         dense: list[PointRow] = []
         for a, b in pairwise(chain):
-            dense += [a, *self._halved(a, b, top, MOST_HALVINGS, found)]
+            dense += [a, *dense_between(a, b, MOST_HALVINGS, partial(self._halved, top, found))]
         return dense[1:]
 
     def _solve(self, left: PointRow, right: PointRow, at: float, onward: float) -> PointRow | None:
@@ -309,13 +311,13 @@ class ResonanceSearch:
         return self._solver.at(at, guesses, onward)
 
     def _halved(
-        self, left: PointRow, right: PointRow, top: float, depth: int, found: Search
-    ) -> list[PointRow]:
-        """Return nodes between two until the cubics of the amplitude predict what lies between."""
+        self, top: float, found: Search, left: PointRow, right: PointRow, _depth: int
+    ) -> tuple[PointRow | None, bool]:
+        """Return the node between two, and whether the cubics of the amplitude predict it."""
         highest = max(left.measures[MAX_ABS], right.measures[MAX_ABS])
         allowed = max(PREDICTED * highest, PREDICTED_OF_TOP * top)
-        if depth == 0 or abs(right.at - left.at) <= 1e-13 * abs(right.at):
-            return []
+        if abs(right.at - left.at) <= 1e-13 * abs(right.at):
+            return None, True
         by_share = self._solver.scales(left, right)
         cubics = []
         for value, slope in ((HIGH, HIGH_SLOPE), (LOW, LOW_SLOPE)):
@@ -323,17 +325,15 @@ class ResonanceSearch:
             cubics.append(0.5 * (left.measures[value] + right.measures[value]) + turn / 8.0)
         straight = 0.5 * (left.measures[MAX_ABS] + right.measures[MAX_ABS])
         if abs(max(cubics) - straight) <= allowed and highest < 0.1 * top:
-            return []
+            return None, True
         onward = 1.0 if right.at > left.at else -1.0
         middle = self._solve(left, right, 0.5 * (left.at + right.at), onward)
         if middle is None:
             found.left.append((0.5 * (left.at + right.at), "no solution was found beside a resonance"))
-            return []
-        off = max(abs(middle.measures[HIGH] - cubics[0]), abs(middle.measures[LOW] - cubics[1]))
-        if off <= allowed:
-            return [middle]
-        before = self._halved(left, middle, top, depth - 1, found)
-        return [*before, middle, *self._halved(middle, right, top, depth - 1, found)]
+            return None, True
+        return middle, max(
+            abs(middle.measures[HIGH] - cubics[0]), abs(middle.measures[LOW] - cubics[1])
+        ) <= allowed
 
 
 def _group_starts(i: Integer, j: Integer) -> Integer:

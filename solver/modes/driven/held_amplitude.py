@@ -20,11 +20,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from solver.balance.balance import Balance
 from solver.balance.kernels.output import extremes
 from solver.contacts.kernels.system import System, by_reference
+from solver.continuation.between import least_between
 from solver.jit.fourier import Complex, Real, cosine_position
 from solver.modes.corrector import Corrected, ModeState, correct
 from solver.modes.equations import Evaluated, Forced
@@ -165,19 +165,22 @@ def least_force(equations: Held, points: Sequence[Corrected]) -> Corrected | Non
         return best
     tried = [best]
 
-    def force(log_omega: float) -> float:
+    def at(log_omega: float) -> Corrected | None:
         near = min(tried, key=lambda each: abs(each.state.log_amplitude - log_omega))
         y = near.state.y.copy()
         y[-2] = math.exp(log_omega)
         found = correct(equations, replace(near.state, y=y, log_amplitude=log_omega), most=_MOST_AT_FIRST)
         if not found.converged or not found.state.y[-1] > 0.0:
-            return math.inf
+            return None
         tried.append(found)
-        return float(found.state.y[-1])
+        return found
 
-    ends = sorted((points[i - 1].state.log_amplitude, points[i + 1].state.log_amplitude))
-    minimize_scalar(force, bounds=ends, method="bounded", options={"xatol": _CLOSE, "maxiter": _MOST_TRIES})
-    return min(tried, key=lambda each: float(each.state.y[-1]))
+    def force(point: Corrected) -> float:
+        return float(point.state.y[-1])
+
+    low, high = sorted((points[i - 1].state.log_amplitude, points[i + 1].state.log_amplitude))
+    least_between(at, force, low, high, _CLOSE, _MOST_TRIES, 2.0 * max(map(force, points)))
+    return min(tried, key=force)
 
 
 def _linear(equations: Held, rest: Real, omega: float) -> ModeState:

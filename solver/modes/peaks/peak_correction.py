@@ -16,8 +16,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, ClassVar, cast
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
+from solver.continuation.between import least_between
 from solver.errors import SettingError
 from solver.jit.fourier import Complex
 from solver.modes.corrector import Corrected, ModeState, correct
@@ -195,20 +195,20 @@ class _Neighbourhood:
                 if rises and k >= _NEAREST:
                     break
         known.sort(key=lambda one: one.state.log_amplitude)
-        i = int(np.argmin([one.state.y[-1] for one in known]))
+        i = int(np.argmin([_force(one) for one in known]))
         if not 0 < i < len(known) - 1:
             return None  # the least force is not between places that were looked at
         ends = known[i - 1].state.log_amplitude, known[i + 1].state.log_amplitude
-        beyond = 2.0 * max(float(one.state.y[-1]) for one in known)  # finite: parabolas are laid through it
 
-        def force(log_omega: float) -> float:
+        def at(log_omega: float) -> Corrected | None:
             near = min(known, key=lambda one: abs(one.state.log_amplitude - log_omega))
             found = self._at(near.state, log_omega)
-            if found is None:
-                return beyond
-            known.append(found)
-            return float(found.state.y[-1])
+            known.extend([] if found is None else [found])
+            return found
 
-        options = {"xatol": _CLOSE * self.width, "maxiter": _TRIES}
-        minimize_scalar(force, bounds=ends, method="bounded", options=options)
-        return min(known, key=lambda one: float(one.state.y[-1]))
+        least_between(at, _force, *ends, _CLOSE * self.width, _TRIES, 2.0 * max(map(_force, known)))
+        return min(known, key=_force)
+
+
+def _force(point: Corrected) -> float:
+    return float(point.state.y[-1])

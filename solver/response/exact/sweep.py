@@ -14,10 +14,10 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from scipy.optimize import brentq, minimize_scalar
 
 from solver.balance.kernels.output import HALF_RANGE, MAX_ABS, MEAN, MEASURES, RESIDUAL
 from solver.balance.parameter import Kind
+from solver.continuation.between import closing_in, least_between
 from solver.continuation.branch import BranchStatus
 from solver.continuation.branches.sweep import check_limit, check_range
 from solver.continuation.certificate import uncertain
@@ -25,7 +25,7 @@ from solver.continuation.extrema.extrema import band_limit
 from solver.continuation.peaks import Band, Edge, Peak
 from solver.continuation.segment import Course
 from solver.continuation.settings import ContinuationSettings
-from solver.continuation.walk import walk
+from solver.continuation.walk import Curve, walk
 from solver.errors import SettingError
 from solver.response.contact_response import code_of
 from solver.response.exact.branch import ExactBranch, Orbits, Point
@@ -41,6 +41,7 @@ _SUPERHARMONICS = 5  # a resonance is met at its frequency over 1 … that
 _BESIDE = (-4.0, -1.0, 0.0, 1.0, 4.0)  # half-widths from a resonance at which the walk stops
 _LIGHTLY = 1e-9  # damping ratio of a pole that nothing damps
 _NEAREST = 1e-10  # relative, of a peak's and an edge's place
+_TRIALS = 500  # of a peak
 _SMALL = 0.01  # of the highest peak: lower ones are not looked at
 _ENDINGS = {
     SolutionStatus.RATCHETS: BranchStatus.RATCHETS,
@@ -100,7 +101,7 @@ def sweep_exactly(
     return branch
 
 
-class OrbitWalk:
+class OrbitWalk(Curve[Point]):
     """The points of a sweep as they are found, in their order.
 
     Attributes
@@ -158,10 +159,6 @@ class OrbitWalk:
             self._lost(new, BranchStatus.STALLED)
             return None, 0.0
         return self._kept(new), min(_LARGEST * self._span, gap * (2.0 if off < 0.3 else 1.0))
-
-    def leapt(self) -> tuple[None, float]:
-        """Go no further: there is no response."""
-        return None, 0.0
 
     def _kept(self, new: Point) -> Point:
         """Stand at a point."""
@@ -271,19 +268,14 @@ def _summits(walk: OrbitWalk) -> Iterator[Point]:
             continue
         if heights[i] == heights[i - 1]:
             continue  # of a plateau its first point counts
-        best = points[i]
 
-        def below(value: float, near: Point = points[i]) -> float:
-            nonlocal best
-            point = walk.orbits.at(float(value), near)
-            if not point.solution.converged:
-                return 0.0
-            best = max(best, point, key=lambda each: each.height)
-            return -point.height
+        def beside(value: float, near: Point = points[i]) -> Point | None:
+            point = walk.orbits.at(value, near)
+            return point if point.solution.converged else None
 
-        ends = sorted((points[i - 1].value, points[i + 1].value))
-        minimize_scalar(below, bounds=ends, method="bounded", options={"xatol": _NEAREST * abs(ends[1])})
-        if best is not points[i]:
+        low, high = sorted((points[i - 1].value, points[i + 1].value))
+        best = least_between(beside, lambda each: -each.height, low, high, _NEAREST * abs(high), _TRIALS, 0.0)
+        if best is not None and best.height > heights[i]:
             yield best
 
 
@@ -298,27 +290,30 @@ def _peaks(points: Sequence[Point]) -> list[tuple[Peak, Point]]:
 
 
 def _band(orbits: Orbits, points: Sequence[Point], limit: float) -> Band:
-    """Return where the amplitude exceeds a limit; its ends by Brent's method on exact responses."""
+    """Return where the amplitude exceeds a limit; its ends closed in by exact responses."""
     rising = sorted(points, key=lambda each: each.value)
     edges: list[Edge] = []
     ends: list[float] = [rising[0].value] if rising[0].height > limit else []
     known = True
+
+    def above(point: Point) -> float:
+        return point.height - limit if point.solution.converged else -limit
+
     for low, high in pairwise(rising):
         if (low.height > limit) == (high.height > limit):
             continue
-        between: dict[float, Point] = {low.value: low, high.value: high}
 
-        def above(value: float, near: Point = low, found: dict[float, Point] = between) -> float:
-            if value not in found:
-                found[value] = orbits.at(value, near)
-            point = found[value]
-            return point.height - limit if point.solution.converged else -limit
+        def at(share: float, low: Point = low, high: Point = high) -> Point:
+            return orbits.at(low.value + share * (high.value - low.value), low)
 
-        at = float(brentq(above, low.value, high.value, xtol=_NEAREST * high.value))
-        point = between.get(at) or orbits.at(at, low)
+        point = low
+        for new, off, width in closing_in(at, above, above(low), above(high)):
+            point = new
+            if off == 0.0 or width * (high.value - low.value) <= _NEAREST * high.value:
+                break
         known &= point.solution.converged
-        ends.append(at)
-        edges.append(Edge(at=at, solution=point.motions.ravel(), opens=high.height > limit))
+        ends.append(point.value)
+        edges.append(Edge(at=point.value, solution=point.motions.ravel(), opens=high.height > limit))
     if rising[-1].height > limit:
         ends.append(rising[-1].value)
     intervals = tuple(zip(ends[::2], ends[1::2], strict=True))

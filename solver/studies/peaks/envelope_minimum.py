@@ -16,8 +16,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.optimize import brentq
 
+from solver.continuation.between import closing_in
 from solver.continuation.extrema.kernels.peak_continuation import DHEIGHT, HEIGHT, Z
 from solver.jit.fourier import Real
 
@@ -224,12 +224,16 @@ def _least(left: Mapping[int, Real], right: Mapping[int, Real]) -> float:
         return 0.5 * (low + high)
     length = high - low
     cubics = [_cubic(a, b, length) for a, b in both]
-    if _top_slope(0.0, cubics) >= 0.0:
-        return low
-    if _top_slope(1.0, cubics) <= 0.0:
-        return high
-    # The slope jumps where lines cross: a bracketing method finds that as well as a root.
-    return low + float(brentq(_top_slope, 0.0, 1.0, args=(cubics,), xtol=1e-16)) * length
+    ends = _top_slope(0.0, cubics), _top_slope(1.0, cubics)
+    if ends[0] >= 0.0 or ends[1] <= 0.0:
+        return low if ends[0] >= 0.0 else high
+    least = 0.5
+    # The slope jumps where lines cross: that is found as well as a root.
+    for t, slope, _ in closing_in(float, lambda t: _top_slope(t, cubics), *ends):
+        least = t
+        if slope == 0.0:
+            break
+    return low + least * length
 
 
 def _cubic(a: Real, b: Real, length: float) -> tuple[float, float, float, float]:

@@ -13,8 +13,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
+from solver.continuation.between import least_between, level_up_to
 from solver.continuation.branch import Branch
 from solver.continuation.extrema.kernels.peak_continuation import DHEIGHT, HEIGHT, Z
 from solver.continuation.peaks import Peak
@@ -28,7 +28,10 @@ LEVEL = 1e-9  # relative change over the range by its slope up to which a peak i
 SHORTEST = 1e-3  # share of the range below which an interval is none
 SHARP = 1e-12  # of the range: how exactly its ends are found
 WORTH = 0.01  # share of the highest peak from which another one counts
-_BANDS = 9  # places at which the width of the band is compared
+_BANDS, _NEAR = (
+    9,
+    1e-5,
+)  # places at which the width of the band is compared, and how near the least is come to
 _FIRST_STEP = 1e-4  # of the range
 BESIDE = (1e-4, 3e-4, 1e-3, 3e-3, 1e-2)  # of the range: how far beside an interval a dip is looked for
 SHALLOW = 1e-8  # relative depth that is no dip
@@ -63,15 +66,20 @@ def interval(tracker: Tracker, best: Lowest) -> tuple[float, float] | None:
     low = np.flatnonzero(tracker.envelope(places) > best.height * (1.0 + CONSTANT))
     left = low[places[low] < best.z]
     right = low[places[low] > best.z]
-    begin = places[left[-1] + 1] if left.size else places[0]
-    end = places[right[0] - 1] if right.size else places[-1]
+    begin = float(places[left[-1] + 1] if left.size else places[0])
+    end = float(places[right[0] - 1] if right.size else places[-1])
     if end - begin < SHORTEST * span:
         return None
-    middle = 0.5 * float(begin + end)
+    middle = 0.5 * (begin + end)
     if not _level(tracker, middle, best.height):
         return None
-    ends = tuple(_end(tracker, middle, way, best.height) for way in (-1.0, 1.0))
-    return (ends[0], ends[1]) if ends[1] - ends[0] >= SHORTEST * span else None
+    begin, end = (
+        level_up_to(
+            lambda z: _level(tracker, z, best.height), middle, bound, _FIRST_STEP * span, SHARP * span
+        )
+        for bound in (tracker.scale.low, tracker.scale.high)
+    )
+    return (begin, end) if end - begin >= SHORTEST * span else None
 
 
 def _level(tracker: Tracker, z: float, height: float) -> bool:
@@ -81,31 +89,6 @@ def _level(tracker: Tracker, z: float, height: float) -> bool:
         return False
     highest = [row for row in rows if row[HEIGHT] >= rows[0][HEIGHT] * (1.0 - CONSTANT)]
     return all(abs(row[DHEIGHT]) * tracker.scale.span <= LEVEL * height for row in highest)
-
-
-def _end(tracker: Tracker, middle: float, way: float, height: float) -> float:
-    """Return the end of an interval from a place in it: upward with `way` 1."""
-    span = tracker.scale.span
-    limit = tracker.scale.high if way > 0.0 else tracker.scale.low
-    inside, step = middle, _FIRST_STEP * span
-    while True:
-        outside = inside + way * step
-        if (outside - limit) * way >= 0.0:
-            outside = limit
-        if not _level(tracker, outside, height):
-            break
-        if outside == limit:
-            return limit
-        inside, step = outside, 2.0 * step
-    while abs(outside - inside) > SHARP * span:
-        z = 0.5 * (inside + outside)
-        if z in (inside, outside):
-            break
-        if _level(tracker, z, height):
-            inside = z
-        else:
-            outside = z
-    return inside
 
 
 def dips(tracker: Tracker, ends: tuple[float, float], height: float) -> bool:
@@ -242,7 +225,7 @@ def _least_band(tracker: Tracker, low: float, high: float) -> float:
     places = [float(z) for z in np.linspace(low, high, _BANDS)]
     at = int(np.argmin([width(z) for z in places]))
     bounds = places[max(at - 1, 0)], places[min(at + 1, _BANDS - 1)]
-    minimize_scalar(width, bounds=bounds, method="bounded", options={"maxiter": _BANDS})
+    least_between(lambda z: z, width, *bounds, _NEAR, _BANDS, 0.0)
     least = min(known.values())
     return min(z for z, found in known.items() if found <= least * (1.0 + CONSTANT))
 

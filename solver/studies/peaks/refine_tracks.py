@@ -8,10 +8,12 @@ higher by some share may be wrong by a quarter of that, and no more, so that not
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
 
+from solver.continuation.between import dense_between
 from solver.continuation.extrema.kernels.peak_continuation import HEIGHT, Z
 from solver.studies.peaks.track import Line
 from solver.studies.peaks.tracker import Place, Tracker
@@ -62,14 +64,16 @@ def _with_more(tracker: Tracker, line: Line, matters: list[bool], least: float) 
     places: list[Place] = [known[0]]
     for (left, right), wanted in zip(pairwise(known), matters, strict=True):
         if wanted:
-            places += _inside(tracker, line, left, right, least, 0)
+            places += dense_between(left, right, _DEEPEST + 1, partial(_halved, tracker, line, least))
         places.append(right)
     rows, solutions, tangents = (np.array(part) for part in zip(*places, strict=True))
     return replace(line, rows=rows, solutions=solutions, tangents=tangents)
 
 
-def _inside(tracker: Tracker, line: Line, left: Place, right: Place, least: float, depth: int) -> list[Place]:
-    """Return the places to be put between two."""
+def _halved(
+    tracker: Tracker, line: Line, least: float, left: Place, right: Place, depth: int
+) -> tuple[Place | None, bool]:
+    """Return the place in the middle of two, and whether the cubic is as exact as it has to be."""
     a, b = left[0], right[0]
     rows, solutions, tangents = (np.array(part) for part in zip(left, right, strict=True))
     pair = replace(line, rows=rows, solutions=solutions, tangents=tangents)
@@ -78,12 +82,11 @@ def _inside(tracker: Tracker, line: Line, left: Place, right: Place, least: floa
         middle = tracker.solved(pair, 0.5 * (a[Z] + b[Z]), fitting=False)
     if middle is None:
         tracker.exact_between.add((a[Z], b[Z], a[HEIGHT]))
-        return []
+        return None, True
     height, cubic = float(middle[0][HEIGHT]), pair.heights(a[Z] + _SAMPLES * (b[Z] - a[Z]))
     allowed = max(EXACT * least, ALLOWED * (min(float(cubic.min()), height) - least))
-    if abs(float(cubic[_SAMPLES.size // 2]) - height) <= allowed or depth >= _DEEPEST:
+    enough = abs(float(cubic[_SAMPLES.size // 2]) - height) <= allowed or depth == 1
+    if enough:
         for one, other in ((a, middle[0]), (middle[0], b)):
             tracker.exact_between.add((one[Z], other[Z], one[HEIGHT]))
-        return [middle]
-    before = _inside(tracker, line, left, middle, least, depth + 1)
-    return [*before, middle, *_inside(tracker, line, middle, right, least, depth + 1)]
+    return middle, enough
