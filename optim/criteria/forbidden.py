@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from optim.criteria.criterion import Criterion, CriterionContext, CriterionRow, Form, Judged, Key, Ranges
 from optim.criteria.key import Ranges as RangesInBodies
+from optim.criteria.peak import maxima
 
 if TYPE_CHECKING:
     from optim.problem.cases import LoadCase
@@ -14,8 +15,6 @@ if TYPE_CHECKING:
 
 def _rows(judged: Judged) -> list[CriterionRow]:
     """A row for every local maximum of the response over a forbidden range."""
-    from optim.criteria.amplitudes import maxima
-
     if judged.hertz is None:
         return []
     low, high = judged.hertz

@@ -131,11 +131,6 @@ class Identification(Drawn):
     seconds: Annotated[float, "Time taken [s]."]
 
     @property
-    def reached(self) -> bool:
-        """Whether there is a fit of all points that tells every unknown."""
-        return self.status is IdentifyStatus.KNOWN
-
-    @property
     def fitted(self) -> bool:
         """Whether there is a fit at all."""
         return bool(self.estimates)

@@ -216,11 +216,6 @@ class RobustResult(MadeOfResponses, Drawn):
     seconds: Annotated[float, "Time in all [s]."]
 
     @property
-    def reached(self) -> bool:
-        """Whether the goal was reached."""
-        return self.status is RobustStatus.OPTIMAL
-
-    @property
     def optimum(self) -> Mapping[str, float]:
         """Variable name to value of the robust optimum; empty when there is none."""
         return {} if self.robust is None else dict(self.robust.values)

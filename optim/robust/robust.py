@@ -25,8 +25,7 @@ from optim.errors import DesignError
 from optim.methods.enough_harmonics import most_harmonics
 from optim.methods.evaluator import SearchStoppedError
 from optim.methods.kkt import KEPT
-from optim.problem.keys import FEWEST_SAMPLES, QUANTILE, SEED, DesignKeys
-from optim.problem.keywords import keywords
+from optim.problem.keys import FEWEST_SAMPLES, QUANTILE, SEED, DesignKeys, keywords
 from optim.problem.numbers import is_number, whole
 from optim.problem.problem import pose
 from optim.problem.typed import Limit, with_limits

@@ -97,11 +97,6 @@ class CampbellDiagram(MadeOfResponses, Drawn):
     seconds: Annotated[float, "Time taken [s]."]
 
     @property
-    def reached(self) -> bool:
-        """Whether every response covers its whole range."""
-        return self.status is CampbellStatus.COMPLETED
-
-    @property
     def clear(self) -> bool | None:
         """Whether the amplitude stays within the limit at every running speed; None if that is not known.
 

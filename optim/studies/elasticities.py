@@ -13,7 +13,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from optim.criteria.amplitudes import COMPETES
+from optim.criteria.peak import COMPETES
 from optim.criteria.response_gradients import Sensitivity
 from optim.problem.variables import Real
 from optim.studies.sensitivity_result import (

@@ -26,8 +26,7 @@ from optim.errors import DesignError
 from optim.methods.enough_harmonics import honest
 from optim.methods.evaluator import DesignSearch, SearchStoppedError
 from optim.methods.kkt import Local
-from optim.problem.keys import FEWEST_POINTS, POINTS, FrontKeys
-from optim.problem.keywords import keywords
+from optim.problem.keys import FEWEST_POINTS, POINTS, FrontKeys, keywords
 from optim.problem.problem import Method, Problem, pose
 from optim.problem.typed import Limit, with_limits
 from optim.problem.variables import BoundedVariable, scaled, unscaled

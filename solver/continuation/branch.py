@@ -196,11 +196,6 @@ class AnyBranch(Drawn):
         """Unit of its values."""
         return self.posed.parameter.unit
 
-    @property
-    def reached(self) -> bool:
-        """Whether the branch reached the end of the range."""
-        return self.status is BranchStatus.COMPLETED
-
     def _measure(self, name: str) -> Real:
         """Return a column of the measures; its number is the kernel's, which results are read without."""
         column: Any = on_demand(f"solver.balance.kernels.output:{name}")

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from solver.contacts.laws.base import AnyContact
 from solver.contacts.laws.parts import Row
+from solver.marching.kernels.state import SparseRows
 from solver.scene.bodies.kinematics import Form
 
 
@@ -25,9 +25,7 @@ def rows(contacts: tuple[AnyContact, ...]) -> tuple[Row, ...]:
     return tuple(row for contact in contacts for row in contact.rows())
 
 
-def columns(
-    placed: Sequence[tuple[Row, tuple[Form, ...]]], index: dict[str, int], n: int
-) -> dict[str, NDArray[Any]]:
+def columns(placed: Sequence[tuple[Row, tuple[Form, ...]]], index: dict[str, int], n: int) -> dict[str, Any]:
     """Return the arrays of `solver.marching.kernels.state.System` that belong to the contacts.
 
     Parameters
@@ -53,7 +51,7 @@ def columns(
     counts = {name: np.array([getattr(row, name) for row in found], dtype=np.int64) for name in whole}
     numbers = {name: np.array([getattr(row, name) for row in found], dtype=np.float64) for name in scalars}
     laws = np.array([row.follows.value for row in found], dtype=np.int64)
-    motions = {**_compressed("L", L), **_compressed("normal", selection(normal, index, n))}
+    motions = {"L": sparse_rows(L), "normal": sparse_rows(selection(normal, index, n))}
     swings = {"waves": waves[0], "wave_phases": waves[1]}
     return {**numbers, **counts, **motions, **swings, "law": laws, "powers": powers, "numbers": own}
 
@@ -65,8 +63,11 @@ def selection(forms: Sequence[Form], index: dict[str, int], n: int) -> csr_array
     return csr_array((factor, (row.astype(np.int64), column.astype(np.int64))), shape=(len(forms), n))
 
 
-def _compressed(name: str, matrix: csr_array) -> dict[str, NDArray[Any]]:
-    return {
-        f"{name}_start": matrix.indptr.astype(np.int64), f"{name}_column": matrix.indices.astype(np.int64),
-        f"{name}_value": matrix.data,
-    }  # fmt: skip
+def sparse_rows(matrix: csr_array) -> SparseRows:
+    """Return a matrix as the kernels read it."""
+    return SparseRows(matrix.indptr.astype(np.int64), matrix.indices.astype(np.int64), matrix.data)
+
+
+def as_sparse(rows: SparseRows, n: int) -> csr_array:
+    """Return it again, with n columns."""
+    return csr_array((rows.value, rows.column, rows.start), shape=(rows.start.size - 1, n))

@@ -11,7 +11,7 @@ from scipy.sparse import block_diag, csr_array, diags_array
 from solver.errors import SettingError
 from solver.linear.first_order import equations, modal_damping_root
 from solver.marching.base import with_base, with_sum
-from solver.marching.contacts import columns, selection
+from solver.marching.contacts import columns, selection, sparse_rows
 from solver.marching.kernels import state as kernel
 from solver.scene.bodies.body import REVOLUTIONS, Body
 from solver.scene.bodies.kinematics import dof_names, pair_form
@@ -144,15 +144,9 @@ def equations_of_motion(scene: Scene, omega: float) -> MarchEquations:
     dof, amplitude, phase, harmonic = zip(*pushes, strict=True) if pushes else ((), (), (), ())
     placed = [(row, own) for one, own in zip(scene.contacts, scene.forms, strict=True) for row in one.rows()]
     system = kernel.System(
-        A_start=A.indptr.astype(np.int64),
-        A_column=A.indices.astype(np.int64),
-        A_value=A.data,
-        B_start=B.indptr.astype(np.int64),
-        B_column=B.indices.astype(np.int64),
-        B_value=B.data,
-        W_start=W.indptr.astype(np.int64),
-        W_column=W.indices.astype(np.int64),
-        W_value=W.data,
+        A=sparse_rows(A),
+        B=sparse_rows(B),
+        W=sparse_rows(W),
         force_dof=np.array(dof, dtype=np.int64),
         force_amplitude=np.array(amplitude, dtype=np.float64),
         force_phase=np.array(phase, dtype=np.float64),

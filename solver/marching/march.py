@@ -19,7 +19,7 @@ from scipy.sparse import csr_array, diags_array
 
 from solver.errors import SettingError
 from solver.marching import moreau
-from solver.marching.contacts import rows
+from solver.marching.contacts import as_sparse, rows
 from solver.marching.equations import MarchEquations, equations_of_motion
 from solver.marching.kernels import state as kernel
 from solver.marching.kernels import taylor as stepping
@@ -209,7 +209,7 @@ def _check(frequency_hz: float, tolerance: float, max_periods: int) -> None:
 
 def _steps(system: kernel.System, forces: tuple[Excitation, ...], wanted: int | None, least: int = 0) -> int:
     """Steps of the finer run: the fastest motion turns less than 0.375 rad in one of them."""
-    full = system.W_value.size > system.W_start.size - 1 or bool(np.any(np.abs(system.L_value) != 1.0))
+    full = system.W.value.size > system.W.start.size - 1 or bool(np.any(np.abs(system.L.value) != 1.0))
     turns = 2.0 * math.pi * _fastest(system, BALANCING if full else 1)
     load = int(np.max(np.nonzero(system.waves)[1], initial=0)) + 1
     harmonic = max(load, *(force.harmonic for force in forces))
@@ -232,30 +232,18 @@ def _order(system: kernel.System) -> int:
 
 def _fastest(system: kernel.System, products: int) -> float:
     """Bound of the largest rate of the motion with every contact stuck, per omega: vibration or decay."""
-    n = system.A_start.size - 1
-    sizes = [
-        _sizes(start, column, value, n)
-        for start, column, value in (
-            (system.A_start, system.A_column, system.A_value),
-            (system.B_start, system.B_column, system.B_value),
-            (system.W_start, system.W_column, system.W_value),
-        )
-    ]
-    L = _sizes(system.L_start, system.L_column, system.L_value, n)
-    normal = _sizes(system.normal_start, system.normal_column, system.normal_value, n)
+    n = system.A.start.size - 1
+    A, B, W, L, normal = (
+        abs(as_sparse(each, n)) for each in (system.A, system.B, system.W, system.L, system.normal)
+    )
     stuck = csr_array((n, n))
     for motions, k in ((L, system.kt), (normal, system.kn)):
         # Against the ground as if against another part.
         k = np.where(np.diff(motions.indptr) == 1, 2.0, 1.0) * k
         stuck = stuck + motions.T @ diags_array(k) @ motions
-    stiffness = _largest(sizes[0] + sizes[2] @ stuck, products)
-    damped = sizes[1] + system.omega * (sizes[2] @ (L.T @ diags_array(2.0 * system.damping) @ L))
+    stiffness = _largest(A + W @ stuck, products)
+    damped = B + system.omega * (W @ (L.T @ diags_array(2.0 * system.damping) @ L))
     return float(max(math.sqrt(stiffness), _largest(damped, products)))
-
-
-def _sizes(start: NDArray[np.int64], column: NDArray[np.int64], value: FloatArray, n: int) -> csr_array:
-    """The absolute values of compressed sparse rows."""
-    return csr_array((np.abs(value), column, start), shape=(start.size - 1, n))
 
 
 def _largest(matrix: csr_array, products: int) -> float:

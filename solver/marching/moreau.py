@@ -6,9 +6,9 @@ from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
 
 from solver.errors import SettingError
+from solver.marching.contacts import as_sparse
 from solver.marching.equations import MarchEquations
 from solver.marching.kernels import moreau as stepping
 from solver.marching.kernels import state as kernel
@@ -31,17 +31,10 @@ def stepped(equations: MarchEquations, steps: int) -> stepping.Stepped:
         A contact of another law than coulomb, elastic-normal or gap.
     """
     system = equations.system
-    n = system.A_start.size - 1
-    A, B, W = (
-        csr_array((value, column, start), shape=(n, n)).toarray()
-        for start, column, value in (
-            (system.A_start, system.A_column, system.A_value),
-            (system.B_start, system.B_column, system.B_value),
-            (system.W_start, system.W_column, system.W_value),
-        )
+    n = system.A.start.size - 1
+    A, B, W, along, across = (
+        as_sparse(rows, n).toarray() for rows in (system.A, system.B, system.W, system.L, system.normal)
     )
-    along = _dense(system.L_start, system.L_column, system.L_value, n)
-    across = _dense(system.normal_start, system.normal_column, system.normal_value, n)
     rows: list[FloatArray] = []
     numbers: list[tuple[int, float, float, float, float, int, FloatArray]] = []
     for c, law in enumerate(system.law):
@@ -128,7 +121,3 @@ def _load(system: kernel.System, c: int) -> FloatArray:
     found[1::2] = system.waves[c] * np.cos(system.wave_phases[c])
     found[2::2] = -system.waves[c] * np.sin(system.wave_phases[c])
     return found
-
-
-def _dense(start: NDArray[np.int64], column: NDArray[np.int64], value: FloatArray, n: int) -> FloatArray:
-    return np.asarray(csr_array((value, column, start), shape=(start.size - 1, n)).toarray())

@@ -90,11 +90,6 @@ class MarchResult(Drawn):
         """The motion repeats within the tolerance."""
         return self.status is MarchStatus.CONVERGED
 
-    @property
-    def reached(self) -> bool:
-        """Whether it came to a motion that repeats."""
-        return self.converged
-
     def plot(self, ax: Axes | Sequence[Axes] | None = None, *, scene: Scene | None = None) -> Figure:
         """Draw the last period and its hysteresis loops.
 

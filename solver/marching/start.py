@@ -49,7 +49,7 @@ def state_at(
         An unknown name, a number that is not finite, or a traction of a contact without friction.
     """
     system, index = equations.system, equations.index
-    n, rows = system.A_start.size - 1, system.kt.size
+    n, rows = system.A.start.size - 1, system.kt.size
     x = _vector("displacements", start.displacements, index, n)
     v = _vector("velocities", start.velocities, index, n) / omega
     if equations.observed not in index.values():

@@ -130,11 +130,6 @@ class Solution(Drawn):
         return int(self.harmonics.size) - 1
 
     @property
-    def reached(self) -> bool:
-        """Whether they are, with the accuracy asked for."""
-        return self.status is SolutionStatus.CONVERGED
-
-    @property
     def uniqueness(self) -> Uniqueness:
         """Whether the scene is proven to have no other response at this frequency, and why."""
         found: Uniqueness = on_demand("solver.response.stability.uniqueness:uniqueness")(

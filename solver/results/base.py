@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
+from enum import Enum
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from solver.results.known import Known, worst_of
@@ -27,6 +28,14 @@ class Shown(Told):
     __slots__ = ()
     VIEWS: ClassVar[Views]
     DATA: ClassVar[Data]
+    status: Any
+    """How it ended, of those that may fall short; the first of its kind says that nothing is missing."""
+
+    @property
+    def reached(self) -> bool:
+        """Whether all that was asked for is there, as the status says."""
+        kinds: type[Enum] = type(self.status)
+        return self.status is next(iter(kinds))
 
     @property
     def completed(self) -> bool:
@@ -34,8 +43,7 @@ class Shown(Told):
         import warnings
 
         warnings.warn("result.completed is result.reached now", DeprecationWarning, stacklevel=2)
-        found: bool = self.reached  # type: ignore[attr-defined]
-        return found
+        return self.reached
 
     def summary(self) -> Summary:
         """What is most worth knowing, in words and with units."""

@@ -97,11 +97,6 @@ class MistuningStudy(MadeOfResponses, Drawn):
     seconds: float
 
     @property
-    def reached(self) -> bool:
-        """Whether all peaks are known."""
-        return self.status is MistuningStatus.COMPLETED
-
-    @property
     def magnifications(self) -> Real:
         """The amplitude magnification factors of the disks whose peaks are known, in their order."""
         return np.array([disk.magnification for disk in self.disks if disk.known])

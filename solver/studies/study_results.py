@@ -65,11 +65,6 @@ class AccuracyStudy(Drawn):
     branch: Annotated[Branch | None, "The sweep that found the highest peak; None if given the frequency."]
     status: Annotated[AccuracyStatus, "How it ended."]
 
-    @property
-    def reached(self) -> bool:
-        """Whether no way was left out."""
-        return self.status is AccuracyStatus.COMPLETED
-
 
 class MapStatus(Enum):
     """How a map ended; the value is a sentence a user can act on."""
@@ -112,11 +107,6 @@ class ResponseMap(MadeOfResponses, Drawn):
         Scene | None, "What it is of, with the values that stayed fixed; None if read from a file."
     ] = None
     highest: Annotated[Known, "How well the highest point of the grid is known."] = NOTHING_KNOWN
-
-    @property
-    def reached(self) -> bool:
-        """Whether every point is a solution."""
-        return self.status is MapStatus.COMPLETED
 
     def known_parts(self) -> Iterable[Known]:
         """The highest point of the grid, and the sweeps of the ridge."""
@@ -247,8 +237,3 @@ class InterferenceDiagram(Drawn):
     missing: Annotated[tuple[int, ...], "Nodal diameters that a reduced sector was not built for."]
     status: Annotated[InterferenceStatus, "How it ended, and what to try if it fell short."]
     seconds: Annotated[float, "Time taken [s]."]
-
-    @property
-    def reached(self) -> bool:
-        """Whether no nodal diameter is missing that the structure is known at."""
-        return self.status is InterferenceStatus.COMPLETED

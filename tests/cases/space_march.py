@@ -58,9 +58,9 @@ class Marched:
     change: float
 
 
-def sparse(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def sparse(matrix: np.ndarray) -> kernel.SparseRows:
     n = len(matrix)
-    return np.arange(0, n * n + 1, n), np.tile(np.arange(n), n), matrix.ravel().copy()
+    return kernel.SparseRows(np.arange(0, n * n + 1, n), np.tile(np.arange(n), n), matrix.ravel().copy())
 
 
 def march_case(scene: dict[str, Any], frequency_hz: float, tolerance: float = 1e-11) -> Marched:
@@ -68,14 +68,13 @@ def march_case(scene: dict[str, Any], frequency_hz: float, tolerance: float = 1e
     omega = 2.0 * math.pi * frequency_hz
     M, C, K = matrices(scene)
     inverse = np.linalg.inv(M)
-    parts = (inverse @ K / omega**2, inverse @ C / omega, inverse / omega**2)
-    flat = [array for part in parts for array in sparse(part)]
     index = {dof: i for i, dof in enumerate(DOFS)}
     forms = tuple((Term(dof, False, 1.0),) for dof in DOFS)
     forces = scene["excitation"]
-    arrays = dict(zip(kernel.System._fields[:9], flat, strict=True))
     system = kernel.System(
-        **arrays,
+        A=sparse(inverse @ K / omega**2),
+        B=sparse(inverse @ C / omega),
+        W=sparse(inverse / omega**2),
         force_dof=np.array([index[force["dof"]] for force in forces]),
         force_amplitude=np.array([force["amplitude"] for force in forces]),
         force_phase=np.array([force["phase"] for force in forces]),

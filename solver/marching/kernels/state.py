@@ -26,8 +26,16 @@ STICK, SEPARATED = 0, 2
 RAN, SETTLED, CHATTER, NOT_FINITE = 0, 1, 2, 3
 
 
+class SparseRows(NamedTuple):
+    """A matrix in compressed sparse rows."""
+
+    start: Whole
+    column: Whole
+    value: Real
+
+
 class System(NamedTuple):
-    """The equations in tau: x'' = W (force - L^T F) - A x - B x', with A, B and W as compressed sparse rows.
+    """The equations in tau: x'' = W (force - L^T F) - A x - B x', with A, B and W sparse.
 
     W is the inverse of the mass matrix times omega^-2. L is that of the motions along which contacts pull,
     `kt` is also the stiffness of a gap spring. Of the laws elastic-normal and circle: the normal motions,
@@ -39,31 +47,21 @@ class System(NamedTuple):
     [rad/s].
     """
 
-    A_start: Whole
-    A_column: Whole
-    A_value: Real
-    B_start: Whole
-    B_column: Whole
-    B_value: Real
-    W_start: Whole
-    W_column: Whole
-    W_value: Real
+    A: SparseRows
+    B: SparseRows
+    W: SparseRows
     force_dof: Whole
     force_amplitude: Real
     force_phase: Real
     force_harmonic: Whole
-    L_start: Whole
-    L_column: Whole
-    L_value: Real
+    L: SparseRows
     kt: Real
     mu: Real
     N0: Real
     waves: Real
     wave_phases: Real
     law: Whole
-    normal_start: Whole
-    normal_column: Whole
-    normal_value: Real
+    normal: SparseRows
     kn: Real
     rest: Real
     presses: Real
@@ -128,25 +126,25 @@ new_record: Callable[..., Record] = referenced("MarchRecord", __name__, Record._
 
 
 @compiled
-def product(start: Whole, column: Whole, value: Real, x: Real, row: int) -> float:
-    """Return row `row` of a matrix in compressed sparse rows times x."""
+def product(rows: SparseRows, x: Real, row: int) -> float:
+    """Return row `row` of a matrix times x."""
     total = 0.0
-    for j in range(start[row], start[row + 1]):
-        total += value[j] * x[column[j]]
+    for j in range(rows.start[row], rows.start[row + 1]):
+        total += rows.value[j] * x[rows.column[j]]
     return total
 
 
 @compiled
 def slip(system: System, x: Real, c: int) -> float:
     """Return the relative motion of contact c."""
-    return product(system.L_start, system.L_column, system.L_value, x, c)
+    return product(system.L, x, c)
 
 
 @compiled
-def pull_back(start: Whole, column: Whole, value: Real, row: int, force: float, pull: Real) -> None:
+def pull_back(rows: SparseRows, row: int, force: float, pull: Real) -> None:
     """Subtract a force along a relative motion from what pulls at each DOF."""
-    for j in range(start[row], start[row + 1]):
-        pull[column[j]] -= value[j] * force
+    for j in range(rows.start[row], rows.start[row + 1]):
+        pull[rows.column[j]] -= rows.value[j] * force
 
 
 @compiled
@@ -192,7 +190,7 @@ def swing(system: System, c: int) -> float:
 @compiled
 def normal_slip(system: System, x: Real, c: int) -> float:
     """Return the normal motion of contact c."""
-    return product(system.normal_start, system.normal_column, system.normal_value, x, c)
+    return product(system.normal, x, c)
 
 
 @compiled

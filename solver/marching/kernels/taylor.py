@@ -112,10 +112,9 @@ def _pull(system: System, tau: float, k: int, scale: float, series: Series) -> N
         turn = wave(k, harmonic * tau + system.force_phase[e])
         pull[system.force_dof[e]] += system.force_amplitude[e] * turn * scale * float(harmonic) ** k
     for c in range(system.kt.size):
-        pull_back(system.L_start, system.L_column, system.L_value, c, f[c], pull)
+        pull_back(system.L, c, f[c], pull)
         if system.law[c] in (ELASTIC_NORMAL, CIRCLE) and system.presses[c] > 0.0:
-            force = series.normal[k, c]
-            pull_back(system.normal_start, system.normal_column, system.normal_value, c, force, pull)
+            pull_back(system.normal, c, series.normal[k, c], pull)
 
 
 @apart
@@ -132,9 +131,9 @@ def _expand(system: System, state: State, tau: float, h: float, series: Series) 
         x, v, rise, pull = series.x[k], series.v[k], series.v[k + 1], series.pull
         _pull(system, tau, k, scale, series)
         for i in range(n):
-            rise[i] = product(system.W_start, system.W_column, system.W_value, pull, i)
-            rise[i] -= product(system.A_start, system.A_column, system.A_value, x, i)
-            rise[i] -= product(system.B_start, system.B_column, system.B_value, v, i)
+            rise[i] = product(system.W, pull, i)
+            rise[i] -= product(system.A, x, i)
+            rise[i] -= product(system.B, v, i)
             rise[i] *= h / (k + 1)
             series.x[k + 1, i] = h / (k + 1) * v[i]
         scale *= h / (k + 1)
@@ -278,8 +277,8 @@ def _sample(system: System, series: Series, place: float, index: int, dof: int, 
     record.v[index] = value_at(series.v[:, dof], place)
     for c in range(system.kt.size):
         motion = 0.0
-        for j in range(system.L_start[c], system.L_start[c + 1]):
-            motion += system.L_value[j] * value_at(series.x[:, system.L_column[j]], place)
+        for j in range(system.L.start[c], system.L.start[c + 1]):
+            motion += system.L.value[j] * value_at(series.x[:, system.L.column[j]], place)
         record.slip[c, index] = motion
         record.force[c, index] = value_at(series.force[:, c], place)
         record.load[c, index] = max(value_at(series.load[:, c], place), 0.0)

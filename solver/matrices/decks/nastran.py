@@ -7,7 +7,7 @@ Guide, entries GRID, GRDSET, CORD1C, CORD2C, CORD2S.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -22,16 +22,20 @@ _BASIC, _FLUID = 0, -1
 
 
 @dataclass(slots=True)
-class _Entry:
+class BulkEntry:
+    """An entry of bulk data: the line it begins in, its name, and the fields behind it."""
+
     line: int
     name: str
     fields: list[str]
 
     def field(self, i: int, default: str = "") -> str:
+        """Field i, or what stands for one that is empty."""
         text = self.fields[i] if i < len(self.fields) else ""
         return text or default
 
     def whole(self, i: int, default: str = "0") -> int:
+        """Field i as a whole number."""
         return int(self.field(i, default))
 
 
@@ -40,7 +44,7 @@ class _Bulk:
     """What the bulk data say of nodes, as they say it."""
 
     grids: dict[int, tuple[int, FloatArray, int]] = field(default_factory=dict)  # CP, numbers, CD
-    cords: dict[int, _Entry] = field(default_factory=dict)
+    cords: dict[int, BulkEntry] = field(default_factory=dict)
     known: dict[int, CoordinateSystem] = field(default_factory=lambda: {_BASIC: GLOBAL})
     open: list[int] = field(default_factory=list)  # systems that are being looked up
 
@@ -89,9 +93,9 @@ def read_nastran(file: DeckFile, deck: Deck) -> None:
     FormatError
         A line that cannot be read, or a coordinate system that is not there.
     """
-    bulk, grids = _Bulk(), list[_Entry]()
-    default: _Entry | None = None
-    for entry in _entries(file):
+    bulk, grids = _Bulk(), list[BulkEntry]()
+    default: BulkEntry | None = None
+    for entry in bulk_entries(_lines(file), _tells_of_nodes):
         try:
             if entry.name == "GRID":
                 grids.append(entry)
@@ -116,7 +120,7 @@ def read_nastran(file: DeckFile, deck: Deck) -> None:
         deck.nodes.update(zip(nodes, map(tuple, places.tolist()), strict=True))
 
 
-def _grid(entry: _Entry, default: _Entry | None, bulk: _Bulk) -> None:
+def _grid(entry: BulkEntry, default: BulkEntry | None, bulk: _Bulk) -> None:
     cp, cd = ("0", "0") if default is None else (default.field(1, "0"), default.field(5, "0"))
     try:
         node = entry.whole(0, "")
@@ -129,28 +133,50 @@ def _grid(entry: _Entry, default: _Entry | None, bulk: _Bulk) -> None:
         raise FormatError(f"line {entry.line}: GRID {node} is there already, at another place")
 
 
-def _refusal(entry: _Entry, error: ValueError) -> FormatError:
+def _refusal(entry: BulkEntry, error: ValueError) -> FormatError:
     if isinstance(error, FormatError):
         return error
     return FormatError(f"line {entry.line} must hold a {entry.name}, got {', '.join(entry.fields)[:80]!r}")
 
 
-def _entries(file: DeckFile) -> Iterator[_Entry]:
-    """The entries that tell of nodes, continued lines joined to them."""
+def _tells_of_nodes(name: str) -> bool:
+    return name in ("GRID", "GRDSET") or name.startswith("CORD")
+
+
+def _lines(file: DeckFile) -> Iterator[tuple[int, str]]:
+    """The lines of the bulk data with their numbers, files included in their place."""
     lines = list(file.lines())
     begins = [i for i, line in enumerate(lines) if re.match(r"\s*BEGIN\b", line, re.IGNORECASE)]
     if len(begins) > 1:
         raise FormatError(f"line {begins[1] + 1} begins further bulk data: give a deck without superelements")
-    current: _Entry | None = None
-    for number, line in enumerate(lines[begins[0] + 1 if begins else 0 :], begins[0] + 2 if begins else 1):
+    first = begins[0] + 1 if begins else 0
+    for number, line in enumerate(lines[first:], first + 1):
+        if line.startswith("="):
+            raise FormatError(f"line {number} repeats an entry (=), which is not read: write every GRID")
+        words = line.split("$")[0].split(None, 1)
+        word = words[0].rstrip("*").upper() if words else ""
+        if word == "ENDDATA":
+            return
+        if word == "INCLUDE":
+            yield number, word
+            yield from _lines(file.other(words[-1].strip().strip("'\""), number))
+        else:
+            yield number, line
+
+
+def bulk_entries(lines: Iterable[tuple[int, str]], wanted: Callable[[str], bool]) -> Iterator[BulkEntry]:
+    """The entries of bulk data whose names are wanted, continued lines joined to them.
+
+    Fields are 8 characters wide, in entries and lines marked * 16, or separated by commas; a line that begins
+    with a blank, + or * continues the one before.
+    """
+    current: BulkEntry | None = None
+    for number, line in lines:
         text = line.split("$")[0].expandtabs(8).rstrip()
         if not text:
             continue
-        if text.startswith("="):
-            raise FormatError(f"line {number} repeats an entry (=), which is not read: write every GRID")
-        head = re.split(r"[,\s]", text.strip() if text[0] == " " and text[:8].strip() else text, maxsplit=1)[
-            0
-        ]
+        named = text.strip() if text[0] == " " and text[:8].strip() else text
+        head = re.split(r"[,\s]", named, maxsplit=1)[0]
         name = head.rstrip("*").upper()
         if name == "" or head[0] in "+*":
             if current is not None:
@@ -158,13 +184,7 @@ def _entries(file: DeckFile) -> Iterator[_Entry]:
             continue
         if current is not None:
             yield current
-        current = None
-        if name == "ENDDATA":
-            return
-        if name == "INCLUDE":
-            yield from _entries(file.other(text.split(None, 1)[-1].strip().strip("'\""), number))
-        elif name in ("GRID", "GRDSET") or name.startswith("CORD"):
-            current = _Entry(number, name, _fields(text, large=head.endswith("*")))
+        current = BulkEntry(number, name, _fields(text, large=head.endswith("*"))) if wanted(name) else None
     if current is not None:
         yield current
 

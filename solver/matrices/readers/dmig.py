@@ -1,21 +1,20 @@
 """Matrices as DMIG entries of Nastran's bulk data: punch files ``.pch``, or ``.dmig`` and ``.bdf``.
 
 From the Quick Reference Guide: a heading ``DMIG, NAME, 0, form, type, …``, then for each column ``DMIG,
-NAME, node, component`` and triples node, component, value, four fields in. Fields are 8 characters wide, 16
-in entries marked ``DMIG*`` (the first and the last of a line 8), or separated by commas; a line that begins
-with a blank, + or * continues the one before. Of a symmetric matrix (form 6) one triangle is given. A scalar
+NAME, node, component`` and triples node, component, value, four fields in
+(`solver.matrices.decks.nastran.bulk_entries`). Of a symmetric matrix (form 6) one triangle is given. A scalar
 point has component 0 or none.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 from scipy.sparse import coo_array
 
+from solver.matrices.decks.nastran import bulk_entries
 from solver.matrices.labels import Label, component
 from solver.matrices.readers.arrays import Labelled, chosen_by_initials, mirrored, named_by_role
 from solver.matrices.readers.numbers_in_text import LARGEST, FormatError, ascii_lines, fortran_real
@@ -57,9 +56,11 @@ def read_dmig(path: Path) -> dict[str, Labelled]:
     """
     found: dict[str, _Entries | None] = {}
     others: list[str] = []
-    for line, fields in _entries(ascii_lines(path, "a file of DMIG entries")):
-        name = fields[1].strip().upper()
-        if fields[2].strip() == "0":
+    lines = enumerate(ascii_lines(path, "a file of DMIG entries"), start=1)
+    for entry in bulk_entries(lines, "DMIG".__eq__):
+        line, fields = entry.line, [entry.name, *entry.fields]
+        name = fields[1].upper()
+        if fields[2] == "0":
             if name in found:
                 raise FormatError(f"line {line}: the file holds two matrices {name!r}")
             why = _passed_over(fields)
@@ -81,40 +82,9 @@ def read_dmig(path: Path) -> dict[str, Labelled]:
     return {name: entries.matrix() for name, entries in kept.items()}
 
 
-def _entries(lines: list[str]) -> Iterator[tuple[int, list[str]]]:
-    """The DMIG entries with the line they begin in: name of the card, then all its fields in a row."""
-    start = 0
-    fields: list[str] = []
-    for number, line in enumerate(lines, start=1):
-        text = line.partition("$")[0].expandtabs(8).rstrip()
-        if not text:
-            continue
-        words = _fields(text)
-        card = words[0].strip().upper()
-        if fields and card[:1] in ("", "+", "*"):
-            width = 4 if card.startswith("*") else 8
-            fields += words[1 : 1 + width] + [""] * (width - len(words[1 : 1 + width]))
-            continue
-        if fields:
-            yield start, fields
-        start, fields = number, []
-        if card.rstrip("*") == "DMIG":
-            width = 4 if card.endswith("*") else 8
-            fields = [card, *words[1 : 1 + width], *[""] * (width - len(words[1 : 1 + width]))]
-    if fields:
-        yield start, fields
-
-
-def _fields(text: str) -> list[str]:
-    if "," in text:
-        return text.split(",")
-    width = 16 if "*" in text[:8] else 8
-    return [text[:8], *(text[at : at + width] for at in range(8, min(len(text), 72), width))]
-
-
 def _passed_over(fields: list[str]) -> str:
     """Why a matrix is none of M, K and C: loads are rectangular, some are complex; empty if it may be one."""
-    form, kind = fields[3].strip(), fields[4].strip()
+    form, kind = fields[3], fields[4]
     if form not in ("1", "6"):
         return f"must have the form {SQUARE} (square) or {SYMMETRIC} (symmetric), got {form!r}"
     if kind not in ("1", "2"):
@@ -124,24 +94,24 @@ def _passed_over(fields: list[str]) -> str:
 
 def _column(entries: _Entries, fields: list[str], line: int) -> None:
     column = _label(fields[2], fields[3], line)
-    if not any(text.strip() for text in fields[5:]):
+    if not any(fields[5:]):
         raise FormatError(f"line {line}: the column {column} has no entries")
     # A triple takes four fields: node, component, value, and the imaginary part that real ones leave empty.
     for at in range(5, len(fields), 4):
         node, part, value, imaginary = (*fields[at : at + 4], "", "", "")[:4]
-        if not any(text.strip() for text in (node, part, value)):
+        if not any((node, part, value)):
             continue
-        if imaginary.strip() and _number(imaginary, line) != 0.0:
-            raise FormatError(f"line {line}: a real matrix has no imaginary part, got {imaginary.strip()!r}")
+        if imaginary and _number(imaginary, line) != 0.0:
+            raise FormatError(f"line {line}: a real matrix has no imaginary part, got {imaginary!r}")
         entries.rows.append(_label(node, part, line))
         entries.columns.append(column)
         entries.values.append(_number(value, line))
 
 
 def _label(node: str, part: str, line: int) -> Label:
-    if not node.strip().isdecimal() or not 0 < int(node) <= LARGEST:
-        raise FormatError(f"line {line}: a node must be a whole number from 1, got {node.strip()!r}")
-    text = part.strip() or "0"
+    if not node.isdecimal() or not 0 < int(node) <= LARGEST:
+        raise FormatError(f"line {line}: a node must be a whole number from 1, got {node!r}")
+    text = part or "0"
     if not text.isdecimal() or int(text) > 6:
         raise FormatError(f"line {line}: a component must be 1 to 6, or 0 of a scalar point, got {text!r}")
     return Label(int(node), component(text))
@@ -149,9 +119,9 @@ def _label(node: str, part: str, line: int) -> Label:
 
 def _number(text: str, line: int) -> float:
     try:
-        return fortran_real(text.strip())
+        return fortran_real(text)
     except ValueError:
-        raise FormatError(f"line {line}: {text.strip()!r} is not a number") from None
+        raise FormatError(f"line {line}: {text!r} is not a number") from None
 
 
 READERS = (

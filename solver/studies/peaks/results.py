@@ -208,11 +208,6 @@ class PeakTrack(MadeOfResponses, Drawn):
         """Why of some sweeps it is not known that no higher peak hides between their points."""
         return tuple(unsettled(one.peak_certificate for one in self.branches))
 
-    @property
-    def reached(self) -> bool:
-        """Whether the whole range was covered and checked."""
-        return self.status is TrackStatus.TRACKED
-
     def known_parts(self) -> Iterable[Known]:
         """Every sweep, and the response at the optimum."""
         return (*(one.known for one in self.branches), *self.optimum.known_parts())
