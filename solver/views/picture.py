@@ -259,6 +259,8 @@ def _say(scene: Scene, picture: Picture, parts: Parts) -> None:
     if left:
         listed = ", ".join(left[:6]) + (f" and {len(left) - 6} more" if len(left) > 6 else "")
         picture.notes.append(f"Without a place, so not drawn: {listed}.")
+    if "mesh" in picture.roles:
+        picture.notes.append("The mesh is drawn at rest: its file tells the motion of the nodes named alone.")
     undrawn = [contact.name for contact in scene.contacts if contact.name not in picture.contacts]
     if undrawn:
         picture.notes.append(f"Contacts without a place: {', '.join(undrawn)}.")

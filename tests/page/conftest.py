@@ -28,7 +28,9 @@ def browser() -> Iterator[Browser]:
     # The first preview waits for its worker, on a machine that may have other work.
     api.expect.set_options(timeout=90_000)
     with api.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=program, args=["--no-sandbox"])
+        browser = playwright.chromium.launch(
+            executable_path=program, args=["--no-sandbox", "--enable-unsafe-swiftshader"]
+        )
         yield browser
         browser.close()
 

@@ -14,7 +14,8 @@ from solver.results.notes import FLAGS
 FOLDER = Path(page.__file__).resolve().parents[2] / "page"
 MODULES = sorted((FOLDER / "js").rglob("*.js"))
 LONGEST_FILE = 400
-MOST_COMPRESSED = 400_000
+MOST_COMPRESSED = 600_000
+LATER = {"three.js"}  # asked for when a shape is opened
 
 
 def test_the_page_and_its_files_are_served_under_a_strict_policy(shipped: httpx.Client) -> None:
@@ -27,7 +28,9 @@ def test_the_page_and_its_files_are_served_under_a_strict_policy(shipped: httpx.
     addresses = re.findall(r'(?:href|src)="([^"#]+)"', found.text)
     assert all(address.startswith("/") for address in addresses)
     files = [address for address in addresses if address.startswith("/page/")]
-    assert {address.rpartition("/")[2] for address in files} >= {path.name for path in MODULES}
+    assert {address.rpartition("/")[2] for address in files} == {
+        path.name for path in FOLDER.rglob("*") if path.suffix in (".js", ".css", ".svg")
+    } - LATER
     for address in files:
         answer = shipped.get(address)
         assert answer.status_code == 200
@@ -66,17 +69,28 @@ def test_modules_are_short_and_put_no_data_into_markup(path: Path) -> None:
     assert not re.search(r"https?://(?!www\.w3\.org/)", text)
 
 
-def test_what_is_from_others_says_whose_it_is_and_how_it_is_made() -> None:
+@pytest.mark.parametrize(
+    ("file", "package", "permits", "users"),
+    [
+        ("d3.js", r"d3-\w+", "Permission to use, copy, modify", "charts"),
+        ("three.js", "three", "Permission is hereby granted, free of charge", "shape"),
+    ],
+)
+def test_what_is_from_others_says_whose_it_is_and_how_it_is_made(
+    file: str, package: str, permits: str, users: str
+) -> None:
     folder = FOLDER / "js" / "vendor"
-    head, told = ((folder / name).read_text("utf-8") for name in ("d3.js", "README.md"))
-    assert "Permission to use, copy, modify" in head.replace("\n// ", " ")
-    for package, version in re.findall(r"(d3-\w+)@([\d.]+)", told):
-        assert f"{package} {version}" in head.replace("\n// ", " ")
-    (exported,) = re.findall(r"export\{(.*?)\};?\s*$", head)
+    head, told = ((folder / name).read_text("utf-8") for name in (file, "README.md"))
+    assert permits in head.replace("\n// ", " ")
+    versions = re.findall(rf"\b({package})@([\d.]+)", told)
+    assert versions
+    for name, version in versions:
+        assert f"{name} {version}" in head.replace("\n// ", " ")
+    (exported,) = re.findall(r"export\{([^{}]*?)\};?\s*$", head)
     names = {each.rpartition(" as ")[2] for each in exported.split(",")}
-    wanted = re.findall(r"^export \{ (.*?) \} from", told, flags=re.MULTILINE)
+    wanted = re.findall(rf'^export \{{ (.*?) \}} from "{package}"', told, flags=re.MULTILINE)
     assert names == {name for each in wanted for name in each.split(", ")}
-    used = "".join(path.read_text("utf-8") for path in (FOLDER / "js" / "charts").glob("*.js"))
+    used = "".join(path.read_text("utf-8") for path in (FOLDER / "js" / users).glob("*.js"))
     assert all(re.search(rf"\b{name}\b", used) for name in names), "nothing is carried that is not used"
 
 

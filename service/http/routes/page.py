@@ -37,6 +37,8 @@ _TYPES = {
 _FOR_EVER = "public, max-age=31536000, immutable"
 _VERSION = "%VERSION%"
 _MODULES = "%MODULES%"
+_LATER = "js/vendor/three.js"
+"""Asked for by the page when a shape is opened."""
 
 
 @cache
@@ -65,7 +67,7 @@ def version() -> str:
 @cache
 def index() -> bytes:
     """The page, which names its modules so that they are fetched together."""
-    modules = sorted(path for path in files() if path.endswith(".js"))
+    modules = sorted(path for path in files() if path.endswith(".js") and path != _LATER)
     links = "\n".join(f'<link rel="modulepreload" href="/page/{version()}/{path}">' for path in modules)
     html = files()["index.html"].decode()
     return html.replace(_MODULES, links).replace(_VERSION, version()).encode()

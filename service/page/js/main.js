@@ -25,6 +25,7 @@ import { startPoint } from "./views/point.js";
 import { startRenewal } from "./views/renewal.js";
 import { startResponse, sweepView } from "./views/response.js";
 import { asked, current, listScenes, loadScene, variedParts } from "./scene/scenes.js";
+import { startShape } from "./shape/card.js";
 import { fillSettings, startSettings } from "./scene/settings.js";
 import { contactTable, drawStructure } from "./scene/structure.js";
 import { startSensitivities } from "./views/sensitivities.js";
@@ -265,6 +266,7 @@ async function start() {
   startResponse();
   startMap();
   startPoint();
+  startShape((at) => ({ ...asked(), frequency_hz: at }));
   startFront();
   startStudies();
   startModes();

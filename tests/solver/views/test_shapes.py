@@ -58,7 +58,7 @@ def test_points_of_a_body_move_as_a_rigid_body_does() -> None:
         assert now == pytest.approx(move + rotated, abs=5e-3 * np.abs(moved).max())
     # The faces rub where the contacts are, and the prism has its corners around the centre of mass.
     contacts = [shape.picture.points[i] for i in shape.picture.contacts.values()]
-    assert sorted(contacts) == sorted(list(contact.at or ()) for contact in scene.contacts)
+    assert sorted(map(tuple, contacts)) == sorted(contact.at or (0.0, 0.0, 0.0) for contact in scene.contacts)
     low, high = at.min(axis=0), at.max(axis=0)
     assert np.all((low < 0.0) & (high > 0.0))
 
@@ -124,6 +124,7 @@ def test_what_has_no_place_is_said() -> None:
     assert picture_of(solver.load_scene("shroud-3d")).notes == ["Without a place, so not drawn: disk."]
     assert "tells no places" in picture_of(solver.load_scene("two-dof")).notes[0]
     placed = picture_of(solver.load_scene("fe-disk"))
+    assert "at rest" in placed.notes[-1]
     assert placed.roles.count("mesh") == 114
     assert set(placed.contacts) == {"lower", "upper"}
 

@@ -56,7 +56,7 @@ function underlay(copy, canvas) {
   copy.prepend(image);
 }
 
-const paperColour = () => getComputedStyle(document.querySelector(".card")).backgroundColor;
+export const paperColour = () => getComputedStyle(document.querySelector(".card")).backgroundColor;
 
 export const svgText = (drawing, canvas) => new XMLSerializer().serializeToString(standalone(drawing, canvas));
 

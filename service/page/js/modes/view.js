@@ -6,13 +6,15 @@ import { on } from "../base/events.js";
 import { csvText, saveText } from "../base/exports.js";
 import { length, number, seconds } from "../base/format.js";
 import { chart } from "../charts/chart.js";
-import { current, value } from "../scene/scenes.js";
+import { asked, current, value } from "../scene/scenes.js";
 import { putAll } from "../views/live.js";
+import { shapeCard } from "../shape/card.js";
 import { amplitudeOf, columnsOf, dampingChart, frequencyChart, loopChart, nearestMotion, performanceChart, shapeChart, stabilityOf, statesAt } from "./charts.js";
 
 const MOST_PINS = 4;
 const EMPTY = "Choose a mode and its amplitudes, then press “Follow the mode”.";
 let plots = null;
+let space = null;
 let last = null;
 let point = 0;
 let contact = 0;
@@ -29,6 +31,8 @@ export function startModes() {
     loop: chart(byId("modes-loop"), { label: "Loop at the amplitude", file: "mode-loop", height: 280 }),
     shape: chart(byId("modes-shape"), { label: "Shape at the amplitude", file: "mode-shape", height: 280 }),
   };
+  space = shapeCard(byId("modes-shape-view"), { id: "mode-space", file: "mode-shape-in-space" });
+  on("scene-left", space.leave);
   on("scene", () => {
     [last, point, contact, pins] = [null, 0, 0, []];
     clear();
@@ -41,6 +45,7 @@ function clear() {
   plots.performance.clear("Resonance peaks that follow from the mode.");
   plots.loop.clear("Hysteresis loops of a chosen amplitude.");
   plots.shape.clear("Shape at a chosen amplitude.");
+  space.offer({ ...asked(), mode: 1 }, "mode 1, contacts as at rest");
   say("modes-status", "The free motion of a mode changes with its amplitude: stuck contacts are springs, sliding ones dampers.");
   for (const id of ["modes-tools", "modes-facts", "modes-loop-more", "modes-peaks-more"]) show(byId(id));
 }
@@ -104,6 +109,7 @@ function choose(at) {
     return;
   }
   const there = nearestMotion(result, point);
+  offerShape(result.motions.points[there]);
   const shown = result.motions.points[there];
   if (result.motions.loops.length) plots.loop.draw(loopChart(result, there, contact));
   else plots.loop.clear("The scene has no contacts.");
@@ -112,6 +118,15 @@ function choose(at) {
   show(byId("modes-loop-more"),
     el("p", { class: "note", role: "status" }, `At a = ${number(result.amplitude[shown], 4)} √kg m, max |${result.dof}| ${length(result.max_abs[shown])}: ${statesAt(result, shown)}. A click on a curve above shows another amplitude.`),
     el("div", { class: "row" }, names.length > 1 ? names.map((name, i) => el("button", { type: "button", "aria-pressed": String(i === contact), onclick: () => { contact = i; choose(point); } }, name)) : null));
+}
+
+// The shape in space at a point of the curve.
+function offerShape(at) {
+  const { result, request } = last;
+  const { scene, set = {}, harmonics = result.n_harmonics } = request;
+  const body = { scene, set, harmonics, mode: result.mode, amplitude: result.amplitude[at] };
+  if (result.nodal_diameter !== null) body.nodal_diameter = result.nodal_diameter;
+  space.offer(body, `mode ${result.mode} at a = ${number(result.amplitude[at], 3)} √kg m`);
 }
 
 function tools() {
