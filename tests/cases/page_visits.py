@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from page_site import Site
@@ -43,3 +44,10 @@ def visit(context: BrowserContext, site: Site, words: str = "") -> Page:
     page.goto(f"{site.url}/{with_all(words)}")
     page.locator("html[data-ready]").wait_for(state="attached")
     return page
+
+
+def downloaded(page: Page, selector: str) -> bytes:
+    """What a click downloads."""
+    with page.expect_download() as found:
+        page.click(selector)
+    return Path(found.value.path()).read_bytes()

@@ -5,14 +5,13 @@ from __future__ import annotations
 import csv
 import io
 import tomllib
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import httpx
 import numpy as np
 import pytest
 from page_site import Site, Watch
-from page_visits import BAD_SCENE, visit
+from page_visits import BAD_SCENE, downloaded, visit
 
 import solver
 
@@ -23,12 +22,6 @@ if TYPE_CHECKING:
 
 Profile = tuple["BrowserContext", Watch]
 LONG_MS = 120_000
-
-
-def downloaded(page: Page, selector: str) -> bytes:
-    with page.expect_download() as found:
-        page.click(selector)
-    return Path(found.value.path()).read_bytes()
 
 
 def values(page: Page) -> dict[str, float]:

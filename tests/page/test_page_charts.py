@@ -128,6 +128,38 @@ def test_zoom_is_linked_and_comes_back(profile: Profile, site: Site, swept: str)
     assert ends(page, "live") == pytest.approx(whole, rel=1e-3)
 
 
+def test_the_cursor_of_one_chart_stands_in_all_of_the_same_abscissa(profile: Profile, site: Site) -> None:
+    """By mouse and by keyboard: at the same place, with the value of each chart."""
+    body = {"kind": "modes", "scene": "two-dof", "from": 0.1, "to": 3, "harmonics": 3}
+    job = httpx.post(f"{site.url}/v1/jobs", json=body, headers={"Prefer": "wait=60"}, timeout=90).json()
+    page = visit(profile[0], site, f"?scene=two-dof&tab=modes&modes={job['id']}")
+    frequency, damping, peaks = (page.locator(f"#modes-{name}") for name in ("frequency", "damping", "peaks"))
+    expect(frequency.locator("path.series").first).to_be_visible()
+    frequency.locator("svg.chart").focus()
+    for key in ("End", "ArrowLeft"):
+        page.keyboard.press(key)
+    result = httpx.get(f"{site.url}/v1/jobs/{job['id']}/results").json()["result"]
+    amplitude, ratio = (result[name][-2] for name in ("amplitude", "damping_ratio"))
+    expect(damping.locator("path.cursor")).to_have_count(1)
+    number = re.search(r"[\d.]+", damping.locator(".chart-read").inner_text())
+    assert number is not None
+    assert float(number[0]) == pytest.approx(amplitude, rel=1e-2)
+    assert f"{100 * ratio:.4g}" in damping.locator(".chart-read").inner_text()
+    expect(peaks.locator("path.cursor")).to_have_count(0)
+    place = damping.locator("svg.chart").bounding_box()
+    assert place is not None
+    page.mouse.move(place["x"] + 0.5 * place["width"], place["y"] + 0.5 * place["height"])
+    lines = [
+        re.search(r"M([\d.]+) ", chart.locator("path.cursor").get_attribute("d") or "")
+        for chart in (frequency, damping)
+    ]
+    assert lines[0] is not None
+    assert lines[1] is not None
+    assert float(lines[0][1]) == pytest.approx(float(lines[1][1]), abs=1.0)
+    page.mouse.move(2, 2)
+    expect(frequency.locator("path.cursor")).to_have_count(0)
+
+
 @pytest.mark.long
 def test_an_axis_is_logarithmic_on_request(profile: Profile, site: Site, swept: str) -> None:
     page = visit(profile[0], site, swept)

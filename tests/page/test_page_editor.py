@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import httpx
 import pytest
 from page_site import Site, Watch
-from page_visits import visit
+from page_visits import downloaded, visit
 
 expect = pytest.importorskip("playwright.sync_api", reason="the package playwright is not installed").expect
 axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="axe is not installed")
@@ -53,9 +53,27 @@ def row(page: Page, section: str, index: int) -> Any:
     return page.locator(f"[data-row='{section}:{index}']")
 
 
+def text_of(page: Page) -> str:
+    """The text of the editor, as it is saved."""
+    return downloaded(page, "#editor button:has-text('Save as TOML')").decode()
+
+
 def tables(page: Page) -> dict[str, Any]:
     """The tables in the text of the editor."""
-    return tomllib.loads(page.input_value("#editor-toml"))
+    return tomllib.loads(text_of(page))
+
+
+def retype(page: Page, line: str, text: str) -> None:
+    """Type another text over a line."""
+    page.locator(".cm-line").filter(has_text=line).click()
+    for key in ("Home", "Shift+End"):
+        page.keyboard.press(key)
+    page.keyboard.type(text)
+
+
+def marked(page: Page) -> Any:
+    """What is marked as wrong in the text."""
+    return page.locator(".cm-lintRange-error")
 
 
 def settled(page: Page, words: str = "Nothing is wrong") -> None:
@@ -82,20 +100,20 @@ def test_what_is_wrong_is_said_at_its_field_and_its_line(profile: Profile, site:
     expect(friction).to_have_attribute("aria-invalid", "true")
     expect(page.locator("#field-contacts-0-mu-message")).to_contain_text("`mu` is missing")
     expect(page.locator(".issue-list")).to_contain_text("contacts 1 › mu, line 11")
-    expect(page.locator(".toml-line.wrong")).to_have_text(["[[contacts]]"])
+    expect(marked(page)).to_have_text(["[[contacts]]"])
     friction.fill("0.3")
     settled(page)
     wanted = MINE.replace("N0 = 40.0 # guessed\n", "N0 = 40.0 # guessed\nmu = 0.3\n")
-    assert page.input_value("#editor-toml") == wanted
+    assert text_of(page) == wanted
     # The other way round, with a syntax error on the way.
-    page.fill("#editor-toml", wanted.replace("kt = 5.0e5", "kt = = 5.0e5"))
+    retype(page, "kt = 5.0e5", "kt = = 5.0e5")
     expect(page.locator("#editor [role=alert]")).to_contain_text("not valid TOML: Invalid value (at line 14")
-    expect(page.locator(".toml-line.wrong")).to_have_text(["kt = = 5.0e5"])
-    page.fill("#editor-toml", wanted.replace("kt = 5.0e5", "kt = 6.0e5"))
+    expect(marked(page)).to_have_text(["kt = = 5.0e5"])
+    retype(page, "kt = = 5.0e5", "kt = 6.0e5")
     expect(page.locator("#field-contacts-0-kt")).to_have_value("600000")
     settled(page)
     page.locator("#field-contacts-0-between-1").fill("wing")
-    expect(page.locator(".toml-line.wrong")).to_have_text(['between = ["blade", "wing"]'])
+    expect(marked(page)).to_have_text(['between = ["blade", "wing"]'])
     expect(page.locator("#field-contacts-0-between-1-message")).to_contain_text("no DOF 'wing'")
     page.keyboard.press("Control+z")
     expect(page.locator("#field-contacts-0-between-1")).to_have_value("ground")
@@ -130,12 +148,12 @@ def test_a_scene_is_drawn_up_from_nothing(profile: Profile, site: Site) -> None:
     row(page, "structure/springs", 0).locator("[data-key=between]").last.fill("disk")
     page.get_by_role("button", name="Add contact").click()
     third = row(page, "contacts", 1)
-    expect(page.locator("#editor-toml")).to_have_value(re.compile('name = "contact"'))
+    expect(page.locator(".cm-content")).to_contain_text('name = "contact"')
     third.locator("[data-key=law]").select_option("gap")
     expect(third.locator("[data-key=gap]")).to_have_value("0.0001")
     expect(third.locator("[data-key=kt]")).to_have_count(0)
     settled(page)
-    expect(page.locator("#editor-toml")).to_have_value(re.compile(r'law = "gap"\n'))
+    expect(page.locator(".cm-content")).to_contain_text('law = "gap"')
     page.locator("#editor-undo").click()
     expect(third.locator("[data-key=kt]")).to_have_value("5530000")
     page.get_by_role("button", name="Remove contact").click()
@@ -151,6 +169,42 @@ def test_a_scene_is_drawn_up_from_nothing(profile: Profile, site: Site) -> None:
     page.get_by_role("button", name="Use this scene").click()
     expect(page.locator("#scene")).to_have_value("from-nothing")
     expect(page.locator("#live-status")).to_contain_text("peak")
+
+
+def test_keys_are_completed_and_the_text_is_left_by_keyboard(profile: Profile, site: Site) -> None:
+    """Keys of the section one types in, words of a choice; Escape closes the list, Tab goes on."""
+    page = visit(profile[0], site)
+    open_text(page, MINE)
+    settled(page, "wrong")
+    content = page.locator(".cm-content")
+    content.get_by_text("N0 = 40.0").click()
+    page.keyboard.press("End")
+    page.keyboard.press("Enter")
+    page.keyboard.type("m")
+    options = page.locator(".cm-tooltip-autocomplete li")
+    expect(options.first).to_contain_text("mu")
+    page.wait_for_timeout(200)  # a list that has just opened takes no key, lest one be meant for the text
+    page.keyboard.press("Enter")
+    page.keyboard.type("0.3")
+    page.keyboard.press("Enter")
+    page.keyboard.type("law = ")
+    page.keyboard.press("Control+Space")
+    expect(options.filter(has_text="coulomb-2d")).to_have_count(1)
+    assert serious(page) == []
+    page.keyboard.press("Escape")
+    expect(options).to_have_count(0)
+    expect(content).to_be_focused()
+    page.keyboard.type('"coulomb"')
+    settled(page)
+    assert (tables(page)["contacts"][0]["mu"], tables(page)["contacts"][0]["law"]) == (0.3, "coulomb")
+    content.focus()
+    page.keyboard.press("Escape")
+    page.keyboard.press("Shift+Tab")
+    expect(content).not_to_be_focused()
+    page.keyboard.press("Tab")
+    expect(content).to_be_focused()
+    page.keyboard.press("Tab")
+    expect(content).not_to_be_focused()
 
 
 @pytest.mark.long

@@ -161,6 +161,8 @@ def test_two_runs_are_compared_and_one_is_opened(profile: Profile, site: Site) -
     expect(rows.filter(has_text="damper.N0")).to_have_text("damper.N061 N140 N+130 %")
     expect(rows.filter(has_text="damper.mu")).to_have_count(0)
     expect(rows.filter(has_text="Time taken")).to_contain_text(" s")
+    for count in ("points", "iterations", "rejected", "residual"):
+        expect(rows.filter(has_text=count)).to_have_count(0)
     page.locator("#runs-compare-body summary", has_text="are equal").click()
     equal = page.get_by_role("region", name="Equal quantities of two runs").locator("tbody tr")
     expect(equal.filter(has_text="damper.mu")).to_have_text("damper.mu0.30.3")

@@ -53,7 +53,10 @@ def asked(kind: str, name: str) -> dict[str, Any]:
             "unknowns": {FORCE: ends}, "starts": 1,
         },
     }  # fmt: skip
-    return {"scene": name, **own.get(kind, {}), **rough}
+    body: Any = scene.to_dict()
+    if kind == "mistuning" and scene.structure.sector_count > 1:
+        body["structure"]["sectors"] = 3
+    return {"scene": body, **own.get(kind, {}), **rough}
 
 
 def _height(scene: solver.Scene, frequency_hz: float) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 from collections.abc import Iterator
 from functools import cache
 from html import escape
@@ -37,8 +38,6 @@ _TYPES = {
 _FOR_EVER = "public, max-age=31536000, immutable"
 _VERSION = "%VERSION%"
 _MODULES = "%MODULES%"
-_LATER = "js/vendor/three.js"
-"""Asked for by the page when a shape is opened."""
 
 
 @cache
@@ -66,8 +65,10 @@ def version() -> str:
 
 @cache
 def index() -> bytes:
-    """The page, which names its modules so that they are fetched together."""
-    modules = sorted(path for path in files() if path.endswith(".js") and path != _LATER)
+    """The page; it names its modules so that they are fetched together, but for those imported on demand."""
+    scripts = {path: data for path, data in files().items() if path.endswith(".js")}
+    later = re.findall(r'[^.]import\("[./]*([^"]+)"\)', b"".join(scripts.values()).decode())
+    modules = sorted(path for path in scripts if not path.endswith(tuple(later)))
     links = "\n".join(f'<link rel="modulepreload" href="/page/{version()}/{path}">' for path in modules)
     html = files()["index.html"].decode()
     return html.replace(_MODULES, links).replace(_VERSION, version()).encode()

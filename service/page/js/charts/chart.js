@@ -5,7 +5,7 @@ import { csvText, pngBlob, saveBlob, saveText, svgText } from "../base/exports.j
 import { number } from "../base/format.js";
 import { pathOf, plane, shape } from "./plane.js";
 import { extent } from "./scales.js";
-import { dragged, joined, zoomButtons, zoomKey, zoomed } from "./zoom.js";
+import { dragged, joined, rule, zoomButtons, zoomKey, zoomed } from "./zoom.js";
 
 const MARGIN_LEFT = 62;
 const LEAST_HEIGHT = 120;
@@ -14,8 +14,8 @@ const DASHES = { dashed: "7 4", dotted: "2 4" };
 // What a chart shows: {x, y: {name, unit, log, zero, low, high}, series: [{name, x, y, colour, dash, width, shape, bare}],
 // bands: [[low, high]], limits: [{y, name}], marks: [{x, y, text, shape, colour}]}.
 // `unit` is the {name, perMetre} of an axis of lengths: files have them in metres, as those of the service do.
-// Charts of the same `link` share the crosshair and the stretch that is zoomed.
-export function chart(host, { label, file, height = 300, onPick, legend = true, pickSeries = 0, link = "" }) {
+// Charts of a tab with the same abscissa share the crosshair and the stretch that is zoomed.
+export function chart(host, { label, file, height = 300, onPick, legend = true, pickSeries = 0 }) {
   const read = el("p", { class: "chart-read", "aria-live": "polite" });
   const drawing = svg("svg", { class: "chart", role: "group", tabindex: 0, "aria-label": label });
   drawing.setAttribute("aria-roledescription", onPick ? "chart, arrows move along it, Enter picks" : "chart, arrows move along it");
@@ -24,7 +24,7 @@ export function chart(host, { label, file, height = 300, onPick, legend = true, 
   show(host, drawing, foot);
   // Where the layout gives a figure its height (`--fill: 1`), the drawing takes what its foot leaves.
   const tall = () => (getComputedStyle(host).getPropertyValue("--fill") === "1" ? Math.max(host.clientHeight - foot.offsetHeight, LEAST_HEIGHT) : height);
-  const self = { drawing, shown: null, at: null, link, log: null, window: null };
+  const self = { drawing, shown: null, at: null, log: null, window: null };
   tools.append(...zoomButtons(self, label), ...saving(self, file, label));
 
   self.repaint = () => self.shown && paint(self, host, tall(), legend, label);
@@ -50,9 +50,9 @@ export function chart(host, { label, file, height = 300, onPick, legend = true, 
   drawing.addEventListener("pointermove", (event) => hover(self, event, pickSeries));
   drawing.addEventListener("pointerleave", () => {
     self.mark?.replaceChildren();
-    self.share?.(null);
+    self.share(null);
   });
-  joined(self);
+  joined(self, (x) => follow(self, x, read, pickSeries));
   const justDragged = dragged(self);
   drawing.addEventListener("keydown", (event) => keyed(self, event, onPick, pickSeries));
   if (onPick) {
@@ -69,10 +69,12 @@ export function chart(host, { label, file, height = 300, onPick, legend = true, 
   return self;
 }
 
-const pointOf = (self, which) => {
+const pointOf = (self, which, at = self.at) => {
   const line = self.shown.series[which];
-  return { x: line.x[self.at], y: line.y[self.at], series: line };
+  return { x: line.x[at], y: line.y[at], series: line };
 };
+
+const wordsOf = ({ shown }, { x, y }, at) => shown.describe?.(x, y, at) ?? `${shown.x.name}: ${number(x, 6)} · ${shown.y.name}: ${number(y, 5)}`;
 
 function ends(axis, lists) {
   const [low, high] = extent(lists, axis);
@@ -246,15 +248,28 @@ function moveCursor(self, index, read, which) {
   while (line.y[next] === null && line.y[next + way] !== undefined) next += way;
   if (line.y[next] === null || line.x[next] === null) return;
   self.at = next;
-  const { x, y } = pointOf(self, which);
+  const point = pointOf(self, which);
+  const { x, y } = point;
   const [px, py] = [self.xs.at(x), self.ys.at(y)];
   show(
     self.mark,
     svg("path", { class: "cursor", d: `M${px} ${self.box.top}V${self.box.bottom}M${self.box.left} ${py}H${self.box.right}` }),
     shape("circle", px, py, 4, 7),
   );
-  self.share?.(x);
-  read.textContent = self.shown.describe?.(x, y, self.at) ?? `${self.shown.x.name}: ${number(x, 6)} · ${self.shown.y.name}: ${number(y, 5)}`;
+  self.share(x);
+  read.setAttribute("aria-live", "polite");
+  read.textContent = wordsOf(self, point, self.at);
+}
+
+// The cursor of another chart: where it stands in this one, and the value there, which is not spoken.
+function follow(self, x, read, which) {
+  const line = self.shown.series[which];
+  const at = x === null || !line?.x.length ? null : nearest(line, x);
+  const point = at === null ? { y: null } : pointOf(self, which, at);
+  const onIt = point.y === null ? [] : [shape("circle", self.xs.at(point.x), self.ys.at(point.y), 4, 7)];
+  if (!rule(self, x, ...onIt) || point.y === null) return;
+  read.setAttribute("aria-live", "off");
+  read.textContent = wordsOf(self, point, at);
 }
 
 function keyed(self, event, onPick, which) {

@@ -12,13 +12,13 @@ import { joined } from "./zoom.js";
 const LEGEND = 14;
 
 // Draws {x, y: {name, values, log}, rows: [[metre]], lines: [{name, x, y, colour, dash}], marks: [{x, y, text}]}.
-export function heatmap(host, { label, file, height = 340, onPick, link = "" }) {
+export function heatmap(host, { label, file, height = 340, onPick }) {
   const read = el("p", { class: "chart-read", "aria-live": "polite" });
   const canvas = el("canvas", { "aria-hidden": "true" });
   const drawing = svg("svg", { class: "chart", role: "group", tabindex: 0, "aria-label": label });
   drawing.setAttribute("aria-roledescription", "map, arrows move in it, with Shift they move the map, Enter picks");
   const stage = el("div", { class: "canvas-host" }, canvas, drawing);
-  const self = { drawing, canvas, shown: null, row: null, column: null, link, window: null, windowY: null, log: {} };
+  const self = { drawing, canvas, shown: null, row: null, column: null, window: null, windowY: null, log: {} };
   const at = () => (self.column === null ? null : pointOf(self));
   const tools = chartTools(self, file, label, mapButtons(self, label, at));
   show(host, stage, el("div", { class: "chart-foot" }, read, tools));
@@ -59,7 +59,7 @@ export function heatmap(host, { label, file, height = 340, onPick, link = "" }) 
   drawing.addEventListener("pointermove", (event) => event.buttons || place(event));
   drawing.addEventListener("pointerleave", () => {
     self.mark?.replaceChildren();
-    self.share?.(null);
+    self.share(null);
   });
   const justDragged = mapDragged(self);
   drawing.addEventListener("click", (event) => !justDragged() && place(event) && onPick(pointOf(self)));
@@ -176,7 +176,7 @@ function cursor(self, column, row, read) {
   show(self.mark, svg("path", { class: "map-cursor", d: `M${px} ${box.top}V${box.bottom}M${box.left} ${py}H${box.right}` }));
   const unit = lengthUnit(point.value ?? 0);
   const height = point.value === null ? "no solution" : `${number(point.value * unit.perMetre)} ${unit.name}`;
-  self.share?.(point.x);
+  self.share(point.x);
   read.textContent = `${shown.x.name} ${number(point.x, 6)} · ${shown.y.name} ${number(point.y, 5)} · ${height}`;
 }
 

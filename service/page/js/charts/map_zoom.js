@@ -1,4 +1,4 @@
-// Zoom and pan of a map: over a stretch of both axes, the abscissa shared with the charts of the same link.
+// Zoom and pan of a map: over a stretch of both axes, the abscissa shared with the charts that have the same.
 
 import { el, show, svg } from "../base/dom.js";
 import { look } from "./zoom.js";
@@ -26,8 +26,7 @@ function stretch([low, high], whole, log, { factor = 1, at = null, by = 0 }) {
 // Looks at other stretches of both axes; null is the whole of one.
 function lookAt(self, x, y) {
   self.windowY = y;
-  if (self.link) look(self, x);
-  else self.window = x;
+  look(self, x);
   self.repaint();
 }
 

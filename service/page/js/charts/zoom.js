@@ -1,7 +1,7 @@
-// Zoom along the abscissa, a logarithmic ordinate, and what charts of the same quantity share: stretch and crosshair.
+// Zoom along the abscissa, a logarithmic ordinate, and what charts of a tab share that have the same abscissa: stretch
+// and crosshair.
 
 import { el, show, svg } from "../base/dom.js";
-import { on, tell } from "../base/events.js";
 
 const LEAST_DRAG = 8;
 const CLOSER = 0.5;
@@ -31,7 +31,9 @@ export function look(self, window) {
   }
 }
 
-const linked = (self) => [...charts].filter((each) => each === self || (self.link && each.link === self.link && each.shown));
+const seen = ({ drawing }) => drawing.getClientRects().length > 0;
+
+const linked = (self) => [...charts].filter((each) => each === self || (each.shown && each.shown.x.name === self.shown?.x.name && seen(each)));
 
 function around(self, factor, at) {
   if (!self.whole) return;
@@ -99,15 +101,17 @@ export function dragged(self) {
   return () => wide;
 }
 
-// The crosshair of one chart stands in those of the same link too.
-export function joined(self) {
+// The crosshair of one chart stands in the others too, null takes it away; `follow` puts it into a chart.
+export function joined(self, follow = (x) => rule(self, x)) {
   charts.add(self);
-  if (!self.link) return;
-  self.share = (x) => tell("crosshair", { from: self, link: self.link, x });
-  on("crosshair", ({ from, link, x }) => {
-    if (from === self || link !== self.link || !self.shown || !self.mark) return;
-    const at = x === null ? null : self.xs.at(x);
-    show(self.mark, at === null || at < self.box.left || at > self.box.right
-      ? null : svg("path", { class: "cursor", d: `M${at} ${self.box.top}V${self.box.bottom}` }));
-  });
+  self.follow = follow;
+  self.share = (x) => linked(self).forEach((each) => each !== self && each.mark && each.follow(x));
+}
+
+// A line at a place of the abscissa, if it is seen, with what stands on it.
+export function rule(self, x, ...on) {
+  const at = x === null ? NaN : self.xs.at(x);
+  const within = at >= self.box.left && at <= self.box.right;
+  show(self.mark, within ? [svg("path", { class: "cursor", d: `M${at} ${self.box.top}V${self.box.bottom}` }), ...on] : null);
+  return within;
 }

@@ -1,17 +1,14 @@
-// The scene that is being edited: its text and its tables, kept alike by the service, and what they were before.
+// The scene that is being edited: its text and its tables, kept alike by the service.
 
 import { Offline, Problem, post } from "../network/api.js";
 
 const PAUSE_MS = 220;
-const MOST_STEPS = 200;
 
-// `shown(what)` is told whenever text, tables or issues are others: {from: "text" | "tables" | "history" | "scene" | "file"}.
+// `shown(what)` is told whenever text, tables or issues are others: {from: "text" | "tables" | "scene" | "file"}.
 export function sceneDocument(shown) {
   let now = { text: "", scene: {} };
   let issues = [];
   let unreadable = false;
-  let steps = [];
-  let at = -1;
   let turn = 0;
   let timer = 0;
   let pending = null;
@@ -47,28 +44,7 @@ export function sceneDocument(shown) {
     unreadable = found.scene === null;
     issues = found.issues;
     now = { text: found.text, scene: found.scene ?? now.scene };
-    if (!unreadable && from !== "history") remember();
     shown({ from });
-  }
-
-  function remember() {
-    const step = JSON.stringify([now.text, now.scene]);
-    if (steps[at] === step) return;
-    steps = [...steps.slice(Math.max(0, at + 2 - MOST_STEPS), at + 1), step];
-    at = steps.length - 1;
-  }
-
-  function move(by) {
-    if (at + by < 0 || at + by >= steps.length) return false;
-    at += by;
-    const [text, scene] = JSON.parse(steps[at]);
-    now = { text, scene };
-    unreadable = false;
-    pending = "history";
-    turn += 1;
-    shown({ from: "history", before: true });
-    settle();
-    return true;
   }
 
   return {
@@ -77,12 +53,10 @@ export function sceneDocument(shown) {
     get issues() { return issues; },
     get unreadable() { return unreadable; },
     get settled() { return pending === null; },
-    get canUndo() { return at > 0; },
-    get canRedo() { return at < steps.length - 1; },
     // Begins with a text, or with tables of which one is made.
     open({ text = "", scene = null }) {
       now = { text, scene: scene ?? {} };
-      [issues, unreadable, steps, at] = [[], false, [], -1];
+      [issues, unreadable] = [[], false];
       turn += 1;
       pending = null;
       running = ask(scene ? "scene" : "file", turn);
@@ -99,8 +73,6 @@ export function sceneDocument(shown) {
       later("tables");
     },
     settle,
-    undo: () => (pending !== null ? (steps.length ? move(0) : false) : move(-1)),
-    redo: () => move(1),
     blame(found) {
       issues = found;
       shown({ from: "tables" });

@@ -50,10 +50,10 @@ async function begin(given, from = "edit-scene") {
   back = from;
   await loadSchema();
   forgetOpened();
-  build();
+  await build();
   say("editor-status", "The scene is being read …");
   await doc.open(given);
-  const first = byId("editor").querySelector("[aria-invalid]") ?? (doc.unreadable ? pane.field : byId("editor").querySelector("input"));
+  const first = byId("editor").querySelector("[aria-invalid]") ?? (doc.unreadable ? pane : byId("editor").querySelector("input"));
   first?.focus();
   byId("editor").scrollIntoView({ block: "start" });
 }
@@ -63,7 +63,7 @@ function close() {
   byId(back).focus();
 }
 
-function build() {
+async function build() {
   const panel = byId("editor");
   panel.hidden = false;
   const tables = el("div", { id: "editor-tables" });
@@ -71,8 +71,8 @@ function build() {
   const form = el("form", { novalidate: true, id: "editor-form" },
     el("div", { class: "editor-bar" },
       el("button", { type: "submit", class: "main-button" }, "Use this scene"),
-      el("button", { type: "button", id: "editor-undo", title: "Undo (Ctrl+Z)", onclick: () => doc.undo() }, "Undo"),
-      el("button", { type: "button", id: "editor-redo", title: "Redo (Ctrl+Shift+Z)", onclick: () => doc.redo() }, "Redo"),
+      el("button", { type: "button", id: "editor-undo", title: "Undo (Ctrl+Z)", onclick: () => step("undo") }, "Undo"),
+      el("button", { type: "button", id: "editor-redo", title: "Redo (Ctrl+Shift+Z)", onclick: () => step("redo") }, "Redo"),
       el("button", { type: "button", onclick: () => saveText(doc.text, `${doc.scene.name || "scene"}.toml`, "application/toml") }, "Save as TOML"),
       el("button", { type: "button", onclick: close }, "Close"),
       el("p", { id: "editor-status", role: "status", class: "note" })),
@@ -82,10 +82,10 @@ function build() {
       text));
   show(panel, form);
   doc = sceneDocument(shown);
-  pane = tomlPane(text, (words) => {
+  pane = await tomlPane(text, (words) => {
     busy(true);
     doc.type(words);
-  });
+  }, () => doc.scene);
   form.addEventListener("submit", (event) => {
     event.preventDefault();
     store();
@@ -97,13 +97,18 @@ function build() {
 // Until the service has looked at the last change.
 const busy = (is) => byId("editor-form").setAttribute("aria-busy", String(is));
 
+// Undoes or redoes a step of the text, which the tables follow; what was typed last into them is in it before.
+async function step(which) {
+  await doc.settle();
+  pane[which]();
+}
+
 function keys(event) {
-  if (!(event.ctrlKey || event.metaKey) || event.altKey) return;
+  if (event.defaultPrevented || !(event.ctrlKey || event.metaKey) || event.altKey) return;
   const pressed = event.key.toLowerCase();
   if (pressed !== "z" && pressed !== "y") return;
   event.preventDefault();
-  if (pressed === "y" || event.shiftKey) doc.redo();
-  else doc.undo();
+  step(pressed === "y" || event.shiftKey ? "redo" : "undo");
 }
 
 // What the column of a field says of it, and the line it stands at.
@@ -159,7 +164,7 @@ function draw() {
   if (kept.ends[0] !== null && kept.ends[0] !== undefined) byId(kept.id).setSelectionRange(...kept.ends);
 }
 
-function shown({ from, before = false, failed = "", errors = [] }) {
+function shown({ from, failed = "", errors = [] }) {
   if (failed) {
     const words = errors.map(({ detail }) => detail).join(" ");
     say("editor-status", words || failed, true);
@@ -171,10 +176,10 @@ function shown({ from, before = false, failed = "", errors = [] }) {
   const typing = document.activeElement?.dataset?.late && byId("editor-tables").contains(document.activeElement);
   if (from !== "tables" || (missing && !typing)) draw();
   byId("editor-tables").inert = doc.unreadable;
-  if (from !== "text" || before) pane.set(doc.text);
-  byId("editor-undo").disabled = !doc.canUndo;
-  byId("editor-redo").disabled = !doc.canRedo;
-  if (before) return;
+  if (from === "tables") pane.set(doc.text);
+  else if (from !== "text") pane.begin(doc.text);
+  byId("editor-undo").disabled = !pane.canUndo;
+  byId("editor-redo").disabled = !pane.canRedo;
   busy(!doc.settled);
   const { issues, unreadable } = doc;
   pane.mark(issues.filter(({ line }) => line), unreadable);

@@ -1,80 +1,107 @@
-// The text of the scene: numbered lines in colours behind a text field, with what is wrong marked at its line.
+// The text of the scene in CodeMirror, which is loaded when it is wanted: what is wrong is marked at its line, keys
+// are completed, and its history is that of the tables too.
 
 import { el, show } from "../base/dom.js";
+import { completionAt } from "./completion.js";
 
-const MOST_COLOURED = 60_000;
-const TOKENS = /(#.*$)|("(?:[^"\\]|\\.)*"|'[^']*')|((?:^\s*|[{,]\s*)[A-Za-z0-9_."-]+(?=\s*=))|\b(true|false)\b|([+-]?\b\d[\d_]*(?:\.\d+)?(?:e[+-]?\d+)?\b)/gi;
-const CLASSES = ["", "toml-comment", "toml-text", "toml-key", "toml-number", "toml-number"];
+const THEME = {
+  "&": { height: "100%", color: "var(--ink)", backgroundColor: "var(--surface)", fontSize: "0.82rem" },
+  "&.cm-focused": { outline: "none" },
+  ".cm-scroller": { fontFamily: 'ui-monospace, "SFMono-Regular", "DejaVu Sans Mono", "Liberation Mono", monospace', lineHeight: "1.5" },
+  ".cm-content": { caretColor: "var(--ink)", outline: "none" },
+  ".cm-gutters": { color: "var(--ink-2)", backgroundColor: "var(--surface)", border: "0" },
+  ".cm-gutter-lint": { width: "0.9em" },
+  ".cm-lint-marker-error": { content: "none", width: "0.7em", height: "0.7em", borderRadius: "50%", backgroundColor: "var(--bad)" },
+  ".cm-lintRange-error": { backgroundImage: "none", backgroundColor: "var(--bad-soft)", textDecoration: "underline wavy var(--bad) 1px" },
+  ".cm-lintRange-error > span": { color: "var(--ink)" },
+  ".cm-tooltip": { color: "var(--ink)", backgroundColor: "var(--surface)", border: "1px solid var(--edge)", borderRadius: "6px", font: "var(--t-small)/1.4 var(--font)", maxWidth: "28rem" },
+  ".cm-tooltip-autocomplete > ul > li[aria-selected]": { color: "var(--accent-ink) !important", backgroundColor: "var(--accent) !important" },
+  ".cm-tooltip-autocomplete > ul": { maxHeight: "none !important", overflow: "hidden !important" },
+  ".cm-completionDetail": { color: "inherit" },
+  ".cm-diagnostic-error": { borderLeftColor: "var(--bad)" },
+};
 
-function coloured(line) {
-  if (/^\s*\[\[?[^[\]]+\]\]?\s*(#.*)?$/.test(line)) return [el("span", { class: "toml-head" }, line)];
-  const parts = [];
-  let at = 0;
-  for (const found of line.matchAll(TOKENS)) {
-    const kind = found.slice(1).findIndex((part) => part !== undefined) + 1;
-    parts.push(line.slice(at, found.index), el("span", { class: CLASSES[kind] }, found[0]));
-    at = found.index + found[0].length;
-  }
-  return [...parts, line.slice(at)];
+const colours = ({ HighlightStyle, tags }) => HighlightStyle.define([
+  { tag: tags.comment, color: "var(--ink-2)", fontStyle: "italic" },
+  { tag: tags.atom, color: "var(--accent)", fontWeight: "650" },
+  { tag: tags.propertyName, color: "var(--c4)" },
+  { tag: tags.string, color: "var(--c3)" },
+  { tag: tags.number, color: "var(--accent)" },
+]);
+
+// Numbers with powers of ten too.
+const withPowers = (toml) => ({ ...toml, token: (stream, state) => (!state.lhs && !state.inString && stream.match(/^[+-]?\d[\d_.]*e[+-]?\d+/i) ? "number" : toml.token(stream, state)) });
+
+// A change from one text to another, without what both begin and end with.
+function between(before, after) {
+  let from = 0;
+  while (from < before.length && before[from] === after[from]) from += 1;
+  let end = 0;
+  while (end < Math.min(before.length, after.length) - from && before.at(-1 - end) === after.at(-1 - end)) end += 1;
+  return { from, to: before.length - end, insert: after.slice(from, after.length - end) };
 }
 
-export function tomlPane(host, told) {
-  const shade = el("pre", { class: "toml-lines", "aria-hidden": "true" });
-  const field = el("textarea", { id: "editor-toml", class: "toml-field", spellcheck: false, autocomplete: "off", wrap: "off", "aria-label": "The scene as TOML", "aria-describedby": "editor-toml-wrong" });
-  field.setAttribute("autocapitalize", "off");
-  const wrong = el("div", { id: "editor-toml-wrong" });
-  let marks = new Map();
-
-  show(host, el("div", { class: "toml" }, shade, field), wrong);
-  field.addEventListener("input", () => {
-    marks = new Map();
-    draw();
-    told(field.value);
-  });
-  field.addEventListener("scroll", follow);
-
-  function follow() {
-    shade.scrollTop = field.scrollTop;
-    shade.scrollLeft = field.scrollLeft;
-  }
-
-  function draw() {
-    const lines = field.value.split("\n");
-    const plain = field.value.length > MOST_COLOURED;
-    show(shade, lines.map((line, i) => el("span", { class: marks.has(i + 1) ? "toml-line wrong" : "toml-line" }, plain ? line : coloured(line))));
-    host.style.setProperty("--digits", String(String(lines.length).length));
-    follow();
-  }
+// `told(text)` of every change that is typed or undone; `sceneOf()` is the scene that the text last held.
+export async function tomlPane(host, told, sceneOf) {
+  const cm = await import("../vendor/codemirror.js");
+  const { EditorState, EditorView } = cm;
+  const ours = cm.Annotation.define();
+  const box = el("div", { class: "toml", id: "editor-toml" });
+  const wrong = el("div", {});
+  let invalid = false;
+  show(host, box, wrong);
+  // The policy of the page allows no style elements; a shadow root takes style sheets that are made.
+  const root = box.attachShadow({ mode: "open" });
+  const extensions = [
+    cm.lineNumbers(), cm.lintGutter(), cm.history(), cm.StreamLanguage.define(withPowers(cm.toml)), cm.syntaxHighlighting(colours(cm)), EditorView.theme(THEME),
+    cm.autocompletion({ override: [(context) => completionAt(context, sceneOf())], icons: false, maxRenderedOptions: 12 }),
+    cm.keymap.of([...cm.completionKeymap, ...cm.historyKeymap, ...cm.defaultKeymap]),
+    EditorView.contentAttributes.of(() => ({ tabindex: "0", "aria-label": "The scene as TOML", "aria-invalid": String(invalid) })),
+    // The browser would keep the look of what is typed over in an inline style, which the policy does not allow.
+    EditorView.domEventHandlers({ beforeinput(event, of) {
+      if (event.inputType !== "insertText" || of.state.selection.main.empty) return false;
+      of.dispatch(of.state.replaceSelection(event.data), { userEvent: "input.type" });
+      event.preventDefault();
+      return true;
+    } }),
+    EditorView.updateListener.of((update) => {
+      if (update.docChanged && !update.transactions.some((one) => one.annotation(ours))) told(update.state.doc.toString());
+    }),
+  ];
+  const view = new EditorView({ root, parent: root });
+  const placeOf = (line, column) => {
+    const { from, to } = view.state.doc.line(Math.min(line, view.state.doc.lines));
+    return Math.min(from + Math.max((column ?? 1) - 1, 0), to);
+  };
 
   return {
-    field,
+    focus: () => view.focus(),
+    undo: () => cm.undo(view),
+    redo: () => cm.redo(view),
+    get canUndo() { return cm.undoDepth(view.state) > 0; },
+    get canRedo() { return cm.redoDepth(view.state) > 0; },
+    // A text to begin with: nothing was before it.
+    begin: (doc) => view.setState(EditorState.create({ doc, extensions })),
+    // What the tables made of the text, one step of the history.
     set(text) {
-      if (field.value === text) return draw();
-      const { scrollTop, scrollLeft } = field;
-      field.value = text;
-      Object.assign(field, { scrollTop, scrollLeft });
-      return draw();
+      const before = view.state.doc.toString();
+      if (before !== text) view.dispatch({ changes: between(before, text), annotations: [ours.of(true), cm.isolateHistory.of("full")] });
     },
     // Marks lines; what makes the text unreadable is said below it.
     mark(issues, unreadable) {
-      marks = new Map(issues.map(({ line, detail }) => [line, detail]));
-      if (issues.length) field.setAttribute("aria-invalid", "true");
-      else field.removeAttribute("aria-invalid");
+      invalid = issues.length > 0;
+      view.dispatch(cm.setDiagnostics(view.state, issues.map(({ line, detail }) => {
+        const { from, to, text } = view.state.doc.line(Math.min(line, view.state.doc.lines));
+        return { from: from + text.search(/\S|$/), to, severity: "error", message: detail };
+      })));
       const [first] = issues;
       show(wrong, unreadable ? el("p", { class: "issues", role: "alert" }, `The file cannot be read: ${first.detail}`, " ", el("button", { type: "button", class: "link", onclick: () => this.go(first.line, first.column) }, `Line ${first.line}`)) : null);
-      draw();
     },
     // Puts the cursor at a place and shows it.
     go(line, column = 1, focus = true) {
-      const lines = field.value.split("\n");
-      const at = lines.slice(0, line - 1).join("\n").length + (line > 1 ? 1 : 0) + Math.max((column ?? 1) - 1, 0);
-      if (focus) {
-        field.focus();
-        field.setSelectionRange(at, at);
-      }
-      const height = field.scrollHeight / Math.max(lines.length, 1);
-      if (field.scrollTop > (line - 2) * height || field.scrollTop + field.clientHeight < (line + 1) * height) field.scrollTop = (line - 1) * height - field.clientHeight / 3;
-      follow();
+      const at = placeOf(line, column);
+      view.dispatch({ ...(focus ? { selection: { anchor: at } } : {}), effects: EditorView.scrollIntoView(at, { y: "center" }) });
+      if (focus) view.focus();
     },
   };
 }

@@ -22,8 +22,8 @@ let last = null;
 export function startIdentify() {
   form = schemaForm(byId("identify-form"), "identify", { keys: (key) => key !== "data", top: ["unknowns"], groups: [{ legend: "Noise, outliers, starts", id: "more" }], submit, words: "Identify", primary: true });
   plots = {
-    response: chart(byId("identify-response"), { label: "Fit over the data", file: "fit", height: 320, link: "measured" }),
-    second: chart(byId("identify-second"), { label: "Phases or loops", file: "fit-phases", height: 320, link: "measured" }),
+    response: chart(byId("identify-response"), { label: "Fit over the data", file: "fit", height: 320 }),
+    second: chart(byId("identify-second"), { label: "Phases or loops", file: "fit-phases", height: 320 }),
   };
   startData(() => {
     last = null;

@@ -25,8 +25,8 @@ let pins = [];
 export function startModes() {
   const pick = (_point, at) => choose(at);
   plots = {
-    frequency: chart(byId("modes-frequency"), { label: "Frequency over amplitude", file: "mode-frequency", height: 280, link: "amplitude", onPick: pick }),
-    damping: chart(byId("modes-damping"), { label: "Damping ratio over amplitude", file: "mode-damping", height: 280, link: "amplitude", onPick: pick }),
+    frequency: chart(byId("modes-frequency"), { label: "Frequency over amplitude", file: "mode-frequency", height: 280, onPick: pick }),
+    damping: chart(byId("modes-damping"), { label: "Damping ratio over amplitude", file: "mode-damping", height: 280, onPick: pick }),
     performance: chart(byId("modes-peaks"), { label: "Peak of the mode", file: "mode-peaks", height: 280 }),
     loop: chart(byId("modes-loop"), { label: "Loop at the amplitude", file: "mode-loop", height: 280 }),
     shape: chart(byId("modes-shape"), { label: "Shape at the amplitude", file: "mode-shape", height: 280 }),

@@ -29,7 +29,6 @@ export function startLive() {
     label: "Frequency response",
     file: "response",
     height: 260,
-    link: "frequency",
     onPick: ({ x }) => tell("point", x),
   });
   ask = previewer("sweep", drawn, refused);

@@ -17,7 +17,6 @@ export function startMap() {
     label: "Map of amplitude over frequency and load",
     file: "map",
     height: 420,
-    link: "frequency",
     onPick: ({ x, y }) => {
       load({ [last.parameter_path]: y }, request);
       tell("point", x);

@@ -80,10 +80,11 @@ function quantities({ a, b, inputs, results }, [one, other]) {
       const field = settings[path.split(".")[0]];
       return { name: field ? path.replace(field.key, field.label) : path, unit: part === "scene" ? unitOf(path) : field?.unit ?? "", a: x, b: y, scene: part === "scene" };
     }),
+    // A number without a unit is a count or a residual of the computation: the JSON of the runs has them.
     ...results.filter(({ name }) => !SAID.test(name)).map(({ name, a: x, b: y }) => {
       const words = told[name]?.description ?? "";
       return { name: nameIn(words) || name.replaceAll("_", " ").replaceAll(".", ", "), unit: UNIT.exec(words)?.[1] ?? (TIMES.test(name) ? "s" : name.endsWith("_hz") ? "Hz" : ""), a: x, b: y };
-    }),
+    }).filter(({ unit, a: x, b: y }) => unit || ![x, y].some(isNumber)),
   ];
 }
 
