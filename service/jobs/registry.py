@@ -18,6 +18,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 from service.errors import InvalidRequestError
 from service.jobs.outputs import JobOutput, Progress, Run, ShouldStop
 from solver.errors import Shown
+from solver.results.told import Block, Summary
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -87,12 +88,10 @@ class NothingToDrawError(Exception):
     """A result without anything a picture could show; the message says why."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PrintedResult:
-    """What is printed of a result: a title, and names with their values."""
-
-    title: str
-    pairs: Sequence[tuple[str, str]]
+PrintedResult = Summary
+"""What is printed of a result: a title, and names with their values."""
+Tell = Callable[[Json], Summary | Iterable[Block]]
+"""From a result to what is printed of it: names with values, and tables."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -120,7 +119,7 @@ class KindView:
     sweeps: str = ""
     keys: str = ""
     flags: Mapping[str, str] = field(default_factory=dict)
-    tell: Callable[[Json], PrintedResult] | None = None
+    tell: Tell | None = None
     draw: Draw | None = None
 
 

@@ -36,6 +36,7 @@ from service.jobs.registry import (
     Resolved,
     SceneSource,
     StoredSweep,
+    Tell,
 )
 from solver.errors import Issue, SettingError
 from solver.results.views import on_demand
@@ -116,9 +117,9 @@ class Study(SceneRequest):
     """Root of the studies: the keys are fields, an alias is how bodies and options call one.
 
     A subclass says its NAME, the FUNCTION that computes (``"solver:track_peak"``), the model of its RESULT;
-    for people what it SHOWS, which SWEEPS it stores, what its progress has COUNTED; of its picture what
-    makes the FIGURE, and the key that is EMPTY where there is none, with what is said then. Its docstring
-    is the help of the command, the first line of which is its summary.
+    for people what it SHOWS, by which function a result is TOLD, which SWEEPS it stores, what its progress
+    has COUNTED; of its picture what makes the FIGURE, and the key that is EMPTY where there is none, with
+    what is said then. Its docstring is the help of the command, the first line of which is its summary.
     """
 
     model_config = ConfigDict(validate_by_alias=True)
@@ -126,6 +127,7 @@ class Study(SceneRequest):
     NAME: ClassVar[str]
     FUNCTION: ClassVar[str]
     RESULT: ClassVar[type[BaseModel] | Callable[[], type[BaseModel]]]
+    TOLD: ClassVar[str] = ""
     SHOWS: ClassVar[str]
     SWEEPS: ClassVar[str] = ""
     COUNTED: ClassVar[str] = "points"
@@ -150,6 +152,11 @@ class Study(SceneRequest):
     def sweeps(cls, _found: Any) -> tuple[SweepRecord, ...]:
         """Return the responses to be stored."""
         return ()
+
+    @classmethod
+    def tell(cls) -> Tell | None:
+        """Return what puts a result in words."""
+        return (lambda result: on_demand(cls.TOLD)(result)) if cls.TOLD else None
 
     @classmethod
     def drawn(cls) -> bool:
@@ -220,7 +227,9 @@ class Study(SceneRequest):
         summary = (inspect.getdoc(cls) or "").partition("\n")[0]
         return JobKind(
             name=cls.NAME, summary=summary, request=cls, resolve=resolve, run=cls.run, result=cls.RESULT,
-            view=KindView(result=cls.SHOWS, sweeps=cls.SWEEPS, draw=cls.draw if cls.drawn() else None),
+            view=KindView(
+                result=cls.SHOWS, sweeps=cls.SWEEPS, tell=cls.tell(), draw=cls.draw if cls.drawn() else None
+            ),
         )  # fmt: skip
 
 

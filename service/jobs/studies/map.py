@@ -45,6 +45,7 @@ class Map(Study, RangeRequest):
 
     model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE]})
     NAME, FUNCTION, RESULT = "map", "solver:response_map", map_result
+    TOLD = "solver.views.tables.tracks:response_map"
     SHOWS, SWEEPS = "the amplitude on the grid, the ridge of its peaks", "those that look for peaks"
     FIGURE = "service.jobs.drawing:map_of"
 

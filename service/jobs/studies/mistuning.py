@@ -77,6 +77,7 @@ class Mistuning(Study, HarmonicRequest):
 
     model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE]})
     NAME, FUNCTION, RESULT = "mistuning", "solver:mistuning_study", mistuning_result
+    TOLD = "solver.views.tables.disks:mistuning"
     SHOWS = "the magnification over many disks and the worst of them ([disks](disks.md))"
     SWEEPS, COUNTED = "the tuned disk's, and that of the worst blade", "disks"
     EMPTY = ("worst", "the peaks of no disk are known")

@@ -38,6 +38,7 @@ class Peaks(Study, RangeRequest):
         }
     )
     NAME, FUNCTION, RESULT = "peaks", "solver:track_peak", peaks_result
+    TOLD = "solver.views.tables.tracks:track"
     SHOWS = "the highest peak over the parameter, where it is least ([peaks](peaks.md))"
     EMPTY = ("parameter", "no peak was tracked")
     SWEEPS, COUNTED = "those that look for peaks", "sweeps"

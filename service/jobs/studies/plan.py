@@ -33,6 +33,7 @@ class Plan(Study, HarmonicRequest):
 
     model_config = ConfigDict(json_schema_extra={"examples": [EXAMPLE]})
     NAME, FUNCTION, RESULT = "plan", "solver:plan", plan_result
+    TOLD = "solver.views.tables.responses:plan"
     SHOWS = "the effects in use and left out, sizes and estimated cost"
 
     effects: EffectsWord = AUTO
