@@ -47,7 +47,7 @@ class Map(Study, RangeRequest):
     NAME, FUNCTION, RESULT = "map", "solver:response_map", map_result
     TOLD = "solver.views.tables.tracks:response_map"
     SHOWS, SWEEPS = "the amplitude on the grid, the ridge of its peaks", "those that look for peaks"
-    FIGURE = "service.jobs.drawing:map_of"
+    FIGURE = "solver.views.plots.tracks:map_figure"
 
     steps: Annotated[_Count, Flag(metavar="N")] = Field(default=60, description="Values of the parameter.")
     frequencies: Annotated[_Count, Flag(metavar="N")] = Field(
