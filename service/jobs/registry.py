@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, Protocol
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from service.errors import InvalidRequestError
-from service.jobs.outputs import JobOutput, Progress, Run, ShouldStop
 from solver.errors import Shown
 from solver.results.told import Block, Summary
 
@@ -24,6 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from service.jobs.checkpoints import Checkpoints
+    from service.jobs.outputs import JobOutput, Progress, Run, ShouldStop
     from service.jobs.parts import Division
 
 
@@ -248,7 +248,7 @@ class Resolved:
     scene_hash: str | None = None
 
 
-RunOn = Callable[[Mapping[str, Any], Progress, ShouldStop, "Checkpoints"], JobOutput]
+RunOn = Callable[[Mapping[str, Any], "Progress", "ShouldStop", "Checkpoints"], "JobOutput"]
 WarmUp = Callable[[], None]
 Resolve = Callable[[Any, SceneSource], Resolved]
 

@@ -25,8 +25,6 @@ from service.jobs.common.scenes import (
     resolved,
     stored_scene,
 )
-from service.jobs.figures import SweepRecord
-from service.jobs.outputs import JobOutput, OnProgress, Progress, ShouldStop
 from service.jobs.registry import (
     JobKind,
     Json,
@@ -45,6 +43,8 @@ from solver.results.watch import part_of
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from service.jobs.figures import SweepRecord
+    from service.jobs.outputs import JobOutput, OnProgress, Progress, ShouldStop
     from solver.results.dataset import Dataset
     from solver.scene.scene import Scene
 
@@ -122,7 +122,7 @@ class Study(SceneRequest):
     what is said then. Its docstring is the help of the command, the first line of which is its summary.
     """
 
-    model_config = ConfigDict(validate_by_alias=True)
+    model_config = ConfigDict(validate_by_alias=True, defer_build=True)
 
     NAME: ClassVar[str]
     FUNCTION: ClassVar[str]
@@ -211,6 +211,9 @@ class Study(SceneRequest):
     @classmethod
     def output(cls, answer: Answer, sweeps: Sequence[SweepRecord]) -> JobOutput:
         """Return what a worker gives back."""
+        # Loaded here: the command stores nothing.
+        from service.jobs.outputs import JobOutput
+
         shortfall = None if answer.reached else answer.status
         return JobOutput(result=answer.json, sweeps=tuple(sweeps), shortfall=shortfall)
 
