@@ -111,7 +111,7 @@ class DesignPeak(Piece):
 class DesignResult(MadeOfResponses, Drawn):
     """The best design found."""
 
-    VIEWS: ClassVar = Views("optim.views", "of_design", "of_design", "design_dataset")
+    VIEWS: ClassVar = Views("optim.views", "design:design", "of_design", "design_dataset")
     JSON: ClassVar = (
         "scene method optimum peak n_harmonics=problem.harmonics peaks band_hz limit bands objective rows"
         " held_by error_estimate stable stable_ground errors warnings plateau chosen_by certainty checked"

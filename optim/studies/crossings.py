@@ -85,7 +85,7 @@ class OrderResponse(Piece):
 class CampbellDiagram(MadeOfResponses, Drawn):
     """Orders of a running speed against the resonances of a scene."""
 
-    VIEWS: ClassVar = Views("optim.views", "of_campbell", "of_campbell", "campbell_dataset")
+    VIEWS: ClassVar = Views("optim.views", "studies:campbell", "of_campbell", "campbell_dataset")
     JSON: ClassVar = "scene speeds_rpm limit clear orders n_harmonics seconds completed=reached status"
 
     scene: Annotated[Scene, "With the values all responses share."]

@@ -96,7 +96,7 @@ class FrontEndStatus(NamedTuple):
 class ParetoResult(MadeOfResponses, Drawn):
     """The front of peak against band: designs of which none is better in both than another."""
 
-    VIEWS: ClassVar = Views("optim.views", "of_front", "designs:pareto_figure", "front_dataset")
+    VIEWS: ClassVar = Views("optim.views", "design:front", "designs:pareto_figure", "front_dataset")
     JSON: ClassVar = (
         "scene=problem.scene.name dof=problem.scene.observe.dof limit=problem.limit points knee dominated"
         " missed ends=ended evaluations seconds reached status"

@@ -64,7 +64,7 @@ class SensitivityResult(MadeOfResponses, Drawn):
     """Sensitivities of a design."""
 
     VIEWS: ClassVar = Views(
-        "optim.views", "of_sensitivities", "designs:sensitivities_figure", "sensitivities_dataset"
+        "optim.views", "studies:shares", "designs:sensitivities_figure", "sensitivities_dataset"
     )
     JSON: ClassVar = (
         "scene peaks band_hz limit band_by_limit rows left_out peak_certificate=branch.peak_certificate"

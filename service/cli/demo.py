@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 import solver
+from optim.views.tables.design import design
 from service.cli.failures import ShortfallError
 from service.cli.progress import Reporter, bars, patience
 from service.client.embedded import EmbeddedService
@@ -20,8 +21,7 @@ from service.db.models import JobState
 from service.errors import InputError
 from service.jobs.drawing import response_of
 from service.jobs.kinds import warm_up
-from service.rendering.tables import design as design_reports
-from service.rendering.tables.text import say
+from service.rendering.text import print_told, say
 from service.schemas.answers import JobAnswer, SweepDetail
 from service.settings.settings import load_settings
 from solver.views.plots.html import save
@@ -120,7 +120,7 @@ def _designs(service: EmbeddedService, cases: Sequence[DemoCase]) -> list[JobAns
     for case, job in zip(cases, submitted, strict=True):
         with bars([f"design {case.scene}"], "responses") as reporters:
             ((done,),) = _follow(service, [[job]], reporters)
-        design_reports.design(service.results(done.id).result)
+        print_told(design(service.results(done.id).result))
         say("")
         ended.append(done)
     return ended

@@ -22,8 +22,7 @@ from service.cli.options.parameters import keyword, with_parameters
 from service.cli.progress import bar
 from service.errors import InputError
 from service.jobs.study import Answer, Study, Watch
-from service.rendering.plain import print_result
-from service.rendering.tables.text import show
+from service.rendering.text import print_result, show
 from solver.errors import SettingError
 from solver.results.views import on_demand
 from solver.results.watch import stopped_by_interrupt
@@ -201,5 +200,5 @@ def give(study: type[Study], answer: Answer, outputs: Outputs, scene: Scene, *, 
         outputs.write(answer.result, draw, scene=scene)
     elif answer.reached and outputs.file is not None:
         raise InputError(f"`--out`: what `{study.NAME}` finds is no table, take --json")
-    show(answer.json, partial(print_result, study.NAME), as_json=as_json)
+    show(answer.json, partial(print_result, study.NAME, tell=study.tell()), as_json=as_json)
     end(answer.reached, answer.status)

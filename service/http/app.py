@@ -72,41 +72,49 @@ def create_app(settings: Settings | None = None, registry: Registry | None = Non
         redoc_url=None,
         telemetry={"tracing": False, "metrics": False, "logs": False, "auto_configure": False},
     )
+    _guard(app, service)
+    events.install(app)
+    for router in (jobs.submissions(service.registry), *_ROUTERS):
+        app.include_router(router)
+    if service.settings.oidc_issuer is not None:
+        _offer_login(app, service)
+    openapi.install(app, service.registry)
+    return app
+
+
+_ROUTERS = (
+    jobs.router, forms.kinds, forms.laws, events.router, stored.designs, stored.results,
+    stored.sweeps, scenes.texts,
+    forms.templates, scenes.router, uploads.router, uploads.matrices, uploads.measurements, scenes.plans,
+    scenes.previews, runs.projects, runs.reports, run_list.router, runs.runs, runs.shares, metrics.router,
+    page.reference, page.router,
+)  # fmt: skip
+
+
+def _guard(app: FastAPI, service: Service) -> None:
+    """Put before the routes what admits, counts and logs requests, and where they find it."""
+    settings = service.settings
     app.state.service = service
     app.state.metrics = Metrics(service)
     app.state.turns = BodyTurns()
     app.state.probe = Probe(service)
     app.state.looks = Looks(service)
     app.state.large = LargeAnswers()
-    app.state.connections = connections = _connections(service.settings)
-    service.lanes.guard(connections.require_taken)
+    app.state.authenticator = Authenticator(service.keys, settings, service.jobs.now)
+    app.state.connections = Connections(
+        settings.connections, settings.header_seconds, settings.write_seconds, settings.unsent_bytes
+    )
+    service.lanes.guard(app.state.connections.require_taken)
     # The last one added is the outermost.
     app.add_middleware(HeadAsGet)
-    authenticator = Authenticator(service.keys, service.settings, service.jobs.now)
-    app.state.authenticator = authenticator
     app.add_middleware(
-        Admission, authenticator=authenticator, concurrency=ConcurrencyLimits(service.settings)
+        Admission, authenticator=app.state.authenticator, concurrency=ConcurrencyLimits(settings)
     )
-    app.add_middleware(HostCheck, hosts=service.settings.hosts)
+    app.add_middleware(HostCheck, hosts=settings.hosts)
     app.add_middleware(RequestMetrics, metrics=app.state.metrics)
     app.add_middleware(RequestLog)
     problems.install(app)
-    app.add_middleware(HeadersAndAudit, settings=service.settings)
-    app.add_middleware(InPieces)
-    events.install(app)
-    app.include_router(jobs.submissions(service.registry))
-    for router in (
-        jobs.router, forms.kinds, forms.laws, events.router, stored.designs, stored.results,
-        stored.sweeps, scenes.texts,
-        forms.templates, scenes.router, uploads.router, uploads.matrices, uploads.measurements, scenes.plans,
-        scenes.previews, runs.projects, runs.reports, run_list.router, runs.runs, runs.shares, metrics.router,
-        page.reference, page.router,
-    ):  # fmt: skip
-        app.include_router(router)
-    if service.settings.oidc_issuer is not None:
-        _offer_login(app, service)
-    openapi.install(app, service.registry)
-    return app
+    app.add_middleware(HeadersAndAudit, settings=settings)
 
 
 def _offer_login(app: FastAPI, service: Service) -> None:
@@ -120,12 +128,6 @@ def _offer_login(app: FastAPI, service: Service) -> None:
         ) from error
     app.state.login = Login(service.settings, service.keys, service.jobs.now)
     app.include_router(login.router)
-
-
-def _connections(settings: Settings) -> Connections:
-    return Connections(
-        settings.connections, settings.header_seconds, settings.write_seconds, settings.unsent_bytes
-    )
 
 
 def _say_if_nobody_can_come_in(service: Service) -> None:

@@ -217,10 +217,7 @@ def _output(arrays: Arrays) -> PartOutput:
     data = {name: array.tobytes() for name, array in arrays.items() if name.startswith(_ARRAY)}
     return PartOutput(
         result=about["result"],
-        arrays={
-            name.removeprefix(_ARRAY): StoredArray(sha256=hashlib.sha256(stored).hexdigest(), data=stored)
-            for name, stored in data.items()
-        },
+        arrays={name.removeprefix(_ARRAY): StoredArray.of_bytes(stored) for name, stored in data.items()},
         points=about["points"],
         final=about["final"],
     )

@@ -6,6 +6,8 @@ sweep, have its name as their label; a word is its own label.
 
 from __future__ import annotations
 
+import hashlib
+import io
 import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -13,6 +15,7 @@ from dataclasses import dataclass, field, fields
 from datetime import datetime
 from functools import cache
 from typing import (
+    TYPE_CHECKING,
     Annotated,
     Any,
     ClassVar,
@@ -26,6 +29,11 @@ from typing import (
 )  # fmt: skip
 
 from pydantic import BaseModel
+
+from service.errors import DatabaseError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 SWEEP, DESIGN = "sweep", "design"
 STATUS = "status"
@@ -176,10 +184,40 @@ class ContactValues:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StoredArray:
-    """An array as it is stored: npy bytes and their SHA-256 in hexadecimal."""
+    """An array as it is stored: NumPy's npy bytes, never pickle, and their SHA-256 in hexadecimal."""
 
     sha256: str
     data: bytes
+
+    @classmethod
+    def of_bytes(cls, data: bytes) -> Self:
+        """Return bytes with their checksum."""
+        return cls(sha256=hashlib.sha256(data).hexdigest(), data=data)
+
+    @classmethod
+    def of(cls, array: NDArray[Any]) -> Self:
+        """Return an array of numbers as bytes; one of objects is an error of the program (ValueError)."""
+        # Loaded here, as below: who lists what is stored needs no NumPy.
+        import numpy as np
+
+        buffer = io.BytesIO()
+        np.save(buffer, np.ascontiguousarray(array), allow_pickle=False)
+        return cls.of_bytes(buffer.getvalue())
+
+    def array(self) -> NDArray[Any]:
+        """Return the array.
+
+        Raises
+        ------
+        DatabaseError
+            The bytes are not those that were stored.
+        """
+        import numpy as np
+
+        if hashlib.sha256(self.data).hexdigest() != self.sha256:
+            raise DatabaseError("a stored array does not match its checksum: the database is damaged")
+        found: NDArray[Any] = np.load(io.BytesIO(self.data), allow_pickle=False)
+        return found
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -16,13 +16,14 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, Protocol
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from service.errors import InvalidRequestError
-from service.jobs.outputs import JobOutput, Progress, Run, ShouldStop
 from solver.errors import Shown
+from solver.results.told import Block, Summary
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from service.jobs.checkpoints import Checkpoints
+    from service.jobs.outputs import JobOutput, Progress, Run, ShouldStop
     from service.jobs.parts import Division
 
 
@@ -87,12 +88,10 @@ class NothingToDrawError(Exception):
     """A result without anything a picture could show; the message says why."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PrintedResult:
-    """What is printed of a result: a title, and names with their values."""
-
-    title: str
-    pairs: Sequence[tuple[str, str]]
+PrintedResult = Summary
+"""What is printed of a result: a title, and names with their values."""
+Tell = Callable[[Json], Summary | Iterable[Block]]
+"""From a result to what is printed of it: names with values, and tables."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -120,7 +119,7 @@ class KindView:
     sweeps: str = ""
     keys: str = ""
     flags: Mapping[str, str] = field(default_factory=dict)
-    tell: Callable[[Json], PrintedResult] | None = None
+    tell: Tell | None = None
     draw: Draw | None = None
 
 
@@ -247,7 +246,7 @@ class Resolved:
     scene_hash: str | None = None
 
 
-RunOn = Callable[[Mapping[str, Any], Progress, ShouldStop, "Checkpoints"], JobOutput]
+RunOn = Callable[[Mapping[str, Any], "Progress", "ShouldStop", "Checkpoints"], "JobOutput"]
 WarmUp = Callable[[], None]
 Resolve = Callable[[Any, SceneSource], Resolved]
 

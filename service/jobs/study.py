@@ -25,8 +25,6 @@ from service.jobs.common.scenes import (
     resolved,
     stored_scene,
 )
-from service.jobs.figures import SweepRecord
-from service.jobs.outputs import JobOutput, OnProgress, Progress, ShouldStop
 from service.jobs.registry import (
     JobKind,
     Json,
@@ -36,6 +34,7 @@ from service.jobs.registry import (
     Resolved,
     SceneSource,
     StoredSweep,
+    Tell,
 )
 from solver.errors import Issue, SettingError
 from solver.results.views import on_demand
@@ -44,6 +43,8 @@ from solver.results.watch import part_of
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from service.jobs.figures import SweepRecord
+    from service.jobs.outputs import JobOutput, OnProgress, Progress, ShouldStop
     from solver.results.dataset import Dataset
     from solver.results.told import Told
     from solver.scene.scene import Scene
@@ -117,16 +118,17 @@ class Study(SceneRequest):
     """Root of the studies: the keys are fields, an alias is how bodies and options call one.
 
     A subclass says its NAME, the FUNCTION that computes (``"solver:track_peak"``), the model of its RESULT;
-    for people what it SHOWS, which SWEEPS it stores, what its progress has COUNTED; of its picture what
-    makes the FIGURE, and the key that is EMPTY where there is none, with what is said then. Its docstring
-    is the help of the command, the first line of which is its summary.
+    for people what it SHOWS, by which function a result is TOLD, which SWEEPS it stores, what its progress
+    has COUNTED; of its picture what makes the FIGURE, and the key that is EMPTY where there is none, with
+    what is said then. Its docstring is the help of the command, the first line of which is its summary.
     """
 
-    model_config = ConfigDict(validate_by_alias=True)
+    model_config = ConfigDict(validate_by_alias=True, defer_build=True)
 
     NAME: ClassVar[str]
     FUNCTION: ClassVar[str]
     RESULT: ClassVar[type[BaseModel] | Callable[[], type[BaseModel]]]
+    TOLD: ClassVar[str] = ""
     SHOWS: ClassVar[str]
     SWEEPS: ClassVar[str] = ""
     COUNTED: ClassVar[str] = "points"
@@ -158,6 +160,11 @@ class Study(SceneRequest):
     def sweeps(cls, _found: Any) -> tuple[SweepRecord, ...]:
         """Return the responses to be stored."""
         return ()
+
+    @classmethod
+    def tell(cls) -> Tell | None:
+        """Return what puts a result in words."""
+        return (lambda result: on_demand(cls.TOLD)(result)) if cls.TOLD else None
 
     @classmethod
     def drawn(cls) -> bool:
@@ -212,6 +219,9 @@ class Study(SceneRequest):
     @classmethod
     def output(cls, answer: Answer, sweeps: Sequence[SweepRecord]) -> JobOutput:
         """Return what a worker gives back."""
+        # Loaded here: the command stores nothing.
+        from service.jobs.outputs import JobOutput
+
         shortfall = None if answer.reached else answer.status
         return JobOutput(result=answer.json, sweeps=tuple(sweeps), shortfall=shortfall)
 
@@ -228,7 +238,9 @@ class Study(SceneRequest):
         summary = (inspect.getdoc(cls) or "").partition("\n")[0]
         return JobKind(
             name=cls.NAME, summary=summary, request=cls, resolve=resolve, run=cls.run, result=cls.RESULT,
-            view=KindView(result=cls.SHOWS, sweeps=cls.SWEEPS, draw=cls.draw if cls.drawn() else None),
+            view=KindView(
+                result=cls.SHOWS, sweeps=cls.SWEEPS, tell=cls.tell(), draw=cls.draw if cls.drawn() else None
+            ),
         )  # fmt: skip
 
 

@@ -11,7 +11,6 @@ from typing import Any
 
 from service.db.repositories import ResultRepository
 from service.errors import NotAcceptableError
-from service.jobs.arrays import decode
 from service.jobs.figures import SweepRecord
 from service.jobs.strict_json import digest
 from service.schemas.answers import SweepDetail
@@ -184,7 +183,7 @@ def sweep_dataset(
     ----------
     scene : that of its job; it is told only if it is the one that was swept.
     """
-    arrays = {name: decode(stored) for name, stored in repository.arrays(row.id).items()}
+    arrays = {name: stored.array() for name, stored in repository.arrays(row.id).items()}
     names = [contact.name for contact in row.contacts]
     states = arrays.get("states")
     swept = None

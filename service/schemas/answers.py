@@ -14,7 +14,6 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from service.db.models import JobState, StoredScene
 from service.db.repositories import JobRow, ResultRepository
-from service.jobs.arrays import decode
 from service.jobs.figures import DESIGN, SWEEP, DesignRecord, Quantity, Record, SweepRecord
 from service.jobs.outputs import AttemptProgress
 
@@ -198,7 +197,7 @@ class SweepDetail(SweepAnswer):
     @classmethod
     def load(cls, row: SweepRecord, repository: ResultRepository) -> Self:
         """The sweep with its arrays."""
-        arrays = {name: _listed(decode(array)) for name, array in repository.arrays(row.id).items()}
+        arrays = {name: _listed(array.array()) for name, array in repository.arrays(row.id).items()}
         return cls.of(row, arrays=arrays)
 
 

@@ -9,7 +9,6 @@ import numpy as np
 
 from service.db.models import JobState
 from service.db.repositories.runs import RunRow
-from service.jobs.arrays import decode
 from service.jobs.figures import SweepRecord
 from service.queue.core import Service
 from service.schemas.answers import Peak
@@ -112,7 +111,7 @@ def _sweep(service: Service, run: RunRow, peak: Peak | None) -> SweepRecord | No
 def _curve(service: Service, sweep: SweepRecord, points: int) -> SmallCurve:
     arrays = service.stored.arrays(sweep.id)
     frequency, amplitude = (
-        np.asarray(decode(arrays[name]), dtype=float) for name in ("parameter", "amplitude")
+        np.asarray(arrays[name].array(), dtype=float) for name in ("parameter", "amplitude")
     )
     stretches = np.array_split(np.arange(frequency.size), min(points, frequency.size))
     tops = [part[int(np.argmax(amplitude[part]))] for part in stretches if part.size]

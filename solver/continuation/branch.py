@@ -95,7 +95,7 @@ class AnyBranch(Drawn):
     A `Branch` has them by continuation of a balance of harmonics, an `ExactBranch` by exact orbits.
     """
 
-    VIEWS: ClassVar = Views("solver.views", "of_branch", "of_branch", "branch_dataset")
+    VIEWS: ClassVar = Views("solver.views", "responses:branch", "of_branch", "branch_dataset")
     JSON: ClassVar = (
         "scene parameter=values parameter_path=parameter unit speed_rpm=speeds_rpm amplitude"
         " half_peak_to_peak mean peak peaks=interior_peaks stable=highest_stability.stable"
@@ -277,7 +277,7 @@ class AnyBranch(Drawn):
         ax : axes to draw into, else a new figure.
         limit : amplitude [m] drawn as a line.
         """
-        figure: Figure = self.VIEWS.call("plots.figures", self, ax=ax, limit=limit)
+        figure: Figure = self.VIEWS.call("figure", self, ax=ax, limit=limit)
         return figure
 
     @property

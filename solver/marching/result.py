@@ -52,7 +52,7 @@ class MarchStatus(Enum):
 class MarchResult(Drawn):
     """The last period of a time march, from the run with the smaller step; n samples."""
 
-    VIEWS: ClassVar = Views("solver.views", "of_march", "of_march")
+    VIEWS: ClassVar = Views("solver.views", "responses:march", "of_march")
     DATA: ClassVar = Data(
         "march", {"time": "time displacement velocity", "contact": "contact=contacts",
         "contact time": "slip force=contact_force normal_load"},
@@ -98,7 +98,7 @@ class MarchResult(Drawn):
         ax : axes to draw into, else a new figure.
         scene : what was marched, for the title.
         """
-        figure: Figure = self.VIEWS.call("plots.figures", self, ax=ax, scene=scene)
+        figure: Figure = self.VIEWS.call("figure", self, ax=ax, scene=scene)
         return figure
 
     def to_json(self) -> dict[str, Any]:

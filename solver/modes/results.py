@@ -76,7 +76,7 @@ class ModalCurve(Drawn):
 class NonlinearMode(ModalCurve):
     """Frequency and damping ratio of a mode over its amplitude; n points along the curve."""
 
-    VIEWS: ClassVar = Views("solver.views", "of_mode", "modes:mode_figure")
+    VIEWS: ClassVar = Views("solver.views", "modes:mode", "modes:mode_figure")
     DATA: ClassVar = Data(
         "modes", {"point": "amplitude frequency=frequency_hz damping_ratio frequency_error damping_error"
          " max_abs forcing", **OF_CONTACTS, "dof": "dof=scene.dofs",

@@ -68,7 +68,7 @@ class SolutionStatus(Enum):
 class Solution(Drawn):
     """A periodic response at one frequency."""
 
-    VIEWS: ClassVar = Views("solver.views", "of_solution", "of_solution", "solution_dataset")
+    VIEWS: ClassVar = Views("solver.views", "responses:solution", "of_solution", "solution_dataset")
     JSON: ClassVar = (
         "scene frequency_hz converged status max_abs half_peak_to_peak mean harmonics flags contacts"
         " stable=stability.stable stable_ground=stability.ground unique unique_ground residual error_estimate"

@@ -9,7 +9,7 @@ from enum import Enum
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from solver.results.known import Known, worst_of
-from solver.results.told import Summary, Told
+from solver.results.told import Block, Summary, Told
 from solver.results.views import Data, Views
 
 if TYPE_CHECKING:
@@ -45,10 +45,17 @@ class Shown(Told):
         warnings.warn("result.completed is result.reached now", DeprecationWarning, stacklevel=2)
         return self.reached
 
+    def blocks(self) -> Sequence[Block]:
+        """What people read of it: names with values, and tables."""
+        return tuple(self.VIEWS.call("told", self)) if hasattr(self, "VIEWS") else super().blocks()
+
     def summary(self) -> Summary:
-        """What is most worth knowing, in words and with units."""
-        found: Summary = self.VIEWS.call("summary", self)
-        return found
+        """What is most worth knowing, in words and with units; the last line is the status."""
+        blocks = self.blocks()
+        pairs = [(name.strip(), value) for block in blocks for name, value in block.pairs]
+        status = getattr(self, "status", None)
+        ended = [("status", status.value)] if isinstance(status, Enum) else []
+        return Summary(blocks[0].title, (*pairs, *ended))
 
     def to_dataset(self) -> Dataset:
         """The result as named arrays with dimensions, units and attributes; SI units."""
@@ -85,11 +92,12 @@ class MadeOfResponses(Shown):
         """How well the numbers are known: the largest error of a response relative to its peak, all flags."""
         return worst_of(self.known_parts())
 
-    def summary(self) -> Summary:
-        """What is most worth knowing, in words and with units; the last line is the status."""
-        found = super().summary()
-        said = [pair for pair in self.known.pairs() if pair not in found.pairs]
-        return replace(found, pairs=(*found.pairs[:-1], *said, *found.pairs[-1:]))
+    def blocks(self) -> Sequence[Block]:
+        """What people read of it: names with values, and tables."""
+        blocks = super().blocks()
+        said = {value for block in blocks for _, value in block.pairs}
+        further = [pair for pair in self.known.pairs() if pair[1] not in said]
+        return (*blocks, Summary("", further)) if further else blocks
 
     def to_dataset(self) -> Dataset:
         """The result as named arrays with dimensions, units and attributes; SI units."""
@@ -111,7 +119,7 @@ class Drawn(Shown):
 
     def plot(self, ax: Axes | Sequence[Axes] | None = None) -> Figure:
         """Draw the result; `ax`: axes to draw into, else a new figure."""
-        figure: Figure = self.VIEWS.call("plots.figures", self, ax=ax)
+        figure: Figure = self.VIEWS.call("figure", self, ax=ax)
         return figure
 
 

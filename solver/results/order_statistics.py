@@ -8,7 +8,8 @@ Statistical Intervals, Wiley 1991, section 5.2). Samples of a Latin hypercube te
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 CONFIDENCE = 0.95
 
@@ -53,3 +54,28 @@ def quantile_json(name: str, value: float, values: Sequence[float], share: float
         "share": share, name: value if known and enough(len(values), share) else None,
         "interval": [end if math.isfinite(end) else None for end in ends], "confidence": CONFIDENCE,
     }  # fmt: skip
+
+
+def quantile_words(
+    found: Mapping[str, Any], key: str, samples: str, show: Callable[[float], str] = "{:.4g}".format
+) -> str:
+    """Return a quantile with the ends between which it lies; that so few samples do not tell it.
+
+    Parameters
+    ----------
+    found : of `quantile_json`; one of an earlier version has no interval.
+    key, samples : name of the value, and what the samples are called.
+    show : puts a number in words.
+    """
+    value = found[key]
+    if "interval" not in found:
+        return "not known" if value is None else show(value)
+    low, high = (None if end is None else show(end) for end in found["interval"])
+    sure = f"{100.0 * found['confidence']:g} % sure"
+    ends = {
+        (True, True): f"{sure}: {low} to {high}", (True, False): f"{sure}: {low} or more, no upper end known",
+        (False, True): f"{sure}: {high} or less, no lower end known", (False, False): "no end known",
+    }[low is not None, high is not None]  # fmt: skip
+    if value is None:
+        return f"not told, at least {needed(found['share'])} {samples} are needed ({ends})"
+    return f"{show(value)} ({ends})"

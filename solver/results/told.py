@@ -6,7 +6,7 @@ import math
 import re
 from abc import ABC, abstractmethod
 from ast import literal_eval
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from enum import Enum
 from functools import cache
@@ -18,6 +18,7 @@ _MOST = 30
 _FEW = 6
 _DIGITS = 5
 _DESCRIBED = re.compile(r"Annotated\[(.+?), (['\"].+['\"])\]")
+_NUMBER = re.compile(r"[≤≥±\s]*[-+]?\d")
 UNIT = re.compile(r" ?\[([^]]+)\]")
 
 
@@ -72,23 +73,72 @@ def at(value: Any, path: str) -> Any:
     return value
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+Pairs = Sequence[tuple[str, str]]
+
+
+@dataclass(frozen=True, slots=True)
 class Summary:
-    """What is most worth knowing of a result: a title, and names with their values."""
+    """What is worth knowing of a result: a title, and names with their values."""
 
     title: str
-    pairs: tuple[tuple[str, str], ...]
+    pairs: Pairs
+
+    def html(self, caption: str) -> str:
+        """A table of a notebook."""
+        return _html(caption, (), self.pairs)
 
 
-def html_table(kind: str, found: Summary) -> str:
-    """A summary as a table of a notebook."""
-    rows = "".join(
-        f"<tr><th style='text-align:left'>{escape(name)}</th><td style='text-align:left'>{escape(value)}"
-        "</td></tr>"
-        for name, value in found.pairs[:_MOST]
+@dataclass(frozen=True, slots=True)
+class Table:
+    """Rows of a result under the heads of their columns."""
+
+    title: str
+    columns: Sequence[str]
+    rows: Sequence[Sequence[str]]
+
+    @property
+    def pairs(self) -> Pairs:
+        """The rows as names with values, the first and the last of many."""
+        rows = self.rows if len(self.rows) <= _FEW else (self.rows[0], self.rows[-1])
+        named = (
+            [" ".join(filter(None, one)) for one in zip(self.columns, row, strict=True) if one[1]]
+            for row in rows
+        )
+        return [(name, " ".join(", ".join(rest).split())) for name, *rest in named if rest]
+
+    @property
+    def numbers(self) -> tuple[bool, ...]:
+        """Which columns hold numbers alone, which are aligned right."""
+        columns = [[cell for cell in column if cell] for column in zip(*self.rows, strict=True)]
+        return tuple(bool(column) and all(map(_NUMBER.match, column)) for column in columns)
+
+    def html(self, caption: str) -> str:
+        """A table of a notebook."""
+        return _html(caption, self.columns, self.rows)
+
+
+Block = Summary | Table
+
+
+def html_of(kind: str, blocks: Iterable[Block]) -> str:
+    """What is told of a result as tables of a notebook."""
+    first, *others = blocks
+    caption = " · ".join(part for part in (kind, first.title) if part)
+    return "".join([first.html(caption), *(other.html(other.title) for other in others)])
+
+
+def _html(caption: str, heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    def line(cells: Sequence[str], first: str) -> str:
+        tags = (first, *("td" for _ in cells[1:])) if first == "th" else ("td" for _ in cells)
+        listed = zip(tags, cells, strict=True)
+        return "".join(f"<{tag} style='text-align:left'>{escape(cell)}</{tag}>" for tag, cell in listed)
+
+    head = "".join(f"<th style='text-align:left'>{escape(one)}</th>" for one in heads)
+    body = "".join(f"<tr>{line(row, 'td' if heads else 'th')}</tr>" for row in rows[:_MOST])
+    return (
+        f"<table><caption style='text-align:left'>{escape(caption)}</caption>"
+        f"{f'<thead><tr>{head}</tr></thead>' if heads else ''}<tbody>{body}</tbody></table>"
     )
-    caption = " · ".join(escape(part) for part in (kind, found.title) if part)
-    return f"<table><caption style='text-align:left'>{caption}</caption><tbody>{rows}</tbody></table>"
 
 
 class Told(ABC):
@@ -152,6 +202,10 @@ class Told(ABC):
     def summary(self) -> Summary:
         """What is most worth knowing, in words and with units."""
 
+    def blocks(self) -> Sequence[Block]:
+        """What people read of it: names with values, and tables."""
+        return (self.summary(),)
+
     def __repr__(self) -> str:
         found = self.summary()
         pairs = ", ".join(f"{name} {value}" for name, value in found.pairs)
@@ -159,8 +213,8 @@ class Told(ABC):
         return f"<{type(self).__name__}{title}: {pairs}>"
 
     def _repr_html_(self) -> str:
-        """Return the summary as a table, for notebooks."""
-        return html_table(type(self).__name__, self.summary())
+        """Return what people read of it as tables, for notebooks."""
+        return html_of(type(self).__name__, self.blocks())
 
 
 class Piece(Told):

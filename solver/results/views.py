@@ -43,23 +43,29 @@ class Views:
 
     Parameters
     ----------
-    package : where the modules ``summary``, ``to_dataset`` and ``plots.figures`` stand.
-    summary, dataset : names of functions there; ``described`` makes the data set that the class says.
-    figure : that of a function of ``plots.figures``, or ``module:name`` of one in ``plots`` that draws what
-        `to_json` gives; empty where there is no picture.
+    package : where ``tables``, ``summary``, ``to_dataset`` and ``plots.figures`` stand.
+    told : ``module:name`` of a function in ``tables`` that puts in words what `to_json` gives, or the name of
+        one of ``summary``.
+    dataset : name of a function; ``described`` makes the data set that the class says.
+    figure : ``module:name`` of a function in ``plots`` that draws what `to_json` gives, or the name of one of
+        ``plots.figures``; empty where there is no picture.
     """
 
     package: str
-    summary: str
+    told: str
     figure: str = ""
     dataset: str = "described"
 
     def call(self, what: str, result: Any, *arguments: Any, **options: Any) -> Any:
-        """Show a result: `what` is ``summary``, ``to_dataset`` or ``plots.figures``."""
-        name = {"summary": self.summary, "to_dataset": self.dataset, "plots.figures": self.figure}[what]
+        """Show a result: `what` is ``told``, ``to_dataset`` or ``figure``."""
+        of_json, of_result, name = {
+            "told": ("tables.", "summary:", self.told),
+            "to_dataset": ("", "to_dataset:", self.dataset),
+            "figure": ("plots.", "plots.figures:", self.figure),
+        }[what]
         if ":" in name:
-            return on_demand(f"{self.package}.plots.{name}")(result.to_json(), *arguments, **options)
-        return on_demand(f"{self.package}.{what}:{name}")(result, *arguments, **options)
+            return on_demand(f"{self.package}.{of_json}{name}")(result.to_json(), *arguments, **options)
+        return on_demand(f"{self.package}.{of_result}{name}")(result, *arguments, **options)
 
 
 def on_demand(place: str) -> Callable[..., Any]:

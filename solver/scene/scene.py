@@ -25,7 +25,7 @@ from solver.contacts.laws.gap import GapSpring
 from solver.contacts.laws.polynomial import PolynomialSpring
 from solver.errors import SceneError, SettingError
 from solver.extensions import on_change
-from solver.results.told import Summary, html_table
+from solver.results.told import Summary, html_of
 from solver.results.units import number
 from solver.scene import parameter_paths as scene_paths
 from solver.scene.bodies import kinematics
@@ -194,7 +194,7 @@ class Scene(Part):
             value = number(found.get(), digits=6)
             rows.setdefault(owner, said).append(" ".join((key, value, found.unit)).rstrip())
         pairs = tuple((owner, ", ".join(said)) for owner, said in rows.items())
-        return html_table("Scene", Summary(title=repr(self)[len("<Scene ") : -1], pairs=pairs))
+        return html_of("Scene", [Summary(repr(self)[len("<Scene ") : -1], pairs)])
 
     @field_validator("excitation", mode="before")
     @classmethod

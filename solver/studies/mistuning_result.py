@@ -73,7 +73,7 @@ class MistunedDisk(Piece):
 class MistuningStudy(MadeOfResponses, Drawn):
     """What becomes of the highest peak when blades are not quite equal."""
 
-    VIEWS: ClassVar = Views("solver.views", "of_mistuning", "disks:mistuning_figure")
+    VIEWS: ClassVar = Views("solver.views", "disks:mistuning", "disks:mistuning_figure")
     DATA: ClassVar = Data(
         "mistuning", {"disk=disks": "seed magnification", "disk sector=disks": "factor=factors"
          " peak=peaks.value frequency=peaks.at_hz"},

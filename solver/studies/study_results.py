@@ -45,7 +45,7 @@ class AccuracyRow(Piece):
 class AccuracyStudy(Drawn):
     """Rows of `accuracy_study` with what they are measured against."""
 
-    VIEWS: ClassVar = Views("solver.views", "of_accuracy", "accuracy:accuracy_figure")
+    VIEWS: ClassVar = Views("solver.views", "responses:accuracy", "accuracy:accuracy_figure")
     DATA: ClassVar = Data(
         "accuracy", {"way=rows": "harmonics evaluator samples max_abs error milliseconds iterations"
          " residual pareto"}, "frequency_hz reference reference_harmonics reference_error",
@@ -78,7 +78,7 @@ class MapStatus(Enum):
 class ResponseMap(MadeOfResponses, Drawn):
     """max|x| of the observed DOF over a parameter and the frequency."""
 
-    VIEWS: ClassVar = Views("solver.views", "of_map", "of_map")
+    VIEWS: ClassVar = Views("solver.views", "tracks:response_map", "of_map")
     DATA: ClassVar = Data(
         "map", {"parameter": "parameter", "frequency": "frequency",
         "parameter frequency": "amplitude half_peak_to_peak", "ridge": "ridge_parameter=ridge.parameter"
@@ -126,7 +126,7 @@ class Effect(Piece):
 class Plan(Shown):
     """What solving a scene will take."""
 
-    VIEWS: ClassVar = Views("solver.views", "of_plan")
+    VIEWS: ClassVar = Views("solver.views", "responses:plan")
     DATA: ClassVar = Data("plan", {"effect=effects": "effect=name used reason"}, status="planned", scene="")
     JSON: ClassVar = (
         "scene effects unknowns linear_dofs contacts n_harmonics=harmonics"
@@ -215,7 +215,7 @@ class InterferenceDiagram(Drawn):
     """Natural frequencies of a disk over its nodal diameters, and the engine orders that meet them."""
 
     VIEWS: ClassVar = Views(
-        "solver.views", "of_interference", "disks:interference_figure", "interference_dataset"
+        "solver.views", "disks:interference", "disks:interference_figure", "interference_dataset"
     )
     JSON: ClassVar = (
         "scene sectors speed_rpm within diameters=points orders crossings missing seconds completed=reached"

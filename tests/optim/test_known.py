@@ -16,8 +16,9 @@ import pytest
 import optim
 import solver
 from optim.results.design import DesignStatus
+from optim.views.tables.robust import robust
 from service.cli import main
-from service.rendering.tables.robust import robust
+from service.rendering.text import print_told
 from solver.results.base import MadeOfResponses, Shown
 from solver.results.known import Known, worst_of
 from solver.results.order_statistics import enough, interval, needed
@@ -185,7 +186,7 @@ def test_quantiles_of_a_robust_design_come_with_their_confidence(capsys: pytest.
     low, high = by_share[0.75]["interval"]
     assert high is None or low <= by_share[0.75]["peak"] <= high
     assert by_share[0.75]["confidence"] == 0.95
-    robust(found.to_json())
+    print_told(robust(found.to_json()))
     told = capsys.readouterr().out
     assert "at least 20 samples are needed" in " ".join(told.split())
 

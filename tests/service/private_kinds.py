@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel, Field
 
-from service.jobs.arrays import encode
 from service.jobs.checkpoints import Checkpoints, RunParts
-from service.jobs.figures import ContactValues, SweepRecord
+from service.jobs.figures import ContactValues, StoredArray, SweepRecord
 from service.jobs.outputs import JobOutput, Progress, ShouldStop
 from service.jobs.registry import JobKind, JobRequest, Registry, Resolved
 from service.jobs.studies import map as maps
@@ -108,7 +107,10 @@ def _record(vector: np.ndarray, value: float, steps: int, index: int) -> SweepRe
         peak=value + index,
         newton_iterations=steps,
         contacts=(ContactValues(name="damper", kt=1.0, mu=0.3, N0=100.0 * index, N1=0.0, N1_phase=0.0),),
-        arrays={"parameter": encode(np.linspace(1.0, 2.0, vector.size)), "amplitude": encode(vector)},
+        arrays={
+            "parameter": StoredArray.of(np.linspace(1.0, 2.0, vector.size)),
+            "amplitude": StoredArray.of(vector),
+        },
     )
 
 

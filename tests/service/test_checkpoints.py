@@ -22,7 +22,6 @@ from service.db.clock import utc_now
 from service.db.engine import Database
 from service.db.models import Checkpoint, JobState
 from service.db.repositories import Attempt, JobRepository, NewJob
-from service.jobs.arrays import decode
 from service.jobs.checkpoints import Checkpoints, KeptPieces, UnusableError, packed, unpacked
 from service.jobs.kinds import SHIPPED
 from service.jobs.outputs import FailureKind, JobFailure, JobOutput, Pace, ResultPiece, ShouldStop, Silent
@@ -88,7 +87,7 @@ def is_what_it_would_have_been(service: Service, job_id: str, name: str) -> None
         stored = service.stored.arrays(row.id)
         assert stored.keys() == record.arrays.keys()
         for array in stored:
-            np.testing.assert_array_equal(decode(stored[array]), decode(record.arrays[array]))
+            np.testing.assert_array_equal(stored[array].array(), record.arrays[array].array())
     with service.database.reading() as connection:
         assert connection.execute(select(func.count()).select_from(Checkpoint)).scalar_one() == 0
 

@@ -23,7 +23,6 @@ from service.db.engine import Database, backup, is_sqlite, migrating, sqlite_not
 from service.db.models import NOBODY, Job, JobState, TableBase
 from service.db.repositories import Attempt, JobRepository, SceneRepository
 from service.errors import DatabaseError, DatabaseInUseError, WrongRevisionError
-from service.jobs.arrays import decode, encode
 from service.jobs.figures import StoredArray
 from service.jobs.outputs import FailureKind, JobFailure, JobOutput
 from service.queue.core import Service
@@ -323,12 +322,12 @@ def test_a_backup_is_a_database(file_url: str, tmp_path: Path) -> None:
 
 def test_arrays_are_numbers_with_a_checksum() -> None:
     array = np.arange(6.0).reshape(2, 3)
-    stored = encode(array)
-    np.testing.assert_array_equal(decode(stored), array)
+    stored = StoredArray.of(array)
+    np.testing.assert_array_equal(stored.array(), array)
     with pytest.raises(DatabaseError, match="checksum"):
-        decode(StoredArray(sha256=stored.sha256, data=stored.data[:-1] + b"x"))
+        StoredArray(sha256=stored.sha256, data=stored.data[:-1] + b"x").array()
     with pytest.raises(ValueError, match="Object arrays"):
-        encode(np.array([object()]))
+        StoredArray.of(np.array([object()]))
 
 
 def test_ids_sort_by_the_order_they_were_made() -> None:

@@ -12,7 +12,6 @@ from service.db import revisions
 from service.db.engine import database_path, is_sqlite, migrating
 from service.db.models import JobState
 from service.db.repositories.integrity import check
-from service.jobs.arrays import decode
 from service.queue.core import Service
 from service.settings.settings import load_settings
 
@@ -129,7 +128,7 @@ def test_a_service_of_today_works_with_what_the_first_one_stored(old: str) -> No
             assert results.result
             for sweep in results.sweeps:
                 arrays = service.stored.arrays(sweep.id)
-                assert decode(arrays["amplitude"]).shape == (sweep.points,)
+                assert arrays["amplitude"].array().shape == (sweep.points,)
                 # Nobody knows of a sweep of that version what stands between its points.
                 assert sweep.peaks_known is None
                 assert sweep.error_estimate is None

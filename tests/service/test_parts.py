@@ -10,7 +10,6 @@ from typing import Any
 import pytest
 
 import solver
-from service.jobs.arrays import decode
 from service.jobs.kinds import SHIPPED
 from service.jobs.outputs import JobOutput
 from service.jobs.parts import Account, Division, JobPart, PartOutput, PartStoppedError, final_one
@@ -83,7 +82,7 @@ def test_parts_in_any_order_and_through_json_give_the_same_job(
         for index in order
     }
     assert whole.sweeps
-    assert all(decode(array) is not None for output in outputs.values() for array in output.arrays.values())
+    assert all(array.array() is not None for output in outputs.values() for array in output.arrays.values())
     assert same_output(parts.joined(spec, outputs), whole)
 
 

@@ -25,8 +25,7 @@ from service.db.repositories.retention import Pruned, RetentionRepository
 from service.db.repositories.rows import RunWords
 from service.db.repositories.runs import Runs, Shares
 from service.errors import ConflictError, DatabaseError, StorageFullError
-from service.jobs.arrays import encode
-from service.jobs.figures import DesignRecord, SweepRecord
+from service.jobs.figures import DesignRecord, StoredArray, SweepRecord
 from service.jobs.outputs import JobOutput
 from service.queue.retention import Retention, prune, prune_database, prune_uploads
 
@@ -39,7 +38,7 @@ def sweep(points: int = 10) -> SweepRecord:
               "points": points, "peak": 1.0, "peak_at": 1.5, "limit": None, "band_hz": None,
               "newton_iterations": 1, "rejected_steps": 0, "seconds": 0.1, "completed": True,
               "status": "done"}  # fmt: skip
-    return SweepRecord(**values, arrays={"parameter": encode(np.zeros(points))})
+    return SweepRecord(**values, arrays={"parameter": StoredArray.of(np.zeros(points))})
 
 
 def design() -> DesignRecord:

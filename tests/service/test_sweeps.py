@@ -17,8 +17,7 @@ from service.db.models import NOBODY
 from service.db.repositories import JobRepository, NewJob, ResultRepository
 from service.db.repositories.results import insert_results
 from service.errors import InvalidRequestError
-from service.jobs.arrays import encode
-from service.jobs.figures import SWEEP, ContactValues, SweepRecord
+from service.jobs.figures import SWEEP, ContactValues, StoredArray, SweepRecord
 from service.jobs.outputs import JobOutput
 from service.jobs.strict_json import validated
 from service.schemas.answers import SweepDetail
@@ -58,7 +57,7 @@ def test_a_range_is_met_by_one_contact_alone(database: Database) -> None:
     attempt = jobs.claim("me", utc_now())
     assert attempt is not None
     two = replace(ONE, contacts=(contact("shroud", 10.0), contact("root", 1000.0)))
-    mean = encode(np.array([1.0, np.nan]))
+    mean = StoredArray.of(np.array([1.0, np.nan]))
     swept = replace(ONE, contacts=(contact("shroud", None),), arrays={"mean": mean})
     assert jobs.succeed(attempt, JobOutput(result={}, sweeps=(two, swept)))
 

@@ -33,7 +33,7 @@ from service.cli.importing.sector import (
 from service.cli.options.inputs import new_file, relative
 from service.cli.options.parameters import taking
 from service.errors import InputError
-from service.rendering.tables.text import print_json, print_pairs
+from service.rendering.text import print_json, print_pairs
 from solver.results.files import whole
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ import typer
 from service.cli.commands.service import settings_of
 from service.cli.options import shared as options
 from service.errors import InputError
-from service.rendering.tables.text import print_json, print_table, say
+from service.rendering.text import print_json, print_table, say
 
 if TYPE_CHECKING:
     from service.auth.callers import KeyLimits, Scope

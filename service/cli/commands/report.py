@@ -10,7 +10,7 @@ import typer
 from service.cli.options import inputs
 from service.cli.options import shared as options
 from service.errors import InputError
-from service.rendering.tables.text import say
+from service.rendering.text import say
 
 if TYPE_CHECKING:
     from service.rendering.report.sections import Designed

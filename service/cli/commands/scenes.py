@@ -11,8 +11,7 @@ import typer
 from service.cli import completion
 from service.cli.options import shared as options
 from service.errors import InputError
-from service.rendering.tables import results as reports
-from service.rendering.tables.text import print_json, say
+from service.rendering.text import print_json, print_table, say
 from solver.scene.json_schema import DIALECT, plain, scene_schema
 
 
@@ -71,8 +70,19 @@ def scenes(as_json: options.Json = False) -> None:
     known = [solver.load_scene(name) for name in solver.shipped_scenes()]
     if as_json:
         print_json({"scenes": [scene.name for scene in known]})
-    else:
-        reports.scenes(known)
+        return
+    rows = [
+        (
+            scene.name,
+            scene.structure.kind,
+            str(len(scene.dofs)),
+            ", ".join(contact.name for contact in scene.contacts),
+            scene.observe.dof,
+            f"{scene.observe.band[0]:g} to {scene.observe.band[1]:g} Hz",
+        )
+        for scene in known
+    ]
+    print_table("Shipped scenes", ("name", "kind", "DOFs", "contacts", "observed", "band"), rows)
 
 
 def schema(

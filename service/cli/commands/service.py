@@ -12,7 +12,7 @@ from service.cli.failures import FELL_SHORT
 from service.cli.options import shared as options
 from service.cli.options.inputs import age, count
 from service.errors import InputError
-from service.rendering.tables.text import print_json, print_pairs, say
+from service.rendering.text import print_json, print_pairs, say
 
 if TYPE_CHECKING:
     from service.settings.settings import Settings

@@ -13,7 +13,7 @@ import typer
 from service.cli.options.inputs import amount, count, new_file, relative, text
 from service.cli.options.shared import Json
 from service.errors import InputError
-from service.rendering.tables.text import print_pairs
+from service.rendering.text import print_pairs
 from solver.results.files import whole
 
 if TYPE_CHECKING:

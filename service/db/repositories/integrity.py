@@ -14,7 +14,6 @@ from service.db.engine import database_name, database_path, is_sqlite, read_engi
 from service.db.models import Job, JobResult, JobState, Project, Result, Run, SweepArray
 from service.db.revisions import head_revision, off_head
 from service.errors import DamagedDatabaseError, DatabaseError, WrongRevisionError
-from service.jobs.arrays import decode
 from service.jobs.figures import SWEEP, StoredArray
 
 # A job that ends as `successful` wrote its result with the same transaction, unless it repeats another's.
@@ -169,7 +168,7 @@ def check(url: str) -> Findings:
         damaged = []
         for sweep_id, name, stored in arrays(engine):
             try:
-                decode(stored)
+                stored.array()
             except (DatabaseError, ValueError) as error:
                 damaged.append(f"array `{name}` of sweep {sweep_id}: {error}")
         damaged += damaged_results(engine)

@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from pydantic import ConfigDict
-
 from optim.criteria.key import Name as Name
 from optim.criteria.key import Pair as Pair
 from optim.criteria.key import Ranges as Ranges
@@ -26,7 +24,6 @@ _OF_OTHERS = ("points", *ROBUST)
 class ProblemRequest(ProblemKeys, Study, HarmonicRequest):
     """A design problem as a study, in the words of `optim.design`; kinds add the keys of the criteria."""
 
-    model_config = ConfigDict(defer_build=True)
     COUNTED = "computed"
     KEYS: ClassVar[str] = ""
 

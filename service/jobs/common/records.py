@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from service.jobs.arrays import encode
 from service.jobs.figures import ContactValues, DesignRecord, StoredArray, SweepRecord, VariableValues
 from service.jobs.strict_json import digest
 from solver.results.told import json_number
@@ -66,12 +65,12 @@ def sweep_record(
         intermediate=intermediate,
         contacts=contact_values(scene, parameter),
         arrays={
-            "parameter": encode(branch.values),
-            "residual": encode(branch.residuals),
-            "states": encode(branch.states.astype(np.int8)),
+            "parameter": StoredArray.of(branch.values),
+            "residual": StoredArray.of(branch.residuals),
+            "states": StoredArray.of(branch.states.astype(np.int8)),
         }
-        | {name: encode(getattr(branch, name)) for name in _ARRAYS}
-        | ({"unstable": encode(unstable.astype(np.int8))} if unstable.any() else {}),
+        | {name: StoredArray.of(getattr(branch, name)) for name in _ARRAYS}
+        | ({"unstable": StoredArray.of(unstable.astype(np.int8))} if unstable.any() else {}),
     )
 
 

@@ -48,6 +48,7 @@ def body_model(name: str, request: type[JobRequest]) -> type[BaseModel]:
         __cls_kwargs__={
             "json_schema_extra": described,
             "title": f"{request.__name__.removesuffix(_WORD)}{_WORD}",
+            "defer_build": False,
         },
         kind=kind,
     )
@@ -69,7 +70,11 @@ def design_body(registry: Registry) -> type[BaseModel]:
         __base__=base,
         __doc__=base.__doc__,
         __module__=base.__module__,
-        __cls_kwargs__={"title": base.__name__, "extra": "forbid" if known else "allow"},
+        __cls_kwargs__={
+            "title": base.__name__,
+            "extra": "forbid" if known else "allow",
+            "defer_build": False,
+        },
         kind=kind,
     )
 

@@ -35,6 +35,7 @@ class Accuracy(Study):
     model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE]})
     NAME, FUNCTION = "accuracy", "solver:accuracy_study"
     RESULT = answered("solver.studies.study_results:AccuracyStudy", "AccuracyResult")
+    TOLD = "solver.views.tables.responses:accuracy"
     SHOWS, SWEEPS, COUNTED = (
         "error against time ([accuracy](accuracy.md))",
         "the one that found the peak",

@@ -44,6 +44,7 @@ class Campbell(Study, HarmonicRequest):
     model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE]})
     NAME, FUNCTION = "campbell", "optim:campbell_diagram"
     RESULT = answered("optim.studies.crossings:CampbellDiagram", "CampbellResult")
+    TOLD = "optim.views.tables.studies:campbell"
     SHOWS = "crossings and speeds above the limit ([Campbell diagrams](campbell.md))"
     EMPTY = ("orders", "it stored no sweep to draw")
     SWEEPS = "one an order; one for all without sectors"

@@ -36,6 +36,7 @@ class Controlled(Study, HarmonicRequest):
         changes=list[Table],
         least=Table | None,
     )
+    TOLD = "solver.views.tables.modes:held"
     SHOWS = "force and phase over the frequency ([a held amplitude](modes.md#a-held-amplitude))"
     EMPTY = ("frequency", "no response with this amplitude was found")
     FIGURE = "solver.views.plots.modes:held_figure"

@@ -81,6 +81,7 @@ class _Design(NominalAndRobustKeys, ProblemRequest):
     model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE]})
     NAME, FUNCTION, RESULT = "design", "optim:design", design_result
     KEYS = "those of [a design problem](design.md)"
+    TOLD = "optim.views.tables.design:design"
     SHOWS, SWEEPS = "the optimum and what holds it", "every response computed"
 
     def issues(self, scene: Scene) -> list[Issue]:

@@ -71,6 +71,7 @@ class Identify(Study, HarmonicRequest):
 
     model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE]})
     NAME, FUNCTION, RESULT = "identify", "optim:identify", identify_result
+    TOLD = "optim.views.tables.identify:identification"
     SHOWS = "estimates, intervals, what the data do not tell ([identification](identification.md))"
     EMPTY, COUNTED = ("runs", "there is no fit to draw"), "places"
     FIGURE = "optim.views.plots.designs:identification_figure"

@@ -33,6 +33,7 @@ class Interference(Study):
     model_config = ConfigDict(json_schema_extra={"examples": [{"scene": "bladed-disk", "speed_rpm": 11000}]})
     NAME, FUNCTION = "interference", "solver:interference_diagram"
     RESULT = answered("solver.studies.study_results:InterferenceDiagram", "InterferenceResult")
+    TOLD = "solver.views.tables.disks:interference"
     SHOWS = "frequencies at each nodal diameter, orders that meet them ([interference](disks.md))"
     FIGURE = "solver.views.plots.disks:interference_figure"
     COUNTED = "nodal diameters"

@@ -13,6 +13,7 @@ from service.jobs.common.results import Curve, KindResult, answered
 from service.jobs.common.scenes import CHECKED_BY, SCENE, stored_scene
 from service.jobs.common.sizes import MOST_POINTS, balance_issues
 from service.jobs.common.study_keys import RangeRequest, law_issues, range_issues
+from service.jobs.figures import StoredArray
 from service.jobs.outputs import JobOutput, OnProgress, ShouldStop
 from service.jobs.parts import Division, JobPart, PartOutput, PartStoppedError
 from service.jobs.registry import Flag, JobKind, Json
@@ -45,8 +46,9 @@ class Map(Study, RangeRequest):
 
     model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE]})
     NAME, FUNCTION, RESULT = "map", "solver:response_map", map_result
+    TOLD = "solver.views.tables.tracks:response_map"
     SHOWS, SWEEPS = "the amplitude on the grid, the ridge of its peaks", "those that look for peaks"
-    FIGURE = "service.jobs.drawing:map_of"
+    FIGURE = "solver.views.plots.tracks:map_figure"
 
     steps: Annotated[_Count, Flag(metavar="N")] = Field(default=60, description="Values of the parameter.")
     frequencies: Annotated[_Count, Flag(metavar="N")] = Field(
@@ -95,8 +97,6 @@ def run_part(
     spec: Mapping[str, Any], part: Mapping[str, Any], progress: OnProgress, should_stop: ShouldStop
 ) -> PartOutput:
     """Track the peaks, or solve some rows."""
-    from service.jobs.arrays import encode
-
     if part.get("ridge"):
         return _ridge(spec, progress, should_stop)
     strip = _grid(spec).solve(*part["rows"], on_progress=progress, should_stop=should_stop)
@@ -106,21 +106,20 @@ def run_part(
         result={
             "first": strip.first, "newton_iterations": strip.newton_iterations, "seconds": strip.seconds
         },
-        arrays={"values": encode(strip.values)},
+        arrays={"values": StoredArray.of(strip.values)},
         points=strip.values.shape[0] * strip.values.shape[1],
     )  # fmt: skip
 
 
 def join(spec: Mapping[str, Any], outputs: Mapping[int, PartOutput]) -> JobOutput:
     """The map from its strips; the stored sweeps are those that look for peaks."""
-    from service.jobs.arrays import decode
     from service.jobs.common.records import unpacked
     from solver.results.known import Known, worst_of
     from solver.studies.response_map import Strip
 
     parts = list(outputs.values())
     ridge = parts.pop(0) if spec["ridge"] else None
-    found = _grid(spec).joined([Strip(**part.result, values=decode(part.arrays["values"])) for part in parts])
+    found = _grid(spec).joined([Strip(**part.result, values=part.arrays["values"].array()) for part in parts])
     result = found.to_json()
     if ridge is not None:
         result["ridge"] = ridge.result["ridge"]

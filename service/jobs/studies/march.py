@@ -35,6 +35,7 @@ class March(Study):
         "solver.marching.result:MarchResult", "MarchResult", harmonics=list[float | None] | None,
         history=(Table | None, None),
     )  # fmt: skip
+    TOLD = "solver.views.tables.responses:march"
     SHOWS, COUNTED = "amplitude and periods marched", "periods"
     EMPTY = ("harmonics", "no response was found")
     FIGURE = "service.jobs.drawing:harmonics_of"

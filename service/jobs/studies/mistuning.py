@@ -15,6 +15,7 @@ from service.jobs.common.results import Table, answered
 from service.jobs.common.scenes import FrequencyHz, HarmonicRequest, stored_scene
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
 from service.jobs.common.study_keys import band_issues
+from service.jobs.figures import StoredArray
 from service.jobs.outputs import JobOutput, OnProgress, ShouldStop
 from service.jobs.parts import Division, JobPart, PartOutput, PartStoppedError
 from service.jobs.registry import Flag, JobKind
@@ -77,6 +78,7 @@ class Mistuning(Study, HarmonicRequest):
 
     model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE]})
     NAME, FUNCTION, RESULT = "mistuning", "solver:mistuning_study", mistuning_result
+    TOLD = "solver.views.tables.disks:mistuning"
     SHOWS = "the magnification over many disks and the worst of them ([disks](disks.md))"
     SWEEPS, COUNTED = "the tuned disk's, and that of the worst blade", "disks"
     EMPTY = ("worst", "the peaks of no disk are known")
@@ -162,7 +164,6 @@ def run_part(
     import numpy as np
 
     import solver
-    from service.jobs.arrays import encode
     from service.jobs.common.records import packed, sweep_records
     from solver.studies.mistuning import without_mistuning, worst_branch
 
@@ -194,7 +195,9 @@ def run_part(
         if peaks.largest > (0.0 if worst is None else worst.largest):
             worst = peaks
     sweeps, arrays = packed(sweep_records(() if worst is None else worst_branch(worst)))
-    arrays |= {key: encode(np.array([getattr(peaks, key) for peaks in found])) for key in _OF_THE_PEAKS}
+    arrays |= {
+        key: StoredArray.of(np.array([getattr(peaks, key) for peaks in found])) for key in _OF_THE_PEAKS
+    }
     status = [[each.name for each in peaks.status] for peaks in found]
     return PartOutput(
         result={
@@ -236,9 +239,8 @@ def join(spec: Mapping[str, Any], outputs: Mapping[int, PartOutput]) -> JobOutpu
 def _peaks(part: PartOutput) -> list[BladePeaks]:
     """The peaks that a part found, a disk each."""
     import solver
-    from service.jobs.arrays import decode
 
-    value, at_hz = (decode(part.arrays[key]) for key in _OF_THE_PEAKS)
+    value, at_hz = (part.arrays[key].array() for key in _OF_THE_PEAKS)
     return [
         solver.BladePeaks(
             dof=part.result["dof"], value=value[i], at_hz=at_hz[i], branches=(),

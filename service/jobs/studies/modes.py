@@ -139,6 +139,7 @@ class Modes(Study, HarmonicRequest):
         json_schema_extra={"examples": [{"scene": "two-dof", "mode": 1, "from": 0.01, "to": 100}]}
     )
     NAME, FUNCTION, RESULT = "modes", "solver:nonlinear_mode", modes_result
+    TOLD = "solver.views.tables.modes:mode"
     SHOWS = "frequency and damping ratio over the amplitude ([modes](modes.md))"
     EMPTY = ("amplitude", "no point of the mode was found")
 

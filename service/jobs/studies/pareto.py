@@ -37,6 +37,7 @@ class _Pareto(PointsOfFront, ProblemRequest):
     model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE]})
     NAME, FUNCTION, RESULT = "pareto", "optim:pareto_front", pareto_result
     KEYS = "those of a design problem, `points`"
+    TOLD = "optim.views.tables.design:front"
     SHOWS, SWEEPS = "the front of peak against band ([trade-offs](trade-offs.md))", "those of its points"
     EMPTY, FIGURE = ("points", "its front has no point"), "optim.views.plots.designs:pareto_figure"
 

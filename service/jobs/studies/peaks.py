@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated
 
 from pydantic import ConfigDict, Field
@@ -11,14 +10,12 @@ from service.jobs.common.results import answered
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
 from service.jobs.common.study_keys import RangeRequest, law_issues, range_issues
 from service.jobs.figures import SweepRecord
-from service.jobs.registry import Flag, Json, ReadSweep, StoredSweep
+from service.jobs.registry import Flag
 from service.jobs.study import Study
 from solver.errors import Issue
 from solver.scene.descriptions import DISK_LOAD
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from solver.scene.scene import Scene
     from solver.studies.peaks.results import PeakTrack
 
@@ -38,8 +35,9 @@ class Peaks(Study, RangeRequest):
         }
     )
     NAME, FUNCTION, RESULT = "peaks", "solver:track_peak", peaks_result
+    TOLD = "solver.views.tables.tracks:track"
     SHOWS = "the highest peak over the parameter, where it is least ([peaks](peaks.md))"
-    EMPTY = ("parameter", "no peak was tracked")
+    FIGURE, EMPTY = "solver.views.plots.tracks:track_figure", ("parameter", "no peak was tracked")
     SWEEPS, COUNTED = "those that look for peaks", "sweeps"
 
     checks: Annotated[int, Field(strict=True, ge=0, le=200), Flag(metavar="N")] = Field(
@@ -61,14 +59,6 @@ class Peaks(Study, RangeRequest):
         from service.jobs.common.records import sweep_records
 
         return sweep_records(found.branches, intermediate=True)
-
-    @classmethod
-    def figure(cls, result: Json, _sweeps: Sequence[StoredSweep], _read: ReadSweep) -> Figure:
-        """Return the highest peak over the parameter."""
-        from service.jobs.drawing import track_of
-        from solver.views.plots.tracks import track_figure
-
-        return track_figure(track_of(result), dof="x")
 
 
 STUDY = Peaks

@@ -31,8 +31,9 @@ def plan_result() -> type[KindResult]:
 class Plan(Study, HarmonicRequest):
     """Say which effects a scene calls for, and why."""
 
-    model_config = ConfigDict(json_schema_extra={"examples": [EXAMPLE]})
+    model_config = ConfigDict(defer_build=False, json_schema_extra={"examples": [EXAMPLE]})
     NAME, FUNCTION, RESULT = "plan", "solver:plan", plan_result
+    TOLD = "solver.views.tables.responses:plan"
     SHOWS = "the effects in use and left out, sizes and estimated cost"
 
     effects: EffectsWord = AUTO

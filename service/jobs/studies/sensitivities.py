@@ -31,6 +31,7 @@ class Sensitivities(Study, HarmonicRequest):
     RESULT = answered(
         "optim.studies.sensitivity_result:SensitivityResult", "SensitivitiesResult", peaks=list[PeakAt]
     )
+    TOLD = "optim.views.tables.studies:shares"
     SHOWS = "the change of peaks and band by one per cent of each parameter ([sensitivities](trade-offs.md))"
     SWEEPS, FIGURE = "the response", "optim.views.plots.designs:sensitivities_figure"
 

@@ -63,6 +63,7 @@ class Solve(Study, HarmonicRequest):
 
     model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE, _EVERY]})
     NAME, FUNCTION, RESULT = "solve", "solver:solve", solve_result
+    TOLD = "solver.views.tables.responses:solution"
     SHOWS, COUNTED = "the response at one frequency", "solutions"
     EMPTY = ("harmonics", "no response was found")
     FIGURE = "service.jobs.drawing:harmonics_of"

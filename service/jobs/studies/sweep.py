@@ -67,6 +67,7 @@ class Sweep(Study, HarmonicRequest):
 
     model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE, _OVER_A_LOAD]})
     NAME, FUNCTION, RESULT = "sweep", "solver:sweep", sweep_result
+    TOLD = "solver.views.tables.responses:branch"
     SHOWS, SWEEPS = "peaks, band, folds", "the branch"
     EMPTY = ("parameter", "it stored no sweep to draw")
 

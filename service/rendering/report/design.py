@@ -7,6 +7,8 @@ from html import escape
 from typing import Any
 
 import optim
+from optim.views.tables.design import design, front
+from optim.views.tables.studies import shares
 from service.rendering.report.responses import ReportLine, Sweeps, linear_lines
 from service.rendering.report.sections import (
     Designed,
@@ -19,11 +21,10 @@ from service.rendering.report.sections import (
     plan_section,
     response_section,
     scene_section,
+    table_of,
     title_section,
 )
-from service.rendering.tables.design import design_tables
 from solver.errors import SolverError
-from solver.results import units
 from solver.scene.parameter_paths import parameter
 from solver.scene.scene import Scene
 from solver.views.plots import style
@@ -105,16 +106,14 @@ def _holds(given: Designed, chosen: Json) -> list[str]:
     if _is_front(given.result):
         active = "; ".join(chosen["active"])
         return [f"<h2>What holds it</h2><p>{escape(active)}</p>"] if active else []
-    found, tables = design_tables(given.result)
-    parts = ["<h2>What holds it</h2>", pairs(found)]
+    first, *tables = design(given.result)
+    parts = ["<h2>What holds it</h2>", pairs(first.pairs)]
     conditions = given.result.get("conditions")
     if conditions is not None:
         worst = max(conditions["violation"], 0.0)
         violation = f"{worst:.1e}" if worst > 0.0 else "none"
         parts.append(pairs([("largest relative violation of a limit", violation)]))
-    for one in tables:
-        parts += [f"<h3>{escape(one.heading)}</h3>", table(list(one.columns), [list(r) for r in one.rows])]
-    return parts
+    return parts + [f"<h3>{escape(one.title)}</h3>{table_of(one)}" for one in tables]
 
 
 def _sensitivities(given: Designed, after: Scene) -> str:
@@ -126,20 +125,8 @@ def _sensitivities(given: Designed, after: Scene) -> str:
     told: Json = found.to_json()
     if not found.reached:
         return f"<h2>Sensitivities</h2><p>{escape(told['status'])}</p>"
-    rows: list[list[Any]] = [
-        [row["path"], f"{units.number(row['value'], 6)} {row['unit']}".rstrip(),
-         *map(_share, row["peaks_percent"]), _share(row["band_percent"])]
-        for row in told["rows"][:_MOST_PARAMETERS]
-    ]  # fmt: skip
     words = "Change for one per cent more of a parameter; those that matter most for the highest peak."
-    peaks = [f"peak at {peak['at']:.6g} Hz" for peak in told["peaks"]]
-    heads = ["parameter", "at the optimum", *peaks, "band"]
-    return f"<h2>Sensitivities</h2><p class=quiet>{words}</p>{table(heads, rows)}"
-
-
-def _share(share: float | None) -> str:
-    # Added to 0: a share that rounds to nothing has no sign.
-    return "" if share is None else f"{round(share, 3) + 0.0:+.3f} %"
+    return f"<h2>Sensitivities</h2><p class=quiet>{words}</p>{table_of(next(shares(told)), _MOST_PARAMETERS)}"
 
 
 def _trade_off(result: Json) -> list[str]:
@@ -148,10 +135,5 @@ def _trade_off(result: Json) -> list[str]:
         return []
     from optim.views.plots.designs import pareto_figure
 
-    heads = [*result["points"][0]["values"], "peak", "band"]
-    rows = [
-        [*p["values"].values(), units.length(p["peak"]), f"{units.number(p['band_hz'])} Hz"]
-        for p in result["points"]
-    ]
     words = "The front of peak against band, and the frequencies at risk"
-    return ["<h2>Trade-off</h2>", image(pareto_figure(result), words), table(heads, rows)]
+    return ["<h2>Trade-off</h2>", image(pareto_figure(result), words), table_of(next(front(result)))]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from html import escape
 from typing import Any
 
+from optim.views.tables.identify import candidate_words, estimate_row, told_pairs
 from service.rendering.report.sections import (
     Designed,
     Json,
@@ -13,7 +14,6 @@ from service.rendering.report.sections import (
     title_section,
     versions,
 )
-from service.rendering.tables.identify import candidate_words, estimate_row, told_pairs
 from solver.scene.parameter_paths import parameter
 from solver.scene.scene import Scene
 from solver.scene.toml import toml_text

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from optim.views.plots.designs import robust_figure
+from optim.views.tables.robust import effort_pairs, side_lines, uncertain_rows
 from service.rendering.report.responses import DASHED, ReportLine, Sweeps, in_scenario, linear_lines
 from service.rendering.report.sections import (
     Designed,
@@ -20,7 +21,6 @@ from service.rendering.report.sections import (
     scene_section,
     title_section,
 )
-from service.rendering.tables.robust import effort_pairs, side_lines, uncertain_rows
 from solver.continuation.branch import AnyBranch
 from solver.results import units
 from solver.scene.parameter_paths import parameter

@@ -40,7 +40,7 @@ class LeastForce(NamedTuple):
 class HeldAmplitude(ModalCurve):
     """Responses of one amplitude over the frequency, at the DOF that the scene observes; n points."""
 
-    VIEWS: ClassVar = Views("solver.views", "of_held", "modes:held_figure")
+    VIEWS: ClassVar = Views("solver.views", "modes:held", "modes:held_figure")
     DATA: ClassVar = Data(
         "controlled", {"point": "frequency=frequency_hz excitation excitation_error phase=phase_deg"
          " max_abs stable=stable_words", **OF_CONTACTS, "point harmonic": "observed"},
@@ -101,7 +101,7 @@ class HeldAmplitude(ModalCurve):
 class PhaseResonance(ModalCurve):
     """Responses in phase resonance over the amplitude; n points along the curve."""
 
-    VIEWS: ClassVar = Views("solver.views", "of_resonance", "modes:resonance_figure")
+    VIEWS: ClassVar = Views("solver.views", "modes:mode", "modes:resonance_figure")
     DATA: ClassVar = Data(
         "phase-resonance", {"point": "amplitude frequency=frequency_hz excitation max_abs"},
         "mode_number=mode",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import math
+from collections.abc import Sequence
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -61,14 +62,14 @@ def image(figure: Figure, words: str, caption: str = "") -> str:
     return f'<figure><img src="data:image/svg+xml;base64,{data}" alt="{escape(words)}">{below}</figure>'
 
 
-def table(heads: list[str], rows: list[list[Any]]) -> str:
+def table(heads: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
     """A table; numbers are rounded and aligned right."""
     head = "".join(f"<th scope='col'>{escape(one)}</th>" for one in heads)
     body = "".join(f"<tr>{''.join(_cell(value) for value in row)}</tr>" for row in rows)
     return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
 
 
-def pairs(given: list[tuple[str, str]]) -> str:
+def pairs(given: Sequence[tuple[str, str]]) -> str:
     """Names with their values."""
     rows = "".join(f"<tr><th scope='row'>{escape(n)}</th><td>{escape(v)}</td></tr>" for n, v in given)
     return f"<table><tbody>{rows}</tbody></table>"

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -15,95 +16,102 @@ from solver.views.plots import style
 from solver.views.plots.responses import axis_name
 from solver.views.plots.style import Into
 
-if TYPE_CHECKING:
-    from solver.studies.peaks.results import PeakTrack
-    from solver.studies.study_results import ResponseMap
+Json = Mapping[str, Any]
 
 _LOGARITHMIC_FROM = 5.0  # ratio of the ends from which an axis is logarithmic
 _SAME_FREQUENCY = 2e-3  # relative distance from a tracked peak within which a point lies on it
 
 
-def track_figure(track: PeakTrack, *, dof: str, ax: Into = None) -> Figure:
+def track_figure(track: Json, *, dof: str = "x", ax: Into = None) -> Figure:
     """The highest peak and its frequency over the parameter, competing peaks thin, the optimum marked.
 
     Parameters
     ----------
-    track : with at least one point.
+    track : as its `to_json` gives it, with at least one point.
     dof : the observed DOF.
     """
-    unit = units.length_unit(float(track.peak.min()))
+    parameter, peak = numbers(track["parameter"]), numbers(track["peak"])
+    unit = units.length_unit(float(peak.min()))
     with style.styled():
         page, (heights, places) = style.figure(9.2, 3.6, columns=2, into=ax)
-        for line in track.competing:
-            heights.plot(line.parameter, line.peak * unit.per_metre, color=style.GREY, linewidth=0.8)
-            places.plot(line.parameter, line.frequency, color=style.GREY, linewidth=0.8)
-        heights.plot(track.parameter, track.peak * unit.per_metre, color=style.BLUE)
+        for line in track["competing"]:
+            higher = numbers(line["peak"]) * unit.per_metre
+            heights.plot(line["parameter"], higher, color=style.GREY, linewidth=0.8)
+            places.plot(line["parameter"], line["frequency"], color=style.GREY, linewidth=0.8)
+        heights.plot(parameter, peak * unit.per_metre, color=style.BLUE)
         places.plot(*ridge_lines(track), color=style.BLUE)
-        best = track.optimum
-        if np.isfinite(best.at):
-            heights.plot([best.at], [best.peak * unit.per_metre], **_DOT)
-            for peak in best.active:
-                places.plot([best.at], [peak.frequency], **_DOT)
-            text = f"least at {style.quantity(track.parameter_path, best.at, 5)}\n{unit.show(best.peak)}"
+        at, least = track["optimum"]["at"], track["optimum"]["peak"]
+        if at is not None:
+            heights.plot([at], [least * unit.per_metre], **_DOT)
+            for one in track["optimum"]["active"]:
+                places.plot([at], [one["frequency"]], **_DOT)
+            text = f"least at {style.quantity(track['parameter_path'], at, 5)}\n{unit.show(least)}"
             heights.annotate(
-                text, (best.at, best.peak * unit.per_metre), xytext=(0, -10), textcoords="offset points",
+                text, (at, least * unit.per_metre), xytext=(0, -10), textcoords="offset points",
                 ha="center", va="top", color=style.VERMILION, linespacing=1.35,
             )  # fmt: skip
         for axes in (heights, places):
-            _scaled(axes, track.parameter)
+            _scaled(axes, parameter)
         heights.set_yscale("log")
         style.plain_log(heights.yaxis)
-        low, high = track.peak.min() * unit.per_metre, track.peak.max() * unit.per_metre
+        low, high = peak.min() * unit.per_metre, peak.max() * unit.per_metre
         heights.set_ylim(low * (low / high) ** 0.35, high * (high / low) ** 0.06)
-        style.label(heights, axis_name(track.parameter_path), f"highest peak, max |{dof}| [{unit.name}]")
-        style.label(places, axis_name(track.parameter_path), "frequency of the peak [Hz]")
-        heights.set_title(track.scene)
+        style.label(heights, axis_name(track["parameter_path"]), f"highest peak, max |{dof}| [{unit.name}]")
+        style.label(places, axis_name(track["parameter_path"]), "frequency of the peak [Hz]")
+        heights.set_title(track["scene"])
     return page
 
 
-def map_figure(found: ResponseMap, *, dof: str, ax: Into = None) -> Figure:
+def map_figure(found: Json, *, dof: str = "x", ax: Into = None) -> Figure:
     """The amplitude in colours over frequency and parameter; the ridge of the highest peak on it.
 
     Parameters
     ----------
-    found : with at least one solved point.
+    found : as its `to_json` gives it, with at least one solved point.
     dof : the observed DOF.
     """
-    known = found.amplitude[np.isfinite(found.amplitude) & (found.amplitude > 0.0)]
+    parameter, frequency = numbers(found["parameter"]), numbers(found["frequency"])
+    amplitude = numbers(found["amplitude"])
+    known = amplitude[np.isfinite(amplitude) & (amplitude > 0.0)]
     unit = units.length_unit(float(np.median(known)))
     scale = LogNorm(float(known.min()) * unit.per_metre, float(known.max()) * unit.per_metre)
     with style.styled():
         page, (axes,) = style.figure(6.8, 4.2, into=ax)
         mesh = axes.pcolormesh(
-            found.frequency, found.parameter, found.amplitude * unit.per_metre, norm=scale, cmap="viridis",
+            frequency, parameter, amplitude * unit.per_metre, norm=scale, cmap="viridis",
             shading="nearest", rasterized=True,
         )  # fmt: skip
         axes.grid(visible=False)
-        if found.ridge is not None and found.ridge.parameter.size:
-            _draw_ridge(axes, found.ridge)
-        if _is_wide(found.parameter):
+        if found["ridge"] is not None and found["ridge"]["parameter"]:
+            _draw_ridge(axes, found["ridge"])
+        if _is_wide(parameter):
             axes.set_yscale("log")
             style.plain_log(axes.yaxis)
-        low, high = sorted((float(found.parameter[0]), float(found.parameter[-1])))
+        low, high = sorted((float(parameter[0]), float(parameter[-1])))
         axes.set_ylim(low, high)
-        axes.set_xlim(float(found.frequency[0]), float(found.frequency[-1]))
-        style.label(axes, axis_name("frequency"), axis_name(found.parameter_path))
+        axes.set_xlim(float(frequency[0]), float(frequency[-1]))
+        style.label(axes, axis_name("frequency"), axis_name(found["parameter_path"]))
         bar = page.colorbar(mesh, ax=axes)
         bar.set_label(f"amplitude, max |{dof}| [{unit.name}]")
-        axes.set_title(found.scene)
+        axes.set_title(found["scene"])
     return page
 
 
-def ridge_lines(track: PeakTrack) -> tuple[Real, Real]:
+def numbers(values: Sequence[Any]) -> Real:
+    """Numbers of a JSON object as an array; NaN for null."""
+    return np.array(values, dtype=np.float64)
+
+
+def ridge_lines(track: Json) -> tuple[Real, Real]:
     """Return parameter and frequency of the highest peak, with a NaN where another peak becomes the highest.
 
     However fast a peak moves, it is one line: two points are joined if one tracked peak passes through both.
     """
-    p, f = track.parameter, track.frequency
+    p, f = numbers(track["parameter"]), numbers(track["frequency"])
     joined = np.zeros(max(p.size - 1, 0), bool)
-    for line in track.competing:
-        order = np.argsort(line.parameter)
-        known, place = line.parameter[order], line.frequency[order]
+    for line in track["competing"]:
+        order = np.argsort(line["parameter"])
+        known, place = numbers(line["parameter"])[order], numbers(line["frequency"])[order]
         inside = (p >= known[0]) & (p <= known[-1])
         on = inside & (np.abs(np.interp(p, known, place) - f) <= _SAME_FREQUENCY * f)
         joined |= on[:-1] & on[1:] & (np.diff(p) != 0.0)
@@ -120,15 +128,14 @@ _DOT: dict[str, Any] = {
 }
 
 
-def _draw_ridge(axes: Axes, ridge: PeakTrack) -> None:
+def _draw_ridge(axes: Axes, ridge: Json) -> None:
     """Competing peaks as dots, the highest as a line that is broken where another becomes the highest."""
-    for line in ridge.competing:
-        axes.plot(line.frequency, line.parameter, color="white", linewidth=0.7, linestyle=":")
+    for line in ridge["competing"]:
+        axes.plot(line["frequency"], line["parameter"], color="white", linewidth=0.7, linestyle=":")
     parameter, frequency = ridge_lines(ridge)
     axes.plot(frequency, parameter, color="white", linewidth=1.4)
-    best = ridge.optimum
-    for peak in best.active:
-        axes.plot([peak.frequency], [best.at], **_DOT)
+    for peak in ridge["optimum"]["active"]:
+        axes.plot([peak["frequency"]], [ridge["optimum"]["at"]], **_DOT)
 
 
 def _scaled(axes: Axes, values: np.ndarray) -> None:

@@ -13,7 +13,8 @@ from optim.identification.fit import Runs
 from optim.identification.reading import read_data
 from optim.identification.unknowns import read_unknowns
 from optim.problem.uncertainty_input import read_uncertain
-from service.rendering.tables.identify import report
+from optim.views.tables.identify import identification
+from service.rendering.text import print_told
 
 SCENE = solver.load_scene("two-dof")
 BOUNDS = {"damper.kt": (15.0, 80.0), "damper.mu": (0.1, 0.6)}
@@ -145,7 +146,7 @@ def test_conditions_that_tell_nothing_are_not_proposed(capsys: pytest.CaptureFix
     found = identified(two_dof_runs(np.random.default_rng(3), 0.02), BOUNDS).to_json()
     useless = {"conditions": {"damper.N0": 1.0}, "like": "", "gain": 1e-8, "tells": "damper.kt"}
     for factor, wanted in ((1.0, "none of the 1 conditions tried"), (0.5, "error of damper.kt times 0.5")):
-        report({**found, "candidates": [{**useless, "factor": factor}]})
+        print_told(identification({**found, "candidates": [{**useless, "factor": factor}]}))
         assert wanted in " ".join(capsys.readouterr().out.split())
 
 

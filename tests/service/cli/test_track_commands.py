@@ -65,7 +65,7 @@ def test_bad_input_ends_with_two(arguments: str, word: str, capsys: pytest.Captu
 def test_the_ridge_is_broken_only_where_another_peak_becomes_the_highest() -> None:
     """Between 85 and 120 N the peak of the disk moves by 100 Hz, which is no jump; at 185 N there is one."""
     track = solver.track_peak(solver.load_scene("bladed-disk"), "shroud.N0", 60.0, 300.0, checks=0)
-    parameter, frequency = ridge_lines(track)
+    parameter, frequency = ridge_lines(track.to_json())
     assert np.array_equal(parameter[~np.isnan(parameter)], track.parameter)
     assert np.array_equal(frequency[~np.isnan(frequency)], track.frequency)
     breaks = np.flatnonzero(np.isnan(parameter))

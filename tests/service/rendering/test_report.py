@@ -56,7 +56,7 @@ def test_a_report_has_everything_and_gives_the_same_again(
     assert "What two-dof consists of" in page
     assert f"{datetime.now().astimezone():%Y-%m-%d}" in page
     # The load is held by the band, so that a little more of it changes the band; the peak grows as the force.
-    force = re.search(r"excitation\.amplitude.*?([+-]\d\.\d+) %", page, re.DOTALL)
+    force = re.search(r"excitation\.amplitude.*?>([+-]\d\.\d+)<", page, re.DOTALL)
     assert force is not None
     assert float(force[1]) > 0.5
     blocks = [html.unescape(block) for block in re.findall(r"<pre>(.*?)</pre>", page, re.DOTALL)]

@@ -18,8 +18,7 @@ from service.cli.options.parameters import given_key
 from service.cli.options.problem_inputs import scene_to_submit, uploaded
 from service.cli.progress import bar
 from service.errors import InputError
-from service.rendering.plain import print_result
-from service.rendering.tables.text import print_json, print_table, say
+from service.rendering.text import print_json, print_result, print_table, say
 from solver.results import units
 from solver.scene.parameter_paths import parameter
 
@@ -97,7 +96,7 @@ def show_designs(found: Mapping[str, Any], *, as_json: bool) -> None:
         )
         for one in found["items"]
     ]
-    print_table("Stored designs", ("id", "scene", "design", "peak", "band", "reached"), rows, right="34")
+    print_table("Stored designs", ("id", "scene", "design", "peak", "band", "reached"), rows)
 
 
 def _chosen(name: str, value: float | None) -> str:
@@ -120,13 +119,13 @@ def listed(ask: Callable[..., Iterator[_T]], count: int | None, **filters: Any) 
 
 def tell_list(
     found: Sequence[AnswerModel], title: str, columns: Sequence[str], rows: Iterable[Sequence[str]],
-    *, right: str, as_json: bool,
+    *, as_json: bool,
 ) -> None:  # fmt: skip
     """Print a list: one JSON object, or a table as of `print_table`."""
     if as_json:
         print_json({"items": [one.model_dump(mode="json") for one in found]})
     else:
-        print_table(title, columns, rows, right=right)
+        print_table(title, columns, rows)
 
 
 def tell(answer: AnswerModel, words: str, *, as_json: bool) -> None:
@@ -247,7 +246,12 @@ def _show(job: JobAnswer, answer: ResultsAnswer, *, as_json: bool) -> None:
     if as_json:
         print_json(answer.model_dump(mode="json"))
         return
-    print_result(job.kind, answer.result)
+    # Loaded here: it brings every kind along.
+    from service.settings.kinds import registry_here
+
+    registry = registry_here()
+    tell = registry[job.kind].view.tell if job.kind in registry else None
+    print_result(job.kind, answer.result, tell)
     rows = [
         (
             sweep.id,
@@ -258,7 +262,7 @@ def _show(job: JobAnswer, answer: ResultsAnswer, *, as_json: bool) -> None:
         for sweep in answer.sweeps
     ]
     if rows:
-        print_table("Stored sweeps", ("id", "parameter", "points", "peak [m]"), rows, right="23")
+        print_table("Stored sweeps", ("id", "parameter", "points", "peak [m]"), rows)
     say(f"job {job.id}")
 
 

@@ -10,7 +10,7 @@ from service.cli.commands.client.jobs import MOST, client_of, listed, tell, tell
 from service.cli.options import shared as options
 from service.cli.options.inputs import amount, count
 from service.errors import InputError
-from service.rendering.tables.text import print_json, print_table, say
+from service.rendering.text import print_json, print_table, say
 
 OfProject = Annotated[
     str | None, typer.Option("--project", metavar="ID", help="Id of a project, as `projects list` shows it.")
@@ -65,7 +65,7 @@ def show(
         for one in found
     ]
     columns = ("id", "kind", "status", "scene", "name", "tags", "sweeps")
-    tell_list(found, "Runs", columns, rows, right="6", as_json=as_json)
+    tell_list(found, "Runs", columns, rows, as_json=as_json)
 
 
 def change(
@@ -117,11 +117,11 @@ def compare(
         return
     heads = (found.a.name or "A", found.b.name or "B")
     inputs = [(one.path, _word(one.a), _word(one.b)) for one in found.inputs]
-    print_table("Inputs that differ", ("input", *heads), inputs, right="12")
+    print_table("Inputs that differ", ("input", *heads), inputs)
     if found.more_inputs:
         say(f"and {found.more_inputs} more")
     figures = [(one.name, _word(one.a), _word(one.b)) for one in found.results]
-    print_table("Results", ("figure", *heads), figures, right="12")
+    print_table("Results", ("figure", *heads), figures)
 
 
 def share(
@@ -161,7 +161,7 @@ def show_projects(
         found = listed(client.projects, limit, text=text, deleted=deleted)
     rows = [(one.id, one.name, str(one.runs), f"{one.changed:%Y-%m-%d %H:%M}") for one in found]
     columns = ("id", "name", "runs", "changed [UTC]")
-    tell_list(found, "Projects", columns, rows, right="2", as_json=as_json)
+    tell_list(found, "Projects", columns, rows, as_json=as_json)
 
 
 def create_project(

@@ -8,15 +8,15 @@ import optim
 import solver
 from optim.methods.afterwards import looked_after
 from optim.results.design import DesignStatus
+from optim.views.tables import design as designs
+from optim.views.tables import studies
 from service.cli import main
 from service.rendering.report.responses import ReportLine
 from service.rendering.report.sections import branch_table
-from service.rendering.tables import design as design_reports
-from service.rendering.tables import disks as disk_reports
-from service.rendering.tables import results as reports
-from service.rendering.tables import track as track_reports
+from service.rendering.text import print_told
 from solver.continuation.certificate import uncertain
 from solver.results.notes import FLAGS, NONE_HIGHER, flag_words
+from solver.views.tables import responses, tracks
 
 WHY = "a resonance was left at 1.5"
 
@@ -32,12 +32,12 @@ def branch():
 
 
 def test_the_sweep_says_it(branch, capsys):
-    reports.branch(branch.to_json())
+    print_told(responses.branch(branch.to_json()))
     assert NONE_HIGHER in capsys.readouterr().out
     assert NONE_HIGHER in str(branch.summary())
     found = doubtful(branch).to_json()
     assert found["band_known"] is False
-    reports.branch(found)
+    print_told(responses.branch(found))
     assert WHY in " ".join(capsys.readouterr().out.split())
     assert WHY in str(doubtful(branch).summary())
 
@@ -46,7 +46,7 @@ def test_a_sweep_of_an_earlier_version_is_read(branch, capsys):
     found = branch.to_json()
     for key in ("peak_certificate", "band_known", "flags", "mean_undetermined"):
         del found[key]
-    reports.branch(found)
+    print_told(responses.branch(found))
     printed = capsys.readouterr().out
     assert "between points" not in printed
     assert "peak" in printed
@@ -61,7 +61,7 @@ def test_the_report_says_it(branch):
 
 def test_flags_are_told_in_words(branch, capsys):
     flagged = replace(branch, flags=("travelling_wave_assumed", "of_a_newer_version"))
-    reports.branch(flagged.to_json())
+    print_told(responses.branch(flagged.to_json()))
     printed = " ".join(capsys.readouterr().out.split())
     for words in (FLAGS["travelling_wave_assumed"], "of a newer version"):
         assert words in printed
@@ -81,7 +81,7 @@ def test_an_optimum_is_claimed_only_of_what_is_known(capsys):
     assert again.status is DesignStatus.LOCAL
     assert not again.reached
     assert any(WHY in words for words in again.warnings)
-    design_reports.design(again.to_json())
+    print_told(designs.design(again.to_json()))
     assert WHY in " ".join(capsys.readouterr().out.split())
 
 
@@ -94,7 +94,7 @@ def test_a_diagram_is_clear_only_if_that_is_known(capsys):
     open_ended = replace(diagram, orders=orders)
     assert open_ended.clear is None
     assert WHY in str(open_ended.summary())
-    disk_reports.campbell(open_ended.to_json())
+    print_told(studies.campbell(open_ended.to_json()))
     assert WHY in " ".join(capsys.readouterr().out.split())
 
 
@@ -103,10 +103,10 @@ def test_tracks_and_sensitivities_warn(capsys):
     assert track.peaks_open == ()
     track = replace(track, branches=tuple(doubtful(one) for one in track.branches))
     assert len(track.to_json()["peaks_open"]) == 1
-    track_reports.track(track.to_json())
+    print_told(tracks.track(track.to_json()))
     assert WHY in " ".join(capsys.readouterr().out.split())
     shares = optim.sensitivities(solver.load_scene("two-dof"), harmonics=1)
-    track_reports.shares(replace(shares, branch=doubtful(shares.branch)).to_json())
+    print_told(studies.shares(replace(shares, branch=doubtful(shares.branch)).to_json()))
     assert WHY in " ".join(capsys.readouterr().out.split())
 
 

@@ -1,18 +1,14 @@
-"""What people read of a result, given as the JSON object a program reads."""
+"""What people read of responses and plans, given as the JSON object a program reads."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator, Mapping
+from typing import Any
 
-from service.rendering.tables.text import print_pairs, print_table, say
 from solver.results import units
 from solver.results.notes import BAND_OPEN, FLAGS, between_points, drift_words, flag_words
-from solver.results.views import on_demand
+from solver.results.told import Block, Summary, Table
 from solver.scene.parameter_paths import parameter
-
-if TYPE_CHECKING:
-    from solver.scene.scene import Scene
 
 Json = Mapping[str, Any]
 Pairs = list[tuple[str, str]]
@@ -20,32 +16,15 @@ Pairs = list[tuple[str, str]]
 _ACCURACY_COLUMNS = ("", "harmonics", "contact forces", "max|x|", "error", "ms", "iterations")
 _SOLUTION_COLUMNS = ("half peak to peak", "mean", "", "largest multiplier", "found by", "residual forces")
 _EFFECT_COLUMNS = ("used", "effect", "reason")
-_SCENE_COLUMNS = ("name", "kind", "DOFs", "contacts", "observed", "band")
 
 
-def scenes(known: Sequence[Scene]) -> None:
-    """A table of scenes."""
-    rows = [
-        (
-            scene.name,
-            scene.structure.kind,
-            str(len(scene.dofs)),
-            ", ".join(contact.name for contact in scene.contacts),
-            scene.observe.dof,
-            f"{scene.observe.band[0]:g} to {scene.observe.band[1]:g} Hz",
-        )
-        for scene in known
-    ]
-    print_table("Shipped scenes", _SCENE_COLUMNS, rows)
-
-
-def plan(found: Json) -> None:
+def plan(found: Json) -> Iterator[Block]:
     """The effects in use and left out, the sizes and the cost."""
     effects = [("yes" if e["used"] else "no", e["name"], e["reason"]) for e in found["effects"]]
-    print_table(f"Plan of {found['scene']}", _EFFECT_COLUMNS, effects)
+    yield Table(f"Plan of {found['scene']}", _EFFECT_COLUMNS, effects)
     seconds = found["estimated_seconds_of_stability"]
     stability = "not known" if seconds is None else f"about {units.duration(seconds)} a response"
-    print_pairs(
+    yield Summary(
         "",
         [
             (
@@ -61,15 +40,15 @@ def plan(found: Json) -> None:
     )
 
 
-def solution(found: Json) -> None:
+def solution(found: Json) -> Iterator[Block]:
     """One response, or all that were found."""
     if found.get("solutions") is not None:
-        all_solutions(found)
+        yield from _all_solutions(found)
         return
     title = f"{found['scene']} at {found['frequency_hz']:g} Hz, {found['n_harmonics']} harmonics"
     if not found["converged"]:
         notes = [("note", words) for words in flag_words(found["flags"])]
-        print_pairs(title, [("converged", "no"), *_drift(found), *notes])
+        yield Summary(title, [("converged", "no"), *_drift(found), *notes])
         return
     pairs = _amplitudes(found)
     if found["error_estimate"] is not None:
@@ -86,7 +65,7 @@ def solution(found: Json) -> None:
     if low is not None and high is not None:
         pairs.append(("mean, any history", f"{units.length(low)} to {units.length(high)}"))
     pairs += [("residual", f"{found['residual']:.1e}"), ("time", units.duration(found["seconds"]))]
-    print_pairs(title, pairs)
+    yield Summary(title, pairs)
 
 
 def _drift(found: Json) -> list[tuple[str, str]]:
@@ -96,7 +75,7 @@ def _drift(found: Json) -> list[tuple[str, str]]:
     return [("drifts", drift_words(found["drift_per_period"], found["flags"]))]
 
 
-def all_solutions(found: Json) -> None:
+def _all_solutions(found: Json) -> Iterator[Block]:
     """The solutions of one frequency, and whether there are others."""
     rows = []
     for each in found["solutions"]:
@@ -115,19 +94,19 @@ def all_solutions(found: Json) -> None:
     if found["solutions"]:
         first = found["solutions"][0]
         title = f"{first['scene']} at {first['frequency_hz']:g} Hz, {first['n_harmonics']} harmonics"
-        print_table(title, _SOLUTION_COLUMNS, rows, right="013")
-    say(f"One response alone: {found['unique']}. {found['unique_ground']}")
-    say(found["note"])
+        yield Table(title, _SOLUTION_COLUMNS, rows)
+    alone = f"{found['unique']}: {found['unique_ground']}"
+    yield Summary("", [("one response alone", alone), ("note", found["note"])])
 
 
-def branch(found: Json) -> None:
+def branch(found: Json) -> Iterator[Block]:
     """A branch: its peaks and its band."""
     path, values = found["parameter_path"], found["parameter"]
     pairs = _peaks(found, path)
     if found["error_estimate"] is not None:
         pairs.append(("estimated error", f"{units.length(found['error_estimate'])} of the highest"))
     if found.get("stable"):
-        pairs.append(("stable", f"at the highest peak {found['stable']}: {found['stable_ground']}"))
+        pairs.append(("stable at the peak", f"{found['stable']}: {found['stable_ground']}"))
     if found.get("mean_undetermined"):
         pairs.append(("note", "at the highest peak " + FLAGS["mean_undetermined"]))
     if found["band_hz"] is not None:
@@ -142,7 +121,7 @@ def branch(found: Json) -> None:
     title = f"{found['scene']}, {path}"
     if values:
         title += f" from {parameter(path, values[0])} to {parameter(path, values[-1])}"
-    print_pairs(f"{title}, {found['n_harmonics']} harmonics", pairs)
+    yield Summary(f"{title}, {found['n_harmonics']} harmonics", pairs)
 
 
 def _marks(found: Json, path: str) -> Pairs:
@@ -178,7 +157,7 @@ def sure_of(found: Json) -> Pairs:
     return pairs
 
 
-def accuracy(found: Json) -> None:
+def accuracy(found: Json) -> Iterator[Block]:
     """Error against time, the rows nothing beats marked."""
     size = found["reference"]
     rows = [
@@ -198,50 +177,18 @@ def accuracy(found: Json) -> None:
         title += (
             f" with {found['reference_harmonics']} harmonics, to {units.length(found['reference_error'])}"
         )
-    print_table(title, _ACCURACY_COLUMNS, rows, right="13456")
-    say("* nothing else here is both as accurate and as fast")
+    yield Table(title, _ACCURACY_COLUMNS, rows)
+    yield Summary("", [("*", "nothing else here is both as accurate and as fast")])
 
 
-def march(found: Json) -> None:
+def march(found: Json) -> Iterator[Block]:
     """What a time march came to."""
     pairs = _amplitudes(found)
     if found["error_estimate"] is not None:
         pairs.append(("estimated error", f"{found['error_estimate']:.1e} of max|x|"))
     pairs.append(("periods", f"{found['periods']} of {found['steps_per_period']} steps"))
     pairs.append(("time", units.duration(found["seconds"])))
-    print_pairs("Time march", pairs)
-
-
-def design(found: Json) -> None:
-    """A design, of what is known or in spite of what is not."""
-    from service.rendering.tables import design as design_reports
-    from service.rendering.tables import robust as robust_reports
-
-    if "nominal" in found:
-        robust_reports.robust(found)
-    else:
-        design_reports.design(found)
-
-
-_HOMES = {
-    "solve": "results.solution", "sweep": "results.branch", "design": "results.design",
-    "pareto": "design.front", "march": "results.march", "map": "track.response_map",
-    "peaks": "track.track", "accuracy": "results.accuracy", "campbell": "disks.campbell",
-    "interference": "disks.interference",
-    "mistuning": "disks.mistuning", "identify": "identify.report", "modes": "modes.report",
-    "controlled": "modes.held", "sensitivities": "track.shares", "plan": "results.plan",
-}  # fmt: skip
-
-
-def knows(kind: str) -> bool:
-    """Whether results of a kind are printed as the local command prints them."""
-    return kind in _HOMES
-
-
-def of_kind(kind: str) -> Callable[[Json], None]:
-    """What prints the result of a job of a kind, imported when it is asked for."""
-    module, _, function = _HOMES[kind].partition(".")
-    return on_demand(f"service.rendering.tables.{module}:{function}")
+    yield Summary("Time march", pairs)
 
 
 def _amplitudes(found: Json) -> Pairs:

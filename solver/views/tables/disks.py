@@ -1,72 +1,20 @@
-"""What people read of disks: Campbell and interference diagrams, and mistuned disks, given as JSON."""
+"""What people read of disks: interference diagrams and mistuned disks, given as JSON."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
-from service.rendering.tables.robust import quantile_words
-from service.rendering.tables.text import print_pairs, print_table
 from solver.results import units
 from solver.results.known import known_pairs
-
-
-def campbell(found: Mapping[str, Any]) -> None:
-    """The crossings, and what every order does at running speeds."""
-    low, high = found["speeds_rpm"][0]
-    title = f"{found['scene']}, {low:g} to {high:g} rpm, {found['n_harmonics']} harmonics"
-    rows = [
-        (
-            str(order["order"]), f"{crossing['speed_rpm']:.6g}", f"{crossing['frequency_hz']:.6g}",
-            _amplitude(crossing),
-            "running speed" if crossing["inside"] else f"{100.0 * crossing['margin']:.3g} % away",
-        )
-        for order in found["orders"]
-        for crossing in order["crossings"]
-    ]  # fmt: skip
-    print_table(title, ("order", "crossing [rpm]", "peak [Hz]", "amplitude", ""), rows, right="0123")
-    pairs = []
-    for order in found["orders"]:
-        pairs.append((f"order {order['order']}", _running(order)))
-        for what, name in (("stuck_hz", "all stuck"), ("open_hz", "all open")):
-            pairs.append((f"  {name}", ", ".join(f"{value:.5g}" for value in order[what]) + " Hz"))
-    reasons = (o["peak_certificate"] for o in found["orders"] if "peak_certificate" in o)
-    open_ends = dict.fromkeys(one["reason"] for one in reasons if not one["known"])
-    pairs += [("warning", f"a response may have further peaks. {reason}") for reason in open_ends]
-    pairs += known_pairs(found, besides=("peaks_open",))
-    words = {True: "no", False: "yes", None: "unknown"}[found["clear"]]
-    what = "a peak" if found["limit"] is None else f"more than {units.length(found['limit'])}"
-    pairs.append((f"{what} at a running speed", words))
-    pairs.append(("time", units.duration(found["seconds"])))
-    print_pairs("", pairs)
-
-
-def _amplitude(crossing: Mapping[str, Any]) -> str:
-    """An amplitude with its estimated error; of an earlier version without."""
-    error, height = crossing.get("error_estimate"), crossing["amplitude"]
-    if error is None:
-        return units.length(height) + (" ± not known" if "error_estimate" in crossing else "")
-    unit = units.length_unit(height)
-    return f"{units.number(height * unit.per_metre)} ± {units.number(error * unit.per_metre, 2)} {unit.name}"
-
-
-def _running(order: Mapping[str, Any]) -> str:
-    """What one order does at running speeds, in words."""
-    highest = order["highest_running"]
-    text = "no response at running speeds"
-    if highest is not None:
-        text = f"at most {_amplitude(highest)}, at {highest['speed_rpm']:.6g} rpm"
-    over = ", ".join(f"{low:.6g} to {high:.6g}" for low, high in order["exceeded_running_rpm"])
-    if over:
-        text += f"; above {units.length(order['limit'])} from {over} rpm"
-    return text
-
+from solver.results.order_statistics import quantile_words
+from solver.results.told import Block, Summary, Table
 
 _DIRECTIONS = {"standing": "", "both": "", "forward": " forward", "backward": " backward"}
 MISSING = "the sector was not reduced for nodal diameters {}: reduce it for all with --engine-order 1"
 
 
-def interference(found: Mapping[str, Any]) -> None:
+def interference(found: Mapping[str, Any]) -> Iterator[Block]:
     """The frequencies at each nodal diameter, and the orders that meet them."""
     rows = [
         (
@@ -77,17 +25,17 @@ def interference(found: Mapping[str, Any]) -> None:
         for point in found["diameters"]
     ]
     title = f"{found['scene']}, {found['sectors']} sectors"
-    print_table(title, ("nodal diameter", "all open [Hz]", "all stuck [Hz]"), rows, right="012")
+    yield Table(title, ("nodal diameter", "all open [Hz]", "all stuck [Hz]"), rows)
     if found["speed_rpm"] is not None:
-        _crossings(found)
+        yield _crossings(found)
     pairs = []
     if found["missing"]:
         pairs.append(("warning", MISSING.format(", ".join(map(str, found["missing"])))))
     pairs.append(("time", units.duration(found["seconds"])))
-    print_pairs("", pairs)
+    yield Summary("", pairs)
 
 
-def _crossings(found: Mapping[str, Any]) -> None:
+def _crossings(found: Mapping[str, Any]) -> Table:
     rows = [
         (
             str(one["order"]), f"{one['frequency_hz']:.6g}",
@@ -99,7 +47,7 @@ def _crossings(found: Mapping[str, Any]) -> None:
     ]  # fmt: skip
     title = f"orders within {100.0 * found['within']:g} % of a family at {found['speed_rpm']:g} rpm"
     names = ("order", "frequency [Hz]", "nodal diameter", "family", "open to stuck [Hz]", "")
-    print_table(title, names, rows, right="0134")
+    return Table(title, names, rows)
 
 
 def _listed(values: list[float]) -> str:
@@ -113,7 +61,7 @@ def _errors(found: Mapping[str, Any]) -> str:
     return of_peaks + ("" if by_disks is None else f", standard error {by_disks:.2g} by the number of disks")
 
 
-def mistuning(found: Mapping[str, Any]) -> None:
+def mistuning(found: Mapping[str, Any]) -> Iterator[Block]:
     """The amplitude magnification over the disks, and the worst of them."""
     disks, tuned, worst = found["samples"], found["tuned"], found["worst"]
     title = f"{found['scene']}, {len(disks)} disks, spread {found['spread']:g} of {', '.join(found['of'])}"
@@ -140,4 +88,4 @@ def mistuning(found: Mapping[str, Any]) -> None:
         pairs.append(("  its disk", f"seed {worst['seed']}, factors {factors}"))
     pairs += known_pairs(found)
     pairs.append(("time", units.duration(found["seconds"])))
-    print_pairs(f"{title}, {found['n_harmonics']} harmonics", pairs)
+    yield Summary(f"{title}, {found['n_harmonics']} harmonics", pairs)

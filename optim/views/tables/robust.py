@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
-from service.rendering.tables.text import print_pairs, print_table, say
 from solver.results import units
 from solver.results.known import known_pairs
-from solver.results.order_statistics import needed
+from solver.results.order_statistics import quantile_words
+from solver.results.told import Block, Summary, Table
 from solver.scene.parameter_paths import parameter
 
 Json = Mapping[str, Any]
@@ -16,7 +16,7 @@ Json = Mapping[str, Any]
 _UNKNOWN = "not known"
 
 
-def robust(found: Json) -> None:
+def robust(found: Json) -> Iterator[Block]:
     """The nominal and the robust optimum side by side, and the scenarios that make the difference."""
     sides = [(name, found[name]) for name in ("nominal", "robust") if found[name] is not None]
     rows: list[tuple[str, ...]] = []
@@ -27,15 +27,14 @@ def robust(found: Json) -> None:
     aim = found["aim"] if found["quantile"] is None else f"{100.0 * found['quantile']:g} % {found['aim']}"
     title = f"Robust damper of {found['scene']}, {aim}"
     columns = ("", *(f"{name} optimum" for name, _ in sides))
-    print_table(title, columns, rows, right="".join(str(i + 1) for i in range(len(sides))))
+    yield Table(title, columns, rows)
     said = "; ".join(f"{name} {what}" for name, what in uncertain_rows(found["uncertain"]))
-    print_pairs("", [("uncertain", said), *effort_pairs(found)])
+    yield Summary("", [("uncertain", said), *effort_pairs(found)])
     held = [cut for cut in found["cuts"] if abs(cut["multiplier"]) > 1e-6]
     if held:
-        say("")
-        print_table(
+        yield Table(
             "Scenarios that hold the robust optimum", ("scenario", "multiplier"),
-            [(cut["scenario"]["words"], units.number(cut["multiplier"])) for cut in held], right="1",
+            [(cut["scenario"]["words"], units.number(cut["multiplier"])) for cut in held],
         )  # fmt: skip
 
 
@@ -100,28 +99,3 @@ _LINES: tuple[tuple[str, Callable[[Json], str]], ...] = (
     ("95 % of the samples below", lambda side: _quantile(side, 0.95)),
     ("keeps the limits", lambda side: "yes" if side["feasible"] else "no"),
 )
-
-
-def quantile_words(
-    found: Mapping[str, Any], key: str, samples: str, show: Callable[[float], str] = "{:.4g}".format
-) -> str:
-    """A quantile with the ends between which it lies; that so few samples do not tell it.
-
-    Parameters
-    ----------
-    found : of `solver.results.order_statistics.quantile_json`; one of an earlier version has no interval.
-    key, samples : name of the value, and what the samples are called.
-    show : puts a number in words.
-    """
-    value = found[key]
-    if "interval" not in found:
-        return "not known" if value is None else show(value)
-    low, high = (None if end is None else show(end) for end in found["interval"])
-    sure = f"{100.0 * found['confidence']:g} % sure"
-    ends = {
-        (True, True): f"{sure}: {low} to {high}", (True, False): f"{sure}: {low} or more, no upper end known",
-        (False, True): f"{sure}: {high} or less, no lower end known", (False, False): "no end known",
-    }[low is not None, high is not None]  # fmt: skip
-    if value is None:
-        return f"not told, at least {needed(found['share'])} {samples} are needed ({ends})"
-    return f"{show(value)} ({ends})"

@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
-from service.rendering.tables.text import print_pairs, print_table
 from solver.results import units
+from solver.results.told import Block, Summary, Table
 
 _CANDIDATES = 5  # shown, the most telling
 _TELLING = 0.99  # of an error, above which a measurement lowers none
 
 
-def report(found: Mapping[str, Any]) -> None:
+def identification(found: Mapping[str, Any]) -> Iterator[Block]:
     """The estimates, what the data do not tell, and which measurement would tell most."""
     title = f"{found['scene']}, {len(found['runs'])} runs, {found['n_harmonics']} harmonics"
     rows = [estimate_row(one) for one in found["estimates"]]
-    print_table(title, ("parameter", "estimate", "± error", "95 % interval", ""), rows, right="12")
+    yield Table(title, ("parameter", "estimate", "± error", "95 % interval", ""), rows)
     pairs = told_pairs(found)
     known = [one for one in found["candidates"] if one["gain"] is not None]
     telling = [one for one in known if one["factor"] < _TELLING]
@@ -27,7 +27,7 @@ def report(found: Mapping[str, Any]) -> None:
         pairs.append(("measure next", f"{tried}: try others (--candidate), or another DOF"))
     pairs.append(("starts", f"{found['starts']}, of the best {found['agreeing']} ended at the same place"))
     pairs.append(("time", units.duration(found["seconds"])))
-    print_pairs("", pairs)
+    yield Summary("", pairs)
 
 
 def told_pairs(found: Mapping[str, Any]) -> list[tuple[str, str]]:

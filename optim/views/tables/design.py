@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from service.rendering.tables.text import print_pairs, print_table, say
+from optim.views.tables.robust import robust
 from solver.results import units
 from solver.results.known import known_pairs
+from solver.results.told import Block, Summary, Table
 from solver.scene.parameter_paths import parameter
 
 Json = Mapping[str, Any]
@@ -20,29 +20,15 @@ _COUNTS = 1e-6  # multipliers below this hold nothing
 _ROUNDING = 1e-6  # relative excess over a limit up to which it is kept
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PrintedTable:
-    """A table to print: heading, column heads, rows, and which columns are aligned right."""
-
-    heading: str
-    columns: tuple[str, ...]
-    rows: list[tuple[str, ...]]
-    right: str
-
-
-def design(found: Json) -> None:
-    """The best design: what it reaches, what holds it, what it must keep, and the other optima."""
+def design(found: Json) -> Iterator[Block]:
+    """The best design, robust if that was asked: what it reaches, what holds it, the other optima."""
+    if "nominal" in found:
+        yield from robust(found)
+        return
     title = f"Best damper of {found['scene']}"
-    print_pairs(title if _kept(found) else f"{title}: not all limits can be kept", _pairs(found))
-    for table in design_tables(found)[1]:
-        say("")
-        print_table(table.heading, table.columns, table.rows, right=table.right)
-
-
-def design_tables(found: Json) -> tuple[Pairs, list[PrintedTable]]:
-    """What a design came to, and its tables: limits, what is active, local optima."""
+    yield Summary(title if _kept(found) else f"{title}: not all limits can be kept", _pairs(found))
     tables = (_limits(found), _active(found), _basins(found), _checked(found))
-    return _pairs(found), [table for table in tables if table is not None]
+    yield from (table for table in tables if table is not None)
 
 
 def _kept(found: Json) -> bool:
@@ -51,7 +37,7 @@ def _kept(found: Json) -> bool:
     return not found.get("broken") or (conditions is not None and conditions["violation"] <= _ROUNDING)
 
 
-def front(found: Json) -> None:
+def front(found: Json) -> Iterator[Block]:
     """The points of a front of peak against band with what each costs in terms of the other."""
     points: Sequence[Json] = found["points"]
     names = tuple(points[0]["values"]) if points else ()
@@ -71,12 +57,11 @@ def front(found: Json) -> None:
     ]
     costs = (f"peak for {hertz:g} Hz less band", f"band for {units.length(metres)} less peak")
     columns = (*names, "peak", "error", "band", *costs, "")
-    right = "".join(str(i) for i in range(min(len(columns) - 1, 10)))
-    print_table(f"Front of {found['scene']}: peak against band", columns, rows, right=right)
+    yield Table(f"Front of {found['scene']}: peak against band", columns, rows)
     pairs = [("not found", f"band of {units.number(width)} Hz") for width in found["missed"]]
     pairs += [("end", end["status"]) for end in found["ends"] if not end["reached"]]
     effort = f"{found['evaluations']} designs in {units.duration(found['seconds'])}"
-    print_pairs("", [*pairs, *known_pairs(found), ("effort", effort)])
+    yield Summary("", [*pairs, *known_pairs(found), ("effort", effort)])
 
 
 def _error(point: Json) -> str:
@@ -190,7 +175,7 @@ def _errors(found: Json) -> Pairs:
     return pairs + [("warning", words) for words in found.get("warnings", ())]
 
 
-def _checked(found: Json) -> PrintedTable | None:
+def _checked(found: Json) -> Table | None:
     """The local optima again with more harmonics, where the estimated error is large."""
     checked: Sequence[Json] = found.get("checked", ())
     if not checked:
@@ -206,11 +191,10 @@ def _checked(found: Json) -> PrintedTable | None:
         for one in checked
     ]
     columns = (*names, "harmonics", "peak", "keeps the limits")
-    right = "".join(str(i) for i in range(min(len(names) + 2, 10)))
-    return PrintedTable(heading="Again with more harmonics", columns=columns, rows=rows, right=right)
+    return Table("Again with more harmonics", columns, rows)
 
 
-def _limits(found: Json) -> PrintedTable | None:
+def _limits(found: Json) -> Table | None:
     """Every limit: what was asked, what is reached, and what is left or missing."""
     worst: dict[tuple[str, str, str, float], Json] = {}
     for row in found.get("rows", ()):
@@ -234,10 +218,10 @@ def _limits(found: Json) -> PrintedTable | None:
             what = what.removeprefix("-")
             asked, reached = f"≥ {amount(0.0 - row['bound'], unit)}", amount(0.0 - row["value"], unit)
         rows.append((what, asked, reached, holds))
-    return PrintedTable(heading="Limits", columns=("limit", "asked", "reached", ""), rows=rows, right="12")
+    return Table("Limits", ("limit", "asked", "reached", ""), rows)
 
 
-def _active(found: Json) -> PrintedTable | None:
+def _active(found: Json) -> Table | None:
     """The rows and bounds that hold the optimum, with their multipliers."""
     conditions = found.get("conditions")
     if not conditions:
@@ -252,12 +236,10 @@ def _active(found: Json) -> PrintedTable | None:
         for bound in conditions["bounds"]
     ]
     rows: list[tuple[str, ...]] = [(what, units.number(x)) for what, x in held if abs(x) > _COUNTS]
-    return (
-        PrintedTable(heading="Active", columns=("row", "multiplier"), rows=rows, right="1") if rows else None
-    )
+    return Table("Active", ("row", "multiplier"), rows) if rows else None
 
 
-def _basins(found: Json) -> PrintedTable | None:
+def _basins(found: Json) -> Table | None:
     """The local optima, if there are several."""
     basins: Sequence[Json] = found.get("basins", ())
     if len(basins) < 2:
@@ -274,5 +256,4 @@ def _basins(found: Json) -> PrintedTable | None:
         for basin in basins
     ]
     columns = (*names, "peak", "settled", "proven", "keeps the limits")
-    right = "".join(str(i) for i in range(min(len(names) + 1, 10)))
-    return PrintedTable(heading="Local optima", columns=columns, rows=rows, right=right)
+    return Table("Local optima", columns, rows)

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
-from service.rendering.tables.text import print_pairs, print_table
 from solver.results import units
+from solver.results.told import Block, Summary, Table
 
 _MOST_ROWS = 40
+_LEVEL = 1e-9  # relative difference of damping ratios that is none
 
 
-def held(found: Mapping[str, Any]) -> None:
+def held(found: Mapping[str, Any]) -> Iterator[Block]:
     """Frequency, force, phase and states of the contacts where one amplitude is held."""
     size = units.length(found["amplitude"])
     title = f"{found['scene']}, |{found['dof']}| held at {size}, {found['n_harmonics']} harmonics"
@@ -28,17 +29,17 @@ def held(found: Mapping[str, Any]) -> None:
         heads = [
             "frequency [Hz]", "× excitation", "phase [deg]", f"max |{found['dof']}|", "stable", "contacts",
         ]  # fmt: skip
-        print_table(title, heads, rows, right="0123")
+        yield Table(title, heads, rows)
     pairs = [("points", str(count)), ("time", units.duration(found["seconds"]))]
     if found["least"] is not None:
         best = found["least"]
         pairs.insert(0, ("least force", f"{best['excitation']:.5g} times, at {best['frequency']:.6g} Hz"))
     if found["stability_unknown"]:
         pairs.append(("stability", found["stability_unknown"]))
-    print_pairs("" if count else title, pairs)
+    yield Summary("" if count else title, pairs)
 
 
-def resonance(found: Mapping[str, Any]) -> None:
+def resonance(found: Mapping[str, Any]) -> Iterator[Block]:
     """Amplitude, frequency, force and states of the contacts in phase resonance."""
     title = f"{found['scene']}, phase resonance of mode {found['mode']}"
     count = len(found["amplitude"])
@@ -51,15 +52,15 @@ def resonance(found: Mapping[str, Any]) -> None:
             for i in _thinned(count)
         ]  # fmt: skip
         heads = ["a [√kg m]", f"max |{found['dof']}|", "frequency [Hz]", "× excitation", "contacts"]
-        print_table(title, heads, rows, right="0123")
+        yield Table(title, heads, rows)
     pairs = [("points", str(count)), ("time", units.duration(found["seconds"]))]
-    print_pairs("" if count else title, pairs)
+    yield Summary("" if count else title, pairs)
 
 
-def report(found: Mapping[str, Any]) -> None:
+def mode(found: Mapping[str, Any]) -> Iterator[Block]:
     """Amplitude, frequency, damping ratio and states of the contacts, a point a row, thinned to a page."""
     if found.get("damping_ratio") is None:
-        resonance(found)
+        yield from resonance(found)
         return
     of = "" if found["nodal_diameter"] is None else f", nodal diameter {found['nodal_diameter']}"
     title = f"{found['scene']}, mode {found['mode']}{of}, {found['n_harmonics']} harmonics"
@@ -70,17 +71,23 @@ def report(found: Mapping[str, Any]) -> None:
             "a [√kg m]", f"max |{found['dof']}|", "frequency [Hz]", "damping ratio", "± by harmonics",
             "contacts",
         ]  # fmt: skip
-        print_table(title, heads, rows, right="01234")
+        yield Table(title, heads, rows)
     pairs = [("points", f"{count}, {found['newton_iterations']} Newton iterations")]
+    if count:
+        # Where damping is level, rounding would choose among its places.
+        ratios = found["damping_ratio"]
+        best = next(i for i, one in enumerate(ratios) if one >= max(ratios) - _LEVEL * abs(max(ratios)))
+        at = f"a = {found['amplitude'][best]:.4g} √kg m, {found['frequency'][best]:.6g} Hz"
+        pairs.insert(0, ("most damping", f"{ratios[best]:.5g} at {at}"))
     pairs.append(("time", units.duration(found["seconds"])))
-    print_pairs("" if count else title, pairs)
+    yield Summary("" if count else title, pairs)
     if found.get("performance"):
-        _performance(found["performance"], found["dof"])
+        yield from _performance(found["performance"], found["dof"])
     if found.get("limit_cycles"):
-        _cycles(found["limit_cycles"], found["dof"])
+        yield _cycles(found["limit_cycles"], found["dof"])
 
 
-def _performance(curve: Mapping[str, Any], dof: str) -> None:
+def _performance(curve: Mapping[str, Any], dof: str) -> Iterator[Block]:
     """Peaks over the excitation and, where they scale, over the loads."""
     heads = ["× excitation", f"peak of |{dof}|", "at [Hz]", "× load", f"peak of |{dof}|"]
     rows = []
@@ -93,15 +100,15 @@ def _performance(curve: Mapping[str, Any], dof: str) -> None:
         known = curve["scales"] and curve["load"][i] is not None
         row += [f"{curve['load'][i]:.4g}", units.length(curve["peak_at_load"][i])] if known else ["", ""]
         rows.append(row)
-    print_table("Peaks of this mode alone", heads, rows, right="01234")
+    yield Table("Peaks of this mode alone", heads, rows)
     if curve["least"] is not None:
         best = curve["least"]
-        print_pairs(
+        yield Summary(
             "", [("least peak", f"{units.length(best['peak'])} with {best['load']:.4g} times the loads")]
         )
 
 
-def _cycles(found: Mapping[str, Any], dof: str) -> None:
+def _cycles(found: Mapping[str, Any], dof: str) -> Summary:
     """Limit cycles, and the most the damper holds."""
     pairs = []
     if found["most_damping"] is not None:
@@ -128,7 +135,7 @@ def _cycles(found: Mapping[str, Any], dof: str) -> None:
     if not found["completed"]:
         pairs.append(("not complete", "the curve ends before its largest amplitude: more may be beyond"))
     on = ", on this mode alone" if found["mode_alone"] else ""
-    print_pairs(f"Aerodynamic damping ratio {found['aero_damping']:g}{on}", pairs)
+    return Summary(f"Aerodynamic damping ratio {found['aero_damping']:g}{on}", pairs)
 
 
 def _error(value: float | None, told: Callable[[float], str] = "{:.2g}".format) -> str:

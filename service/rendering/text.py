@@ -7,14 +7,20 @@ import os
 import shutil
 import sys
 import textwrap
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from itertools import zip_longest
 from typing import TYPE_CHECKING, Any
+
+from solver.results.told import Block, Summary, Table
 
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from service.jobs.registry import Json, Tell
+
 _PIPE_WIDTH = 120
 _BOLD, _DIM = "1", "2"
+_LISTED = 6
 
 
 def print_json(obj: Mapping[str, object]) -> None:
@@ -45,31 +51,63 @@ def print_pairs(title: str, pairs: Iterable[tuple[str, str]]) -> None:
             say(" " * column + line)
 
 
-def print_table(
-    title: str, columns: Sequence[str], rows: Iterable[Sequence[str]], *, right: str = ""
-) -> None:
-    """Print rows under column heads; `right` lists the numbers of the columns that are aligned right.
+def print_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
+    """Print rows under column heads, columns of numbers aligned right.
 
     What identifies a thing, in a column `id`, stands whole on one line, to be copied: other columns fold.
     """
     from rich.box import SIMPLE_HEAD
-    from rich.table import Table
+    from rich.table import Table as RichTable
 
-    table = Table(box=SIMPLE_HEAD, pad_edge=False, show_edge=False)
+    made = RichTable(box=SIMPLE_HEAD, pad_edge=False, show_edge=False)
     listed = list(rows)
-    for index, column in enumerate(columns):
+    numbers = Table(title, columns, listed).numbers
+    for index, (column, right) in enumerate(zip_longest(columns, numbers)):
         whole = max((len(row[index]) for row in listed), default=0) if column == "id" else None
-        table.add_column(
-            column,
-            justify="right" if str(index) in right else "left",
-            overflow="fold",
-            min_width=whole,
-        )
+        made.add_column(column, justify="right" if right else "left", overflow="fold", min_width=whole)
     for row in listed:
-        table.add_row(*row)
+        made.add_row(*row)
     console = _console()
     console.print(title, style="bold")
-    console.print(table)
+    console.print(made)
+
+
+def print_told(blocks: Iterable[Block]) -> None:
+    """Print what is told of a result, an empty line before each further heading."""
+    for place, block in enumerate(blocks):
+        if place and block.title:
+            say("")
+        if isinstance(block, Table):
+            print_table(block.title, block.columns, block.rows)
+        else:
+            print_pairs(block.title, block.pairs)
+
+
+def print_result(kind: str, result: Json, tell: Tell | None) -> None:
+    """Print a result as its kind says; of which nothing is said, its numbers and words by their keys."""
+    found = Summary(kind, list(_pairs(result, ""))) if tell is None else tell(result)
+    print_told((found,) if isinstance(found, Summary) else found)
+
+
+def _pairs(table: Json, before: str) -> Iterator[tuple[str, str]]:
+    for key, value in table.items():
+        if isinstance(value, Mapping):
+            yield from _pairs(value, f"{before}{key}.")
+        else:
+            yield before + key, _shown(value)
+
+
+def _shown(value: Any) -> str:
+    """A value in a few words."""
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, str) or not isinstance(value, Sequence):
+        return "" if value is None else str(value)
+    scalars = not any(isinstance(one, (Mapping, list)) for one in value)
+    few = scalars and len(value) <= _LISTED
+    return ", ".join(map(_shown, value)) if few else f"{len(value)} values"
 
 
 def _styled(text: str, style: str) -> str:

@@ -1,0 +1,1 @@
+"""What people read of designs and studies, from the JSON objects that programs read."""

@@ -1,0 +1,1 @@
+"""What people read of results of the solver, from the JSON objects that programs read."""
