@@ -115,6 +115,7 @@ def _guard(app: FastAPI, service: Service) -> None:
     app.add_middleware(RequestLog)
     problems.install(app)
     app.add_middleware(HeadersAndAudit, settings=settings)
+    app.add_middleware(InPieces)
 
 
 def _offer_login(app: FastAPI, service: Service) -> None:

@@ -19,7 +19,8 @@ from service.jobs.answering import PLAN, PREVIEW, STORE
 from service.jobs.common.scene_parameters import SceneParameterList
 from service.jobs.common.scenes import SceneRequest
 from service.jobs.kinds.bodies import KIND, any_body, examples, request_of
-from service.jobs.kinds.previews import PREVIEWS, PreviewRequest
+from service.jobs.kinds.preview_request import PreviewRequest
+from service.jobs.kinds.previews import PREVIEWS
 from service.jobs.studies.plan import EXAMPLE, Plan, plan_result
 from service.queue.scene_store import shipped
 from service.schemas.answers import SceneAnswer, SceneDetail, SceneList
