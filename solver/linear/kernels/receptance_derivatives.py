@@ -24,6 +24,7 @@ from solver.linear.kernels.dynamic_stiffness import (
     ORDERS,
     VALUE,
     fill_from_matrices,
+    fill_second_terms,
     fill_terms,
 )
 from solver.linear.kernels.modal_products import basis_of_modes, fill_product
@@ -100,6 +101,7 @@ def _modal(system: System, omega: float, out: Jets) -> None:
             if system.which[i] != s:
                 continue
             fill_terms(system, s, 0, nm, float(system.ks[i]), omega, 1.0, terms)
+            fill_second_terms(system, nm, float(system.ks[i]), terms)
             for order in range(BY_P):
                 for m in range(nm):
                     part = complex(terms[2 * order, m], terms[2 * order + 1, m])
