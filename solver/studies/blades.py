@@ -182,11 +182,18 @@ def blade_peaks(
             at_hz=np.array([peak.at for peak in peaks]), status=(branch.status,) * len(names),
             branches=(highest,), highest=highest.known,
         )  # fmt: skip
+    return _of_every_blade(name, names, branch, repeats, on_progress, should_stop)
+
+
+def _of_every_blade(
+    name: str, names: list[str], branch: Branch, repeats: int,
+    on_progress: Callable[[float, int], None] | None, should_stop: Callable[[], bool] | None,
+) -> BladePeaks:  # fmt: skip
+    """Return the peaks of all blades with their branches: every blade moves in the same solutions."""
     branches = [branch] * repeats
     for done, each in enumerate(names[1:], 1):
         if should_stop is not None and should_stop():
             break
-        # Every blade moves in the same solutions.
         branches.append(observing(branch, each))
         if on_progress is not None:
             on_progress(_OF_THE_SWEEP + (1.0 - _OF_THE_SWEEP) * (done + 1.0) / len(names), done)

@@ -25,7 +25,7 @@ from solver.jit.lapack import copy_to, dot, invert, set_to
 from solver.jit.lapack import factorise as factorise_block
 from solver.jit.separate import apart
 
-_LEAST = 400  # unknowns from which a band pays
+BANDED_FROM = 400  # unknowns from which a band pays
 _NARROW = 6  # times in them that one side of it has to go
 _NOTHING = 1e-9  # relative size of an entry of A⁻¹ that is rounding
 NOT_BANDED = math.nan
@@ -37,7 +37,7 @@ def factorise_banded(
 ) -> float:
     """Factorise as `solver.balance.kernels.jacobian.factorise`, or return NaN where that has to."""
     n, nt = coefficient_count(system.ks), point.border.size
-    if point.counts[BANDED] < 0 or nt < _LEAST or point.counts[UNHELD] > 0:
+    if point.counts[BANDED] < 0 or point.counts[UNHELD] > 0:
         point.counts[BANDED] = min(point.counts[BANDED], 0)
         return NOT_BANDED
     sign, reach = _stiffness_of_ports(system, linear, point), 0

@@ -28,7 +28,7 @@ import math
 
 import numpy as np
 
-from solver.balance.kernels.banded import factorise_banded, step_banded, step_banded_transposed
+from solver.balance.kernels.banded import BANDED_FROM, factorise_banded, step_banded, step_banded_transposed
 from solver.balance.kernels.coordinates import (
     factorise_coordinates,
     is_reduced,
@@ -317,9 +317,10 @@ def factorise(
     if is_reduced(system, linear):
         return factorise_coordinates(system, linear, point, tangent, weight_u, weight_p)
     point.counts[AT_BRANCH_POINT] = 0
-    sign = factorise_banded(system, linear, point, tangent, weight_u, weight_p)
-    if not math.isnan(sign):
-        return sign
+    if point.border.size >= BANDED_FROM:
+        sign = factorise_banded(system, linear, point, tangent, weight_u, weight_p)
+        if not math.isnan(sign):
+            return sign
     _part(system, point)
     take_slopes(system, point)
     if not _eliminate(system, linear, point):

@@ -116,7 +116,8 @@ class _Unique:
     def tried(self, size: float) -> tuple[PointRow | None, float]:
         """Solve at a value of the parameter, from where the tangent leads or from the last point."""
         last, onward, least = self._last, self._onward, SMALLEST * self._span
-        assert last is not None
+        if last is None:
+            return None, 0.0
         ahead = (self._stop - last.at) * onward
         self._there = there = self._stop if ahead <= 1.5 * size else last.at + onward * size
         guess = last.solution[:-1] + (there - last.at) * onward * last.tangent[:-1]

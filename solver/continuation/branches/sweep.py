@@ -57,21 +57,11 @@ _LOST = (
 
 @shows_progress("sweep")
 def sweep(
-    scene: Scene,
-    parameter: str = "frequency",
-    start: float | None = None,
-    stop: float | None = None,
-    *,
-    harmonics: int = 11,
-    accuracy: float | None = None,
-    frequency_hz: float | None = None,
-    limit: float | None = None,
-    settings: ContinuationSettings | None = None,
-    effects: Effects | None = None,
-    course: Course | None = None,
-    on_progress: OnProgress = None,
-    should_stop: ShouldStop = None,
-) -> Branch:
+    scene: Scene, parameter: str = "frequency", start: float | None = None, stop: float | None = None, *,
+    harmonics: int = 11, accuracy: float | None = None, frequency_hz: float | None = None,
+    limit: float | None = None, settings: ContinuationSettings | None = None, effects: Effects | None = None,
+    course: Course | None = None, on_progress: OnProgress = None, should_stop: ShouldStop = None,
+) -> Branch:  # fmt: skip
     """Follow the periodic response over a range of one parameter.
 
     As `stickslip.sweep` it takes `peaks` and `errors` of the settings and the fields of the course by
@@ -110,24 +100,29 @@ def sweep(
         parameter = FREQUENCY
         start, stop = (None if end is None else end * scene.speed_order / 60.0 for end in (start, stop))
     course, settings = course or Course(), settings or ContinuationSettings()
-    if accuracy is not None:
-        if course.guess is not None or course.resume is not None:
-            raise SettingError(
-                "accuracy", accuracy, "cannot go with a guess or a beginning, whose harmonics are fixed"
-            )
-
-        def sweep_with(count: int) -> Branch:
-            return sweep(
-                scene, parameter, start, stop, harmonics=count, frequency_hz=frequency_hz, limit=limit,
-                settings=settings, effects=effects, on_progress=on_progress, should_stop=should_stop,
-            )  # fmt: skip
-
-        return sweep_to(sweep_with, accuracy)
-    begun = time.perf_counter()
-    if parameter == "frequency":
+    if accuracy is not None and (course.guess is not None or course.resume is not None):
+        raise SettingError(
+            "accuracy", accuracy, "cannot go with a guess or a beginning, whose harmonics are fixed"
+        )
+    if parameter == FREQUENCY:
         start = scene.observe.band[0] if start is None else start
         stop = scene.observe.band[1] if stop is None else stop
-    balance = build(scene, parameter, harmonics=harmonics, frequency_hz=frequency_hz, effects=effects)
+
+    def with_harmonics(count: int, course: Course) -> Branch:
+        balance = build(scene, parameter, harmonics=count, frequency_hz=frequency_hz, effects=effects)
+        return _swept(balance, start, stop, limit, settings, course, on_progress, should_stop)
+
+    if accuracy is None:
+        return with_harmonics(harmonics, course)
+    return sweep_to(lambda count: with_harmonics(count, Course()), accuracy)
+
+
+def _swept(
+    balance: Balance, start: float | None, stop: float | None, limit: float | None,
+    settings: ContinuationSettings, course: Course, on_progress: OnProgress, should_stop: ShouldStop,
+) -> Branch:  # fmt: skip
+    """Return the branch of a balance, as `sweep`."""
+    begun = time.perf_counter()
     first, last = check_range(balance.parameter, start, stop)
     check_limit(limit)
     workspace = Workspace.of(balance)

@@ -88,13 +88,13 @@ def _take(
 def fill_terms(
     system: System, s: int, first: int, size: int, k: float, omega: float, by_omega: float, terms: Real
 ) -> None:
-    """Fill in 1/d_m and as many derivatives as `terms` has rows for; NaN where d_m is zero.
+    """Fill in 1/d_m and its derivative; NaN where d_m is zero.
 
     Parameters
     ----------
     first, size : the block of modes.
     by_omega : 1.0 where λ is the frequency, else 0.0: derivatives are by λ.
-    terms : (4 or 6, ·) real and imaginary part of the value, then of each derivative.
+    terms : (4, ·) or more rows: real and imaginary part of the value, then of the derivative.
     """
     speed, values = k * omega, system.eigenvalues[s]
     for m in range(size):
@@ -114,20 +114,22 @@ def fill_terms(
             b[m] = speed - b[m]
             da[m] = 0.0
             db[m] = k * by_omega
-    if terms.shape[0] > 4:
-        bend = -2.0 * k * k * by_omega if system.form == MODES else 0.0
-        for m in range(size):
-            d, slope = complex(a[m], b[m]), complex(da[m], db[m])
-            if d == 0.0:
-                d = complex(np.nan, np.nan)
-            second = (2.0 * slope * slope / d - bend) / (d * d)
-            terms[4, m], terms[5, m] = second.real, second.imag
     for m in range(size):
         inverse = 1.0 / (a[m] * a[m] + b[m] * b[m])
         re, im = a[m] * inverse, -b[m] * inverse
         re2, im2 = re * re - im * im, 2.0 * re * im
         a[m], b[m] = re, im
         da[m], db[m] = im2 * db[m] - re2 * da[m], -re2 * db[m] - im2 * da[m]
+
+
+@compiled
+def fill_second_terms(system: System, size: int, k: float, terms: Real) -> None:
+    """Fill in the second derivatives by ω behind what `fill_terms` filled in: 2 g'²/g − d'' g², g = 1/d_m."""
+    bend = -2.0 * k * k if system.form == MODES else 0.0
+    for m in range(size):
+        g, slope = complex(terms[0, m], terms[1, m]), complex(terms[2, m], terms[3, m])
+        second = 2.0 * slope * slope / g - bend * g * g
+        terms[4, m], terms[5, m] = second.real, second.imag
 
 
 @compiled

@@ -10,12 +10,11 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numba.experimental import structref
 
 from solver.contacts.kernels.system import DENSE, STRUCTURE, System
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Complex
-from solver.jit.reference import Reference
+from solver.jit.reference import referenced
 from solver.jit.separate import apart
 from solver.linear.kernels.dynamic_stiffness import (
     BY_BOTH,
@@ -24,6 +23,7 @@ from solver.linear.kernels.dynamic_stiffness import (
     ORDERS,
     VALUE,
     fill_from_matrices,
+    fill_second_terms,
     fill_terms,
 )
 from solver.linear.kernels.modal_products import basis_of_modes, fill_product
@@ -39,18 +39,7 @@ class Jets(NamedTuple):
     x_linear: Complex  # (ORDERS, nk)
 
 
-@structref.register
-class _JetsType(Reference):
-    """Numba's type of `Jets` by reference."""
-
-
-class _JetsReference(structref.StructRefProxy):
-    """`Jets` by reference."""
-
-
-structref.define_proxy(_JetsReference, _JetsType, list(Jets._fields))
-
-_new: Callable[..., Jets] = _JetsReference
+_new: Callable[..., Jets] = referenced("Jets", __name__, Jets._fields)
 
 
 @compiled
@@ -100,6 +89,7 @@ def _modal(system: System, omega: float, out: Jets) -> None:
             if system.which[i] != s:
                 continue
             fill_terms(system, s, 0, nm, float(system.ks[i]), omega, 1.0, terms)
+            fill_second_terms(system, nm, float(system.ks[i]), terms)
             for order in range(BY_P):
                 for m in range(nm):
                     part = complex(terms[2 * order, m], terms[2 * order + 1, m])

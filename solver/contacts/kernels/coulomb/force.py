@@ -157,29 +157,7 @@ def contact_force(
     # Of a half-wave symmetric force the second half only doubles what the first one gives.
     symmetric = is_symmetric(ks, N)
     marched, weight = (count // 2, 2.0) if symmetric and count > 1 else (count, 1.0)
-    top = ks[-1] + max(ks[-1], load_ks[-1])
-    moments = np.zeros((4, top + 1))
-    for i in range(marched):
-        row = segments[i]
-        if row.motion == STICK:
-            add_moments(row.begin, row.end, weight, moments[0], moments[1])
-        else:
-            add_moments(row.begin, row.end, weight * row.direction, moments[2], moments[3])
-    products(moments[2], moments[3], ks, load_ks, 1.0, dF_dN)
-    products(moments[0], moments[1], ks, ks, 1.0, dF_dU)
-    for i in range(n):
-        total = 0.0
-        for j in range(N.size):
-            total += dF_dN[i, j] * N[j]
-        dF_dmu[i] = total
-        total = 0.0
-        for j in range(n):
-            total += dF_dU[i, j] * U[j]
-        dF_dkt[i] = total
-        for j in range(N.size):
-            dF_dN[i, j] *= mu
-        for j in range(n):
-            dF_dU[i, j] *= kt
+    _fill_moments(segments, marched, weight, U, ks, N, load_ks, kt, mu, dF_dU, dF_dkt, dF_dmu, dF_dN)
     _add_onsets(segments, marched, weight, U, ks, N, load_ks, kt, mu, dF_dU, dF_dkt, dF_dmu, dF_dN)
     if symmetric:
         # What a load of odd harmonics adds in one half it takes away in the other.
@@ -191,6 +169,37 @@ def contact_force(
     for i in range(n):
         F[i] = kt * dF_dkt[i] + mu * dF_dmu[i]
     return state, count
+
+
+@compiled
+def _fill_moments(
+    segments: Records, count: int, weight: float, U: Real, ks: Integer, N: Real, load_ks: Integer, kt: float,
+    mu: float, dF_dU: Real, dF_dkt: Real, dF_dmu: Real, dF_dN: Real,
+) -> None:  # fmt: skip
+    """Fill the derivatives with what all segments give but for the offsets of sticks."""
+    top = ks[-1] + max(ks[-1], load_ks[-1])
+    moments = np.zeros((4, top + 1))
+    for i in range(count):
+        row = segments[i]
+        if row.motion == STICK:
+            add_moments(row.begin, row.end, weight, moments[0], moments[1])
+        else:
+            add_moments(row.begin, row.end, weight * row.direction, moments[2], moments[3])
+    products(moments[2], moments[3], ks, load_ks, 1.0, dF_dN)
+    products(moments[0], moments[1], ks, ks, 1.0, dF_dU)
+    for i in range(U.size):
+        total = 0.0
+        for j in range(N.size):
+            total += dF_dN[i, j] * N[j]
+        dF_dmu[i] = total
+        total = 0.0
+        for j in range(U.size):
+            total += dF_dU[i, j] * U[j]
+        dF_dkt[i] = total
+        for j in range(N.size):
+            dF_dN[i, j] *= mu
+        for j in range(U.size):
+            dF_dU[i, j] *= kt
 
 
 @compiled

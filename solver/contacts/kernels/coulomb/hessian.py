@@ -104,14 +104,8 @@ def second_along(
         weights[i] = w[i] / math.pi
     if ks[0] == 0:
         weights[0] *= 0.5
-    by_motion, by_load = 0.0, 0.0
-    for i in range(n):
-        for j in range(n):
-            by_motion += w[i] * dF_dU[i, j] * dU[j]
-        for j in range(m):
-            by_load += w[i] * dF_dN[i, j] * dN[j]
     rates = np.zeros(3)
-    rates[_KT], rates[_LOAD] = by_motion / kt, by_load
+    rates[_KT], rates[_LOAD] = _weighed(w, dF_dU, dU) / kt, _weighed(w, dF_dN, dN)
     at, over = np.empty((4, n)), np.empty((4, m))
     for index in range(count):
         row = segments[index]
@@ -142,6 +136,15 @@ def second_along(
     if rates[_LOAD] != 0.0:
         rates[_MU] += rates[_LOAD] / mu
     return rates[_KT], rates[_MU]
+
+
+@compiled
+def _weighed(w: Real, matrix: Real, v: Real) -> float:
+    """Return w · matrix v."""
+    total = 0.0
+    for i in range(w.size):
+        total += w[i] * dot(matrix[i], v)
+    return total
 
 
 @compiled
