@@ -340,22 +340,6 @@ def test_a_band_nobody_can_keep_is_status_1(run: Run) -> None:
     assert optim.DesignStatus.INFEASIBLE.value in err
 
 
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        "solve two-dof --frequency 1.2 --plot picture.png",
-        "sweep two-dof --from 0.5 --to 1.5 --limit 1 --plot picture.svg",
-        "design two-dof --variable damper.N0 90 110 --harmonics 3 --plot picture.pdf",
-        "march two-dof --frequency 1.2 --plot picture.png",
-    ],
-)
-def test_pictures(run: Run, tmp_path: Path, arguments: str) -> None:
-    assert run(arguments)[0] == 0
-    (picture,) = tmp_path.iterdir()
-    beginnings = {".png": b"\x89PNG", ".svg": b"<?xml", ".pdf": b"%PDF"}
-    assert picture.read_bytes().startswith(beginnings[picture.suffix])
-
-
 def test_a_pipe_gets_no_progress() -> None:
     done = subprocess.run([*COMMAND, "sweep", "two-dof"], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
