@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import pytest
 from launch import COMMAND, answers, free_port
@@ -57,6 +57,12 @@ class Site:
             self._process = None
 
 
+class Address(NamedTuple):
+    """A service that the test itself runs."""
+
+    url: str
+
+
 @dataclass
 class Watch:
     """What a browser said while a test used it."""
@@ -81,7 +87,7 @@ class Watch:
 
 
 @contextmanager
-def opened(browser: Browser, site: Site, **options: Any) -> Iterator[tuple[BrowserContext, Watch]]:
+def opened(browser: Browser, site: Site | Address, **options: Any) -> Iterator[tuple[BrowserContext, Watch]]:
     """A fresh profile of the browser whose pages must not complain nor ask elsewhere."""
     context = browser.new_context(viewport={"width": 1280, "height": 900}, **options)
     context.set_default_timeout(90_000)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import sqlite3
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,15 +13,14 @@ import pytest
 
 pytest.importorskip("playwright.sync_api", reason="the package playwright is not installed")
 
-from page_site import Site, opened
+from page_site import Address, opened
 from playwright.sync_api import expect
+from service_helpers import serving
 
 import optim
-from service.client.embedded import EmbeddedService
-from service.db.models import JobState
+from service.jobs.kinds import SHIPPED
 from service.rendering.report.design import design_report
 from service.rendering.report.sections import Designed
-from service.settings.settings import load_settings
 from solver.scene.scene import load_scene
 
 if TYPE_CHECKING:
@@ -30,25 +30,22 @@ BAD = (
     '"><img src=x onerror="window.hurt=1"><script src="http://evil.invalid/a.js"></script>'
     '<svg onload="window.hurt=1"><a href="javascript:window.hurt=1">${window.hurt=1}'
 )
-SWEEP = {"scene": "two-dof", "harmonics": 3}
 
 
 @pytest.fixture(scope="module")
-def poisoned(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
+def poisoned(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Address]:
     """A service whose database somebody has filled with markup."""
     folder = tmp_path_factory.mktemp("poisoned")
-    site = Site(folder)
-    with EmbeddedService(load_settings(database=site.database, workers=1, answer_workers=1)) as service:
-        assert service.wait(service.submit("sweep", SWEEP)).status is JobState.SUCCESSFUL
-    with sqlite3.connect(folder / "jobs.db") as connection:
-        connection.execute("UPDATE result SET scene_name = ?, status = ?", [BAD, BAD])
-        connection.execute("UPDATE quantity SET label = ? WHERE name = 'parameter'", [BAD])
-        connection.execute("UPDATE quantity SET label = ? WHERE label = 'damper'", [BAD])
-        connection.execute("UPDATE job SET scene_name = ?", [BAD])
-    connection.close()
-    site.start()
-    yield site
-    site.stop()
+    with serving(folder, SHIPPED, max_body_bytes=4_000_000, preview_seconds=60.0) as client:
+        body = {"kind": "sweep", "scene": "two-dof", "harmonics": 3}
+        done = client.post("/v1/jobs", json=body, headers={"Prefer": "wait=60"}).json()
+        assert done["status"] == "successful"
+        with closing(sqlite3.connect(folder / "jobs.db")) as connection, connection:
+            connection.execute("UPDATE result SET scene_name = ?, status = ?", [BAD, BAD])
+            connection.execute("UPDATE quantity SET label = ? WHERE name = 'parameter'", [BAD])
+            connection.execute("UPDATE quantity SET label = ? WHERE label = 'damper'", [BAD])
+            connection.execute("UPDATE job SET scene_name = ?", [BAD])
+        yield Address(str(client.base_url).rstrip("/"))
 
 
 def unhurt(page: Page) -> None:
@@ -57,7 +54,7 @@ def unhurt(page: Page) -> None:
     assert page.locator("img[src=x], script[src*='evil'], a[href^='javascript']").count() == 0
 
 
-def test_stored_markup_is_text_on_the_page(browser: Browser, poisoned: Site) -> None:
+def test_stored_markup_is_text_on_the_page(browser: Browser, poisoned: Address) -> None:
     with opened(browser, poisoned) as (context, _):
         page = context.new_page()
         page.goto(f"{poisoned.url}/?scene=two-dof")
@@ -71,7 +68,9 @@ def test_stored_markup_is_text_on_the_page(browser: Browser, poisoned: Site) -> 
     "text",
     [f"'{BAD}' = 1", f"name = '{BAD}'", f"[[contacts]]\nname = '{BAD}'", f"[structure]\nkind = '{BAD}'"],
 )
-def test_markup_in_a_scene_file_is_text_in_the_messages(browser: Browser, poisoned: Site, text: str) -> None:
+def test_markup_in_a_scene_file_is_text_in_the_messages(
+    browser: Browser, poisoned: Address, text: str
+) -> None:
     with opened(browser, poisoned) as (context, watch):
         watch.allowed = ("status of 4",)
         page = context.new_page()

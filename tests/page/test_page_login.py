@@ -7,8 +7,11 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import pytest
+from launch import free_port
 from oidc import provider
-from page_site import Site
+from service_helpers import serving
+
+from service.jobs.kinds import SHIPPED
 
 expect = pytest.importorskip("playwright.sync_api", reason="the package playwright is not installed").expect
 for name in ("authlib", "oidc_provider_mock"):
@@ -20,23 +23,25 @@ if TYPE_CHECKING:
 
 
 @pytest.fixture(scope="module")
-def locked(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
+def locked(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     """A service that wants keys, and lets in those whose address is verified."""
-    with provider() as issuer:
-        site = Site(
-            tmp_path_factory.mktemp("locked"), STICKSLIP_REQUIRE_KEYS="true", STICKSLIP_OIDC_ISSUER=issuer,
-            STICKSLIP_OIDC_CLIENT_ID="stickslip", STICKSLIP_OIDC_CLIENT_SECRET="a secret",
-        )  # fmt: skip
-        site.set_environment(STICKSLIP_PUBLIC_URL=site.url)
-        site.start()
-        yield site
-        site.stop()
+    port = free_port()
+    url = f"http://127.0.0.1:{port}"
+    with (
+        provider() as issuer,
+        serving(
+            tmp_path_factory.mktemp("locked"), SHIPPED, port=port, public_url=url, require_keys=True,
+            max_body_bytes=4_000_000, preview_seconds=60.0, oidc_issuer=issuer,
+            oidc_client_id="stickslip", oidc_client_secret="a secret",
+        ),
+    ):  # fmt: skip
+        yield url
 
 
-def test_a_person_logs_in(browser: Browser, locked: Site) -> None:
+def test_a_person_logs_in(browser: Browser, locked: str) -> None:
     with browser.new_context() as context:
         page = context.new_page()
-        page.goto(f"{locked.url}/?scene=two-dof")
+        page.goto(f"{locked}/?scene=two-dof")
         expect(page.locator("#key-form")).to_be_visible()
         page.get_by_role("link", name="Log in with your account").click()
         page.locator("input[name=sub]").fill("bob")
@@ -44,7 +49,7 @@ def test_a_person_logs_in(browser: Browser, locked: Site) -> None:
         expect(page.locator("#banner")).to_contain_text("Your account may not use this service")
         page.get_by_role("link", name="Log in with your account").click()
         page.get_by_role("button", name="ann").click()
-        page.wait_for_url(f"{locked.url}/**")
+        page.wait_for_url(f"{locked}/**")
         expect(page.locator("#live-status")).to_contain_text("peak")
         expect(page.locator("#key-form")).to_be_hidden()
         assert "login" not in page.url

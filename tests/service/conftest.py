@@ -1,7 +1,12 @@
+import os
 import subprocess
-from collections.abc import Iterator
+import threading
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
+from multiprocessing.connection import Connection
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import httpx
 import pytest
@@ -12,6 +17,7 @@ from service_helpers import MakeSettings, serving, settings_of, with_tables
 from service.client.embedded import EmbeddedService
 from service.db.engine import Database
 from service.jobs.kinds import SHIPPED
+from service.uploads import inspection
 
 BACKENDS = ("sqlite", "postgresql")
 
@@ -36,6 +42,21 @@ def small_disk(tmp_path: Path) -> Iterator[Path]:
         pytest.skip("a small disk can be mounted by root only")
     yield folder
     subprocess.run(["umount", str(folder)], check=True)
+
+
+@pytest.fixture
+def read_here(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Files are read by a thread of this process: for many refusals, each of which would start a reader."""
+
+    def start(target: Callable[..., None], args: tuple[Any, ...], name: str) -> SimpleNamespace:
+        theirs = Connection(os.dup(args[0].fileno()), readable=False)
+        thread = threading.Thread(target=target, args=(theirs, *args[1:]), name=name)
+        thread.start()
+        return SimpleNamespace(kill=int, join=thread.join, close=theirs.close, status=int)
+
+    monkeypatch.setattr(inspection, "start", start)
+    monkeypatch.setattr(inspection, "limit_process", lambda *_: None)
+    monkeypatch.chdir(Path.cwd())  # the reader goes to the folder of the files; back afterwards
 
 
 @pytest.fixture(params=BACKENDS)

@@ -119,7 +119,7 @@ def meets(record: SweepRecord, query: dict[str, Any]) -> bool:
 
 
 @pytest.mark.parametrize("of_sweeps", [False, True], ids=["results", "sweeps"])
-@pytest.mark.parametrize("queries", [30, pytest.param(500, marks=pytest.mark.long)])
+@pytest.mark.parametrize("queries", [15, pytest.param(500, marks=pytest.mark.long)])
 def test_random_queries_are_answered_as_by_a_plain_filter(
     filled: tuple[Database, list[Owned]], queries: int, of_sweeps: bool
 ) -> None:

@@ -115,6 +115,7 @@ def refused(client: httpx.Client, **body: object) -> dict[str, str]:
     return {issue["pointer"]: issue["detail"] for issue in problem["errors"]}
 
 
+@pytest.mark.usefixtures("read_here")
 def test_what_does_not_fit_is_said_beside_its_key(shipped: httpx.Client) -> None:
     small, _ = beam(5)
     mass, stiffness, other, rows = sent(
