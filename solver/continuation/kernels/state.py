@@ -6,14 +6,12 @@ import math
 from collections.abc import Callable
 from typing import NamedTuple
 
-from numba.experimental import structref
-
 from solver.balance.kernels.residual import least_size
 from solver.contacts.kernels.system import System
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Real
 from solver.jit.lapack import copy_to, largest_entry
-from solver.jit.reference import Reference
+from solver.jit.reference import referenced
 
 # How a stretch of continuation ended, and how the next point may be predicted.
 RUNNING, FINISHED, NO_START, STALLED, LEFT_RANGE = 0, 1, 2, 3, 4
@@ -50,18 +48,7 @@ class Walk(NamedTuple):
     numbers: Real  # (NUMBERS,)
 
 
-@structref.register
-class _WalkType(Reference):
-    """Numba's type of a `Walk` by reference."""
-
-
-class _WalkReference(structref.StructRefProxy):
-    """A `Walk` by reference."""
-
-
-structref.define_proxy(_WalkReference, _WalkType, list(Walk._fields))
-
-new_walk: Callable[..., Walk] = _WalkReference
+new_walk: Callable[..., Walk] = referenced("Walk", __name__, Walk._fields)
 
 
 @compiled

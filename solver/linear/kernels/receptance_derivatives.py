@@ -10,12 +10,11 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numba.experimental import structref
 
 from solver.contacts.kernels.system import DENSE, STRUCTURE, System
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Complex
-from solver.jit.reference import Reference
+from solver.jit.reference import referenced
 from solver.jit.separate import apart
 from solver.linear.kernels.dynamic_stiffness import (
     BY_BOTH,
@@ -39,18 +38,7 @@ class Jets(NamedTuple):
     x_linear: Complex  # (ORDERS, nk)
 
 
-@structref.register
-class _JetsType(Reference):
-    """Numba's type of `Jets` by reference."""
-
-
-class _JetsReference(structref.StructRefProxy):
-    """`Jets` by reference."""
-
-
-structref.define_proxy(_JetsReference, _JetsType, list(Jets._fields))
-
-_new: Callable[..., Jets] = _JetsReference
+_new: Callable[..., Jets] = referenced("Jets", __name__, Jets._fields)
 
 
 @compiled

@@ -7,7 +7,6 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numba.experimental import structref
 
 from solver.contacts.kernels.stick_slip_events import SEGMENT, segment_capacity
 from solver.contacts.kernels.system import (
@@ -20,7 +19,7 @@ from solver.contacts.kernels.system import (
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Integer, Real, coefficient_count
 from solver.jit.records import Records
-from solver.jit.reference import Reference
+from solver.jit.reference import referenced
 from solver.linear.kernels.receptance_derivatives import Jets, new_jets
 
 # Entries of `Summit.numbers`.
@@ -60,18 +59,7 @@ class Summit(NamedTuple):
     numbers: Real  # (NUMBERS,)
 
 
-@structref.register
-class _SummitType(Reference):
-    """Numba's type of a `Summit` by reference."""
-
-
-class _SummitReference(structref.StructRefProxy):
-    """A `Summit` by reference."""
-
-
-structref.define_proxy(_SummitReference, _SummitType, list(Summit._fields))
-
-_new: Callable[..., Summit] = _SummitReference
+_new: Callable[..., Summit] = referenced("Summit", __name__, Summit._fields)
 
 
 @compiled
