@@ -51,7 +51,7 @@ KERNELS = (
 SECOND_KERNELS = (
     "solver.contacts.kernels.coulomb.second_law:line_second",
     "solver.contacts.kernels.coulomb.second_law:box_second",
-    "solver.contacts.kernels.circle.second_law:circle_law_second",
+    "solver.contacts.kernels.circle.hessian:circle_law_second",
     "solver.contacts.kernels.springs.second_law:gap_second",
     "solver.contacts.kernels.springs.second_law:polynomial_second",
 )

@@ -1,6 +1,6 @@
 """Second derivatives of the springs of `solver.contacts.kernels.springs.force`, behind the contract.
 
-The arguments are those of `solver.contacts.kernels.second_laws`. With W = w·e: of the gap spring the gradient
+The arguments are those of `solver.contacts.kernels.laws`. With W = w·e: of the gap spring the gradient
 by the motion is k ∫W e over the intervals of contact, whose ends move by −(du − dgap)/u'; of a polynomial f
 it is ∫W f'(u) e, and its derivative along du and df is ∫W (f''(u) du + df'(u)) e.
 """
