@@ -16,9 +16,8 @@ from solver.scene.parameter_paths import parameter
 if TYPE_CHECKING:
     from solver.continuation.branch import AnyBranch
     from solver.marching.result import MarchResult
-    from solver.modes.driven.results import HeldAmplitude, PhaseResonance
     from solver.modes.peaks.performance import PerformanceCurve
-    from solver.modes.results import NonlinearMode
+    from solver.modes.results import HeldAmplitude, NonlinearMode, PhaseResonance
     from solver.response.solution import Solution
     from solver.response.stability.floquet import Stability
     from solver.studies.blades import BladeAmplitudes, BladePeaks
