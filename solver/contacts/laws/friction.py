@@ -280,7 +280,7 @@ class FrictionContact(AnyContact):
 
     def friction_at(self, motions: Real, load: Real, tau: Real) -> Real:
         """Return the friction force along each direction [N] at the angles `tau`, by its segments."""
-        from solver.contacts.force_history import force_by_segments
+        from solver.contacts.segments import force_by_segments
 
         slider = self.friction
         pairs = zip(slider.ports, slider.stiffnesses, strict=True)

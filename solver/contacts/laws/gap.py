@@ -92,8 +92,8 @@ class GapSpring(AnyContact):
 
     def perturbed(self, motions: Real, load: Real) -> tuple[ContactPart, ...]:
         """Return how it follows small perturbations of a motion."""
+        from solver.contacts.pieces.line import gap_pieces
         from solver.contacts.pieces.piece import ContactPart
-        from solver.contacts.pieces.springs import gap_pieces
 
         del load
         return (ContactPart((0,), gap_pieces(motions[0], self.k, self.gap)),)

@@ -117,8 +117,8 @@ class PolynomialSpring(AnyContact):
 
     def perturbed(self, motions: Real, load: Real) -> tuple[ContactPart, ...]:
         """Return how it follows small perturbations of a motion."""
+        from solver.contacts.pieces.line import polynomial_pieces
         from solver.contacts.pieces.piece import ContactPart
-        from solver.contacts.pieces.springs import polynomial_pieces
 
         del load
         return (ContactPart((0,), polynomial_pieces(motions[0], self.coefficients)),)
