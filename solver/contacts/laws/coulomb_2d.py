@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 from solver.contacts.fields import Between, NonNegative, Real, Samples
 from solver.contacts.kernels import columns
@@ -106,23 +106,11 @@ class SlidesInAPlane(FrictionContact):
 
     def rows(self) -> tuple[Row, ...]:
         """Return its rows of the time march, one for each direction; the first has the normal force."""
-        moves = self.normal_port is not None
-        given = {**self.row_numbers(), **self._normal_row()}
-        first = second = Follows.RUBBING if moves else Follows.FRICTION
+        first = {**self.row_numbers(), "presses": float(self.moving is not None)}
+        second = {**first, "port": 1, "presses": 0.0, "kt": self.tangential[1]}
         if not self.limits_apart:
-            first, second = Follows.CIRCLE, Follows.CIRCLE_SECOND
-        pressing = 1.0 if moves else 0.0
-        return (
-            Row(name=self.name, follows=first, presses=pressing, **given),
-            Row(
-                name=f"{self.name} (second)", port=1, follows=second, presses=0.0,
-                **{**given, "kt": self.tangential[1]},
-            ),
-        )  # fmt: skip
-
-    def _normal_row(self) -> dict[str, Any]:
-        """Return what the rows of the time march have of a normal motion."""
-        return {}
+            first["follows"], second["follows"] = Follows.CIRCLE, Follows.CIRCLE_SECOND
+        return Row(name=self.name, **first), Row(name=f"{self.name} (second)", **second)
 
 
 class PlanarContact(SlidesInAPlane):
