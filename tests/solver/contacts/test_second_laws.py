@@ -67,11 +67,11 @@ LAWS = {
         ports=(0, 1, 2), columns=(KT, MU, KN), tied=True,
     ),
     "gap": Law(
-        force=GAP_SPRING, second="solver.contacts.kernels.springs.second_law:gap_second", ports=(0,),
+        force=GAP_SPRING, second="solver.contacts.kernels.springs:gap_second", ports=(0,),
         columns=(K_GAP, GAP),
     ),
     "polynomial": Law(
-        force=POLYNOMIAL, second="solver.contacts.kernels.springs.second_law:polynomial_second",
+        force=POLYNOMIAL, second="solver.contacts.kernels.springs:polynomial_second",
         ports=(0,), columns=tuple(range(A_1, A_1 + 5)),
     ),
 }  # fmt: skip
