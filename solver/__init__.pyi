@@ -24,11 +24,6 @@ from .marching.march import march as march
 from .marching.start import MarchStart as MarchStart
 from .modes.driven.controlled import held_amplitude as held_amplitude
 from .modes.driven.phase_resonance import phase_resonance as phase_resonance
-from .modes.driven.results import (
-    HeldAmplitude as HeldAmplitude,
-    HeldStatus as HeldStatus,
-    PhaseResonance as PhaseResonance,
-)
 from .modes.gradient import ModeGradient as ModeGradient, mode_gradient as mode_gradient
 from .modes.limit_cycles import (
     LimitCycle as LimitCycle,
@@ -41,7 +36,13 @@ from .modes.peaks.performance import (
     PerformanceCurve as PerformanceCurve,
     performance_curve as performance_curve,
 )
-from .modes.results import NonlinearMode as NonlinearMode, NonlinearModeStatus as NonlinearModeStatus
+from .modes.results import (
+    HeldAmplitude as HeldAmplitude,
+    HeldStatus as HeldStatus,
+    NonlinearMode as NonlinearMode,
+    NonlinearModeStatus as NonlinearModeStatus,
+    PhaseResonance as PhaseResonance,
+)
 from .response.power_balance import PowerBalance as PowerBalance, power_balance as power_balance
 from .response.solution import Solution as Solution, SolutionStatus as SolutionStatus
 from .response.solve import solve as solve

@@ -186,118 +186,95 @@ def _fill(
     return taken
 
 
-class _Callback(casadi.Callback):
-    """z to the numbers of all places, with their Jacobian."""
+class _Function(casadi.Callback):
+    """A function of columns as CasADi calls it, with its Jacobian if it is given one."""
 
-    def __init__(self, rows: _Rows, n: int) -> None:
+    def __init__(
+        self, name: str, sizes: Sequence[int], out: casadi.Sparsity, of: Callable[..., Any],
+        jacobian: Callable[[str], casadi.Function] | None = None,
+    ) -> None:  # fmt: skip
         casadi.Callback.__init__(self)
-        self._rows, self._n = rows, n
-        self._jacobian: _Jacobian | None = None
-        self.failure: BaseException | None = None
-        self.construct("rows", {})
+        self._sizes, self._out, self._of, self._jacobian = sizes, out, of, jacobian
+        self.construct(name, {})
 
     def get_n_in(self) -> int:
-        return 1
+        return len(self._sizes)
 
     def get_n_out(self) -> int:
         return 1
 
-    def get_sparsity_in(self, _: int) -> casadi.Sparsity:
-        return casadi.Sparsity.dense(self._n, 1)
+    def get_sparsity_in(self, which: int) -> casadi.Sparsity:
+        return casadi.Sparsity.dense(self._sizes[which], 1)
 
     def get_sparsity_out(self, _: int) -> casadi.Sparsity:
-        return casadi.Sparsity.dense(self._rows.count, 1)
+        return self._out
 
-    def values(self, z: casadi.DM | Real) -> _Values:
-        """Return the numbers; what stops the search is kept, for IPOPT would swallow it."""
-        try:
-            if self.failure is None:
-                return self._rows.at(np.array(z, dtype=np.float64).reshape(-1))
-        except Exception as failure:  # noqa: BLE001 — raised again by `_run` once IPOPT has let go
-            self.failure = failure
-        return _unknown(self._rows.count, self._n)
-
-    def eval(self, arguments: Any) -> list[Real]:
-        return [self.values(arguments[0]).numbers]
+    def eval(self, arguments: Any) -> list[Any]:
+        return [self._of(*(np.array(one, dtype=np.float64).reshape(-1) for one in arguments))]
 
     def has_jacobian(self) -> bool:
-        return True
+        return self._jacobian is not None
 
     def get_jacobian(
         self, name: str, inames: Sequence[str], onames: Sequence[str], opts: Any
     ) -> casadi.Function:
-        del inames, onames, opts  # the names are CasADi's own
-        self._jacobian = _Jacobian(self, name, self._n, self._rows.count)
-        return self._jacobian
+        if self._jacobian is None:
+            return super().get_jacobian(name, inames, onames, opts)
+        self._made = self._jacobian(name)  # CasADi holds no reference of its own
+        return self._made
 
 
-class _Jacobian(casadi.Callback):
-    """z (and the numbers there) to the derivatives."""
+class _Programme:
+    """The functions of a programme: numbers of all places, their derivatives, the Hessian."""
 
-    def __init__(self, owner: _Callback, name: str, n: int, count: int) -> None:
-        casadi.Callback.__init__(self)
-        self._owner, self._n, self._count = owner, n, count
-        self.construct(name, {})
+    def __init__(self, rows: _Rows, n: int, tops: int) -> None:
+        self._rows, self._n, self._tops = rows, n, tops
+        self.failure: BaseException | None = None
+        self.numbers = _Function(
+            "rows", (n,), casadi.Sparsity.dense(rows.count, 1), lambda z: self._values(z).numbers,
+            self._derivatives,
+        )  # fmt: skip
+        whole = casadi.Sparsity.upper(n + tops)
+        self.hessian = _Function("hess_lag", (n + tops, 0, 1, rows.count), whole, self._lagrangian)
 
-    def get_n_in(self) -> int:
-        return 2
+    def _values(self, z: Real) -> _Values:
+        """Return the numbers; what stops the search is kept, for IPOPT would swallow it."""
+        try:
+            if self.failure is None:
+                return self._rows.at(z)
+        except Exception as failure:  # noqa: BLE001 — raised again by `_run` once IPOPT has let go
+            self.failure = failure
+        return _unknown(self._rows.count, self._n)
 
-    def get_n_out(self) -> int:
-        return 1
+    def _derivatives(self, name: str) -> casadi.Function:
+        """Return the derivatives as a function of z (and the numbers there)."""
+        count, n = self._rows.count, self._n
+        dense = casadi.Sparsity.dense(count, n)
+        return _Function(name, (n, count), dense, lambda z, _: self._values(z).slopes)
 
-    def get_sparsity_in(self, which: int) -> casadi.Sparsity:
-        return casadi.Sparsity.dense(self._n if which == 0 else self._count, 1)
-
-    def get_sparsity_out(self, _: int) -> casadi.Sparsity:
-        return casadi.Sparsity.dense(self._count, self._n)
-
-    def eval(self, arguments: Any) -> list[Real]:
-        return [self._owner.values(arguments[0]).slopes]
-
-
-class _Hessian(casadi.Callback):
-    """x = (z, t) and the multipliers to the upper triangle of the Hessian of the Lagrangian."""
-
-    def __init__(self, owner: _Callback, n: int, tops: int, count: int) -> None:
-        casadi.Callback.__init__(self)
-        self._owner, self._n, self._tops, self._count = owner, n, tops, count
-        self.construct("hess_lag", {})
-
-    def get_n_in(self) -> int:
-        return 4
-
-    def get_n_out(self) -> int:
-        return 1
-
-    def get_sparsity_in(self, which: int) -> casadi.Sparsity:
-        return casadi.Sparsity.dense((self._n + self._tops, 0, 1, self._count)[which], 1)
-
-    def get_sparsity_out(self, _: int) -> casadi.Sparsity:
-        return casadi.Sparsity.upper(self._n + self._tops)
-
-    def eval(self, arguments: Any) -> list[casadi.DM]:
-        x, multipliers = (np.array(arguments[i], dtype=np.float64).reshape(-1) for i in (0, 3))
-        whole = np.zeros((self._n + self._tops,) * 2)
+    def _lagrangian(self, x: Real, _p: Real, _factor: Real, multipliers: Real) -> casadi.DM:
+        """Return the upper triangle of the Hessian of the Lagrangian by x = (z, t)."""
+        n, upper = self._n, casadi.Sparsity.upper(self._n + self._tops)
+        whole = np.zeros(upper.shape)
         # Every row stands in the programme with a minus sign.
-        whole[: self._n, : self._n] = self._owner.values(x[: self._n]).lagrangian(-multipliers)
-        return [casadi.DM(self.get_sparsity_out(0), casadi.DM(whole)[self.get_sparsity_out(0)].nonzeros())]
+        whole[:n, :n] = self._values(x[:n]).lagrangian(-multipliers)
+        return casadi.DM(upper, casadi.DM(whole)[upper].nonzeros())
 
 
 def _run(rows: _Rows, model: Model, region: float) -> None:
     """Solve one programme from a model; the designs tried are kept by `rows`."""
     n, m, groups = model.z.size, model.heights.size, rows.unique
-    callback = _Callback(rows, n)
+    functions = _Programme(rows, n, len(groups))
     z, t = casadi.MX.sym("z", n), casadi.MX.sym("t", len(groups))
-    numbers = callback(z)
+    numbers = functions.numbers(z)
     which = [int(np.flatnonzero(groups == g)[0]) for g in model.groups]
     parts = [t[g] - numbers[i] for i, g in enumerate(which)] + [-numbers[j] for j in range(m, rows.count)]
     constraints = casadi.vertcat(*parts)
     programme: dict[str, Any] = {"x": casadi.vertcat(z, t), "f": casadi.sum1(t), "g": constraints}
     options, exact = _OPTIONS, all(row.second is not None for row in (*model.rows, *model.limited))
     if exact:
-        hessian = _Hessian(callback, n, len(groups), rows.count)
         ipopt = {**_OPTIONS["ipopt"], "hessian_approximation": "exact"}
-        options = {**_OPTIONS, "ipopt": ipopt, "hess_lag": hessian}
+        options = {**_OPTIONS, "ipopt": ipopt, "hess_lag": functions.hessian}
     solver = casadi.nlpsol("design", "ipopt", programme, options)
     tops = [model.heights[model.groups == g].max() for g in groups]
     solver(
@@ -305,5 +282,5 @@ def _run(rows: _Rows, model: Model, region: float) -> None:
         lbx=np.append(np.maximum(model.z - region, 0.0), np.full(len(groups), -np.inf)),
         ubx=np.append(np.minimum(model.z + region, 1.0), np.full(len(groups), np.inf)), lbg=0.0, ubg=np.inf,
     )  # fmt: skip
-    if callback.failure is not None:
-        raise callback.failure
+    if functions.failure is not None:
+        raise functions.failure

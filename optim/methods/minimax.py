@@ -1,6 +1,6 @@
 """Trust-region search for the design whose largest row is least, subject to limits on others.
 
-Each step solves the convex subproblem of `optim.methods.subproblem` at the present design: every competing
+Each step solves the convex subproblem of `optim.methods.conic` at the present design: every competing
 peak, every band is a row, so an exchange of the highest peak is nothing special. The curvature between
 exchanges is that of the Lagrangian: exact where every row that pulls has second derivatives, else a damped
 BFGS matrix. Reference: Conn, Gould, Toint, Trust-Region Methods (SIAM
@@ -18,9 +18,8 @@ import numpy as np
 from optim.criteria.criterion import CriterionRow
 from optim.criteria.linearised import PENALTY, Model, with_cuts
 from optim.criteria.rows import DesignEvaluation, nearest
-from optim.methods.conic import Step
+from optim.methods.conic import Step, solve_subproblem
 from optim.methods.kkt import KEPT, Evaluate, Local, ModelOf, ended
-from optim.methods.subproblem import solve_subproblem
 from optim.problem.variables import BoundedVariable, Real, snapped, unscaled
 
 Subproblem = Callable[[Model, Real, float], Step | None]
@@ -52,7 +51,7 @@ def minimax_search(
     variables : the design variables.
     begin : a good evaluation to start from.
     model_of : the model of an evaluation.
-    solve : the convex subproblem; that of `optim.methods.subproblem` if left out.
+    solve : the convex subproblem; that of `optim.methods.conic` if left out.
     norm : in which its trust region is round.
     remembered : designs whose rows are kept as cuts.
     enough : merit from which on nothing better is looked for.

@@ -1,6 +1,6 @@
 """The forces of all contacts with all they need to be differentiated twice by any numbers.
 
-What differs from law to law is behind `solver.contacts.kernels.second_laws`; here stands what the numbers of
+What differs from law to law is behind `solver.contacts.kernels.laws`; here stands what the numbers of
 a scene do to rows, loads and excitation.
 """
 
@@ -13,8 +13,7 @@ import numpy as np
 
 from solver.balance.kernels.residual import contact_values
 from solver.balance.parameter import Parameter
-from solver.contacts.kernels.laws import law_force
-from solver.contacts.kernels.second_laws import law_second
+from solver.contacts.kernels.laws import law_force, law_second
 from solver.contacts.kernels.stick_slip_events import FAILED, new_segments
 from solver.contacts.kernels.system import System
 from solver.contacts.laws.base import without_second

@@ -9,8 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from solver.contacts.kernels import columns
-from solver.contacts.kernels.laws import law_number
-from solver.contacts.kernels.second_laws import second_number
+from solver.contacts.kernels.laws import law_number, second_number
 from solver.errors import SettingError
 from solver.jit.fourier import Integer, Real
 from solver.linear.model import LinearModel

@@ -1,15 +1,19 @@
-"""The equations of motion of a scene as the time march reads them: sparse rows in the angle tau = omega t."""
+"""The equations of motion of a scene as the time march reads them: sparse rows in the angle tau = omega t.
+
+They share nothing with the harmonic balance: matrices are inverted here, not decomposed.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import linalg
 from scipy.sparse import block_diag, csr_array, diags_array
 
 from solver.errors import SettingError
-from solver.linear.first_order import equations, modal_damping_root
 from solver.marching.base import with_base, with_sum
 from solver.marching.contacts import columns, selection, sparse_rows
 from solver.marching.kernels import state as kernel
@@ -18,6 +22,84 @@ from solver.scene.bodies.kinematics import dof_names, pair_form
 from solver.scene.scene import LumpedStructure, MatricesStructure, Scene
 
 FloatArray = NDArray[np.float64]
+_INDEPENDENT = 1e-9  # smallest singular value of the modes at the DOFs in use, relative to the largest
+
+
+Equations = tuple[FloatArray, FloatArray, FloatArray, dict[str, int]]
+"""M⁻¹ K [1/s²], M⁻¹ C [1/s] and M⁻¹ [1/kg], (n, n) each, and the coordinate of each DOF in use."""
+
+
+def _of_structure(structure: MatricesStructure, used: Sequence[str], spin: float) -> Equations:
+    """The equations with the DOFs `used` as coordinates, at a speed of rotation `spin` [rad/s].
+
+    Raises
+    ------
+    SettingError
+        The structure is given by too few modes to tell the motions of these DOFs apart.
+    """
+    rows = dict(zip(structure.dofs, structure.dofs.rows, strict=True))
+    if structure.modes is not None:
+        return _of_modes(structure, list(dict.fromkeys(used)), rows)
+    if structure.M is None or structure.K is None:
+        raise SettingError("structure", structure.kind, "must have M and K, or `modes`")
+    M, K = structure.M.array, structure.K.array
+    symmetric = 0.5 * (K + K.T)
+    C = structure.stiffness_proportional_damping * symmetric + structure.mass_proportional_damping * M
+    if structure.C is not None:
+        C = C + structure.C.array
+    if structure.damping_ratio is not None:
+        # C = 2 ζ M sqrt(M⁻¹ K): the square root taken in the coordinates where M is 1.
+        factor = linalg.cholesky(M, lower=True)
+        half = linalg.solve_triangular(factor, symmetric, lower=True)
+        C = C + factor @ _modal_damping_root(linalg.solve_triangular(factor, half.T, lower=True),
+                                            structure.damping_ratio) @ factor.T  # fmt: skip
+    if structure.G is not None:
+        C = C + spin * structure.G.array
+    if structure.K_omega2 is not None:
+        K = K + spin**2 * structure.K_omega2.array
+    W = linalg.inv(M)
+    return W @ K, W @ C, W, {name: rows[name] for name in used}
+
+
+def _modal_damping_root(scaled: FloatArray, ratios: float | Sequence[float]) -> FloatArray:
+    """Twice the square root of a stiffness where M is 1, each mode with its damping ratio."""
+    values, vectors = linalg.eigh(scaled)
+    zeta = _ratio_of_each(ratios, values.size)
+    return np.asarray((vectors * (2.0 * zeta * np.sqrt(np.maximum(values, 0.0)))) @ vectors.T)
+
+
+def _ratio_of_each(ratios: float | Sequence[float], count: int) -> FloatArray:
+    """The damping ratio of each of `count` modes: the last one given also of those above it."""
+    given = np.atleast_1d(np.array(ratios, dtype=np.float64))
+    return np.concatenate([given, np.full(max(count - given.size, 0), given[-1])])[:count]
+
+
+def _of_modes(structure: MatricesStructure, used: list[str], rows: dict[str, int]) -> Equations:
+    """Coordinates y = S q: the DOFs in use, and what of the modes q is orthogonal to them."""
+    modes = structure.modes
+    if modes is None:
+        raise SettingError("structure", structure.kind, "must have `modes`")
+    seen = modes.modes[[rows[name] for name in used]]
+    sizes = linalg.svdvals(seen)
+    if seen.shape[0] > seen.shape[1] or sizes[-1] <= _INDEPENDENT * sizes[0]:
+        raise SettingError(
+            "scene",
+            f"{modes.omega2.size} modes at the DOFs {', '.join(used)}",
+            "must have modes that tell its DOFs in use apart to be marched in time (or M and K)",
+        )
+    S = np.vstack([seen, linalg.null_space(seen).T])
+    inverse = linalg.inv(S)
+    omega = np.sqrt(modes.omega2)
+    ratio = modes.damping_ratio
+    if ratio is None:
+        ratio = _ratio_of_each(structure.damping_ratio or 0.0, omega.size)
+    damping = (
+        2.0 * ratio * omega
+        + structure.stiffness_proportional_damping * modes.omega2
+        + structure.mass_proportional_damping
+    )
+    index = {name: i for i, name in enumerate(used)}
+    return (S * modes.omega2) @ inverse, (S * damping) @ inverse, S @ S.T, index
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +138,7 @@ def _matrices(
     if structure.damping_ratio is not None:
         root, own = np.sqrt(M), M.size
         scaled = K.toarray()[:own, :own] / np.outer(root, root)
-        modal = np.outer(root, root) * modal_damping_root(scaled, structure.damping_ratio)
+        modal = np.outer(root, root) * _modal_damping_root(scaled, structure.damping_ratio)
         C = csr_array(C) + csr_array(np.pad(modal, (0, len(index) - own)))
     return M, csr_array(C), csr_array(K)
 
@@ -88,14 +170,14 @@ def _of_matrices(
     used = [*ends, *pushed, *moved, *(dof for dof, _ in scene.seen(scene.observe.dof) or ())]
     used += [dof for entry in scene.entries for dof in (entry.on, entry.of)]
     spin = (scene.speed or 0.0) * REVOLUTIONS
-    found = equations(structure, [dof for dof in used if dof not in own], spin)
-    A, B, W = (csr_array(each) for each in (found.A, found.B, found.W))
+    *_, index = found = _of_structure(structure, [dof for dof in used if dof not in own], spin)
+    A, B, W = (csr_array(each) for each in found[:3])
     if not own:
-        return A, B, W, found.index
+        return A, B, W, index
     nothing, n = csr_array((len(own), len(own))), A.shape[0]
     A, B = (csr_array(block_diag([each, nothing])) for each in (A, B))
     W = csr_array(block_diag([W, *inertias]))
-    return A, B, W, found.index | {dof: n + i for i, dof in enumerate(own)}
+    return A, B, W, index | {dof: n + i for i, dof in enumerate(own)}
 
 
 def _with_couplings(

@@ -9,7 +9,7 @@ import numpy as np
 
 from solver.jit.fourier import Complex, Real
 from solver.modes.equations import Equations, Evaluated
-from solver.modes.kernels import steps as kernels
+from solver.modes.kernels.assembly import relative_residual as relative
 
 TOLERANCE = 1e-9  # of motions relative to the largest, and of the equations beside them
 _FINE = 1e-13  # below it nothing is left but rounding; between the two, steps go on as long as they help
@@ -65,7 +65,7 @@ def scales(y: Real, size: int) -> Real:
 
 def relative_residual(at: Evaluated, y: Real, a: float, size: int) -> float:
     """Return the largest residual, each relative to what it is a difference of."""
-    return float(kernels.relative_residual(at.residual, at.rough, y, size, a, at.lag, _CANCELLED))
+    return float(relative(at.residual, at.rough, y, size, a, at.lag, _CANCELLED))
 
 
 def correct(

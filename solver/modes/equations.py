@@ -29,9 +29,13 @@ from solver.contacts.kernels.system import (
     new_receptance,
 )
 from solver.jit.fourier import Complex, Integer, Real
-from solver.modes.kernels import steps
-from solver.modes.kernels.assembly import fill_functionals, fill_motions, fill_slopes
-from solver.modes.kernels.dynamics import fill_pushes
+from solver.modes.kernels.assembly import (
+    fill_functionals,
+    fill_motions,
+    fill_pushes,
+    fill_slopes,
+    scaled_step,
+)
 from solver.modes.sparse import Factors, Layout, SparseJacobian
 from solver.modes.structure import Dynamics, ModeStructure, structure_of
 from solver.sensitivity.gradient import Amplitudes
@@ -93,7 +97,7 @@ class Evaluated:
 def step(J: Real, rhs: Real, columns: Real) -> Real | None:
     """Solve J δ = rhs in units `columns` of the unknowns, rows brought to one size; None if singular."""
     found = np.array(rhs)
-    good = steps.scaled_step(J, found, columns, np.empty_like(J), np.empty(rhs.size, np.int32))
+    good = scaled_step(J, found, columns, np.empty_like(J), np.empty(rhs.size, np.int32))
     return found if good else None
 
 

@@ -20,8 +20,7 @@ from solver.modes.along import with_turns, zeta_of
 from solver.modes.corrector import Corrected, ModeState, correct
 from solver.modes.curve import CurveEnd, follow, tangent_of
 from solver.modes.equations import Equations
-from solver.modes.error_estimate import Wider
-from solver.modes.records import PointRecord, Recorder
+from solver.modes.records import PointRecord, Recorder, Wider
 from solver.response.stability.floquet import scene_monodromy
 from solver.scene.scene import Scene
 

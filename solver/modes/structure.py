@@ -23,7 +23,7 @@ from solver.linear.condensation import reduce_model
 from solver.linear.contact_table import port_stiffnesses
 from solver.linear.model import dynamic_stiffness
 from solver.matrices.normal_modes import hermitian, undamped_modes
-from solver.modes.kernels.dynamics import fill_stiffness, invert_modes
+from solver.modes.kernels.assembly import fill_stiffness, invert_modes
 from solver.modes.sparse import Factors, Pattern
 
 

@@ -1,9 +1,13 @@
-"""Files appear whole or not at all; tables as CSV."""
+"""Files appear whole or not at all: tables as CSV or Parquet, data sets as NetCDF 3.
+
+NetCDF 3 is what every reader knows; SciPy alone writes it.
+"""
 
 from __future__ import annotations
 
 import csv
 import io
+import json
 import math
 import os
 import secrets
@@ -11,6 +15,12 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.errors import MissingExtraError
+from solver.results.dataset import ROW, Dataset, Variable
 
 
 @contextmanager
@@ -46,3 +56,138 @@ def _cell(value: Any) -> Any:
     if isinstance(value, str) and value[:1] in ("=", "+", "-", "@", "\t", "\r"):
         return "'" + value
     return value
+
+
+_ROWS, _KIND = "stickslip_rows", "kind"
+_TEXT = "string_of_"  # dimensions of characters, joined to texts by readers
+
+
+def write_netcdf(data: Dataset, path: Path) -> None:
+    """Write every variable with its unit; texts as characters, booleans and integers as NetCDF has them."""
+    from scipy.io import netcdf_file
+
+    with netcdf_file(path, "w", version=2) as file:
+        for dim, size in data.sizes.items():
+            file.createDimension(dim, size)
+        for name, variable in data.variables.items():
+            values, dims, extra = _encoded(name, variable)
+            if len(dims) > len(variable.dims):
+                file.createDimension(dims[-1], values.shape[-1])
+            target = file.createVariable(name, values.dtype, dims)
+            target[:] = values
+            for key, text in {**variable.attributes, **extra}.items():
+                setattr(target, key, text.encode())
+        file.Conventions = b"CF-1.10"
+        given = {_KIND: data.kind, _ROWS: json.dumps(list(data.rows)), **data.attributes}
+        for key, value in given.items():
+            setattr(file, key, value.encode() if isinstance(value, str) else value)
+
+
+def read_netcdf(path: Path) -> Dataset:
+    """Read what `write_netcdf` wrote.
+
+    Raises
+    ------
+    OSError, ValueError, TypeError, KeyError
+        Not a NetCDF 3 file, or not one of these.
+    """
+    from scipy.io import netcdf_file
+
+    with netcdf_file(path, "r", mmap=False) as file:
+        attributes = {key: _plain(value) for key, value in file._attributes.items()}
+        variables = {name: _decoded(variable) for name, variable in file.variables.items()}
+    rows, kind = json.loads(str(attributes.pop(_ROWS))), str(attributes.pop(_KIND))
+    attributes.pop("Conventions", None)
+    return Dataset(kind=kind, rows=tuple(rows), variables=variables, attributes=attributes)
+
+
+def _encoded(name: str, variable: Variable) -> tuple[NDArray[Any], tuple[str, ...], dict[str, str]]:
+    """The values as NetCDF 3 can hold them, their dimensions, and what a reader must know to undo it."""
+    values, dims = variable.values, variable.dims
+    if values.dtype.kind == "U":
+        packed = np.char.encode(values, "utf-8")
+        wide = max(packed.dtype.itemsize, 1)
+        characters = np.ascontiguousarray(packed.astype(f"S{wide}")).view("S1").reshape(*values.shape, wide)
+        return characters, (*dims, _TEXT + name), {"_Encoding": "utf-8"}
+    if values.dtype.kind == "b":
+        return values.astype(np.int8), dims, {"dtype": "bool"}
+    if values.dtype.kind in "iu":
+        fits = not values.size or np.abs(values).max() < 2**31
+        return values.astype(np.int32 if fits else np.float64), dims, {"stickslip_dtype": values.dtype.name}
+    return values.astype(np.float64), dims, {}
+
+
+def _decoded(variable: Any) -> Variable:
+    about = {key: _plain(value) for key, value in variable._attributes.items()}
+    values, dims = np.array(variable[:]), tuple(variable.dimensions)
+    if dims and dims[-1].startswith(_TEXT):
+        rows = np.ascontiguousarray(values).reshape(-1, values.shape[-1])
+        texts = [b"".join(row.tolist()).rstrip(b"\0").decode() for row in rows]
+        values, dims = np.array(texts, dtype=np.str_).reshape(values.shape[:-1]), dims[:-1]
+    elif about.get("dtype") == "bool":
+        values = values.astype(bool)
+    else:
+        values = values.astype(str(about.get("stickslip_dtype", "float64")))
+    return Variable(
+        dims=dims, values=values, unit=str(about.get("units", "")), about=str(about.get("long_name", ""))
+    )
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, bytes):
+        return value.decode()
+    return value.item() if isinstance(value, (np.generic, np.ndarray)) else value
+
+
+_KEY = b"stickslip"
+
+
+def write_parquet(data: Dataset, path: Path) -> None:
+    """Write the table of a dataset; MissingExtraError without pyarrow."""
+    pa, pq = _pyarrow()
+    columns = data.table().variables
+    fields = [pa.field(name, _type(pa, v), metadata=v.attributes or None) for name, v in columns.items()]
+    about = json.dumps({"kind": data.kind, "attributes": dict(data.attributes)})
+    schema = pa.schema(fields, metadata={_KEY: about.encode()})
+    pq.write_table(pa.table([pa.array(v.values) for v in columns.values()], schema=schema), path)
+
+
+def read_parquet(path: Path) -> Dataset:
+    """Read a table that `write_parquet` wrote, or any other.
+
+    Raises
+    ------
+    OSError, ValueError
+        Not a Parquet file.
+    MissingExtraError
+        pyarrow is not installed.
+    """
+    _, pq = _pyarrow()
+    table = pq.read_table(path)
+    about = json.loads((table.schema.metadata or {}).get(_KEY, b"{}"))
+    variables = {}
+    for field, column in zip(table.schema, table.columns, strict=True):
+        notes = {key.decode(): text.decode() for key, text in (field.metadata or {}).items()}
+        values = column.to_numpy()
+        variables[field.name] = Variable(
+            dims=(ROW,), values=values.astype(np.str_) if values.dtype.kind == "O" else values,
+            unit=notes.get("units", ""), about=notes.get("long_name", ""),
+        )  # fmt: skip
+    return Dataset(
+        kind=about.get("kind", "table"), rows=(ROW,), variables=variables,
+        attributes=about.get("attributes", {}),
+    )  # fmt: skip
+
+
+def _type(pa: Any, variable: Variable) -> Any:
+    kind = variable.values.dtype
+    return pa.string() if kind.kind == "U" else pa.from_numpy_dtype(kind)
+
+
+def _pyarrow() -> tuple[Any, Any]:
+    try:
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+    except ImportError as error:
+        raise MissingExtraError("pyarrow", "parquet") from error
+    return pa, pq

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from solver.contacts.kernels.circle.hessian import circle_law_second
 from solver.contacts.kernels.circle.law import coulomb_circle
-from solver.contacts.kernels.circle.second_law import circle_law_second
 from solver.contacts.kernels.columns import COLUMNS, KN, KT, KT_SECOND, MU, PRESTRESSED
 from solver.contacts.kernels.coulomb.law import coulomb_box
 from solver.contacts.kernels.stick_slip_events import new_segments

@@ -100,7 +100,7 @@ class SlidersContact(AnyContact):
         return tuple(self.limit * (2 * i + 1) / SLIDERS**2 for i in range(SLIDERS))
 
     def force_at(self, motions: Real, load: Real, tau: Real) -> Real:
-        from solver.contacts.force_history import force_by_segments
+        from solver.contacts.segments import force_by_segments
 
         del load
         loads = [np.array([limit, 0.0, 0.0]) for limit in self.limits]

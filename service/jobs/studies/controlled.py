@@ -31,7 +31,7 @@ class Controlled(Study, HarmonicRequest):
     model_config = ConfigDict(json_schema_extra={"examples": [{"scene": "two-dof", "amplitude": 1.0}]})
     NAME, FUNCTION = "controlled", "solver:held_amplitude"
     RESULT = answered(
-        "solver.modes.driven.results:HeldAmplitude",
+        "solver.modes.results:HeldAmplitude",
         "ControlledResult",
         changes=list[Table],
         least=Table | None,

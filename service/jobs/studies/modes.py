@@ -121,7 +121,7 @@ _FURTHER: dict[str, Any] = dict.fromkeys(("performance", "limit_cycles", "motion
 def modes_result() -> type[BaseModel]:
     """Return the schema of a nonlinear mode, or of the forced responses with `phase_resonance`."""
     one: Any = answered("solver.modes.results:NonlinearMode", "NonlinearModeResult", **_FURTHER)()
-    other: Any = answered("solver.modes.driven.results:PhaseResonance", "PhaseResonanceResult")()
+    other: Any = answered("solver.modes.results:PhaseResonance", "PhaseResonanceResult")()
 
     class ModesResult(RootModel[one | other]):
         """A nonlinear mode; with `phase_resonance` the forced responses."""

@@ -20,8 +20,7 @@ from solver.jit.decorators import compiled
 from solver.jit.fourier import Complex, Real, coefficient_count, cosine_position, magnitude
 from solver.jit.lapack import copy_block, fill
 from solver.jit.separate import apart
-from solver.linear.kernels.modal_responses import driven_motions, goes_through_modes, modal_responses
-from solver.linear.kernels.receptance import receptance
+from solver.linear.kernels.receptance import driven_motions, goes_through_modes, modal_responses, receptance
 
 _CANCELLED, _LOST = 1e-3, 1e-5  # shares of |A| |F| and |A| |dF/dU| |u| a residual is relative to at least
 

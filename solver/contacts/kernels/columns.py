@@ -40,8 +40,8 @@ CLOSED, TOUCHING, DEFORMING = 5, 6, 7
 # are first asked for.
 KERNELS = (
     "solver.contacts.kernels.coulomb.law:coulomb_line",
-    "solver.contacts.kernels.springs.force:gap_spring",
-    "solver.contacts.kernels.springs.force:polynomial_spring",
+    "solver.contacts.kernels.springs:gap_spring",
+    "solver.contacts.kernels.springs:polynomial_spring",
     "solver.contacts.kernels.coulomb.law:coulomb_sampled",
     "solver.contacts.kernels.circle.law:coulomb_circle",
     "solver.contacts.kernels.coulomb.law:coulomb_box",
@@ -51,7 +51,7 @@ KERNELS = (
 SECOND_KERNELS = (
     "solver.contacts.kernels.coulomb.second_law:line_second",
     "solver.contacts.kernels.coulomb.second_law:box_second",
-    "solver.contacts.kernels.circle.second_law:circle_law_second",
-    "solver.contacts.kernels.springs.second_law:gap_second",
-    "solver.contacts.kernels.springs.second_law:polynomial_second",
+    "solver.contacts.kernels.circle.hessian:circle_law_second",
+    "solver.contacts.kernels.springs:gap_second",
+    "solver.contacts.kernels.springs:polynomial_second",
 )

@@ -49,7 +49,7 @@ class AnyContact(Element, InSpace):
     KERNEL: ClassVar[str]
     """``module:NAME`` of the kernel."""
     SECOND: ClassVar[str | None] = None
-    """``module:NAME`` of the kernel of its second derivatives (`solver.contacts.kernels.second_laws`)."""
+    """``module:NAME`` of the kernel of its second derivatives (`solver.contacts.kernels.laws`)."""
     PARAMETERS: ClassVar[Mapping[str, LawQuantity]] = {}
     """Its numbers that are parameter paths."""
     WORDS: ClassVar[Mapping[str, str]] = {}

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 
 from solver.contacts.fields import NonNegative, Real, Stiffness
 from solver.contacts.laws.friction import FrictionContact
-from solver.contacts.laws.parts import ContactMotion, Row
+from solver.contacts.laws.parts import ContactMotion
 from solver.errors import SettingError
 
 if TYPE_CHECKING:
@@ -75,10 +75,6 @@ class Contact(SlidesOnALine):
 
         del force
         return motion_at(segments_of(motions[0], load, self.kt, self.mu), tau)
-
-    def rows(self) -> tuple[Row, ...]:
-        """Return its row of the time march."""
-        return (Row(name=self.name, **self.row_numbers()),)
 
 
 LAW = Contact

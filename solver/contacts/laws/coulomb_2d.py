@@ -2,12 +2,115 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Literal
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING, ClassVar, Literal
 
-from solver.contacts.fields import NonNegative, Samples
+from solver.contacts.fields import Between, NonNegative, Real, Samples
 from solver.contacts.kernels import columns
-from solver.contacts.laws.parts import RestStiffness
-from solver.contacts.laws.plane import SlidesInAPlane
+from solver.contacts.laws.friction import FrictionContact
+from solver.contacts.laws.parts import Follows, RestStiffness, Row, Slider
+
+if TYPE_CHECKING:
+    from solver.contacts.pieces.piece import ContactPart
+    from solver.contacts.segments import Shares
+
+
+class SlidesInAPlane(FrictionContact):
+    """Friction in two directions.
+
+    Attributes
+    ----------
+    between_second : (str, str) or None
+        The ends of the motion in the second direction. Left out where `normal` is given.
+    limit : "circle", "box" or None
+        |T| <= mu N for the whole force (also if left out), or each direction by itself.
+    """
+
+    RUBBING: ClassVar[tuple[int, ...]] = (0, 1)
+
+    between_second: Between | None = None
+    limit: Literal["circle", "box"] | None = None
+
+    @property
+    def kernel(self) -> str:
+        """The kernel of its limit."""
+        if self.limits_apart:
+            return "solver.contacts.kernels.coulomb.law:coulomb_box"
+        return "solver.contacts.kernels.circle.law:coulomb_circle"
+
+    @property
+    def second_kernel(self) -> str:
+        """The kernel of the second derivatives of its limit."""
+        if self.limits_apart:
+            return "solver.contacts.kernels.coulomb.second_law:box_second"
+        return "solver.contacts.kernels.circle.hessian:circle_law_second"
+
+    @property
+    def force_alone(self) -> bool:
+        """Whether its limit is the circle, whose kernel finds the force alone for less."""
+        return not self.limits_apart
+
+    @property
+    def limits_apart(self) -> bool:
+        """Whether each direction has its own limit."""
+        return self.limit == "box"
+
+    def fill(self, row: Real, highest: int) -> None:
+        """Put its numbers into its row of the contact table; NaN: a second stiffness that is the first's."""
+        super().fill(row, highest)
+        row[columns.KT_SECOND] = math.nan
+
+    @property
+    def tangent_varies(self) -> bool:
+        """Whether its force turns while it slips: where one limit is that of both directions."""
+        return not self.limits_apart
+
+    @property
+    def tangential(self) -> tuple[float, float]:
+        """The stiffness of each direction [N/m]."""
+        return self.kt, self.kt
+
+    @property
+    def friction(self) -> Slider:
+        """Its slider."""
+        return replace(super().friction, kt_second=self.tangential[1], limits_apart=self.limits_apart)
+
+    def friction_at(self, motions: Real, load: Real, tau: Real) -> Real:
+        """Return both components of the friction force [N] at the angles `tau`, (2, n)."""
+        if self.limits_apart:
+            return super().friction_at(motions, load, tau)
+        from solver.contacts.space_path import force_in_space, path_in_space
+
+        return force_in_space(path_in_space(motions, load, *self.tangential, self.mu), tau)
+
+    def shares(self, motions: Real, load: Real) -> Shares:
+        """Return the shares of the period in stick, slip and separation."""
+        if self.limits_apart:
+            return super().shares(motions, load)
+        from solver.contacts.space_path import path_in_space, shares_in_space
+
+        return shares_in_space(path_in_space(motions, load, *self.tangential, self.mu))
+
+    def perturbed(self, motions: Real, load: Real) -> tuple[ContactPart, ...]:
+        """Return how it follows small perturbations of a motion."""
+        if self.limits_apart:
+            return super().perturbed(motions, load)
+        from solver.contacts.pieces.circle import circle_pieces
+        from solver.contacts.pieces.piece import ContactPart
+        from solver.contacts.space_path import path_in_space
+
+        kn = None if self.normal_port is None else self.stiffnesses[self.normal_port]
+        path = path_in_space(motions, load, *self.tangential, self.mu)
+        return (ContactPart(tuple(range(len(motions))), circle_pieces(path, kn)),)
+
+    def rows(self) -> tuple[Row, ...]:
+        """Return its rows of the time march, one for each direction; the first has the normal force."""
+        first = {**self.row_numbers(), "presses": float(self.moving is not None)}
+        second = {**first, "port": 1, "presses": 0.0, "kt": self.tangential[1]}
+        if not self.limits_apart:
+            first["follows"], second["follows"] = Follows.CIRCLE, Follows.CIRCLE_SECOND
+        return Row(name=self.name, **first), Row(name=f"{self.name} (second)", **second)
 
 
 class PlanarContact(SlidesInAPlane):

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, ClassVar, Literal
+from typing import ClassVar, Literal
 
 from pydantic import model_validator
 
 from solver.contacts.fields import Between, Positive, Real
 from solver.contacts.kernels import columns
+from solver.contacts.laws.coulomb_2d import SlidesInAPlane
 from solver.contacts.laws.friction import FrictionContact
 from solver.contacts.laws.parts import LawQuantity, RestStiffness
-from solver.contacts.laws.plane import SlidesInAPlane
 
 _CLOSED = (columns.N0, 1)
 
@@ -95,9 +95,9 @@ class SpaceContact(SlidesInAPlane):
         return self.END_KEYS if self.kn is not None else self.END_KEYS[:2]
 
     @property
-    def normal_port(self) -> int | None:
-        """The port whose motion changes its normal load, or None."""
-        return None if self.kn is None else 2
+    def moving(self) -> tuple[float, bool] | None:
+        """By which stiffness its load moves with the parts [N/m], and whether v counts from equilibrium."""
+        return None if self.kn is None else (self.kn, self.prestressed)
 
     @property
     def held(self) -> tuple[RestStiffness, ...]:
@@ -106,11 +106,6 @@ class SpaceContact(SlidesInAPlane):
         if self.kn is None:
             return RestStiffness(columns.KT), RestStiffness(second)
         return self.HELD[0], RestStiffness(second, *_CLOSED), self.HELD[2]
-
-    @property
-    def stiffnesses(self) -> tuple[float, ...]:
-        """A stiffness of each relative motion [N/m]: what holds it when the contact is closed and stuck."""
-        return (*self.tangential, *(() if self.kn is None else (self.kn,)))
 
     @property
     def tangential(self) -> tuple[float, float]:
@@ -135,7 +130,6 @@ class SpaceContact(SlidesInAPlane):
     def fill(self, row: Real, highest: int) -> None:
         """Put its numbers into its row of the contact table."""
         super().fill(row, highest)
-        row[columns.PRESTRESSED] = float(self.prestressed)
         if self.kt_second is not None:
             row[columns.KT_SECOND] = self.kt_second
 
@@ -146,36 +140,12 @@ class SpaceContact(SlidesInAPlane):
         return moved.model_copy(update=left_out)
 
     @property
-    def separation(self) -> tuple[bool, str]:
-        """Whether it may open, and why."""
-        if self.kn is not None:
-            return True, f"{self.name} opens and closes as it moves"
-        return super().separation
-
-    @property
     def evaluation(self) -> str:
         """How its force is found, in the words of a plan."""
         load = "under a given load" if self.kn is None else f"the load moves with {self.kn:g} N/m"
         if self.limits_apart:
             return f"contact in space, {load}: a limit for each direction, in closed form"
         return f"contact in space, {load}: circular limit, closed form in stick, collocation in slip"
-
-    def _normal_row(self) -> dict[str, Any]:
-        """Return what the rows of the time march have of a normal motion."""
-        if self.kn is None:
-            return {}
-        rest = max(self.N0, 0.0) if self.prestressed else 0.0
-        return {"normal_port": 2, "kn": self.kn, "rest": rest}
-
-    def linear_limit(self, load: float, *, gone: bool) -> dict[str, Any]:
-        """Return what makes it linear; a load that moves acts on the parts.
-
-        Removed it never closes, stuck it counts from the pressed state.
-        """
-        found = super().linear_limit(load, gone=gone)
-        if self.kn is None:
-            return found
-        return {**found, **({"N0": -load} if gone else {"prestressed": True})}
 
 
 LAW = SpaceContact

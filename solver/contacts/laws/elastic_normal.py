@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, ClassVar, Literal
+from typing import ClassVar, Literal
 
-from solver.contacts.fields import Between, Real, Stiffness
+from solver.contacts.fields import Between, Stiffness
 from solver.contacts.kernels import columns
 from solver.contacts.laws.coulomb import SlidesOnALine
 from solver.contacts.laws.friction import FrictionContact
-from solver.contacts.laws.parts import Follows, LawQuantity, RestStiffness, Row
+from solver.contacts.laws.parts import LawQuantity, RestStiffness
 
 _CLOSED = (columns.N0, 1)
 
@@ -61,7 +61,6 @@ class ElasticNormalContact(SlidesOnALine):
         RestStiffness(columns.KN, *_CLOSED),
     )
     OPENS: ClassVar[bool] = True
-    NORMAL_PORT: ClassVar[int | None] = 1
 
     law: Literal["elastic-normal"]
     normal_between: Between | None = None
@@ -70,36 +69,14 @@ class ElasticNormalContact(SlidesOnALine):
     prestressed: bool = False
 
     @property
-    def stiffnesses(self) -> tuple[float, ...]:
-        """A stiffness of each relative motion [N/m]: what holds it when the contact is closed and stuck."""
-        return (self.kt, self.kn)
-
-    def fill(self, row: Real, highest: int) -> None:
-        """Put its numbers into its row of the contact table."""
-        super().fill(row, highest)
-        row[columns.PRESTRESSED] = float(self.prestressed)
+    def moving(self) -> tuple[float, bool]:
+        """By which stiffness its load moves with the parts [N/m], and whether v counts from equilibrium."""
+        return self.kn, self.prestressed
 
     @property
     def evaluation(self) -> str:
         """How its force is found, in the words of a plan."""
         return f"the normal load moves with the parts by {self.kn:g} N/m: friction and load in closed form"
-
-    def rows(self) -> tuple[Row, ...]:
-        """Return its row of the time march."""
-        rest = max(self.N0, 0.0) if self.prestressed else 0.0
-        return (
-            Row(
-                name=self.name, follows=Follows.RUBBING, normal_port=1, kn=self.kn,
-                rest=rest, **self.row_numbers(),
-            ),
-        )  # fmt: skip
-
-    def linear_limit(self, load: float, *, gone: bool) -> dict[str, Any]:
-        """Return what makes it linear; its load acts on the parts.
-
-        Removed it never closes, stuck it counts from the pressed state.
-        """
-        return {**super().linear_limit(load, gone=gone), **({"N0": -load} if gone else {"prestressed": True})}
 
 
 LAW = ElasticNormalContact

@@ -13,7 +13,15 @@ from solver.contacts.fields import Angle, Friction, Positive, Real, Signed
 from solver.contacts.kernels import columns
 from solver.contacts.laws.base import AnyContact
 from solver.contacts.laws.harmonics import LoadHarmonic, as_harmonics, higher_quantity, named_apart, order_of
-from solver.contacts.laws.parts import LawQuantity, NormalLoad, RestStiffness, Slider, Span
+from solver.contacts.laws.parts import (
+    Follows,
+    LawQuantity,
+    NormalLoad,
+    RestStiffness,
+    Row,
+    Slider,
+    Span,
+)
 from solver.errors import SettingError
 
 if TYPE_CHECKING:
@@ -117,9 +125,27 @@ class FrictionContact(AnyContact):
         return 0.0 if self.N1 is None else self.N1
 
     @property
+    def moving(self) -> tuple[float, bool] | None:
+        """The stiffness by which its load moves with the parts [N/m], and whether v counts from equilibrium.
+
+        None: its load is given.
+        """
+        return None
+
+    @property
+    def normal_port(self) -> int | None:
+        """The port whose motion changes its normal load, or None."""
+        return None if self.moving is None else len(self.RUBBING)
+
+    @property
+    def tangential(self) -> tuple[float, ...]:
+        """The stiffness of each direction [N/m]."""
+        return (self.kt,) * len(self.RUBBING)
+
+    @property
     def stiffnesses(self) -> tuple[float, ...]:
         """A stiffness of each relative motion [N/m]: what holds it when the contact is closed and stuck."""
-        return (self.kt,) * len(self.END_KEYS)
+        return (*self.tangential, *(() if self.moving is None else self.moving[:1]))
 
     @property
     def friction(self) -> Slider:
@@ -206,6 +232,7 @@ class FrictionContact(AnyContact):
             if key != "N1_ratio":
                 row[quantity.column] = self.value_of(key)
         row[columns.RATIO] = math.nan if self.N1_ratio is None else self.N1_ratio
+        row[columns.PRESTRESSED] = float(self.moving is not None and self.moving[1])
 
     def with_numbers(self, row: Real) -> Self:
         """The contact with the numbers of a row of the contact table."""
@@ -267,8 +294,8 @@ class FrictionContact(AnyContact):
     @property
     def separation(self) -> tuple[bool, str]:
         """Whether it may open, and why."""
-        if self.OPENS:
-            return super().separation
+        if self.moving is not None:
+            return True, f"{self.name} opens and closes as it moves"
         least = self.load.least
         if least < 0.0:
             return True, f"the normal load of {self.name} falls to {least:g} N"
@@ -280,7 +307,7 @@ class FrictionContact(AnyContact):
 
     def friction_at(self, motions: Real, load: Real, tau: Real) -> Real:
         """Return the friction force along each direction [N] at the angles `tau`, by its segments."""
-        from solver.contacts.force_history import force_by_segments
+        from solver.contacts.segments import force_by_segments
 
         slider = self.friction
         pairs = zip(slider.ports, slider.stiffnesses, strict=True)
@@ -323,16 +350,30 @@ class FrictionContact(AnyContact):
         return float(min(shares.max(), 1.0))
 
     def row_numbers(self) -> dict[str, Any]:
-        """Return the numbers of a row of the time march that friction has."""
-        load = self.load
-        return {
+        """Return what every row of the time march has of it."""
+        load, moving = self.load, self.moving
+        given: dict[str, Any] = {
             "kt": self.kt, "mu": self.mu, "N0": load.mean, "N1": load.amplitude, "N1_phase": load.phase,
-            "higher": load.higher,
+            "higher": load.higher, "follows": Follows.FRICTION,
         }  # fmt: skip
+        if moving is not None:
+            kn, prestressed = moving
+            given |= {"follows": Follows.RUBBING, "normal_port": self.normal_port, "kn": kn}
+            given["rest"] = max(self.N0, 0.0) if prestressed else 0.0
+        return given
+
+    def rows(self) -> tuple[Row, ...]:
+        """Return its row of the time march."""
+        return (Row(name=self.name, **self.row_numbers()),)
 
     def linear_limit(self, load: float, *, gone: bool) -> dict[str, Any]:
-        """Return what makes it linear: no load if it is `gone`, else stuck under a large load [N]."""
+        """Return what makes it linear: no load if it is `gone`, else stuck under a large load [N].
+
+        A load that moves acts on the parts: removed it never closes, stuck it counts from the pressed state.
+        """
         changed: dict[str, Any] = {"N1_ratio": None, "N1": 0.0, "N0": 0.0 if gone else load, "load": None}
+        if self.moving is not None:
+            changed |= {"N0": -load} if gone else {"prestressed": True}
         if self.mu < _LEAST_FRICTION:
             changed["mu"] = _LEAST_FRICTION
         return changed

@@ -31,8 +31,8 @@ class GapSpring(AnyContact):
 
     LAW: ClassVar[str] = "gap"
     FORCE: ClassVar[str] = "`k max(u - gap, 0)`"
-    KERNEL: ClassVar[str] = "solver.contacts.kernels.springs.force:gap_spring"
-    SECOND: ClassVar[str | None] = "solver.contacts.kernels.springs.second_law:gap_second"
+    KERNEL: ClassVar[str] = "solver.contacts.kernels.springs:gap_spring"
+    SECOND: ClassVar[str | None] = "solver.contacts.kernels.springs:gap_second"
     PARAMETERS: ClassVar[Mapping[str, LawQuantity]] = {
         "k": LawQuantity(
             column=columns.K_GAP, unit="N/m", least=0.0, wanted="must be a number >= 0 and <= 1e15 [N/m]"
@@ -92,8 +92,8 @@ class GapSpring(AnyContact):
 
     def perturbed(self, motions: Real, load: Real) -> tuple[ContactPart, ...]:
         """Return how it follows small perturbations of a motion."""
+        from solver.contacts.pieces.line import gap_pieces
         from solver.contacts.pieces.piece import ContactPart
-        from solver.contacts.pieces.springs import gap_pieces
 
         del load
         return (ContactPart((0,), gap_pieces(motions[0], self.k, self.gap)),)

@@ -30,8 +30,8 @@ class PolynomialSpring(AnyContact):
 
     LAW: ClassVar[str] = "polynomial"
     FORCE: ClassVar[str] = "`a1 u + a2 u² + … + a9 u⁹`"
-    KERNEL: ClassVar[str] = "solver.contacts.kernels.springs.force:polynomial_spring"
-    SECOND: ClassVar[str | None] = "solver.contacts.kernels.springs.second_law:polynomial_second"
+    KERNEL: ClassVar[str] = "solver.contacts.kernels.springs:polynomial_spring"
+    SECOND: ClassVar[str | None] = "solver.contacts.kernels.springs:polynomial_second"
     PARAMETERS: ClassVar[Mapping[str, LawQuantity]] = {
         f"a{j}": _coefficient(j) for j in range(1, columns.MOST_DEGREE + 1)
     }
@@ -117,8 +117,8 @@ class PolynomialSpring(AnyContact):
 
     def perturbed(self, motions: Real, load: Real) -> tuple[ContactPart, ...]:
         """Return how it follows small perturbations of a motion."""
+        from solver.contacts.pieces.line import polynomial_pieces
         from solver.contacts.pieces.piece import ContactPart
-        from solver.contacts.pieces.springs import polynomial_pieces
 
         del load
         return (ContactPart((0,), polynomial_pieces(motions[0], self.coefficients)),)

@@ -86,7 +86,7 @@ def circle_pieces(path: SpacePath, kn: float | None) -> tuple[StatePiece, ...]:
 
 def _without_friction(path: SpacePath, kn: float | None) -> tuple[StatePiece, ...]:
     """Return when the normal load alone acts."""
-    from solver.contacts.pieces.springs import gap_pieces
+    from solver.contacts.pieces.line import gap_pieces
 
     if kn is None:
         return ()

@@ -1,4 +1,9 @@
-"""The condensed linear part A_k, ū_k at one λ, and the way to the observed DOF, with derivatives by λ."""
+"""The condensed linear part A_k, ū_k at one λ, and the way to the observed DOF, with derivatives by λ.
+
+A that is asked for again where it was filled is not summed again. What forces at the contacts move is found
+through the modes, A_k F = X diag(1/d) Yᴴ F, where derivatives are not asked for: it takes ports × modes
+products where the entries of A_k take ports² × modes.
+"""
 
 from __future__ import annotations
 
@@ -27,8 +32,44 @@ from solver.linear.kernels.dynamic_stiffness import (
     fill_from_matrices,
     fill_terms,
 )
-from solver.linear.kernels.filled import is_filled, note
 from solver.linear.kernels.modal_products import basis_of_modes, fill_product
+
+
+@compiled
+def _place(system: System, p: float, i: int) -> float:
+    """Return number i of those that tell what A belongs to: λ, what λ is, the frequency, and the modes."""
+    if i == 0:
+        return p
+    if i == 1:
+        return float(system.kind)
+    if i == 2:
+        return system.omega
+    address = system.contact_modes.ctypes.data
+    return float(address % 2**32) if i == 3 else float(address // 2**32)
+
+
+@compiled
+def is_filled(system: System, p: float, out: Any) -> bool:
+    """Return whether A is that of this structure at λ = p."""
+    same = True
+    for i in range(out.filled.size):
+        same = same and out.filled[i] == _place(system, p, i)
+    return bool(same)
+
+
+@compiled
+def note(system: System, p: float, out: Any) -> None:
+    """Keep in mind where A was filled."""
+    for i in range(out.filled.size):
+        out.filled[i] = _place(system, p, i)
+
+
+@compiled
+def forget(out: Any) -> None:
+    """Have A filled anew next time: it is changed."""
+    for i in range(out.filled.size):
+        out.filled[i] = np.nan
+
 
 BLOCK = 512  # modes summed at a time: their weights stay in the near cache
 PAIRS_UP_TO = 12  # leading ports, with more products of matrices are faster (measured)
@@ -272,3 +313,59 @@ def _from_matrices(system: System, p: float, out: Receptance) -> None:
     else:
         out.A[1], out.B[1], out.u_linear[1], out.x_linear[1] = 0.0, 0.0, 0.0, 0.0
     fill_from_matrices(system, omega, p, orders, out)
+
+
+@compiled
+def goes_through_modes(system: System) -> bool:
+    """Whether a structure has modes, or poles, and their way costs less: every port leads."""
+    return bool(system.form != DENSE and system.leading.size == system.owner.size and system.owner.size > 1)
+
+
+@apart
+def driven_motions(system: System, p: float, out: Receptance) -> None:
+    """Fill in the motions under the excitation at λ = p, with derivatives; A and B stay what they were."""
+    omega = p if system.kind == FREQUENCY else system.omega
+    by_omega = 1.0 if system.kind == FREQUENCY else 0.0
+    nc, most = out.B.shape[2], min(BLOCK, system.eigenvalues.shape[1])
+    driven, terms = np.empty((2 * (nc + 1), most)), np.empty((4, most))
+    out.x_linear[:], out.u_linear[:] = 0.0, 0.0
+    for i in range(system.ks.size):
+        s = system.which[i]
+        for first in range(0, system.eigenvalues.shape[1], BLOCK):
+            size = min(BLOCK, system.eigenvalues.shape[1] - first)
+            if fill_driven(system, s, first, size, i, driven):
+                fill_terms(system, s, first, size, float(system.ks[i]), omega, by_omega, terms)
+                add_driven_modes(size, i, driven, terms, out)
+    scale_driven(system, p, out)
+
+
+@apart
+def modal_responses(system: System, p: float, i: int, forces: Complex, motions: Complex) -> None:
+    """Fill the motions (nc,) of all ports that forces (nc,) of harmonic number i make at λ = p."""
+    omega = p if system.kind == FREQUENCY else system.omega
+    nc, most = forces.size, min(BLOCK, system.eigenvalues.shape[1])
+    s, k = system.which[i], float(system.ks[i])
+    terms, real, imag = np.empty((4, most)), np.empty(most), np.empty(most)
+    modes, duals = system.contact_modes[s], system.contact_duals[s]
+    motions[:] = 0.0
+    for first in range(0, system.eigenvalues.shape[1], BLOCK):
+        size = min(BLOCK, system.eigenvalues.shape[1] - first)
+        fill_terms(system, s, first, size, k, omega, 0.0, terms)
+        real[:], imag[:] = 0.0, 0.0
+        for d in range(nc):
+            f, g, row = forces[d].real, forces[d].imag, duals[d]
+            for m in range(size):
+                y = row[first + m]
+                real[m] += y.real * f - y.imag * g
+                imag[m] += y.real * g + y.imag * f
+        for m in range(size):
+            a, b = real[m], imag[m]
+            real[m] = a * terms[0, m] - b * terms[1, m]
+            imag[m] = a * terms[1, m] + b * terms[0, m]
+        for c in range(nc):
+            f, g, row = 0.0, 0.0, modes[c]
+            for m in range(size):
+                x = row[first + m]
+                f += x.real * real[m] - x.imag * imag[m]
+                g += x.real * imag[m] + x.imag * real[m]
+            motions[c] += complex(f, g)

@@ -15,11 +15,10 @@ from solver.jit.fourier import Real
 from solver.modes.corrector import Corrected
 from solver.modes.curve import FollowedCurve, follow
 from solver.modes.driven.held_amplitude import Held, first_held, least_force
-from solver.modes.driven.results import HeldAmplitude, HeldStatus, LeastForce
-from solver.modes.error_estimate import Wider
 from solver.modes.limit_cycles import stability_left_out
 from solver.modes.nonlinear_mode import LEAST, MOST_POINTS, pose
-from solver.modes.records import PointRecord, Recorder, last_unknowns, told_of
+from solver.modes.records import PointRecord, Recorder, Wider, last_unknowns, told_of
+from solver.modes.results import HeldAmplitude, HeldStatus, LeastForce
 from solver.response.stability.floquet import motions_stability
 
 if TYPE_CHECKING:

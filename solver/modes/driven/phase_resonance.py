@@ -22,11 +22,10 @@ from solver.balance.speed_line import check_no_line
 from solver.errors import SettingError
 from solver.jit.fourier import Complex, Real
 from solver.modes.curve import follow
-from solver.modes.driven.results import PhaseResonance
 from solver.modes.equations import Evaluated, Forced
 from solver.modes.nonlinear_mode import MOST_POINTS, check_amplitudes, pose
 from solver.modes.records import Recorder, last_unknowns, told_of
-from solver.modes.results import NonlinearModeStatus
+from solver.modes.results import NonlinearModeStatus, PhaseResonance
 from solver.modes.start import begin, coordinates_of
 
 if TYPE_CHECKING:

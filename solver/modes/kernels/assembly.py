@@ -1,4 +1,4 @@
-"""Residual and Jacobian of the extended periodic motion, put together; the formulas stand in `equations`.
+"""The equations of the extended periodic motion and a Newton step; the formulas stand in `equations`.
 
 Amplitudes are v̂ = v_c − i v_s. The slopes of the forces act between the leading motions: where `span` leads
 all ports by fewer motions, dF/dw = spanᵀ dF/dU span.
@@ -6,12 +6,65 @@ all ports by fewer motions, dF/dw = spanᵀ dF/dU span.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from solver.jit.decorators import compiled
-from solver.jit.fourier import Complex, Integer, Real, coefficient_count, cosine_position
-from solver.jit.lapack import multiply
+from solver.jit.fourier import Complex, Index, Integer, Real, coefficient_count, cosine_position
+from solver.jit.lapack import back_substitute, factorise, multiply
 from solver.jit.separate import apart
+from solver.linear.kernels.dynamic_stiffness import dynamic_stiffness
+
+
+@apart
+def fill_stiffness(
+    turns: Real, K: Complex, C: Complex, M: Complex, mass: Complex, omega: float, zeta: float, Z: Complex,
+    by_omega: Complex, by_zeta: Complex,
+) -> None:  # fmt: skip
+    """Fill Z, ∂Z/∂ω and ∂Z/∂ζ entry by entry; all matrices (nk, L), of modes or of whole matrices."""
+    for i in range(K.shape[0]):
+        for j in range(K.shape[1]):
+            drag = complex(0.0, 2.0 * turns[i]) * mass[i, j]
+            value, slope, _ = dynamic_stiffness(K[i, j], C[i, j], M[i, j], turns[i], omega)
+            Z[i, j] = value - zeta * omega * omega * drag
+            by_omega[i, j] = slope - 2.0 * zeta * omega * drag
+            by_zeta[i, j] = -(omega * omega) * drag
+
+
+@apart
+def invert_modes(Z: Complex, first: int, rho: complex, b: Complex) -> bool:
+    """Add ρ |b|² to the modes of harmonic 1 and replace each Z by its inverse; False if one is 0."""
+    for a in range(Z.shape[1]):
+        Z[first, a] += rho * (b[a].real * b[a].real + b[a].imag * b[a].imag)
+    for i in range(Z.shape[0]):
+        for a in range(Z.shape[1]):
+            if Z[i, a] == 0.0:
+                return False
+            Z[i, a] = 1.0 / Z[i, a]
+    return True
+
+
+@apart
+def fill_pushes(
+    ks: Integer, back: Complex, forces: Real, moved: Real, phi: Complex, by_omega: Complex
+) -> None:
+    """Fill −Lᴴ F of all coordinates, (nk, N), and its derivative by ω.
+
+    Parameters
+    ----------
+    back : (nk, N, r); forces, moved : (r, n) forces at the leading ports and their derivatives by ω.
+    """
+    for i in range(ks.size):
+        here = cosine_position(ks, i)
+        has_sine = ks[i] > 0
+        for a in range(back.shape[1]):
+            total, change = complex(0.0), complex(0.0)
+            for c in range(back.shape[2]):
+                to = back[i, a, c]
+                total += to * complex(forces[c, here], -forces[c, here + 1] if has_sine else 0.0)
+                change += to * complex(moved[c, here], -moved[c, here + 1] if has_sine else 0.0)
+            phi[i, a], by_omega[i, a] = -total, -change
 
 
 @apart
@@ -186,3 +239,62 @@ def _add_rest(J: Real, place: int, width: int, each: int, k: int, by: complex) -
         J[place, width + 1] -= by.imag
     else:
         J[place, width + 1 + k] += by.real
+
+
+@apart
+def scaled_step(J: Real, rhs: Real, columns: Real, scaled: Real, pivots: Index) -> bool:
+    """Solve J δ = rhs in units `columns` of the unknowns, rows brought to one size; δ in place of `rhs`.
+
+    Returns
+    -------
+    False, with `rhs` meaningless, if J is singular or something is not finite.
+    """
+    m = rhs.size
+    for i in range(m):
+        largest = 0.0
+        for j in range(m):
+            value = J[i, j] * columns[j]
+            scaled[i, j] = value
+            largest = max(largest, abs(value))
+            if not math.isfinite(value):
+                return False
+        factor = 1.0 if largest == 0.0 else 1.0 / largest
+        for j in range(m):
+            scaled[i, j] *= factor
+        rhs[i] *= factor
+    if factorise(scaled, m, pivots) == 0.0:
+        return False
+    back_substitute(scaled, m, pivots, rhs)
+    for i in range(m):
+        rhs[i] *= columns[i]
+        if not math.isfinite(rhs[i]):
+            return False
+    return True
+
+
+@apart
+def relative_residual(
+    residual: Real, rough: Real, y: Real, size: int, a: float, lag: float, cancelled: float
+) -> float:
+    """Return the largest residual, each relative to what it is a difference of; NaN if one is.
+
+    Parameters
+    ----------
+    rough : (size,) size that a residual of each motion is rounding of, times `cancelled` at least.
+    a : amplitude; lag : what the residual of the phase is relative to.
+    """
+    motion, worst = 1e-300, 0.0
+    for i in range(size):
+        motion = max(motion, abs(y[i]))
+    for i in range(size):
+        share = abs(residual[i]) / max(motion, cancelled * rough[i])
+        if not share <= worst:
+            worst = share
+    q = max(math.hypot(y[size], y[size + 1]), a)
+    for share in (
+        abs(residual[size]) / q, abs(residual[size + 1]) / q, abs(residual[size + 2]) / max(lag, 1e-300),
+        abs(residual[size + 3]),
+    ):  # fmt: skip
+        if not share <= worst:
+            worst = share
+    return worst if math.isfinite(worst) else np.inf

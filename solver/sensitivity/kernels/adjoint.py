@@ -28,8 +28,7 @@ from solver.contacts.kernels.system import Evaluation, Receptance, System
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Complex, Integer, Real, coefficient_count, cosine_position
 from solver.jit.separate import apart
-from solver.linear.kernels.filled import forget
-from solver.linear.kernels.receptance import receptance
+from solver.linear.kernels.receptance import forget, receptance
 
 # Entries of `by`: for each element the slopes by kt, mu and its load, then those of the linear part.
 BY_KT, BY_MU, BY_LOAD = 0, 1, 2

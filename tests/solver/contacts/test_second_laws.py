@@ -19,8 +19,7 @@ from law_cases import (
 from space_elements import random_elements
 
 from solver.contacts.kernels.columns import A_1, COLUMNS, GAP, K_GAP, KN, KT, KT_SECOND, MU
-from solver.contacts.kernels.laws import law_force, law_number
-from solver.contacts.kernels.second_laws import law_second, second_number
+from solver.contacts.kernels.laws import law_force, law_number, law_second, second_number
 from solver.contacts.kernels.stick_slip_events import FAILED, new_segments
 from solver.jit import fourier
 from solver.jit.trig_polynomial import grid_size, grid_tables
@@ -60,19 +59,19 @@ LAWS = {
         force=COULOMB_BOX, second=_RUBBING + "box_second", ports=(0, 1), columns=(KT, KT_SECOND, MU)
     ),
     "coulomb-3d": Law(
-        force=COULOMB_CIRCLE, second="solver.contacts.kernels.circle.second_law:circle_law_second",
+        force=COULOMB_CIRCLE, second="solver.contacts.kernels.circle.hessian:circle_law_second",
         ports=(0, 1, 2), columns=_SPACE,
     ),
     "coulomb-3d, one stiffness": Law(
-        force=COULOMB_CIRCLE, second="solver.contacts.kernels.circle.second_law:circle_law_second",
+        force=COULOMB_CIRCLE, second="solver.contacts.kernels.circle.hessian:circle_law_second",
         ports=(0, 1, 2), columns=(KT, MU, KN), tied=True,
     ),
     "gap": Law(
-        force=GAP_SPRING, second="solver.contacts.kernels.springs.second_law:gap_second", ports=(0,),
+        force=GAP_SPRING, second="solver.contacts.kernels.springs:gap_second", ports=(0,),
         columns=(K_GAP, GAP),
     ),
     "polynomial": Law(
-        force=POLYNOMIAL, second="solver.contacts.kernels.springs.second_law:polynomial_second",
+        force=POLYNOMIAL, second="solver.contacts.kernels.springs:polynomial_second",
         ports=(0,), columns=tuple(range(A_1, A_1 + 5)),
     ),
 }  # fmt: skip

@@ -10,8 +10,7 @@ from solver.balance.kernels.output import LOST, MEASURES, measure
 from solver.balance.kernels.residual import evaluate, evaluate_forces, prepare_forces
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.system import MODES, POLES, evaluation_by_value, receptance_by_value
-from solver.linear.kernels.modal_responses import goes_through_modes, modal_responses
-from solver.linear.kernels.receptance import receptance
+from solver.linear.kernels.receptance import goes_through_modes, modal_responses, receptance
 from solver.scene.scene import Scene
 
 

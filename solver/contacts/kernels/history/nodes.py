@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from solver.contacts.kernels.springs.force import positive_intervals
+from solver.contacts.kernels.springs import positive_intervals
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Integer, Real, cosine_position
 from solver.jit.separate import apart

@@ -1,1 +1,0 @@
-"""Nonlinear springs: force, first and second derivatives."""
