@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from playwright.sync_api import Browser, BrowserContext, Page
 
 DRIVER = "GL Driver Message"  # of WebGL without a graphics card, on reading a frame
-DRAW = """async ([body, tau, wanted]) => {
+DRAW = """async ([body, tau, [[j, point] for j in drawn_of]]) => {
   const base = document.querySelector('link[href*="shape/stage.js"]').href.replace("shape/stage.js", "");
   const { stage } = await import(`${base}shape/stage.js`);
   const three = await import(`${base}vendor/three.js`);
@@ -84,12 +84,12 @@ def test_points_are_drawn_where_the_solver_moves_them(
     ready(page, site, scene)
     given, tau = solver.load_scene(scene), 1.1
     sectors = given.structure.sector_count
-    wanted = [[j, point] for j in ((0, 1, 3) if sectors > 1 else (0,))]
+    drawn_of = (0, 1, 3) if sectors > 1 else (0,)
     body = {"scene": scene, "frequency_hz": hertz, "harmonics": 5}
-    found = page.evaluate(DRAW, [body, tau, wanted])
+    found = page.evaluate(DRAW, [body, tau, [[j, point] for j in drawn_of]])
     solution = solver.solve(given, frequency_hz=hertz, harmonics=5)
     turn = 2.0 * math.pi * given.engine_order / sectors
-    for (j, _), at, rest in zip(wanted, found["at"], found["rest"], strict=True):
+    for j, at, rest in zip(drawn_of, found["at"], found["rest"], strict=True):
         own = [
             0.0 if dof is None else about_the_mean(solution, dof, (tau + j * turn) % (2.0 * math.pi))
             for dof in dofs

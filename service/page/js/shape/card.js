@@ -140,7 +140,7 @@ function describe(self) {
 }
 
 function drawKey({ shape, stage: drawn, parts }) {
-  const marks = shape.contacts.length ? STATE_WORDS.map(([name, words]) => [el("b", { class: name }), words]) : [];
+  const marks = shape.contacts.some(({ states }) => states[0]) ? STATE_WORDS.map(([name, words]) => [el("b", { class: name }), words]) : [];
   const ramp = parts.by.value === "amplitude" ? ["0", el("i"), sizeOf(shape)] : [];
   show(parts.key, ramp, shape.to_scale ? ` drawn × ${number(drawn.factor, 2)} ` : null, marks);
 }
