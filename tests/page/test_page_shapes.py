@@ -176,3 +176,24 @@ def test_without_webgl_or_with_less_motion_a_sentence_or_steps(browser: Browser,
         ready(page, site, "two-dof")
         page.locator("#shape-open").click()
         page.get_by_text("This browser has no WebGL").wait_for()
+
+
+@pytest.mark.long
+def test_a_mode_is_shown_linear_and_at_a_point_of_its_curve(
+    profile: tuple[BrowserContext, Watch], site: Site
+) -> None:
+    context, watch = profile
+    watch.allowed = (DRIVER,)
+    page = context.new_page()
+    ready(page, site, "two-dof&tab=modes")
+    page.locator("#mode-space-open").click()
+    canvas = page.locator("#modes-shape-view canvas[data-drawn]")
+    canvas.wait_for()
+    assert "contacts as at rest" in (canvas.get_attribute("aria-label") or "")
+    page.fill("#modes-from", "0.1")
+    page.fill("#modes-to", "5")
+    page.click("#study")
+    page.locator("#modes-shape-view canvas[aria-label*='mode 1 at a =']").wait_for()
+    name = page.locator("#modes-shape-view canvas").get_attribute("aria-label") or ""
+    assert "damper sticks and slips" in name
+    assert "1/√kg" in name
