@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from playwright.sync_api import Browser, BrowserContext, Page
 
 DRIVER = "GL Driver Message"  # of WebGL without a graphics card, on reading a frame
-DRAW = """async ([body, tau, [[j, point] for j in drawn_of]]) => {
+DRAW = """async ([body, tau, wanted]) => {
   const base = document.querySelector('link[href*="shape/stage.js"]').href.replace("shape/stage.js", "");
   const { stage } = await import(`${base}shape/stage.js`);
   const three = await import(`${base}vendor/three.js`);
