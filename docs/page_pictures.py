@@ -7,6 +7,7 @@ the finite-element disk, and needs playwright and Chromium.
 from __future__ import annotations
 
 import io
+import os
 import shutil
 import subprocess
 import sys
@@ -29,6 +30,9 @@ SIZE = {"width": 1400, "height": 900}
 PORT = 8791
 URL = f"http://127.0.0.1:{PORT}"
 PATIENCE = 240_000  # ms
+FLAGS = ["--no-sandbox", "--enable-unsafe-swiftshader"]
+# Whatever else the machine does meanwhile.
+SLOWLY = {"STICKSLIP_PREVIEW_SECONDS": "60"}
 
 
 def main() -> int:
@@ -42,12 +46,13 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as folder:
         serve = [sys.executable, "-c", "from service.cli import main; main()", "serve", "--port", str(PORT)]
         service = subprocess.Popen(
-            [*serve, "--database", f"sqlite:///{folder}/pictures.db", "--workers", "2"]
+            [*serve, "--database", f"sqlite:///{folder}/pictures.db", "--workers", "2"],
+            env={**os.environ, **SLOWLY},
         )
         try:
             _wait()
             with sync_playwright() as api:
-                browser = api.chromium.launch(executable_path=program, args=["--no-sandbox"])
+                browser = api.chromium.launch(executable_path=program, args=FLAGS)
                 for scheme in ("light", "dark"):
                     context = browser.new_context(viewport=SIZE, color_scheme=scheme, accept_downloads=True)
                     context.set_default_timeout(PATIENCE)
@@ -128,6 +133,17 @@ def top(page: Any) -> None:
     page.locator("#tab-response").click()
     page.mouse.move(5, 5)
     page.evaluate("window.scrollTo(0, 0)")
+
+
+def open_shape(page: Any) -> None:
+    """Show how the sector of finite elements moves near its peak."""
+    anew(page, "fe-disk")
+    page.fill("#point-at", "263")
+    page.click("#point-show")
+    page.locator("#shape-open").click()
+    page.locator("#shape canvas[data-drawn]").wait_for()
+    page.locator("#shape-by").select_option("state")
+    page.locator("#shape").get_by_role("button", name="Whole view").click()
 
 
 def follow_mode(page: Any) -> None:
@@ -245,6 +261,7 @@ VIEWS: dict[str, Show] = {
     "accuracy": tab("accuracy", "tabs"),
     "runs": tab("runs", "tabs"),
     # From here on each opens the page anew.
+    "shape": open_shape,
     "identify": identify,
     "estimates": lambda page: page.locator("#identify-response").evaluate("card => card.scrollIntoView()"),
     "editor": edit,

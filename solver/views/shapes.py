@@ -8,25 +8,26 @@ solved each has motions of its own, and θ = 0.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from solver.arrays import Complex, Integer, Real
+from solver.errors import SettingError
 from solver.jit import fourier
 from solver.linear.assembly import linear_model
-from solver.modes.nonlinear_mode import at_nodal_diameter, nonlinear_mode, pose
+from solver.modes.nonlinear_mode import at_nodal_diameter, pose
 from solver.modes.records import diameter_of
-from solver.response.contact_response import state_of
 from solver.response.solution import Solution
 from solver.response.time_history import motion
+from solver.scene.cyclic.annulus import written_out
 from solver.scene.scene import Scene
 from solver.views.picture import Picture, picture_of
 
 FAINT = 1e-3
 """Harmonics that move every point less than this share of the largest motion are left out."""
 _INSTANTS = 96
-_BELOW = 0.01  # of an amplitude, where the curve to it begins: nearer another mode may be met
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -77,55 +78,73 @@ def deflection_shape(scene: Scene, solution: Solution) -> Shape:
     coefficients = motion(solution)
     states = {contact.name: contact.state.value for contact in solution.contacts}
     amplitudes = np.array([fourier.to_complex(row) for row in coefficients])
-    return _shape(scene, solution.scene, amplitudes, solution.frequency_hz, "m", states)
+    return _shape(scene, solution.scene.dofs, amplitudes, solution.frequency_hz, "m", states)
 
 
-def mode_shape(
-    scene: Scene, mode: int, *, nodal_diameter: int | None = None, amplitude: float | None = None,
-    harmonics: int = 11,
-) -> Shape | str:  # fmt: skip
-    """Return the shape of a mode, or in words why there is none.
+def mode_shape(scene: Scene, mode: int, *, nodal_diameter: int | None = None, harmonics: int = 11) -> Shape:
+    """Return the shape of a linear mode, mass-normalised, with the contacts as they are at rest.
 
     Parameters
     ----------
     scene : what vibrates; its loads count, its excitation gives the phase alone.
     mode, nodal_diameter, harmonics : as of `solver.modes.nonlinear_mode.nonlinear_mode`.
-    amplitude : modal amplitude [√kg m], at which the mode is followed as one that is not linear; the linear
-        mode with the contacts as they are at rest, mass-normalised, if left out.
 
     Raises
     ------
     SettingError
-        A mode, nodal diameter, amplitude or harmonics that cannot be.
+        A mode, nodal diameter or harmonics that cannot be.
     """
     scene = at_nodal_diameter(scene, nodal_diameter)
-    if amplitude is None:
-        problem = pose(scene, mode, None, harmonics)
-        solved = problem.equations.balance.scene
-        moved = linear_model(solved).shapes @ problem.mode.shape
-        both = np.stack([np.zeros_like(moved), moved], axis=1)
-        return _shape(scene, solved, both, problem.mode.omega / (2.0 * math.pi), "1/√kg", {})
-    found = nonlinear_mode(
-        scene, mode, amplitudes=(_BELOW * amplitude, amplitude), harmonics=harmonics, errors=False
-    )
-    if not found.reached:
-        return found.status.value
-    states = {
-        name: state_of(int(code)).value
-        for name, code in zip(found.contact_names, found.states[-1], strict=True)
-    }
-    amplitudes = np.array([fourier.to_complex(row) for row in found.dof_motions[-1]])
-    return _shape(scene, found.scene, amplitudes, float(found.frequency_hz[-1]), "m", states)
+    problem = pose(scene, mode, None, harmonics)
+    solved = problem.equations.balance.scene
+    moved = linear_model(solved).shapes @ problem.mode.shape
+    return _shape(scene, solved.dofs, _first(moved), problem.mode.omega / (2.0 * math.pi), "1/√kg", {})
+
+
+def shape_of_motion(
+    scene: Scene, dofs: Sequence[str], motion: Complex, frequency_hz: float, states: dict[str, str],
+    nodal_diameter: int | None = None,
+) -> Shape:  # fmt: skip
+    """Return the shape of harmonic 1 of a nonlinear mode over its amplitude, as its results tell it.
+
+    Parameters
+    ----------
+    dofs : names, of one sector or of all.
+    motion : (n,) harmonic 1 of each [1/√kg], see `solver.modes.results.NonlinearMode.shape`.
+    frequency_hz, states : what it has there.
+    nodal_diameter : of a disk of which one sector was solved; that of the engine order if left out.
+
+    Raises
+    ------
+    SettingError
+        A DOF that is missing, or a nodal diameter that cannot be.
+    """
+    scene = at_nodal_diameter(scene, nodal_diameter)
+    needed = scene.dofs if scene.dofs[0] in dofs else written_out(scene).dofs
+    missing = next((dof for dof in needed if dof not in dofs), None)
+    if missing is not None:
+        raise SettingError("dofs", missing, "is missing: the motion of every DOF must be told, it lacks")
+    return _shape(scene, tuple(dofs), _first(motion), frequency_hz, "1/√kg", states)
+
+
+def _first(motion: Complex) -> Complex:
+    """Harmonics 0 and 1 of which the second alone moves anything."""
+    return np.stack([np.zeros_like(motion), motion], axis=1)
 
 
 def _shape(
-    scene: Scene, solved: Scene, amplitudes: Complex, frequency_hz: float, unit: str, states: dict[str, str]
+    scene: Scene,
+    dofs: tuple[str, ...],
+    amplitudes: Complex,
+    frequency_hz: float,
+    unit: str,
+    states: dict[str, str],
 ) -> Shape:
-    """The shape of complex amplitudes of the DOFs of what was solved, (n_dofs, H + 1)."""
+    """The shape of complex amplitudes of the DOFs that were solved, of one sector or all, (n_dofs, H + 1)."""
     picture = picture_of(scene)
-    whole = solved.dofs != scene.dofs
+    whole = scene.dofs[0] not in dofs
     count = scene.structure.sector_count if whole else 1
-    row = {dof: i for i, dof in enumerate(solved.dofs)}
+    row = {dof: i for i, dof in enumerate(dofs)}
     factors = picture.factors(scene.dofs)
     motions = np.empty((count, amplitudes.shape[1], len(picture.points), 3), np.complex128)
     for j in range(count):

@@ -84,12 +84,12 @@ def test_points_are_drawn_where_the_solver_moves_them(
     ready(page, site, scene)
     given, tau = solver.load_scene(scene), 1.1
     sectors = given.structure.sector_count
-    wanted = [[j, point] for j in ((0, 1, 3) if sectors > 1 else (0,))]
+    drawn_of = (0, 1, 3) if sectors > 1 else (0,)
     body = {"scene": scene, "frequency_hz": hertz, "harmonics": 5}
-    found = page.evaluate(DRAW, [body, tau, wanted])
+    found = page.evaluate(DRAW, [body, tau, [[j, point] for j in drawn_of]])
     solution = solver.solve(given, frequency_hz=hertz, harmonics=5)
     turn = 2.0 * math.pi * given.engine_order / sectors
-    for (j, _), at, rest in zip(wanted, found["at"], found["rest"], strict=True):
+    for j, at, rest in zip(drawn_of, found["at"], found["rest"], strict=True):
         own = [
             0.0 if dof is None else about_the_mean(solution, dof, (tau + j * turn) % (2.0 * math.pi))
             for dof in dofs
@@ -176,3 +176,24 @@ def test_without_webgl_or_with_less_motion_a_sentence_or_steps(browser: Browser,
         ready(page, site, "two-dof")
         page.locator("#shape-open").click()
         page.get_by_text("This browser has no WebGL").wait_for()
+
+
+@pytest.mark.long
+def test_a_mode_is_shown_linear_and_at_a_point_of_its_curve(
+    profile: tuple[BrowserContext, Watch], site: Site
+) -> None:
+    context, watch = profile
+    watch.allowed = (DRIVER,)
+    page = context.new_page()
+    ready(page, site, "two-dof&tab=modes")
+    page.locator("#mode-space-open").click()
+    canvas = page.locator("#modes-shape-view canvas[data-drawn]")
+    canvas.wait_for()
+    assert "contacts as at rest" in (canvas.get_attribute("aria-label") or "")
+    page.fill("#modes-from", "0.1")
+    page.fill("#modes-to", "5")
+    page.click("#study")
+    page.locator("#modes-shape-view canvas[aria-label*='mode 1 at a =']").wait_for()
+    name = page.locator("#modes-shape-view canvas").get_attribute("aria-label") or ""
+    assert "damper sticks and slips" in name
+    assert "1/√kg" in name

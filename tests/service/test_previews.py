@@ -20,6 +20,7 @@ from service.workers.preview_workers import MOST_WAITING, Previews
 from solver.errors import SettingError, SolverError
 
 TWO_DOF = {"scene": "two-dof"}
+MOTION = {"dofs": ["m1", "m2"], "real": [1.0, 2.0], "imag": [0.0, -1.0], "frequency_hz": 1.1}
 
 
 def post(http: httpx.Client, **body: object) -> httpx.Response:
@@ -109,7 +110,8 @@ def test_of_a_disk_written_out_every_sector_has_its_states(shipped: httpx.Client
         ({"kind": "point", "frequency_hz": 5e-324}, "/frequency_hz"),
         ({"kind": "shape"}, "/frequency_hz"),
         ({"kind": "shape", "mode": 1, "frequency_hz": 1.0}, "/frequency_hz"),
-        ({"kind": "shape", "frequency_hz": 1.0, "amplitude": 1.0}, "/amplitude"),
+        ({"kind": "shape", "frequency_hz": 1.0, "nodal_diameter": 1}, "/nodal_diameter"),
+        ({"kind": "shape", "motion": MOTION | {"real": [1.0]}}, "/motion"),
         ({"kind": "shape", "mode": 9}, "/mode"),
         ({"kind": "shape", "mode": 1, "nodal_diameter": 1}, "/nodal_diameter"),
         ({"kind": "sweep", "client": 5}, "/client"),
@@ -281,3 +283,9 @@ def test_a_shape_is_told_as_arrays_with_what_is_drawn(shipped: httpx.Client) -> 
     assert set(shroud["motions"][0]) == {0, 1}
     mode = post(shipped, kind="shape", scene="bladed-disk", mode=1, nodal_diameter=-2).json()["shape"]
     assert (mode["unit"], mode["nodal_diameter"]) == ("1/√kg", -2)
+    given = post(shipped, kind="shape", motion=MOTION | {"states": {"damper": "stuck"}}).json()["shape"]
+    assert [given["real"][0][0][given["names"].index(m)][0] for m in ("m1", "m2")] == MOTION["real"]
+    assert [given["imag"][0][0][given["names"].index(m)][0] for m in ("m1", "m2")] == MOTION["imag"]
+    assert [contact["states"] for contact in given["contacts"]] == [["stuck"]]
+    problem = is_problem(post(shipped, kind="shape", motion=MOTION | {"dofs": ["m1", "m3"]}), 422)
+    assert "m2" in problem["errors"][0]["detail"]

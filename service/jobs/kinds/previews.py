@@ -233,6 +233,8 @@ def warm_up() -> None:
         "contact": None,
         "frequency_hz": 1.05,
         "mode": None,
+        "motion": None,
+        "nodal_diameter": None,
     }
     for run in (run_sweep, run_sensitivities, run_limits, run_point, run_shape):
         run(spec, Silent(), nothing)

@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from service.jobs.common.periods import period_of
 from service.jobs.common.results import KindResult
-from service.jobs.common.scenes import FrequencyHz, PositiveNumber, check, require, resolved, stored_scene
+from service.jobs.common.scenes import FrequencyHz, Number, check, require, resolved, stored_scene
 from service.jobs.kinds.preview_request import POINT_UNKNOWNS, PreviewRequest, harmonics_in_time, scene_of
 from service.jobs.outputs import JobOutput, Progress, ShouldStop
 from service.jobs.registry import Resolved, SceneSource
@@ -25,6 +25,7 @@ SAMPLES = 96
 """Of what a contact does over the period."""
 DIGITS = 6
 LEAST_HZ = 1e-9
+MOST_TOLD = 2000
 Point = Annotated[list[float], Field(min_length=3, max_length=3)]
 Amplitudes = list[list[list[Point]]]
 
@@ -76,8 +77,22 @@ class ShapePreview(KindResult):
     shape: DrawnShape | None
 
 
+class ShapeMotion(BaseModel):
+    """Harmonic 1 of every DOF over the amplitude of a nonlinear mode, as `motions` of its result has it."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    dofs: Annotated[list[str], Field(min_length=1, max_length=MOST_TOLD)]
+    real: Annotated[list[Number], Field(max_length=MOST_TOLD, description="[1/√kg].")]
+    imag: Annotated[list[Number], Field(max_length=MOST_TOLD, description="[1/√kg].")]
+    frequency_hz: FrequencyHz
+    states: Annotated[dict[str, str], Field(max_length=MOST_TOLD)] = Field(
+        default={}, description="What contacts do."
+    )
+
+
 class ShapePreviewRequest(PreviewRequest):
-    """The deflection at `frequency_hz`; or a `mode`, linear, or at a modal amplitude."""
+    """The deflection at `frequency_hz`; or a linear `mode`; or the `motion` that a result has of one."""
 
     model_config = ConfigDict(
         json_schema_extra={
@@ -92,53 +107,59 @@ class ShapePreviewRequest(PreviewRequest):
     mode: Annotated[int, Field(strict=True, ge=1, le=100_000)] | None = Field(
         default=None, description="In place of it: which mode, 1 the slowest, contacts as they are at rest."
     )
+    motion: ShapeMotion | None = Field(
+        default=None, description="In place of both: what a nonlinear mode does at a point of its curve."
+    )
     nodal_diameter: Diameter | None = Field(
         default=None, description="Of a mode of a disk; that of the engine order if left out."
-    )
-    amplitude: PositiveNumber | None = Field(
-        default=None, description="Modal amplitude [√kg m] of the mode; without, it is the linear one."
     )
 
 
 def resolve_shape(request: ShapePreviewRequest, source: SceneSource) -> Resolved:
     """Look up the scene, check its size and what is asked, and choose the harmonics that can be kept."""
-    if (request.frequency_hz is None) == (request.mode is None):
-        named = Naming("must be given, or {mode} in its place; not both")
+    if sum(each is not None for each in (request.frequency_hz, request.mode, request.motion)) != 1:
+        named = Naming("must be given, or {mode} or {motion} in its place; one of them")
         require([Issue(("frequency_hz",), named, request.frequency_hz)])
     if request.frequency_hz is not None and request.frequency_hz < LEAST_HZ:
         require([Issue(("frequency_hz",), f"must be at least {LEAST_HZ:g}", request.frequency_hz)])
-    for key in ("nodal_diameter", "amplitude"):
-        if request.mode is None and (given := getattr(request, key)) is not None:
-            require([Issue((key,), Naming("needs {mode}: it says which"), given)])
+    if request.frequency_hz is not None and request.nodal_diameter is not None:
+        require([Issue(("nodal_diameter",), Naming("needs {mode} or {motion}"), request.nodal_diameter)])
     scene = scene_of(request, source, 1, request.harmonics)
     if request.mode is not None:
         from solver.modes.nonlinear_mode import at_nodal_diameter, check_mode
 
         mode = request.mode
         require(check(lambda: check_mode(at_nodal_diameter(scene, request.nodal_diameter), mode)))
+    motion = request.motion
+    if motion is not None and not len(motion.dofs) == len(motion.real) == len(motion.imag):
+        wanted = f"must have as many numbers in `real` and `imag` as `dofs` has names, {len(motion.dofs)}"
+        require([Issue(("motion",), wanted, f"{len(motion.real)} and {len(motion.imag)}")])
     kept = harmonics_in_time(scene, request.harmonics, POINT_UNKNOWNS)
-    given = request.model_dump(include={"frequency_hz", "mode", "nodal_diameter", "amplitude"})
+    given = request.model_dump(include={"frequency_hz", "mode", "motion", "nodal_diameter"})
     return resolved(scene, harmonics=kept, **given)
 
 
 def run_shape(spec: Mapping[str, Any], _progress: Progress, _should_stop: ShouldStop) -> JobOutput:
     """Solve at the frequency, or find the mode, and tell how everything moves."""
-    import solver
-    from solver.views.shapes import deflection_shape, mode_shape
+    import numpy as np
 
-    scene, over = stored_scene(spec), dict[str, Any]()
-    if spec["mode"] is None:
-        solution = solver.solve(scene, frequency_hz=spec["frequency_hz"], harmonics=spec["harmonics"])
-        found: Shape | str = solution.status.value
-        if solution.converged:
-            found = deflection_shape(scene, solution)
-            over = {each["name"]: each["motion"] for each in period_of(solution, SAMPLES)["contacts"]}
+    import solver
+    from solver.views.shapes import deflection_shape, mode_shape, shape_of_motion
+
+    scene, over, diameter = stored_scene(spec), dict[str, Any](), spec["nodal_diameter"]
+    if (told := spec["motion"]) is not None:
+        motion = np.array(told["real"]) + 1j * np.array(told["imag"])
+        shape = shape_of_motion(scene, told["dofs"], motion, told["frequency_hz"], told["states"], diameter)
+    elif spec["mode"] is not None:
+        shape = mode_shape(scene, spec["mode"], nodal_diameter=diameter, harmonics=spec["harmonics"])
     else:
-        given = {key: spec[key] for key in ("nodal_diameter", "amplitude", "harmonics")}
-        found = mode_shape(scene, spec["mode"], **given)
-    if isinstance(found, str):
-        return JobOutput(result={"reached": False, "status": found, "shape": None}, shortfall=found)
-    return JobOutput(result={"reached": True, "status": "It was found.", "shape": _told(scene, found, over)})
+        solution = solver.solve(scene, frequency_hz=spec["frequency_hz"], harmonics=spec["harmonics"])
+        if not solution.converged:
+            status = solution.status.value
+            return JobOutput(result={"reached": False, "status": status, "shape": None}, shortfall=status)
+        shape = deflection_shape(scene, solution)
+        over = {each["name"]: each["motion"] for each in period_of(solution, SAMPLES)["contacts"]}
+    return JobOutput(result={"reached": True, "status": "It was found.", "shape": _told(scene, shape, over)})
 
 
 def _told(scene: Scene, shape: Shape, over: Mapping[str, list[int] | None]) -> dict[str, Any]:

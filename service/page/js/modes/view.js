@@ -124,7 +124,10 @@ function choose(at) {
 function offerShape(at) {
   const { result, request } = last;
   const { scene, set = {}, harmonics = result.n_harmonics } = request;
-  const body = { scene, set, harmonics, mode: result.mode, amplitude: result.amplitude[at] };
+  const there = result.motions.points.indexOf(at);
+  const { dofs, shapes: { real, imag } } = result.motions;
+  const states = Object.fromEntries(result.contacts.map((name, i) => [name, result.states[at][i]]));
+  const body = { scene, set, harmonics, motion: { dofs, real: real[there], imag: imag[there], frequency_hz: result.frequency[at], states } };
   if (result.nodal_diameter !== null) body.nodal_diameter = result.nodal_diameter;
   space.offer(body, `mode ${result.mode} at a = ${number(result.amplitude[at], 3)} √kg m`);
 }

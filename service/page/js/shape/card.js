@@ -135,12 +135,14 @@ function describe(self) {
   const words = [`${number(shape.frequency_hz, 6)} Hz${wave}`, `largest ${sizeOf(shape)}`, ...statesOf(shape)];
   parts.canvas.setAttribute("aria-label", `${wish.words}: ${words.join("; ")}`);
   const { shown } = self.stage;
-  parts.notes.textContent = [`${words.join(" · ")}.`, ...shape.notes, ...(shown < shape.sectors ? [`${shown} of ${shape.sectors} sectors are drawn.`] : [])].join(" ");
+  const whole = shape.contacts.filter(({ states, motions }) => states[0] && !motions[0]).map(({ name }) => name);
+  const coloured = whole.length ? [`${whole.join(", ")}: coloured by what they do over the whole period.`] : [];
+  parts.notes.textContent = [`${words.join(" · ")}.`, ...coloured, ...shape.notes, ...(shown < shape.sectors ? [`${shown} of ${shape.sectors} sectors are drawn.`] : [])].join(" ");
   drawKey(self);
 }
 
 function drawKey({ shape, stage: drawn, parts }) {
-  const marks = shape.contacts.length ? STATE_WORDS.map(([name, words]) => [el("b", { class: name }), words]) : [];
+  const marks = shape.contacts.some(({ states }) => states[0]) ? STATE_WORDS.map(([name, words]) => [el("b", { class: name }), words]) : [];
   const ramp = parts.by.value === "amplitude" ? ["0", el("i"), sizeOf(shape)] : [];
   show(parts.key, ramp, shape.to_scale ? ` drawn × ${number(drawn.factor, 2)} ` : null, marks);
 }

@@ -1,7 +1,7 @@
 // A shape in space: what the service tells, repeated around the disk and moved through a period, drawn with WebGL.
 
 const DRAWN = 0.1; // the largest motion, of the size of what is drawn
-const BOX = 0.028; // half an edge of a mass, of that size
+const BOX = 0.021; // half an edge of a mass, of that size
 const MOST_POINTS = 150_000;
 const FIELD = (35 * Math.PI) / 180;
 const CORNERS = [0, 1, 2, 3, 4, 5, 6, 7].map((i) => [i & 1, (i >> 1) & 1, i >> 2].map((side) => 2 * side - 1));
@@ -37,7 +37,9 @@ function layout(shape) {
   const ring = shape.points.flatMap((p) => turns.map((_, j) => at(j, p)));
   const [low, high] = [Math.min, Math.max].map((pick) => [0, 1, 2].map((i) => ring.reduce((best, p) => pick(best, p[i]), ring[0][i])));
   const size = Math.hypot(...high.map((v, i) => v - low[i])) || 1;
-  const half = (BOX * size) / Math.max(1, shown > 12 ? 2 : 1);
+  const middle = low.map((v, i) => (v + high[i]) / 2);
+  const reach = ring.reduce((most, p) => Math.max(most, Math.hypot(...p.map((v, i) => v - middle[i]))), 0) + DRAWN * size;
+  const half = (BOX * size) / (shown > 12 ? 2 : 1);
   const places = shape.points.map((rest, point) => ({ point, rest }));
   const boxes = [];
   shape.roles.forEach((role, point) => {
@@ -46,7 +48,7 @@ function layout(shape) {
     const wide = shape.to_scale ? half / 2 : half;
     for (const corner of CORNERS) places.push({ point, rest: shape.points[point].map((v, i) => v + wide * corner[i]) });
   });
-  return { shown, turns, places, boxes, size, middle: low.map((v, i) => (v + high[i]) / 2) };
+  return { shown, turns, places, boxes, size, middle, reach };
 }
 
 function indices(shape, { shown, places, boxes }) {
@@ -166,7 +168,8 @@ export function stage(three, canvas, shape) {
     renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
     renderer.setSize(width, height, false);
     camera.aspect = width / height;
-    const far = (view.far * 0.46 * size) / Math.sin(FIELD / 2) / Math.min(camera.aspect, 1);
+    // A ring that is seen from its side is wider than it is high.
+    const far = (view.far * plan.reach) / Math.sin(FIELD / 2) / Math.min(camera.aspect, shape.sectors > 1 ? 1.4 : 1);
     const [c, s] = [Math.cos(view.over), Math.sin(view.over)];
     const from = [0, 1, 2].map((i) => c * (Math.sin(view.round) * first[i] - Math.cos(view.round) * second[i]) + s * up[i]);
     camera.up.set(...up);
