@@ -206,3 +206,17 @@ def test_a_report_is_one_file_that_holds_the_answer(browser: Browser, site: Site
     assert str(date.today().year) in text
     assert not re.search(r'(?:src|href)="https?://', text)
     assert "<button" not in text
+
+
+def test_an_empty_view_says_how_long_its_button_takes(profile: Profile, site: Site) -> None:
+    page = visit(profile[0], site, "?scene=bladed-disk&tab=map")
+    expect(page.locator("#answer-body")).to_have_text(
+        re.compile(r"No design yet: Find the best damper searches shroud.N0 .*, about [\d.]+ (s|min)")
+    )
+    told = [page.locator(f"#{name}-takes") for name in ("map", "front")]
+    for one in told:
+        expect(one).to_have_text(re.compile(r"^about [\d.]+ (ms|s|min)"))
+    seconds = [float(re.findall(r"[\d.]+(?= s$)", one.inner_text())[0]) for one in told]
+    assert 1.0 <= seconds[0] < seconds[1] <= 60.0, "a front is dearer than a map, which takes seconds"
+    expect(page.locator("#point .figure:visible")).to_have_count(0)
+    expect(page.locator("#point-status")).to_contain_text("or enter a frequency")

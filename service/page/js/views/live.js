@@ -4,11 +4,11 @@ import { state, write } from "../base/address.js";
 import { chart } from "../charts/chart.js";
 import { byId, el, show } from "../base/dom.js";
 import { on, tell } from "../base/events.js";
-import { length, number, quantity, seconds, unitOf } from "../base/format.js";
+import { length, number, quantity, unitOf } from "../base/format.js";
 import { previewer } from "../network/previews.js";
 import { responseOf, throughPeak } from "../charts/curves.js";
 import { sameValues } from "../scene/inputs.js";
-import { pointsOf } from "../scene/kinds.js";
+import { takes } from "../scene/kinds.js";
 import { ghosts, pinned } from "./pins.js";
 import { asked, current, ownValue, sliders as ranges, value, variedParts } from "../scene/scenes.js";
 
@@ -21,8 +21,6 @@ let slow = 0;
 let latest = null;
 // The response of the study, with what it was computed for and its linear limits.
 let study = null;
-// Of a point of the response, by the plan [s].
-let cost = 0;
 
 export function startLive() {
   plot = chart(byId("live-figure"), {
@@ -34,7 +32,6 @@ export function startLive() {
   ask = previewer("sweep", drawn, refused);
   pinned(() => shown());
   on("pins", redraw);
-  on("cost", (found) => { cost = found; });
   on("study-curve", (found) => {
     study = found;
     redraw();
@@ -59,7 +56,7 @@ export function startLive() {
 export function refresh() {
   if (!current.body) return;
   clearTimeout(slow);
-  slow = setTimeout(() => { byId("live-status").textContent = `The response is being computed${cost ? `, about ${seconds(cost * pointsOf("sweep"))}` : ""} …`; }, SLOW_MS);
+  slow = setTimeout(() => { byId("live-status").textContent = `The response is being computed${takes("sweep") && `, ${takes("sweep")}`} …`; }, SLOW_MS);
   ask({ kind: "sweep", ...asked() }, state.scene);
 }
 
