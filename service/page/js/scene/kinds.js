@@ -43,12 +43,11 @@ const proposal = (name) => current.studies?.get(name);
 // The keys of a body that the scene itself suggests.
 export const proposed = (name) => proposal(name)?.body ?? {};
 
-// How long studies take, about, in words: what the service says each costs, at the price of a point that the plan of
-// the scene names. Empty where one is not known.
-export function takes(...names) {
-  const points = names.reduce((sum, name) => sum + (proposal(name)?.points ?? 0), 0);
-  return price && points ? `about ${seconds(points * price)}` : "";
-}
+// How long studies take, about [s]: what the service says each costs, at the price of a point that the plan of the
+// scene names. 0 where one is not known.
+export const secondsOf = (...names) => price * names.reduce((sum, name) => sum + (proposal(name)?.points ?? 0), 0);
+
+export const takes = (...names) => (secondsOf(...names) ? `about ${seconds(secondsOf(...names))}` : "");
 
 // Why the scene has no such study; empty if it has.
 export const refusedFor = (name) => proposal(name)?.refused ?? "";
