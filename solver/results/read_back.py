@@ -118,7 +118,7 @@ def _value(of: Any, value: Any) -> Any:
     return _made(of, value) if isinstance(of, type) else value
 
 
-def _made(of: type, value: Any) -> Any:
+def _made(of: Any, value: Any) -> Any:
     """Return an object of a class."""
     if issubclass(of, Enum):
         try:

@@ -99,7 +99,7 @@ def submission(kind: JobKind, local: Command | None) -> Command:
         column: list[str] | None = None, **given: Any,
     ) -> None:  # fmt: skip
         if columns is not None:
-            given[_DATA] = _tables(name, given[_DATA], column)
+            given[_DATA] = _tables(str(name), given[_DATA], column)
         body = {one.key: one.in_body(given[one.parameter.name]) for one in made}
         scene = {} if name is None else {SCENE: scene_of(name)}
         told = {key: value for key, value in body.items() if value is not None}
@@ -110,7 +110,7 @@ def submission(kind: JobKind, local: Command | None) -> Command:
     return _with_options(submit, [*about_scene, *(one.parameter for one in made), *of_data])
 
 
-def _tables(name: str | None, data: str, columns: Sequence[str] | None) -> str:
+def _tables(name: str, data: str, columns: Sequence[str] | None) -> str:
     """Return what stands behind `--data` as JSON: it may be a file of measurements."""
     if data.lstrip().startswith(("[", "{")):
         if columns:
