@@ -192,5 +192,5 @@ def test_data_dropped_on_their_card_are_taken_for_data_alone(profile: Profile, s
     text = "frequency [Hz],amplitude [m]\n1.0,1.93\n1.2,1.77\n"
     page.evaluate(DROP, ["#identify-data", "rig.csv", text])
     expect(page.locator("#identify")).to_contain_text("rig.csv")
-    expect(page.locator("#editor")).to_be_hidden()
+    expect(page.locator("#matrices")).to_be_hidden()
     expect(page.locator(".dropping")).to_have_count(0)
