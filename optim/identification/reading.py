@@ -14,7 +14,7 @@ from optim.errors import DataError
 from optim.identification.data.measured import KINDS, DataKind, MeasuredRows
 from optim.identification.data.table import Table, check_numbers, runs_of
 from optim.identification.readers.csv_text import FORMAT as CSV
-from optim.identification.readers.csv_text import FromText
+from optim.identification.readers.csv_text import FromText, described
 from optim.identification.readers.export import Choice, read_export, text_of
 from optim.identification.readers.registry import Head, read_file, read_head, table_of
 from solver.errors import SettingError
@@ -74,18 +74,43 @@ def with_columns(scene: Scene, data: Sequence[str], columns: Sequence[str]) -> l
     """
     if not columns:
         return list(data)
-    choices, paths = dict(map(Choice.told, columns)), frozenset(scene.parameter_paths())
-    found: list[Given] = []
+    return [_of_text(scene, given, columns) if _is_csv(given) else given for given in data]
+
+
+def job_tables(scene: Scene, data: Sequence[str], columns: Sequence[str] = ()) -> list[dict[str, Any]]:
+    """Return files in CSV as the tables of a job; arguments as of `with_columns`.
+
+    Raises
+    ------
+    DataError
+        What is wrong, with its line; or a file is of another format.
+    """
     for given in data:
-        match = _WITH_HEAD.match(given)
-        file = Path(match["file"] if match else given)
-        if file.suffix.lower() not in CSV.suffixes:
-            found.append(given)
-            continue
-        pairs = match["pairs"].split(",") if match else []
-        conditions = {key: value for key, _, value in (pair.partition("=") for pair in pairs)}
-        found.append(read_export(text_of(file), file.name, paths, choices, conditions))
-    return found
+        if not _is_csv(given):
+            raise DataError("data", given, "must be a file in CSV (.csv) or JSON, to be submitted")
+    return [_of_text(scene, given, columns).job_table for given in data]
+
+
+def _split(given: str) -> tuple[Path, dict[str, str]]:
+    """Return the file, and the conditions behind its name."""
+    match = _WITH_HEAD.match(given)
+    pairs = match["pairs"].split(",") if match else []
+    return Path(match["file"] if match else given), {
+        key: value for key, _, value in (pair.partition("=") for pair in pairs)
+    }
+
+
+def _is_csv(given: str) -> bool:
+    return _split(given)[0].suffix.lower() in CSV.suffixes
+
+
+def _of_text(scene: Scene, given: str, columns: Sequence[str]) -> FromText:
+    """Read a file in CSV, by what its columns are if that is given."""
+    (file, conditions), paths = _split(given), frozenset(scene.parameter_paths())
+    if columns:
+        return read_export(text_of(file), file.name, paths, dict(map(Choice.told, columns)), conditions)
+    head = "".join(f"# {key} = {value}\n" for key, value in conditions.items())
+    return described(head + text_of(file).removeprefix("\ufeff"), file.name, paths)
 
 
 def _tables(given: Given, index: int, paths: frozenset[str]) -> list[Table]:

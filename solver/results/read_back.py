@@ -118,7 +118,7 @@ def _value(of: Any, value: Any) -> Any:
     return _made(of, value) if isinstance(of, type) else value
 
 
-def _made(of: type[Any], value: Any) -> Any:
+def _made(of: Any, value: Any) -> Any:
     """Return an object of a class."""
     if issubclass(of, Enum):
         try:
@@ -127,7 +127,8 @@ def _made(of: type[Any], value: Any) -> Any:
             raise _OtherFormError from error
     if issubclass(of, Told) and is_dataclass(of):
         try:
-            return of.from_json(_of(value, dict))
+            kind: Any = of
+            return read_back(kind, _of(value, dict))
         except ValueError as error:
             raise _OtherFormError from error
     names = getattr(of, "_fields", None)

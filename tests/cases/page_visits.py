@@ -32,6 +32,15 @@ amplitude = 5.0
 dof = "blade"
 band = [300.0, 900.0]
 """
+# Drops a file with a text on what a selector names.
+DROP = """([selector, name, text]) => {
+  const dataTransfer = new DataTransfer();
+  dataTransfer.items.add(new File([text], name));
+  for (const type of ["dragover", "drop"]) {
+    const event = new DragEvent(type, { dataTransfer, bubbles: true, cancelable: true });
+    document.querySelector(selector).dispatchEvent(event);
+  }
+}"""
 
 
 def with_all(words: str) -> str:

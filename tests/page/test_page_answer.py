@@ -206,3 +206,48 @@ def test_a_report_is_one_file_that_holds_the_answer(browser: Browser, site: Site
     assert str(date.today().year) in text
     assert not re.search(r'(?:src|href)="https?://', text)
     assert "<button" not in text
+
+
+def test_an_empty_view_says_how_long_its_button_takes(profile: Profile, site: Site) -> None:
+    page = visit(profile[0], site, "?scene=bladed-disk&tab=map")
+    expect(page.locator("#answer-body")).to_have_text(
+        re.compile(r"No design yet: Find the best damper searches shroud.N0 .*, about [\d.]+ (s|min)")
+    )
+    told = [page.locator(f"#{name}-takes") for name in ("map", "front")]
+    for one in told:
+        expect(one).to_have_text(re.compile(r"^about [\d.]+ (ms|s|min)"))
+    seconds = [float(re.findall(r"[\d.]+(?= s$)", one.inner_text())[0]) for one in told]
+    assert 1.0 <= seconds[0] < seconds[1] <= 60.0, "a front is dearer than a map, which takes seconds"
+    expect(page.locator("#point .figure:visible")).to_have_count(0)
+    expect(page.locator("#point-status")).to_contain_text("or enter a frequency")
+
+
+def test_a_slow_response_is_drawn_coarser_first_and_says_so(profile: Profile, site: Site) -> None:
+    """Where the last response took long: a coarser one, named so, then that of all harmonics."""
+    context, _ = profile
+    held: list[Route] = []
+    harmonics: list[int] = []
+
+    def answer(route: Route) -> None:
+        asked = route.request.post_data_json
+        if asked["kind"] != "sweep":
+            return route.continue_()
+        harmonics.append(asked["harmonics"])
+        if len(harmonics) == 1:  # as if it had taken a second
+            found = route.fetch()
+            return route.fulfill(response=found, json={**found.json(), "seconds": 1.0})
+        return held.append(route) if harmonics[-1] == 11 else route.continue_()
+
+    context.route("**/v1/previews", answer)
+    page = visit(context, site, "?scene=two-dof&tab=response")
+    status = page.locator("#live-status")
+    expect(status).to_contain_text("points in 1000 ms")
+    page.locator("#sliders input[type=number]").first.fill("77")
+    page.keyboard.press("Enter")
+    expect(status).to_contain_text("preview with 5 harmonics, that with 11 is being computed")
+    assert harmonics[:2] == [11, 5]
+    expect(page.locator("#live-figure path.series").first).to_be_visible()
+    for route in held:
+        route.continue_()
+    expect(status).not_to_contain_text("preview with")
+    expect(status).to_contain_text("answered after")

@@ -13,7 +13,7 @@ from fe_files import coordinate, hbmat
 from matrix_cases import beam
 from page_matrices import ANSYS, K, M, file, place
 from page_site import Site, Watch
-from page_visits import visit
+from page_visits import DROP, visit
 from sector_files import SECTORS, sector_files
 
 from solver.matrices.readers.registry import readers
@@ -25,14 +25,6 @@ if TYPE_CHECKING:
     from playwright.sync_api import BrowserContext, Page
 
 Profile = tuple["BrowserContext", Watch]
-DROP = """([selector, name, text]) => {
-  const dataTransfer = new DataTransfer();
-  dataTransfer.items.add(new File([text], name));
-  for (const type of ["dragover", "drop"]) {
-    const event = new DragEvent(type, { dataTransfer, bubbles: true, cancelable: true });
-    document.querySelector(selector).dispatchEvent(event);
-  }
-}"""
 
 
 @pytest.mark.parametrize("sector", [False, pytest.param(True, marks=pytest.mark.long)])

@@ -9,7 +9,7 @@ import httpx
 import numpy as np
 import pytest
 from page_site import Site, Watch
-from page_visits import visit
+from page_visits import DROP, visit
 
 import solver
 
@@ -184,3 +184,13 @@ def test_an_export_of_a_rig_is_shown_before_it_is_read(profile: Profile, site: S
     expect(form).to_contain_text("as last time")
     form.get_by_role("button", name="Leave the file out").click()
     expect(page.locator("#identify-files")).not_to_contain_text("second.csv")
+
+
+def test_data_dropped_on_their_card_are_taken_for_data_alone(profile: Profile, site: Site) -> None:
+    page = visit(profile[0], site, "?scene=two-dof&tab=identify")
+    expect(page.locator("#live-status")).to_contain_text("peak")
+    text = "frequency [Hz],amplitude [m]\n1.0,1.93\n1.2,1.77\n"
+    page.evaluate(DROP, ["#identify-data", "rig.csv", text])
+    expect(page.locator("#identify")).to_contain_text("rig.csv")
+    expect(page.locator("#matrices")).to_be_hidden()
+    expect(page.locator(".dropping")).to_have_count(0)

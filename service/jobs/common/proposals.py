@@ -31,7 +31,7 @@ class StudyProposal(BaseModel):
     ----------
     kind : of the job.
     body : keys beside the scene; what is left out has the default of the schema.
-    points : of the response that it solves, about; times the cost of a point in the plan its time.
+    points : of a response that cost as much, about; times the cost of a point in the plan its time.
     refused : why this scene has no such study.
     """
 
@@ -39,7 +39,7 @@ class StudyProposal(BaseModel):
 
     kind: str
     body: dict[str, Any] = Field(description="Keys beside the scene that the scene itself suggests.")
-    points: int | None = Field(description="Points of the response that are solved, about; null: not known.")
+    points: int | None = Field(description="Points of a response that cost as much, about; null: not known.")
     refused: str | None = Field(description="Why the scene has no such study; null: it has.")
 
 
@@ -168,8 +168,14 @@ def _at_one_frequency(scene: Scene) -> Proposed:
     return {"frequency_hz": _rounded(_middle(scene), 4)}
 
 
-_SWEEP = 200  # points of a response, about
-_POINTS: Mapping[str, int] = {"sweep": _SWEEP, "campbell": _SWEEP}  # of a search nobody knows it before
+# What a study takes in all, in points of a response as the plan prices them: measured in processor time on
+# the shipped scenes, as they are asked by default. A response has its peaks polished and its errors
+# estimated, a front is a search for each of its points.
+_SWEEP = 350
+_POINTS: Mapping[str, int] = {
+    "sweep": _SWEEP, "campbell": _SWEEP, "map": 41_000, "design": 2_500, "pareto": 110_000, "modes": 4_000,
+    "accuracy": 40_000, "interference": 300,
+}  # fmt: skip
 _PROPOSED: Mapping[str, Callable[[Scene], Proposed]] = {
     "map": _map, "campbell": _campbell, "interference": _interference, "modes": _modes,
     "identify": _identify,

@@ -77,7 +77,10 @@ class Identify(Study, HarmonicRequest):
     FIGURE = "optim.views.plots.designs:identification_figure"
 
     data: Annotated[
-        list[dict[str, Any]], BeforeValidator(_small), Field(min_length=1, max_length=MOST_TABLES)
+        list[dict[str, Any]],
+        BeforeValidator(_small),
+        Field(min_length=1, max_length=MOST_TABLES),
+        Flag(metavar="JSON|FILE.csv"),
     ] = Field(
         description="Measured runs: tables of columns (lists), `conditions` (path to value), `units` "
         "(column to unit) and words such as `dof`."

@@ -2,7 +2,7 @@
 
 import { asOneStep, lastWritten, read, state, write } from "./base/address.js";
 import { Problem, patiently, post } from "./network/api.js";
-import { byId, el, show } from "./base/dom.js";
+import { byId, dropsOn, el, show } from "./base/dom.js";
 import { startInterference } from "./disk/interference.js";
 import { startAnswer } from "./views/answer.js";
 import { startDesign } from "./views/design.js";
@@ -187,7 +187,7 @@ function controls() {
     byId("file").value = "";
   });
   byId("open-matrices").addEventListener("click", () => openMatrices());
-  startDrops();
+  dropsOn(document.body, (given) => filesOf(given).then(take).catch(failed));
   byId("new-scene").addEventListener("click", () => newScene().catch(failed));
   byId("edit-scene").addEventListener("click", () => editCurrent().catch(failed));
   byId("save-toml").addEventListener("click", () => saveToml(`${state.scene}.toml`));
@@ -200,21 +200,6 @@ async function take(files) {
   const scene = sceneIn(files);
   if (scene) await openScene(scene, files);
   else if (files.length) openMatrices(files);
-}
-
-function startDrops() {
-  const card = document.body;
-  const over = (event, on) => {
-    if (!event.dataTransfer?.types.includes("Files")) return;
-    event.preventDefault();
-    card.classList.toggle("dropping", on);
-  };
-  card.addEventListener("dragover", (event) => over(event, true));
-  card.addEventListener("dragleave", (event) => over(event, false));
-  card.addEventListener("drop", (event) => {
-    over(event, false);
-    filesOf(event.dataTransfer).then(take).catch(failed);
-  });
 }
 
 async function share() {

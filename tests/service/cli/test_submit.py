@@ -79,6 +79,23 @@ def test_a_problem_file_goes_with_the_job_and_the_design_is_listed(run: Run, tmp
     assert "/sort" in run("results --sort colour")[2]
 
 
+def test_an_export_of_a_rig_is_submitted_by_its_columns(run: Run, tmp_path: Path) -> None:
+    """The same file, with the same conditions, as the command computes it here."""
+    rows = zip(("1,0", "1,2", "1,4"), ("1930,0", "1770,0", "1250,0"), strict=True)
+    text = "Weg[mm];f[Hz]\n" + "".join(f"{height};{frequency}\n" for frequency, height in rows)
+    (tmp_path / "rig.csv").write_text(text)
+    file, columns = "rig.csv:damper.N0=100", "--column Weg[mm]=amplitude:mm --column f[Hz]=frequency:Hz"
+    asked = f"--unknown damper.mu 0.1 0.6 --starts 1 --harmonics 3 {columns} --json"
+    status, out, err = run(f"submit identify two-dof --data {file} {asked} --wait")
+    assert (status, err) == (0, "")
+    status, here, err = run(f"identify two-dof {file} {asked}")
+    assert (status, err) == (0, "")
+    assert json.loads(out)["result"]["values"] == pytest.approx(json.loads(here)["values"], rel=1e-6)
+    status, _, err = run("submit identify two-dof --data [] --column a=b:c --unknown damper.mu 0.1 0.6")
+    assert status == 2
+    assert "`--column` is for a file" in err
+
+
 @pytest.mark.long
 def test_a_front_is_submitted_and_drawn(run: Run, tmp_path: Path) -> None:
     status, out, _ = run("submit pareto two-dof --limit 1.5 --points 3 --harmonics 3 --wait --json")

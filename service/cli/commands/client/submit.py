@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Container, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +11,7 @@ from typer.core import TyperCommand, TyperGroup
 
 from optim.problem.keys import options as key_options_of
 from service.cli.commands.client.jobs import hand_in, scene_of
-from service.cli.options import problem_inputs
+from service.cli.options import inputs, problem_inputs
 from service.cli.options import shared as options
 from service.cli.options.key_options import (
     SCENE,
@@ -21,6 +22,7 @@ from service.cli.options.key_options import (
 from service.cli.options.parameters import Command, keyed, keyword, with_parameters
 from service.cli.options.problem_inputs import FLAGS, ProblemFlags, takes_problem
 from service.cli.table import TOP, CommandEntry
+from service.errors import InputError
 from service.jobs.registry import ABOUT_THE_RUN, JobKind
 from service.settings.kinds import registry_here
 
@@ -56,6 +58,7 @@ class SubmitGroup(TyperGroup):
                 self.add_command(TyperCommand(kind.name, help=kind.summary, rich_markup_mode=None))
 
 
+_DATA, _COLUMN = "key_data", "--column"
 _OF_ALL = ("fresh", "priority", "max_seconds", *ABOUT_THE_RUN)
 
 
@@ -89,16 +92,33 @@ def submission(kind: JobKind, local: Command | None) -> Command:
         own = [one for one in made if _beside_a_problem(one, ProblemRequest.model_fields, known)]
         return _of_a_problem(kind, kind.request, own)
 
+    columns = None if local is None else options_of(local).get(_COLUMN)
+
     def submit(
-        name: str | None = None, wait: bool = False, as_json: bool = False, url: str = "", **given: Any
-    ) -> None:
+        name: str | None = None, wait: bool = False, as_json: bool = False, url: str = "",
+        column: list[str] | None = None, **given: Any,
+    ) -> None:  # fmt: skip
+        if columns is not None:
+            given[_DATA] = _tables(str(name), given[_DATA], column)
         body = {one.key: one.in_body(given[one.parameter.name]) for one in made}
         scene = {} if name is None else {SCENE: scene_of(name)}
         told = {key: value for key, value in body.items() if value is not None}
         hand_in(url, {"kind": kind.name, **scene, **told}, wait=wait, as_json=as_json)
 
     about_scene = [keyword("name", options.Scene)] if SCENE in kind.request.model_fields else []
-    return _with_options(submit, [*about_scene, *(one.parameter for one in made)])
+    of_data = [] if columns is None else [columns]
+    return _with_options(submit, [*about_scene, *(one.parameter for one in made), *of_data])
+
+
+def _tables(name: str, data: str, columns: Sequence[str] | None) -> str:
+    """Return what stands behind `--data` as JSON: it may be a file of measurements."""
+    if data.lstrip().startswith(("[", "{")):
+        if columns:
+            raise InputError(f"`{_COLUMN}` is for a file: `--data` has its columns in JSON here")
+        return data
+    from optim.identification.reading import job_tables
+
+    return json.dumps(job_tables(inputs.scene(name, None), [data], columns or ()))
 
 
 def _beside_a_problem(option: KeyOption, of_problems: Container[str], known: Container[str] | None) -> bool:

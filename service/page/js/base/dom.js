@@ -38,6 +38,22 @@ export function say(id, text, bad = false) {
   node.classList.toggle("bad", bad);
 }
 
+// Files that are dropped on a card: it is marked while they are over it, and takes them alone.
+export function dropsOn(card, take) {
+  const over = (event, on) => {
+    if (!event.dataTransfer?.types.includes("Files")) return;
+    event.preventDefault();
+    event.stopPropagation();
+    card.classList.toggle("dropping", on);
+  };
+  card.addEventListener("dragover", (event) => over(event, true));
+  card.addEventListener("dragleave", (event) => over(event, false));
+  card.addEventListener("drop", (event) => {
+    over(event, false);
+    take(event.dataTransfer);
+  });
+}
+
 export const facts = (pairs) =>
   el("dl", { class: "facts" }, pairs.flatMap(([name, value]) => [el("dt", {}, name), el("dd", {}, value)]));
 

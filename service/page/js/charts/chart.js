@@ -9,6 +9,7 @@ import { dragged, joined, rule, zoomButtons, zoomKey, zoomed } from "./zoom.js";
 
 const MARGIN_LEFT = 62;
 const LEAST_HEIGHT = 120;
+const NOTHING = "Nothing computed yet.";
 const DASHES = { dashed: "7 4", dotted: "2 4" };
 
 // What a chart shows: {x, y: {name, unit, log, zero, low, high}, series: [{name, x, y, colour, dash, width, shape, bare}],
@@ -33,16 +34,18 @@ export function chart(host, { label, file, height = 300, onPick, legend = true, 
     self.shown = what;
     tools.hidden = false;
     drawing.toggleAttribute("hidden", false);
+    host.toggleAttribute("data-empty", false);
     if (before === null) read.textContent = "";
     self.repaint();
     // What the cursor reads is of the curve that is seen, not of the one before.
     if (before !== null) self.cursor(nearest(self.shown.series[pickSeries], before));
   };
   // Nothing to show is one line.
-  self.clear = (words = "Nothing computed yet.") => {
+  self.clear = (words = NOTHING) => {
     Object.assign(self, { shown: null, at: null, window: null, width: host.clientWidth });
     tools.hidden = true;
     drawing.toggleAttribute("hidden", true);
+    host.toggleAttribute("data-empty", words === NOTHING);
     read.textContent = words;
   };
   self.clear();

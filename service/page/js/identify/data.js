@@ -1,7 +1,7 @@
 // Measured data of the page: files that were chosen, dropped or pasted, read by the service against the scene.
 
 import { Problem, patiently, post } from "../network/api.js";
-import { byId, el, show } from "../base/dom.js";
+import { byId, dropsOn, el, show } from "../base/dom.js";
 import { number, quantity } from "../base/format.js";
 import { asked } from "../scene/scenes.js";
 import { askColumns } from "./columns.js";
@@ -22,18 +22,7 @@ export function startData(onChange) {
     const text = byId("identify-paste").value;
     if (text.trim()) take([{ name: fresh(PASTED), text }]).then((good) => { if (good) byId("identify-paste").value = ""; });
   });
-  const card = byId("identify-data");
-  const over = (event, on) => {
-    if (!event.dataTransfer?.types.includes("Files")) return;
-    event.preventDefault();
-    card.classList.toggle("dropping", on);
-  };
-  card.addEventListener("dragover", (event) => over(event, true));
-  card.addEventListener("dragleave", (event) => over(event, false));
-  card.addEventListener("drop", (event) => {
-    over(event, false);
-    takeFiles([...event.dataTransfer.files]);
-  });
+  dropsOn(byId("identify-data"), (given) => takeFiles([...given.files]));
 }
 
 // A name that no other file has.

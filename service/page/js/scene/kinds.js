@@ -3,12 +3,15 @@
 import { request } from "../network/api.js";
 import { fieldsOf } from "../forms/fields.js";
 import { state } from "../base/address.js";
-import { tell } from "../base/events.js";
+import { on, tell } from "../base/events.js";
+import { seconds } from "../base/format.js";
 import { asked, current, variable } from "./scenes.js";
 
 // The scene, the run and the queue are asked for elsewhere on the page.
 const OF_THE_PAGE = ["kind", "scene", "set", "fresh", "priority", "max_seconds", "project", "name", "notes", "tags"];
 let kinds = new Map();
+let price = 0;
+on("cost", (cost) => { price = cost; });
 
 export async function loadKinds() {
   kinds = new Map((await request("/v1/kinds")).items.map((kind) => [kind.name, { ...kind, fields: fieldsOf(kind.body).filter(({ key, kind: what }) => !OF_THE_PAGE.includes(key) && !(key === "harmonics" && what === "number")) }]));
@@ -19,7 +22,7 @@ export const kindNames = () => [...kinds.keys()];
 
 export const kindOf = (name) => kinds.get(name);
 
-const takes = (name, key) => kinds.get(name)?.fields.find((field) => field.key === key);
+const keyed = (name, key) => kinds.get(name)?.fields.find((field) => field.key === key);
 
 // What a request of a kind says of the scene.
 export function askedFor(name) {
@@ -31,8 +34,8 @@ export function askedFor(name) {
 export function ofTheBar(name) {
   if (!state.range) return {};
   const [from, to] = state.range;
-  if (takes(name, "variables")) return { variables: { [variable()]: [from, to] } };
-  return takes(name, "parameter")?.required ? { parameter: variable(), from, to } : {};
+  if (keyed(name, "variables")) return { variables: { [variable()]: [from, to] } };
+  return keyed(name, "parameter")?.required ? { parameter: variable(), from, to } : {};
 }
 
 const proposal = (name) => current.studies?.get(name);
@@ -40,8 +43,11 @@ const proposal = (name) => current.studies?.get(name);
 // The keys of a body that the scene itself suggests.
 export const proposed = (name) => proposal(name)?.body ?? {};
 
-// How many points of the response a study solves, about; null where nobody knows.
-export const pointsOf = (name) => proposal(name)?.points ?? null;
+// How long studies take, about [s]: what the service says each costs, at the price of a point that the plan of the
+// scene names. 0 where one is not known.
+export const secondsOf = (...names) => price * names.reduce((sum, name) => sum + (proposal(name)?.points ?? 0), 0);
+
+export const takes = (...names) => (secondsOf(...names) ? `about ${seconds(secondsOf(...names))}` : "");
 
 // Why the scene has no such study; empty if it has.
 export const refusedFor = (name) => proposal(name)?.refused ?? "";

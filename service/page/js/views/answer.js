@@ -10,6 +10,7 @@ import { inUse, sameValues } from "../scene/inputs.js";
 import { givenByScene, variable } from "../scene/scenes.js";
 import { load } from "./design.js";
 import { changedSince, isUnderway, renewButton } from "./renewal.js";
+import { pressTakes } from "./study.js";
 
 let designed = null;
 let before = null;
@@ -33,6 +34,7 @@ export function startAnswer() {
   });
   on("staleness", draw);
   on("scene", draw);
+  on("cost", () => designed === null && draw());
 }
 
 const key = () => JSON.stringify([state.scene, designed?.request.set ?? {}, designed?.request.harmonics ?? 11]);
@@ -53,7 +55,7 @@ function draw() {
   if (empty) {
     show(host, el("p", { class: "note" }, isUnderway("design")
       ? "The search for the best damper is under way."
-      : variable() ? `No design yet: Find the best damper searches ${variable()} over its range.` : "No design: the scene has no contact to design."));
+      : variable() ? `No design yet: Find the best damper searches ${variable()} over its range and draws the other views${pressTakes() && `, ${pressTakes()}`}.` : "No design: the scene has no contact to design."));
     show(byId("answer-stale"));
     return;
   }

@@ -4,25 +4,27 @@ import { state, write } from "../base/address.js";
 import { chart } from "../charts/chart.js";
 import { byId, el, show } from "../base/dom.js";
 import { on, tell } from "../base/events.js";
-import { length, number, quantity, seconds, unitOf } from "../base/format.js";
+import { length, number, quantity, unitOf } from "../base/format.js";
 import { previewer } from "../network/previews.js";
 import { responseOf, throughPeak } from "../charts/curves.js";
 import { sameValues } from "../scene/inputs.js";
-import { pointsOf } from "../scene/kinds.js";
+import { secondsOf, takes } from "../scene/kinds.js";
 import { ghosts, pinned } from "./pins.js";
 import { asked, current, ownValue, sliders as ranges, value, variedParts } from "../scene/scenes.js";
 
 const STEPS = 400;
-const SLOW_MS = 600;
+const SLOW_MS = 300;
 const ROOM = 1.3; // above the response, where its limits rise
 let plot = null;
 let ask = null;
 let slow = 0;
+// The last response with all harmonics [s]; from LONG on a coarser one comes first.
+let took = 0;
+const LONG = 0.3;
+const COARSE = 5;
 let latest = null;
 // The response of the study, with what it was computed for and its linear limits.
 let study = null;
-// Of a point of the response, by the plan [s].
-let cost = 0;
 
 export function startLive() {
   plot = chart(byId("live-figure"), {
@@ -34,14 +36,13 @@ export function startLive() {
   ask = previewer("sweep", drawn, refused);
   pinned(() => shown());
   on("pins", redraw);
-  on("cost", (found) => { cost = found; });
   on("study-curve", (found) => {
     study = found;
     redraw();
   });
   // The curve of another scene is not shown under the name of this one, whether its own comes or not.
   on("scene-left", () => {
-    [latest, study] = [null, null];
+    [latest, study, took] = [null, null, 0];
     plot.clear();
   });
   on("scene", () => {
@@ -59,14 +60,18 @@ export function startLive() {
 export function refresh() {
   if (!current.body) return;
   clearTimeout(slow);
-  slow = setTimeout(() => { byId("live-status").textContent = `The response is being computed${cost ? `, about ${seconds(cost * pointsOf("sweep"))}` : ""} …`; }, SLOW_MS);
-  ask({ kind: "sweep", ...asked() }, state.scene);
+  slow = setTimeout(() => { byId("live-status").textContent = `The response is being computed${takes("sweep") && `, ${takes("sweep")}`} …`; }, SLOW_MS);
+  wish(Math.max(took, secondsOf("sweep")) > LONG && asked().harmonics > COARSE ? COARSE : asked().harmonics);
 }
+
+const valuesNow = () => JSON.stringify([state.scene, asked()]);
+
+const wish = (harmonics) => ask({ kind: "sweep", ...asked(), harmonics }, { scene: state.scene, values: valuesNow(), harmonics });
 
 // What is too large to be followed live is computed by a job, whose response takes the place of this one.
 function refused(error, token) {
   clearTimeout(slow);
-  if (token !== state.scene) return;
+  if (token.scene !== state.scene) return;
   if (error.retryAfter || error.status === 409) {
     byId("live-status").textContent = error.message;
     return;
@@ -113,15 +118,24 @@ function redraw() {
 
 function drawn(answer, { milliseconds, token }) {
   clearTimeout(slow);
-  if (token !== state.scene) return;
+  if (token.scene !== state.scene) return;
   latest = answer;
   redraw();
   tell("states", { states: answer.states, at: answer.peak?.at });
   if (answer.peak) tell("size", answer.peak.value);
-  const fewer = answer.n_harmonics < state.harmonics ? ` · with ${answer.n_harmonics} of ${state.harmonics} harmonics, to answer at once: the frequency response below keeps all` : "";
-  byId("live-status").textContent = `${words(answer)} · ${answer.points} points in ${number(answer.seconds * 1e3, 2)} ms, answered after ${number(milliseconds, 2)} ms${fewer}`;
+  byId("live-status").textContent = `${words(answer)} · ${answer.points} points in ${number(answer.seconds * 1e3, 2)} ms, answered after ${number(milliseconds, 2)} ms${fewer(answer, token)}`;
   performance.mark("live-drawn");
   document.documentElement.dataset.live = String(Number(document.documentElement.dataset.live ?? 0) + 1);
+}
+
+// What is left out of a curve for it to come soon: by the page, where that of all harmonics follows, or by the service.
+function fewer({ n_harmonics: kept, seconds: taken }, { values, harmonics }) {
+  const { harmonics: all } = asked();
+  if (kept === all) took = taken;
+  if (kept === all || values !== valuesNow()) return "";
+  if (kept < harmonics) return ` · preview with ${kept} of ${all} harmonics, to answer at once: the frequency response below keeps all`;
+  wish(all);
+  return ` · preview with ${kept} harmonics, that with ${all} is being computed`;
 }
 
 const toStep = ({ log, low, high }, number) =>

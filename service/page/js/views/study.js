@@ -3,10 +3,9 @@
 import { state, write } from "../base/address.js";
 import { byId, say } from "../base/dom.js";
 import { on, tell } from "../base/events.js";
-import { seconds } from "../base/format.js";
 import { schemaForm } from "../forms/form.js";
 import { run } from "../network/jobs.js";
-import { askedFor, ofTheBar, pointsOf, proposed, refusedFor } from "../scene/kinds.js";
+import { askedFor, ofTheBar, proposed, refusedFor, takes } from "../scene/kinds.js";
 import { variable } from "../scene/scenes.js";
 import { readSettings } from "../scene/settings.js";
 import { VIEWS } from "../views.js";
@@ -28,9 +27,11 @@ const FORMS = {
   modes: { id: "modes", words: "Follow the mode", primary: true, top: ["mode", "from", "to", "nodal_diameter", "aero_damping", "exact_peaks"], groups: [{ legend: "Loops, peaks, disturbances, phase resonance", id: "more" }] },
 };
 // Where a view is about one study, the button of the bar is that of its form.
-const OF_TAB = { design: ["problem-form", "Search this design"], identify: ["identify-form", "Identify"], modes: ["modes-form", "Follow the mode"] };
+const OF_TAB = { design: ["problem-form", "Search this design", "design"], identify: ["identify-form", "Identify", "identify"], modes: ["modes-form", "Follow the mode", "modes"] };
 const WITHOUT_VARIABLE = ["identify", "modes"];
 const OF_THE_BUTTON = ["map", "accuracy", "campbell", "interference"];
+// How long all that one press begins takes, about.
+export const pressTakes = () => takes("sweep", "design", "pareto", ...OF_THE_BUTTON.filter((kind) => !refusedFor(kind)));
 const forms = new Map();
 let studies = 0;
 // The amplitude [m] at which the band of the best design was measured.
@@ -44,12 +45,14 @@ export function startStudy() {
   byId("study").addEventListener("click", () => (OF_TAB[state.tab] ? byId(OF_TAB[state.tab][0]).requestSubmit() : study()));
   const named = () => {
     byId("study").textContent = OF_TAB[state.tab]?.[1] ?? "Find the best damper";
+    byId("study").title = OF_TAB[state.tab] ? takes(OF_TAB[state.tab][2]) : pressTakes();
     byId("study").disabled = !variable() && !WITHOUT_VARIABLE.includes(state.tab);
   };
   for (const event of ["tab-shown", "scene", "scene-contact"]) on(event, named);
   // What a study takes is said beside its button, by the plan of the scene.
-  on("cost", (cost) => {
-    for (const [kind, { id }] of Object.entries(FORMS)) if (pointsOf(kind)) byId(`${id}-takes`).textContent = `about ${seconds(pointsOf(kind) * cost)}`;
+  on("cost", () => {
+    for (const [kind, { id }] of Object.entries(FORMS)) byId(`${id}-takes`).textContent = takes(kind);
+    named();
   });
   on("renew", renew);
   on("computed", ({ kind, request, result }) => {
