@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from itertools import zip_longest
 from typing import TYPE_CHECKING, Any
 
-from solver.results.told import Block, Summary, Table
+from solver.results.told import Block, ResultTable, Summary
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -61,11 +61,11 @@ def print_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]
     What identifies a thing, in a column `id`, stands whole on one line, to be copied: other columns fold.
     """
     from rich.box import SIMPLE_HEAD
-    from rich.table import Table as RichTable
+    from rich.table import Table
 
-    made = RichTable(box=SIMPLE_HEAD, pad_edge=False, show_edge=False)
+    made = Table(box=SIMPLE_HEAD, pad_edge=False, show_edge=False)
     listed = list(rows)
-    numbers = Table(title, columns, listed).numbers
+    numbers = ResultTable(title, columns, listed).numbers
     for index, (column, right) in enumerate(zip_longest(columns, numbers)):
         whole = max((len(row[index]) for row in listed), default=0) if column == "id" else None
         made.add_column(column, justify="right" if right else "left", overflow="fold", min_width=whole)
@@ -81,7 +81,7 @@ def print_told(blocks: Iterable[Block]) -> None:
     for place, block in enumerate(blocks):
         if place and block.title:
             say("")
-        if isinstance(block, Table):
+        if isinstance(block, ResultTable):
             print_table(block.title, block.columns, block.rows)
         else:
             print_pairs(block.title, block.pairs)
