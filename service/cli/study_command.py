@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, Self
@@ -22,7 +21,7 @@ from service.cli.options.parameters import keyword, with_parameters
 from service.cli.progress import bar
 from service.errors import InputError
 from service.jobs.study import Answer, Study, Watch
-from service.rendering.text import print_result, show
+from service.rendering.text import show
 from solver.errors import SettingError
 from solver.results.views import on_demand
 from solver.results.watch import stopped_by_interrupt
@@ -200,5 +199,5 @@ def give(study: type[Study], answer: Answer, outputs: Outputs, scene: Scene, *, 
         outputs.write(answer.result, draw, scene=scene)
     elif answer.reached and outputs.file is not None:
         raise InputError(f"`--out`: what `{study.NAME}` finds is no table, take --json")
-    show(answer.json, partial(print_result, study.NAME, tell=study.tell()), as_json=as_json)
+    show(study.NAME, answer.json, study.tell(), as_json=as_json)
     end(answer.reached, answer.status)

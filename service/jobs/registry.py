@@ -358,6 +358,10 @@ class Registry:
             ("kind",), f"must be one of {', '.join(self._kinds)}", Shown(f"{name!r:.80}")
         )
 
+    def tell_of(self, name: str) -> Tell | None:
+        """What puts results of a kind in words, if there is such a kind and it says it."""
+        return self._kinds[name].view.tell if name in self._kinds else None
+
     def extended(self, *kinds: JobKind) -> Registry:
         """This registry with further kinds."""
         return Registry([*self, *kinds], self.warm_up)

@@ -1,4 +1,4 @@
-"""What the command prints: tables for people, one JSON object for programs."""
+"""What people read of results, and how the command prints: tables for them, a JSON object for programs."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ import os
 import shutil
 import sys
 import textwrap
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import zip_longest
 from typing import TYPE_CHECKING, Any
 
-from solver.results.told import Block, Summary, Table
+from solver.results.told import Block, ResultTable, Summary
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 _PIPE_WIDTH = 120
 _BOLD, _DIM = "1", "2"
 _LISTED = 6
+_DEEPEST = 3  # of objects inside objects: what is deeper is in the JSON
 
 
 def print_json(obj: Mapping[str, object]) -> None:
@@ -28,9 +29,12 @@ def print_json(obj: Mapping[str, object]) -> None:
     sys.stdout.write(json.dumps(obj, allow_nan=False, ensure_ascii=False) + "\n")
 
 
-def show(answer: Mapping[str, Any], told: Callable[[Mapping[str, Any]], None], *, as_json: bool) -> None:
-    """Print what was computed: one JSON object, or what `told` makes of it."""
-    (print_json if as_json else told)(answer)
+def show(kind: str, answer: Json, tell: Tell | None, *, as_json: bool) -> None:
+    """Print what was computed: one JSON object, or what is told of it."""
+    if as_json:
+        print_json(answer)
+    else:
+        print_told(told(kind, answer, tell))
 
 
 def say(text: str) -> None:
@@ -57,11 +61,11 @@ def print_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]
     What identifies a thing, in a column `id`, stands whole on one line, to be copied: other columns fold.
     """
     from rich.box import SIMPLE_HEAD
-    from rich.table import Table as RichTable
+    from rich.table import Table
 
-    made = RichTable(box=SIMPLE_HEAD, pad_edge=False, show_edge=False)
+    made = Table(box=SIMPLE_HEAD, pad_edge=False, show_edge=False)
     listed = list(rows)
-    numbers = Table(title, columns, listed).numbers
+    numbers = ResultTable(title, columns, listed).numbers
     for index, (column, right) in enumerate(zip_longest(columns, numbers)):
         whole = max((len(row[index]) for row in listed), default=0) if column == "id" else None
         made.add_column(column, justify="right" if right else "left", overflow="fold", min_width=whole)
@@ -77,36 +81,36 @@ def print_told(blocks: Iterable[Block]) -> None:
     for place, block in enumerate(blocks):
         if place and block.title:
             say("")
-        if isinstance(block, Table):
+        if isinstance(block, ResultTable):
             print_table(block.title, block.columns, block.rows)
         else:
             print_pairs(block.title, block.pairs)
 
 
-def print_result(kind: str, result: Json, tell: Tell | None) -> None:
-    """Print a result as its kind says; of which nothing is said, its numbers and words by their keys."""
-    found = Summary(kind, list(_pairs(result, ""))) if tell is None else tell(result)
-    print_told((found,) if isinstance(found, Summary) else found)
+def told(kind: str, result: Json, tell: Tell | None) -> tuple[Block, ...]:
+    """What people read of a result: as its kind says; of which nothing is said, by its keys."""
+    found = Summary(kind, by_keys(result)) if tell is None else tell(result)
+    return (found,) if isinstance(found, Summary) else tuple(found)
 
 
-def _pairs(table: Json, before: str) -> Iterator[tuple[str, str]]:
+def by_keys(table: Json, before: str = "", depth: int = 1) -> list[tuple[str, str]]:
+    """Names and values of what is one number or word, of long lists how long they are; null says nothing."""
+    found: list[tuple[str, str]] = []
     for key, value in table.items():
         if isinstance(value, Mapping):
-            yield from _pairs(value, f"{before}{key}.")
-        else:
-            yield before + key, _shown(value)
+            found += by_keys(value, f"{before}{key}.", depth + 1) if depth < _DEEPEST else []
+        elif value is not None:
+            found.append((before + key, _shown(value)))
+    return found
 
 
 def _shown(value: Any) -> str:
     """A value in a few words."""
-    if isinstance(value, float):
-        return f"{value:.6g}"
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, str) or not isinstance(value, Sequence):
-        return "" if value is None else str(value)
-    scalars = not any(isinstance(one, (Mapping, list)) for one in value)
-    few = scalars and len(value) <= _LISTED
+        return f"{value:.6g}" if isinstance(value, float) else str(value)
+    few = len(value) <= _LISTED and not any(isinstance(one, Mapping | list) for one in value)
     return ", ".join(map(_shown, value)) if few else f"{len(value)} values"
 
 

@@ -89,7 +89,7 @@ class Summary:
 
 
 @dataclass(frozen=True, slots=True)
-class Table:
+class ResultTable:
     """Rows of a result under the heads of their columns."""
 
     title: str
@@ -117,7 +117,7 @@ class Table:
         return _html(caption, self.columns, self.rows)
 
 
-Block = Summary | Table
+Block = Summary | ResultTable
 
 
 def html_of(kind: str, blocks: Iterable[Block]) -> str:

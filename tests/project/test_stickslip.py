@@ -14,6 +14,7 @@ import solver
 import stickslip
 from service.client.client import Client
 from service.errors import ServiceProblem
+from service.jobs.kinds import studies
 from solver.results.views import Views, on_demand
 
 ROOT = Path(__file__).resolve().parent.parent.parent
@@ -121,9 +122,12 @@ def test_every_result_is_shown_by_functions_that_are_there() -> None:
     assert len(views) > 15
     for view in views:
         figure = view.figure if ":" in view.figure else f"figures:{view.figure}"
-        places = [f"summary:{view.summary}", f"to_dataset:{view.dataset}"]
+        told = f"tables.{view.told}" if ":" in view.told else f"summary:{view.told}"
+        places = [told, f"to_dataset:{view.dataset}"]
         for place in [*places, *([f"plots.{figure}"] if view.figure else [])]:
             assert callable(on_demand(f"{view.package}.{place}"))
+    shown = {f"{view.package}.tables.{view.told}" for view in views}
+    assert {study.TOLD for study in studies().values()} <= shown, "said by a study and by its result"
 
 
 def test_the_name_of_a_scene_does_where_a_scene_does(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 from optim.views.tables.robust import robust
 from solver.results import units
 from solver.results.known import known_pairs
-from solver.results.told import Block, Summary, Table
+from solver.results.told import Block, ResultTable, Summary
 from solver.scene.parameter_paths import parameter
 
 Json = Mapping[str, Any]
@@ -57,7 +57,7 @@ def front(found: Json) -> Iterator[Block]:
     ]
     costs = (f"peak for {hertz:g} Hz less band", f"band for {units.length(metres)} less peak")
     columns = (*names, "peak", "error", "band", *costs, "")
-    yield Table(f"Front of {found['scene']}: peak against band", columns, rows)
+    yield ResultTable(f"Front of {found['scene']}: peak against band", columns, rows)
     pairs = [("not found", f"band of {units.number(width)} Hz") for width in found["missed"]]
     pairs += [("end", end["status"]) for end in found["ends"] if not end["reached"]]
     effort = f"{found['evaluations']} designs in {units.duration(found['seconds'])}"
@@ -175,7 +175,7 @@ def _errors(found: Json) -> Pairs:
     return pairs + [("warning", words) for words in found.get("warnings", ())]
 
 
-def _checked(found: Json) -> Table | None:
+def _checked(found: Json) -> ResultTable | None:
     """The local optima again with more harmonics, where the estimated error is large."""
     checked: Sequence[Json] = found.get("checked", ())
     if not checked:
@@ -191,10 +191,10 @@ def _checked(found: Json) -> Table | None:
         for one in checked
     ]
     columns = (*names, "harmonics", "peak", "keeps the limits")
-    return Table("Again with more harmonics", columns, rows)
+    return ResultTable("Again with more harmonics", columns, rows)
 
 
-def _limits(found: Json) -> Table | None:
+def _limits(found: Json) -> ResultTable | None:
     """Every limit: what was asked, what is reached, and what is left or missing."""
     worst: dict[tuple[str, str, str, float], Json] = {}
     for row in found.get("rows", ()):
@@ -218,10 +218,10 @@ def _limits(found: Json) -> Table | None:
             what = what.removeprefix("-")
             asked, reached = f"≥ {amount(0.0 - row['bound'], unit)}", amount(0.0 - row["value"], unit)
         rows.append((what, asked, reached, holds))
-    return Table("Limits", ("limit", "asked", "reached", ""), rows)
+    return ResultTable("Limits", ("limit", "asked", "reached", ""), rows)
 
 
-def _active(found: Json) -> Table | None:
+def _active(found: Json) -> ResultTable | None:
     """The rows and bounds that hold the optimum, with their multipliers."""
     conditions = found.get("conditions")
     if not conditions:
@@ -236,10 +236,10 @@ def _active(found: Json) -> Table | None:
         for bound in conditions["bounds"]
     ]
     rows: list[tuple[str, ...]] = [(what, units.number(x)) for what, x in held if abs(x) > _COUNTS]
-    return Table("Active", ("row", "multiplier"), rows) if rows else None
+    return ResultTable("Active", ("row", "multiplier"), rows) if rows else None
 
 
-def _basins(found: Json) -> Table | None:
+def _basins(found: Json) -> ResultTable | None:
     """The local optima, if there are several."""
     basins: Sequence[Json] = found.get("basins", ())
     if len(basins) < 2:
@@ -256,4 +256,4 @@ def _basins(found: Json) -> Table | None:
         for basin in basins
     ]
     columns = (*names, "peak", "settled", "proven", "keeps the limits")
-    return Table("Local optima", columns, rows)
+    return ResultTable("Local optima", columns, rows)

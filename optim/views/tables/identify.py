@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from solver.results import units
-from solver.results.told import Block, Summary, Table
+from solver.results.told import Block, ResultTable, Summary
 
 _CANDIDATES = 5  # shown, the most telling
 _TELLING = 0.99  # of an error, above which a measurement lowers none
@@ -16,7 +16,7 @@ def identification(found: Mapping[str, Any]) -> Iterator[Block]:
     """The estimates, what the data do not tell, and which measurement would tell most."""
     title = f"{found['scene']}, {len(found['runs'])} runs, {found['n_harmonics']} harmonics"
     rows = [estimate_row(one) for one in found["estimates"]]
-    yield Table(title, ("parameter", "estimate", "± error", "95 % interval", ""), rows)
+    yield ResultTable(title, ("parameter", "estimate", "± error", "95 % interval", ""), rows)
     pairs = told_pairs(found)
     known = [one for one in found["candidates"] if one["gain"] is not None]
     telling = [one for one in known if one["factor"] < _TELLING]

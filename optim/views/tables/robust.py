@@ -8,7 +8,7 @@ from typing import Any
 from solver.results import units
 from solver.results.known import known_pairs
 from solver.results.order_statistics import quantile_words
-from solver.results.told import Block, Summary, Table
+from solver.results.told import Block, ResultTable, Summary
 from solver.scene.parameter_paths import parameter
 
 Json = Mapping[str, Any]
@@ -27,12 +27,12 @@ def robust(found: Json) -> Iterator[Block]:
     aim = found["aim"] if found["quantile"] is None else f"{100.0 * found['quantile']:g} % {found['aim']}"
     title = f"Robust damper of {found['scene']}, {aim}"
     columns = ("", *(f"{name} optimum" for name, _ in sides))
-    yield Table(title, columns, rows)
+    yield ResultTable(title, columns, rows)
     said = "; ".join(f"{name} {what}" for name, what in uncertain_rows(found["uncertain"]))
     yield Summary("", [("uncertain", said), *effort_pairs(found)])
     held = [cut for cut in found["cuts"] if abs(cut["multiplier"]) > 1e-6]
     if held:
-        yield Table(
+        yield ResultTable(
             "Scenarios that hold the robust optimum", ("scenario", "multiplier"),
             [(cut["scenario"]["words"], units.number(cut["multiplier"])) for cut in held],
         )  # fmt: skip

@@ -7,7 +7,7 @@ from typing import Any
 
 from solver.results import units
 from solver.results.known import known_pairs
-from solver.results.told import Block, Summary, Table
+from solver.results.told import Block, ResultTable, Summary
 
 
 def campbell(found: Mapping[str, Any]) -> Iterator[Block]:
@@ -23,7 +23,7 @@ def campbell(found: Mapping[str, Any]) -> Iterator[Block]:
         for order in found["orders"]
         for crossing in order["crossings"]
     ]  # fmt: skip
-    yield Table(title, ("order", "crossing [rpm]", "peak [Hz]", "amplitude", ""), rows)
+    yield ResultTable(title, ("order", "crossing [rpm]", "peak [Hz]", "amplitude", ""), rows)
     pairs = []
     for order in found["orders"]:
         pairs.append((f"order {order['order']}", _running(order)))
@@ -85,7 +85,7 @@ def shares(found: Mapping[str, Any]) -> Iterator[Block]:
         )
         for row in found["rows"]
     ]
-    yield Table(title, columns, rows)
+    yield ResultTable(title, columns, rows)
     pairs = [("note", "for 1 % more of the parameter; an angle, or what is 0, has no per cent")]
     if any(row["peak_slope"] is None for row in found["rows"]):
         pairs.append(("status", found["status"]))

@@ -7,7 +7,7 @@ The revision of what can be changed is the `ETag` of its answers and stands in `
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from operator import itemgetter
@@ -59,6 +59,7 @@ from service.schemas.workbench_answers import (
     ShareQuery,
     changes_of,
 )
+from solver.results.told import Block
 
 _TAG = re.compile(r'"(\d{1,9})"')
 _TOLD: dict[str, Any] = {"ETag": {"description": "The revision.", "schema": {"type": "string"}}}
@@ -339,14 +340,17 @@ def shared_run(context: OfLink) -> Response:
     if kind == JSON:
         return as_json(told, headers={"Vary": "Accept"})
     from service.rendering.report.about import POLICY, shared_page
+    from service.rendering.text import told as told_of
 
-    result, sweeps = None, []
+    blocks: Sequence[Block] = ()
+    sweeps: list[SweepAnswer] = []
     if run.job.state is JobState.SUCCESSFUL:
         with context.service.database.reading():
             found = context.service.results(run.id, reader)
-            result, sweeps = found.result, [SweepAnswer.of(one) for one in found.sweeps]
+            blocks = told_of(run.job.kind, found.result, context.service.registry.tell_of(run.job.kind))
+            sweeps = [SweepAnswer.of(one) for one in found.sweeps]
     headers = {"Vary": "Accept", "Content-Security-Policy": POLICY}
-    return Response(shared_page(told, result, sweeps, context.token), media_type=_PAGE, headers=headers)
+    return Response(shared_page(told, blocks, sweeps, context.token), media_type=_PAGE, headers=headers)
 
 
 @shares.get("/shared/scene", response_model=JobScene)

@@ -13,6 +13,7 @@ from solver.views.plots.html import pairs
 if TYPE_CHECKING:
     from service.schemas.answers import SweepAnswer
     from service.schemas.workbench_answers import ProjectAnswer, RunAnswer, SharedRun
+    from solver.results.told import Block
 
 
 class About(TypedDict, total=False):
@@ -77,22 +78,20 @@ POLICY = (
     "frame-ancestors 'none'"
 )
 """What such a page may load: nothing but the style it has."""
-_DEEPEST = 3  # of objects inside objects: what is deeper is in the file
 
 
-def shared_page(
-    run: SharedRun, result: Mapping[str, Any] | None, sweeps: Sequence[SweepAnswer], token: str
-) -> str:
+def shared_page(run: SharedRun, found: Sequence[Block], sweeps: Sequence[SweepAnswer], token: str) -> str:
     """A page without buttons of a run.
 
     Parameters
     ----------
     run : what was asked and how it ended.
-    result : what it computed, as JSON; None while it has not.
+    found : what is told of its result; nothing while it has none.
     sweeps : those stored with it.
     token : of the link, which the files of the page are asked for with.
     """
-    from solver.views.plots.html import page, pairs, table
+    from service.rendering.text import by_keys
+    from solver.views.plots.html import block_html, page, pairs, table
 
     title = run.name or f"{run.kind} of {run.scene or 'a scene of its own'}"
     ended = "" if run.finished is None else f"{run.finished:%Y-%m-%d %H:%M %Z}"
@@ -107,43 +106,23 @@ def shared_page(
         ("notes", run.notes),
     ]
     parts = [f"<h1>{escape(title)}</h1>", pairs([(name, words) for name, words in about if words])]
-    if result is not None:
-        parts += ["<h2>What came out</h2>", pairs(list(_told(result)))]
-    parts += ["<h2>What was asked</h2>", pairs(list(_told(run.request or {})))]
+    parts += ["<h2>What came out</h2>"] if found else []
+    for block in found:
+        parts += [f"<h3>{escape(block.title)}</h3>"] if block.title else []
+        parts.append(block_html(block))
+    parts += ["<h2>What was asked</h2>", pairs(by_keys(run.request or {}))]
     if sweeps:
         rows = [[one.parameter, one.points, one.peak and one.peak.value] for one in sweeps]
         parts += ["<h2>Stored sweeps</h2>", table(["over", "points", "peak [m]"], rows)]
-    parts += [f"<h2>Files</h2><ul>{''.join(_files(run, result, sweeps, token))}</ul>"]
+    parts += [f"<h2>Files</h2><ul>{''.join(_files(run, bool(found), sweeps, token))}</ul>"]
     return page(title, "\n".join(parts))
 
 
-def _told(given: Mapping[str, Any], before: str = "", depth: int = 1) -> Iterator[tuple[str, str]]:
-    """Names and values of what is one number or word; of lists how long they are."""
-    for name, value in given.items():
-        path = f"{before}{name}"
-        if isinstance(value, Mapping):
-            if depth < _DEEPEST:
-                yield from _told(value, f"{path}.", depth + 1)
-        elif isinstance(value, list):
-            short = all(not isinstance(one, list | dict) for one in value) and len(value) <= 8
-            yield path, ", ".join(map(_word, value)) if short else f"{len(value)} entries"
-        elif value is not None:
-            yield path, _word(value)
-
-
-def _word(value: Any) -> str:
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
-
-
-def _files(
-    run: SharedRun, result: Mapping[str, Any] | None, sweeps: Sequence[SweepAnswer], token: str
-) -> Iterator[str]:
+def _files(run: SharedRun, ended: bool, sweeps: Sequence[SweepAnswer], token: str) -> Iterator[str]:
     """Links to what there is of it: kinds of one's own need no scene."""
     if "scene" in (run.request or {}):
         yield _link("/v1/shared/scene", "Scene, JSON", token=token)
-    if result is not None:
+    if ended:
         yield _link("/v1/shared/results", "Result, JSON", token=token)
     for number, sweep in enumerate(sweeps, start=1):
         address = f"/v1/shared/sweeps/{quote(sweep.id)}"

@@ -21,14 +21,13 @@ from service.rendering.report.sections import (
     plan_section,
     response_section,
     scene_section,
-    table_of,
     title_section,
 )
 from solver.errors import SolverError
 from solver.scene.parameter_paths import parameter
 from solver.scene.scene import Scene
 from solver.views.plots import style
-from solver.views.plots.html import image, page, pairs, table
+from solver.views.plots.html import block_html, image, page, pairs, table
 
 _MOST_PARAMETERS = 8
 
@@ -113,7 +112,7 @@ def _holds(given: Designed, chosen: Json) -> list[str]:
         worst = max(conditions["violation"], 0.0)
         violation = f"{worst:.1e}" if worst > 0.0 else "none"
         parts.append(pairs([("largest relative violation of a limit", violation)]))
-    return parts + [f"<h3>{escape(one.title)}</h3>{table_of(one)}" for one in tables]
+    return parts + [f"<h3>{escape(one.title)}</h3>{block_html(one)}" for one in tables]
 
 
 def _sensitivities(given: Designed, after: Scene) -> str:
@@ -126,7 +125,8 @@ def _sensitivities(given: Designed, after: Scene) -> str:
     if not found.reached:
         return f"<h2>Sensitivities</h2><p>{escape(told['status'])}</p>"
     words = "Change for one per cent more of a parameter; those that matter most for the highest peak."
-    return f"<h2>Sensitivities</h2><p class=quiet>{words}</p>{table_of(next(shares(told)), _MOST_PARAMETERS)}"
+    most = block_html(next(shares(told)), _MOST_PARAMETERS)
+    return f"<h2>Sensitivities</h2><p class=quiet>{words}</p>{most}"
 
 
 def _trade_off(result: Json) -> list[str]:
@@ -136,4 +136,4 @@ def _trade_off(result: Json) -> list[str]:
     from optim.views.plots.designs import pareto_figure
 
     words = "The front of peak against band, and the frequencies at risk"
-    return ["<h2>Trade-off</h2>", image(pareto_figure(result), words), table_of(next(front(result)))]
+    return ["<h2>Trade-off</h2>", image(pareto_figure(result), words), block_html(next(front(result)))]

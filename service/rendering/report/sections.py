@@ -17,7 +17,6 @@ from service.rendering.report.responses import ReportLine, comparison_figure
 from solver.continuation.branch import AnyBranch
 from solver.results import units
 from solver.results.notes import flag_words
-from solver.results.told import Block, Summary
 from solver.scene.parameter_paths import parameter
 from solver.scene.scene import Scene
 from solver.scene.toml import toml_text
@@ -82,13 +81,6 @@ def bounds_of(given: Designed, name: str) -> str:
     bounds = (given.problem.get("variables") or {}).get(name)
     path = name.split(",")[0].strip()
     return "" if bounds is None else f"{units.number(bounds[0], 6)} to {parameter(path, bounds[1])}"
-
-
-def table_of(block: Block, most: int | None = None) -> str:
-    """What is told of a result, a table of at most so many rows, as HTML."""
-    if isinstance(block, Summary):
-        return pairs(block.pairs)
-    return table(block.columns, [list(row) for row in block.rows[:most]])
 
 
 def branch_table(lines: Sequence[ReportLine]) -> str:

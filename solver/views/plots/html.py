@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 
 from solver.results.dataset import Dataset
 from solver.results.files import whole
+from solver.results.told import Block, Summary
 from solver.views.plots import style
 from solver.views.plots.style import write
 
@@ -67,6 +68,11 @@ def table(heads: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
     head = "".join(f"<th scope='col'>{escape(one)}</th>" for one in heads)
     body = "".join(f"<tr>{''.join(_cell(value) for value in row)}</tr>" for row in rows)
     return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+
+
+def block_html(block: Block, most: int | None = None) -> str:
+    """What is told of a result, a table of at most so many rows, without its title."""
+    return pairs(block.pairs) if isinstance(block, Summary) else table(block.columns, block.rows[:most])
 
 
 def pairs(given: Sequence[tuple[str, str]]) -> str:

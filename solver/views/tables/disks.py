@@ -8,7 +8,7 @@ from typing import Any
 from solver.results import units
 from solver.results.known import known_pairs
 from solver.results.order_statistics import quantile_words
-from solver.results.told import Block, Summary, Table
+from solver.results.told import Block, ResultTable, Summary
 
 _DIRECTIONS = {"standing": "", "both": "", "forward": " forward", "backward": " backward"}
 MISSING = "the sector was not reduced for nodal diameters {}: reduce it for all with --engine-order 1"
@@ -25,7 +25,7 @@ def interference(found: Mapping[str, Any]) -> Iterator[Block]:
         for point in found["diameters"]
     ]
     title = f"{found['scene']}, {found['sectors']} sectors"
-    yield Table(title, ("nodal diameter", "all open [Hz]", "all stuck [Hz]"), rows)
+    yield ResultTable(title, ("nodal diameter", "all open [Hz]", "all stuck [Hz]"), rows)
     if found["speed_rpm"] is not None:
         yield _crossings(found)
     pairs = []
@@ -35,7 +35,7 @@ def interference(found: Mapping[str, Any]) -> Iterator[Block]:
     yield Summary("", pairs)
 
 
-def _crossings(found: Mapping[str, Any]) -> Table:
+def _crossings(found: Mapping[str, Any]) -> ResultTable:
     rows = [
         (
             str(one["order"]), f"{one['frequency_hz']:.6g}",
@@ -47,7 +47,7 @@ def _crossings(found: Mapping[str, Any]) -> Table:
     ]  # fmt: skip
     title = f"orders within {100.0 * found['within']:g} % of a family at {found['speed_rpm']:g} rpm"
     names = ("order", "frequency [Hz]", "nodal diameter", "family", "open to stuck [Hz]", "")
-    return Table(title, names, rows)
+    return ResultTable(title, names, rows)
 
 
 def _listed(values: list[float]) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 from solver.results import units
-from solver.results.told import Block, Summary, Table
+from solver.results.told import Block, ResultTable, Summary
 
 _MOST_ROWS = 40
 _LEVEL = 1e-9  # relative difference of damping ratios that is none
@@ -29,7 +29,7 @@ def held(found: Mapping[str, Any]) -> Iterator[Block]:
         heads = [
             "frequency [Hz]", "× excitation", "phase [deg]", f"max |{found['dof']}|", "stable", "contacts",
         ]  # fmt: skip
-        yield Table(title, heads, rows)
+        yield ResultTable(title, heads, rows)
     pairs = [("points", str(count)), ("time", units.duration(found["seconds"]))]
     if found["least"] is not None:
         best = found["least"]
@@ -52,7 +52,7 @@ def resonance(found: Mapping[str, Any]) -> Iterator[Block]:
             for i in _thinned(count)
         ]  # fmt: skip
         heads = ["a [√kg m]", f"max |{found['dof']}|", "frequency [Hz]", "× excitation", "contacts"]
-        yield Table(title, heads, rows)
+        yield ResultTable(title, heads, rows)
     pairs = [("points", str(count)), ("time", units.duration(found["seconds"]))]
     yield Summary("" if count else title, pairs)
 
@@ -71,7 +71,7 @@ def mode(found: Mapping[str, Any]) -> Iterator[Block]:
             "a [√kg m]", f"max |{found['dof']}|", "frequency [Hz]", "damping ratio", "± by harmonics",
             "contacts",
         ]  # fmt: skip
-        yield Table(title, heads, rows)
+        yield ResultTable(title, heads, rows)
     pairs = [("points", f"{count}, {found['newton_iterations']} Newton iterations")]
     if count:
         # Where damping is level, rounding would choose among its places.
@@ -100,7 +100,7 @@ def _performance(curve: Mapping[str, Any], dof: str) -> Iterator[Block]:
         known = curve["scales"] and curve["load"][i] is not None
         row += [f"{curve['load'][i]:.4g}", units.length(curve["peak_at_load"][i])] if known else ["", ""]
         rows.append(row)
-    yield Table("Peaks of this mode alone", heads, rows)
+    yield ResultTable("Peaks of this mode alone", heads, rows)
     if curve["least"] is not None:
         best = curve["least"]
         yield Summary(

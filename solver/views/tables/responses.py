@@ -7,7 +7,7 @@ from typing import Any
 
 from solver.results import units
 from solver.results.notes import BAND_OPEN, FLAGS, between_points, drift_words, flag_words
-from solver.results.told import Block, Summary, Table
+from solver.results.told import Block, ResultTable, Summary
 from solver.scene.parameter_paths import parameter
 
 Json = Mapping[str, Any]
@@ -21,7 +21,7 @@ _EFFECT_COLUMNS = ("used", "effect", "reason")
 def plan(found: Json) -> Iterator[Block]:
     """The effects in use and left out, the sizes and the cost."""
     effects = [("yes" if e["used"] else "no", e["name"], e["reason"]) for e in found["effects"]]
-    yield Table(f"Plan of {found['scene']}", _EFFECT_COLUMNS, effects)
+    yield ResultTable(f"Plan of {found['scene']}", _EFFECT_COLUMNS, effects)
     seconds = found["estimated_seconds_of_stability"]
     stability = "not known" if seconds is None else f"about {units.duration(seconds)} a response"
     yield Summary(
@@ -94,7 +94,7 @@ def _all_solutions(found: Json) -> Iterator[Block]:
     if found["solutions"]:
         first = found["solutions"][0]
         title = f"{first['scene']} at {first['frequency_hz']:g} Hz, {first['n_harmonics']} harmonics"
-        yield Table(title, _SOLUTION_COLUMNS, rows)
+        yield ResultTable(title, _SOLUTION_COLUMNS, rows)
     alone = f"{found['unique']}: {found['unique_ground']}"
     yield Summary("", [("one response alone", alone), ("note", found["note"])])
 
@@ -177,7 +177,7 @@ def accuracy(found: Json) -> Iterator[Block]:
         title += (
             f" with {found['reference_harmonics']} harmonics, to {units.length(found['reference_error'])}"
         )
-    yield Table(title, _ACCURACY_COLUMNS, rows)
+    yield ResultTable(title, _ACCURACY_COLUMNS, rows)
     yield Summary("", [("*", "nothing else here is both as accurate and as fast")])
 
 

@@ -18,7 +18,7 @@ from service.cli.options.parameters import given_key
 from service.cli.options.problem_inputs import scene_to_submit, uploaded
 from service.cli.progress import bar
 from service.errors import InputError
-from service.rendering.text import print_json, print_result, print_table, say
+from service.rendering.text import print_json, print_table, print_told, say, told
 from solver.results import units
 from solver.scene.parameter_paths import parameter
 
@@ -249,9 +249,7 @@ def _show(job: JobAnswer, answer: ResultsAnswer, *, as_json: bool) -> None:
     # Loaded here: it brings every kind along.
     from service.settings.kinds import registry_here
 
-    registry = registry_here()
-    tell = registry[job.kind].view.tell if job.kind in registry else None
-    print_result(job.kind, answer.result, tell)
+    print_told(told(job.kind, answer.result, registry_here().tell_of(job.kind)))
     rows = [
         (
             sweep.id,
