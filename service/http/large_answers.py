@@ -14,7 +14,7 @@ from service.http.middleware.connections import KEY, Connection
 _PIECE = 1 << 16
 
 
-class _Held:
+class _SharedBody:
     """A body; there for as long as an answer with it is being sent."""
 
     def __init__(self) -> None:
@@ -23,7 +23,7 @@ class _Held:
 
 
 class _Answer(Response):
-    def __init__(self, held: _Held, media_type: str) -> None:
+    def __init__(self, held: _SharedBody, media_type: str) -> None:
         super().__init__(held.body, media_type=media_type)
         self.held = held
 
@@ -32,13 +32,13 @@ class LargeAnswers:
     """The bodies that are being sent, by what they show."""
 
     def __init__(self) -> None:
-        self._held: WeakValueDictionary[str, _Held] = WeakValueDictionary()
+        self._held: WeakValueDictionary[str, _SharedBody] = WeakValueDictionary()
         self._lock = threading.Lock()
 
     def answer(self, key: str, make: Callable[[], bytes], media_type: str = "application/json") -> Response:
         """An answer whose body does not change while it is being sent; `make` makes it if nobody reads it."""
         with self._lock:
-            held = self._held.setdefault(key, _Held())
+            held = self._held.setdefault(key, _SharedBody())
         with held.making:
             held.body = held.body or make()
         return _Answer(held, media_type)

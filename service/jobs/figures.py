@@ -91,7 +91,7 @@ def figures(table: Mapping[str, Any]) -> Iterator[FigureValue]:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Record:
+class StoredRecord:
     """What of a result can be asked for. Every further field is a figure; those of parts are tuples.
 
     Attributes
@@ -155,7 +155,7 @@ class Record:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class KindRecord(Record):
+class KindRecord(StoredRecord):
     """The figures of the result of a job, of whatever kind."""
 
     values: tuple[FigureValue, ...] = ()
@@ -221,7 +221,7 @@ class StoredArray:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SweepRecord(Record):
+class SweepRecord(StoredRecord):
     """A branch to be stored. Its `error_estimate` and `peaks_known` are None of earlier versions."""
 
     PART, PART_TYPE = "contact", ContactValues
@@ -262,7 +262,7 @@ class VariableValues:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class DesignRecord(Record):
+class DesignRecord(StoredRecord):
     """A design to be stored."""
 
     PART, PART_TYPE = "variable", VariableValues
@@ -286,13 +286,13 @@ class DesignRecord(Record):
     variables: tuple[VariableValues, ...] = ()
 
 
-RECORDS: Mapping[str, type[Record]] = {SWEEP: SweepRecord, DESIGN: DesignRecord}
+RECORDS: Mapping[str, type[StoredRecord]] = {SWEEP: SweepRecord, DESIGN: DesignRecord}
 """What is stored in records of its own; of other kinds the figures of the result."""
 
 
 @_once
 def _own(record: Any) -> list[Any]:
-    shared = {one.name for one in fields(Record)}
+    shared = {one.name for one in fields(StoredRecord)}
     return [one for one in fields(record) if one.name not in shared and one.name != "arrays"]
 
 

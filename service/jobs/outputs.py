@@ -13,7 +13,7 @@ from service.jobs.figures import (
     DesignRecord,
     FigureValue,
     KindRecord,
-    Record,
+    StoredRecord,
     SweepRecord,
     figures,
 )
@@ -133,7 +133,7 @@ class JobOutput:
     design: DesignRecord | None = None
     shortfall: str | None = None
 
-    def records(self, kind: str, scene_name: str | None, scene_hash: str | None) -> list[Record]:
+    def records(self, kind: str, scene_name: str | None, scene_hash: str | None) -> list[StoredRecord]:
         """Return what is stored of it beside its sweeps: the design, or the figures of the result.
 
         What a kind of sweeps or designs computes is told by those.

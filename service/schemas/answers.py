@@ -14,7 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from service.db.models import JobState, StoredScene
 from service.db.repositories import JobRow, ResultRepository
-from service.jobs.figures import DESIGN, SWEEP, DesignRecord, Quantity, Record, SweepRecord
+from service.jobs.figures import DESIGN, SWEEP, DesignRecord, Quantity, StoredRecord, SweepRecord
 from service.jobs.outputs import AttemptProgress
 
 if TYPE_CHECKING:
@@ -314,7 +314,7 @@ class StoredResult(AnswerModel):
     links: dict[str, str]
 
     @classmethod
-    def of_record(cls, record: Record, known: Mapping[str, Quantity]) -> Self:
+    def of_record(cls, record: StoredRecord, known: Mapping[str, Quantity]) -> Self:
         """The answer for a record; of its figures those that are known."""
         places = {SWEEP: f"/v1/sweeps/{record.id}", DESIGN: f"/v1/designs/{record.id}"}
         own = places.get(record.of, f"/v1/jobs/{record.job_id}/results")

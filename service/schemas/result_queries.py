@@ -24,7 +24,7 @@ from service.jobs.figures import (
     DesignRecord,
     KindRecord,
     Quantity,
-    Record,
+    StoredRecord,
     SweepRecord,
     part_names,
     quantities_of_model,
@@ -94,7 +94,7 @@ class StoredQuery(ListQuery):
 _ENDS = ("min", "max")
 
 
-def _keys(record: type[Record], known: Mapping[str, Quantity]) -> dict[str, Any]:
+def _keys(record: type[StoredRecord], known: Mapping[str, Quantity]) -> dict[str, Any]:
     """The keys that figures add to a query, with what they must be."""
     keys: dict[str, Any] = {}
     inside = {} if record.PART_TYPE is None else quantities_of_record(record.PART_TYPE)
@@ -106,7 +106,7 @@ def _keys(record: type[Record], known: Mapping[str, Quantity]) -> dict[str, Any]
     return keys | ({record.PART: (LongName, None)} if record.PART else {})
 
 
-def _listing(record: type[Record], name: str, columns: Mapping[str, Any], *renamed: str) -> Any:
+def _listing(record: type[StoredRecord], name: str, columns: Mapping[str, Any], *renamed: str) -> Any:
     """Root of the queries of one kind of records: every figure is a key, every number one to sort by."""
     known = quantities_of_record(record)
     keys = _keys(record, known) | {f"{key}_{end}": (Bound, None) for key in renamed for end in _ENDS}
@@ -162,7 +162,7 @@ class ResultQuery(StoredQuery):
     cursor: Cursor = None
 
 
-def _record(of: str) -> type[Record]:
+def _record(of: str) -> type[StoredRecord]:
     return RECORDS.get(of, KindRecord)
 
 

@@ -7,16 +7,18 @@ caller time to watch and stop.
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 
 import numpy as np
 
-from solver.balance.workspace import Workspace
+from solver.balance.kernels.mechanics import ALLOWED
+from solver.balance.kernels.output import LOST
+from solver.balance.workspace import PointSolution, Workspace
 from solver.continuation.branch import BranchStatus
 from solver.continuation.endings import MANY, ratchets_ahead, stands_still, taken_up
 from solver.continuation.kernels import state as walk_states
 from solver.continuation.kernels.pseudo_arclength import walk_on
 from solver.continuation.kernels.state import Control, Walk, walk_by_value
-from solver.continuation.loose_parts import balanced_part
 from solver.continuation.segment import Stretch, rows_of, state_of
 from solver.continuation.settings import ContinuationSettings
 from solver.continuation.walk import Curve
@@ -107,3 +109,23 @@ class BranchStretches(Curve[Stretch]):
             stepped_over=int(numbers[walk_states.STEPPED_OVER]),
             seconds=time.perf_counter() - self._begun, walk=state_of(self._state),
         )  # fmt: skip
+
+
+def balanced_part(workspace: Workspace, stretch: Stretch) -> Stretch:
+    """Return a stretch up to the first point that does not obey mechanics; itself if all do.
+
+    What is cut ends as `ending` says of a solution from nothing there.
+    """
+    wrong = ~(stretch.measures[:, LOST] <= ALLOWED)
+    if not wrong.any():
+        return stretch
+    first = int(np.argmax(wrong))
+    found = Workspace.of(workspace.balance).solve(float(stretch.solutions[first, -1]))
+    return replace(stretch.first(first), status=ending(found, BranchStatus.STALLED), walk=np.zeros(0))
+
+
+def ending(found: PointSolution, else_: BranchStatus) -> BranchStatus:
+    """Return why a branch ends where this was tried from nothing."""
+    if found.ratchets:
+        return BranchStatus.RATCHETS
+    return BranchStatus.POWER_LOST if found.loses_power else else_

@@ -15,7 +15,7 @@ from typing import Any, TypeVar
 import numba
 
 from solver.jit import plain
-from solver.jit.setting import PLAIN
+from solver.jit.plain import PLAIN
 
 if not PLAIN:
     from solver.jit.cache import KernelCache

@@ -1,7 +1,7 @@
 """Factors and inverses of matrices: our own loops, and LAPACK's ``getrf`` and ``getri``.
 
 These are called by the entries Numba itself links, which stay cacheable on disk; in the plain way of
-`solver.jit.setting` our own loops stand for them.
+`solver.jit.plain` our own loops stand for them.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ import numpy as np
 
 from solver.jit import lapack_loading
 from solver.jit.fourier import Complex, Index, Real
+from solver.jit.plain import PLAIN
 from solver.jit.separate import apart
-from solver.jit.setting import PLAIN
 
 
 @apart

@@ -25,7 +25,7 @@ from typing import Any
 from numba import types
 
 from solver.jit.fourier import Complex, Real
-from solver.jit.numbered import numbered
+from solver.jit.separate import numbered
 
 _FLOAT, _COMPLEX = types.float64, types.complex128
 _VECTOR, _TABLE = (types.Array(_FLOAT, dimensions, "C") for dimensions in (1, 2))

@@ -15,7 +15,7 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 
-from solver.jit.setting import PLAIN
+from solver.jit.plain import PLAIN
 
 if not PLAIN:
     from solver.jit.slots import make, watched

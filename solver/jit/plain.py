@@ -1,4 +1,4 @@
-"""Kernels by what Numba documents alone, so that a new Numba cannot strand us (`solver.jit.setting`).
+"""Kernels by what Numba documents alone, so that a new Numba cannot strand us.
 
 Everything is `numba.njit`. The code of a kernel becomes part of each that calls it, and nothing is kept on
 disk: a process compiles for minutes. What is called by its number is called through Python.
@@ -7,6 +7,7 @@ disk: a process compiles for minutes. What is called by its number is called thr
 from __future__ import annotations
 
 import importlib
+import os
 from collections.abc import Callable
 from typing import Any, TypeVar
 
@@ -14,6 +15,8 @@ import numba
 from numba import types
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
+PLAIN = os.environ.get("STICKSLIP_PLAIN_KERNELS", "") not in ("", "0")
+"""Whether kernels are compiled this way: slow to start, nothing is kept on disk, but of any Numba."""
 FASTMATH = {"reassoc", "contract"}
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numba
 from numba.experimental import structref
 
-from solver.jit.setting import PLAIN
+from solver.jit.plain import PLAIN
 
 
 class Reference(numba.types.StructRef):

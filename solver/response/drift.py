@@ -25,9 +25,9 @@ from solver.contacts.kernels.system import UNHELD
 from solver.contacts.laws.parts import Slider
 from solver.jit import fourier
 from solver.jit.fourier import Complex, Integer, Real
+from solver.jit.separate import apart
 from solver.linear.assembly import linear_model
 from solver.linear.contact_table import port_stiffnesses
-from solver.response.kernels.slide import slide
 from solver.sensitivity.gradient import Amplitudes
 
 if TYPE_CHECKING:
@@ -36,6 +36,8 @@ if TYPE_CHECKING:
 
 SAMPLES = 1024  # of a period
 MOST_UNKNOWNS = 800  # beyond which it costs more than a march
+_REPEATS = 1e-12  # of the largest limit: change over a period
+_PERIODS = 20_000  # after which friction that does not repeat is given up
 _SHARES = (1.0, 0.3, 3.0)  # of the first drift, to begin with one after the other
 _LEAST, _LARGEST, _TRIALS = 1e-4, 1e2, 16  # drifts in a period that are looked at, relative to the vibration
 _MOST, _HALVINGS = 25, 6
@@ -345,3 +347,39 @@ def _in_real(A: Complex, ks: Integer) -> Real:
             real[:, here, :, here + 1] = A[i].imag
             real[:, here + 1, :, here] = -A[i].imag
     return real.reshape(nc * n, nc * n)
+
+
+@apart
+def slide(pulls: Real, limits: Real, one_limit: bool, out: Real) -> None:
+    """Follow friction of springs with a limit from sample to sample until it repeats.
+
+    Fill `out` (many, directions, samples) with the forces [N] of the last period.
+
+    Parameters
+    ----------
+    pulls : (many, directions, samples) by how much the springs' forces grow to each sample [N].
+    limits : (many, samples) [N].
+    one_limit : for the whole force, a circle, in place of one for each direction.
+    """
+    many, directions, samples = pulls.shape
+    for i in range(many):
+        largest = 0.0
+        for j in range(samples):
+            largest = max(largest, limits[i, j])
+        for _ in range(_PERIODS):
+            change, last = 0.0, out[i, :, samples - 1].copy()
+            for j in range(samples):
+                carried = 0.0
+                for d in range(directions):
+                    before = out[i, d, j - 1] if j > 0 else last[d]
+                    out[i, d, j] = before + pulls[i, d, j]
+                    carried = math.hypot(carried, out[i, d, j])
+                    if not one_limit:
+                        out[i, d, j] = min(max(out[i, d, j], -limits[i, j]), limits[i, j])
+                if one_limit and carried > limits[i, j]:
+                    for d in range(directions):
+                        out[i, d, j] *= limits[i, j] / carried
+            for d in range(directions):
+                change = max(change, abs(out[i, d, samples - 1] - last[d]))
+            if change <= _REPEATS * largest:
+                break

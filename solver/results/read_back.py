@@ -40,7 +40,7 @@ def declared(kind: type, path: str) -> tuple[Any, str]:
     if text is None:
         return None, ""
     text = str(getattr(text, "__forward_arg__", text))  # a named tuple wraps it
-    found = eval(text, {}, _Names({**vars(builtins), **vars(sys.modules[owner.__module__])}, owner))
+    found = eval(text, {}, _FieldNames({**vars(builtins), **vars(sys.modules[owner.__module__])}, owner))
     if rest:
         kinds = get_args(found) if get_origin(found) in (Union, UnionType) else (found,)
         inner, words = declared(next(one for one in kinds if one is not NoneType), rest)
@@ -50,7 +50,7 @@ def declared(kind: type, path: str) -> tuple[Any, str]:
     return found, (made.__doc__ or "").partition("\n")[0]
 
 
-class _Names(dict[str, Any]):
+class _FieldNames(dict[str, Any]):
     """What annotations name."""
 
     def __init__(self, known: Mapping[str, Any], owner: type) -> None:

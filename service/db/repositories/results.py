@@ -48,7 +48,7 @@ from service.db.pagination import (
 )
 from service.db.postgresql import lock_quantities
 from service.db.repositories.runs import in_the_bin
-from service.jobs.figures import RECORDS, SWEEP, KindRecord, Record, StoredArray
+from service.jobs.figures import RECORDS, SWEEP, KindRecord, StoredArray, StoredRecord
 
 Name = tuple[str, str]
 """Name and label of a quantity."""
@@ -166,7 +166,7 @@ class ResultRepository:
         with self._db.reading() as connection:
             return self._read(connection, of, connection.execute(query).mappings().all())
 
-    def _read(self, connection: Connection, of: str, rows: Sequence[Any]) -> list[Record]:
+    def _read(self, connection: Connection, of: str, rows: Sequence[Any]) -> list[StoredRecord]:
         """The records of rows, with their figures."""
         numbers = {"results": [row["number"] for row in rows]}
         stored = connection.execute(_FIGURES, numbers).all() if rows else ()
@@ -181,7 +181,7 @@ class ResultRepository:
         return [_record(of).stored(head, figures[head["number"]]) for head in heads]
 
 
-def _record(of: str) -> type[Record]:
+def _record(of: str) -> type[StoredRecord]:
     return RECORDS.get(of, KindRecord)
 
 
@@ -346,7 +346,11 @@ def _read_quantities(connection: Connection, of: str, wanted: Iterable[Name]) ->
 
 
 def insert_results(
-    connection: Connection, job_id: str, records: Iterable[Record], created: datetime, owner: str = NOBODY
+    connection: Connection,
+    job_id: str,
+    records: Iterable[StoredRecord],
+    created: datetime,
+    owner: str = NOBODY,
 ) -> None:
     """Write results of a job inside the transaction that writes its own; `owner` is the job's."""
     figures, arrays = [], []

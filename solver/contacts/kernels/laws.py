@@ -32,8 +32,8 @@ from solver.contacts.kernels.columns import KERNELS, SECOND_KERNELS
 from solver.contacts.kernels.stick_slip_events import SEGMENT
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Integer, Real
-from solver.jit.numbered import numbered
 from solver.jit.records import Records
+from solver.jit.separate import numbered
 
 _VECTOR, _TABLE, _BLOCKS = (types.Array(types.float64, dimensions, "C") for dimensions in (1, 2, 3))
 _HARMONICS = types.Array(types.int64, 1, "C")

@@ -24,8 +24,8 @@ from solver.contacts.kernels.system import DENSE, MODES
 from solver.continuation.branch import BranchStatus
 from solver.continuation.extrema.node_table import PointRow
 from solver.continuation.extrema.nodes import NodeSolver
-from solver.continuation.loose_parts import ending
 from solver.continuation.segment import Stretch
+from solver.continuation.stretches import ending
 from solver.continuation.walk import walk
 from solver.jit.fourier import Real
 from solver.linear.assembly import linear_model

@@ -31,11 +31,10 @@ from solver.continuation.extrema.node_table import Points
 from solver.continuation.from_nothing import solve_from_nothing
 from solver.continuation.kernels import state as walk_states
 from solver.continuation.kernels.pseudo_arclength import begin_walk
-from solver.continuation.loose_parts import ending
 from solver.continuation.peaks import Peak
 from solver.continuation.segment import Course, Stretch, go_on_from, joined, rows_of
 from solver.continuation.settings import ContinuationSettings
-from solver.continuation.stretches import BranchStretches, control_of
+from solver.continuation.stretches import BranchStretches, control_of, ending
 from solver.continuation.walk import walk as along
 from solver.errors import SettingError
 from solver.jit.fourier import Real, to_full

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -11,7 +12,6 @@ from solver.balance.kernels.locate import HIGH_PEAK, LOW_PEAK
 from solver.balance.kernels.output import HIGH, HIGH_SLOPE, LOW, LOW_SLOPE, MAX_ABS
 from solver.continuation.extrema.node_table import PointRow
 from solver.continuation.extrema.nodes import Between
-from solver.jit.hermite import extreme
 
 CURVES = ((HIGH, HIGH_SLOPE, HIGH_PEAK), (LOW, LOW_SLOPE, LOW_PEAK))
 
@@ -34,7 +34,7 @@ def highest_share(
         a, b = left.measures[value], right.measures[value]
         rise, fall = left.measures[slope] * by_share[0], right.measures[slope] * by_share[1]
         if rise > 0.0 > fall and max(a, b) + 0.25 * (rise - fall) > limit:
-            return extreme(a, rise, b, fall)
+            return _extreme(a, rise, b, fall)
     return None
 
 
@@ -63,3 +63,15 @@ def lowest_share(
         # One curve is above at each end: between they change places.
         return 0.5
     return min(max(sum(places) / len(places), 0.05), 0.95)
+
+
+def _extreme(a: float, da: float, b: float, db: float) -> float:
+    """Return where the cubic of these values and slopes at two ends is extreme, kept off the ends."""
+    chord = b - a
+    c1, c2 = 3.0 * chord - 2.0 * da - db, da + db - 2.0 * chord
+    root = math.sqrt(max(c1 * c1 - 3.0 * c2 * da, 0.0))
+    # The stable form of the root between the ends.
+    below = -c1 - math.copysign(root, c1)
+    places = [da / below if below != 0.0 else 0.5, below / (3.0 * c2) if c2 != 0.0 else 0.5]
+    inside = [t for t in places if 0.0 < t < 1.0]
+    return min(max(inside[0] if inside else da / (da - db), 0.05), 0.95)

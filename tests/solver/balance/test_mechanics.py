@@ -18,7 +18,7 @@ from solver.balance.kernels.mechanics import ALLOWED, unaccounted
 from solver.balance.kernels.output import LOST
 from solver.balance.workspace import Workspace
 from solver.continuation.branches.sweep import walk
-from solver.continuation.loose_parts import balanced_part
+from solver.continuation.stretches import balanced_part
 from solver.response.solve import describe, described_at
 
 Drawn = tuple[Scene, float, int]

@@ -15,7 +15,7 @@ import numpy as np
 from solver.jit.separate import apart
 from numba import types
 from solver.jit.decorators import compiled
-from solver.jit.numbered import numbered
+from solver.jit.separate import numbered
 
 @apart
 def half(x: float) -> float:

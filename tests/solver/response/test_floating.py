@@ -24,8 +24,8 @@ from solver.balance.workspace import Workspace
 from solver.contacts.kernels.system import UNHELD
 from solver.continuation.branches.point_by_point import walk_by_points
 from solver.continuation.branches.sweep import walk
-from solver.continuation.loose_parts import balanced_part
 from solver.continuation.segment import joined
+from solver.continuation.stretches import balanced_part
 from solver.linear.condensation import loose_motions
 from solver.marching.result import MarchStatus
 
