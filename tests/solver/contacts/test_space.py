@@ -4,7 +4,7 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import islice, product
+from itertools import chain, islice, product
 
 import numpy as np
 import pytest
@@ -76,10 +76,9 @@ def test_extremes_are_the_integrated_law_too():
     assert compared >= 4
 
 
-@pytest.mark.parametrize("seed", [0, 4, 22])
-def test_along_a_line_it_is_the_law_of_a_line_where_a_contact_closes(seed: int):
-    """It sticks or slips at once, and slips briefly within a grid interval."""
-    for case in islice(closing_cases(np.random.default_rng(seed)), 4):
+def test_along_a_line_it_is_the_law_of_a_line_where_a_contact_closes():
+    """It sticks or slips at once, or slips within a grid interval; its force is 0 but for rounding."""
+    for case in chain(*(islice(closing_cases(np.random.default_rng(seed)), 4) for seed in range(60))):
         for off in (1e-3, -1e-3, 1e-6, -1e-6, 1e-9, -1e-9):
             mu = case.mu * (1.0 + off)
             element = Element(

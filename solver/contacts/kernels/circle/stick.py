@@ -16,6 +16,8 @@ from solver.jit.decorators import compiled
 from solver.jit.fourier import Real
 from solver.jit.separate import apart
 
+ROUNDING = 1e-12  # of the offset, at most: what is left of a force that is 0
+
 
 @compiled
 def length(x: float, y: float) -> float:
@@ -36,7 +38,7 @@ def excess_slopes(at: Curves, kappa: float, offset_x: float, offset_y: float) ->
     tx, ty = offset_x + at.x, offset_y + at.y / kappa
     size = length(tx, ty)
     dx, dy = at.dx, at.dy / kappa
-    if size == 0.0:
+    if size <= ROUNDING * (abs(offset_x) + abs(offset_y)):
         speed = length(dx, dy)
         turn = (dx * at.ddx + dy * at.ddy / kappa) / speed if speed > 0.0 else 0.0
         return speed - at.dlimit, turn - at.ddlimit
