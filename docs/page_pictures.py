@@ -1,5 +1,6 @@
-"""Pictures of every view of the page, 1400 × 900, light and dark: docs/img/page/views/NAME-THEME.png.
+"""Pictures of every view of the page at four sizes, light and dark, in docs/img/page/views.
 
+NAME-THEME.png is 1440 × 900, NAME-sizes-THEME.png has the others beside one another.
 python docs/page_pictures.py [VIEW …] starts a service with an empty database, computes the shipped disk and
 the finite-element disk, and needs playwright and Chromium.
 """
@@ -26,7 +27,9 @@ from playwright.sync_api import sync_playwright
 import solver
 
 FOLDER = Path(__file__).resolve().parent / "img" / "page" / "views"
-SIZE = {"width": 1400, "height": 900}
+SIZE = {"width": 1440, "height": 900}
+OTHERS = ((1366, 768), (1024, 768), (390, 844))
+GAP = 24  # px between them
 PORT = 8791
 URL = f"http://127.0.0.1:{PORT}"
 PATIENCE = 240_000  # ms
@@ -59,9 +62,10 @@ def main() -> int:
                     page = context.new_page()
                     prepare(page, first=scheme == "light")
                     for name in asked:
-                        VIEWS[name](page)
+                        show, card = VIEWS[name]
+                        show(page)
                         page.wait_for_timeout(700)
-                        take(page, f"{name}-{scheme}.png")
+                        take(page, name, scheme, card)
                         print(f"{name}-{scheme}.png")
                 browser.close()
         finally:
@@ -89,7 +93,7 @@ def prepare(page: Any, *, first: bool) -> None:
     page.locator("#study:enabled").wait_for()
     if first:
         page.locator("#live-status").get_by_text("peak").wait_for()
-        take(page, "nothing-yet-light.png")
+        take(page, "nothing-yet", "light")
         study(page)
         # A second run, to be compared with the first.
         page.fill("#high", "60")
@@ -98,10 +102,34 @@ def prepare(page: Any, *, first: bool) -> None:
     study(page)
 
 
-def take(page: Any, name: str) -> None:
-    """Keep what the window shows, in as many colours as a palette has: a third of the size."""
-    with Image.open(io.BytesIO(page.screenshot())) as picture:
-        picture.convert("RGB").quantize(256, dither=Image.Dither.NONE).save(FOLDER / name, optimize=True)
+def take(page: Any, name: str, scheme: str, card: str | None = None) -> None:
+    """Keep what the window shows, then the same in windows of the other sizes."""
+    _scroll(page, card)
+    _keep(_seen(page), f"{name}-{scheme}.png")
+    width, height = sum(size[0] + GAP for size in OTHERS) - GAP, max(size[1] for size in OTHERS)
+    sheet, left = Image.new("RGB", (width, height), "#808080"), 0
+    for size in OTHERS:
+        page.set_viewport_size({"width": size[0], "height": size[1]})
+        page.wait_for_timeout(500)
+        _scroll(page, card)
+        sheet.paste(_seen(page), (left, 0))
+        left += size[0] + GAP
+    _keep(sheet, f"{name}-sizes-{scheme}.png")
+    page.set_viewport_size(SIZE)
+
+
+def _scroll(page: Any, card: str | None) -> None:
+    if card is not None:
+        page.locator(f"#{card}").evaluate("card => card.scrollIntoView()")
+
+
+def _seen(page: Any) -> Image.Image:
+    return Image.open(io.BytesIO(page.screenshot())).convert("RGB")
+
+
+def _keep(picture: Image.Image, name: str) -> None:
+    """Keep a picture in as many colours as a palette has: a third of the size."""
+    picture.quantize(256, dither=Image.Dither.NONE).save(FOLDER / name, optimize=True)
 
 
 def study(page: Any) -> None:
@@ -113,8 +141,8 @@ def study(page: Any) -> None:
 Show = Callable[[Any], None]
 
 
-def tab(name: str, scroll_to: str | None = None, do: Show | None = None) -> Show:
-    """Return what opens a tab, does something there, and scrolls a card of it to the top."""
+def tab(name: str, do: Show | None = None) -> Show:
+    """Return what opens a tab and does something there."""
 
     def show(page: Any) -> None:
         page.locator(f"#tab-{name}").click()
@@ -122,8 +150,6 @@ def tab(name: str, scroll_to: str | None = None, do: Show | None = None) -> Show
         page.evaluate("window.scrollTo(0, 0)")
         if do is not None:
             do(page)
-        if scroll_to is not None:
-            page.locator(f"#{scroll_to}").evaluate("card => card.scrollIntoView()")
 
     return show
 
@@ -190,7 +216,6 @@ def edit(page: Any) -> None:
     page.click("#scene-menu")
     page.locator("#edit-scene").click()
     page.locator("#editor-form[aria-busy=false]").wait_for()
-    page.locator("#editor").evaluate("card => card.scrollIntoView()")
 
 
 def choose(page: Any) -> None:
@@ -219,7 +244,6 @@ def sector(page: Any) -> None:
     """Show the finite-element sector with its boundaries and contacts."""
     anew(page, "fe-disk", "&tab=disk")
     page.locator("#structure svg").first.wait_for()
-    page.locator("#structure").evaluate("card => card.scrollIntoView()")
 
 
 def interference(page: Any) -> None:
@@ -228,7 +252,6 @@ def interference(page: Any) -> None:
     page.fill("#interference-speed_rpm", "11000")
     page.locator("#interference-submit").click()
     page.locator("#interference-figure path.series").first.wait_for()
-    page.locator("#interference").evaluate("card => card.scrollIntoView()")
 
 
 def compare(page: Any) -> None:
@@ -241,37 +264,37 @@ def compare(page: Any) -> None:
     for one in (runs.first, runs.filter(has_text="shroud.N0 60 N").first):
         one.locator("input[type=checkbox]").first.check()
     page.locator("#runs-compare-body table").first.wait_for()
-    page.locator("#runs-compare").evaluate("card => card.scrollIntoView()")
 
 
-VIEWS: dict[str, Show] = {
-    "answer": top,
-    "response": tab("response", "tabs"),
-    "live": tab("response", "live"),
-    "curve": tab("response", "response"),
-    "point": tab("response", "point"),
-    "map": tab("map", "tabs"),
-    "front": tab("map", "front"),
-    "design": tab("design", "tabs"),
-    "result": tab("design", "design"),
-    "disk": tab("disk", "tabs"),
-    "campbell": tab("disk", "campbell"),
-    "modes": tab("modes", "tabs", follow_mode),
-    "mode-peaks": tab("modes", "modes-frequency"),
-    "accuracy": tab("accuracy", "tabs"),
-    "runs": tab("runs", "tabs"),
+VIEWS: dict[str, tuple[Show, str | None]] = {
+    "answer": (top, None),
+    "response": (tab("response"), "tabs"),
+    "live": (tab("response"), "live"),
+    "curve": (tab("response"), "response"),
+    "point": (tab("response"), "point"),
+    "map": (tab("map"), "tabs"),
+    "front": (tab("map"), "front"),
+    "design": (tab("design"), "tabs"),
+    "result": (tab("design"), "design"),
+    "disk": (tab("disk"), "tabs"),
+    "campbell": (tab("disk"), "campbell"),
+    "modes": (tab("modes", follow_mode), "tabs"),
+    "mode-peaks": (tab("modes"), "modes-frequency"),
+    "accuracy": (tab("accuracy"), "tabs"),
+    "runs": (tab("runs"), "tabs"),
     # From here on each opens the page anew.
-    "shape": open_shape,
-    "identify": identify,
-    "estimates": lambda page: page.locator("#identify-response").evaluate("card => card.scrollIntoView()"),
-    "editor": edit,
-    "new-scene": choose,
-    "wizard": question,
-    "matrices": matrices,
-    "sector": sector,
-    "interference": interference,
-    "compare": compare,
+    "shape": (open_shape, None),
+    "identify": (identify, None),
+    "estimates": (lambda page: page.locator("#identify-response").wait_for(), "identify-response"),
+    "editor": (edit, "editor"),
+    "new-scene": (choose, None),
+    "wizard": (question, None),
+    "matrices": (matrices, None),
+    "sector": (sector, "structure"),
+    "interference": (interference, "interference"),
+    "compare": (compare, "runs-compare"),
 }
+"""What opens a view, and the card of it that is scrolled to the top, if any."""
 
 
 if __name__ == "__main__":
