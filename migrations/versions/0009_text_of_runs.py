@@ -33,7 +33,7 @@ _KEPT = (
     ("delete", "DELETE", (_GONE,)),
     ("update", "UPDATE OF name, notes", (_GONE, _NEW)),
 )
-_TRIGRAMS = "(lower(name) gin_trgm_ops, lower(notes) gin_trgm_ops)"
+_TRIGRAMS = "(name gin_trgm_ops, notes gin_trgm_ops)"
 
 
 def upgrade() -> None:

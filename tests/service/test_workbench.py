@@ -20,7 +20,7 @@ from service.db.models import Job, JobState
 from service.db.repositories import JobRepository
 from service.db.repositories.owned import Projects
 from service.db.repositories.rows import RunWords
-from service.db.repositories.runs import RunFilter, Runs
+from service.db.repositories.runs import RunFilter, Runs, _containing
 from service.errors import (
     ChangedMeanwhileError,
     ConflictError,
@@ -351,6 +351,18 @@ def test_every_filter_holds_on_both_databases(database: Database) -> None:
     assert found(deleted=True) == [hard]
     runs.restore(hard, None)
     assert found() == [hard, soft]
+
+
+def test_texts_are_found_by_the_index_of_texts(database: Database) -> None:
+    sqlite = database.backend == "sqlite"
+    with database.reading() as connection:
+        found = _containing("turbofan", sqlite=sqlite).ids
+        asked = str(found.compile(connection, compile_kwargs={"literal_binds": True}))
+        if not sqlite:
+            # Of so few rows all are read sooner.
+            connection.exec_driver_sql("SET LOCAL enable_seqscan = off")
+        plan = connection.exec_driver_sql(f"{'EXPLAIN QUERY PLAN' if sqlite else 'EXPLAIN'} {asked}").all()
+    assert ("run_text VIRTUAL TABLE" if sqlite else "ix_run_text") in str(plan)
 
 
 @pytest.mark.parametrize("counted", [0, 5000], ids=["looked at one by one", "by the index"])

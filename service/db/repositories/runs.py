@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import defaultdict
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, fields
@@ -257,7 +258,10 @@ def _containing(text: str, *, sqlite: bool) -> Condition:
 
     PostgreSQL takes its index for this by itself. SQLite's, which knows triples of letters, is asked by name.
     """
-    holds = or_(*(one.icontains(text, autoescape=True) for one in (Run.name, Run.notes)))
+    pattern = "%" + re.sub("([%_/])", r"/\1", text) + "%"
+    # LIKE of SQLite takes capitals for small letters by itself, and ILIKE there folds each text first.
+    alike = [one.like if sqlite else one.ilike for one in (Run.name, Run.notes)]
+    holds = or_(*(one(pattern, escape="/") for one in alike))
     if len(text) < _LETTERS:
         return _said(holds, few=_NEVER_LEADS)
     held = holds
