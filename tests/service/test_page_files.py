@@ -14,7 +14,7 @@ from solver.results.notes import FLAGS
 FOLDER = Path(page.__file__).resolve().parents[2] / "page"
 MODULES = sorted((FOLDER / "js").rglob("*.js"))
 LONGEST_FILE = 400
-MOST_COMPRESSED = 400_000
+MOST_COMPRESSED = 600_000  # 442 kB today, of them CodeMirror 114 and three.js 135, loaded on demand
 MOST_AT_FIRST = 200_000
 ON_DEMAND = {"codemirror.js", "three.js"}
 
