@@ -31,24 +31,12 @@ Ranges = tuple[tuple[float, float], ...]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CriterionContext:
-    """What the keys of a criterion are read in.
+    """What the keys of a criterion are read in."""
 
-    Attributes
-    ----------
-    scene : Scene
-        What is designed.
-    cases : tuple of Case
-        The responses it is judged by.
-    limit : float or None
-        Amplitude [m] at which bands are measured.
-    values : mapping
-        The criterion's keys that were given.
-    """
-
-    scene: Scene
-    cases: tuple[LoadCase, ...]
-    limit: float | None
-    values: Mapping[str, object]
+    scene: Annotated[Scene, "What is designed."]
+    cases: Annotated[tuple[LoadCase, ...], "The responses it is judged by."]
+    limit: Annotated[float | None, "Amplitude [m] at which bands are measured."]
+    values: Annotated[Mapping[str, object], "The criterion's keys that were given."]
 
 
 def _unscaled(_scene: Scene) -> float:
@@ -145,15 +133,11 @@ class Criterion:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Limits:
-    """What a design must keep.
+    """What a design must keep."""
 
-    Attributes
-    ----------
-    read : mapping of Criterion to object
-        What the keys of each criterion that is limited came to.
-    """
-
-    read: Mapping[Criterion, Any] = field(default_factory=dict)
+    read: Annotated[Mapping[Criterion, Any], "What the keys of each criterion that is limited came to."] = (
+        field(default_factory=dict)
+    )
 
     def of(self, criterion: Criterion) -> Any:
         """Return what the keys of a criterion came to; None if none was given."""
@@ -171,24 +155,17 @@ class Limits:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Goals:
-    """What a design is to reach, and by what.
+    """What a design is to reach, and by what."""
 
-    Attributes
-    ----------
-    variables : tuple of Variable
-        What may be chosen.
-    limit : float or None
-        Amplitude [m] above which the resonance band is measured; half power of the highest peak if None.
-    weights : mapping of Criterion to float
-        What is minimised: of each the largest value times its weight, summed.
-    limits : Limits
-        What must be kept.
-    """
-
-    variables: tuple[BoundedVariable, ...]
-    limit: float | None
-    weights: Mapping[Criterion, float]
-    limits: Limits
+    variables: Annotated[tuple[BoundedVariable, ...], "What may be chosen."]
+    limit: Annotated[
+        float | None,
+        "Amplitude [m] above which the resonance band is measured; half power of the highest peak if None.",
+    ]
+    weights: Annotated[
+        Mapping[Criterion, float], "What is minimised: of each the largest value times its weight, summed."
+    ]
+    limits: Annotated[Limits, "What must be kept."]
 
     @property
     def paths(self) -> tuple[str, ...]:

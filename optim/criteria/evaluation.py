@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 from optim.criteria.criterion import Criterion, CriterionRow, Judged
 from optim.criteria.registry import criteria
@@ -108,19 +109,11 @@ def effects_of(problem: Problem, scene: Scene) -> Effects:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Range:
-    """Frequencies [Hz] of a response that is judged.
+    """Frequencies [Hz] of a response that is judged."""
 
-    Attributes
-    ----------
-    low, high : float or None
-        Its ends; None for the band.
-    criteria : tuple of Criterion
-        What it is judged by.
-    """
-
-    low: float | None
-    high: float | None
-    criteria: tuple[Criterion, ...]
+    low: Annotated[float | None, "Its lower end; None for the band."]
+    high: Annotated[float | None, "Its upper end; None for the band."]
+    criteria: Annotated[tuple[Criterion, ...], "What it is judged by."]
 
 
 def ranges_of(problem: Problem, case: LoadCase) -> tuple[Range, ...]:
@@ -143,17 +136,11 @@ def ranges_of(problem: Problem, case: LoadCase) -> tuple[Range, ...]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Judge:
-    """Turns the responses of one case into rows.
+    """Turns the responses of one case into rows."""
 
-    Attributes
-    ----------
-    problem, case : what is judged.
-    gradients : compute them (otherwise they are NaN).
-    """
-
-    problem: Problem
+    problem: Annotated[Problem, "What is judged."]
     case: LoadCase
-    gradients: bool
+    gradients: Annotated[bool, "Compute them (otherwise they are NaN)."]
 
     def rows(self, branch: Branch, over: Range) -> list[CriterionRow]:
         """Return the rows of a response over a range; none unless it covers it and has a peak."""

@@ -30,33 +30,17 @@ class Form(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Option:
-    """The option of the command that stands for a key.
+    """The option of the command that stands for a key."""
 
-    Attributes
-    ----------
-    form : Form
-        How it is written.
-    flag : str
-        Its name.
-    metavar : str
-        What stands behind it in the help.
-    help : str
-        What it means.
-    word : str
-        What each name of an option of `Form.NAMES` stands for in the table of the key.
-    example : str
-        Of its text.
-    words : tuple of str
-        Those it takes, of `Form.WORD`.
-    """
-
-    form: Form
-    flag: str
-    metavar: str
-    help: str
-    word: str = ""
-    example: str = ""
-    words: tuple[str, ...] = ()
+    form: Annotated[Form, "How it is written."]
+    flag: Annotated[str, "Its name."]
+    metavar: Annotated[str, "What stands behind it in the help."]
+    help: Annotated[str, "What it means."]
+    word: Annotated[
+        str, "What each name of an option of `Form.NAMES` stands for in the table of the key."
+    ] = ""
+    example: Annotated[str, "Of its text."] = ""
+    words: Annotated[tuple[str, ...], "Those it takes, of `Form.WORD`."] = ()
 
     @property
     def several(self) -> int:

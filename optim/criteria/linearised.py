@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 from scipy.optimize import nnls
@@ -23,45 +24,23 @@ AT_BOUND = 1e-12  # scaled distance within which a variable is on its bound
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Model:
-    """Rows of one design in scaled variables z; m objective rows in groups, c limited rows.
+    """Rows of one design in scaled variables z; m objective rows in groups, c limited rows."""
 
-    Attributes
-    ----------
-    z : (n,) array
-        The design.
-    rows : tuple of Row
-        The m objective rows.
-    heights, slopes : (m,), (m, n) arrays
-        Weighted values relative to the scale, and their derivatives by z.
-    groups : (m,) array of int
-        Rows of one group are maximised over, the maxima of the groups are added.
-    limited : tuple of Row
-        The c limited rows.
-    excess, excess_slopes : (c,), (c, n) arrays
-        Relative excess over the bounds.
-    by_z, bends : (n,) arrays
-        First and second derivatives of the variables by z.
-    unit : float
-        The objective that counts as 1.
-    units : (c,) array
-        What each excess is relative to.
-    penalty : float
-        On the largest excess, in what a search decreases.
-    """
-
-    z: Real
-    rows: tuple[CriterionRow, ...]
-    heights: Real
-    slopes: Real
-    groups: Real
-    limited: tuple[CriterionRow, ...]
-    excess: Real
-    excess_slopes: Real
-    by_z: Real
-    bends: Real
-    unit: float
-    units: Real
-    penalty: float = PENALTY
+    z: Annotated[Real, "The design, (n,)."]
+    rows: Annotated[tuple[CriterionRow, ...], "The m objective rows."]
+    heights: Annotated[Real, "Weighted values relative to the scale, (m,)."]
+    slopes: Annotated[Real, "Their derivatives by z, (m, n)."]
+    groups: Annotated[
+        Real, "Rows of one group are maximised over, the maxima of the groups are added, (m,) of int."
+    ]
+    limited: Annotated[tuple[CriterionRow, ...], "The c limited rows."]
+    excess: Annotated[Real, "Relative excess over the bounds, (c,)."]
+    excess_slopes: Annotated[Real, "Their derivatives by z, (c, n)."]
+    by_z: Annotated[Real, "First derivatives of the variables by z, (n,)."]
+    bends: Annotated[Real, "Second ones, (n,)."]
+    unit: Annotated[float, "The objective that counts as 1."]
+    units: Annotated[Real, "What each excess is relative to, (c,)."]
+    penalty: Annotated[float, "On the largest excess, in what a search decreases."] = PENALTY
 
     def second(self, i: int) -> Real | None:
         """Return the second derivatives of objective row `i` by z, (n, n); None where they do not exist."""
@@ -142,25 +121,22 @@ def model_of(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Conditions:
-    """The Karush-Kuhn-Tucker conditions of a design: which rows hold it, with which force.
+    """The Karush-Kuhn-Tucker conditions of a design: which rows hold it, with which force."""
 
-    Attributes
-    ----------
-    rows : tuple of (Row, float)
-        Active rows with their multipliers: objective rows of one quantity sum to 1; those of limited rows say
-        by how much of the objective's scale the optimum falls for a relative relief of the bound.
-    bounds : tuple of (str, str, float)
-        Variable, ``lower`` or ``upper``, and multiplier, of the variables on a bound.
-    residual : float
-        Largest component of the gradient of the Lagrangian, relative objective per scaled variable.
-    violation : float
-        Largest relative excess over a bound.
-    """
-
-    rows: tuple[tuple[CriterionRow, float], ...]
-    bounds: tuple[tuple[str, str, float], ...]
-    residual: float
-    violation: float
+    rows: Annotated[
+        tuple[tuple[CriterionRow, float], ...],
+        "Active rows with their multipliers: objective rows of one quantity sum to 1; those of limited "
+        "rows say by how much of the objective's scale the optimum falls for a relative relief of the "
+        "bound.",
+    ]
+    bounds: Annotated[
+        tuple[tuple[str, str, float], ...],
+        "Variable, ``lower`` or ``upper``, and multiplier, of the variables on a bound.",
+    ]
+    residual: Annotated[
+        float, "Largest component of the gradient of the Lagrangian, relative objective per scaled variable."
+    ]
+    violation: Annotated[float, "Largest relative excess over a bound."]
 
 
 def conditions(

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 from optim.criteria.band import BAND
 from optim.criteria.criterion import Criterion, CriterionRow
@@ -30,21 +31,13 @@ class CaseResponse:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DesignEvaluation:
-    """One design with everything it is judged by.
+    """One design with everything it is judged by."""
 
-    Attributes
-    ----------
-    values : mapping
-        Variable name to value.
-    responses : tuple of Response
-        The frequency responses behind the numbers, in the order of the cases.
-    rows : tuple of Row
-        Empty unless every response covered its whole range.
-    """
-
-    values: Mapping[str, float]
-    responses: tuple[CaseResponse, ...]
-    rows: tuple[CriterionRow, ...]
+    values: Annotated[Mapping[str, float], "Variable name to value."]
+    responses: Annotated[
+        tuple[CaseResponse, ...], "The frequency responses behind the numbers, in the order of the cases."
+    ]
+    rows: Annotated[tuple[CriterionRow, ...], "Empty unless every response covered its whole range."]
 
     @property
     def good(self) -> bool:

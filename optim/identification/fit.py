@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
@@ -25,26 +26,13 @@ from solver.scene.scene import Scene
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Fitted:
-    """The predictions of all runs at one place.
+    """The predictions of all runs at one place."""
 
-    Attributes
-    ----------
-    z : (n,) array
-        Scaled unknowns.
-    values : (N,) array
-        Predicted observations, NaN where not reached.
-    jacobian : (N, n) array
-        By z.
-    reached : (N,) array of bool
-    states : tuple of mappings
-        Of each run, contact to state codes.
-    """
-
-    z: Real
-    values: Real
-    jacobian: Real
-    reached: np.ndarray
-    states: tuple[Mapping[str, Integer], ...]
+    z: Annotated[Real, "Scaled unknowns, (n,)."]
+    values: Annotated[Real, "Predicted observations, NaN where not reached, (N,)."]
+    jacobian: Annotated[Real, "By z, (N, n)."]
+    reached: Annotated[np.ndarray, "(N,) of bool."]
+    states: Annotated[tuple[Mapping[str, Integer], ...], "Of each run, contact to state codes."]
 
 
 class Runs:
@@ -124,44 +112,23 @@ _EDGE = 1e-9  # scaled distance from a bound at which a search begins
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Noise:
-    """What is known of the noise, and how residuals count.
+    """What is known of the noise, and how residuals count."""
 
-    Attributes
-    ----------
-    level : float or None
-        Relative standard deviation; None where the residuals shall tell.
-    robust : bool
-        Whether outliers weigh less.
-    """
-
-    level: float | None
-    robust: bool
+    level: Annotated[float | None, "Relative standard deviation; None where the residuals shall tell."]
+    robust: Annotated[bool, "Whether outliers weigh less."]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LocalFit:
-    """A local optimum.
+    """A local optimum."""
 
-    Attributes
-    ----------
-    fitted : Fitted
-        The predictions there.
-    sd : (N,) array
-        Standard deviation of every observation.
-    level : float
-        By which noise of unknown level was found to be in proportion; 1 if all is known.
-    active : (N,) array of bool
-        The observations that counted: those reached.
-    cost : float
-        Half the sum of the losses, priors included.
-    converged : bool
-    """
-
-    fitted: Fitted
-    sd: Real
-    level: float
-    active: np.ndarray
-    cost: float
+    fitted: Annotated[Fitted, "The predictions there."]
+    sd: Annotated[Real, "Standard deviation of every observation, (N,)."]
+    level: Annotated[
+        float, "By which noise of unknown level was found to be in proportion; 1 if all is known."
+    ]
+    active: Annotated[np.ndarray, "The observations that counted, (N,) of bool: those reached."]
+    cost: Annotated[float, "Half the sum of the losses, priors included."]
     converged: bool
 
     def residuals(self, observations: Real) -> Real:
@@ -265,22 +232,17 @@ _WORSE = 0.5  # share of the progress that the first look is worth
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Searched:
-    """What the search found.
+    """What the search found."""
 
-    Attributes
-    ----------
-    best : LocalFit or None
-        None where no place reached enough points, or the search was stopped before any fit.
-    others : tuple of (z, cost)
-        Further local optima of the thinned runs, cost relative to that of the best.
-    starts : int
-        Places tried; agreeing : searches of the first look that ended at the best.
-    agreeing : int
-    """
-
-    best: LocalFit | None
-    others: tuple[tuple[Real, float], ...]
-    starts: int
+    best: Annotated[
+        LocalFit | None,
+        "None where no place reached enough points, or the search was stopped before any fit.",
+    ]
+    others: Annotated[
+        tuple[tuple[Real, float], ...],
+        "Further local optima of the thinned runs, cost relative to that of the best.",
+    ]
+    starts: Annotated[int, "Places tried; agreeing : searches of the first look that ended at the best."]
     agreeing: int
 
 

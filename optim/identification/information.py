@@ -27,24 +27,14 @@ _TINY = 1e-12  # of the largest eigenvalue, below which information is rounding
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Information:
-    """What data and priors tell of the scaled unknowns.
+    """What data and priors tell of the scaled unknowns."""
 
-    Attributes
-    ----------
-    data : (n, n) array
-        Information matrix of the data, Jᵀ J in standard deviations of the noise.
-    prior : (n, n) array
-        That of the priors.
-    degrees : int
-        Degrees of freedom of the noise level; 0 where it was given.
-    reduced_chi2 : float
-        Mean square of the residuals in standard deviations, over the degrees of freedom.
-    """
-
-    data: Real
-    prior: Real
-    degrees: int
-    reduced_chi2: float
+    data: Annotated[Real, "Information matrix of the data, Jᵀ J in standard deviations of the noise, (n, n)."]
+    prior: Annotated[Real, "That of the priors, (n, n)."]
+    degrees: Annotated[int, "Degrees of freedom of the noise level; 0 where it was given."]
+    reduced_chi2: Annotated[
+        float, "Mean square of the residuals in standard deviations, over the degrees of freedom."
+    ]
 
     @property
     def total(self) -> Real:

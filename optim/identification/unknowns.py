@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -37,17 +37,10 @@ class Prior:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Unknowns:
-    """Parameters within bounds, each scaled to z from 0 to 1, logarithmically over wide ranges.
+    """Parameters within bounds, each scaled to z from 0 to 1, logarithmically over wide ranges."""
 
-    Attributes
-    ----------
-    variables : tuple of Variable
-    priors : mapping
-        Name of a variable to what was known of it.
-    """
-
-    variables: tuple[BoundedVariable, ...]
-    priors: Mapping[str, Prior]
+    variables: Annotated[tuple[BoundedVariable, ...], "Tuple of Variable."]
+    priors: Annotated[Mapping[str, Prior], "Name of a variable to what was known of it."]
 
     def __len__(self) -> int:
         return len(self.variables)

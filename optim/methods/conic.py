@@ -12,6 +12,7 @@ import warnings
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Annotated
 
 import cvxpy
 import numpy as np
@@ -28,58 +29,30 @@ _STEEP = 1e6  # times the change of the objective, the most a penalty may change
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Step:
-    """A solved subproblem.
+    """A solved subproblem."""
 
-    Attributes
-    ----------
-    step : (n,) array
-        In scaled variables.
-    predicted : float
-        Merit of the linear model at the step.
-    multipliers : (m,) array
-        Of the objective rows; those of a group sum to 1.
-    limit_multipliers : (c,) array
-        Of the limited rows.
-    """
-
-    step: Real
-    predicted: float
-    multipliers: Real
-    limit_multipliers: Real
+    step: Annotated[Real, "In scaled variables, (n,)."]
+    predicted: Annotated[float, "Merit of the linear model at the step."]
+    multipliers: Annotated[Real, "Of the objective rows, (m,); those of a group sum to 1."]
+    limit_multipliers: Annotated[Real, "Of the limited rows, (c,)."]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Numbers:
-    """The numbers of a model for one radius, all of order one.
-
-    Attributes
-    ----------
-    heights, slopes : (m,), (m, n) arrays
-        Objective rows below the largest of their group.
-    excess, excess_slopes : (c,), (c, n) arrays
-        Limited rows below the largest excess, or below 0 if all limits are kept.
-    share, price : float
-        Factors of the objective and of the penalty.
-    least : float
-        Where the penalty begins.
-    root : (n, n) array
-        R.
-    low, high : (n,) arrays
-        Bounds of the variables, within a box of the radius.
-    """
+    """The numbers of a model for one radius, all of order one."""
 
     model: Model
     radius: float
-    heights: Real
-    slopes: Real
-    excess: Real
-    excess_slopes: Real
-    share: float
-    price: float
-    least: float
-    root: Real
-    low: Real
-    high: Real
+    heights: Annotated[Real, "Objective rows below the largest of their group, (m,)."]
+    slopes: Annotated[Real, "Their slopes, (m, n)."]
+    excess: Annotated[Real, "Limited rows below the largest excess, or below 0 if all limits are kept, (c,)."]
+    excess_slopes: Annotated[Real, "Their slopes, (c, n)."]
+    share: Annotated[float, "Factor of the objective."]
+    price: Annotated[float, "That of the penalty."]
+    least: Annotated[float, "Where the penalty begins."]
+    root: Annotated[Real, "R, (n, n)."]
+    low: Annotated[Real, "Lower bounds of the variables, within a box of the radius, (n,)."]
+    high: Annotated[Real, "Upper ones, (n,)."]
 
     def step(self, d: Real, duals: Real, rows: Index, limit_duals: Real, limited: Index) -> Step:
         """Return the step of a solution.

@@ -6,7 +6,7 @@ Where that of a single case keeps all limits it is the optimum with them as well
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 from optim.criteria.criterion import Limits
 from optim.methods.evaluator import DesignSearch, SearchStoppedError
@@ -22,18 +22,13 @@ MOST_CASES = 4
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Eased:
-    """What a problem without its limits says about it.
+    """What a problem without its limits says about it."""
 
-    Attributes
-    ----------
-    starts : tuple of designs
-        The one asked for, and the local optima of single cases without limits.
-    proven : Tracked or None
-        The optimum without limits, if it keeps them all.
-    """
-
-    starts: tuple[dict[str, float], ...]
-    proven: Tracked | None = None
+    starts: Annotated[
+        tuple[dict[str, float], ...],
+        "The one asked for, and the local optima of single cases without limits.",
+    ]
+    proven: Annotated[Tracked | None, "The optimum without limits, if it keeps them all."] = None
 
     @classmethod
     def of(cls, search: DesignSearch, plain: Tracked | None = None) -> Eased:

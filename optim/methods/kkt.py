@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 
@@ -21,31 +22,18 @@ FLAT_SLOPE = 1e-9  # relative objective per scaled variable below which there is
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Local:
-    """Where a local search ended.
+    """Where a local search ended."""
 
-    Attributes
-    ----------
-    evaluation : Evaluation
-        The best design.
-    merit : float
-        Its objective, with the penalty on the limits it does not keep.
-    settled : bool
-        Whether the first-order conditions hold: of the objective, or, if limits are not kept, of the largest
-        excess over them.
-    feasible : bool
-        Whether the limits are kept.
-    conditions : Conditions
-        Multipliers and residual.
-    standing : (float, float)
-        What designs are compared by; see `standing`.
-    """
-
-    evaluation: DesignEvaluation
-    merit: float
-    settled: bool
-    feasible: bool
-    conditions: Conditions
-    standing: tuple[float, float]
+    evaluation: Annotated[DesignEvaluation, "The best design."]
+    merit: Annotated[float, "Its objective, with the penalty on the limits it does not keep."]
+    settled: Annotated[
+        bool,
+        "Whether the first-order conditions hold: of the objective, or, if limits are not kept, of the "
+        "largest excess over them.",
+    ]
+    feasible: Annotated[bool, "Whether the limits are kept."]
+    conditions: Annotated[Conditions, "Multipliers and residual."]
+    standing: Annotated[tuple[float, float], "What designs are compared by; see `standing`."]
 
 
 def standing(model: Model) -> tuple[float, float]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Annotated
 
 from optim.criteria.evaluation import Judge, effects_of, evaluate, ranges_of
 from optim.criteria.peak import PEAK
@@ -33,27 +34,13 @@ _STATUS = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tracked:
-    """What the tracked peak found.
+    """What the tracked peak found."""
 
-    Attributes
-    ----------
-    status : DesignStatus
-        How it ended.
-    evaluation : Evaluation or None
-        The optimum, or the best seen.
-    basins : tuple of Basin
-        The local minima met, best first.
-    sweeps : int
-        Frequency responses computed.
-    work : float
-        Everything, in frequency responses.
-    """
-
-    status: DesignStatus
-    evaluation: DesignEvaluation | None
-    basins: tuple[LocalOptimum, ...]
-    sweeps: int
-    work: float
+    status: Annotated[DesignStatus, "How it ended."]
+    evaluation: Annotated[DesignEvaluation | None, "The optimum, or the best seen."]
+    basins: Annotated[tuple[LocalOptimum, ...], "The local minima met, best first."]
+    sweeps: Annotated[int, "Frequency responses computed."]
+    work: Annotated[float, "Everything, in frequency responses."]
 
 
 def tracked_optimum(

@@ -13,6 +13,7 @@ import math
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Annotated
 
 import numpy as np
 from scipy.optimize import minimize, minimize_scalar
@@ -44,21 +45,11 @@ _NEAR = (0.2, 1.0)  # factors on the excitation a curve of one design covers
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ByCurve:
-    """What the curves found.
+    """What the curves found."""
 
-    Attributes
-    ----------
-    status : DesignStatus
-        How it ended.
-    evaluation : Evaluation or None
-        The whole response at the optimum.
-    check : CurveCheck or None
-        The curve beside it.
-    """
-
-    status: DesignStatus
-    evaluation: DesignEvaluation | None
-    check: CurveCheck | None
+    status: Annotated[DesignStatus, "How it ended."]
+    evaluation: Annotated[DesignEvaluation | None, "The whole response at the optimum."]
+    check: Annotated[CurveCheck | None, "The curve beside it."]
 
 
 @dataclass(slots=True, kw_only=True)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
@@ -43,27 +44,18 @@ def nothing() -> None:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DesignPlateau:
-    """What is as good as an optimum, and the design chosen of it.
+    """What is as good as an optimum, and the design chosen of it."""
 
-    Attributes
-    ----------
-    intervals : mapping of variable name to (low, high)
-        Along each variable that has one, the others as chosen.
-    evaluation : Evaluation
-        The design chosen.
-    chosen_by : str
-        The criterion it was chosen by.
-    better : Evaluation or None
-        A design met on the way that is better than the optimum: then that was none.
-    responses : int
-        Frequency responses computed.
-    """
-
-    intervals: Mapping[str, tuple[float, float]]
-    evaluation: DesignEvaluation
-    chosen_by: str
-    better: DesignEvaluation | None
-    responses: int
+    intervals: Annotated[
+        Mapping[str, tuple[float, float]], "Along each variable that has one, the others as chosen."
+    ]
+    evaluation: Annotated[DesignEvaluation, "The design chosen."]
+    chosen_by: Annotated[str, "The criterion it was chosen by."]
+    better: Annotated[
+        DesignEvaluation | None,
+        "A design met on the way that is better than the optimum: then that was none.",
+    ]
+    responses: Annotated[int, "Frequency responses computed."]
 
 
 def plateau_of(

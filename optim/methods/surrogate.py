@@ -14,6 +14,7 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
@@ -68,24 +69,12 @@ def corners(n: int) -> Real:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Taylor:
-    """First-order model of a number: Σ over groups of the largest row, a price on the largest limited row.
+    """First-order model of a number: Σ over groups of the largest row, a price on the largest limited row."""
 
-    Attributes
-    ----------
-    place : (n,) array
-        Where it was looked at.
-    groups : tuple of ((m,), (m, n)) arrays
-        Rows with their slopes.
-    limited : ((c,), (c, n)) arrays or None
-        Relative excesses over bounds.
-    price : float
-        On the largest excess above 0.
-    """
-
-    place: Real
-    groups: tuple[tuple[Real, Real], ...]
-    limited: tuple[Real, Real] | None = None
-    price: float = 0.0
+    place: Annotated[Real, "Where it was looked at, (n,)."]
+    groups: Annotated[tuple[tuple[Real, Real], ...], "Rows with their slopes."]
+    limited: Annotated[tuple[Real, Real] | None, "Relative excesses over bounds."] = None
+    price: Annotated[float, "On the largest excess above 0."] = 0.0
 
     @property
     def value(self) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 from optim.errors import DesignError
 from optim.problem.numbers import number_pair, positive, whole
@@ -15,27 +16,18 @@ _KEYS = ("name", "set", "band", "observe", "engine_order", "order", "weight")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LoadCase:
-    """One frequency response a design is judged by: one DOF, one band, one excitation.
+    """One frequency response a design is judged by: one DOF, one band, one excitation."""
 
-    Attributes
-    ----------
-    name : str
-        How results call it.
-    scene : Scene
-        With the case's own values; the design's values are set on top.
-    weight : float
-        By which its peaks count in what is minimised.
-    order : int
-        How many times a revolution the excitation repeats; turns speeds into frequencies.
-    beside : str or None
-        An earlier case that differs in the observed DOF alone, so that one response serves both.
-    """
-
-    name: str
-    scene: Scene
-    weight: float
-    order: int
-    beside: str | None = None
+    name: Annotated[str, "How results call it."]
+    scene: Annotated[Scene, "With the case's own values; the design's values are set on top."]
+    weight: Annotated[float, "By which its peaks count in what is minimised."]
+    order: Annotated[
+        int, "How many times a revolution the excitation repeats; turns speeds into frequencies."
+    ]
+    beside: Annotated[
+        str | None,
+        "An earlier case that differs in the observed DOF alone, so that one response serves both.",
+    ] = None
 
 
 def with_engine_order(scene: Scene, engine_order: int) -> Scene:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 from optim.criteria.criterion import Criterion, CriterionContext, Goals, Limits
 from optim.criteria.peak import PEAK
@@ -23,37 +23,22 @@ from solver.scene.scene import Scene
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Problem(Goals):
-    """A design problem, checked.
+    """A design problem, checked."""
 
-    Attributes
-    ----------
-    scene : Scene
-        What is designed.
-    cases : tuple of Case
-        The responses it is judged by.
-    harmonics : int
-        Highest harmonic kept.
-    start : mapping or None
-        A design to start from, variable name to value.
-    method : Method
-        How it is searched.
-    basins : int
-        How many local optima are looked for.
-    tolerance : float
-        Relative error of the peak up to which a performance curve suffices.
-    keeps_measure : bool
-        Whether the measure that the scene observes stays where the mean is free: designs that are compared
-        need one measure.
-    """
-
-    scene: Scene
-    cases: tuple[LoadCase, ...]
-    harmonics: int
-    start: Mapping[str, float] | None
-    method: Method
-    basins: int
-    tolerance: float = TOLERANCE
-    keeps_measure: bool = False
+    scene: Annotated[Scene, "What is designed."]
+    cases: Annotated[tuple[LoadCase, ...], "The responses it is judged by."]
+    harmonics: Annotated[int, "Highest harmonic kept."]
+    start: Annotated[Mapping[str, float] | None, "A design to start from, variable name to value."]
+    method: Annotated[Method, "How it is searched."]
+    basins: Annotated[int, "How many local optima are looked for."]
+    tolerance: Annotated[float, "Relative error of the peak up to which a performance curve suffices."] = (
+        TOLERANCE
+    )
+    keeps_measure: Annotated[
+        bool,
+        "Whether the measure that the scene observes stays where the mean is free: designs that are "
+        "compared need one measure.",
+    ] = False
 
     @property
     def plain(self) -> bool:

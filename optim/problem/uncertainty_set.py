@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
+from typing import Annotated
 
 import numpy as np
 from scipy.special import ndtri
@@ -28,21 +29,13 @@ class How(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Coordinate:
-    """One uncertain number; several parameter paths may share it.
+    """One uncertain number; several parameter paths may share it."""
 
-    Attributes
-    ----------
-    name : str
-        The paths as the user wrote them.
-    paths : tuple of str
-        The parameter paths it acts on.
-    how : How
-        Its value, or its deviation from the nominal value (of a variable: from the design's).
-    """
-
-    name: str
-    paths: tuple[str, ...]
-    how: How
+    name: Annotated[str, "The paths as the user wrote them."]
+    paths: Annotated[tuple[str, ...], "The parameter paths it acts on."]
+    how: Annotated[
+        How, "Its value, or its deviation from the nominal value (of a variable: from the design's)."
+    ]
 
     def value(self, nominal: float, delta: float) -> float:
         """Return the value of a path."""
@@ -69,22 +62,12 @@ class Coordinate:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Disk:
-    """A disk whose blades are not quite equal; the keys are those of ``[structure.mistuning]`` in a scene.
+    """A disk whose blades are not quite equal; the keys are those of ``[structure.mistuning]`` in a scene."""
 
-    Attributes
-    ----------
-    of : tuple of str
-        The parts that differ.
-    spread, seed : float, int
-        Of the random factors, unless `values` are given.
-    values : tuple of float
-        The factors themselves.
-    """
-
-    of: tuple[str, ...]
-    spread: float = 0.0
-    seed: int = 0
-    values: tuple[float, ...] = ()
+    of: Annotated[tuple[str, ...], "The parts that differ."]
+    spread: Annotated[float, "Of the random factors, unless `values` are given."] = 0.0
+    seed: Annotated[int, "Likewise."] = 0
+    values: Annotated[tuple[float, ...], "The factors themselves."] = ()
 
     def table(self) -> dict[str, object]:
         """Return the table of a scene."""
@@ -117,21 +100,13 @@ class Disk:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scenario:
-    """One thing that may be the case.
+    """One thing that may be the case."""
 
-    Attributes
-    ----------
-    settings : tuple of (Coordinate, float)
-        The uncertain parameters with their δ; all others are nominal.
-    disk : Disk or None
-        The mistuned disk; None for the scene's own.
-    xi : tuple of float
-        Its place in the unit box or ball; empty for a sample of a list.
-    """
-
-    settings: tuple[tuple[Coordinate, float], ...] = ()
-    disk: Disk | None = None
-    xi: tuple[float, ...] = ()
+    settings: Annotated[
+        tuple[tuple[Coordinate, float], ...], "The uncertain parameters with their δ; all others are nominal."
+    ] = ()
+    disk: Annotated[Disk | None, "The mistuned disk; None for the scene's own."] = None
+    xi: Annotated[tuple[float, ...], "Its place in the unit box or ball; empty for a sample of a list."] = ()
 
     def words(self) -> str:
         """Return it in words."""
@@ -161,34 +136,23 @@ class UncertaintyShape(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class UncertainSet:
-    """All scenarios that count.
+    """All scenarios that count."""
 
-    Attributes
-    ----------
-    shape : Shape
-        Of the set of ξ.
-    coordinates : tuple of Coordinate
-        The n uncertain parameters.
-    centre, axes : (n,), (n, n) arrays as nested tuples
-        δ = centre + axes ξ.
-    deviations : float
-        How many standard deviations the ellipsoid of a normal distribution reaches to.
-    ends : tuple of (low, high)
-        The intervals as they were given, so that their ends are met to the last digit.
-    disks : tuple of Disk
-        Each of them may be the disk at hand; empty if the scene's own is.
-    listed : tuple of Scenario
-        The samples of a list.
-    """
-
-    shape: UncertaintyShape
-    coordinates: tuple[Coordinate, ...] = ()
-    centre: tuple[float, ...] = ()
-    axes: tuple[tuple[float, ...], ...] = ()
-    deviations: float = 1.0
-    ends: tuple[tuple[float, float], ...] = ()
-    disks: tuple[Disk, ...] = ()
-    listed: tuple[Scenario, ...] = ()
+    shape: Annotated[UncertaintyShape, "Of the set of ξ."]
+    coordinates: Annotated[tuple[Coordinate, ...], "The n uncertain parameters."] = ()
+    centre: Annotated[tuple[float, ...], "δ = centre + axes ξ, (n,)."] = ()
+    axes: Annotated[tuple[tuple[float, ...], ...], "Nested, (n, n)."] = ()
+    deviations: Annotated[
+        float, "How many standard deviations the ellipsoid of a normal distribution reaches to."
+    ] = 1.0
+    ends: Annotated[
+        tuple[tuple[float, float], ...],
+        "The intervals as they were given, so that their ends are met to the last digit.",
+    ] = ()
+    disks: Annotated[
+        tuple[Disk, ...], "Each of them may be the disk at hand; empty if the scene's own is."
+    ] = ()
+    listed: Annotated[tuple[Scenario, ...], "The samples of a list."] = ()
 
     @property
     def finite(self) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,25 +24,15 @@ LOGARITHMIC_FROM = 5.0  # ratio of the bounds from which a variable is scaled lo
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BoundedVariable:
-    """One number to choose, with bounds; several parameter paths may share it.
+    """One number to choose, with bounds; several parameter paths may share it."""
 
-    Attributes
-    ----------
-    name : str
-        The paths as the user wrote them, separated by commas: ``shroud.N0`` or ``shroud.N0,root.N0``.
-    paths : tuple of str
-        The parameter paths that get the value.
-    low, high : float
-        Bounds, in the parameter's unit.
-    logarithmic : bool
-        Whether equal ratios count equally.
-    """
-
-    name: str
-    paths: tuple[str, ...]
-    low: float
-    high: float
-    logarithmic: bool
+    name: Annotated[
+        str, "The paths as the user wrote them, separated by commas: ``shroud.N0`` or ``shroud.N0,root.N0``."
+    ]
+    paths: Annotated[tuple[str, ...], "The parameter paths that get the value."]
+    low: Annotated[float, "Its lower bound, in the parameter's unit."]
+    high: Annotated[float, "Its upper one."]
+    logarithmic: Annotated[bool, "Whether equal ratios count equally."]
 
     def inside(self, value: float) -> float:
         """Return the scaled value, 0 at the lower bound and 1 at the upper."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Annotated
 
 from optim.criteria.peak import PEAK
 from optim.criteria.rows import DesignEvaluation
@@ -34,30 +35,21 @@ FEW = 8  # samples that the starts of a sampled search are judged by
 
 @dataclass(slots=True, kw_only=True)
 class SearchProgress:
-    """What a search knows at any time.
+    """What a search knows at any time."""
 
-    Attributes
-    ----------
-    scenarios : list of Scenario
-        Those of the master problem.
-    exceeded : list of float
-        By how much each was worse than those before when it came in; NaN if it was there from the start.
-    peaks : list of float
-        Highest peak of the design it was found at.
-    best : Local or None
-        The best design so far.
-    gap : float
-        Relative excess of the worst scenario found over the worst of the master problem.
-    finished : bool
-        Whether the look over the whole uncertainty behind the gap came to its end.
-    """
-
-    scenarios: list[Scenario] = field(default_factory=list)
-    exceeded: list[float] = field(default_factory=list)
-    peaks: list[float] = field(default_factory=list)
-    best: Local | None = None
-    gap: float = math.nan
-    finished: bool = False
+    scenarios: Annotated[list[Scenario], "Those of the master problem."] = field(default_factory=list)
+    exceeded: Annotated[
+        list[float],
+        "By how much each was worse than those before when it came in; NaN if it was there from the start.",
+    ] = field(default_factory=list)
+    peaks: Annotated[list[float], "Highest peak of the design it was found at."] = field(default_factory=list)
+    best: Annotated[Local | None, "The best design so far."] = None
+    gap: Annotated[
+        float, "Relative excess of the worst scenario found over the worst of the master problem."
+    ] = math.nan
+    finished: Annotated[
+        bool, "Whether the look over the whole uncertainty behind the gap came to its end."
+    ] = False
 
     def add(self, found: Outcome, exceeds: float) -> bool:
         """Add a scenario to the master problem unless it is there."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 
@@ -29,24 +30,15 @@ ShouldStop = Callable[[], bool] | None
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome:
-    """A design in a scenario.
+    """A design in a scenario."""
 
-    Attributes
-    ----------
-    scenario : Scenario
-        What is the case.
-    rows : tuple of Row
-        What it is judged by, gradients by the variables; empty unless every response covered its range.
-    by_delta : (n_rows, n) array
-        Their derivatives by the δ of the scenario's settings.
-    responses : int
-        Frequency responses computed.
-    """
-
-    scenario: Scenario
-    rows: tuple[CriterionRow, ...]
-    by_delta: Real
-    responses: int
+    scenario: Annotated[Scenario, "What is the case."]
+    rows: Annotated[
+        tuple[CriterionRow, ...],
+        "What it is judged by, gradients by the variables; empty unless every response covered its range.",
+    ]
+    by_delta: Annotated[Real, "Their derivatives by the δ of the scenario's settings, (n_rows, n)."]
+    responses: Annotated[int, "Frequency responses computed."]
 
     @property
     def good(self) -> bool:

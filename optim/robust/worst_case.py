@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from scipy.optimize import minimize
@@ -51,24 +52,12 @@ class UnknownScenarioError(Exception):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Aspect:
-    """One of the numbers whose worst case counts.
+    """One of the numbers whose worst case counts."""
 
-    Attributes
-    ----------
-    quantity : Criterion
-        Of which rows.
-    limited : bool
-        Their excess over the bounds; otherwise their weighted value.
-    unit : float
-        What an excess over a bound of 0 is relative to.
-    plain : bool
-        The value itself, without weight.
-    """
-
-    quantity: Criterion
-    limited: bool
-    unit: float = 1.0
-    plain: bool = False
+    quantity: Annotated[Criterion, "Of which rows."]
+    limited: Annotated[bool, "Their excess over the bounds; otherwise their weighted value."]
+    unit: Annotated[float, "What an excess over a bound of 0 is relative to."] = 1.0
+    plain: Annotated[bool, "The value itself, without weight."] = False
 
     def of(self, row: CriterionRow) -> float:
         """Return the number of a row; −inf if it does not count."""
@@ -93,24 +82,14 @@ class Aspect:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Finding:
-    """The worst scenarios of a design in one aspect.
+    """The worst scenarios of a design in one aspect."""
 
-    Attributes
-    ----------
-    worst : Outcome
-        The design in the worst of them.
-    value : float
-        The number there.
-    outcomes : tuple of Outcome
-        Everything tried, worst first.
-    finished : bool
-        Whether every scenario was tried, or a look over the whole set came to its end.
-    """
-
-    worst: Outcome
-    value: float
-    outcomes: tuple[Outcome, ...]
-    finished: bool
+    worst: Annotated[Outcome, "The design in the worst of them."]
+    value: Annotated[float, "The number there."]
+    outcomes: Annotated[tuple[Outcome, ...], "Everything tried, worst first."]
+    finished: Annotated[
+        bool, "Whether every scenario was tried, or a look over the whole set came to its end."
+    ]
 
 
 Ask = Callable[[Scenario], Outcome]

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,41 +29,26 @@ Blocks = tuple[tuple[int, Real], ...]  # offsets between sectors, and a matrix f
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class OwnTerms:
-    """What a structure given by matrices has beside the symmetric ones, as blocks by offsets between sectors.
+    """What a structure given by matrices has beside the symmetric ones, by offsets between sectors."""
 
-    Attributes
-    ----------
-    skew : Blocks, Blocks
-        Antisymmetric parts of K and C.
-    G, K_omega2 : Blocks
-        Damping per speed and stiffness per squared speed.
-    """
-
-    skew: tuple[Blocks, Blocks]
-    G: Blocks
-    K_omega2: Blocks
+    skew: Annotated[tuple[Blocks, Blocks], "Antisymmetric parts of K and C."]
+    G: Annotated[Blocks, "Damping per speed."]
+    K_omega2: Annotated[Blocks, "Stiffness per squared speed."]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Coordinates:
-    """What extra terms are written in.
+    """What extra terms are written in."""
 
-    Attributes
-    ----------
-    dofs : tuple of str
-        Names of the DOFs.
-    shapes : (n_dofs, n) array
-        The DOFs in the coordinates of the matrices.
-    direct : bool
-        Whether they are these coordinates themselves, as of a lumped structure.
-    own : OwnTerms or None
-        What the structure's own coordinates, in front of those of bodies, have beside symmetric matrices.
-    """
-
-    dofs: tuple[str, ...]
-    shapes: Real
-    direct: bool = False
-    own: OwnTerms | None = None
+    dofs: Annotated[tuple[str, ...], "Names of the DOFs."]
+    shapes: Annotated[Real, "The DOFs in the coordinates of the matrices, (n_dofs, n)."]
+    direct: Annotated[bool, "Whether they are these coordinates themselves, as of a lumped structure."] = (
+        False
+    )
+    own: Annotated[
+        OwnTerms | None,
+        "What the structure's own coordinates, in front of those of bodies, have beside symmetric matrices.",
+    ] = None
 
     def rows(self, selected: NDArray[Any]) -> NDArray[Any]:
         """Return rows over the DOFs as rows over the coordinates; read-only."""

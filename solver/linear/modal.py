@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,18 +38,12 @@ LEAST_POLE = 1e-25  # smallest |1/s| relative to the largest: below is rounding
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HeldMatrices:
-    """Matrices at each nodal diameter, (ns, n, n) each, real where all phases are.
-
-    Attributes
-    ----------
-    key : tuple
-        Tells equal ones apart from others.
-    """
+    """Matrices at each nodal diameter, (ns, n, n) each, real where all phases are."""
 
     K: NDArray[Any] = field(repr=False)
     C: NDArray[Any] = field(repr=False)
     M: NDArray[Any] = field(repr=False)
-    key: tuple[object, ...]
+    key: Annotated[tuple[object, ...], "Tells equal ones apart from others."]
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, HeldMatrices) and self.key == other.key
@@ -60,21 +54,13 @@ class HeldMatrices:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Decomposition:
-    """Z⁻¹ = Σ right_m left_m / d_m, with d_m as `solver.linear.kernels.receptance` has it for the form.
-
-    Attributes
-    ----------
-    eigenvalues, dampings : (ns, nm) array
-        Of every structure.
-    right, left : (ns, n, nm) array
-        Mass-normalised modes and their conjugates, or residues of the poles.
-    """
+    """Z⁻¹ = Σ right_m left_m / d_m, with d_m as `solver.linear.kernels.receptance` has it for the form."""
 
     form: int
-    eigenvalues: Complex
-    dampings: Real
-    right: NDArray[Any]
-    left: NDArray[Any]
+    eigenvalues: Annotated[Complex, "Of every structure, (ns, nm)."]
+    dampings: Annotated[Real, "Likewise, (ns, nm)."]
+    right: Annotated[NDArray[Any], "Mass-normalised modes, or residues of the poles, (ns, n, nm)."]
+    left: Annotated[NDArray[Any], "Their conjugates, or residues of the poles, (ns, n, nm)."]
 
 
 def matrices_of(model: LinearModel, diameters: Integer, moving: Flags) -> HeldMatrices:

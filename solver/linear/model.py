@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Annotated, Any, Generic, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,24 +46,14 @@ def dynamic_stiffness(K: Any, C: Any, M: Any, k: Any, omega: float) -> tuple[Com
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ForceTerm:
-    """One force amplitude * cos(harmonic * omega t + phase) along `vector`.
+    """One force amplitude * cos(harmonic * omega t + phase) along `vector`."""
 
-    Attributes
-    ----------
-    vector : (n,) array
-        Selects the DOF; complex where several have phases of their own.
-    amplitude : float
-        Force [N].
-    phase : float
-        Phase [rad].
-    harmonic : int
-        Multiple of the excitation frequency; 0 is a static load.
-    """
-
-    vector: FloatArray | Complex
-    amplitude: float
-    phase: float
-    harmonic: int
+    vector: Annotated[
+        FloatArray | Complex, "Selects the DOF, (n,); complex where several have phases of their own."
+    ]
+    amplitude: Annotated[float, "Force [N]."]
+    phase: Annotated[float, "Phase [rad]."]
+    harmonic: Annotated[int, "Multiple of the excitation frequency; 0 is a static load."]
 
 
 class Source(Protocol):
@@ -79,27 +69,16 @@ class ExtraTerms:
 
     They are complex where a term is one of the frequency domain. A hysteretic term (structural damping
     K (1 + iη), an imaginary coefficient) is of a motion e^{iωt} with ω > 0 and has no share in the mean.
-
-    Attributes
-    ----------
-    offsets : tuple of int
-        Sectors ahead; (0,) of a structure without sectors.
-    K, C : (m, n, n) array
-        Complex stiffness [N/m] and damping [N s/m].
-    still : (n, n) array or None
-        Stiffness of the mean alone [N/m].
-    loss_factor : float
-        The symmetric stiffness times i and this belongs to it too.
-    lossy : Terms or None
-        Those whose stiffness it is; None: of the terms beside which these stand.
     """
 
-    offsets: tuple[int, ...]
-    K: Complex
-    C: Complex
-    still: FloatArray | None = None
-    loss_factor: float = 0.0
-    lossy: Terms | None = None
+    offsets: Annotated[tuple[int, ...], "Sectors ahead; (0,) of a structure without sectors."]
+    K: Annotated[Complex, "Complex stiffness [N/m], (m, n, n)."]
+    C: Annotated[Complex, "Complex damping [N s/m], (m, n, n)."]
+    still: Annotated[FloatArray | None, "Stiffness of the mean alone [N/m], (n, n)."] = None
+    loss_factor: Annotated[float, "The symmetric stiffness times i and this belongs to it too."] = 0.0
+    lossy: Annotated[
+        Terms | None, "Those whose stiffness it is; None: of the terms beside which these stand."
+    ] = None
 
     @property
     def is_real(self) -> bool:
@@ -143,31 +122,20 @@ class Terms:
     Harmonic k of engine order i sees the nodal diameter n = k i: the neighbour of x in the next sector is
     x e^{j theta} with theta = 2 pi n / sectors. There a matrix is X0 + Xp e^{j theta} + Xp^T e^{-j theta}, or
     what `sector` gives; `at` says it for all of them, with the extra terms. All arrays are read-only.
-
-    Attributes
-    ----------
-    sectors : int
-        Number of sectors, 1 if lumped.
-    M : (n, n) array
-        Mass [kg].
-    C0, Cp : (n, n) array
-        Damping [N s/m]; `Cp` couples to the next sector, 0 if lumped.
-    K0, Kp : (n, n) array
-        Stiffness [N/m]; `Kp` couples to the next sector, 0 if lumped.
-    sector : Source or None
-        What the matrices are at each nodal diameter, in place of these.
-    extra : ExtraTerms or None
-        Terms that are not symmetric, not real or not of springs and dashpots; see `at`.
     """
 
-    sectors: int
-    M: FloatArray
-    C0: FloatArray
-    Cp: FloatArray
-    K0: FloatArray
-    Kp: FloatArray
-    sector: Source | None = None
-    extra: ExtraTerms | None = None
+    sectors: Annotated[int, "Number of sectors, 1 if lumped."]
+    M: Annotated[FloatArray, "Mass [kg], (n, n)."]
+    C0: Annotated[FloatArray, "Damping [N s/m], (n, n)."]
+    Cp: Annotated[FloatArray, "Damping that couples to the next sector [N s/m], (n, n); 0 if lumped."]
+    K0: Annotated[FloatArray, "Stiffness [N/m], (n, n)."]
+    Kp: Annotated[FloatArray, "Stiffness that couples to the next sector [N/m], (n, n); 0 if lumped."]
+    sector: Annotated[Source | None, "What the matrices are at each nodal diameter, in place of these."] = (
+        None
+    )
+    extra: Annotated[
+        ExtraTerms | None, "Terms that are not symmetric, not real or not of springs and dashpots; see `at`."
+    ] = None
 
     def turns(self, diameters: Integer) -> Complex:
         """Return e^{j theta} at nodal diameters, (nd,); without rounding where it is real."""
@@ -228,44 +196,32 @@ class Terms:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LinearModel(Terms):
-    """The structure without its contacts: its terms, and what acts on it, joins it and is seen of it.
+    """The structure without its contacts: its terms, and what acts on it, joins it and is seen of it."""
 
-    Attributes
-    ----------
-    dofs : tuple of str
-        Names of the DOFs.
-    shapes : (n_dofs, n) array
-        The DOFs in the coordinates of the matrices: the identity, or what a structure given by matrices or
-        modes names.
-    contact_here, contact_next : (n_ports, n) array
-        L(theta) = contact_here + contact_next e^{j theta}; relative motions u = L x, x the coordinates.
-    forces : tuple of ForceTerm
-        The excitation.
-    observe : (n,) array
-        Selects the observed DOF.
-    engine_order : int
-        Engine order of the excitation, 0 if lumped.
-    every_diameter : bool
-        Whether the matrices of all nodal diameters are known.
-    prescribed : int
-        So many coordinates, the last, are motions of a base; see `solver.linear.moving_base`.
-    line : ExtraTerms or None
-        What K gains per squared speed and C per speed where the speed follows the frequency, Ω = ω / order.
-    line_order : float
-        That order.
-    """
-
-    dofs: tuple[str, ...]
-    shapes: FloatArray
-    contact_here: FloatArray
-    contact_next: FloatArray
-    forces: tuple[ForceTerm, ...]
-    observe: FloatArray
-    engine_order: int
-    every_diameter: bool = True
-    prescribed: int = 0
-    line: ExtraTerms | None = None
-    line_order: float = 1.0
+    dofs: Annotated[tuple[str, ...], "Names of the DOFs."]
+    shapes: Annotated[
+        FloatArray,
+        "The DOFs in the coordinates of the matrices, (n_dofs, n): the identity, or what a structure given "
+        "by matrices or modes names.",
+    ]
+    contact_here: Annotated[
+        FloatArray,
+        "L(theta) = contact_here + contact_next e^{j theta}, (n_ports, n); u = L x, x the coordinates.",
+    ]
+    contact_next: Annotated[FloatArray, "Its part in the next sector, (n_ports, n)."]
+    forces: Annotated[tuple[ForceTerm, ...], "The excitation."]
+    observe: Annotated[FloatArray, "Selects the observed DOF, (n,)."]
+    engine_order: Annotated[int, "Engine order of the excitation, 0 if lumped."]
+    every_diameter: Annotated[bool, "Whether the matrices of all nodal diameters are known."] = True
+    prescribed: Annotated[
+        int, "So many coordinates, the last, are motions of a base; see `solver.linear.moving_base`."
+    ] = 0
+    line: Annotated[
+        ExtraTerms | None,
+        "What K gains per squared speed and C per speed where the speed follows the frequency, Ω = ω / "
+        "order.",
+    ] = None
+    line_order: Annotated[float, "That order."] = 1.0
 
     @property
     def n_coordinates(self) -> int:
@@ -316,26 +272,18 @@ class LinearModel(Terms):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LinearModelDerivative(Terms):
-    """Derivatives of a `LinearModel` by one parameter: its terms in units per unit of the parameter.
+    """Derivatives of a `LinearModel` by one parameter: its terms in units per unit of the parameter."""
 
-    Attributes
-    ----------
-    affine : bool
-        The matrices are affine in this parameter, so these derivatives are constant.
-    contact_here, contact_next : (n_ports, n) array or None
-        Derivatives of the relative motions; None where they do not depend on it.
-    forces, second_forces : tuple of ForceTerm
-        First and second derivatives of the forces [N per unit, and per unit squared].
-    second_extra : ExtraTerms or None
-        Second derivatives of the extra terms.
-    """
-
-    affine: bool = True
-    contact_here: FloatArray | None = None
-    contact_next: FloatArray | None = None
-    forces: tuple[ForceTerm, ...] = ()
-    second_forces: tuple[ForceTerm, ...] = ()
-    second_extra: ExtraTerms | None = None
+    affine: Annotated[
+        bool, "The matrices are affine in this parameter, so these derivatives are constant."
+    ] = True
+    contact_here: Annotated[
+        FloatArray | None, "Derivative of that matrix, (n_ports, n); None where it does not depend on it."
+    ] = None
+    contact_next: Annotated[FloatArray | None, "Likewise, (n_ports, n)."] = None
+    forces: Annotated[tuple[ForceTerm, ...], "First derivatives of the forces [N per unit]."] = ()
+    second_forces: Annotated[tuple[ForceTerm, ...], "Second ones [N per unit squared]."] = ()
+    second_extra: Annotated[ExtraTerms | None, "Second derivatives of the extra terms."] = None
 
     @property
     def by_loss_factor(self) -> bool:

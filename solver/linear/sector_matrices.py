@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,21 +27,13 @@ _NO_PROPORTIONAL = {"stiffness_proportional_damping": 0.0, "mass_proportional_da
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SectorMatrices:
-    """The matrices of a structure with its bodies behind its coordinates.
+    """The matrices of a structure with its bodies behind its coordinates."""
 
-    Attributes
-    ----------
-    structure : MatricesStructure
-        One sector, or the whole.
-    bodies : tuple of Body
-        Of it.
-    shapes : (n_dofs, n) array
-        The DOFs of structure and bodies in the coordinates.
-    """
-
-    structure: MatricesStructure
-    bodies: tuple[Body, ...]
-    shapes: NDArray[np.float64]
+    structure: Annotated[MatricesStructure, "One sector, or the whole."]
+    bodies: Annotated[tuple[Body, ...], "Of it."]
+    shapes: Annotated[
+        NDArray[np.float64], "The DOFs of structure and bodies in the coordinates, (n_dofs, n)."
+    ]
 
     @property
     def every_diameter(self) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,24 +20,20 @@ _FEW = 5
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Face:
-    """A face and what it lies on.
+    """A face and what it lies on."""
 
-    Attributes
-    ----------
-    pairs : list of (int, int or None)
-        Node of the first face and that of the second; None: the ground.
-    places : (n, 3) array
-        Positions of the first face, in the units of the deck.
-    areas : (n,) array
-        Area that belongs to each node, in those units squared; of a face that is a line, lengths.
-    plane : (3,) array or None
-        Unit normal of the plane that fits best, of either sign; None of a line or a single node.
-    """
-
-    pairs: list[tuple[int, int | None]]
-    places: NDArray[np.float64]
-    areas: NDArray[np.float64]
-    plane: NDArray[np.float64] | None
+    pairs: Annotated[
+        list[tuple[int, int | None]], "Node of the first face and that of the second; None: the ground."
+    ]
+    places: Annotated[NDArray[np.float64], "Positions of the first face, in the units of the deck, (n, 3)."]
+    areas: Annotated[
+        NDArray[np.float64],
+        "Area that belongs to each node, in those units squared, (n,); of a face that is a line, lengths.",
+    ]
+    plane: Annotated[
+        NDArray[np.float64] | None,
+        "Unit normal of the plane that fits best, of either sign, (3,); None of a line or a single node.",
+    ]
 
 
 def face(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 from scipy.sparse import coo_array, csr_array, diags_array
@@ -26,33 +26,21 @@ PART = "parts/"  # begins the key of a part of the structure, such as a blade, b
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MatrixSet:
-    """M, K and maybe C of a structure.
+    """M, K and maybe C of a structure."""
 
-    Attributes
-    ----------
-    matrices : dict
-        Sparse, by their keys.
-    labels : tuple of Label or None
-        Node and component of each row.
-    held : int
-        Rows left out because a boundary condition holds them.
-    parts : dict
-        Stiffness of parts of the structure, sparse, by their names.
-    global_rows : bool
-        Whether the rows are along the global axes, whatever frames a deck gives to nodes.
-    deck : Deck or None
-        Where the nodes are, if it was given; displacements have been turned out of its frames.
-    remarks : tuple of str
-        What was done to the rows and should be known.
-    """
-
-    matrices: dict[str, coo_array]
-    labels: tuple[Label, ...] | None = None
-    held: int = 0
-    parts: dict[str, coo_array] = field(default_factory=dict)
-    global_rows: bool = False
-    deck: Deck | None = None
-    remarks: tuple[str, ...] = ()
+    matrices: Annotated[dict[str, coo_array], "Sparse, by their keys."]
+    labels: Annotated[tuple[Label, ...] | None, "Node and component of each row."] = None
+    held: Annotated[int, "Rows left out because a boundary condition holds them."] = 0
+    parts: Annotated[dict[str, coo_array], "Stiffness of parts of the structure, sparse, by their names."] = (
+        field(default_factory=dict)
+    )
+    global_rows: Annotated[
+        bool, "Whether the rows are along the global axes, whatever frames a deck gives to nodes."
+    ] = False
+    deck: Annotated[
+        Deck | None, "Where the nodes are, if it was given; displacements have been turned out of its frames."
+    ] = None
+    remarks: Annotated[tuple[str, ...], "What was done to the rows and should be known."] = ()
 
     def row(self, label: Label) -> int | None:
         """The row of a label (zero-based); None if there is none."""

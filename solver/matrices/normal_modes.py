@@ -8,7 +8,7 @@ few carry the response.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,21 +25,11 @@ LEAST = 1e-16  # smallest μ relative to the largest: below is rounding, and onl
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class UndampedModes:
-    """Modes ψ with ψᴴ (K + σ M) ψ = 1 and ψᴴ M ψ = μ, lowest frequency first.
+    """Modes ψ with ψᴴ (K + σ M) ψ = 1 and ψᴴ M ψ = μ, lowest frequency first."""
 
-    Attributes
-    ----------
-    mu : (m,) array
-        1 / (ω² + σ) [s²].
-    psi : (n, m) array
-        One mode a column.
-    sigma : float
-        σ [rad²/s²], 0 if K alone is positive definite.
-    """
-
-    mu: Real
-    psi: NDArray[Any]
-    sigma: float
+    mu: Annotated[Real, "1 / (ω² + σ) [s²], (m,)."]
+    psi: Annotated[NDArray[Any], "One mode a column, (n, m)."]
+    sigma: Annotated[float, "σ [rad²/s²], 0 if K alone is positive definite."]
 
     @property
     def omega2(self) -> Real:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Self, TypeVar
+from typing import Annotated, Any, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -100,18 +100,10 @@ def _real(array: Any) -> FloatArray:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Matrix(ByContent):
-    """A square matrix of a scene; equal to another with the same entries.
+    """A square matrix of a scene; equal to another with the same entries."""
 
-    Attributes
-    ----------
-    array : (n, n) array
-        Read-only.
-    digest : str
-        Hash of the content.
-    """
-
-    array: FloatArray
-    digest: str = field(init=False)
+    array: Annotated[FloatArray, "Read-only, (n, n)."]
+    digest: Annotated[str, "Hash of the content."] = field(init=False)
 
     def __post_init__(self) -> None:
         array = np.asarray(self.array)
@@ -180,24 +172,12 @@ class Matrix(ByContent):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NormalModes(ByContent):
-    """Mass-normalised modes of a structure: q'' + 2 ζ ω q' + ω² q = φᵀ f, x = φ q.
+    """Mass-normalised modes of a structure: q'' + 2 ζ ω q' + ω² q = φᵀ f, x = φ q."""
 
-    Attributes
-    ----------
-    omega2 : (m,) array
-        Squares of the natural frequencies [rad²/s²]; 0 of a rigid body.
-    modes : (n, m) array
-        One mode a column, φᵀ M φ = 1 [kg^-1/2].
-    damping_ratio : (m,) array or None
-        ζ of each mode.
-    digest : str
-        Hash of the content.
-    """
-
-    omega2: FloatArray
-    modes: FloatArray
-    damping_ratio: FloatArray | None = None
-    digest: str = field(init=False)
+    omega2: Annotated[FloatArray, "Squares of the natural frequencies [rad²/s²], (m,); 0 of a rigid body."]
+    modes: Annotated[FloatArray, "One mode a column, φᵀ M φ = 1 [kg^-1/2], (n, m)."]
+    damping_ratio: Annotated[FloatArray | None, "ζ of each mode, (m,)."] = None
+    digest: Annotated[str, "Hash of the content."] = field(init=False)
 
     def __post_init__(self) -> None:
         omega2, modes = np.asarray(self.omega2), np.asarray(self.modes)

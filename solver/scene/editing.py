@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 from difflib import SequenceMatcher
 from enum import Enum
 from itertools import pairwise
-from typing import Any
+from typing import Annotated, Any
 
 from solver.scene.toml import MOST_INLINE, key_text, toml_text, value_text
 
@@ -48,30 +48,18 @@ class WritingKind(Enum):
 
 @dataclass(slots=True)
 class TextPlace:
-    """Where one part of a text stands.
-
-    Attributes
-    ----------
-    kind : Kind
-    start : int
-        Offset at which it is told: its key, its header, or itself in a list.
-    first, last : int
-        Its value is ``text[first:last]``; of a table under a header these are the lines below it.
-    keys : dict
-        The places in a table.
-    items : list
-        The places in a list.
-    blocks : list of (int, int)
-        The lines of its headers, with comments right above them, to where the next one's begin.
-    """
+    """Where one part of a text stands."""
 
     kind: WritingKind
-    start: int
-    first: int
+    start: Annotated[int, "Offset at which it is told: its key, its header, or itself in a list."]
+    first: Annotated[int, "Its value is ``text[first:last]``; of a table under a header the lines below it."]
     last: int
-    keys: dict[str, TextPlace] = field(default_factory=dict)
-    items: list[TextPlace] = field(default_factory=list)
-    blocks: list[list[int]] = field(default_factory=list)
+    keys: Annotated[dict[str, TextPlace], "The places in a table."] = field(default_factory=dict)
+    items: Annotated[list[TextPlace], "The places in a list."] = field(default_factory=list)
+    blocks: Annotated[
+        list[list[int]],
+        "The lines of its headers, with comments right above them, to where the next one's begin.",
+    ] = field(default_factory=list)
 
     def parts(self) -> Iterator[TextPlace]:
         """Itself and everything in it."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,38 +33,32 @@ Vector = tuple[float, float, float]
 
 @dataclass(slots=True)
 class Picture:
-    """One sector of a disk, or the whole of another structure.
+    """One sector of a disk, or the whole of another structure."""
 
-    Attributes
-    ----------
-    points : list
-        Places at rest [m]; of unit size where the scene tells none.
-    names, roles : list of str
-        Of each point: ``mesh``, ``node``, ``mass``, ``body``, ``contact`` or ``ground``.
-    moves : list
-        For each point and direction the factor of each DOF in its motion.
-    edges, ahead, faces : lists
-        Numbers of points: of the ends of lines, of lines whose second end is of the next sector, and of the
-        corners of triangles.
-    contacts : dict
-        Number of the point of each contact that is drawn.
-    to_scale : bool
-        Whether the scene tells the places.
-    notes : list of str
-        What is not drawn, and why.
-    """
-
-    to_scale: bool
+    to_scale: Annotated[bool, "Whether the scene tells the places."]
     axis: Vector
-    points: list[Sequence[float]] = field(default_factory=list)
-    names: list[str] = field(default_factory=list)
-    roles: list[str] = field(default_factory=list)
-    moves: list[Sequence[Mapping[str, float]]] = field(default_factory=list)
-    edges: list[tuple[int, int]] = field(default_factory=list)
-    ahead: list[tuple[int, int]] = field(default_factory=list)
-    faces: list[tuple[int, int, int]] = field(default_factory=list)
-    contacts: dict[str, int] = field(default_factory=dict)
-    notes: list[str] = field(default_factory=list)
+    points: Annotated[
+        list[Sequence[float]], "Places at rest [m]; of unit size where the scene tells none."
+    ] = field(default_factory=list)
+    names: Annotated[list[str], "Of each point."] = field(default_factory=list)
+    roles: Annotated[list[str], "``mesh``, ``node``, ``mass``, ``body``, ``contact`` or ``ground``."] = field(
+        default_factory=list
+    )
+    moves: Annotated[
+        list[Sequence[Mapping[str, float]]],
+        "For each point and direction the factor of each DOF in its motion.",
+    ] = field(default_factory=list)
+    edges: Annotated[list[tuple[int, int]], "Numbers of points: the ends of lines."] = field(
+        default_factory=list
+    )
+    ahead: Annotated[list[tuple[int, int]], "Those of lines whose second end is of the next sector."] = field(
+        default_factory=list
+    )
+    faces: Annotated[list[tuple[int, int, int]], "The corners of triangles."] = field(default_factory=list)
+    contacts: Annotated[dict[str, int], "Number of the point of each contact that is drawn."] = field(
+        default_factory=dict
+    )
+    notes: Annotated[list[str], "What is not drawn, and why."] = field(default_factory=list)
 
     def add(self, at: Sequence[float], name: str, role: str, moves: Sequence[Mapping[str, float]]) -> int:
         """Draw a point, and return its number."""

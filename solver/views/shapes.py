@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
@@ -32,39 +33,21 @@ _INSTANTS = 96
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Shape:
-    """How a scene moves over one period.
+    """How a scene moves over one period."""
 
-    Attributes
-    ----------
-    picture : Picture
-        Points at rest, and what is drawn between them.
-    unit : str
-        Of the motions: m, or 1/√kg of a mode that is linear.
-    frequency_hz : float
-        [Hz].
-    nodal_diameter : int or None
-        Of harmonic 1, negative for a wave that travels backward; None where it is no wave.
-    turn : float
-        Phase of harmonic 1 from a sector to the next [rad].
-    harmonics : (nk,) array
-        The mean, if it is there, and those that move something.
-    motions : (ns, nk, n_points, 3) array
-        Complex amplitudes; of one sector, or of each where all were solved.
-    amplitude : (ns, n_points) array
-        Largest motion of each point about its mean over the period.
-    states : dict
-        What every contact does, where it is known.
-    """
-
-    picture: Picture
-    unit: str
-    frequency_hz: float
-    nodal_diameter: int | None
-    turn: float
-    harmonics: Integer
-    motions: Complex
-    amplitude: Real
-    states: dict[str, str]
+    picture: Annotated[Picture, "Points at rest, and what is drawn between them."]
+    unit: Annotated[str, "Of the motions: m, or 1/√kg of a mode that is linear."]
+    frequency_hz: Annotated[float, "Its frequency [Hz]."]
+    nodal_diameter: Annotated[
+        int | None, "Of harmonic 1, negative for a wave that travels backward; None where it is no wave."
+    ]
+    turn: Annotated[float, "Phase of harmonic 1 from a sector to the next [rad]."]
+    harmonics: Annotated[Integer, "The mean, if it is there, and those that move something, (nk,)."]
+    motions: Annotated[
+        Complex, "Complex amplitudes, (ns, nk, n_points, 3); of one sector, or of each where all were solved."
+    ]
+    amplitude: Annotated[Real, "Largest motion of each point about its mean over the period, (ns, n_points)."]
+    states: Annotated[dict[str, str], "What every contact does, where it is known."]
 
 
 def deflection_shape(scene: Scene, solution: Solution) -> Shape:

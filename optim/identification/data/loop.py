@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 
@@ -37,30 +38,14 @@ _WORDS = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LoopRun(MeasuredRows):
-    """A hysteresis loop.
+    """A hysteresis loop."""
 
-    Attributes
-    ----------
-    contact : str
-        Name of the contact.
-    frequency_hz : float
-        Of the motion.
-    motion : (2H + 1,) array
-        Coefficients of the motion [m].
-    force : (2H + 1,) array
-        Coefficients of the measured force [N].
-    samples : int
-        They were made of.
-    sd : float or None
-        Standard deviation of a sample of the force [N].
-    """
-
-    contact: str
-    frequency_hz: float
-    motion: Real
-    force: Real
-    samples: int
-    sd: float | None
+    contact: Annotated[str, "Name of the contact."]
+    frequency_hz: Annotated[float, "Of the motion."]
+    motion: Annotated[Real, "Coefficients of the motion [m], (2H + 1,)."]
+    force: Annotated[Real, "Coefficients of the measured force [N], (2H + 1,)."]
+    samples: Annotated[int, "They were made of."]
+    sd: Annotated[float | None, "Standard deviation of a sample of the force [N]."]
 
     @property
     def scale(self) -> float:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Annotated
 
 import numpy as np
 
@@ -21,24 +22,16 @@ from solver.scene.scene import Scene
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Predicted:
-    """What a model says of every observation of a run.
+    """What a model says of every observation of a run."""
 
-    Attributes
-    ----------
-    values : (n,) array
-        In the order of `Measured.observations`; NaN where the point was not reached.
-    slopes : (n, n_paths) array
-        Derivatives by the parameter paths.
-    reached : (n,) array of bool
-        Whether the response of the observation's point was found.
-    states : mapping
-        Contact to the state codes it had, (n_points,); -1 where not reached.
-    """
-
-    values: Real
-    slopes: Real
-    reached: np.ndarray
-    states: Mapping[str, Integer] = field(default_factory=dict)
+    values: Annotated[
+        Real, "In the order of `Measured.observations`, (n,); NaN where the point was not reached."
+    ]
+    slopes: Annotated[Real, "Derivatives by the parameter paths, (n, n_paths)."]
+    reached: Annotated[np.ndarray, "Whether the response of the observation's point was found, (n,) of bool."]
+    states: Annotated[
+        Mapping[str, Integer], "Contact to the state codes it had, (n_points,); -1 where not reached."
+    ] = field(default_factory=dict)
 
 
 class RunModel(ABC):
@@ -57,18 +50,10 @@ class RunModel(ABC):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MeasuredRows(ABC):
-    """One run: rows measured under the same conditions.
+    """One run: rows measured under the same conditions."""
 
-    Attributes
-    ----------
-    source : str
-        The file, or the place in a description.
-    conditions : mapping
-        Parameter path to value.
-    """
-
-    source: str
-    conditions: Mapping[str, float]
+    source: Annotated[str, "The file, or the place in a description."]
+    conditions: Annotated[Mapping[str, float], "Parameter path to value."]
 
     @property
     @abstractmethod
@@ -135,30 +120,17 @@ class Column:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DataKind:
-    """A kind of measured data: what files and descriptions of it have, and how it is read.
+    """A kind of measured data: what files and descriptions of it have, and how it is read."""
 
-    Attributes
-    ----------
-    name : str
-        Its word, ``kind`` of a head.
-    help : str
-        A sentence of Markdown.
-    columns : tuple of Column
-        Those it knows.
-    marks : tuple of tuples of str
-        Columns of which all those of one group tell the kind.
-    words : mapping
-        What its head may say besides, each with its meaning.
-    read : callable
-        From a scene and the table of one run, checked for numbers, to the run.
-    """
-
-    name: str
-    help: str
-    columns: tuple[Column, ...]
-    marks: tuple[tuple[str, ...], ...]
-    words: Mapping[str, str]
-    read: Callable[[Scene, Table], MeasuredRows]
+    name: Annotated[str, "Its word, ``kind`` of a head."]
+    help: Annotated[str, "A sentence of Markdown."]
+    columns: Annotated[tuple[Column, ...], "Those it knows."]
+    marks: Annotated[tuple[tuple[str, ...], ...], "Columns of which all those of one group tell the kind."]
+    words: Annotated[Mapping[str, str], "What its head may say besides, each with its meaning."]
+    read: Annotated[
+        Callable[[Scene, Table], MeasuredRows],
+        "From a scene and the table of one run, checked for numbers, to the run.",
+    ]
 
 
 SHIPPED = (

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 
@@ -34,28 +35,14 @@ _WORDS = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ModeRun(MeasuredRows):
-    """Frequency and damping ratio over the amplitude.
+    """Frequency and damping ratio over the amplitude."""
 
-    Attributes
-    ----------
-    amplitude : (m,) array
-        Modal amplitudes [√kg m].
-    frequency_hz, damping_ratio : (m,) array or None
-        What was measured of each.
-    sd : (n,) array or None
-        Standard deviation of each observation.
-    mode : int
-        Its number.
-    nodal_diameter : int or None
-        Of a cyclic structure.
-    """
-
-    amplitude: Real
-    frequency_hz: Real | None
-    damping_ratio: Real | None
-    sd: Real | None
-    mode: int
-    nodal_diameter: int | None
+    amplitude: Annotated[Real, "Modal amplitudes [√kg m], (m,)."]
+    frequency_hz: Annotated[Real | None, "Frequencies measured [Hz], (m,)."]
+    damping_ratio: Annotated[Real | None, "Damping ratios measured, (m,)."]
+    sd: Annotated[Real | None, "Standard deviation of each observation, (n,)."]
+    mode: Annotated[int, "Its number."]
+    nodal_diameter: Annotated[int | None, "Of a cyclic structure."]
 
     @property
     def observations(self) -> Real:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 
@@ -134,30 +135,20 @@ _WORDS = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ResponseRun(MeasuredRows):
-    """A response over frequency.
+    """A response over frequency."""
 
-    Attributes
-    ----------
-    frequency_hz : (m,) array
-        In the order of the sweep.
-    data : (m,) array
-        Displacements [m]; complex of `Quantity.COMPLEX`, with the phase of an excitation of phase 0.
-    sd : (m,) array or None
-        Standard deviation of each, of a complex one of its real and its imaginary part [m].
-    quantity : Quantity
-        What was measured.
-    harmonic : int
-        Of an amplitude or a complex one.
-    dof : str
-        Where.
-    """
-
-    frequency_hz: Real
-    data: Real | Complex
-    sd: Real | None
-    quantity: Quantity
-    harmonic: int
-    dof: str
+    frequency_hz: Annotated[Real, "In the order of the sweep, (m,)."]
+    data: Annotated[
+        Real | Complex,
+        "Displacements [m], (m,); complex of `Quantity.COMPLEX`, with the phase of an excitation of phase 0.",
+    ]
+    sd: Annotated[
+        Real | None,
+        "Standard deviation of each, of a complex one of its real and its imaginary part [m], (m,).",
+    ]
+    quantity: Annotated[Quantity, "What was measured."]
+    harmonic: Annotated[int, "Of an amplitude or a complex one."]
+    dof: Annotated[str, "Where."]
 
     @property
     def parts(self) -> int:

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from itertools import pairwise
+from typing import Annotated
 
 import numpy as np
 
@@ -35,21 +36,11 @@ class Dimension(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Unit:
-    """How a column becomes SI.
+    """How a column becomes SI."""
 
-    Attributes
-    ----------
-    factor : float
-        Of its numbers, to Hz, m, deg, N or s and their derivatives.
-    order : int
-        0 of a displacement, 1 of a velocity, 2 of an acceleration.
-    per_force : bool
-        Whether it is a motion for each newton of excitation.
-    """
-
-    factor: float = 1.0
-    order: int = 0
-    per_force: bool = False
+    factor: Annotated[float, "Of its numbers, to Hz, m, deg, N or s and their derivatives."] = 1.0
+    order: Annotated[int, "0 of a displacement, 1 of a velocity, 2 of an acceleration."] = 0
+    per_force: Annotated[bool, "Whether it is a motion for each newton of excitation."] = False
 
 
 _PLAIN = {
@@ -98,33 +89,24 @@ def split_head(text: str) -> tuple[str, str | None]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Table:
-    """Rows measured under conditions.
+    """Rows measured under conditions."""
 
-    Attributes
-    ----------
-    source : str
-        The file, or the place in a description; messages begin with it.
-    columns : mapping
-        Name to (n,) numbers, in Hz, m (or m/s, m/s²), deg, N, s.
-    units : mapping
-        Name to what unit it had, of columns of a motion.
-    conditions : mapping
-        Parameter path to the value it had for all rows; a column named as a path has a value for each row.
-    words : mapping
-        What else the head says: ``dof``, ``contact``, ``kind``.
-    lines : (n,) array
-        Line of each row in the file; empty where there are no lines.
-    place : Place
-        Where it stands in a description.
-    """
-
-    source: str
-    columns: Mapping[str, Real]
-    units: Mapping[str, Unit] = field(default_factory=dict)
-    conditions: Mapping[str, float] = field(default_factory=dict)
-    words: Mapping[str, str] = field(default_factory=dict)
-    lines: Integer = field(default_factory=lambda: np.zeros(0, np.int64))
-    place: Place = ("data",)
+    source: Annotated[str, "The file, or the place in a description; messages begin with it."]
+    columns: Annotated[Mapping[str, Real], "Name to (n,) numbers, in Hz, m (or m/s, m/s²), deg, N, s."]
+    units: Annotated[Mapping[str, Unit], "Name to what unit it had, of columns of a motion."] = field(
+        default_factory=dict
+    )
+    conditions: Annotated[
+        Mapping[str, float],
+        "Parameter path to the value it had for all rows; a column named as a path has a value for each row.",
+    ] = field(default_factory=dict)
+    words: Annotated[Mapping[str, str], "What else the head says: ``dof``, ``contact``, ``kind``."] = field(
+        default_factory=dict
+    )
+    lines: Annotated[Integer, "Line of each row in the file, (n,); empty where there are no lines."] = field(
+        default_factory=lambda: np.zeros(0, np.int64)
+    )
+    place: Annotated[Place, "Where it stands in a description."] = ("data",)
 
     def __len__(self) -> int:
         return len(next(iter(self.columns.values()), ()))

@@ -12,6 +12,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 from optim.errors import DataError
 from optim.identification.data.measured import known_columns
@@ -73,21 +74,13 @@ class Choice:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Layout:
-    """How a text is laid out.
+    """How a text is laid out."""
 
-    Attributes
-    ----------
-    separator, decimal : between cells, and before decimals.
-    head_line : of the headings, from 1.
-    heads : as they stand there, with the units that a line below them has.
-    rows : line to its cells.
-    """
-
-    separator: str
-    decimal: str
-    head_line: int
-    heads: tuple[str, ...]
-    rows: Mapping[int, Sequence[str]]
+    separator: Annotated[str, "Between cells."]
+    decimal: Annotated[str, "Before decimals."]
+    head_line: Annotated[int, "Of the headings, from 1."]
+    heads: Annotated[tuple[str, ...], "As they stand there, with the units that a line below them has."]
+    rows: Annotated[Mapping[int, Sequence[str]], "Line to its cells."]
 
 
 def layout_of(text: str, name: str) -> Layout:

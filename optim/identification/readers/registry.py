@@ -10,6 +10,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
@@ -31,24 +32,15 @@ SHIPPED = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DataFormat:
-    """A format of files with measured data.
+    """A format of files with measured data."""
 
-    Attributes
-    ----------
-    name : str
-        What people call it.
-    suffixes : tuple of str
-        Endings, lower case, with their dots.
-    help : str
-        How units and conditions stand in it, a sentence of Markdown.
-    read : callable
-        From a path and the names a scene has (parameter paths) to the tables in it.
-    """
-
-    name: str
-    suffixes: tuple[str, ...]
-    help: str
-    read: Callable[[Path, frozenset[str]], list[Table]]
+    name: Annotated[str, "What people call it."]
+    suffixes: Annotated[tuple[str, ...], "Endings, lower case, with their dots."]
+    help: Annotated[str, "How units and conditions stand in it, a sentence of Markdown."]
+    read: Annotated[
+        Callable[[Path, frozenset[str]], list[Table]],
+        "From a path and the names a scene has (parameter paths) to the tables in it.",
+    ]
 
 
 FORMATS: Kinds[DataFormat] = Kinds(DataFormat, "format", lambda one: one.suffixes, SHIPPED, "FORMAT")

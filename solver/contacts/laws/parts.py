@@ -6,7 +6,7 @@ import cmath
 import math
 from dataclasses import dataclass, field, replace
 from enum import Enum
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
@@ -17,22 +17,15 @@ _AROUND, _BOTH_WAYS = 20.0, 4.0  # times its value, how far a parameter is varie
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Span:
-    """What a slider of a parameter covers.
+    """What a slider of a parameter covers."""
 
-    Attributes
-    ----------
-    low, high : float
-        Its ends.
-    of : str or None
-        The parameter of whose absolute value they are multiples; None: they are values as they stand.
-    logarithmic : bool
-        Whether equal steps are equal ratios.
-    """
-
-    low: float
-    high: float
-    of: str | None = None
-    logarithmic: bool = False
+    low: Annotated[float, "Its lower end."]
+    high: Annotated[float, "Its upper one."]
+    of: Annotated[
+        str | None,
+        "The parameter of whose absolute value they are multiples; None: they are values as they stand.",
+    ] = None
+    logarithmic: Annotated[bool, "Whether equal steps are equal ratios."] = False
 
 
 def usual_span(key: str, least: float) -> Span:
@@ -44,48 +37,32 @@ def usual_span(key: str, least: float) -> Span:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LawQuantity:
-    """A parameter of a law.
+    """A parameter of a law."""
 
-    Attributes
-    ----------
-    column : int
-        Of the contact table, see `solver.contacts.kernels.columns`.
-    unit : str
-        Empty of a pure number.
-    wanted : str
-        What a value must be, for the message of a bad one.
-    least : float
-        Smallest value that means something to a continuation.
-    unlike_half_waves : str
-        Why a change of it may call for even harmonics: "changes …"; empty if it does not.
-    breaks_symmetry : bool
-        Whether with it a motion and its negative half a period later are answered differently.
-    varies_load : bool
-        Whether it makes the normal load vary.
-    load_order : int
-        The harmonic of the load that it makes vary.
-    symbol : str
-        How people write it; as its key if empty.
-    otherwise : tuple of str or None
-        The parameters whose product it is where a scene leaves it out; None: it is then not there.
-    by_hand : bool
-        Whether it is worth a slider.
-    covered : Span or None
-        What its slider covers; None: values of the size it has, of both signs if it may have both.
-    """
-
-    column: int
-    unit: str
-    wanted: str = "must be a number from -1e15 to 1e15"
-    least: float = -math.inf
-    unlike_half_waves: str = ""
-    breaks_symmetry: bool = False
-    varies_load: bool = False
-    load_order: int = 1
-    symbol: str = ""
-    otherwise: tuple[str, ...] | None = None
-    by_hand: bool = True
-    covered: Span | None = None
+    column: Annotated[int, "Of the contact table, see `solver.contacts.kernels.columns`."]
+    unit: Annotated[str, "Empty of a pure number."]
+    wanted: Annotated[str, "What a value must be, for the message of a bad one."] = (
+        "must be a number from -1e15 to 1e15"
+    )
+    least: Annotated[float, "Smallest value that means something to a continuation."] = -math.inf
+    unlike_half_waves: Annotated[
+        str, 'Why a change of it may call for even harmonics: "changes …"; empty if it does not.'
+    ] = ""
+    breaks_symmetry: Annotated[
+        bool, "Whether with it a motion and its negative half a period later are answered differently."
+    ] = False
+    varies_load: Annotated[bool, "Whether it makes the normal load vary."] = False
+    load_order: Annotated[int, "The harmonic of the load that it makes vary."] = 1
+    symbol: Annotated[str, "How people write it; as its key if empty."] = ""
+    otherwise: Annotated[
+        tuple[str, ...] | None,
+        "The parameters whose product it is where a scene leaves it out; None: it is then not there.",
+    ] = None
+    by_hand: Annotated[bool, "Whether it is worth a slider."] = True
+    covered: Annotated[
+        Span | None,
+        "What its slider covers; None: values of the size it has, of both signs if it may have both.",
+    ] = None
 
     def span(self, key: str) -> Span | None:
         """Return what its slider covers as the parameter `key`; None without a slider."""
@@ -96,21 +73,13 @@ class LawQuantity:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NormalLoad:
-    """A given normal load N(τ) = mean + amplitude cos(τ + phase) + Σ A_k cos(kτ + φ_k), k ≥ 2 [N, rad].
-
-    Attributes
-    ----------
-    ratio : float or None
-        Of the amplitude to the mean where it is tied to it.
-    higher : tuple of (float, float)
-        Amplitude and phase of the harmonics 2, 3, …
-    """
+    """A given normal load N(τ) = mean + amplitude cos(τ + phase) + Σ A_k cos(kτ + φ_k), k ≥ 2 [N, rad]."""
 
     mean: float
     amplitude: float
     phase: float
-    ratio: float | None = None
-    higher: tuple[tuple[float, float], ...] = ()
+    ratio: Annotated[float | None, "Of the amplitude to the mean where it is tied to it."] = None
+    higher: Annotated[tuple[tuple[float, float], ...], "Amplitude and phase of the harmonics 2, 3, …"] = ()
 
     @property
     def waves(self) -> tuple[tuple[float, float], ...]:
@@ -157,31 +126,17 @@ class NormalLoad:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Slider:
-    """Friction with a limit: a spring and a slider that moves where the spring's force reaches μN.
+    """Friction with a limit: a spring and a slider that moves where the spring's force reaches μN."""
 
-    Attributes
-    ----------
-    kt : float
-        Stiffness of the spring in the first direction it slides in [N/m].
-    kt_second : float or None
-        That of the second direction [N/m]; None: the same.
-    mu : float
-        Friction coefficient.
-    ports : tuple of int
-        The relative motions it slides along.
-    normal_port, normal_stiffness
-        The motion that changes the load, and by how much [N/m]; None and 0 where the load is given.
-    limits_apart : bool
-        Each direction has its own limit, in place of one for the whole force.
-    """
-
-    kt: float
-    mu: float
-    kt_second: float | None = None
-    ports: tuple[int, ...] = (0,)
-    normal_port: int | None = None
-    normal_stiffness: float = 0.0
-    limits_apart: bool = False
+    kt: Annotated[float, "Stiffness of the spring in the first direction it slides in [N/m]."]
+    mu: Annotated[float, "Friction coefficient."]
+    kt_second: Annotated[float | None, "That of the second direction [N/m]; None: the same."] = None
+    ports: Annotated[tuple[int, ...], "The relative motions it slides along."] = (0,)
+    normal_port: Annotated[int | None, "The motion that changes the load; None where it is given."] = None
+    normal_stiffness: Annotated[float, "By how much [N/m]; 0 where it is given."] = 0.0
+    limits_apart: Annotated[
+        bool, "Each direction has its own limit, in place of one for the whole force."
+    ] = False
 
     @property
     def stiffnesses(self) -> tuple[float, ...]:
@@ -238,52 +193,33 @@ class Follows(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Row:
-    """A contact, or a part of one, as the time march follows it.
+    """A contact, or a part of one, as the time march follows it."""
 
-    Attributes
-    ----------
-    name : str
-        As the march calls it.
-    port : int
-        Which of the contact's relative motions it pulls along.
-    kt, mu, N0, N1, N1_phase : float
-        Stiffness [N/m], friction coefficient, normal load [N, rad].
-    higher : tuple of (float, float)
-        Amplitude and phase of the load's harmonics from the second on [N, rad].
-    normal_port, kn, rest : of a row that rubs
-        Which of them is the normal motion, its stiffness [N/m], and the part of the normal force that is in
-        equilibrium at rest [N].
-    presses : float
-        0.0 where another row has the normal force already, else 1.0.
-    gap : float
-        Where a spring on one side begins [m].
-    powers : tuple of float
-        a1, a2, … of a polynomial spring [N/m^j]; `kt` is then the size of a1.
-    history, in_steps, states, damping, numbers : of a law given by functions
-        Its number (`solver.jit.law_functions`), whether it goes from sample to sample, how
-        many states it has, its damping at rest [N s/m], and its parameters.
-    """
-
-    name: str
-    port: int = 0
+    name: Annotated[str, "As the march calls it."]
+    port: Annotated[int, "Which of the contact's relative motions it pulls along."] = 0
     follows: Follows = Follows.FRICTION
-    kt: float = 0.0
-    mu: float = 0.0
-    N0: float = 0.0
-    N1: float = 0.0
-    N1_phase: float = 0.0
-    higher: tuple[tuple[float, float], ...] = ()
-    normal_port: int | None = None
-    kn: float = 0.0
-    rest: float = 0.0
-    presses: float = 1.0
-    gap: float = 0.0
-    powers: tuple[float, ...] = field(default=())
-    history: int = 0
-    in_steps: bool = False
-    states: int = 0
-    damping: float = 0.0
-    numbers: tuple[float, ...] = field(default=())
+    kt: Annotated[float, "Stiffness [N/m]."] = 0.0
+    mu: Annotated[float, "Friction coefficient."] = 0.0
+    N0: Annotated[float, "Mean normal load [N]."] = 0.0
+    N1: Annotated[float, "Its amplitude [N]."] = 0.0
+    N1_phase: Annotated[float, "Its phase [rad]."] = 0.0
+    higher: Annotated[
+        tuple[tuple[float, float], ...],
+        "Amplitude and phase of the load's harmonics from the second on [N, rad].",
+    ] = ()
+    normal_port: Annotated[int | None, "Of a row that rubs: which of them is the normal motion."] = None
+    kn: Annotated[float, "Its stiffness [N/m]."] = 0.0
+    rest: Annotated[float, "The part of the normal force that is in equilibrium at rest [N]."] = 0.0
+    presses: Annotated[float, "0.0 where another row has the normal force already, else 1.0."] = 1.0
+    gap: Annotated[float, "Where a spring on one side begins [m]."] = 0.0
+    powers: Annotated[
+        tuple[float, ...], "a1, a2, … of a polynomial spring [N/m^j]; `kt` is then the size of a1."
+    ] = field(default=())
+    history: Annotated[int, "Of a law given by functions: its number (`solver.jit.law_functions`)."] = 0
+    in_steps: Annotated[bool, "Whether it goes from sample to sample."] = False
+    states: Annotated[int, "How many states it has."] = 0
+    damping: Annotated[float, "Its damping at rest [N s/m]."] = 0.0
+    numbers: Annotated[tuple[float, ...], "Its parameters."] = field(default=())
 
 
 class ContactMotion(Enum):

@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
@@ -49,28 +49,24 @@ class StateEntry(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StatePiece:
-    """One state of a contact with m motions.
+    """One state of a contact with m motions."""
 
-    Attributes
-    ----------
-    begin, end : float
-        When it lasts [rad]; `begin` may be any angle, and the end at most a period later.
-    rates : Rates or callable
-        How it follows; of angles (t,), as (t, …) arrays, where that changes within the state.
-    entry : Entry or None
-        None where nothing is remembered, or a slider is held all the time.
-    carried : (s, m) array
-        How what is remembered moves with a constant displacement that it gives way to.
-    edges : tuple of float
-        Angles between begin and end where `rates` is not smooth or begins to change faster.
-    """
-
-    begin: float
-    end: float
-    rates: Rates | Callable[[Real], Rates]
-    entry: StateEntry | None = None
-    carried: Real
-    edges: tuple[float, ...] = ()
+    begin: Annotated[float, "When it begins [rad], at any angle."]
+    end: Annotated[float, "When it ends [rad], at most a period later."]
+    rates: Annotated[
+        Rates | Callable[[Real], Rates],
+        "How it follows; of angles (t,), as (t, …) arrays, where that changes within the state.",
+    ]
+    entry: Annotated[
+        StateEntry | None, "None where nothing is remembered, or a slider is held all the time."
+    ] = None
+    carried: Annotated[
+        Real, "How what is remembered moves with a constant displacement that it gives way to, (s, m)."
+    ]
+    edges: Annotated[
+        tuple[float, ...],
+        "Angles between begin and end where `rates` is not smooth or begins to change faster.",
+    ] = ()
 
     @property
     def lasts(self) -> float:

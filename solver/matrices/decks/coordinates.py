@@ -10,7 +10,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,20 +30,11 @@ class CoordinateKind(Enum):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CoordinateSystem:
-    """A coordinate system.
-
-    Attributes
-    ----------
-    kind : Kind
-    origin : (3,) array
-        In the global system.
-    axes : (3, 3) array
-        Directions of x, y and z as columns, orthonormal and right-handed.
-    """
+    """A coordinate system."""
 
     kind: CoordinateKind
-    origin: FloatArray
-    axes: FloatArray
+    origin: Annotated[FloatArray, "In the global system, (3,)."]
+    axes: Annotated[FloatArray, "Directions of x, y and z as columns, orthonormal and right-handed, (3, 3)."]
 
     def places(self, given: FloatArray) -> FloatArray:
         """Places (n, 3) in the global system of the numbers (n, 3) that tell them in this one."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
@@ -18,20 +19,11 @@ _MOST_MEMBERS = 2_000_000
 
 @dataclass(frozen=True, slots=True)
 class DeckFile:
-    """A file of a deck.
-
-    Attributes
-    ----------
-    path : Path
-    alone : bool
-        Whether it may not include other files, as a stranger's.
-    depth : int
-        How many files include it.
-    """
+    """A file of a deck."""
 
     path: Path
-    alone: bool = False
-    depth: int = 0
+    alone: Annotated[bool, "Whether it may not include other files, as a stranger's."] = False
+    depth: Annotated[int, "How many files include it."] = 0
 
     def lines(self) -> Iterator[str]:
         """The lines of the file, one after the other."""
@@ -84,24 +76,21 @@ def real(text: str) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Deck:
-    """What a deck says of its nodes.
+    """What a deck says of its nodes."""
 
-    Attributes
-    ----------
-    nodes : dict
-        Position of each node, in the units of the deck.
-    sets : dict
-        Nodes of each set, by its name in capitals.
-    elements : list of (Shape, (n, nodes) array)
-        If they were asked for: those of ``*ELEMENT`` that can be drawn.
-    systems : dict
-        Coordinate system along whose axes a node moves, where it is not the global one.
-    """
-
-    nodes: dict[int, tuple[float, float, float]] = field(default_factory=dict)
-    sets: dict[str, list[int]] = field(default_factory=dict)
-    elements: list[tuple[ElementShape, Integer]] = field(default_factory=list)
-    systems: dict[int, CoordinateSystem] = field(default_factory=dict)
+    nodes: Annotated[
+        dict[int, tuple[float, float, float]], "Position of each node, in the units of the deck."
+    ] = field(default_factory=dict)
+    sets: Annotated[dict[str, list[int]], "Nodes of each set, by its name in capitals."] = field(
+        default_factory=dict
+    )
+    elements: Annotated[
+        list[tuple[ElementShape, Integer]], "If they were asked for: those of ``*ELEMENT`` that can be drawn."
+    ] = field(default_factory=list)
+    systems: Annotated[
+        dict[int, CoordinateSystem],
+        "Coordinate system along whose axes a node moves, where it is not the global one.",
+    ] = field(default_factory=dict)
 
 
 def positions(deck: Deck, nodes: Sequence[int]) -> FloatArray:

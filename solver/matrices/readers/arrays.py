@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,23 +19,18 @@ MOST_ROWS = 10_000_000
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Labelled:
-    """A matrix of a file.
+    """A matrix of a file."""
 
-    Attributes
-    ----------
-    matrix : sparse (n, n)
-    labels : tuple of Label or None
-        Node and component of each row, where the file tells.
-    held : frozenset of Label
-        Rows that a boundary condition holds, which are no DOFs.
-    sized : bool
-        Whether the file tells how many rows there are; else empty ones at the end do not show.
-    """
-
-    matrix: coo_array
-    labels: tuple[Label, ...] | None = None
-    held: frozenset[Label] = frozenset()
-    sized: bool = True
+    matrix: Annotated[coo_array, "Sparse (n, n)."]
+    labels: Annotated[tuple[Label, ...] | None, "Node and component of each row, where the file tells."] = (
+        None
+    )
+    held: Annotated[frozenset[Label], "Rows that a boundary condition holds, which are no DOFs."] = (
+        frozenset()
+    )
+    sized: Annotated[
+        bool, "Whether the file tells how many rows there are; else empty ones at the end do not show."
+    ] = True
 
 
 def mirrored(

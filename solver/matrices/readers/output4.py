@@ -17,7 +17,7 @@ import struct
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,24 +34,16 @@ _STRING = 65536
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Heading:
-    """The first record of a matrix.
-
-    Attributes
-    ----------
-    double, complex : bool
-        What a number is.
-    words : int
-        Words a real number has.
-    """
+    """The first record of a matrix."""
 
     name: str
     columns: int
     rows: int
     form: int
     bigmat: bool
-    double: bool
-    complex: bool
-    words: int
+    double: Annotated[bool, "Whether a number is of double precision."]
+    complex: Annotated[bool, "Whether it is complex."]
+    words: Annotated[int, "Words a real number has."]
 
     @classmethod
     def of(cls, counts: Sequence[int], name: str, where: str, *, word: int = 4) -> Heading:

@@ -13,7 +13,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,27 +30,15 @@ Array = NDArray[Any]  # real, or complex where the matrices are Hermitian: a nod
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reduced:
-    """Matrices of the DOFs in use, in their order, followed by one coordinate for each mode kept.
+    """Matrices of the DOFs in use, in their order, followed by one coordinate for each mode kept."""
 
-    Attributes
-    ----------
-    matrices : dict
-        M, K and, if there was one, C, each (n, n), Hermitian.
-    modes : int
-        Modes kept.
-    highest_hz : float
-        Frequency of the highest of them; 0 if there is none.
-    quality : Quality
-        What the reduction is good for.
-    basis : (rows, n) array or None
-        The motions of the full model that the coordinates stand for, if asked for.
-    """
-
-    matrices: dict[str, Array]
-    modes: int
-    highest_hz: float
-    quality: Quality
-    basis: Array | None = None
+    matrices: Annotated[dict[str, Array], "M, K and, if there was one, C, each (n, n), Hermitian."]
+    modes: Annotated[int, "Modes kept."]
+    highest_hz: Annotated[float, "Frequency of the highest of them; 0 if there is none."]
+    quality: Annotated[Quality, "What the reduction is good for."]
+    basis: Annotated[
+        Array | None, "The motions of the full model that the coordinates stand for, if asked for, (rows, n)."
+    ] = None
 
 
 def craig_bampton(

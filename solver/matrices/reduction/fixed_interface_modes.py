@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -114,29 +114,15 @@ _BODY = 6
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Interior:
-    """K − σ M of the rest, factorised.
+    """K − σ M of the rest, factorised."""
 
-    Attributes
-    ----------
-    K, M : sparse (n, n)
-    couplings : dict
-        K and M between the rest and the DOFs in use, (n, n_kept).
-    shift : float
-        σ <= 0 [rad²/s²], 0 if the DOFs in use hold the rest.
-    solve : the inverse of K − σ M
-    follow : (n, n_kept) array
-        How the rest follows a unit displacement of each DOF in use.
-    residual : float
-        Of that solution, relative to the forces it balances.
-    """
-
-    K: Any
-    M: Any
-    couplings: dict[str, Array]
-    shift: float
-    solve: Any
-    follow: Array
-    residual: float
+    K: Annotated[Any, "Stiffness, sparse, (n, n)."]
+    M: Annotated[Any, "Mass, sparse, (n, n)."]
+    couplings: Annotated[dict[str, Array], "K and M between the rest and the DOFs in use, (n, n_kept)."]
+    shift: Annotated[float, "σ <= 0 [rad²/s²], 0 if the DOFs in use hold the rest."]
+    solve: Annotated[Any, "The inverse of K − σ M."]
+    follow: Annotated[Array, "How the rest follows a unit displacement of each DOF in use, (n, n_kept)."]
+    residual: Annotated[float, "Of that solution, relative to the forces it balances."]
 
 
 def interior(K: Any, M: Any, rest: NDArray[np.int64], kept: NDArray[np.int64]) -> Interior:

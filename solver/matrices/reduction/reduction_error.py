@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,37 +21,24 @@ GOOD = 1e-3  # relative error of a frequency that is still called good
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Quality:
-    """What was kept and what it is worth.
+    """What was kept and what it is worth."""
 
-    Attributes
-    ----------
-    held_hz : (m,) array
-        Frequencies of the modes kept, the DOFs in use held [Hz].
-    effective_mass : (m, n_kept) array
-        Share of the inertia of the rest, when one DOF in use is moved, that each mode carries; (m, 0) where
-        it was not asked for.
-    system_hz : (n,) array
-        Frequencies of the reduced model without contacts [Hz].
-    system_error : (n,) array
-        Estimated relative error of each; infinite above the modes kept.
-    good_to_hz : float
-        Frequency up to which every error is below `GOOD` [Hz].
-    static_residual : float
-        Forces left over by the static solutions, relative: how exact the static stiffness is.
-    rigid_body_modes : int
-        Of the reduced model.
-    shift_hz : float
-        sqrt(−σ) / 2π of the shift that a free rest needed, else 0 [Hz].
-    """
-
-    held_hz: FloatArray
-    effective_mass: FloatArray
-    system_hz: FloatArray
-    system_error: FloatArray
-    good_to_hz: float
-    static_residual: float
-    rigid_body_modes: int
-    shift_hz: float
+    held_hz: Annotated[FloatArray, "Frequencies of the modes kept, the DOFs in use held [Hz], (m,)."]
+    effective_mass: Annotated[
+        FloatArray,
+        "Share of the inertia of the rest, when one DOF in use is moved, that each mode carries, (m, "
+        "n_kept); (m, 0) where it was not asked for.",
+    ]
+    system_hz: Annotated[FloatArray, "Frequencies of the reduced model without contacts [Hz], (n,)."]
+    system_error: Annotated[
+        FloatArray, "Estimated relative error of each, (n,); infinite above the modes kept."
+    ]
+    good_to_hz: Annotated[float, "Frequency up to which every error is below `GOOD` [Hz]."]
+    static_residual: Annotated[
+        float, "Forces left over by the static solutions, relative: how exact the static stiffness is."
+    ]
+    rigid_body_modes: Annotated[int, "Of the reduced model."]
+    shift_hz: Annotated[float, "sqrt(−σ) / 2π of the shift that a free rest needed, else 0 [Hz]."]
 
     @property
     def mass_carried(self) -> FloatArray:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,26 +23,19 @@ class DiameterMatrices(ByContent):
     """M, K and maybe C of one sector at some nodal diameters; equal to another with the same content.
 
     The first coordinates are DOFs, the same at each nodal diameter; the others may be modes of their own.
-
-    Attributes
-    ----------
-    diameters : tuple of int
-        Ascending, each from 0 to half the number of sectors; that of n backward is the complex conjugate.
-    M, K : (nd, n, n) array
-        Hermitian; read-only.
-    C : (nd, n, n) array or None
-    parts : PartsAcross or None
-        Parts that mistuning may scale, between the nodal diameters.
-    digest : str
-        Hash of the content.
     """
 
-    diameters: tuple[int, ...]
-    M: ComplexArray
-    K: ComplexArray
-    C: ComplexArray | None = None
-    parts: PartsAcross | None = None
-    digest: str = field(init=False)
+    diameters: Annotated[
+        tuple[int, ...],
+        "Ascending, each from 0 to half the number of sectors; that of n backward is the complex conjugate.",
+    ]
+    M: Annotated[ComplexArray, "Hermitian and read-only, (nd, n, n)."]
+    K: Annotated[ComplexArray, "As M."]
+    C: Annotated[ComplexArray | None, "(nd, n, n)."] = None
+    parts: Annotated[PartsAcross | None, "Parts that mistuning may scale, between the nodal diameters."] = (
+        None
+    )
+    digest: Annotated[str, "Hash of the content."] = field(init=False)
 
     def __post_init__(self) -> None:
         given = {"M": self.M, "K": self.K} | ({} if self.C is None else {"C": self.C})

@@ -10,6 +10,7 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,18 +27,10 @@ _BENT = math.radians(25.0)  # between the normals of two faces
 
 @dataclass(frozen=True, slots=True)
 class ElementShape:
-    """A kind of element: how many nodes it has, and the faces between its corners.
+    """A kind of element: how many nodes it has, and the faces between its corners."""
 
-    Attributes
-    ----------
-    nodes : int
-        Of the element, those on its edges too.
-    faces : tuple of tuples of int
-        Corners of each face in turn, three or four.
-    """
-
-    nodes: int
-    faces: tuple[tuple[int, ...], ...]
+    nodes: Annotated[int, "Of the element, those on its edges too."]
+    faces: Annotated[tuple[tuple[int, ...], ...], "Corners of each face in turn, three or four."]
 
 
 _TETRAHEDRON = ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0))

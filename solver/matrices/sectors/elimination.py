@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,19 +52,13 @@ def phase_factor(diameter: int, sectors: int) -> complex | float:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Elimination:
-    """P0 and P1, sparse (n, n_kept), and the rows kept.
+    """P0 and P1, sparse (n, n_kept), and the rows kept."""
 
-    Attributes
-    ----------
-    kept : (n_kept,) array
-        Rows of the sector that are not on its high boundary, ascending.
-    here, beyond : sparse
-        P0 and P1.
-    """
-
-    kept: NDArray[np.int64]
-    here: Any
-    beyond: Any
+    kept: Annotated[
+        NDArray[np.int64], "Rows of the sector that are not on its high boundary, ascending, (n_kept,)."
+    ]
+    here: Annotated[Any, "P0, sparse."]
+    beyond: Annotated[Any, "P1, sparse."]
 
     def of(self, matrix: Any) -> Circulant:
         """What is left of a matrix of the sector, dense or sparse as it is."""

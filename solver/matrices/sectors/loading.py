@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from scipy.sparse import csr_array
 
@@ -30,21 +30,12 @@ DEFAULT_AXIS = (0.0, 0.0, 1.0)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Boundaries:
-    """The boundaries of a sector as rows, and the axis.
+    """The boundaries of a sector as rows, and the axis."""
 
-    Attributes
-    ----------
-    low, high : list of tuple of int
-        Pairs of groups of rows.
-    axis : (3,) tuple
-    outline : SectorOutline or None
-        Of the mesh, where there is a deck.
-    """
-
-    low: list[Group]
-    high: list[Group]
-    axis: tuple[float, float, float]
-    outline: SectorOutline | None = None
+    low: Annotated[list[Group], "Groups of rows."]
+    high: Annotated[list[Group], "Those paired with them."]
+    axis: Annotated[tuple[float, float, float], "(3,)."]
+    outline: Annotated[SectorOutline | None, "Of the mesh, where there is a deck."] = None
 
     def elimination(self, n: int, sectors: int) -> Elimination:
         """How the high boundary of a sector of n rows follows."""

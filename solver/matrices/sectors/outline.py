@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,25 +29,15 @@ Real = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SectorOutline(ByContent):
-    """What is drawn of a sector; nothing is computed with it. Equal to another with the same content.
+    """What is drawn of a sector; nothing is computed with it. Equal to another with the same content."""
 
-    Attributes
-    ----------
-    points : (n, 3) array
-        Places of nodes [m], read-only.
-    edges : (m, 2) array
-        Pairs of points that a line joins; none where the deck tells no elements.
-    low, high : (k,) arrays
-        Points of the boundaries to the sector before and to the next one.
-    digest : str
-        Hash of the content.
-    """
-
-    points: Real
-    edges: Integer
-    low: Integer
-    high: Integer
-    digest: str = field(init=False)
+    points: Annotated[Real, "Places of nodes [m], read-only, (n, 3)."]
+    edges: Annotated[
+        Integer, "Pairs of points that a line joins, (m, 2); none where the deck tells no elements."
+    ]
+    low: Annotated[Integer, "Points of the boundary to the sector before, (k,)."]
+    high: Annotated[Integer, "Of that to the next one, (k,)."]
+    digest: Annotated[str, "Hash of the content."] = field(init=False)
 
     def __post_init__(self) -> None:
         kept: dict[str, NDArray[Any]] = {}

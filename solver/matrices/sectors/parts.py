@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,22 +68,12 @@ class PartsAcross(ByContent):
     j they get the matrices T(n)ᴴ P T(m) 1/N Σ_j δ_j e^{i(m−n)jα}, with T(−n) the complex conjugate of T(n)
     (component modes of mistuned disks: R. Bladh, M. P. Castanier, C. Pierre, J. Eng. Gas Turbines Power 123
     (2001) 100, doi:10.1115/1.1338948).
-
-    Attributes
-    ----------
-    names : tuple of str
-    ahead : (n_parts, nd, nd, n, n) array
-        T(a)ᴴ P T(b).
-    back : (n_parts, nd, nd, n, n) array
-        T(a)ᴴ P T(−b).
-    digest : str
-        Hash of the content.
     """
 
-    names: tuple[str, ...]
-    ahead: ComplexArray
-    back: ComplexArray
-    digest: str = field(init=False)
+    names: Annotated[tuple[str, ...], "Tuple of str."]
+    ahead: Annotated[ComplexArray, "T(a)ᴴ P T(b), (n_parts, nd, nd, n, n)."]
+    back: Annotated[ComplexArray, "T(a)ᴴ P T(−b), (n_parts, nd, nd, n, n)."]
+    digest: Annotated[str, "Hash of the content."] = field(init=False)
 
     def __post_init__(self) -> None:
         if not self.names or len(set(self.names)) < len(self.names):

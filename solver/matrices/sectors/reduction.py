@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -25,33 +25,15 @@ SUFFIX = ".npz"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReducedSector:
-    """The matrices of each nodal diameter, and what each is good for.
+    """The matrices of each nodal diameter, and what each is good for."""
 
-    Attributes
-    ----------
-    matrices : DiameterMatrices
-        The DOFs in use first, then the modes of the rest.
-    rows : dict
-        Row of each DOF in use.
-    full : int
-        Rows of the full sector.
-    modes : int
-        Modes kept at each nodal diameter.
-    highest_hz : float
-        Least frequency over the nodal diameters of the highest mode kept [Hz].
-    quality : tuple of Quality
-        Of each nodal diameter.
-    seconds : tuple of float
-        That each took [s].
-    """
-
-    matrices: DiameterMatrices
-    rows: dict[str, int]
-    full: int
-    modes: int
-    highest_hz: float
-    quality: tuple[Quality, ...]
-    seconds: tuple[float, ...]
+    matrices: Annotated[DiameterMatrices, "The DOFs in use first, then the modes of the rest."]
+    rows: Annotated[dict[str, int], "Row of each DOF in use."]
+    full: Annotated[int, "Rows of the full sector."]
+    modes: Annotated[int, "Modes kept at each nodal diameter."]
+    highest_hz: Annotated[float, "Least frequency over the nodal diameters of the highest mode kept [Hz]."]
+    quality: Annotated[tuple[Quality, ...], "Of each nodal diameter."]
+    seconds: Annotated[tuple[float, ...], "That each took [s]."]
 
     @property
     def good_to_hz(self) -> float:

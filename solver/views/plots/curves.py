@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Annotated, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,40 +18,23 @@ Marks = tuple[tuple[str, float, float], ...]  # kind, parameter value, amplitude
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Response:
-    """An amplitude curve and what is marked on it.
+    """An amplitude curve and what is marked on it."""
 
-    Attributes
-    ----------
-    scene, parameter : str
-        Name of the scene, path of the parameter.
-    values : (P,) array
-        Parameter values in user units.
-    amplitude : (P,) array
-        max|x| of the observed DOF [m].
-    dof : str
-        The observed DOF; ``x`` if it is not known.
-    peak : (float, float) or None
-        Parameter value and amplitude [m] of the highest peak; it is a point of the curve.
-    limit : float or None
-        Amplitude [m] at which the band is measured.
-    intervals : tuple of (low, high)
-        Where the amplitude is above it.
-    unstable : (P,) array of bool or None
-        Points at which a perturbation grows.
-    marks : tuple of (kind, value, amplitude)
-        Folds, branch points and an early end.
-    """
-
-    scene: str
-    parameter: str
-    values: FloatArray
-    amplitude: FloatArray
-    dof: str = "x"
-    peak: tuple[float, float] | None = None
-    limit: float | None = None
-    intervals: Intervals = ()
-    unstable: NDArray[np.bool_] | None = None
-    marks: Marks = ()
+    scene: Annotated[str, "Its name."]
+    parameter: Annotated[str, "Path of the parameter."]
+    values: Annotated[FloatArray, "Parameter values in user units, (P,)."]
+    amplitude: Annotated[FloatArray, "max|x| of the observed DOF [m], (P,)."]
+    dof: Annotated[str, "The observed DOF; ``x`` if it is not known."] = "x"
+    peak: Annotated[
+        tuple[float, float] | None,
+        "Parameter value and amplitude [m] of the highest peak; it is a point of the curve.",
+    ] = None
+    limit: Annotated[float | None, "Amplitude [m] at which the band is measured."] = None
+    intervals: Annotated[Intervals, "Where the amplitude is above it."] = ()
+    unstable: Annotated[NDArray[np.bool_] | None, "Points at which a perturbation grows, (P,) of bool."] = (
+        None
+    )
+    marks: Annotated[Marks, "Folds, branch points and an early end."] = ()
 
     @classmethod
     def of_branch(cls, branch: AnyBranch) -> Self:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Annotated, Self
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -36,30 +36,16 @@ class Loop:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Motion:
-    """One period of a motion.
+    """One period of a motion."""
 
-    Attributes
-    ----------
-    title : str
-        What it is of.
-    dof : str
-        The observed DOF.
-    time : (n,) array
-        Instants from 0 to the end of the period [s].
-    displacement : (n,) array
-        Of the observed DOF [m].
-    loops : tuple of Loop
-        One for each contact; of a cyclic scene, those of one sector.
-    harmonics : (H + 1,) array or None
-        |mean| and the amplitudes of the observed DOF [m].
-    """
-
-    title: str
-    dof: str
-    time: FloatArray
-    displacement: FloatArray
-    loops: tuple[Loop, ...]
-    harmonics: FloatArray | None = None
+    title: Annotated[str, "What it is of."]
+    dof: Annotated[str, "The observed DOF."]
+    time: Annotated[FloatArray, "Instants from 0 to the end of the period [s], (n,)."]
+    displacement: Annotated[FloatArray, "Of the observed DOF [m], (n,)."]
+    loops: Annotated[tuple[Loop, ...], "One for each contact; of a cyclic scene, those of one sector."]
+    harmonics: Annotated[
+        FloatArray | None, "|mean| and the amplitudes of the observed DOF [m], (H + 1,)."
+    ] = None
 
     @classmethod
     def of_solution(cls, solution: Solution) -> Self:

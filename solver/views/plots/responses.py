@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from matplotlib import colormaps
@@ -23,47 +24,31 @@ _MARKERS = {"fold": "o", "branch_point": "s", "period_doubling": "^", "torus": "
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Family:
-    """Frequency responses for several values of a variable.
+    """Frequency responses for several values of a variable."""
 
-    Attributes
-    ----------
-    variable : str
-        Path of the variable, for example ``shroud.N0``.
-    members : tuple of (value, Response)
-        Ascending in the value; the optimum is among them.
-    optimum : float
-        The best value.
-    free, stuck : Response
-        The linear limits: the contact removed, and stuck throughout.
-    dof : str
-        The observed DOF.
-    """
-
-    variable: str
-    members: tuple[tuple[float, Response], ...]
-    optimum: float
-    free: Response
-    stuck: Response
-    dof: str
+    variable: Annotated[str, "Path of the variable, for example ``shroud.N0``."]
+    members: Annotated[
+        tuple[tuple[float, Response], ...], "Ascending in the value; the optimum is among them."
+    ]
+    optimum: Annotated[float, "The best value."]
+    free: Annotated[Response, "The linear limit with the contact removed."]
+    stuck: Annotated[Response, "That with it stuck throughout."]
+    dof: Annotated[str, "The observed DOF."]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Demands:
-    """What was asked of a response.
+    """What was asked of a response."""
 
-    Attributes
-    ----------
-    limit : float or None
-        Amplitude [m] at which the band is measured, and that forbidden ranges must stay below.
-    max_peak : float or None
-        Largest amplitude allowed [m].
-    forbidden : tuple of (low, high)
-        Ranges of the parameter in which the amplitude must stay below `limit`.
-    """
-
-    limit: float | None = None
-    max_peak: float | None = None
-    forbidden: tuple[tuple[float, float], ...] = ()
+    limit: Annotated[
+        float | None,
+        "Amplitude [m] at which the band is measured, and that forbidden ranges must stay below.",
+    ] = None
+    max_peak: Annotated[float | None, "Largest amplitude allowed [m]."] = None
+    forbidden: Annotated[
+        tuple[tuple[float, float], ...],
+        "Ranges of the parameter in which the amplitude must stay below `limit`.",
+    ] = ()
 
 
 def response_figure(

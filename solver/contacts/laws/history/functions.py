@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numba
 import numpy as np
@@ -36,20 +36,12 @@ _STEP = 1e-6
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ready:
-    """A law in this process.
+    """A law in this process."""
 
-    Attributes
-    ----------
-    number : by which kernels call its functions.
-    derivatives : how they are found.
-    compiled : whether Numba compiled all of its functions.
-    kept : what must live as long as the machine code is called.
-    """
-
-    number: int
-    derivatives: Derivatives
-    compiled: bool
-    kept: tuple[Any, ...]
+    number: Annotated[int, "By which kernels call its functions."]
+    derivatives: Annotated[Derivatives, "How they are found."]
+    compiled: Annotated[bool, "Whether Numba compiled all of its functions."]
+    kept: Annotated[tuple[Any, ...], "What must live as long as the machine code is called."]
 
 
 @cache
