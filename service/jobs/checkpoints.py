@@ -29,32 +29,33 @@ if TYPE_CHECKING:
 
 log = logging.getLogger("stickslip.worker")
 
-_VERSION = "stickslip"
+_VERSION, _REQUEST = "stickslip", "request"
 _ARRAY = "array:"
 
 
 class UnusableError(Exception):
-    """What was kept cannot be used: of another version, or not what it should be."""
+    """What was kept cannot be used: of another version or request, or not what it should be."""
 
 
-def packed(part: int, arrays: Arrays) -> ResultPiece:
-    """Arrays of numbers as a piece: NumPy's npz format with the version that wrote it, never pickle."""
+def packed(part: int, arrays: Arrays, request: str) -> ResultPiece:
+    """Arrays of numbers as a piece: NumPy's npz format with version and digest of request, never pickle."""
     # Loaded here, and below: the module of the workers imports nothing heavy.
     import numpy as np
 
     buffer = io.BytesIO()
-    np.savez(buffer, allow_pickle=False, **{**arrays, _VERSION: np.array(version("stickslip"))})
+    about = {_VERSION: np.array(version("stickslip")), _REQUEST: np.array(request)}
+    np.savez(buffer, allow_pickle=False, **arrays, **about)
     data = buffer.getvalue()
     return ResultPiece(part=part, sha256=hashlib.sha256(data).hexdigest(), data=data)
 
 
-def unpacked(piece: ResultPiece) -> Arrays:
+def unpacked(piece: ResultPiece, request: str) -> Arrays:
     """The arrays of a piece.
 
     Raises
     ------
     UnusableError
-        If its bytes are not those that were packed, or another version packed them.
+        If its bytes are not those that were packed, another version packed them, or for another request.
     """
     import numpy as np
 
@@ -68,6 +69,9 @@ def unpacked(piece: ResultPiece) -> Arrays:
     writer = str(arrays.pop(_VERSION, "an unknown version"))
     if writer != version("stickslip"):
         raise UnusableError(f"piece {piece.part} is of another version, {writer}")
+    if str(arrays.pop(_REQUEST, "")) != request:
+        # That a kind takes the pieces says little: a point of one branch may solve another's equations.
+        raise UnusableError(f"piece {piece.part} is of another request")
     return arrays
 
 
@@ -92,12 +96,15 @@ class Checkpoints:
         Takes what is to be stored.
     pace : Pace
         How often pieces are sent, and how much a job may keep.
+    request : str
+        Digest of what is computed; pieces of another one are not used.
     """
 
     def __init__(
-        self, job_id: str, found: Sequence[ResultPiece], send: Callable[[KeptPieces], None], pace: Pace
-    ) -> None:
-        self._job_id = job_id
+        self, job_id: str, found: Sequence[ResultPiece], send: Callable[[KeptPieces], None], pace: Pace,
+        request: str,
+    ) -> None:  # fmt: skip
+        self._job_id, self._request = job_id, request
         self._found = sorted(found, key=lambda piece: piece.part)
         self._send = send
         self._pace = pace
@@ -111,12 +118,12 @@ class Checkpoints:
     def none(cls) -> Checkpoints:
         """For a run that goes on from nothing and keeps nothing."""
         pace = Pace(progress_seconds=0.0, checkpoint_seconds=0.0, checkpoint_bytes=0)
-        return cls("", (), lambda _kept: None, pace)
+        return cls("", (), lambda _kept: None, pace, "")
 
     def found(self) -> dict[int, Arrays]:
         """The pieces of earlier attempts by their numbers; none of them if one cannot be used."""
         try:
-            return {piece.part: unpacked(piece) for piece in self._found}
+            return {piece.part: unpacked(piece, self._request) for piece in self._found}
         except UnusableError as error:
             self.begin_anew(str(error))
             return {}
@@ -135,7 +142,7 @@ class Checkpoints:
         """Keep a piece; it is sent at once if that is due, else with a later one."""
         if self._full:
             return
-        piece = packed(part, arrays)
+        piece = packed(part, arrays, self._request)
         if self._size + len(piece.data) > self._pace.checkpoint_bytes:
             self._full = True
             log.warning(

@@ -189,6 +189,7 @@ class DaskExecutor:
             run_part=None if index is None or kind.parts is None else kind.parts.run_part,
             part=None if index is None else work.parts[index].spec,
             saved=work.saved if index is None else (),
+            spec_hash=attempt.spec_hash,
             told=work.told,
             warm_up=self._registry.warm_up,
             version=self._version,

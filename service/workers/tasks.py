@@ -53,6 +53,8 @@ class Order:
         One of them: for a whole job, or for the part whose spec is `part`.
     saved : tuple of Piece
         What earlier orders of a whole job kept.
+    spec_hash : str
+        Digest of what is computed, to which they belong.
     told : int
         How many points of its branch the service knows; they are not said again.
     version : str
@@ -71,6 +73,7 @@ class Order:
     run_part: RunPart | None
     part: Mapping[str, Any] | None
     saved: tuple[ResultPiece, ...]
+    spec_hash: str
     told: int
     warm_up: WarmUp
     version: str
@@ -167,7 +170,7 @@ def _answer(order: Order) -> TaskAnswer:
 
 
 def _computed(order: Order, threads: int, progress: Throttle, stop: _OrderStop) -> TaskAnswer:
-    kept = Checkpoints(order.job_id, order.saved, stop.kept.append, order.pace)
+    kept = Checkpoints(order.job_id, order.saved, stop.kept.append, order.pace, order.spec_hash)
     try:
         _warm(order.warm_up, order.limits.for_threads(threads))
         output: JobOutput | PartOutput

@@ -54,7 +54,8 @@ class Work:
         def keep(kept: KeptPieces) -> None:
             sink.kept(self.attempt, kept.pieces, anew=kept.anew)
 
-        self._checkpoints = Checkpoints(self.attempt.job_id, self.attempt.saved, keep, pace)
+        attempt = self.attempt
+        self._checkpoints = Checkpoints(attempt.job_id, attempt.saved, keep, pace, attempt.spec_hash)
         self._outputs.update(known_parts(self._checkpoints))
         self._account = Account(self.parts, self._outputs, Throttle(send, pace.progress_seconds))
         self.pending.extend(index for index in range(len(self.parts)) if index not in self._outputs)

@@ -53,13 +53,14 @@ log = logging.getLogger("stickslip.worker")
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """To a worker: compute this, from what earlier attempts kept. `token` is larger than any before."""
+    """To a worker: compute this, from what earlier attempts at it kept; `token` is larger than any before."""
 
     token: int
     job_id: str
     kind: str
     spec: Mapping[str, Any]
     saved: tuple[ResultPiece, ...] = ()
+    spec_hash: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -195,7 +196,7 @@ def main(
             connection.send(Reply(task.token, Done()))
             continue
         stop, reply = _Stop(orders, task.token), _replying(connection, task)
-        kept = Checkpoints(task.job_id, task.saved, reply, pace)
+        kept = Checkpoints(task.job_id, task.saved, reply, pace, task.spec_hash)
         with logs.about(job=task.job_id, kind=task.kind):
             limits.begin()
             done = _compute(runs, task, Throttle(reply, pace.progress_seconds), stop, kept, limits)

@@ -32,6 +32,7 @@ DISK = solver.annulus(solver.load_scene("bladed-disk")).to_dict()
 SWEEP = {"scene": DISK, "from": 500, "to": 900, "harmonics": 13}
 MAP = {"scene": "two-dof", "parameter": "damper.N0", "from": 60, "to": 160, "steps": 20, "frequencies": 3000,
        "ridge": False, "harmonics": 3}  # fmt: skip
+REQUEST = "e" * 64
 SLOW = {"slow-sweep": ("sweep", SWEEP), "slow-map": ("map", MAP)}
 
 
@@ -157,7 +158,7 @@ def stopped_midway(name: str) -> list[ResultPiece]:
     sent: list[KeptPieces] = []
     calls = iter(range(100))
     with suppress(PartStoppedError):
-        run_here(name, Checkpoints("a", [], sent.append, pace()), lambda: next(calls) >= 4)
+        run_here(name, Checkpoints("a", [], sent.append, pace(), REQUEST), lambda: next(calls) >= 4)
     return [one for message in sent for one in message.pieces]
 
 
@@ -166,7 +167,7 @@ def test_a_run_goes_on_from_what_another_kept(name: str) -> None:
     kept_before = stopped_midway(name)
     assert len(kept_before) >= 1
     sent: list[KeptPieces] = []
-    again = run_here(name, Checkpoints("a", kept_before, sent.append, pace()), lambda: False)
+    again = run_here(name, Checkpoints("a", kept_before, sent.append, pace(), REQUEST), lambda: False)
     assert timeless(again.result) == timeless(expected(name).result)
     new = [one.part for message in sent for one in message.pieces]
     assert new
@@ -177,12 +178,12 @@ def test_a_run_goes_on_from_what_another_kept(name: str) -> None:
 @pytest.mark.parametrize("name", SLOW)
 def test_what_cannot_be_used_is_not(name: str, caplog: pytest.LogCaptureFixture) -> None:
     good = stopped_midway(name)
-    foreign = packed(0, {"walk": np.zeros(3)})
+    foreign = packed(0, {"walk": np.zeros(3)}, REQUEST)
     for bad in (foreign, ResultPiece(part=0, sha256="0" * 64, data=good[0].data)):
         caplog.clear()
         sent: list[KeptPieces] = []
         found = [bad, *good[1:]]
-        output = run_here(name, Checkpoints("a", found, sent.append, pace()), lambda: False)
+        output = run_here(name, Checkpoints("a", found, sent.append, pace(), REQUEST), lambda: False)
         assert timeless(output.result) == timeless(expected(name).result)
         assert caplog.text.count("job a begins anew, its checkpoint cannot be used: ") == 1
         assert [message.anew for message in sent] == [True] + [False] * (len(sent) - 1)
@@ -193,11 +194,23 @@ def test_the_beginning_of_another_branch_is_not_used(caplog: pytest.LogCaptureFi
     kind = SHIPPED["sweep"]
     body = {**SWEEP, "set": {"shroud.N0": 90.0}, "from": 590}
     spec = kind.resolve(kind.request.model_validate(body), _Nowhere()).spec
-    found = Checkpoints("a", good, lambda _kept: None, pace())
+    found = Checkpoints("a", good, lambda _kept: None, pace(), REQUEST)
     output = SHIPPED.runs()["sweep"](spec, Silent(), lambda: False, found)
     whole = kind.run(spec, Silent(), lambda: False)
     assert timeless(output.result) == timeless(whole.result)
     assert "must be the beginning of the same branch" in caplog.text
+
+
+def test_a_branch_is_not_followed_from_that_of_another_request(caplog: pytest.LogCaptureFixture) -> None:
+    """Its last point may well solve the equations here: the digest tells that the rest does not belong."""
+    good = stopped_midway("slow-sweep")
+    kind = SHIPPED["sweep"]
+    spec = kind.resolve(kind.request.model_validate({**SWEEP, "from": 510}), _Nowhere()).spec
+    found = Checkpoints("a", good, lambda _kept: None, pace(), "f" * 64)
+    output = SHIPPED.runs()["sweep"](spec, Silent(), lambda: False, found)
+    assert timeless(output.result) == timeless(kind.run(spec, Silent(), lambda: False).result)
+    assert min(output.sweeps[0].arrays["parameter"].array()) >= 510.0
+    assert "piece 0 is of another request" in caplog.text
 
 
 def test_a_checkpoint_damaged_in_the_database_is_replaced(
@@ -217,7 +230,7 @@ def test_a_checkpoint_damaged_in_the_database_is_replaced(
     def keep(message: KeptPieces) -> None:
         assert jobs.keep(again, message.pieces, 0.1, 1, later, anew=message.anew)
 
-    checkpoints = Checkpoints(again.job_id, again.saved, keep, pace())
+    checkpoints = Checkpoints(again.job_id, again.saved, keep, pace(), REQUEST)
     assert checkpoints.found() == {}
     assert f"job {attempt.job_id} begins anew, its checkpoint cannot be used: piece 1 does" in caplog.text
     checkpoints.add(0, {"values": np.zeros(2)})
@@ -243,7 +256,7 @@ def claimed(jobs: JobRepository, owner: str = "one") -> Attempt:
 
 
 def piece(part: int) -> ResultPiece:
-    return packed(part, {"values": np.arange(part + 3.0)})
+    return packed(part, {"values": np.arange(part + 3.0)}, REQUEST)
 
 
 ENDS = {
@@ -302,21 +315,21 @@ def pace(**values: Any) -> Pace:
 
 def test_a_job_keeps_no_more_than_it_may(caplog: pytest.LogCaptureFixture) -> None:
     sent: list[KeptPieces] = []
-    checkpoints = Checkpoints("a", [piece(0)], sent.append, pace(checkpoint_bytes=10_000))
+    checkpoints = Checkpoints("a", [piece(0)], sent.append, pace(checkpoint_bytes=10_000), REQUEST)
     for part in range(1, 50):
         checkpoints.add(part, {"values": np.zeros(100)})
     stored = sum(len(one.data) for message in sent for one in message.pieces)
     assert 5_000 < stored <= 10_000
     assert not checkpoints.due()
     assert caplog.text.count("keeps no more") == 1
-    nothing = Checkpoints("a", [], sent.append, pace(checkpoint_bytes=0))
+    nothing = Checkpoints("a", [], sent.append, pace(checkpoint_bytes=0), REQUEST)
     nothing.add(0, {"values": np.zeros(1)})
     assert not nothing.due()
 
 
 def test_pieces_are_sent_when_it_is_time_or_the_run_is_stopped() -> None:
     sent: list[KeptPieces] = []
-    checkpoints = Checkpoints("a", [], sent.append, pace(checkpoint_seconds=1000.0))
+    checkpoints = Checkpoints("a", [], sent.append, pace(checkpoint_seconds=1000.0), REQUEST)
     checkpoints.add(0, {"values": np.zeros(2)})
     checkpoints.add(1, {"values": np.zeros(2)})
     assert sent == []
@@ -331,17 +344,19 @@ def test_pieces_are_sent_when_it_is_time_or_the_run_is_stopped() -> None:
 
 
 def test_pieces_are_numbers_of_this_version(monkeypatch: pytest.MonkeyPatch) -> None:
-    one = packed(3, {"a": np.arange(4.0), "b": np.array([1, 2])})
-    arrays = unpacked(one)
+    one = packed(3, {"a": np.arange(4.0), "b": np.array([1, 2])}, REQUEST)
+    arrays = unpacked(one, REQUEST)
     np.testing.assert_array_equal(arrays["a"], np.arange(4.0))
     assert set(arrays) == {"a", "b"}
     with pytest.raises(ValueError, match="Object arrays cannot be saved"):
-        packed(0, {"a": np.array([object()])})
+        packed(0, {"a": np.array([object()])}, REQUEST)
     with pytest.raises(UnusableError, match="piece 3 does not match its checksum"):
-        unpacked(ResultPiece(part=3, sha256="0" * 64, data=one.data))
+        unpacked(ResultPiece(part=3, sha256="0" * 64, data=one.data), REQUEST)
+    with pytest.raises(UnusableError, match="piece 3 is of another request"):
+        unpacked(one, "f" * 64)
     garbage = b"PK\x03\x04 no archive"
     with pytest.raises(UnusableError, match="cannot be read"):
-        unpacked(ResultPiece(part=0, sha256=sha256(garbage).hexdigest(), data=garbage))
+        unpacked(ResultPiece(part=0, sha256=sha256(garbage).hexdigest(), data=garbage), REQUEST)
     monkeypatch.setattr("service.jobs.checkpoints.version", lambda _name: "99.0")
     with pytest.raises(UnusableError, match="of another version"):
-        unpacked(one)
+        unpacked(one, REQUEST)

@@ -75,6 +75,7 @@ TABLE: dict[str, tuple[tuple[int, ...], Any]] = {
     "POST /v1/runs/{job_id}/restore": (CHANGED, None),
     "GET /v1/runs/{job_id}/shares": (OWNED, None),
     "POST /v1/runs/{job_id}/shares": ((401, 401, 404, 401, 401, 403, 201, 201), {"days": 1.0}),
+    "GET /v1/shares": (LISTED, None),
     # Whoever may end it does so, and it is gone.
     "DELETE /v1/runs/{job_id}/shares/{share_id}": ((401, 401, 404, 401, 401, 403, 204, 404), None),
     # A link needs no key; one that does not work is refused all the same.
