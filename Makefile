@@ -16,7 +16,7 @@ PART ?= 1/1
 # Which benchmarks: all when empty; `python -m benchmarks --help` lists them.
 BENCH ?=
 .DEFAULT_GOAL := help
-.PHONY: help setup dev demo test test-long style lint bench docs serve clean
+.PHONY: help setup dev demo test test-long style lint bench docs pins sbom serve clean
 
 help:
 	@echo "make setup      set up .venv; the command is then $(BIN)/stickslip"
@@ -27,6 +27,8 @@ help:
 	@echo "make lint       check the code: ruff, mypy, import-linter"
 	@echo "make bench      measure the solver and print tables; some of them: make bench BENCH='case-a chains'"
 	@echo "make docs       build the documentation site, reference and gallery too; it goes to site/"
+	@echo "make pins       renew the digests in pins/, after a version there was changed"
+	@echo "make sbom       list what an installation consists of, as CycloneDX, in sbom.cdx.json"
 	@echo "make serve      start the service on http://127.0.0.1:8000"
 	@echo "make clean      remove .venv, caches and demo-output/"
 
@@ -34,15 +36,16 @@ setup: $(STAMP)
 
 # The first kernels are compiled while the other packages are installed: pip keeps one core busy, no more.
 # What is imported is kept as bytecode, whatever PYTHONDONTWRITEBYTECODE says: else every process reads sources.
-$(PACKAGES): pyproject.toml constraints.txt
+$(PACKAGES): pyproject.toml pins/kernels.txt pins/package.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
 	  echo "stickslip needs Python 3.11 or newer, as in: make $(MAKECMDGOALS) PYTHON=python3.12" >&2; exit 1; }
 	$(PYTHON) -m venv .venv
-	$(PIP) --constraint constraints.txt setuptools numpy scipy numba pydantic
+	$(PIP) --require-hashes -r pins/kernels.txt
 	@echo "Installing the other packages, and compiling the kernels of a first design: half a minute on two cores."
 	PYTHONDONTWRITEBYTECODE= $(BIN)/python -m service.warm_up --first & kernels=$$!; \
-	  $(PIP) --constraint constraints.txt --no-build-isolation -e '.[fast]' || { kill $$kernels; exit 1; }; \
+	  $(PIP) --require-hashes -r pins/package.txt || { kill $$kernels; exit 1; }; \
 	  wait $$kernels
+	$(PIP) --no-deps --no-build-isolation -e .
 	@touch $@
 
 $(STAMP): $(PACKAGES)
@@ -53,9 +56,9 @@ $(STAMP): $(PACKAGES)
 
 dev: $(DEV)
 
-$(DEV): $(PACKAGES)
+$(DEV): $(PACKAGES) pins/image.txt pins/dev.txt
 	$(BIN)/python -m service.warm_up & kernels=$$!; \
-	  $(PIP) -r constraints.txt || { kill $$kernels; exit 1; }; \
+	  $(PIP) --require-hashes -r pins/image.txt -r pins/dev.txt || { kill $$kernels; exit 1; }; \
 	  wait $$kernels
 	$(BYTECODE)
 	@touch $(STAMP) $@
@@ -92,9 +95,19 @@ bench: dev
 docs: dev
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
 
+# Of all files of a version, for any system and any Python: which one is installed is another machine's affair.
+pins: dev
+	@for part in pins/*.txt; do \
+	  $(BIN)/uv pip compile $$part --output-file $$part --generate-hashes --no-deps --universal --python-version 3.12 \
+	    --no-header --no-annotate --quiet >/dev/null || exit 1; \
+	done
+
+sbom: setup
+	$(BIN)/python deploy/sbom.py > sbom.cdx.json
+
 serve: setup
 	$(BIN)/stickslip serve
 
 clean:
-	rm -rf .venv demo-output site build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
+	rm -rf .venv demo-output sbom.cdx.json site build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
 	find stickslip solver optim service migrations tests benchmarks -name __pycache__ -type d -prune -exec rm -rf {} +

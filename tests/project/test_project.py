@@ -1,14 +1,19 @@
 """The repository itself: pinned versions, no machine's addresses, the shape of the code."""
 
 import ast
+import json
 import re
 import shutil
 import subprocess
+import sys
 import tomllib
 from collections.abc import Iterator
+from importlib.metadata import requires
 from pathlib import Path
 
 import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
@@ -48,19 +53,69 @@ def test_no_file_names_a_registry_or_a_machine() -> None:
     assert found == []
 
 
-def test_every_dependency_is_pinned() -> None:
-    lines = (ROOT / "constraints.txt").read_text(encoding="utf-8").splitlines()
-    pins = [line for line in lines if line and not line.startswith("#")]
-    assert [pin for pin in pins if not re.fullmatch(r"[A-Za-z0-9_.-]+==[A-Za-z0-9_.]+", pin)] == []
-    names = [_normal(pin.partition("==")[0]) for pin in pins]
+PINNED = re.compile(
+    r"(?P<name>[A-Za-z0-9_.-]+)==[A-Za-z0-9_.]+( ; [^\n\\]+)?( \\\n    --hash=sha256:[0-9a-f]{64})+\n"
+)
+
+
+def pinned(part: str) -> list[str]:
+    """The packages of a file of pins, each with a version and the digests of its files."""
+    text = (ROOT / "pins" / f"{part}.txt").read_text(encoding="utf-8")
+    assert PINNED.sub("", text) == ""
+    return [canonicalize_name(one["name"]) for one in PINNED.finditer(text)]
+
+
+def needed(wanted: list[str]) -> set[str]:
+    """Every package that these requirements lead to, by what is installed here."""
+    found, left = set(), [Requirement(one) for one in wanted]
+    while left:
+        need = left.pop()
+        key = (canonicalize_name(need.name), frozenset(need.extras))
+        if key not in found:
+            found.add(key)
+            own = (Requirement(one) for one in requires(need.name) or ())
+            left += [one for one in own if applies(one, need.extras)]
+    return {name for name, _ in found}
+
+
+def applies(need: Requirement, extras: set[str]) -> bool:
+    return need.marker is None or any(need.marker.evaluate({"extra": one}) for one in ("", *extras))
+
+
+def test_every_dependency_is_pinned_with_what_it_needs() -> None:
+    """An installation by digests takes nothing that is not listed, and no package is listed twice."""
+    extras = PROJECT["project"]["optional-dependencies"]
+    first = [*PROJECT["build-system"]["requires"], "numpy", "scipy", "numba", "pydantic"]
+    own = [*PROJECT["project"]["dependencies"], *extras["fast"]]
+    image = [*extras["postgresql"], *extras["traces"], *extras["stores"]]
+    names: list[str] = []
+    for part, wanted in (("kernels", first), ("package", own), ("image", image), ("dev", extras["dev"])):
+        names += pinned(part)
+        assert needed([one for one in wanted if applies(Requirement(one), set())]) - set(names) == set()
     assert len(names) == len(set(names))
-    wanted = [*PROJECT["project"]["dependencies"], *PROJECT["project"]["optional-dependencies"]["dev"]]
-    wanted += PROJECT["build-system"]["requires"]
-    assert {_normal(re.split(r"[<>=!~\[; ]", need)[0]) for need in wanted} <= set(names)
 
 
-def _normal(name: str) -> str:
-    return re.sub(r"[-_.]+", "-", name).lower()
+def test_the_bill_of_materials_lists_what_is_installed() -> None:
+    made = subprocess.run(
+        [sys.executable, ROOT / "deploy" / "sbom.py"], capture_output=True, check=True, timeout=60
+    )
+    bill = json.loads(made.stdout)
+    assert (bill["bomFormat"], bill["specVersion"]) == ("CycloneDX", "1.6")
+    names = [one["name"] for one in bill["components"]]
+    assert set(names) >= {
+        *pinned("kernels"),
+        *pinned("package"),
+        *pinned("image"),
+        "three",
+        "@codemirror/view",
+    }
+    assert "esbuild" not in names
+    references = {one["bom-ref"] for one in bill["components"]}
+    assert len(references) == len(names)
+    needs = {one["ref"]: set(one["dependsOn"]) for one in bill["dependencies"]}
+    assert set().union(*needs.values()) <= references
+    own = needs[bill["metadata"]["component"]["bom-ref"]]
+    assert {one.partition("@")[0] for one in own} >= {"pkg:pypi/numpy", "pkg:pypi/fastapi"}
 
 
 def test_continuous_integration_runs_the_test_command() -> None:
