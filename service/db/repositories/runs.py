@@ -263,7 +263,8 @@ def _containing(text: str, *, sqlite: bool) -> Condition:
     alike = [one.like if sqlite else one.ilike for one in (Run.name, Run.notes)]
     holds = or_(*(one(pattern, escape="/") for one in alike))
     if len(text) < _LETTERS:
-        return _said(holds, few=_NEVER_LEADS)
+        # SQLite looks through the texts alone in a fifth of the time that it takes to look at each run.
+        return _said(holds, few=_FEW_TEXTS if sqlite else _NEVER_LEADS)
     held = holds
     if sqlite:
         phrase = '"{}"'.format(text.replace('"', '""'))
