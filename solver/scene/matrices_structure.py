@@ -167,6 +167,10 @@ class MatricesStructure(Part):
         spinning = {key: value for key in ("G", "K_omega2") if (value := getattr(self, key)) is not None}
         if self.sectors is not None:
             check_sector(self, spinning)
+        moved = None if self.diameters is None else self.diameters.motion
+        if moved is not None and self.outline is not None and moved.points != len(self.outline.points):
+            drawn = len(self.outline.points)
+            raise ValueError(f"`motion` of the outline must be of its {drawn} points, got {moved.points}")
         if self.diameters is None:
             joined = self.sectors is not None
             check_matrices(self.M, self.K, self.C, self.modes, self.dofs, spinning, joined=joined)

@@ -18,10 +18,11 @@ from numpy.typing import NDArray
 from solver.arrays import Real
 from solver.contacts.fields import parse_end
 from solver.contacts.frames import cross, unit
+from solver.matrices.sectors.outline_motion import OutlineMotion
 from solver.scene.bodies.body import Body
 from solver.scene.bodies.kinematics import places, point_motion
 from solver.scene.bodies.shapes import Cylinder, Wedge
-from solver.scene.scene import AnyContact, Scene
+from solver.scene.scene import AnyContact, MatricesStructure, Scene
 from solver.views.layout import GROUND, NEXT, Parts, parts_of, places_of
 
 _AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
@@ -251,14 +252,25 @@ def _say(scene: Scene, picture: Picture, parts: Parts) -> None:
         return
     moving = {dof for moves in picture.moves for factors in moves for dof in factors}
     left = [dof for dof in scene.dofs if dof not in moving and not dof.startswith(COORDINATE)]
-    if left:
+    if left and motion_of_mesh(scene) is None:
         listed = ", ".join(left[:6]) + (f" and {len(left) - 6} more" if len(left) > 6 else "")
         picture.notes.append(f"Without a place, so not drawn: {listed}.")
-    if "mesh" in picture.roles:
-        picture.notes.append("The mesh is drawn at rest: its file tells the motion of the nodes named alone.")
+    if "mesh" in picture.roles and motion_of_mesh(scene) is None:
+        picture.notes.append(
+            "The mesh is drawn at rest: its file tells the motion of the nodes named alone. `stickslip "
+            "import --nodes … --reduce` writes one that tells all."
+        )
     undrawn = [contact.name for contact in scene.contacts if contact.name not in picture.contacts]
     if undrawn:
         picture.notes.append(f"Contacts without a place: {', '.join(undrawn)}.")
+
+
+def motion_of_mesh(scene: Scene) -> OutlineMotion | None:
+    """Return how the coordinates of a sector move the points of its mesh, the first ones, if it is known."""
+    structure = scene.structure
+    if not isinstance(structure, MatricesStructure) or structure.diameters is None:
+        return None
+    return None if structure.outline is None else structure.diameters.motion
 
 
 COORDINATE = "coordinate "

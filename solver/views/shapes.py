@@ -16,15 +16,16 @@ import numpy as np
 
 from solver.arrays import Complex, Integer, Real
 from solver.errors import SettingError
-from solver.jit import fourier
 from solver.linear.assembly import linear_model
+from solver.linear.model import LinearModel
+from solver.matrices.sectors.outline_motion import OutlineMotion
 from solver.modes.nonlinear_mode import at_nodal_diameter, pose
 from solver.modes.records import diameter_of
 from solver.response.solution import Solution
-from solver.response.time_history import motion
+from solver.response.time_history import all_coordinates
 from solver.scene.cyclic.annulus import written_out
-from solver.scene.scene import Scene
-from solver.views.picture import Picture, picture_of
+from solver.scene.scene import MatricesStructure, Scene
+from solver.views.picture import Picture, motion_of_mesh, picture_of
 
 FAINT = 1e-3
 """Harmonics that move every point less than this share of the largest motion are left out."""
@@ -58,10 +59,8 @@ def deflection_shape(scene: Scene, solution: Solution) -> Shape:
     SettingError
         The solution did not converge.
     """
-    coefficients = motion(solution)
-    states = {contact.name: contact.state.value for contact in solution.contacts}
-    amplitudes = np.array([fourier.to_complex(row) for row in coefficients])
-    return _shape(scene, solution.scene.dofs, amplitudes, solution.frequency_hz, "m", states)
+    coordinates, states = all_coordinates(solution).T, {c.name: c.state.value for c in solution.contacts}
+    return _shape(scene, solution.scene, coordinates, solution.frequency_hz, "m", states)
 
 
 def mode_shape(scene: Scene, mode: int, *, nodal_diameter: int | None = None, harmonics: int = 11) -> Shape:
@@ -80,8 +79,8 @@ def mode_shape(scene: Scene, mode: int, *, nodal_diameter: int | None = None, ha
     scene = at_nodal_diameter(scene, nodal_diameter)
     problem = pose(scene, mode, None, harmonics)
     solved = problem.equations.balance.scene
-    moved = linear_model(solved).shapes @ problem.mode.shape
-    return _shape(scene, solved.dofs, _first(moved), problem.mode.omega / (2.0 * math.pi), "1/√kg", {})
+    moved, hertz = _first(problem.mode.shape), problem.mode.omega / (2.0 * math.pi)
+    return _shape(scene, solved, moved, hertz, "1/√kg", {})
 
 
 def shape_of_motion(
@@ -103,11 +102,13 @@ def shape_of_motion(
         A DOF that is missing, or a nodal diameter that cannot be.
     """
     scene = at_nodal_diameter(scene, nodal_diameter)
-    needed = scene.dofs if scene.dofs[0] in dofs else written_out(scene).dofs
-    missing = next((dof for dof in needed if dof not in dofs), None)
+    solved = scene if scene.dofs[0] in dofs else written_out(scene)
+    missing = next((dof for dof in solved.dofs if dof not in dofs), None)
     if missing is not None:
         raise SettingError("dofs", missing, "is missing: the motion of every DOF must be told, it lacks")
-    return _shape(scene, tuple(dofs), _first(motion), frequency_hz, "1/√kg", states)
+    told = np.array([motion[dofs.index(dof)] for dof in solved.dofs])
+    coordinates = _following(linear_model(solved), told, 2.0 * math.pi * frequency_hz)
+    return _shape(scene, solved, _first(coordinates), frequency_hz, "1/√kg", states)
 
 
 def _first(motion: Complex) -> Complex:
@@ -115,16 +116,35 @@ def _first(motion: Complex) -> Complex:
     return np.stack([np.zeros_like(motion), motion], axis=1)
 
 
+def _following(model: LinearModel, told: Complex, omega: float) -> Complex:
+    """Coordinates (n,) of harmonic 1, of which the DOFs are told; no contact or force acts on the others.
+
+    (K − ω² M) q = 0 in their rows: the damping is small beside it. Where DOFs are no coordinates but sums of
+    modes, the least ones that move them so: nothing else is drawn of such a structure.
+    """
+    place = np.argmax(np.abs(model.shapes), axis=1)
+    if not np.array_equal(model.shapes, np.eye(model.n_coordinates)[place]):
+        return np.asarray(np.linalg.pinv(model.shapes) @ told)
+    K, _, M = (each[0] for each in model.at(model.diameters(np.ones(1, np.int64)), np.ones(1, np.bool_)))
+    rest = np.setdiff1d(np.arange(len(M)), place)
+    dynamic = (K - omega**2 * M)[rest]
+    coordinates = np.zeros(len(M), np.complex128)
+    coordinates[place] = told
+    coordinates[rest] = np.linalg.solve(dynamic[:, rest], -dynamic[:, place] @ told)
+    return coordinates
+
+
 def _shape(
     scene: Scene,
-    dofs: tuple[str, ...],
-    amplitudes: Complex,
+    solved: Scene,
+    coordinates: Complex,
     frequency_hz: float,
     unit: str,
     states: dict[str, str],
 ) -> Shape:
-    """The shape of complex amplitudes of the DOFs that were solved, of one sector or all, (n_dofs, H + 1)."""
-    picture = picture_of(scene)
+    """The shape of complex amplitudes of the coordinates of a scene or of its annulus, (n, H + 1)."""
+    picture, model, dofs = picture_of(scene), linear_model(solved), linear_model(solved).dofs
+    amplitudes = model.shapes @ coordinates
     whole = scene.dofs[0] not in dofs
     count = scene.structure.sector_count if whole else 1
     row = {dof: i for i, dof in enumerate(dofs)}
@@ -133,16 +153,42 @@ def _shape(
     for j in range(count):
         own = amplitudes[[row[f"{dof}@{j}" if whole else dof] for dof in scene.dofs]]
         motions[j] = np.einsum("pcd,dk->kpc", factors, own)
+    if (mesh := motion_of_mesh(scene)) is not None:
+        motions[:, :, : mesh.points] = _of_mesh(mesh, scene, model, coordinates, whole=whole)
     sizes = np.linalg.norm(motions, axis=-1).max(axis=(0, 2), initial=0.0)
     kept = np.flatnonzero(sizes >= FAINT * sizes.max(initial=0.0))
     kept = kept if sizes.any() else np.array([1], dtype=np.int64)
     motions = motions[:, kept]
     tau = np.linspace(0.0, 2.0 * math.pi, _INSTANTS, endpoint=False)
     waves = np.where(kept > 0, np.exp(1j * np.outer(tau, kept)), 0.0)
-    over = np.einsum("tk,skpc->stpc", waves, motions).real
+    over = (np.einsum("tk,kpc->tpc", waves, each).real for each in motions)
     return Shape(
         picture=picture, unit=unit, frequency_hz=frequency_hz,
         nodal_diameter=diameter_of(scene), turn=linear_model(scene).interblade_phase if not whole else 0.0,
         harmonics=kept.astype(np.int64), motions=motions,
-        amplitude=np.linalg.norm(over, axis=-1).max(axis=1), states=states,
+        amplitude=np.array([np.linalg.norm(each, axis=-1).max(axis=0) for each in over]), states=states,
     )  # fmt: skip
+
+
+def _of_mesh(
+    mesh: OutlineMotion, scene: Scene, model: LinearModel, coordinates: Complex, *, whole: bool
+) -> Complex:
+    """The motion of the points of a mesh, (sectors, H + 1, n_points, 3); of all sectors as a sum of waves."""
+    structure = scene.structure
+    assert isinstance(structure, MatricesStructure)
+    assert structure.diameters is not None
+    count, n, built = structure.sector_count, structure.n_coordinates, structure.diameters.diameters
+
+    def moved(wave: int, q: Complex) -> Complex:
+        back = 2 * wave > count  # it runs backward: the complex conjugate of the one ahead
+        found = mesh.at(built.index(min(wave, count - wave)), q.conj() if back else q)
+        return found.conj() if back else found
+
+    if not whole:
+        waves = model.diameters(np.arange(coordinates.shape[1])).tolist()
+        still = np.zeros((mesh.points, 3), np.complex128)
+        return np.array(
+            [[moved(m, q) if q.any() else still for m, q in zip(waves, coordinates[:n].T, strict=True)]]
+        )
+    sectors = np.fft.fft(coordinates[: count * n].reshape(count, n, -1), axis=0)
+    return np.fft.ifft(np.array([[moved(m, q) for q in own.T] for m, own in enumerate(sectors)]), axis=0)

@@ -15,6 +15,7 @@ import solver
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, BrowserContext, Page
 
+OF_MESH = 97  # the node of the outline of `fe-disk` at `ahead-lower`
 DRIVER = "GL Driver Message"  # of WebGL without a graphics card, on reading a frame
 DRAW = """async ([body, tau, wanted]) => {
   const base = document.querySelector('link[href*="shape/stage.js"]').href.replace("shape/stage.js", "");
@@ -28,7 +29,7 @@ DRAW = """async ([body, tau, wanted]) => {
     const canvas = document.getElementById("main").appendChild(document.createElement("canvas"));
     const made = stage(three, canvas, what);
     made.draw(angle);
-    const found = wanted.map(([j, name]) => made.at(j, shape.names.indexOf(name)));
+    const found = wanted.map(([j, at]) => made.at(j, at >= 0 ? at : shape.names.indexOf(at)));
     made.close();
     canvas.remove();
     return { factor: made.factor, at: found };
@@ -72,11 +73,12 @@ def turned(j: int, sectors: int, vector: list[float]) -> np.ndarray:
         ("bladed-disk", 740.0, (None, None, "tip"), "tip"),
         pytest.param("platform-wedge", 370.0, ("ax", "ay", "az"), "left", marks=pytest.mark.long),
         ("fe-disk", 250.0, ("a1x", "a1y", "a1z"), "ahead-lower"),
+        ("fe-disk", 250.0, ("a1x", "a1y", "a1z"), OF_MESH),
     ],
 )
 def test_points_are_drawn_where_the_solver_moves_them(
     profile: tuple[BrowserContext, Watch], site: Site, scene: str, hertz: float,
-    dofs: tuple[str | None, ...], point: str,
+    dofs: tuple[str | None, ...], point: str | int,
 ) -> None:  # fmt: skip
     context, watch = profile
     watch.allowed = (DRIVER,)

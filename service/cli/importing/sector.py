@@ -206,7 +206,7 @@ def reduce_disk(
         check_part_sizes(given)
         parts = parts_to_reduce({"of": mistune}, given)
         met = range(of.sectors // 2 + 1) if parts else diameters_met([of.engine_order], of.sectors)
-        reduced = reduce_sector(matrices, gone, rows, modes, met, of.sectors, parts)
+        reduced = reduce_sector(matrices, gone, rows, modes, met, of.sectors, parts, ends.drawn)
     except SceneError as error:
         raise refused([error.issues[0].at("mistune")], {"mistune": "--mistune"}) from error
     except ValueError as error:

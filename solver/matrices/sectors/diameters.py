@@ -9,12 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.errors import SettingError
+from solver.matrices.sectors.outline_motion import OutlineMotion
 from solver.matrices.sectors.parts import PartsAcross
 from solver.matrices.validation import differs
 from solver.matrices.values import MOST_DOFS, ByContent, Matrix
 
 ComplexArray = NDArray[np.complex128]
-_KEYS = ("diameters", "M", "K", "C", "parts")
+_KEYS = ("diameters", "M", "K", "C", "parts", "motion")
 _MOST = 5001  # nodal diameters of the largest disk
 
 
@@ -35,6 +36,7 @@ class DiameterMatrices(ByContent):
     parts: Annotated[PartsAcross | None, "Parts that mistuning may scale, between the nodal diameters."] = (
         None
     )
+    motion: Annotated[OutlineMotion | None, "Of the outline of the mesh, to be drawn."] = None
     digest: Annotated[str, "Hash of the content."] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -60,7 +62,8 @@ class DiameterMatrices(ByContent):
             if differs(array, turned):
                 raise ValueError(f"`{key}` must be Hermitian at each nodal diameter")
             kept[key] = 0.5 * (array + turned)
-        self._hold(kept, self.diameters, None if self.parts is None else self.parts.digest)
+        besides = [each.digest for each in (self.parts, self.motion) if each is not None]
+        self._hold(kept, self.diameters, *besides)
         for n, mass in zip(self.diameters, self.M, strict=True):
             try:
                 np.linalg.cholesky(mass)
@@ -68,6 +71,8 @@ class DiameterMatrices(ByContent):
                 raise ValueError(f"`M` must be positive definite at nodal diameter {n}") from error
         if self.parts is not None:
             self.parts.check(len(self.diameters), self.size)
+        if self.motion is not None:
+            self.motion.check(len(self.diameters), self.size)
 
     def __repr__(self) -> str:
         listed = ", ".join(map(str, self.diameters))
@@ -101,7 +106,7 @@ class DiameterMatrices(ByContent):
 
     @classmethod
     def read(cls, data: object) -> DiameterMatrices:
-        """Read a table of `diameters`, lists `M`, `K`, `C` of tables `real`, `imag`, and maybe `parts`."""
+        """Read a table of `diameters`, lists `M`, `K`, `C` of tables `real`, `imag`; `parts`, `motion`."""
         if isinstance(data, DiameterMatrices):
             return data
         if isinstance(data, str):
@@ -118,7 +123,8 @@ class DiameterMatrices(ByContent):
             raise ValueError("`diameters` must be a list of whole numbers")
         arrays = {key: _stack(key, data[key], len(counts)) for key in ("M", "K", "C") if data.get(key)}
         parts = None if data.get("parts") is None else PartsAcross.read(data["parts"])
-        return cls(diameters=tuple(counts), parts=parts, **arrays)
+        motion = None if data.get("motion") is None else OutlineMotion.read(data["motion"])
+        return cls(diameters=tuple(counts), parts=parts, motion=motion, **arrays)
 
     def write(self) -> dict[str, object]:
         """The table that `read` reads."""
@@ -129,6 +135,8 @@ class DiameterMatrices(ByContent):
                 table[key] = [_written(matrix) for matrix in value]
         if self.parts is not None:
             table["parts"] = self.parts.write()
+        if self.motion is not None:
+            table["motion"] = self.motion.write()
         return table
 
 

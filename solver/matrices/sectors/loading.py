@@ -11,6 +11,8 @@ from typing import Annotated, Any
 from scipy.sparse import csr_array
 
 from solver.errors import UNSAID, Place, SceneError
+from solver.matrices.decks.deck import frames
+from solver.matrices.labels import COMPONENTS, OWN_COMPONENTS, Label
 from solver.matrices.load_set import MatrixSet
 from solver.matrices.readers.numbers_in_text import FormatError
 from solver.matrices.readers.reader import MatrixFileError
@@ -36,6 +38,9 @@ class Boundaries:
     high: Annotated[list[Group], "Those paired with them."]
     axis: Annotated[tuple[float, float, float], "(3,)."]
     outline: Annotated[SectorOutline | None, "Of the mesh, where there is a deck."] = None
+    drawn: Annotated[
+        Any | None, "The motion of its points along the global axes by the rows, sparse (3 n_points, rows)."
+    ] = None
 
     def elimination(self, n: int, sectors: int) -> Elimination:
         """How the high boundary of a sector of n rows follows."""
@@ -82,19 +87,34 @@ def boundaries(
         ours, theirs = groups(pairs, found, rotation(axis, 2.0 * math.pi / sectors))
     except ValueError as error:
         raise _refusal("low", str(error), named=False) from error
-    return Boundaries(
-        low=ours, high=theirs, axis=(float(axis[0]), float(axis[1]), float(axis[2])),
-        outline=_outline(deck, pairs, metres),
-    )  # fmt: skip
+    outline, drawn = (None, None) if deck is None else _outline(deck, pairs, found, metres)
+    direction = (float(axis[0]), float(axis[1]), float(axis[2]))
+    return Boundaries(low=ours, high=theirs, axis=direction, outline=outline, drawn=drawn)
 
 
-def _outline(deck: Deck | None, pairs: Pairs, metres: float) -> SectorOutline | None:
-    if deck is None:
-        return None
+def _outline(
+    deck: Deck, pairs: Pairs, found: MatrixSet, metres: float
+) -> tuple[SectorOutline, csr_array | None]:
+    """The outline of a deck, and how the rows move its points where they are labelled."""
     try:
-        return outline_of(deck, [one for one, _ in pairs], [other for _, other in pairs], metres)
+        outline, nodes = outline_of(deck, [one for one, _ in pairs], [other for _, other in pairs], metres)
     except ValueError as error:
         raise _refusal("nodes", f"`nodes`: {error}", named=False) from error
+    return outline, None if found.labels is None else displacements(nodes, found.labels, deck)
+
+
+def displacements(nodes: Sequence[int], labels: Sequence[Label], deck: Deck) -> csr_array:
+    """How the rows of matrices move nodes along the global axes, sparse (3 nodes, rows)."""
+    at = {node: 3 * i for i, node in enumerate(nodes)}
+    entries: list[tuple[int, int, float]] = []
+    for row, (node, component) in enumerate(labels):
+        if node in at and component in COMPONENTS[:3]:
+            entries.append((at[node] + COMPONENTS.index(component), row, 1.0))
+        elif node in at and component in OWN_COMPONENTS[:3]:
+            own = frames(deck, [node])[0][:, OWN_COMPONENTS.index(component)]
+            entries += [(at[node] + i, row, float(own[i])) for i in range(3)]
+    rows, columns, values = zip(*entries, strict=True) if entries else ((), (), ())
+    return csr_array((values, (rows, columns)), shape=(3 * len(nodes), len(labels)))
 
 
 def _is_direction(given: Sequence[object]) -> bool:
@@ -199,7 +219,7 @@ def _reduced(
         gone = ends.elimination(matrices["M"].shape[0], sectors)
         parts = parts_to_reduce(tables.get("mistuning"), found)
         met = tuple(range(sectors // 2 + 1)) if parts else diameters_met(orders, sectors)
-        return reduce_sector(matrices, gone, dofs, keep, met, sectors, parts)
+        return reduce_sector(matrices, gone, dofs, keep, met, sectors, parts, ends.drawn)
     except ValueError as error:
         raise SceneError.of(("structure", "dofs"), str(error), named=False) from error
 

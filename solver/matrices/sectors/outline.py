@@ -116,8 +116,10 @@ def _numbers(key: str, data: object) -> NDArray[Any]:
         raise ValueError(f"`{key}` of the outline must have rows of one length, finite") from error
 
 
-def outline_of(deck: Deck, low: Sequence[int], high: Sequence[int], metres: float = 1.0) -> SectorOutline:
-    """The outline of the mesh of a deck.
+def outline_of(
+    deck: Deck, low: Sequence[int], high: Sequence[int], metres: float = 1.0
+) -> tuple[SectorOutline, list[int]]:
+    """The outline of the mesh of a deck, and the node of each point.
 
     Parameters
     ----------
@@ -140,9 +142,8 @@ def outline_of(deck: Deck, low: Sequence[int], high: Sequence[int], metres: floa
     points = metres * np.array([deck.nodes[int(node)] for node in shown]).reshape(-1, 3)
     if points.size and (size := float(np.ptp(points, axis=0).max())) > 0.0:
         points = np.round(points, _DIGITS - math.floor(math.log10(size)))
-    return SectorOutline(
-        points, np.searchsorted(shown, edges), *(np.searchsorted(shown, each) for each in ends)
-    )
+    ends = [np.searchsorted(shown, each) for each in ends]
+    return SectorOutline(points, np.searchsorted(shown, edges), *ends), shown.tolist()
 
 
 def _some(nodes: Sequence[int], most: int) -> Integer:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -17,6 +17,7 @@ from solver.matrices.reduction.reduction_error import Quality
 from solver.matrices.sectors.diameters import DiameterMatrices
 from solver.matrices.sectors.elimination import Elimination, phase_factor
 from solver.matrices.sectors.outline import SectorOutline
+from solver.matrices.sectors.outline_motion import OutlineMotion
 from solver.matrices.sectors.parts import PartsAcross
 from solver.matrices.validation import DofTable
 
@@ -55,6 +56,7 @@ def reduce_sector(
     diameters: Sequence[int],
     sectors: int,
     parts: Mapping[str, Any] | None = None,
+    drawn: Any | None = None,
     on_progress: Callable[[int], None] | None = None,
 ) -> ReducedSector:
     """Reduce a sector (Craig, Bampton 1968) at each nodal diameter.
@@ -67,6 +69,7 @@ def reduce_sector(
     keep_modes : of the rest with these held, at each nodal diameter.
     diameters : ascending.
     parts : matrices of what mistuning may scale, sparse, of the full sector; then all nodal diameters.
+    drawn : sparse (3 n_points, rows) of the full sector: the motion of the outline's points by its rows.
     on_progress : called with each nodal diameter that is done.
 
     Raises
@@ -76,13 +79,15 @@ def reduce_sector(
     """
     own = _kept_rows(dofs, eliminated)
     circulants = {key: eliminated.of(matrix) for key, matrix in matrices.items()}
-    found, seconds = [], []
+    found, seconds, moved = [], [], []
     for n in diameters:
         begun = time.perf_counter()
         at = {key: circulant.at(n, sectors) for key, circulant in circulants.items()}
-        found.append(
-            craig_bampton(at["M"], at["K"], at.get("C"), own, keep_modes, weigh=False, keep_basis=bool(parts))
-        )
+        basis = bool(parts) or drawn is not None
+        one = craig_bampton(at["M"], at["K"], at.get("C"), own, keep_modes, weigh=False, keep_basis=basis)
+        if drawn is not None:
+            moved.append(drawn @ _of_sector(one, eliminated, n, sectors))
+        found.append(one if parts else replace(one, basis=None))
         seconds.append(time.perf_counter() - begun)
         if on_progress is not None:
             on_progress(n)
@@ -94,8 +99,9 @@ def reduce_sector(
         )
     stacks = {key: np.array([each.matrices[key] for each in found]) for key in circulants}
     across = _across(parts, found, eliminated, diameters, sectors) if parts else None
+    motion = OutlineMotion.of(moved) if moved else None
     return ReducedSector(
-        matrices=DiameterMatrices(diameters=tuple(diameters), parts=across, **stacks),
+        matrices=DiameterMatrices(diameters=tuple(diameters), parts=across, motion=motion, **stacks),
         rows={name: row for row, name in enumerate(own)},
         full=int(eliminated.here.shape[0]),
         modes=found[0].modes,
@@ -110,11 +116,7 @@ def _across(
     sectors: int,
 ) -> PartsAcross:  # fmt: skip
     """Parts of the sector between the bases of its nodal diameters."""
-    bases = []
-    for n, each in zip(diameters, found, strict=True):
-        if each.basis is not None:
-            turn = phase_factor(n, sectors)
-            bases.append((eliminated.here @ each.basis) + turn * (eliminated.beyond @ each.basis))
+    bases = [_of_sector(each, eliminated, n, sectors) for n, each in zip(diameters, found, strict=True)]
     shape = (len(parts), len(bases), len(bases), bases[0].shape[1], bases[0].shape[1])
     ahead, back = np.empty(shape, np.complex128), np.empty(shape, np.complex128)
     for i, P in enumerate(parts.values()):
@@ -124,6 +126,12 @@ def _across(
                 ahead[i, a, b] = left.conj().T @ moved
                 back[i, a, b] = left.conj().T @ moved.conj()
     return PartsAcross(tuple(parts), ahead, back)
+
+
+def _of_sector(reduced: Reduced, eliminated: Elimination, n: int, sectors: int) -> Any:
+    """The motions of all rows of a sector, its high boundary too, that the coordinates stand for."""
+    turn = phase_factor(n, sectors)
+    return (eliminated.here @ reduced.basis) + turn * (eliminated.beyond @ reduced.basis)
 
 
 def _kept_rows(dofs: Mapping[str, int], eliminated: Elimination) -> DofTable:
@@ -145,8 +153,9 @@ def _kept_rows(dofs: Mapping[str, int], eliminated: Elimination) -> DofTable:
 def write_diameters(path: Path, reduced: ReducedSector, outline: SectorOutline | None = None) -> None:
     """Write a reduced sector: arrays `diameters`, `M`, `K`, maybe `C`, `names` and `good_to_hz` (.npz).
 
-    With an outline also `outline_points`, `outline_edges`, `outline_low` and `outline_high`. With parts
-    `parts` has their names, `parts_ahead` and `parts_back` the matrices (`PartsAcross`).
+    With an outline also `outline_points`, `outline_edges`, `outline_low` and `outline_high`, with its motion
+    `outline_patterns` and `outline_shares` (`OutlineMotion`). With parts `parts` has their names,
+    `parts_ahead` and `parts_back` the matrices (`PartsAcross`).
 
     Raises
     ------
@@ -164,6 +173,7 @@ def write_diameters(path: Path, reduced: ReducedSector, outline: SectorOutline |
         allow_pickle=False,
         **arrays,
         **({} if outline is None else outline.arrays()),
+        **({} if found.motion is None else found.motion.arrays()),
         diameters=np.array(found.diameters, np.int64),
         names=np.array(names),
         full=np.array(reduced.full),
@@ -195,7 +205,8 @@ def read_sector(path: Path) -> tuple[DiameterMatrices, dict[str, Any], SectorOut
         if "parts" in arrays:
             names = tuple(map(str, arrays["parts"]))
             parts = PartsAcross(names, arrays["parts_ahead"], arrays["parts_back"])
-        matrices = DiameterMatrices(diameters=diameters, parts=parts, **kept)
+        motion = OutlineMotion.from_arrays(arrays)
+        matrices = DiameterMatrices(diameters=diameters, parts=parts, motion=motion, **kept)
         highest = float(held[:, -1].min()) if held.size else 0.0
         if not 0.0 <= highest < math.inf:
             raise ValueError(f"`held_hz` must hold finite frequencies >= 0, got {highest}")

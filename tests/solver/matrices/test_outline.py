@@ -1,19 +1,23 @@
 """The outline of a sector's mesh: edges counted by hand, files that keep it, what is wrong with one."""
 
+import json
 import math
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from sector_files import DOFS, SECTORS, sector_files
+from scipy.linalg import eigh
+from sector_files import DOFS, SECTORS, TABLES, scene_of, sector_files
 
 import solver
 from service.cli import main
 from solver.matrices.readers.numbers_in_text import FormatError
 from solver.matrices.sectors.decks import read_deck
+from solver.matrices.sectors.elimination import elimination, phase_factor
 from solver.matrices.sectors.outline import SectorOutline, outline_of
 from solver.matrices.sectors.reduction import read_sector
+from solver.views.shapes import deflection_shape, mode_shape, shape_of_motion
 
 CUBE = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)]
 HIGHER = [(x, y, 2) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))]
@@ -44,7 +48,8 @@ def written(folder: Path, places: list[tuple[int, ...]], kind: str, elements: li
 def test_edges_are_drawn_where_a_surface_ends_or_is_bent(mesh: str, tmp_path: Path) -> None:
     places, kind, elements, count = MESHES[mesh]
     deck = read_deck(written(tmp_path, places, kind, elements), elements=True)
-    found = outline_of(deck, [1], [2], metres=1e-3)
+    found, nodes = outline_of(deck, [1], [2], metres=1e-3)
+    assert len(nodes) == len(found.points)
     assert len(found.edges) == count
     length = np.linalg.norm(found.points[found.edges[:, 0]] - found.points[found.edges[:, 1]], axis=1)
     assert np.all(length > 0.0)
@@ -94,6 +99,74 @@ def test_a_reduced_sector_and_a_scene_keep_it(tmp_path: Path, monkeypatch: pytes
     )  # fmt: skip
     scene = solver.load_scene("small.toml")
     assert solver.Scene.from_dict(scene.to_dict()) == scene
+
+
+def shape_and_full(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, **changes: Any) -> tuple[Any, Any]:
+    """A ring reduced with all its modes, as a scene, and the structure it was reduced from."""
+    monkeypatch.chdir(tmp_path)
+    for name, data in sector_files().items():
+        Path(name).write_bytes(data)
+    full = {"M": "ring.mas", "K": "ring.sti", "mapping": "ring.dof", "dofs": DOFS}
+    joined = {**TABLES, "nodes": "ring.inp"}
+    raw, free = scene_of({**full, "cyclic": joined}), 18 - len(DOFS)
+    small = scene_of({**full, "cyclic": {**joined, "keep_modes": free}}) | changes
+    small["excitation"]["engine_order"] = 1  # which meets every nodal diameter
+    for name, table in (("small.json", small), ("whole.json", raw)):
+        Path(name).write_text(json.dumps(table))
+    return solver.load_scene("small.json"), solver.load_scene("whole.json").structure
+
+
+def test_the_mesh_of_a_mode_is_that_of_the_full_sector(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene, full = shape_and_full(tmp_path, monkeypatch, contacts=[])
+    gone = elimination(27, full.cyclic.low_rows, full.cyclic.high_rows, full.cyclic.axis, SECTORS)
+    for n in (0, 2, 3):
+        K, M = (gone.of(matrix.array).at(n, SECTORS) for matrix in (full.K, full.M))
+        squares, vectors = eigh(K, M)
+        wave = (gone.here + phase_factor(n, SECTORS) * gone.beyond) @ vectors[:, 0]
+        shape = mode_shape(scene, 1, nodal_diameter=n)
+        assert shape.frequency_hz == pytest.approx(math.sqrt(squares[0]) / (2.0 * math.pi), rel=1e-6)
+        found = shape.motions[0, -1, :9].ravel()
+        turn = np.vdot(found, wave) / abs(np.vdot(found, wave))
+        np.testing.assert_allclose(found * turn, wave, atol=2e-3 * np.abs(wave).max())
+        told = [found[3 * 5 + 2], found[3 * 3]]  # the rim and the hub, by the places of their labels
+        again = shape_of_motion(scene, tuple(DOFS), np.array(told), shape.frequency_hz, {}, n)
+        np.testing.assert_allclose(again.motions[0, -1, :9].ravel(), found, atol=4e-3 * np.abs(found).max())
+
+
+def test_the_mesh_of_all_sectors_is_that_of_one_wave(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    scene, _ = shape_and_full(tmp_path, monkeypatch)
+    solved = [
+        solver.solve(scene, frequency_hz=40.0, harmonics=3, effects=solver.Effects(every_sector=every))
+        for every in (False, True)
+    ]
+    one, whole = (deflection_shape(scene, solution) for solution in solved)
+    assert (len(one.motions), len(whole.motions)) == (1, SECTORS)
+    size = np.abs(one.motions).max()
+    for j in range(SECTORS):
+        turns = np.exp(1j * one.harmonics * j * one.turn)[:, None, None]
+        np.testing.assert_allclose(whole.motions[j, :, :9], turns * one.motions[0, :, :9], atol=1e-5 * size)
+
+
+def test_a_file_without_the_motion_of_the_mesh_is_read(tmp_path: Path) -> None:
+    scene = solver.load_scene("fe-disk")
+    shipped = Path(solver.__file__).parent / "scene" / "shipped"
+    with np.load(shipped / "fe-disk.npz") as found:
+        old = {key: found[key] for key in found.files if key not in ("outline_patterns", "outline_shares")}
+    np.savez(tmp_path / "fe-disk.npz", **old)
+    (tmp_path / "disk.toml").write_text((shipped / "fe-disk.toml").read_text())
+    before = solver.load_scene(tmp_path / "disk.toml")
+    shapes = [mode_shape(each, 1, nodal_diameter=3) for each in (before, scene)]
+    assert [shape.motions[0, 0, :114].any() for shape in shapes] == [False, True]
+    assert "at rest" in " ".join(shapes[0].picture.notes)
+    assert shapes[1].picture.notes == []
+    # Points of the mesh where contacts are move as the DOFs of the nodes there.
+    points = np.array(shapes[1].picture.points)
+    for i in range(114, len(points)):
+        near = int(np.linalg.norm(points[:114] - points[i], axis=1).argmin())
+        moved = shapes[1].motions[0, 0]
+        np.testing.assert_allclose(moved[near], moved[i], atol=1e-3 * np.abs(moved).max())
 
 
 BAD: dict[str, tuple[Any, str]] = {

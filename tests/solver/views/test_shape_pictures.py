@@ -123,7 +123,7 @@ def test_what_has_no_place_is_said() -> None:
     assert picture_of(solver.load_scene("shroud-3d")).notes == ["Without a place, so not drawn: disk."]
     assert "tells no places" in picture_of(solver.load_scene("two-dof")).notes[0]
     placed = picture_of(solver.load_scene("fe-disk"))
-    assert "at rest" in placed.notes[-1]
+    assert placed.notes == []  # the mesh moves, and so do the DOFs that are on it
     assert placed.roles.count("mesh") == 114
     assert set(placed.contacts) == {"lower", "upper"}
 
