@@ -84,9 +84,9 @@ class MarchedMap:
         return law in RUBBING and start.mode == kernel.STICK
 
     def _row(self, c: int) -> np.ndarray:
-        found = np.zeros(self.state.x.size)
-        place = slice(self.system.L_start[c], self.system.L_start[c + 1])
-        found[self.system.L_column[place]] = self.system.L_value[place]
+        found, rows = np.zeros(self.state.x.size), self.system.L
+        place = slice(rows.start[c], rows.start[c + 1])
+        found[rows.column[place]] = rows.value[place]
         return found
 
     def numbers(self, state: kernel.State) -> np.ndarray:
