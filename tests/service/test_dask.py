@@ -208,7 +208,8 @@ def test_a_divided_job_leaves_room_for_others(service: tuple[EmbeddedService, Da
     """Its parts are on both workers, a small job gets between them, and a cancel ends them all."""
     embedded, _ = service
     study = embedded.submit("mistuning", {**BODIES["mistuning"], "samples": 2000})
-    until(lambda: embedded._service.queue.status().busy == 2)
+    client = embedded._service.queue._executor._cluster._client
+    until(lambda: len(computing := client.processing()) == 2 and all(computing.values()))
     until(lambda: embedded.job(study).points > 0)
     small = embedded.wait(embedded.submit("iteration", {"seed": 4}), timeout=PATIENCE)
     assert small.status is JobState.SUCCESSFUL
