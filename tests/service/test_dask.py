@@ -219,6 +219,19 @@ def test_a_divided_job_leaves_room_for_others(service: tuple[EmbeddedService, Da
     assert embedded.job(study).points < 1000, "half of it"
 
 
+def test_parts_are_computed_where_there_is_room(service: tuple[EmbeddedService, DaskCluster]) -> None:
+    embedded, dask = service
+    body = {"size": 20, "seconds": 0.1}
+    (result, _), known = ended(embedded, "naps", body), {each.pid for each in processes_of(dask)}
+    assert result["square"] == [number**2 for number in range(20)]
+    assert len(set(result["pid"])) == 2
+    assert set(result["pid"]) <= known
+
+
+def processes_of(dask: DaskCluster) -> list[Any]:
+    return [each for process in dask.workers for each in dask.family(process)]
+
+
 def test_a_worker_with_another_version_computes_nothing(
     service: tuple[EmbeddedService, DaskCluster], monkeypatch: pytest.MonkeyPatch
 ) -> None:
