@@ -5,10 +5,10 @@ A study that has several at a time asks for the `spreader`: there is one inside 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
-from typing import Any, Protocol
+from typing import Any, Generic, Protocol, TypeVar
 
 
 class Spread(Protocol):
@@ -60,6 +60,42 @@ _SPREAD: ContextVar[Spread | None] = ContextVar("spread", default=None)
 def spreader() -> Spread | None:
     """Return what computes calls elsewhere too; None if there is nothing but this process."""
     return _SPREAD.get()
+
+
+_Key = TypeVar("_Key")
+_Found = TypeVar("_Found")
+
+
+class Ahead(Generic[_Key, _Found]):
+    """Results that are asked for one after the other, computed together before where somebody helps.
+
+    Who asks does so as without: what is counted, and when, does not depend on who computed it.
+
+    Parameters
+    ----------
+    should_stop : asked between calls.
+    """
+
+    def __init__(self, should_stop: Callable[[], bool] | None) -> None:
+        self._should_stop = should_stop or (lambda: False)
+        self._found: dict[_Key, _Found] = {}
+
+    def compute(self, function: Callable[..., _Found], calls: Mapping[_Key, tuple[Any, ...]]) -> None:
+        """Call ``function(*call, should_stop=…)`` for what is not there; nothing where nobody helps."""
+        spread = _SPREAD.get()
+        keys = [key for key in calls if key not in self._found]
+        if spread is None or len(keys) < 2:
+            return
+
+        def done(index: int, found: _Found) -> bool:
+            self._found[keys[index]] = found
+            return False
+
+        spread(function, [calls[key] for key in keys], done, should_stop=self._should_stop)
+
+    def take(self, key: _Key) -> _Found | None:
+        """Return a result, once; None if it was not computed."""
+        return self._found.pop(key, None)
 
 
 @contextmanager

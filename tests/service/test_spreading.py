@@ -14,10 +14,14 @@ import pytest
 from private_kinds import PRIVATE
 from service_helpers import PATIENCE, promptly, until, with_tables
 
+import optim
+import solver
 from service.client.embedded import EmbeddedService
 from service.db.models import JobState
 from service.settings.settings import load_settings
+from service.workers import spreading as spreading_module
 from service.workers.spreading import BatchAnswer, Spreading, helped
+from solver.results.spread import spreading
 
 WORKERS = 2
 
@@ -98,6 +102,24 @@ def test_a_helper_that_does_not_heed_is_ended(embedded: EmbeddedService) -> None
 # What is sent and what is not ----------------------------------------------------------------------------
 
 
+class Clock:
+    """Time that passes by calls alone: what is sent does not depend on this machine."""
+
+    def __init__(self) -> None:
+        self.now = 0.0
+
+    def perf_counter(self) -> float:
+        return self.now
+
+
+CLOCK = Clock()
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(spreading_module, "time", CLOCK)
+
+
 class Here:
     """Helpers that compute when they are asked; `lost` of them do not."""
 
@@ -132,7 +154,7 @@ class Here:
 
 def squared(seconds: float, value: int, *, should_stop: Callable[[], bool]) -> int:
     assert not should_stop()
-    time.sleep(seconds)
+    CLOCK.now += seconds
     return value**2
 
 
@@ -151,12 +173,14 @@ def spread(
     return found
 
 
+@pytest.mark.usefixtures("clock")
 def test_what_costs_more_than_it_gains_stays() -> None:
     helpers = Here()
     assert spread(helpers, 20, 0.0005) == {value: value**2 for value in range(20)}
     assert helpers.batches == []
 
 
+@pytest.mark.usefixtures("clock")
 def test_short_calls_go_in_batches_and_long_ones_alone() -> None:
     short, long = Here(), Here()
     assert spread(short, 200, 0.002) == {value: value**2 for value in range(200)}
@@ -165,6 +189,7 @@ def test_short_calls_go_in_batches_and_long_ones_alone() -> None:
     assert set(long.batches) == {1}
 
 
+@pytest.mark.usefixtures("clock")
 def test_what_is_lost_and_what_has_no_name_is_computed_here() -> None:
     helpers, expected = Here(lost=(1, 2)), {value: value**2 for value in range(30)}
     assert spread(helpers, 30, 0.01) == expected
@@ -178,8 +203,52 @@ def test_what_is_lost_and_what_has_no_name_is_computed_here() -> None:
     assert nameless.batches == []
 
 
+@pytest.mark.usefixtures("clock")
 def test_a_final_result_ends_the_rest() -> None:
     helpers = Here()
     found = spread(helpers, 500, 0.002, final=1)
     assert len(found) < 500
     assert 1 in found
+
+
+# Searches that spread what they evaluate -----------------------------------------------------------------
+
+TWO_DOF: dict[str, Any] = {"variables": {"damper.N0": [20, 500]}, "harmonics": 3}
+SEARCHES: dict[str, Callable[[], Any]] = {
+    "robust": lambda: optim.robust_design(
+        solver.load_scene("two-dof"), **TWO_DOF, uncertain={"damper.kt": [0.9, 1.1]}
+    ),
+    "samples": lambda: optim.robust_design(
+        solver.load_scene("two-dof"), **TWO_DOF, uncertain={"damper.kt": [0.9, 1.1]}, aim="mean", samples=8
+    ),
+    "several variables": lambda: optim.design(
+        solver.load_scene("two-dof"), variables={"damper.N0": [20, 500], "damper.kt": [0.5, 2.0]},
+        harmonics=3, method="minimax",
+    ),
+    "front": lambda: optim.pareto_front(solver.load_scene("two-dof"), **TWO_DOF, points=3),
+}  # fmt: skip
+
+
+class Elsewhere(Here):
+    """All calls but the first go through pickle to another place."""
+
+    alone = False
+
+
+def timeless(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: timeless(one) for key, one in value.items() if key != "seconds"}
+    return [timeless(one) for one in value] if isinstance(value, list | tuple) else value
+
+
+@pytest.mark.few(keep=("samples", "several variables"))
+@pytest.mark.parametrize("name", SEARCHES)
+def test_a_search_finds_the_same_wherever_designs_are_evaluated(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(spreading_module, "_WORTH_SECONDS", 0.0)
+    alone, helpers = SEARCHES[name](), Elsewhere()
+    with spreading(Spreading(helpers, lambda: False)):
+        spread_out = SEARCHES[name]()
+    assert sum(helpers.batches) > 3
+    assert timeless(spread_out.to_json()) == timeless(alone.to_json())
