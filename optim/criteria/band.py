@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING
 
 from optim.criteria.criterion import Criterion, CriterionRow, Form, Judged, Key
@@ -38,7 +39,7 @@ def _second(judged: Judged) -> Callable[[], Real] | None:
     if sensitivity is None or branch.band is None or not sensitivity.has_second:
         return None
     edges, highest = branch.band.edges, None if judged.problem.limit is not None else branch.peaks[0]
-    return lambda: sensitivity.band_second(edges, highest)
+    return partial(sensitivity.band_second, edges, highest)
 
 
 BAND = CRITERION = Criterion(

@@ -8,9 +8,10 @@ module of a criterion imports what computes inside its functions: a service that
 from __future__ import annotations
 
 import math
+import operator
 from collections.abc import Callable, Container, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from optim.criteria.key import WORD
@@ -55,6 +56,13 @@ def positive_limit(asked: CriterionContext) -> object:
 
     ((name, value),) = asked.values.items()
     return positive(name, value)
+
+
+def registered(name: str) -> Criterion:
+    """Return the criterion of a name; KeyError if there is none here."""
+    from optim.criteria.registry import criteria
+
+    return {one.name: one for one in criteria()}[name]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
@@ -120,6 +128,10 @@ class Criterion:
             raise ValueError(f"the criterion {self.name!r} is minimised by its `weight`: smaller is better")
         if self.weight and not WORD.fullmatch(self.weight):
             raise ValueError(f"`weight` of {self.name!r} must be a word such as peak, got {self.weight!r}")
+
+    def __reduce__(self) -> tuple[Callable[[str], Criterion], tuple[str]]:
+        """Be sent to another process by name: there too, a criterion is one object."""
+        return registered, (self.name,)
 
     def __repr__(self) -> str:
         return f"Criterion({self.name})"
@@ -209,6 +221,11 @@ class CriterionRow(Piece):
         return abs(self.bound) if self.bound else scale
 
 
+def _after(change: Callable[[Real], Real], compute: Callable[[], Real]) -> Real:
+    """What is computed, changed: a row keeps what computes so that it can be sent to another process."""
+    return change(compute())
+
+
 def of_sector(contact: AnyContact) -> str:
     """Return the name a contact has in one sector: that of ``shroud@3`` is ``shroud``."""
     return contact.name.partition("@")[0]
@@ -283,7 +300,7 @@ class Judged:
         gradient = np.full(len(variables), np.nan)
         if by_paths is not None:
             gradient = by_variables(variables, by_paths)
-        twice = None if second is None else lambda: by_variables_twice(variables, second())
+        twice = None if second is None else partial(_after, partial(by_variables_twice, variables), second)
         weight = self.weight(criterion) if weight is None else weight
         if criterion.smaller_is_better:
             return CriterionRow(
@@ -294,5 +311,5 @@ class Judged:
         return CriterionRow(
             quantity=criterion, case=self.case.name, what=f"-{what}", value=0.0 - value,
             gradient=-gradient, at_hz=at_hz, weight=0.0, bound=None if bound is None else 0.0 - bound,
-            second=None if twice is None else lambda: -twice(),
+            second=None if twice is None else partial(_after, operator.neg, twice),
         )  # fmt: skip

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING
 
 from optim.criteria.criterion import Criterion, CriterionRow, Form, Judged, Key
@@ -39,7 +40,7 @@ def maxima(
 def _second(sensitivity: Sensitivity | None, peak: Peak) -> Callable[[], Real] | None:
     if sensitivity is None or not sensitivity.has_second:
         return None
-    return lambda: sensitivity.peak_second(peak)
+    return partial(sensitivity.peak_second, peak)
 
 
 def _rows(judged: Judged) -> list[CriterionRow]:

@@ -36,6 +36,11 @@ class Sensitivity:
     def __init__(self, balance: Balance, paths: Sequence[str]) -> None:
         self.amplitudes = Sensitivities(balance, paths)
         self._n = len(tuple(paths))
+        self._of = balance, tuple(paths)
+
+    def __reduce__(self) -> tuple[type[Sensitivity], tuple[Balance, tuple[str, ...]]]:
+        """Be made anew in another process: what is compiled here is not sent."""
+        return Sensitivity, self._of
 
     @property
     def has_second(self) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
+from functools import partial
 
 from optim.criteria.evaluation import evaluate, natural_scales
 from optim.criteria.linearised import Model, model_of
@@ -15,6 +16,7 @@ from optim.problem.variables import BoundedVariable
 from optim.results.design import DesignStatus
 from optim.results.doubts import open_peaks
 from optim.results.parts import FEWER_HARMONICS, PEAKS_OPEN, VERIFIED, BestSoFar, OnBest
+from solver.results.spread import Ahead
 from solver.results.watch import OnProgress, ShouldStop
 
 MOST_EVALUATIONS = 800
@@ -54,6 +56,7 @@ class DesignSearch:
         # By identity, with the evaluation itself, which so keeps its place in memory.
         self._models: dict[int, tuple[DesignEvaluation, Model]] = {}
         # Of another search: by another measure, or with other harmonics.
+        self._ahead: Ahead[tuple[float, ...], DesignEvaluation] = Ahead(should_stop)
         self._earlier = {self._place(one.values): one for one in before}
 
     def __call__(self, values: Mapping[str, float]) -> DesignEvaluation:
@@ -70,12 +73,19 @@ class DesignSearch:
             return self._known[place]
         if len(self.history) >= self._most:
             raise SearchStoppedError(DesignStatus.TOO_MANY)
-        evaluation = evaluate(
+        evaluation = self._ahead.take(place) or evaluate(
             self.problem, values, errors=False, should_stop=self.should_stop, before=self._earlier.get(place)
         )  # fmt: skip
         self._known[place] = evaluation
         self.keep(evaluation)
         return evaluation
+
+    def ahead(self, several: Iterable[Mapping[str, float]]) -> None:
+        """Compute designs that will be asked for, where there are others to do so."""
+        calls = {self._place(values): (values,) for values in several}
+        known = self._known.keys() | self._earlier.keys()
+        unknown = {place: call for place, call in calls.items() if place not in known}
+        self._ahead.compute(partial(evaluate, self.problem, errors=False), unknown)
 
     def _place(self, values: Mapping[str, float]) -> tuple[float, ...]:
         return tuple(values[variable.name] for variable in self.variables)

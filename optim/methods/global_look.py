@@ -132,7 +132,9 @@ class WholeRange:
         True if nothing depends on the variables, None if no response could be computed.
         """
         try:
-            for i, z in enumerate(() if self._seen else places(self._n)):
+            begin = [] if self._seen else list(places(self._n))
+            self._ahead(z for i, z in enumerate(begin) if i < SURE * (self._n + 1))
+            for i, z in enumerate(begin):
                 if i < SURE * (self._n + 1) or self._worth(z):
                     self._look(z)
             begins = [e for values in given if (e := self.search(values)).good]
@@ -164,6 +166,9 @@ class WholeRange:
             return False
         return all(is_flat(self.search.model(e)) for e in self._exact(self._seen[:2]))
 
+    def _ahead(self, several: Iterable[Real]) -> None:
+        self._scout.ahead(unscaled(self.search.variables, z) for z in several)
+
     def _look(self, z: Real) -> None:
         """Look at a design."""
         evaluation = self._scout(unscaled(self.search.variables, z))
@@ -174,7 +179,9 @@ class WholeRange:
         """Return designs of the look with all harmonics, those that can be computed."""
         if self._scout is self.search:
             return list(some)
-        exact = [self.search(e.values) for e in some]
+        chosen = list(some)
+        self.search.ahead(e.values for e in chosen)
+        exact = [self.search(e.values) for e in chosen]
         return [e for e in exact if e.good]
 
     def _starts_given(self, begins: list[DesignEvaluation]) -> None:
@@ -209,6 +216,7 @@ class WholeRange:
             if not more:
                 self.finished = True
                 return
+            self._ahead(more)
             for z in more:
                 self._look(z)
             most = 2

@@ -124,9 +124,7 @@ def _worse(
     progress.finished = True
     for aspect in search.aspects():
         master = aspect.worst(here.rows)
-        finding = pessimise(
-            lambda scenario: search.outcome(values, scenario), search.uncertain, aspect, progress.scenarios
-        )
+        finding = pessimise(search.asking(values), search.uncertain, aspect, progress.scenarios)
         if drawn and _excess(aspect, finding.value, master) <= CLOSED and not search.uncertain.finite:
             finding = _checked(search, values, aspect, progress, drawn)
         progress.finished = progress.finished and finding.finished
@@ -152,10 +150,12 @@ def _checked(
 ) -> Finding:  # fmt: skip
     """Return the worst scenarios again, looking at the whole set and climbing from the worst drawn ones."""
     inside = [scenario for scenario in drawn if search.uncertain.inside_of(scenario)]
-    asked = [search.outcome(values, scenario) for scenario in inside]
+    asking = search.asking(values)
+    asking.several(inside)
+    asked = [asking(scenario) for scenario in inside]
     ranked = sorted((o for o in asked if o.good), key=lambda found: -aspect.worst(found.rows))
     return pessimise(
-        lambda scenario: search.outcome(values, scenario), search.uncertain, aspect, progress.scenarios,
+        asking, search.uncertain, aspect, progress.scenarios,
         besides=[found.scenario for found in ranked[:MOST_BESIDES]], thorough=True,
     )  # fmt: skip
 
@@ -206,6 +206,7 @@ def _starts(
     given = [dict(basin.values) for basin in nominal.basins] + _coarse(search.problem)
     if nominal.optimum:
         given.insert(0, dict(nominal.optimum))
+    search.ahead((values, scenario) for values in given for scenario in scenarios)
     seen = [search.evaluation(values, scenarios) for values in given]
     if nominal.optimum and not any(evaluation.good for evaluation in seen):
         for scenario in scenarios:

@@ -66,6 +66,7 @@ def side_of(
     """
     nominal = search.outcome(values, Scenario(), gradients=False)
     slopes = not search.uncertain.finite  # the search for the worst begins from them
+    search.ahead([(values, scenario) for scenario in drawn], gradients=slopes)
     samples = [search.outcome(values, scenario, gradients=slopes) for scenario in drawn]
     peaks = [found.highest(PEAK) if found.good else None for found in samples]
     worst, unknown = _worst(search, values, samples, scenarios)
@@ -90,7 +91,7 @@ def _worst(
     besides = [found.scenario for found in ranked[:MOST_BESIDES]]
     try:
         finding = pessimise(
-            lambda scenario: search.outcome(values, scenario),
+            search.asking(values),
             search.uncertain,
             aspect,
             known,

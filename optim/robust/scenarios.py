@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Annotated
 
 import numpy as np
@@ -179,8 +180,7 @@ class _Chain:
 
     def twice(self, second: Callable[[], Real]) -> Callable[[], Real]:
         """Return what computes second derivatives by the variables from what does so by the paths."""
-        members = self._members()
-        return lambda: members @ second() @ members.T
+        return partial(_by_members, self._members(), second)
 
     def _by_nominal(self, path: str) -> float:
         if path not in self._of:
@@ -194,6 +194,10 @@ class _Chain:
             sum(by_path[self._places[p]] * coordinate.by_delta(self._nominal[p]) for p in coordinate.paths)
             for coordinate, _ in self._scenario.settings
         ])  # fmt: skip
+
+
+def _by_members(members: Real, second: Callable[[], Real]) -> Real:
+    return np.asarray(members @ second() @ members.T)
 
 
 def _single(values: Mapping[str, float]) -> tuple[BoundedVariable, ...]:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import cvxpy
 import numpy as np
@@ -25,8 +25,9 @@ from optim.problem.words import Aim
 from optim.results.design import DesignStatus
 from optim.results.parts import NOMINAL, BestSoFar, OnBest
 from optim.robust.scenarios import Outcome, aim_model, known_in, outcome, together
-from optim.robust.worst_case import Aspect
+from optim.robust.worst_case import Asking, Aspect
 from solver.results.known import Known
+from solver.results.spread import Ahead
 
 _BLOCK = 4  # rows are padded to multiples of it
 _LOCK = threading.Lock()  # a problem keeps its numbers in itself
@@ -114,6 +115,7 @@ class RobustSearch:
         self.responses = 0
         self._on_progress, self._should_stop = on_progress, should_stop
         self._outcomes: dict[Key, Outcome] = {}
+        self._ahead: Ahead[Key, Outcome] = Ahead(should_stop)
         self._on_best = on_best
         self._known: tuple[tuple[int, int], tuple[float, float]] | None = (
             None  # over what, standing of the best
@@ -143,21 +145,43 @@ class RobustSearch:
         StoppedError
             The caller asked to stop, or the responses are used up.
         """
-        place = tuple(values[variable.name] for variable in self.variables)
-        harmonics = self.problem.harmonics
-        for slopes in (True, gradients):
-            if (place, scenario, slopes, harmonics) in self._outcomes:
-                return self._outcomes[place, scenario, slopes, harmonics]
+        key = self._key(values, scenario, gradients)
+        if (known := self._known_outcome(key)) is not None:
+            return known
         if self._should_stop is not None and self._should_stop():
             raise SearchStoppedError(DesignStatus.STOPPED)
         if self.responses >= MOST_RESPONSES:
             raise SearchStoppedError(DesignStatus.TOO_MANY)
-        found = outcome(self.problem, values, scenario, gradients=gradients, should_stop=self._should_stop)
+        found = self._ahead.take(key) or outcome(
+            self.problem, values, scenario, gradients=gradients, should_stop=self._should_stop
+        )
         if not found.good and self._should_stop is not None and self._should_stop():
             raise SearchStoppedError(DesignStatus.STOPPED)
-        self._outcomes[place, scenario, gradients, harmonics] = found
+        self._outcomes[key] = found
         self.count(found.responses)
         return found
+
+    def ahead(self, asked: Iterable[tuple[Mapping[str, float], Scenario]], *, gradients: bool = True) -> None:
+        """Compute designs in scenarios that will be asked for, where there are others to do so."""
+        calls = {self._key(values, scenario, gradients): (values, scenario) for values, scenario in asked}
+        unknown = {key: call for key, call in calls.items() if self._known_outcome(key) is None}
+        self._ahead.compute(partial(outcome, self.problem, gradients=gradients), unknown)
+
+    def asking(self, values: Mapping[str, float]) -> Asking:
+        """Return what asks for a design in scenarios."""
+        return Asking(
+            lambda scenario: self.outcome(values, scenario),
+            lambda scenarios: self.ahead((values, scenario) for scenario in scenarios),
+        )
+
+    def _key(self, values: Mapping[str, float], scenario: Scenario, gradients: bool) -> Key:
+        place = tuple(values[variable.name] for variable in self.variables)
+        return place, scenario, gradients, self.problem.harmonics
+
+    def _known_outcome(self, key: Key) -> Outcome | None:
+        place, scenario, _, harmonics = key
+        with_slopes = self._outcomes.get((place, scenario, True, harmonics))
+        return with_slopes or self._outcomes.get(key)
 
     def known(self, values: Mapping[str, float], scenario: Scenario) -> Known:
         """Return how well the highest peak of a design in a scenario is known."""
@@ -174,6 +198,7 @@ class RobustSearch:
     def evaluation(self, values: Mapping[str, float], scenarios: Sequence[Scenario]) -> DesignEvaluation:
         """Return a design over several scenarios."""
         found: list[Outcome] = []
+        self.ahead((values, scenario) for scenario in scenarios)
         for scenario in scenarios:
             found.append(self.outcome(values, scenario))
             if not found[-1].good:

@@ -116,13 +116,15 @@ def pessimise(
         A response could not be computed.
     """
     finished = uncertain.finite or thorough
+    asking = ask if isinstance(ask, Asking) else Asking(ask, _one_by_one)
     if uncertain.finite:
+        asking.several(list(uncertain.all()))
         tried = [_asked(ask, scenario) for scenario in uncertain.all()]
     else:
         tried = []
         for disk in uncertain.disks or (None,):
             mine = [s for s in (*known, *besides) if s.disk == disk and uncertain.inside_of(s)]
-            ascent = _Ascent(ask, uncertain, aspect, disk)
+            ascent = _Ascent(asking, uncertain, aspect, disk)
             tried += ascent.run(mine)
             if thorough:
                 inside = sum(max(map(abs, s.xi)) < 1.0 for s in besides if s in mine)
@@ -141,10 +143,26 @@ def _asked(ask: Ask, scenario: Scenario) -> Outcome:
     return found
 
 
+@dataclass(frozen=True, slots=True)
+class Asking:
+    """How a design is asked for in scenarios: in one, and that several will be asked for."""
+
+    one: Ask
+    several: Callable[[Sequence[Scenario]], None]
+
+    def __call__(self, scenario: Scenario) -> Outcome:
+        """Return the design in a scenario."""
+        return self.one(scenario)
+
+
+def _one_by_one(_scenarios: Sequence[Scenario]) -> None:
+    """For who asks in another way."""
+
+
 class _Ascent:
     """The search of one disk over the unit box or ball."""
 
-    def __init__(self, ask: Ask, uncertain: UncertainSet, aspect: Aspect, disk: Disk | None) -> None:
+    def __init__(self, ask: Asking, uncertain: UncertainSet, aspect: Aspect, disk: Disk | None) -> None:
         self._ask, self._set, self._aspect, self._disk = ask, uncertain, aspect, disk
         self._tried: list[tuple[Real, Outcome]] = []
         self._climbed: list[Real] = []
@@ -153,8 +171,8 @@ class _Ascent:
         """Try the starts, what their gradients point to, the corners if they are few, and climb."""
         n = len(self._set.centre)
         corners = self._set.corners(MOST_CORNERS)
-        for start in ((0.0,) * n, *(scenario.xi for scenario in starts), *corners):
-            self._at(np.array(start))
+        begins = ((0.0,) * n, *(scenario.xi for scenario in starts), *corners)
+        self._all_at([np.array(start) for start in begins])
         for _ in range(MOST_JUMPS):
             jump = self._promising()
             if jump is None:
@@ -176,8 +194,7 @@ class _Ascent:
         So many places between the bounds are `known`: random ones, that were tried already.
         """
         n = len(self._set.centre)
-        for z in places(n, known if n > 1 else 0):
-            self._at(2.0 * z - 1.0)
+        self._all_at([2.0 * z - 1.0 for z in places(n, known if n > 1 else 0)])
         idle = 0
         for turn in range(MOST_ROUNDS):
             worst = self._worst()
@@ -187,8 +204,7 @@ class _Ascent:
             more = self._room(turn)
             if not more or idle >= IDLE:
                 return True
-            for z in more:
-                self._at(2.0 * z - 1.0)
+            self._all_at([2.0 * z - 1.0 for z in more])
             if self._worst() > worst + WORSE * abs(worst):
                 idle = 0
         return False
@@ -243,11 +259,23 @@ class _Ascent:
     def _value(self, found: Outcome) -> float:
         return self._aspect.worst(found.rows)
 
-    def _at(self, place: Real) -> Outcome:
-        place = self._set.inside(place)
+    def _all_at(self, there: Sequence[Real]) -> None:
+        """Ask for several places that do not depend on what is found at the others."""
+        new = [inside for place in there if not self._tried_at(inside := self._set.inside(place))]
+        self._ask.several([self._set.scenario(place, self._disk) for place in new])
+        for place in there:
+            self._at(place)
+
+    def _tried_at(self, place: Real) -> Outcome | None:
         for other, found in self._tried:
             if np.abs(other - place).max(initial=0.0) <= SAME:
                 return found
+        return None
+
+    def _at(self, place: Real) -> Outcome:
+        place = self._set.inside(place)
+        if (known := self._tried_at(place)) is not None:
+            return known
         found = _asked(self._ask, self._set.scenario(place, self._disk))
         self._tried.append((place, found))
         return found

@@ -4,17 +4,20 @@ A kind of job whose work can be divided has a `Division` beside its `run`. What 
 spec alone, never on how many workers there are: every executor computes the same parts through the same
 function and joins them through the same function, so that the result is the same bit for bit, wherever and
 in whatever order they were computed. What a part gives back is JSON and arrays, so that it can be kept as a
-checkpoint; a part that is known already is not computed again.
+checkpoint; a part that is known already is not computed again. The worker of the job computes its parts, and
+gives some of them to others that have nothing to do (`solver.results.spread`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 from service.jobs.figures import StoredArray
 from service.jobs.outputs import JobOutput, OnProgress, ShouldStop
+from solver.results.spread import in_turn, spreader
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,6 +62,9 @@ class PartStoppedError(Exception):
     """A part was told to stop: there is no output."""
 
 
+PART_SECONDS = 0.1
+"""What a part takes at least, about [s]."""
+
 Split = Callable[[Mapping[str, Any]], Sequence[JobPart]]
 RunPart = Callable[[Mapping[str, Any], Mapping[str, Any], OnProgress, ShouldStop], PartOutput]
 Join = Callable[[Mapping[str, Any], Mapping[int, PartOutput]], JobOutput]
@@ -96,7 +102,7 @@ class Division:
         known: Mapping[int, PartOutput] | None = None,
         on_part: OnPart = _not_kept,
     ) -> JobOutput:
-        """Compute the parts one after the other and join them: the `run` of the kind.
+        """Compute the parts, here and by who helps, and join them: the `run` of the kind.
 
         Parameters
         ----------
@@ -111,21 +117,40 @@ class Division:
         parts = self.split(spec)
         outputs = dict(known or {})
         account = Account(parts, outputs, progress)
-        for index, part in enumerate(parts):
-            if final_one(outputs):
-                break
-            if index in outputs:
-                continue
-            if should_stop():
-                raise PartStoppedError
-            outputs[index] = self.run_part(spec, part.spec, account.of(index), should_stop)
-            account.done(index, outputs[index])
-            on_part(index, outputs[index])
+        left = [index for index in range(len(parts)) if index not in outputs]
+
+        def here(number: int) -> PartOutput:
+            index = left[number]
+            return self.run_part(spec, parts[index].spec, account.of(index), should_stop)
+
+        def done(number: int, output: PartOutput) -> bool:
+            index = left[number]
+            outputs[index] = output
+            account.done(index, output)
+            on_part(index, output)
+            return output.final
+
+        if not final_one(outputs):
+            calls = [(parts[index].spec,) for index in left]
+            spread = spreader() or in_turn
+            spread(
+                partial(run_apart, self.run_part, spec), calls, done, should_stop=should_stop, here=here,
+                seconds=PART_SECONDS,
+            )  # fmt: skip
+        if len(outputs) < len(parts) and not final_one(outputs):
+            raise PartStoppedError
         return self.joined(spec, outputs)
 
     def joined(self, spec: Mapping[str, Any], outputs: Mapping[int, PartOutput]) -> JobOutput:
         """The output of the job from those of all parts, or from a final one."""
         return self.join(spec, final_one(outputs) or dict(sorted(outputs.items())))
+
+
+def run_apart(
+    run_part: RunPart, spec: Mapping[str, Any], part: Mapping[str, Any], *, should_stop: ShouldStop
+) -> PartOutput:
+    """Compute a part of another worker's job, whose progress is told when it is done."""
+    return run_part(spec, part, lambda _share, _points: None, should_stop)
 
 
 def final_one(outputs: Mapping[int, PartOutput]) -> dict[int, PartOutput]:

@@ -1,8 +1,9 @@
-"""Workers of a Dask cluster: one order an attempt, or one a part where the kind can be divided.
+"""Workers of a Dask cluster: an order for each attempt, whose worker asks others for help by itself.
 
 The row in the database stays the truth: orders carry everything a worker needs, what comes back is written
-here, and an order that was lost costs the attempt (a part is computed once more). The cluster's own second
-tries are not wanted: an order that begins a second time is a worker that died.
+here, and an order that was lost costs the attempt (that of a divided kind is given again once, behind what it
+kept). The cluster's own second tries are not wanted: an order that begins a second time is a worker that
+died.
 """
 
 from __future__ import annotations
@@ -22,8 +23,8 @@ from distributed import Future, KilledWorker, Security
 from service.db.repositories import Attempt
 from service.errors import UnknownKindError
 from service.jobs.outputs import Pace
-from service.jobs.registry import JobKind, Registry
-from service.workers.base import ExecutorStatus, Failed, Lost, Outcome, Sink, Stopped
+from service.jobs.registry import Registry
+from service.workers.base import ExecutorStatus, Failed, Finished, Lost, Outcome, Sink, Stopped
 from service.workers.cluster import Cluster, answer_of
 from service.workers.process_limits import UNLIMITED, ProcessLimits
 from service.workers.tasks import Order, TaskAnswer
@@ -33,6 +34,7 @@ from service.workers.worker import Task, failure_of
 log = logging.getLogger("stickslip.executor")
 
 _WRITERS = 4
+_LOSSES = 1  # of a divided job, that cost no attempt
 
 _tokens = itertools.count(1)
 
@@ -52,7 +54,7 @@ class DaskExecutor:
         Time between asking an attempt to stop and ending its worker by force [s], if that has one thread and
         a nanny.
     pace : Pace
-        How often workers tell what, and how much of a divided job is kept for later attempts.
+        How often workers tell what, and how much of a job is kept for later attempts.
     limits : ProcessLimits
         What an order may use of its worker.
     """
@@ -91,16 +93,22 @@ class DaskExecutor:
         self._cluster.start()
 
     def free(self) -> int:
-        """How many attempts could start now; one that is divided leaves threads to the others."""
+        """How many attempts could start now."""
         with self._lock:
             return max(self._cluster.threads - len(self._work), 0) if self._cluster.connected else 0
 
     def submit(self, attempt: Attempt) -> None:
-        """Send an attempt, in parts if its kind can be divided."""
-        work = Work(attempt)
+        """Send an attempt."""
+        known = attempt.kind in self._registry
+        divided = known and self._registry[attempt.kind].parts is not None
+        work = Work(attempt, _LOSSES if divided else 0)
+        work.pending = known
         with self._lock:
             self._work.append(work)
-        self._later(self._begin, work)
+        if known:
+            self._later(self._fill)
+        else:
+            self._later(self._end, work, Failed(failure_of(_task(attempt), UnknownKindError(attempt.kind))))
 
     def stop_attempt(self, attempt: Attempt) -> None:
         """Let an attempt go; its workers see that it is not wanted any more."""
@@ -145,54 +153,37 @@ class DaskExecutor:
         except Exception:
             log.exception("an outcome could not be dealt with")
 
-    def _begin(self, work: Work) -> None:
-        """Divide an attempt and send what there is room for."""
-        attempt = work.attempt
-        try:
-            if attempt.kind not in self._registry:
-                raise UnknownKindError(attempt.kind)
-            work.divide(self._registry[attempt.kind].parts, self._sink, self._pace)
-        except Exception as error:  # noqa: BLE001 - the boundary: whatever it is, the job must hear of it
-            self._end(work, Failed(failure_of(_task(attempt), error)))
-            return
-        self._finish_if_whole(work)
-        self._fill()
-
     def _fill(self) -> None:
-        """Send orders while there are threads without one; attempts with the fewest go first."""
+        """Send orders while there are threads without one."""
         with self._lock:
             while len(self._flights) + len(self._leaving) < self._cluster.threads:
-                waiting = [work for work in self._work if work.pending]
-                if not waiting:
+                work = next((work for work in self._work if work.pending), None)
+                if work is None:
                     return
-                work = min(waiting, key=lambda work: work.flying)
-                index = work.pending.popleft()
-                order = self._order(work, index)
+                work.pending = False
+                order = self._order(work)
                 try:
                     future = self._cluster.send(order, 0)
                 except (OSError, RuntimeError, TypeError) as error:
                     self._later(self._end, work, Lost(f"it could not be sent: {error}"))
                     return
-                work.flying += 1
-                self._flights[order.token] = Flight(work=work, index=index, future=future)
+                self._flights[order.token] = Flight(work=work, future=future)
                 future.add_done_callback(lambda _, token=order.token: self._later(self._landed, token))
 
-    def _order(self, work: Work, index: int | None) -> Order:
+    def _order(self, work: Work) -> Order:
         attempt = work.attempt
-        kind: JobKind = self._registry[attempt.kind]
         return Order(
             token=f"{attempt.lease_owner}-{next(_tokens)}",
             job_id=attempt.job_id,
             kind=attempt.kind,
             spec=attempt.spec,
-            run=self._runs[attempt.kind] if index is None else None,
-            run_part=None if index is None or kind.parts is None else kind.parts.run_part,
-            part=None if index is None else work.parts[index].spec,
-            saved=work.saved if index is None else (),
+            run=self._runs[attempt.kind],
+            saved=work.saved,
             spec_hash=attempt.spec_hash,
             told=work.told,
             warm_up=self._registry.warm_up,
             version=self._version,
+            threads=self._cluster.threads,
             pace=self._pace,
             limits=self._limits,
         )
@@ -210,7 +201,6 @@ class DaskExecutor:
         with self._lock:
             if self._flights.pop(token, None) is None:
                 return
-            flight.work.flying -= 1
         flight.future.release()
         self._deal(flight, answer)
         self._fill()
@@ -226,37 +216,28 @@ class DaskExecutor:
 
     def _deal(self, flight: Flight, answer: TaskAnswer) -> None:
         """Draw the consequences of an answer."""
-        work, index = flight.work, flight.index
+        work = flight.work
         if answer.failure is not None:
             self._end(work, Failed(answer.failure))
         elif answer.retry is not None:
-            self._again(work, index, answer.retry)
+            self._again(work, answer.retry)
         elif answer.output is None:
             # It kept something, or its worker leaves the cluster in good order; nothing was lost.
             for kept in answer.kept:
                 self._sink.kept(work.attempt, kept.pieces, anew=kept.anew)
             with self._lock:
-                work.go_on(index, answer.kept)
+                work.go_on(answer.kept)
         else:
-            work.keep(index, answer.output)
-            self._finish_if_whole(work)
+            self._end(work, Finished(answer.output))
 
-    def _again(self, work: Work, index: int | None, reason: str) -> None:
-        """Compute a lost part once more, if the connection is there; else the attempt is lost."""
+    def _again(self, work: Work, reason: str) -> None:
+        """Order a divided job once more, if the connection is there; else the attempt is lost."""
         with self._lock:
-            if self._cluster.connected and work.may_lose(index):
-                log.warning("job %s, part %s: %s", work.attempt.job_id, index, reason)
-                work.pending.appendleft(index)
+            if self._cluster.connected and work.may_lose():
+                log.warning("job %s: %s", work.attempt.job_id, reason)
+                work.pending = True
                 return
         self._end(work, Lost(reason))
-
-    def _finish_if_whole(self, work: Work) -> None:
-        try:
-            outcome = work.outcome()
-        except Exception as error:  # noqa: BLE001 - the boundary: whatever it is, the job must hear of it
-            outcome = Failed(failure_of(_task(work.attempt), error))
-        if outcome is not None:
-            self._end(work, outcome)
 
     def _end(self, work: Work, outcome: Outcome) -> None:
         """Report an attempt and let go what is still computed for it; nothing the second time."""
@@ -271,7 +252,6 @@ class DaskExecutor:
                     self._leaving[token] = flight.leaving(time.monotonic() + self._grace_seconds)
         for flight in mine.values():
             flight.future.release()
-        work.flush()
         self._sink.ended(work.attempt, outcome)
         self._fill()
         self._sink.room()
@@ -305,15 +285,15 @@ class DaskExecutor:
                 self._sink.found(flight.work.attempt, found)
             if "best" in note:
                 self._sink.best(flight.work.attempt, note["best"])
-            flight.work.progress(flight.index, float(note["share"]), int(note["points"]))
+            self._sink.progress(flight.work.attempt, float(note["share"]), int(note["points"]))
 
     def _begun_again(self, flight: Flight) -> None:
         """Its worker died, and the scheduler gave the order to another one by itself."""
         reason = f"Dask worker {flight.worker} died"
-        if not flight.work.may_lose(flight.index):
+        if not flight.work.may_lose():
             self._later(self._end, flight.work, Lost(reason))
         else:
-            log.warning("job %s, part %s: %s", flight.work.attempt.job_id, flight.index, reason)
+            log.warning("job %s: %s", flight.work.attempt.job_id, reason)
 
     def _looked(self, changed: bool) -> None:
         """The connection is there: end workers that did not heed in time, use new ones."""

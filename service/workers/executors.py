@@ -13,7 +13,7 @@ from service.jobs.registry import Registry, RunOn, WarmUp
 from service.settings.settings import Settings
 from service.workers.base import Executor, ExecutorStatus, Sink, Stopped
 from service.workers.process_limits import UNLIMITED, ProcessLimits
-from service.workers.slot import Slot
+from service.workers.slot import LentBatch, Slot
 
 _TEND_SECONDS = 0.1
 
@@ -83,9 +83,31 @@ class LocalExecutor:
         if self.free():
             self.sink.room()
 
+    def lend(self, batch: LentBatch) -> None:
+        """Have a process without attempts compute a batch of another's; without one it goes back."""
+        others = sorted(self._slots, key=Slot.errands, reverse=True)
+        if not any(slot.help(batch) for slot in others if slot is not batch.of):
+            batch.of.answer(batch, None)
+        self.tell_room()
+
+    def recall(self, of: Slot, token: int) -> None:
+        """Of the batches of a task none is wanted any more."""
+        for slot in self._slots:
+            slot.forget(of, token)
+
+    def tell_room(self) -> None:
+        """Tell every process how many batches the others would take."""
+        room = [(slot, slot.errands()) for slot in self._slots]
+        total, others = sum(own for _, own in room), len(room) - 1
+        for slot, own in room:
+            slot.lend_room(total - own, others)
+
     def submit(self, attempt: Attempt) -> None:
         """Give an attempt to the process with the fewest; without a place it goes back to the queue."""
-        if not any(slot.give(attempt) for slot in sorted(self._slots, key=lambda slot: slot.held)):
+        slots = sorted(self._slots, key=lambda slot: (slot.held, slot.busy))
+        given = any(slot.give(attempt) for slot in slots)
+        self.tell_room()
+        if not given:
             self.sink.ended(attempt, Stopped())
         elif any(slot.held > 1 for slot in self._slots):
             self._ahead.set()
@@ -112,7 +134,7 @@ class LocalExecutor:
         return ExecutorStatus(
             workers=len(self._slots),
             ready=sum(slot.ready for slot in self._slots),
-            busy=sum(slot.held > 0 for slot in self._slots),
+            busy=sum(slot.busy for slot in self._slots),
             trouble=self.trouble,
         )
 

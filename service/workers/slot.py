@@ -22,7 +22,16 @@ from service.workers.base import Failed, Finished, Lost, Outcome, Sink, Stopped
 from service.workers.child import Child, death, ending_signal
 from service.workers.process_limits import ProcessLimits
 from service.workers.processes import Process
-from service.workers.worker import Done, Reply, Task, WorkerReady
+from service.workers.worker import (
+    Batch,
+    Done,
+    Errand,
+    ErrandDone,
+    Recall,
+    Reply,
+    Task,
+    WorkerReady,
+)
 
 log = logging.getLogger("stickslip.executor")
 
@@ -40,15 +49,35 @@ _SMALL_BYTES = 8 * 1024
 _tokens = itertools.count(1)
 
 
+_MOST_ERRANDS = 2  # one is computed, one waits
+
+
+@dataclass(frozen=True, slots=True)
+class LentBatch:
+    """Calls of the task of one process that another one may compute, with the number it knows them by."""
+
+    of: Slot
+    token: int
+    number: int
+    data: bytes
+
+
 @dataclass(slots=True)
 class _Held:
-    """An attempt that a process has: the first is computed, the others wait in its pipe."""
+    """An attempt that a process has, or a batch: the first is computed, the others wait in its pipe."""
 
-    attempt: Attempt
+    work: Attempt | LentBatch
     token: int
     began: float
     sent: bool = False
     stopping: bool = False
+
+    def task(self) -> Task | Errand:
+        """What is sent to the process."""
+        work = self.work
+        if isinstance(work, LentBatch):
+            return Errand(self.token, work.data)
+        return Task(self.token, work.job_id, work.kind, work.spec, work.saved, work.spec_hash)
 
 
 class Host(Protocol):
@@ -65,6 +94,15 @@ class Host(Protocol):
 
     def room(self) -> None:
         """The slot may have a place."""
+
+    def lend(self, batch: LentBatch) -> None:
+        """Have another slot's process compute a batch, or answer it."""
+
+    def recall(self, of: Slot, token: int) -> None:
+        """Of the batches of a task none is wanted any more."""
+
+    def tell_room(self) -> None:
+        """Something changed in who has nothing to do."""
 
 
 class Slot(threading.Thread):
@@ -84,6 +122,8 @@ class Slot(threading.Thread):
         self._child: Child | None = None
         self._held: deque[_Held] = deque()
         self._withdrawn: set[int] = set()
+        self._writing = threading.Lock()
+        self._lends = 0  # token of its task, if that has lent something
         self._usual = _SHORT_SECONDS
         self._closing = False
 
@@ -95,14 +135,19 @@ class Slot(threading.Thread):
     @property
     def held(self) -> int:
         """How many attempts it has."""
-        return len(self._held)
+        return sum(isinstance(one.work, Attempt) for one in tuple(self._held))
+
+    @property
+    def busy(self) -> bool:
+        """Whether its process computes."""
+        return len(self._held) > 0
 
     @property
     def places(self) -> int:
         """How many attempts it may have."""
         if self._child is None or self._closing or self._withdrawn:
             return 0
-        if self._usual >= _SHORT_SECONDS:
+        if self._usual >= _SHORT_SECONDS or self._lends:
             return 1
         return 1 + min(MOST_AHEAD, max(1, int(AHEAD_SECONDS / self._usual)))
 
@@ -110,32 +155,77 @@ class Slot(threading.Thread):
         """Take the attempt if there is a place; whether it was taken."""
         with self._lock:
             child = self._child
-            if child is None or len(self._held) >= self.places:
+            if child is None or self.held >= self.places:
                 return False
-            held = _Held(attempt, next(_tokens), time.monotonic())
-            in_order = not self._held or self._held[-1].sent
-            self._held.append(held)
-            if in_order:
-                self._send(child, held)
+            self._add(child, attempt)
         return True
+
+    def errands(self) -> int:
+        """How many batches of others it takes: none while it has an attempt."""
+        if self._child is None or self._closing or self._withdrawn or self.held:
+            return 0
+        return max(_MOST_ERRANDS - len(self._held), 0)
+
+    def help(self, batch: LentBatch) -> bool:
+        """Take a batch if there is nothing else to do; whether it was taken."""
+        with self._lock:
+            child = self._child
+            if child is None or not self.errands():
+                return False
+            self._add(child, batch)
+        return True
+
+    def answer(self, batch: LentBatch, data: bytes | None) -> None:
+        """Give a batch back to the process whose it is, if it computes that task still."""
+        with self._lock:
+            child = self._child
+            if child is None or not self._held or self._held[0].token != batch.token:
+                return
+        told = bytes(ForkingPickler.dumps(ErrandDone(batch.token, batch.number, data)))
+        # It reads between two calls: nobody else waits for it.
+        threading.Thread(target=self._write, args=(child, told), daemon=True).start()
+
+    def forget(self, of: Slot, token: int) -> None:
+        """Stop the batches of a task."""
+        with self._lock:
+            for held in self._held:
+                work = held.work
+                if isinstance(work, LentBatch) and work.of is of and work.token == token:
+                    self._ask_to_stop(held)
+
+    def lend_room(self, room: int, others: int) -> None:
+        """Tell the process how many batches others would take."""
+        child = self._child
+        if child is not None:
+            child.orders.lend(room, others)
+
+    def _add(self, child: Child, work: Attempt | LentBatch) -> None:
+        held = _Held(work, next(_tokens), time.monotonic())
+        in_order = not self._held or self._held[-1].sent
+        self._held.append(held)
+        if in_order:
+            self._send(child, held)
+
+    def _ask_to_stop(self, held: _Held) -> None:
+        if not held.stopping:
+            held.stopping = True
+            if held is self._held[0]:
+                self._enforce(held)
 
     def stop(self, attempt: Attempt) -> bool:
         """Ask its attempt to stop if it has it; whether it has."""
         with self._lock:
-            held = next((one for one in self._held if one.attempt is attempt), None)
+            held = next((one for one in self._held if one.work is attempt), None)
             if held is None:
                 return False
-            if not held.stopping:
-                held.stopping = True
-                if held is self._held[0]:
-                    self._enforce(held)
+            self._ask_to_stop(held)
         return True
 
     def withdraw_stuck(self) -> bool:
         """Take back what waits behind an attempt that takes long; whether something waits still."""
         with self._lock:
             child = self._child
-            if child is None or len(self._held) < 2:
+            if child is None or self.held < 2:
                 return False
             if time.monotonic() - self._held[0].began < _STUCK_SECONDS:
                 return True
@@ -152,11 +242,10 @@ class Slot(threading.Thread):
         """End the process and the thread; an attempt that runs is asked to stop first."""
         with self._lock:
             self._closing = True
-            current = self._held[0].attempt if self._held else None
-            if current is None and self._child is not None:
+            if self._held:
+                self._ask_to_stop(self._held[0])
+            elif self._child is not None:
                 self._child.process.kill()
-        if current is not None:
-            self.stop(current)
         self._wake_writer.send_bytes(b"!")
 
     def run(self) -> None:
@@ -186,25 +275,21 @@ class Slot(threading.Thread):
 
     def _send(self, child: Child, held: _Held) -> None:
         """Send the task of an attempt; a large one only when its turn has come, and without waiting."""
-        attempt = held.attempt
-        task = bytes(
-            ForkingPickler.dumps(
-                Task(held.token, attempt.job_id, attempt.kind, attempt.spec, attempt.saved, attempt.spec_hash)
-            )
-        )
+        task = bytes(ForkingPickler.dumps(held.task()))
         if len(task) <= _SMALL_BYTES:
-            self._write(child, held, task)
+            self._write(child, task, held)
         elif held is self._held[0]:
             # The process may have been stopped and read nothing: nobody else waits for it then.
-            threading.Thread(target=self._write, args=(child, held, task), daemon=True).start()
+            threading.Thread(target=self._write, args=(child, task, held), daemon=True).start()
 
-    @staticmethod
-    def _write(child: Child, held: _Held, task: bytes) -> None:
+    def _write(self, child: Child, message: bytes, held: _Held | None = None) -> None:
         try:
-            child.connection.send_bytes(task)
+            with self._writing:
+                child.connection.send_bytes(message)
         except OSError:
             return  # the process died: its end of the pipe says so to the thread that reads
-        held.sent = True
+        if held is not None:
+            held.sent = True
 
     def _enforce(self, held: _Held) -> None:
         """Ask the process to stop what it computes, and kill it when the grace is over."""
@@ -236,6 +321,7 @@ class Slot(threading.Thread):
                 self._executor.trouble = None
                 self._executor.warmed.set()
                 if self._child is not None:
+                    self._executor.tell_room()
                     self._executor.room()
                     self._converse(child)
             return trouble
@@ -280,25 +366,32 @@ class Slot(threading.Thread):
                 return
             if isinstance(message, Reply):
                 self._hear(child, message)
+            elif isinstance(message, ErrandDone):
+                self._conclude(child, message.token, message)
 
     def _hear(self, child: Child, reply: Reply) -> None:
         current = next(iter(self._held), None)
         about = reply.about
         if isinstance(about, Done):
             self._conclude(child, reply.token, about)
-        elif current is None or current.token != reply.token:
+        elif current is None or current.token != reply.token or isinstance(current.work, LentBatch):
             return
+        elif isinstance(about, Batch):
+            self._lends = reply.token
+            self._executor.lend(LentBatch(self, reply.token, about.number, about.data))
+        elif isinstance(about, Recall):
+            self._executor.recall(self, reply.token)
         elif isinstance(about, KeptPieces):
-            self._executor.sink.kept(current.attempt, about.pieces, anew=about.anew)
+            self._executor.sink.kept(current.work, about.pieces, anew=about.anew)
         else:
             if about.found:
-                self._executor.sink.found(current.attempt, about.found)
+                self._executor.sink.found(current.work, about.found)
             if about.best is not None:
-                self._executor.sink.best(current.attempt, about.best)
-            self._executor.sink.progress(current.attempt, about.fraction, about.points)
+                self._executor.sink.best(current.work, about.best)
+            self._executor.sink.progress(current.work, about.fraction, about.points)
 
-    def _conclude(self, child: Child, token: int, done: Done) -> None:
-        """An attempt ended: go on with the next one, then say what became of it."""
+    def _conclude(self, child: Child, token: int, done: Done | ErrandDone) -> None:
+        """An attempt or a batch ended: go on with the next one, then say what became of it."""
         now, leftover = time.monotonic(), []
         with self._lock:
             self._withdrawn.discard(token)
@@ -306,8 +399,9 @@ class Slot(threading.Thread):
                 ended = None
             else:
                 ended = self._held.popleft()
-                seconds = now - ended.began
-                self._usual = max(seconds, 0.8 * self._usual + 0.2 * seconds)
+                if isinstance(ended.work, Attempt):
+                    self._lends, seconds = 0, now - ended.began
+                    self._usual = max(seconds, 0.8 * self._usual + 0.2 * seconds)
                 if self._closing:
                     leftover = list(self._held)
                     self._held.clear()
@@ -316,9 +410,10 @@ class Slot(threading.Thread):
             elif self._withdrawn:
                 self._expect_withdrawn(child)
         self._give_back(leftover)
+        self._executor.tell_room()
         self._executor.room()
         if ended is not None:
-            self._executor.sink.ended(ended.attempt, _outcome(done))
+            self._end(ended, done)
 
     def _begin(self, child: Child, held: _Held, now: float) -> None:
         held.began = now
@@ -339,16 +434,30 @@ class Slot(threading.Thread):
             self._held.clear()
             self._withdrawn.clear()
             self._usual = _SHORT_SECONDS
+            lends, self._lends = self._lends, 0
+        if lends:
+            self._executor.recall(self, lends)
+        self._executor.tell_room()
         if not held and not self._closing:
             log.warning("%s while it had nothing to do", reason)
-        lost = held[:1] if held and held[0].sent else []
-        for one in lost:
-            self._executor.sink.ended(one.attempt, Lost(reason, ended_by))
-        self._give_back(held[len(lost) :])
+        first = held.pop(0) if held and held[0].sent else None
+        if first is not None and isinstance(first.work, Attempt):
+            self._executor.sink.ended(first.work, Lost(reason, ended_by))
+        elif first is not None:
+            held.insert(0, first)
+        self._give_back(held)
 
     def _give_back(self, several: Iterable[_Held]) -> None:
         for held in several:
-            self._executor.sink.ended(held.attempt, Stopped())
+            self._end(held, Done())
+
+    def _end(self, held: _Held, done: Done | ErrandDone) -> None:
+        """Say what became of an attempt or a batch."""
+        work = held.work
+        if isinstance(work, LentBatch):
+            work.of.answer(work, done.data if isinstance(done, ErrandDone) else None)
+        elif isinstance(done, Done):
+            self._executor.sink.ended(work, _outcome(done))
 
 
 def _outcome(done: Done) -> Outcome:

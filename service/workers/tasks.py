@@ -7,6 +7,7 @@ cannot hang when the scheduler does.
 
 from __future__ import annotations
 
+import logging
 import os
 import pickle
 import threading
@@ -14,15 +15,16 @@ import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.metadata import version
+from queue import Empty, SimpleQueue
 from typing import Any
 
-from distributed import Status, Worker, get_worker
+from distributed import Client, Future, Status, Worker, get_client, get_worker, rejoin, secede
 
 from service.jobs.checkpoints import Checkpoints, KeptPieces
 from service.jobs.outputs import JobFailure, JobOutput, Pace, ResultPiece
-from service.jobs.parts import PartOutput, RunPart
 from service.jobs.registry import RunOn, WarmUp
 from service.workers.process_limits import ProcessLimits
+from service.workers.spreading import BatchAnswer, Spreading, helped
 from service.workers.worker import (
     THREAD_LIMITS,
     Report,
@@ -32,10 +34,13 @@ from service.workers.worker import (
     failure_of,
     out_of_memory,
 )
+from solver.results.spread import spreading
 
 TOPIC = "stickslip"
 
 _GONE = (Status.closing, Status.closing_gracefully, Status.closed, Status.failed)
+
+log = logging.getLogger("stickslip.worker")
 
 _warming = threading.Lock()
 _warmed: set[WarmUp] = set()
@@ -43,24 +48,24 @@ _warmed: set[WarmUp] = set()
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Order:
-    """To a worker: compute this job, or this part of it.
+    """To a worker: compute this job.
 
     Attributes
     ----------
     token : str
         Names the order in what the worker says about it.
-    run, run_part : callable or None
-        One of them: for a whole job, or for the part whose spec is `part`.
     saved : tuple of Piece
-        What earlier orders of a whole job kept.
+        What earlier orders kept.
     spec_hash : str
         Digest of what is computed, to which they belong.
     told : int
         How many points of its branch the service knows; they are not said again.
     version : str
         Of the service; a worker with another one might compute other numbers.
+    threads : int
+        Of all workers: some of them may help.
     pace : Pace
-        How often the worker tells what, and when a whole job keeps what it has.
+        How often the worker tells what, and when it keeps what it has.
     limits : ProcessLimits
         What the order may use; a worker with several threads may use as much for each of them.
     """
@@ -69,14 +74,13 @@ class Order:
     job_id: str
     kind: str
     spec: Mapping[str, Any]
-    run: RunOn | None
-    run_part: RunPart | None
-    part: Mapping[str, Any] | None
+    run: RunOn
     saved: tuple[ResultPiece, ...]
     spec_hash: str
     told: int
     warm_up: WarmUp
     version: str
+    threads: int
     pace: Pace
     limits: ProcessLimits
 
@@ -89,7 +93,7 @@ class TaskAnswer:
     """
 
     kept: tuple[KeptPieces, ...] = ()
-    output: JobOutput | PartOutput | None = None
+    output: JobOutput | None = None
     failure: JobFailure | None = None
     retry: str | None = None
 
@@ -110,6 +114,94 @@ class _Unwanted:
         return self.obeyed
 
 
+class _Colleagues:
+    """The threads of the cluster as `Helpers`: batches are tasks of their own, behind the orders of jobs.
+
+    The order leaves its thread to them as long as it waits: Dask deals out what is to be done, and no batch
+    waits for the thread that waits for it.
+    """
+
+    alone = False
+
+    def __init__(self, order: Order) -> None:
+        self._order = order
+        self._client: Client | None = None
+        self._underway: dict[int, Future] = {}
+        self._back: SimpleQueue[int] = SimpleQueue()
+        self._seceded = False
+
+    def room(self) -> int:
+        """How many batches may be sent now: one is computed by each thread, and one waits."""
+        return 2 * self._order.threads - len(self._underway) if self._order.threads > 1 else 0
+
+    def share(self) -> int:
+        """All threads."""
+        return self._order.threads
+
+    def send(self, number: int, data: bytes) -> None:
+        """Send a batch to whoever has nothing to do."""
+        order = self._order
+        if self._client is None:
+            self._client = get_client()
+        if not self._seceded:
+            secede()
+            self._seceded = True
+        future = self._client.submit(
+            assist, data, order.warm_up, order.version, order.limits, pure=False, retries=0, priority=-1,
+            key=f"stickslip-batch-{order.token}-{number}-{time.time_ns()}",
+        )  # fmt: skip
+        self._underway[number] = future
+        future.add_done_callback(lambda _: self._back.put(number))
+
+    def answers(self, seconds: float) -> list[BatchAnswer]:
+        """What came back."""
+        found: list[BatchAnswer] = []
+        try:
+            while True:
+                number = self._back.get(timeout=0.0 if found else seconds)
+                if (future := self._underway.pop(number, None)) is not None:
+                    found.append(BatchAnswer(number, _result_of(future)))
+        except Empty:
+            return found
+
+    def end(self, *, recall: bool) -> None:
+        """Let go what is underway, and take the thread again."""
+        if recall and self._client is not None:
+            self._client.cancel(list(self._underway.values()), force=True)
+            self._underway.clear()
+        if self._seceded:
+            self._seceded = False
+            rejoin()
+
+
+def _result_of(future: Future) -> bytes | None:
+    """What a batch gave; None if its worker died or could not compute it."""
+    try:
+        data: bytes | None = future.result()
+    except Exception as error:  # noqa: BLE001 - all that may become of a future; it is computed here then
+        log.warning("a batch did not come back: %s: %s", type(error).__name__, error)
+        return None
+    finally:
+        future.release()
+    return data
+
+
+def assist(data: bytes, warm_up: WarmUp, service: str, limits: ProcessLimits) -> bytes | None:
+    """Compute a batch of another worker's order; whatever is wrong with it, that one meets it again."""
+    worker = get_worker()
+    if version("stickslip") != service:
+        return None
+    stop = _Unwanted(worker, worker.get_current_task())
+    try:
+        _warm(warm_up, limits.for_threads(worker.state.nthreads))
+        return helped(data, stop)
+    except Exception as error:  # noqa: BLE001 - the boundary: as for a local worker
+        log.info("a batch of another worker's job was not computed: %s: %s", type(error).__name__, error)
+        return None
+    finally:
+        limits.forget()
+
+
 class _OrderStop:
     """`should_stop` of one order, and the place where its run keeps what it has.
 
@@ -119,12 +211,12 @@ class _OrderStop:
     """
 
     def __init__(self, unwanted: _Unwanted) -> None:
-        self._unwanted = unwanted
+        self.unwanted = unwanted
         self.kept: list[KeptPieces] = []
         self.obeyed = False
 
     def __call__(self) -> bool:
-        if self.kept or self._unwanted():
+        if self.kept or self.unwanted():
             self.obeyed = True
         return self.obeyed
 
@@ -173,10 +265,7 @@ def _computed(order: Order, threads: int, progress: Throttle, stop: _OrderStop) 
     kept = Checkpoints(order.job_id, order.saved, stop.kept.append, order.pace, order.spec_hash)
     try:
         _warm(order.warm_up, order.limits.for_threads(threads))
-        output: JobOutput | PartOutput
-        if order.run_part is not None and order.part is not None:
-            output = order.run_part(order.spec, order.part, progress, stop)
-        elif order.run is not None:
+        with spreading(Spreading(_Colleagues(order), stop.unwanted)):
             output = checked(order.run(order.spec, progress, stop, kept))
     except MemoryError as error:
         done = out_of_memory(error, order.limits)

@@ -15,6 +15,7 @@ import pickle
 import signal
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from ctypes import Array
 from dataclasses import dataclass, replace
@@ -30,7 +31,9 @@ from service.jobs.outputs import Best, FailureKind, JobFailure, JobOutput, Pace,
 from service.jobs.registry import RunOn, WarmUp
 from service.settings import logs
 from service.workers.process_limits import ProcessLimits
+from service.workers.spreading import BatchAnswer, Spreading, helped
 from solver.errors import SceneError, SettingError, SolverError
+from solver.results.spread import spreading
 
 THREAD_LIMITS = dict.fromkeys(
     (
@@ -64,6 +67,36 @@ class Task:
 
 
 @dataclass(frozen=True, slots=True)
+class Errand:
+    """To a worker that has nothing to do: compute these calls of another's task; tokens as of tasks."""
+
+    token: int
+    data: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class ErrandDone:
+    """To the worker whose batch it was, and from the one that computed it: None if it was not."""
+
+    token: int
+    number: int
+    data: bytes | None
+
+
+@dataclass(frozen=True, slots=True)
+class Batch:
+    """From a worker: calls of its task that another may compute."""
+
+    number: int
+    data: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Recall:
+    """From a worker: of the batches of its task none is wanted any more."""
+
+
+@dataclass(frozen=True, slots=True)
 class WorkerReady:
     """From a worker: everything is loaded."""
 
@@ -92,7 +125,7 @@ class Reply:
     """From a worker: something about the task with this token."""
 
     token: int
-    about: Report | KeptPieces | Done
+    about: Report | KeptPieces | Done | Batch | Recall
 
 
 class Orders:
@@ -101,7 +134,7 @@ class Orders:
     Plain numbers: reading them costs nothing, and a process killed while it looks cannot hold a lock.
     """
 
-    SIZE = 3
+    SIZE = 5
 
     def __init__(self, numbers: Array[ctypes.c_longlong]) -> None:
         self._numbers = numbers
@@ -115,6 +148,20 @@ class Orders:
         # The range is empty in between: tokens grow, and those withdrawn before were answered by now.
         self._numbers[1] = first
         self._numbers[2] = last
+
+    def lend(self, room: int, others: int) -> None:
+        """Tell that so many batches may be sent to so many other workers."""
+        self._numbers[3], self._numbers[4] = room, others
+
+    @property
+    def room(self) -> int:
+        """How many batches may be sent."""
+        return int(self._numbers[3])
+
+    @property
+    def others(self) -> int:
+        """How many other workers there are."""
+        return int(self._numbers[4])
 
     def stopped(self, token: int) -> bool:
         """Whether this task is to stop."""
@@ -168,6 +215,66 @@ class Throttle:
         self._best = found
 
 
+class _Inbox:
+    """What the parent sends: tasks and errands in turn, and answers to the batches of the present task."""
+
+    def __init__(self, connection: Connection) -> None:
+        self.connection = connection
+        self._ordered: deque[Task | Errand | None] = deque()
+
+    def ordered(self) -> Task | Errand | None:
+        """The next task or errand; None at the end."""
+        while not self._ordered:
+            self._take(0)
+        return self._ordered.popleft()
+
+    def answers(self, token: int, seconds: float) -> list[BatchAnswer]:
+        """What came back for a task, after so long at most if there is nothing yet."""
+        found: list[BatchAnswer] = []
+        while self.connection.poll(0.0 if found else seconds):
+            found += self._take(token)
+        return found
+
+    def _take(self, token: int) -> list[BatchAnswer]:
+        message = self.connection.recv()
+        if not isinstance(message, ErrandDone):
+            self._ordered.append(message)
+            return []
+        # Of a task that ended in between nobody wants to know.
+        return [BatchAnswer(message.number, message.data)] if message.token == token else []
+
+
+class _Neighbours:
+    """The other workers of the service as `Helpers`; the parent is between."""
+
+    alone = True
+
+    def __init__(self, inbox: _Inbox, orders: Orders, token: int) -> None:
+        self._inbox, self._orders, self._token = inbox, orders, token
+
+    def room(self) -> int:
+        """How many batches may be sent now; one that finds no place after all comes back at once."""
+        return self._orders.room
+
+    def share(self) -> int:
+        """All workers."""
+        return self._orders.others + 1
+
+    def send(self, number: int, data: bytes) -> None:
+        """Send a batch to whoever has nothing to do."""
+        self._orders.lend(self._orders.room - 1, self._orders.others)  # until the parent says it anew
+        self._inbox.connection.send(Reply(self._token, Batch(number, data)))
+
+    def answers(self, seconds: float) -> list[BatchAnswer]:
+        """What came back."""
+        return self._inbox.answers(self._token, seconds)
+
+    def end(self, *, recall: bool) -> None:
+        """Tell that nothing is wanted any more."""
+        if recall:
+            self._inbox.connection.send(Reply(self._token, Recall()))
+
+
 def main(
     connection: Connection,
     numbers: Array[ctypes.c_longlong],
@@ -185,19 +292,24 @@ def main(
     limits.confine()
     orders = Orders(numbers)
     connection.send(WorkerReady())
+    inbox = _Inbox(connection)
     while True:
         try:
-            task = connection.recv()
+            task = inbox.ordered()
         except (EOFError, OSError):
             return
         if task is None:
             return
+        if isinstance(task, Errand):
+            connection.send(ErrandDone(task.token, 0, _run_errand(task, _Stop(orders, task.token), limits)))
+            continue
         if orders.withdrawn(task.token):
             connection.send(Reply(task.token, Done()))
             continue
         stop, reply = _Stop(orders, task.token), _replying(connection, task)
         kept = Checkpoints(task.job_id, task.saved, reply, pace, task.spec_hash)
-        with logs.about(job=task.job_id, kind=task.kind):
+        spread = Spreading(_Neighbours(inbox, orders, task.token), stop)
+        with logs.about(job=task.job_id, kind=task.kind), spreading(spread):
             limits.begin()
             done = _compute(runs, task, Throttle(reply, pace.progress_seconds), stop, kept, limits)
             limits.end()
@@ -206,6 +318,19 @@ def main(
             connection.send(Reply(task.token, done))
         except (pickle.PicklingError, TypeError, AttributeError) as error:
             connection.send(Reply(task.token, Done(failure=failure_of(task, error))))
+
+
+def _run_errand(errand: Errand, stop: _Stop, limits: ProcessLimits) -> bytes | None:
+    """Compute a batch of another's task; whatever is wrong with it, that one meets it again itself."""
+    limits.begin()
+    try:
+        return helped(errand.data, stop)
+    except Exception as error:  # noqa: BLE001 - the boundary: the process lives on
+        log.info("a batch of another worker's job was not computed: %s: %s", type(error).__name__, error)
+        return None
+    finally:
+        limits.end()
+        limits.forget()
 
 
 def _replying(connection: Connection, task: Task) -> Callable[[Report | KeptPieces], None]:

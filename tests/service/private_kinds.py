@@ -12,7 +12,8 @@ from pydantic import BaseModel, Field
 
 from service.jobs.checkpoints import Checkpoints, RunParts
 from service.jobs.figures import ContactValues, StoredArray, SweepRecord
-from service.jobs.outputs import JobOutput, Progress, ShouldStop
+from service.jobs.outputs import JobOutput, OnProgress, Progress, ShouldStop
+from service.jobs.parts import Division, JobPart, PartOutput, PartStoppedError
 from service.jobs.registry import JobKind, JobRequest, Registry, Resolved
 from service.jobs.studies import map as maps
 from service.jobs.studies.sweep import Sweep
@@ -192,6 +193,30 @@ def slow_map(
     return RunParts(maps.PARTS)(spec, progress, slow(should_stop), checkpoints)
 
 
+def naps(spec: Mapping[str, Any]) -> list[JobPart]:
+    """As many parts as the size says."""
+    return [JobPart(spec={"number": number}) for number in range(spec["size"])]
+
+
+def nap(
+    spec: Mapping[str, Any], part: Mapping[str, Any], _progress: OnProgress, should_stop: ShouldStop
+) -> PartOutput:
+    """Takes so many seconds, and leaves the processor to what is tested beside it."""
+    end = time.monotonic() + spec["seconds"]
+    while (left := end - time.monotonic()) > 0.0:
+        if should_stop():
+            raise PartStoppedError
+        time.sleep(min(left, 0.05))
+    return PartOutput(result={"square": part["number"] ** 2, "pid": os.getpid()}, points=1)
+
+
+def rested(_spec: Mapping[str, Any], outputs: Mapping[int, PartOutput]) -> JobOutput:
+    told = [output.result for output in outputs.values()]
+    return JobOutput(result={key: [one[key] for one in told] for key in ("square", "pid")})
+
+
+NAPS = Division(split=naps, run_part=nap, join=rested)
+
 _RUNS = {
     "iteration": power_iteration,
     "deaf": deaf,
@@ -229,6 +254,7 @@ PRIVATE = Registry(
         result=IterationResult,
     ),
     JobKind(name="confused", summary="", request=IterationRequest, resolve=confused, run=power_iteration),
+    JobKind(name="naps", summary="", request=IterationRequest, resolve=as_it_is, run=NAPS.run, parts=NAPS),
     *SLOW,
 )
 

@@ -208,7 +208,8 @@ def test_a_divided_job_leaves_room_for_others(service: tuple[EmbeddedService, Da
     """Its parts are on both workers, a small job gets between them, and a cancel ends them all."""
     embedded, _ = service
     study = embedded.submit("mistuning", {**BODIES["mistuning"], "samples": 2000})
-    until(lambda: embedded._service.queue.status().busy == 2)
+    client = embedded._service.queue._executor._cluster._client
+    until(lambda: len(computing := client.processing()) == 2 and all(computing.values()))
     until(lambda: embedded.job(study).points > 0)
     small = embedded.wait(embedded.submit("iteration", {"seed": 4}), timeout=PATIENCE)
     assert small.status is JobState.SUCCESSFUL
@@ -216,6 +217,19 @@ def test_a_divided_job_leaves_room_for_others(service: tuple[EmbeddedService, Da
     assert embedded.dismiss(study).status is JobState.DISMISSED
     until(lambda: threads_idle(embedded))
     assert embedded.job(study).points < 1000, "half of it"
+
+
+def test_parts_are_computed_where_there_is_room(service: tuple[EmbeddedService, DaskCluster]) -> None:
+    embedded, dask = service
+    body = {"size": 20, "seconds": 0.1}
+    (result, _), known = ended(embedded, "naps", body), {each.pid for each in processes_of(dask)}
+    assert result["square"] == [number**2 for number in range(20)]
+    assert len(set(result["pid"])) == 2
+    assert set(result["pid"]) <= known
+
+
+def processes_of(dask: DaskCluster) -> list[Any]:
+    return [each for process in dask.workers for each in dask.family(process)]
 
 
 def test_a_worker_with_another_version_computes_nothing(
