@@ -40,6 +40,7 @@ from service.jobs.outputs import OnProgress
 from service.jobs.registry import ABOUT_THE_RUN, JobKind, JobRequest, Registry
 from service.jobs.strict_json import validated
 from service.queue.lanes import Lanes
+from service.queue.meters import Meters
 from service.queue.queue import JobQueue
 from service.queue.retention import Retention
 from service.queue.running import Event, Waiters
@@ -120,12 +121,15 @@ class Service:
         self.projects = Projects(self.database, self.jobs.now, settings.bin_days)
         self.shares = Shares(self.database, self.runs, self.jobs.now)
         self.waiters = Waiters()
-        self.lanes = Lanes(settings.database_seconds)
+        self.meters = Meters()
+        self.lanes = Lanes(settings.database_seconds, self.meters)
         self.previews = Previews(settings.preview_seconds, memory_bytes=settings.answer_memory_bytes)
         self.answers = Answers(
             answering.runs(self.registry, self.previews.registry), answering.warm_up, _answer_limits(settings)
         )
-        self.queue = JobQueue(self.jobs, executor_of(settings, self.registry), settings, self.waiters)
+        self.queue = JobQueue(
+            self.jobs, executor_of(settings, self.registry), settings, self.waiters, self.meters
+        )
         self.retention = Retention(self.database, settings, self.jobs.now)
         self._notices = None if self.database.exclusive else self._make_notices()
         self.stopping = threading.Event()

@@ -79,6 +79,8 @@ class Attempt:
 
     Attributes
     ----------
+    created : datetime
+        When its job was handed in.
     seconds_limit : float or None
         Longest time it may take [s], if the job has a limit of its own.
     progress, points : float, int
@@ -93,6 +95,7 @@ class Attempt:
     attempt: int
     max_attempts: int
     lease_owner: str
+    created: datetime
     owner: str = NOBODY
     seconds_limit: float | None = None
     progress: float = 0.0
