@@ -45,6 +45,7 @@ from service.queue.queue import JobQueue
 from service.queue.retention import Retention
 from service.queue.running import Event, Waiters
 from service.queue.scene_store import SceneStore
+from service.settings import traces
 from service.settings.kinds import registry_of
 from service.settings.settings import Settings
 from service.uploads.uploads import Uploads
@@ -156,9 +157,12 @@ class Service:
             If the tables are not this version's.
         DatabaseError
             If the database cannot be used.
+        ConfigurationError
+            If there are to be traces and their extra is not installed.
         """
         if self._open:
             return
+        traces.configure(on=self.settings.traces)
         self.database.acquire()
         try:
             revisions.prepare(self.settings.database)
@@ -190,6 +194,7 @@ class Service:
         if self._notices is not None:
             self._notices.stop()
         self.database.close()
+        traces.flush()
         self._open = False
 
     def stop_waiting(self) -> None:
@@ -253,6 +258,7 @@ class Service:
             idempotency_key=idempotency_key,
             owner=caller.owner,
             seconds_limit=seconds,
+            trace=traces.current(),
             words=RunWords(**{name: getattr(request, name) for name in ABOUT_THE_RUN}),
         )
         waiting = None if caller.key_id is None else share(caller, self.settings, "waiting")

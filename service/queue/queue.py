@@ -15,13 +15,14 @@ import threading
 import time
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
+from dataclasses import replace
 from datetime import datetime, timedelta
 
 from service.db.repositories import Attempt, JobRepository
 from service.jobs.outputs import AttemptProgress, Best, FailureKind, JobFailure, JobOutput, Point, ResultPiece
 from service.queue.meters import Meters
 from service.queue.running import Live, Running, StopReason, Waiters
-from service.settings import logs
+from service.settings import logs, traces
 from service.settings.settings import Settings
 from service.workers.base import Executor, ExecutorStatus, Failed, Finished, Lost, Outcome, Stopped
 
@@ -221,6 +222,8 @@ class JobQueue:
                 # Given back, the job may run here again by now, as another attempt.
                 if entry is not None and self._running.get(attempt.job_id) is entry:
                     del self._running[attempt.job_id]
+            if entry is not None and entry.span is not None:
+                entry.span.end(outcome=type(outcome).__name__.lower())
             self._waiters.ended(attempt.job_id)
             self._wake.set()
 
@@ -312,10 +315,7 @@ class JobQueue:
         with self._claiming:
             attempts = self._jobs.claim_several(self.owner, self._lease_until(), free)
             now = time.monotonic()
-            entries = [
-                Running(attempt=one, started=now, written=now, fraction=one.progress, points=one.points)
-                for one in attempts
-            ]
+            entries = [self._begun(one, now) for one in attempts]
             with self._lock:
                 self._running.update((entry.attempt.job_id, entry) for entry in entries)
         for entry in entries:
@@ -324,6 +324,18 @@ class JobQueue:
                 waited = (self._jobs.now() - entry.attempt.created).total_seconds()
                 self._meters.waited.labels(entry.attempt.kind).observe(max(waited, 0.0))
         return len(attempts) == free
+
+    @staticmethod
+    def _begun(attempt: Attempt, now: float) -> Running:
+        span = traces.begin(
+            "attempt", attempt.trace, job=attempt.job_id, kind=attempt.kind, attempt=attempt.attempt
+        )
+        if span is not None:
+            attempt = replace(attempt, trace=span.carried)
+        return Running(
+            attempt=attempt, started=now, written=now, fraction=attempt.progress, points=attempt.points,
+            span=span,
+        )  # fmt: skip
 
     def _submit(self, entry: Running) -> None:
         attempt = entry.attempt

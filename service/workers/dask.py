@@ -190,6 +190,7 @@ class DaskExecutor:
             part=None if index is None else work.parts[index].spec,
             saved=work.saved if index is None else (),
             told=work.told,
+            trace=attempt.trace,
             warm_up=self._registry.warm_up,
             version=self._version,
             pace=self._pace,

@@ -188,7 +188,9 @@ class Slot(threading.Thread):
         """Send the task of an attempt; a large one only when its turn has come, and without waiting."""
         attempt = held.attempt
         task = bytes(
-            ForkingPickler.dumps(Task(held.token, attempt.job_id, attempt.kind, attempt.spec, attempt.saved))
+            ForkingPickler.dumps(
+                Task(held.token, attempt.job_id, attempt.kind, attempt.spec, attempt.saved, attempt.trace)
+            )
         )
         if len(task) <= _SMALL_BYTES:
             self._write(child, held, task)

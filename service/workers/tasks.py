@@ -18,10 +18,12 @@ from typing import Any
 
 from distributed import Status, Worker, get_worker
 
+from service.errors import ConfigurationError
 from service.jobs.checkpoints import Checkpoints, KeptPieces
 from service.jobs.outputs import JobFailure, JobOutput, Pace, ResultPiece
 from service.jobs.parts import PartOutput, RunPart
 from service.jobs.registry import RunOn, WarmUp
+from service.settings import traces
 from service.workers.process_limits import ProcessLimits
 from service.workers.worker import (
     THREAD_LIMITS,
@@ -53,6 +55,8 @@ class Order:
         One of them: for a whole job, or for the part whose spec is `part`.
     saved : tuple of Piece
         What earlier orders of a whole job kept.
+    trace : str or None
+        The `traceparent` it is part of, if there are traces.
     told : int
         How many points of its branch the service knows; they are not said again.
     version : str
@@ -72,6 +76,7 @@ class Order:
     part: Mapping[str, Any] | None
     saved: tuple[ResultPiece, ...]
     told: int
+    trace: str | None
     warm_up: WarmUp
     version: str
     pace: Pace
@@ -143,6 +148,10 @@ def _answer(order: Order) -> TaskAnswer:
     here = f"{worker.address} (process {os.getpid()})"
     if (mine := version("stickslip")) != order.version:
         return TaskAnswer(retry=f"worker {here} has stickslip {mine}, the service {order.version}")
+    try:
+        traces.configure(on=order.pace.traces)
+    except ConfigurationError as error:
+        return TaskAnswer(retry=f"worker {here}: {error}")
 
     def say(**note: Any) -> None:
         worker.log_event(TOPIC, {"token": order.token, "worker": worker.address, **note})
@@ -160,7 +169,8 @@ def _answer(order: Order) -> TaskAnswer:
     say(begun=time.time_ns(), threads=worker.state.nthreads)
     stop = _OrderStop(_Unwanted(worker, worker.get_current_task()))
     try:
-        return _computed(order, worker.state.nthreads, Throttle(send, order.pace.progress_seconds), stop)
+        with traces.span("compute", order.trace, job=order.job_id, kind=order.kind):
+            return _computed(order, worker.state.nthreads, Throttle(send, order.pace.progress_seconds), stop)
     finally:
         order.limits.forget()
         say(over=True)

@@ -28,7 +28,7 @@ from service.jobs.checkpoints import Checkpoints, KeptPieces
 from service.jobs.figures import figures
 from service.jobs.outputs import Best, FailureKind, JobFailure, JobOutput, Pace, Point, ResultPiece
 from service.jobs.registry import RunOn, WarmUp
-from service.settings import logs
+from service.settings import logs, traces
 from service.workers.process_limits import ProcessLimits
 from solver.errors import SceneError, SettingError, SolverError
 
@@ -60,6 +60,7 @@ class Task:
     kind: str
     spec: Mapping[str, Any]
     saved: tuple[ResultPiece, ...] = ()
+    trace: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,6 +181,7 @@ def main(
     signal.signal(signal.SIGTERM, _leave_soon)
     threading.Thread(target=_die_with_parent, name="parent watch", daemon=True).start()
     logs.configure(pace.log_level, pace.log_format)
+    traces.configure(on=pace.traces)
     warm_up()
     limits.confine()
     orders = Orders(numbers)
@@ -196,7 +198,10 @@ def main(
             continue
         stop, reply = _Stop(orders, task.token), _replying(connection, task)
         kept = Checkpoints(task.job_id, task.saved, reply, pace)
-        with logs.about(job=task.job_id, kind=task.kind):
+        with (
+            logs.about(job=task.job_id, kind=task.kind),
+            traces.span("compute", task.trace, job=task.job_id, kind=task.kind),
+        ):
             limits.begin()
             done = _compute(runs, task, Throttle(reply, pace.progress_seconds), stop, kept, limits)
             limits.end()
@@ -211,9 +216,14 @@ def _replying(connection: Connection, task: Task) -> Callable[[Report | KeptPiec
     return lambda about: connection.send(Reply(task.token, about))
 
 
+def _leave() -> None:
+    traces.flush()
+    os._exit(0)
+
+
 def _leave_soon(_signal: int, _frame: FrameType | None) -> None:
     """On SIGTERM: leave the service, which got it too, the time to give the job back to its queue."""
-    timer = threading.Timer(_TERMINATION_SECONDS, os._exit, (0,))
+    timer = threading.Timer(_TERMINATION_SECONDS, _leave)
     timer.daemon = True
     timer.start()
 

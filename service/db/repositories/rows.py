@@ -71,6 +71,7 @@ class NewJob:
     owner: str = NOBODY
     seconds_limit: float | None = None
     words: RunWords = NO_WORDS
+    trace: str | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -83,6 +84,8 @@ class Attempt:
         When its job was handed in.
     seconds_limit : float or None
         Longest time it may take [s], if the job has a limit of its own.
+    trace : str or None
+        The `traceparent` it is part of, if there are traces.
     progress, points : float, int
         How far earlier attempts got, as far as `saved` goes; 0 without it.
     saved : tuple of Piece
@@ -98,6 +101,7 @@ class Attempt:
     created: datetime
     owner: str = NOBODY
     seconds_limit: float | None = None
+    trace: str | None = None
     progress: float = 0.0
     points: int = 0
     saved: tuple[ResultPiece, ...] = field(default=(), compare=False, repr=False)
