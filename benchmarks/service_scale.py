@@ -150,7 +150,11 @@ def _serve(work: Work, ready: Barrier, submitted: Barrier, found: Queue[tuple[fl
     service = Service(settings)
     _, output = _one_output()
     service.queue = JobQueue(
-        service.jobs, ReplayExecutor(output, work.workers, work.seconds), settings, service.waiters
+        service.jobs,
+        ReplayExecutor(output, work.workers, work.seconds),
+        settings,
+        service.waiters,
+        service.meters,
     )
     service.open()
     ready.wait()

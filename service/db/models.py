@@ -135,6 +135,7 @@ class Job(TableBase):
     request: Mapped[dict[str, Any]]
     spec: Mapped[dict[str, Any]]
     stored_bytes: Mapped[int] = mapped_column(BigInteger(), default=0, server_default="0")
+    trace: Mapped[str | None] = mapped_column(String(64))
 
     __table_args__ = (
         Index(None, "state", "owner", "priority", "id"),
@@ -160,6 +161,7 @@ class JobResult(TableBase):
     )
     body: Mapped[dict[str, Any]]
     sha256: Mapped[str | None] = mapped_column(String(64))
+    figures: Mapped[dict[str, Any] | None]
 
 
 class Checkpoint(TableBase):
@@ -288,7 +290,10 @@ class Figure(TableBase):
 
 
 class SweepArray(TableBase):
-    """One array of a sweep in NumPy's npy format, with the SHA-256 of its bytes."""
+    """One array of a sweep in NumPy's npy format, with the SHA-256 of its bytes.
+
+    One with a `size` is in the store of arrays (`service.db.array_store`), and has no bytes here.
+    """
 
     __tablename__ = "sweep_array"
 
@@ -298,6 +303,7 @@ class SweepArray(TableBase):
     name: Mapped[str] = mapped_column(String(64), primary_key=True)
     sha256: Mapped[str] = mapped_column(String(64))
     data: Mapped[bytes] = mapped_column(LargeBinary())
+    size: Mapped[int | None] = mapped_column(BigInteger())
 
 
 NAME_LENGTH = 200

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, MutableMapping
 from contextlib import asynccontextmanager
+from typing import Any
 
 from fastapi import FastAPI
 from starlette.concurrency import run_in_threadpool
@@ -15,7 +16,7 @@ from service.http import metrics, openapi
 from service.http.dependencies import BodyTurns, HostCheck
 from service.http.large_answers import InPieces, LargeAnswers
 from service.http.metrics import Metrics, RequestMetrics
-from service.http.middleware.admission import Admission, ConcurrencyLimits
+from service.http.middleware.admission import Admission, ConcurrencyLimits, by_link
 from service.http.middleware.connections import Connections
 from service.http.middleware.every_answer import HeadAsGet, HeadersAndAudit, RequestLog
 from service.http.routes import (
@@ -70,7 +71,14 @@ def create_app(settings: Settings | None = None, registry: Registry | None = Non
         docs_url=None,
         generate_unique_id_function=lambda route: route.name,
         redoc_url=None,
-        telemetry={"tracing": False, "metrics": False, "logs": False, "auto_configure": False},
+        telemetry={
+            "tracing": service.settings.traces,
+            "operation_spans": False,
+            "metrics": False,
+            "logs": False,
+            "auto_configure": False,
+            "exclude": _by_link,
+        },
     )
     _guard(app, service)
     events.install(app)
@@ -80,6 +88,11 @@ def create_app(settings: Settings | None = None, registry: Registry | None = Non
         _offer_login(app, service)
     openapi.install(app, service.registry)
     return app
+
+
+def _by_link(scope: MutableMapping[str, Any]) -> bool:
+    """Whether a request may have the secret of a link in its address, which no trace is to tell."""
+    return by_link(scope.get("path", ""))
 
 
 _ROUTERS = (

@@ -15,8 +15,10 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.auth import callers
 from service.http.dependencies import TEXT, InContext, media
+from service.http.middleware.admission import NO_KEY, OWNER
 from service.queue.core import SOLVER_VERSION, Service
 from service.queue.health import Health, Probe, Readiness
+from service.queue.meters import REFUSALS
 from service.schemas.answers import AnswerModel
 
 CONTENT_TYPE = "text/plain; version=0.0.4; charset=utf-8"
@@ -29,6 +31,9 @@ class Metrics:
     def __init__(self, service: Service) -> None:
         self._registry = CollectorRegistry()
         self._registry.register(_JobsCollector(service))
+        for meter in service.meters:
+            self._registry.register(meter)
+        self.refused = service.meters.refused
         self.requests = Counter(
             "stickslip_http_requests", "Requests answered.", ("method", "route", "status"),
             registry=self._registry,
@@ -58,6 +63,11 @@ class _JobsCollector(Collector):
         try:
             for state, count in self._service.jobs.count().items():
                 jobs.add_metric((state.value,), float(count))
+            oldest = self._service.jobs.oldest_waiting()
+            age = 0.0 if oldest is None else max((self._service.jobs.now() - oldest).total_seconds(), 0.0)
+            yield GaugeMetricFamily(
+                "stickslip_oldest_waiting_seconds", "Age of the oldest job that waits.", age
+            )
             answers = 1.0
         except SQLAlchemyError:
             answers = 0.0
@@ -105,6 +115,8 @@ class RequestMetrics:
         finally:
             route = _route(scope)
             method = scope["method"] if scope["method"] in _METHODS else "other"
+            if status in REFUSALS:
+                self._metrics.refused.count(scope["state"].get(OWNER, NO_KEY), status)
             self._metrics.requests.labels(method, route, str(status)).inc()
             self._metrics.seconds.labels(method, route).observe(time.perf_counter() - begun)
 

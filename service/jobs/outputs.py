@@ -85,6 +85,8 @@ class Pace:
         Most that a job keeps for later attempts.
     log_level, log_format : str
         As in `service.settings.logs.configure`.
+    traces : bool
+        As in `service.settings.traces.configure`.
     """
 
     progress_seconds: float
@@ -92,6 +94,7 @@ class Pace:
     checkpoint_bytes: int
     log_level: str = "INFO"
     log_format: str = "text"
+    traces: bool = False
 
 
 class Found(Protocol):

@@ -40,10 +40,12 @@ from service.jobs.outputs import OnProgress
 from service.jobs.registry import ABOUT_THE_RUN, JobKind, JobRequest, Registry
 from service.jobs.strict_json import validated
 from service.queue.lanes import Lanes
+from service.queue.meters import Meters
 from service.queue.queue import JobQueue
 from service.queue.retention import Retention
 from service.queue.running import Event, Waiters
 from service.queue.scene_store import SceneStore
+from service.settings import traces
 from service.settings.kinds import registry_of
 from service.settings.settings import Settings
 from service.uploads.uploads import Uploads
@@ -120,12 +122,15 @@ class Service:
         self.projects = Projects(self.database, self.jobs.now, settings.bin_days)
         self.shares = Shares(self.database, self.runs, self.jobs.now)
         self.waiters = Waiters()
-        self.lanes = Lanes(settings.database_seconds)
+        self.meters = Meters()
+        self.lanes = Lanes(settings.database_seconds, self.meters)
         self.previews = Previews(settings.preview_seconds, memory_bytes=settings.answer_memory_bytes)
         self.answers = Answers(
             answering.runs(self.registry, self.previews.registry), answering.warm_up, _answer_limits(settings)
         )
-        self.queue = JobQueue(self.jobs, executor_of(settings, self.registry), settings, self.waiters)
+        self.queue = JobQueue(
+            self.jobs, executor_of(settings, self.registry), settings, self.waiters, self.meters
+        )
         self.retention = Retention(self.database, settings, self.jobs.now)
         self._notices = None if self.database.exclusive else self._make_notices()
         self.stopping = threading.Event()
@@ -152,9 +157,12 @@ class Service:
             If the tables are not this version's.
         DatabaseError
             If the database cannot be used.
+        ConfigurationError
+            If there are to be traces and their extra is not installed.
         """
         if self._open:
             return
+        traces.configure(on=self.settings.traces)
         self.database.acquire()
         try:
             revisions.prepare(self.settings.database)
@@ -186,6 +194,7 @@ class Service:
         if self._notices is not None:
             self._notices.stop()
         self.database.close()
+        traces.flush()
         self._open = False
 
     def stop_waiting(self) -> None:
@@ -249,6 +258,7 @@ class Service:
             idempotency_key=idempotency_key,
             owner=caller.owner,
             seconds_limit=seconds,
+            trace=traces.current(),
             words=RunWords(**{name: getattr(request, name) for name in ABOUT_THE_RUN}),
         )
         waiting = None if caller.key_id is None else share(caller, self.settings, "waiting")

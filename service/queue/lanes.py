@@ -7,6 +7,7 @@ first keep nobody waiting for the second. Inside a lane owners take turns, and n
 from __future__ import annotations
 
 import asyncio
+import time
 from collections import Counter, OrderedDict, deque
 from collections.abc import Callable
 from functools import partial
@@ -16,6 +17,7 @@ from anyio import CapacityLimiter, to_thread
 
 from service.auth.callers import LINK_READERS
 from service.errors import OverloadedError, RetryLaterError, TooManyRequestsError
+from service.queue.meters import Meters
 
 _P = ParamSpec("_P")
 _T = TypeVar("_T")
@@ -29,6 +31,10 @@ def _everybody(_owner: str) -> None:
     """Nobody is refused."""
 
 
+def _unwatched(_seconds: float) -> None:
+    """Nobody looks."""
+
+
 class Lane:
     """Some threads. All but the work itself happens on one event loop, so nothing here needs a lock.
 
@@ -40,9 +46,12 @@ class Lane:
         How many calls run at a time.
     seconds : float
         How long a call waits for its turn at most [s].
+    waited : callable, optional
+        Told how long each call waited [s].
     """
 
-    def __init__(self, threads: int, seconds: float) -> None:
+    def __init__(self, threads: int, seconds: float, waited: Callable[[float], object] = _unwatched) -> None:
+        self._waited = waited
         self.require: Callable[[str], None] = _everybody
         self._seconds = seconds
         self._free = threads
@@ -60,7 +69,9 @@ class Lane:
         TooManyRequestsError, OverloadedError
             If that is not in time: the owner has their share of the threads, or others have all of them.
         """
+        begun = time.perf_counter()
         await self._enter(owner)
+        self._waited(time.perf_counter() - begun)
         try:
             # Once more: many may have come before the first of them had its answer.
             self.require(owner)
@@ -131,13 +142,16 @@ class Lane:
 class Lanes:
     """The lanes of a service: look-ups, changes of the database, stored arrays, pictures, uploaded files."""
 
-    def __init__(self, seconds: float) -> None:
-        self.reads = Lane(_READING, seconds)
-        self.writes = Lane(_WRITING, seconds)
+    def __init__(self, seconds: float, meters: Meters) -> None:
+        def lane(name: str, threads: int, seconds: float) -> Lane:
+            return Lane(threads, seconds, meters.lanes.labels(name).observe)
+
+        self.reads = lane("reads", _READING, seconds)
+        self.writes = lane("writes", _WRITING, seconds)
         # What takes long itself may wait longer.
-        self.files = Lane(_FILES, _LONG * seconds)
-        self.pictures = Lane(_DRAWING, _LONG * seconds)
-        self.uploads = Lane(_UPLOADS, _LONG * seconds)
+        self.files = lane("files", _FILES, _LONG * seconds)
+        self.pictures = lane("pictures", _DRAWING, _LONG * seconds)
+        self.uploads = lane("uploads", _UPLOADS, _LONG * seconds)
 
     def guard(self, require: Callable[[str], None]) -> None:
         """Have `require` refuse owners (by what it raises) before anything is done for them."""

@@ -15,12 +15,14 @@ import threading
 import time
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
+from dataclasses import replace
 from datetime import datetime, timedelta
 
 from service.db.repositories import Attempt, JobRepository
 from service.jobs.outputs import AttemptProgress, Best, FailureKind, JobFailure, JobOutput, Point, ResultPiece
+from service.queue.meters import Meters
 from service.queue.running import Live, Running, StopReason, Waiters
-from service.settings import logs
+from service.settings import logs, traces
 from service.settings.settings import Settings
 from service.workers.base import Executor, ExecutorStatus, Failed, Finished, Lost, Outcome, Stopped
 
@@ -57,9 +59,19 @@ class JobQueue:
         Lease, poll and time limit.
     waiters : Waiters
         Told of progress and of every job that ends.
+    meters : Meters
+        Told how long jobs wait and run.
     """
 
-    def __init__(self, jobs: JobRepository, executor: Executor, settings: Settings, waiters: Waiters) -> None:
+    def __init__(
+        self,
+        jobs: JobRepository,
+        executor: Executor,
+        settings: Settings,
+        waiters: Waiters,
+        meters: Meters,
+    ) -> None:
+        self._meters = meters
         self.owner = f"{socket.gethostname()}:{os.getpid()}:{secrets.token_hex(4)}"
         self._jobs = jobs
         self._executor = executor
@@ -195,6 +207,8 @@ class JobQueue:
         """
         entry = self._entry(attempt)
         seconds = None if entry is None else round(time.monotonic() - entry.started, 3)
+        if seconds is not None:
+            self._meters.ran.labels(attempt.kind, type(outcome).__name__.lower()).observe(seconds)
         try:
             with _about(attempt, seconds):
                 if entry is not None and entry.unwritten and not isinstance(outcome, Finished):
@@ -208,6 +222,8 @@ class JobQueue:
                 # Given back, the job may run here again by now, as another attempt.
                 if entry is not None and self._running.get(attempt.job_id) is entry:
                     del self._running[attempt.job_id]
+            if entry is not None and entry.span is not None:
+                entry.span.end(outcome=type(outcome).__name__.lower())
             self._waiters.ended(attempt.job_id)
             self._wake.set()
 
@@ -269,11 +285,11 @@ class JobQueue:
             case StopReason.LEASE:
                 self._note(attempt, "stopped", written=False)
 
-    @staticmethod
-    def _note(attempt: Attempt, what: str, *, written: bool) -> None:
+    def _note(self, attempt: Attempt, what: str, *, written: bool) -> None:
         if written:
             log.info("job %s, attempt %d: %s", attempt.job_id, attempt.attempt, what)
         else:
+            self._meters.lost.labels("own").inc()
             log.warning(
                 "job %s, attempt %d lost its lease and wrote nothing", attempt.job_id, attempt.attempt
             )
@@ -299,15 +315,27 @@ class JobQueue:
         with self._claiming:
             attempts = self._jobs.claim_several(self.owner, self._lease_until(), free)
             now = time.monotonic()
-            entries = [
-                Running(attempt=one, started=now, written=now, fraction=one.progress, points=one.points)
-                for one in attempts
-            ]
+            entries = [self._begun(one, now) for one in attempts]
             with self._lock:
                 self._running.update((entry.attempt.job_id, entry) for entry in entries)
         for entry in entries:
             self._submit(entry)
+            if entry.attempt.attempt == 1:
+                waited = (self._jobs.now() - entry.attempt.created).total_seconds()
+                self._meters.waited.labels(entry.attempt.kind).observe(max(waited, 0.0))
         return len(attempts) == free
+
+    @staticmethod
+    def _begun(attempt: Attempt, now: float) -> Running:
+        span = traces.begin(
+            "attempt", attempt.trace, job=attempt.job_id, kind=attempt.kind, attempt=attempt.attempt
+        )
+        if span is not None:
+            attempt = replace(attempt, trace=span.carried)
+        return Running(
+            attempt=attempt, started=now, written=now, fraction=attempt.progress, points=attempt.points,
+            span=span,
+        )  # fmt: skip
 
     def _submit(self, entry: Running) -> None:
         attempt = entry.attempt
@@ -351,6 +379,8 @@ class JobQueue:
         for entry in running:
             if entry.stop is None and entry.attempt.job_id in cancelled:
                 self._ask_to_stop(entry, StopReason.CANCEL)
-        if self._jobs.recover_expired([entry.attempt.job_id for entry in running]).total:
+        expired = self._jobs.recover_expired([entry.attempt.job_id for entry in running]).total
+        if expired:
             log.warning("jobs whose lease ran out were taken back")
+            self._meters.lost.labels("taken back").inc(expired)
             self._wake.set()

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 
 from service.db.repositories import Attempt
 from service.jobs.outputs import Best, Point
+from service.settings.traces import Open
 
 
 class StopReason(enum.Enum):
@@ -35,6 +36,7 @@ class Running:
     points: int = 0
     best: Best | None = None
     unwritten: bool = False
+    span: Open | None = None
     stop: StopReason | None = None
     tag: str = field(default_factory=lambda: secrets.token_hex(4))
     found: list[Point] = field(default_factory=list)

@@ -348,6 +348,11 @@ class Settings(ClientLimits):
     log_format: Literal["text", "json"] = Field(
         default="text", description="The log on standard error: lines for people, or JSON objects."
     )
+    traces: bool = Field(
+        default=False,
+        description="Send OpenTelemetry traces of requests, jobs and their computation where "
+        "OTEL_EXPORTER_OTLP_ENDPOINT says; needs the extra `traces`.",
+    )
     log_level: Literal["DEBUG", "INFO", "WARNING", "ERROR"] = Field(
         default="INFO", description="Least level that is logged."
     )
@@ -419,6 +424,7 @@ class Settings(ClientLimits):
             checkpoint_bytes=self.checkpoint_bytes,
             log_level=self.log_level,
             log_format=self.log_format,
+            traces=self.traces,
         )
 
     @field_validator("database")

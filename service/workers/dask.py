@@ -181,6 +181,7 @@ class DaskExecutor:
             saved=work.saved,
             spec_hash=attempt.spec_hash,
             told=work.told,
+            trace=attempt.trace,
             warm_up=self._registry.warm_up,
             version=self._version,
             threads=self._cluster.threads,

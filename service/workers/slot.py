@@ -77,7 +77,7 @@ class _Held:
         work = self.work
         if isinstance(work, LentBatch):
             return Errand(self.token, work.data)
-        return Task(self.token, work.job_id, work.kind, work.spec, work.saved, work.spec_hash)
+        return Task(self.token, work.job_id, work.kind, work.spec, work.saved, work.spec_hash, work.trace)
 
 
 class Host(Protocol):

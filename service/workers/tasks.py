@@ -20,9 +20,11 @@ from typing import Any
 
 from distributed import Client, Future, Status, Worker, get_client, get_worker, rejoin, secede
 
+from service.errors import ConfigurationError
 from service.jobs.checkpoints import Checkpoints, KeptPieces
 from service.jobs.outputs import JobFailure, JobOutput, Pace, ResultPiece
 from service.jobs.registry import RunOn, WarmUp
+from service.settings import traces
 from service.workers.process_limits import ProcessLimits
 from service.workers.spreading import BatchAnswer, Spreading, helped
 from service.workers.worker import (
@@ -58,6 +60,8 @@ class Order:
         What earlier orders kept.
     spec_hash : str
         Digest of what is computed, to which they belong.
+    trace : str or None
+        The `traceparent` it is part of, if there are traces.
     told : int
         How many points of its branch the service knows; they are not said again.
     version : str
@@ -78,6 +82,7 @@ class Order:
     saved: tuple[ResultPiece, ...]
     spec_hash: str
     told: int
+    trace: str | None
     warm_up: WarmUp
     version: str
     threads: int
@@ -238,6 +243,10 @@ def _answer(order: Order) -> TaskAnswer:
     here = f"{worker.address} (process {os.getpid()})"
     if (mine := version("stickslip")) != order.version:
         return TaskAnswer(retry=f"worker {here} has stickslip {mine}, the service {order.version}")
+    try:
+        traces.configure(on=order.pace.traces)
+    except ConfigurationError as error:
+        return TaskAnswer(retry=f"worker {here}: {error}")
 
     def say(**note: Any) -> None:
         worker.log_event(TOPIC, {"token": order.token, "worker": worker.address, **note})
@@ -255,7 +264,8 @@ def _answer(order: Order) -> TaskAnswer:
     say(begun=time.time_ns(), threads=worker.state.nthreads)
     stop = _OrderStop(_Unwanted(worker, worker.get_current_task()))
     try:
-        return _computed(order, worker.state.nthreads, Throttle(send, order.pace.progress_seconds), stop)
+        with traces.span("compute", order.trace, job=order.job_id, kind=order.kind):
+            return _computed(order, worker.state.nthreads, Throttle(send, order.pace.progress_seconds), stop)
     finally:
         order.limits.forget()
         say(over=True)

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
-from service.db.clock import new_id
+from service.db.clock import new_id, utc_now
 from service.db.repositories import Attempt
 from service.jobs.outputs import Pace
 from service.jobs.registry import RunOn, WarmUp
@@ -46,7 +46,13 @@ class WarmTask:
     def of(cls, task: str, spec: dict[str, Any], owner: str, **more: Any) -> WarmTask:
         """A task with what it is given."""
         attempt = Attempt(
-            job_id=new_id(), kind=task, spec=spec, attempt=1, max_attempts=1, lease_owner="warm"
+            job_id=new_id(),
+            kind=task,
+            spec=spec,
+            attempt=1,
+            max_attempts=1,
+            lease_owner="warm",
+            created=utc_now(),
         )
         return cls(attempt, owner, **more)
 

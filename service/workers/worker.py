@@ -29,7 +29,7 @@ from service.jobs.checkpoints import Checkpoints, KeptPieces
 from service.jobs.figures import figures
 from service.jobs.outputs import Best, FailureKind, JobFailure, JobOutput, Pace, Point, ResultPiece
 from service.jobs.registry import RunOn, WarmUp
-from service.settings import logs
+from service.settings import logs, traces
 from service.workers.process_limits import ProcessLimits
 from service.workers.spreading import BatchAnswer, Spreading, helped
 from solver.errors import SceneError, SettingError, SolverError
@@ -64,6 +64,7 @@ class Task:
     spec: Mapping[str, Any]
     saved: tuple[ResultPiece, ...] = ()
     spec_hash: str = ""
+    trace: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -288,6 +289,7 @@ def main(
     signal.signal(signal.SIGTERM, _leave_soon)
     threading.Thread(target=_die_with_parent, name="parent watch", daemon=True).start()
     logs.configure(pace.log_level, pace.log_format)
+    traces.configure(on=pace.traces)
     warm_up()
     limits.confine()
     orders = Orders(numbers)
@@ -309,7 +311,11 @@ def main(
         stop, reply = _Stop(orders, task.token), _replying(connection, task)
         kept = Checkpoints(task.job_id, task.saved, reply, pace, task.spec_hash)
         spread = Spreading(_Neighbours(inbox, orders, task.token), stop)
-        with logs.about(job=task.job_id, kind=task.kind), spreading(spread):
+        with (
+            logs.about(job=task.job_id, kind=task.kind),
+            traces.span("compute", task.trace, job=task.job_id, kind=task.kind),
+            spreading(spread),
+        ):
             limits.begin()
             done = _compute(runs, task, Throttle(reply, pace.progress_seconds), stop, kept, limits)
             limits.end()
@@ -337,9 +343,14 @@ def _replying(connection: Connection, task: Task) -> Callable[[Report | KeptPiec
     return lambda about: connection.send(Reply(task.token, about))
 
 
+def _leave() -> None:
+    traces.flush()
+    os._exit(0)
+
+
 def _leave_soon(_signal: int, _frame: FrameType | None) -> None:
     """On SIGTERM: leave the service, which got it too, the time to give the job back to its queue."""
-    timer = threading.Timer(_TERMINATION_SECONDS, os._exit, (0,))
+    timer = threading.Timer(_TERMINATION_SECONDS, _leave)
     timer.daemon = True
     timer.start()
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hmac
 import json
 import logging
+import re
 from collections.abc import Iterator
 from datetime import timedelta
 from pathlib import Path
@@ -132,6 +133,9 @@ def test_limits_of_a_key(guarded: ServedClient) -> None:
     refused = guarded.get("/v1/jobs", headers=few)
     assert "3 requests a minute" in is_problem(refused, 429)["detail"]
     assert 1 <= int(refused.headers["retry-after"]) <= 20
+    monitor = bearer(token_of(guarded, Scope.MONITOR))
+    told = guarded.get("/metrics", headers=monitor).text
+    assert re.search(r'\nstickslip_refused_total\{owner="[^"]+",status="429"\} [1-9]', told)
     admin = bearer(token_of(guarded, Scope.ADMIN))
     queue = bearer(token_of(guarded, owner="queue", waiting=1, seconds=5.0))
     made = [guarded.post("/v1/jobs", json=SLOW, headers=queue) for _ in range(3)]

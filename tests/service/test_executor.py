@@ -14,6 +14,7 @@ import pytest
 from private_kinds import PRIVATE, IterationRequest, as_it_is
 from service_helpers import PATIENCE, pids, until
 
+from service.db.clock import utc_now
 from service.db.repositories import Attempt
 from service.jobs.outputs import Point, ResultPiece
 from service.settings.settings import load_settings
@@ -65,7 +66,9 @@ def attempt(
 ) -> Attempt:
     asked = IterationRequest(size=5, seconds=seconds, pid_file=pid_file)
     spec = {**as_it_is(asked, None).spec, "padding": padding}
-    return Attempt(job_id=name, kind=kind, spec=spec, attempt=1, max_attempts=3, lease_owner="me")
+    return Attempt(
+        job_id=name, kind=kind, spec=spec, attempt=1, max_attempts=3, lease_owner="me", created=utc_now()
+    )
 
 
 @pytest.fixture

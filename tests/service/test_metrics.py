@@ -2,6 +2,9 @@
 
 import httpx
 from prometheus_client.parser import text_string_to_metric_families
+from service_helpers import until
+
+from service.queue.meters import OTHERS, Refusals
 
 
 def numbers(http: httpx.Client) -> dict[tuple[str, tuple[tuple[str, str], ...]], float]:
@@ -57,3 +60,34 @@ def test_times_add_up(http: httpx.Client) -> None:
     assert count >= 1.0
     assert found["stickslip_http_request_seconds_bucket", (("le", "+Inf"), *labels)] == count
     assert 0.0 < found["stickslip_http_request_seconds_sum", labels] < 60.0 * count
+
+
+def test_jobs_are_timed_by_kind_and_lanes_by_name(http: httpx.Client) -> None:
+    def more(name: str, **labels: str) -> float:
+        key = (name, tuple(sorted(labels.items())))
+        return numbers(http).get(key, 0.0) - before.get(key, 0.0)
+
+    before = numbers(http)
+    body = {"kind": "iteration", "size": 5, "fresh": True}
+    answer = http.post("/v1/jobs", json=body, headers={"Prefer": "wait=60"})
+    assert answer.status_code == 200
+    until(lambda: more("stickslip_job_run_seconds_count", kind="iteration", outcome="finished") == 1.0)
+    assert more("stickslip_job_wait_seconds_count", kind="iteration") == 1.0
+    assert more("stickslip_lane_wait_seconds_count", lane="writes") >= 1.0
+    assert before["stickslip_oldest_waiting_seconds", ()] >= 0.0
+
+
+def test_refusals_are_counted_of_the_busiest_owners_by_name() -> None:
+    """No series ever falls, and the sum is that of all refusals, whoever comes to the front."""
+    refused, seen = Refusals(shown=2, ranked=6), dict[tuple[str, str], float]()
+    owners = ["a"] * 3 + ["b"] * 2 + ["c"] * 9 + [f"once {k}" for k in range(20)] + ["a"] * 20 + ["c"]
+    for number, owner in enumerate(owners, 1):
+        refused.count(owner, 429 if number % 3 else 503)
+        [family] = refused.collect()
+        found = {(one.labels["owner"], one.labels["status"]): one.value for one in family.samples}
+        named = {owner for owner, _ in found} - {OTHERS}
+        assert len(named) <= 2
+        assert sum(found.values()) == number
+        assert all(found[key] >= value for key, value in seen.items() if key in found)
+        seen = found
+    assert named == {"a", "c"}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import fields
 from typing import Any
 
-from sqlalchemy import Table, Text, Update, bindparam, cast, insert, select, update
+from sqlalchemy import Table, Text, Update, bindparam, cast, func, insert, select, update
 from sqlalchemy.sql.elements import ColumnElement
 
 from service.db.models import Job, JobResult, JobState
@@ -46,6 +46,9 @@ COMPUTED_BEFORE = (
     .order_by(_C.id.concat("").desc())
     .limit(1)
 )
+
+_FIRST = select(func.min(_C.id)).where(_C.state == JobState.ACCEPTED).scalar_subquery()
+OLDEST_WAITING = select(_C.created).where(_C.id == _FIRST)
 
 _NOT_OF_THE_ROW = ("job_id", "lease_owner", "saved")
 TAKEN = ["id", *(item.name for item in fields(Attempt) if item.name not in _NOT_OF_THE_ROW)]

@@ -189,6 +189,11 @@ class JobRepository:
             found = {row.state: row.number for row in connection.execute(query)}
         return {state: found.get(state, 0) for state in JobState}
 
+    def oldest_waiting(self) -> datetime | None:
+        """When the job was handed in that waits for longest, None if none waits; ids ascend with time."""
+        with self._db.reading() as connection:
+            return connection.execute(job_statements.OLDEST_WAITING).scalar_one_or_none()
+
     def claim(self, owner: str, lease_until: datetime) -> Attempt | None:
         """Take the next waiting job for `owner`; None if none waits."""
         return next(iter(self.claim_several(owner, lease_until, 1)), None)

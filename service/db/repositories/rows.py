@@ -71,6 +71,7 @@ class NewJob:
     owner: str = NOBODY
     seconds_limit: float | None = None
     words: RunWords = NO_WORDS
+    trace: str | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -79,10 +80,14 @@ class Attempt:
 
     Attributes
     ----------
+    created : datetime
+        When its job was handed in.
     spec_hash : str
         Digest of what is computed, to which its checkpoints belong.
     seconds_limit : float or None
         Longest time it may take [s], if the job has a limit of its own.
+    trace : str or None
+        The `traceparent` it is part of, if there are traces.
     progress, points : float, int
         How far earlier attempts got, as far as `saved` goes; 0 without it.
     saved : tuple of Piece
@@ -95,9 +100,11 @@ class Attempt:
     attempt: int
     max_attempts: int
     lease_owner: str
+    created: datetime
     spec_hash: str = ""
     owner: str = NOBODY
     seconds_limit: float | None = None
+    trace: str | None = None
     progress: float = 0.0
     points: int = 0
     saved: tuple[ResultPiece, ...] = field(default=(), compare=False, repr=False)

@@ -76,6 +76,10 @@ LOGIN = "/v1/login"
 _PAGE = "/page/"
 _SHARED = "/v1/shared"
 """What a link to a run shows, by the token in the query."""
+OWNER = "owner"
+"""Where a request's state has whose it is, once that is known."""
+NO_KEY = "(no key)"
+"""The owner, to those who count, of a request whose key is not known."""
 _MONITORED = frozenset({"/metrics"})
 _READING = frozenset({"GET", "HEAD", "OPTIONS"})
 _OURS = frozenset({"same-origin", "none"})
@@ -117,6 +121,7 @@ class Admission:
                 _refuse_other_pages(request)
                 token = _token(request)
                 caller = await self._admit(request, token)
+                request.scope["state"][OWNER] = (LINK_READERS if by_link(scope["path"]) else caller).owner
                 needed = scope_of(scope["method"], scope["path"])
                 if needed is not None:
                     self._authenticator.require(caller, needed)
