@@ -186,6 +186,28 @@ def slow_sweep(
     return Sweep.run_on(spec, progress, slow(should_stop), checkpoints)
 
 
+class HeldSweep(Sweep):
+    """A sweep whose second stretch waits for a file."""
+
+    until: str
+
+
+def held_sweep(
+    spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop, checkpoints: Checkpoints
+) -> JobOutput:
+    """The kind `sweep`; what it has found is told while it waits, however fast it was."""
+    asked = dict(spec)
+    seen = Path(asked.pop("until"))
+
+    def held() -> bool:
+        while not seen.exists() and not should_stop():
+            time.sleep(0.01)
+            progress(0.0, 0)
+        return should_stop()
+
+    return Sweep.run_on(asked, progress, held, checkpoints)
+
+
 def slow_map(
     spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop, checkpoints: Checkpoints
 ) -> JobOutput:
@@ -239,6 +261,7 @@ def confused(_request: IterationRequest, _source: object) -> Resolved:
 
 SLOW = (
     replace(Sweep.as_kind(), name="slow-sweep", run_on=slow_sweep),
+    replace(Sweep.as_kind(), name="held-sweep", request=HeldSweep, run_on=held_sweep),
     replace(maps.Map.as_kind(), name="slow-map", parts=None, run_on=slow_map),
 )
 PRIVATE = Registry(

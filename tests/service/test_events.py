@@ -95,14 +95,18 @@ def test_refusals(http: httpx.Client) -> None:
     is_problem(http.get("/v1/jobs/none/events", headers={"Last-Event-ID": "a" * 201}), 422)
 
 
-def test_the_points_of_a_sweep_arrive_while_it_is_computed(shipped: httpx.Client) -> None:
-    scene = shipped.get("/v1/scenes/two-dof").json()["scene"]
-    body = {"kind": "sweep", "scene": scene, "from": 0.05, "to": 20.0, "harmonics": 49, "fresh": True}
-    job = shipped.post("/v1/jobs", json=body).json()["id"]
-    events = follow(shipped, job)
-    points = [p for e in events if e.get("event") == "partial" for p in e["data"]["points"]]
-    sweep = shipped.get(f"/v1/jobs/{job}/results").json()["sweeps"][0]
-    arrays = shipped.get(sweep["links"]["self"]).json()["arrays"]
+def test_the_points_of_a_sweep_arrive_while_it_is_computed(http: httpx.Client, tmp_path: Path) -> None:
+    scene = http.get("/v1/scenes/two-dof").json()["scene"]
+    body = {"kind": "held-sweep", "scene": scene, "from": 0.05, "to": 20.0, "fresh": True}
+    job = http.post("/v1/jobs", json={**body, "until": str(tmp_path / "seen")}).json()["id"]
+    points: list[list[float]] = []
+    with http.stream("GET", f"/v1/jobs/{job}/events") as answer:
+        for event in parsed(answer.iter_lines()):
+            points += event["data"]["points"] if event.get("event") == "partial" else []
+            if len(points) >= 64:
+                (tmp_path / "seen").touch()
+    sweep = http.get(f"/v1/jobs/{job}/results").json()["sweeps"][0]
+    arrays = http.get(sweep["links"]["self"]).json()["arrays"]
     known = list(map(list, zip(arrays["parameter"], arrays["amplitude"], strict=True)))
     # The finished branch has the points that were told, in their order, and those put between.
     rest = iter(known)
