@@ -21,7 +21,7 @@ from solver.linear.contact_table import contact_set, contact_table, highest_load
 from solver.scene.bodies.kinematics import static_forces
 from solver.scene.cyclic.annulus import check_in_annulus, written_out
 from solver.scene.harmonics import MOST_HARMONICS, forced_harmonics, kept_harmonics
-from solver.scene.parameter_paths import AMPLITUDE
+from solver.scene.parameter_paths import AMPLITUDE, check_frequency
 from solver.scene.scene import Scene
 
 
@@ -89,20 +89,6 @@ def check_harmonics(harmonics: int) -> int:
     if not 0 <= harmonics <= MOST_HARMONICS:
         raise SettingError("harmonics", harmonics, f"must be from 0 to {MOST_HARMONICS}")
     return harmonics
-
-
-def check_frequency(name: str, frequency_hz: float) -> float:
-    """Return `frequency_hz` as a float if it is a usable frequency.
-
-    Raises
-    ------
-    SettingError
-        Not a finite number above 0.
-    """
-    good = isinstance(frequency_hz, (int, float, np.number)) and not isinstance(frequency_hz, bool)
-    if not good or not math.isfinite(frequency_hz) or frequency_hz <= 0.0:
-        raise SettingError(name, frequency_hz, "must be a frequency > 0 Hz")
-    return float(frequency_hz)
 
 
 def build(

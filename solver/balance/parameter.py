@@ -13,7 +13,7 @@ from solver.contacts.kernels import system as kernel
 from solver.errors import SettingError
 from solver.jit.fourier import Real
 from solver.scene.bodies.paths import SPEED
-from solver.scene.parameter_paths import FREQUENCY, follows_speed, parameter_of
+from solver.scene.parameter_paths import FREQUENCY, check_frequency, follows_speed, parameter_of
 from solver.scene.scene import Scene
 
 
@@ -88,8 +88,8 @@ class Parameter:
             or not np.isfinite(value)
         ):
             raise SettingError(name, value, f"must be a finite number ({self.path})")
-        if self.kind is Kind.FREQUENCY and value <= 0.0:
-            raise SettingError(name, value, "must be a frequency > 0 Hz")
+        if self.kind is Kind.FREQUENCY:
+            return check_frequency(name, value)
         if value < self.least:
             raise SettingError(name, value, f"must be >= 0, a value of `{self.path}`")
         return float(value)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solver.balance.balance import Balance, build, check_frequency, check_harmonics
+from solver.balance.balance import Balance, build, check_harmonics
 from solver.balance.kernels.gauge import FREE
 from solver.balance.kernels.output import HALF_RANGE, MEAN, extremes
 from solver.balance.parameter import Kind
@@ -29,6 +29,7 @@ from solver.response.contact_response import OPENS, ContactResponse, ContactStat
 from solver.response.history_dependence import has_another_solution, history_of
 from solver.response.solution import HISTORY_DEPENDENT, MEAN_UNDETERMINED, Solution, SolutionStatus
 from solver.results.notes import ABOVE_FRICTION
+from solver.scene.parameter_paths import check_frequency
 from solver.scene.scene import Scene
 
 if TYPE_CHECKING:

@@ -10,6 +10,8 @@ import math
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, TypeVar, cast
 
+import numpy as np
+
 from solver.contacts.laws.base import AnyContact
 from solver.contacts.laws.parts import LawQuantity
 from solver.errors import SettingError
@@ -31,9 +33,26 @@ from solver.scene.structure_parameters import (
 from solver.wording import listing, nearest
 
 FREQUENCY = "frequency"
+LEAST_HZ, MOST_HZ = 1e-100, 1e100  # their squares, times any mass or stiffness, are numbers
 
 
 _SceneT = TypeVar("_SceneT", bound="HasParts")
+
+
+def check_frequency(name: str, frequency_hz: float) -> float:
+    """Return `frequency_hz` as a float if it is a usable frequency.
+
+    Raises
+    ------
+    SettingError
+        Not a number above 0, or one whose square floating-point numbers cannot tell.
+    """
+    number = isinstance(frequency_hz, (int, float, np.number)) and not isinstance(frequency_hz, bool)
+    if not number or not 0.0 < frequency_hz < math.inf:
+        raise SettingError(name, frequency_hz, "must be a frequency > 0 Hz")
+    if not LEAST_HZ <= frequency_hz <= MOST_HZ:
+        raise SettingError(name, frequency_hz, f"must be a frequency from {LEAST_HZ:g} to {MOST_HZ:g} Hz")
+    return float(frequency_hz)
 
 
 def contact_paths(scene: HasParts) -> tuple[str, ...]:

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from solver.balance.balance import Balance, build, check_frequency, check_harmonics
+from solver.balance.balance import Balance, build, check_harmonics
 from solver.balance.kernels.output import MAX_ABS
 from solver.balance.more_harmonics import more_harmonics, pad
 from solver.balance.workspace import Workspace
@@ -22,6 +22,7 @@ from solver.errors import SettingError
 from solver.jit.fourier import Real
 from solver.results.watch import ShouldStop, shows_progress
 from solver.scene.harmonics import kept_harmonics
+from solver.scene.parameter_paths import check_frequency
 from solver.scene.scene import Scene
 from solver.studies.study_results import AccuracyRow, AccuracyStatus, AccuracyStudy
 

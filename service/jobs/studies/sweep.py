@@ -33,6 +33,7 @@ from service.jobs.registry import Flag, JobKind, Json, ReadSweep, StoredSweep
 from service.jobs.study import Answer, Study, Watch
 from solver.errors import Issue, Naming, SettingError, Shown
 from solver.scene.descriptions import DISK_LOAD
+from solver.scene.parameter_paths import check_frequency
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -119,8 +120,8 @@ class Sweep(Study, HarmonicRequest):
                 issues.append(Issue((name,), f"is needed for a sweep of `{path}`"))
             elif not over_frequency:
                 issues += check(partial(scene.with_values, {path: end}), name)
-            elif end <= 0.0:
-                issues.append(Issue((name,), "must be a frequency > 0 Hz", end))
+            else:
+                issues += check(partial(check_frequency, name, end), name)
         if ends[0] is not None and ends[0] == ends[1]:
             issues.append(Issue(("to",), Naming("must differ from {from}"), Shown(f"{ends[1]!r} for both")))
         at = self.frequency_hz

@@ -20,6 +20,7 @@ from solver.modes.nonlinear_mode import LEAST, MOST_POINTS, pose
 from solver.modes.records import PointRecord, Recorder, Wider, last_unknowns, told_of
 from solver.modes.results import HeldAmplitude, HeldStatus, LeastForce
 from solver.response.stability.floquet import motions_stability
+from solver.scene.parameter_paths import check_frequency
 
 if TYPE_CHECKING:
     from solver.scene.scene import Scene
@@ -96,14 +97,13 @@ def _checked(scene: Scene, amplitude: float, dof: str | None) -> Scene:
 
 def _range(scene: Scene, start: float | None, stop: float | None) -> tuple[float, float]:
     """Return the frequencies [Hz]."""
-    ends = [scene.observe.band[i] if end is None else end for i, end in enumerate((start, stop))]
-    for name, value in zip(("start", "stop"), ends, strict=True):
-        number = isinstance(value, (int, float)) and not isinstance(value, bool)
-        if not number or not 0.0 < value < math.inf:
-            raise SettingError(name, value, "must be a frequency > 0 Hz")
-    if not ends[0] < ends[1]:
-        raise SettingError("stop", ends[1], f"must be above the start {ends[0]!r}")
-    return float(ends[0]), float(ends[1])
+    low, high = (
+        check_frequency(name, scene.observe.band[i] if end is None else end)
+        for i, (name, end) in enumerate((("start", start), ("stop", stop)))
+    )
+    if not low < high:
+        raise SettingError("stop", high, f"must be above the start {low!r}")
+    return low, high
 
 
 def _check_moves(equations: Held, scene: Scene, omega: float) -> None:

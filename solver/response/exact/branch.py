@@ -8,7 +8,7 @@ from typing import Annotated
 
 import numpy as np
 
-from solver.balance.balance import check_frequency, check_harmonics
+from solver.balance.balance import check_harmonics
 from solver.balance.parameter import Kind, Parameter, resolve
 from solver.continuation.branch import AnyBranch
 from solver.continuation.marks import Bifurcations, Mark, MarkKind
@@ -20,6 +20,7 @@ from solver.response.exact.orbit import Orbit
 from solver.response.known import known_of_solution
 from solver.response.solution import MEAN_UNDETERMINED, Solution
 from solver.results.known import Known, Stable, Verdict
+from solver.scene.parameter_paths import check_frequency
 from solver.scene.scene import Scene
 
 

@@ -14,7 +14,7 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
-from solver.balance.balance import build, check_frequency
+from solver.balance.balance import build
 from solver.balance.simplifications import Effects
 from solver.continuation.from_nothing import solve_from_nothing
 from solver.errors import SettingError
@@ -29,6 +29,7 @@ from solver.response.stability.uniqueness import Uniqueness, uniqueness
 from solver.results.known import Stable, Verdict
 from solver.results.told import Piece
 from solver.results.watch import shows_progress
+from solver.scene.parameter_paths import check_frequency
 from solver.scene.scene import Scene
 
 INCOMPLETE = "The list may be incomplete: no search finds every solution for certain."

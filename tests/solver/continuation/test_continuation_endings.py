@@ -126,6 +126,7 @@ def test_what_a_branch_holds():
     [
         ({"start": 0.0, "stop": 1.0}, "start", 0.0),
         ({"start": 1.0, "stop": math.inf}, "stop", math.inf),
+        ({"start": 1.0, "stop": 1e300}, "stop", 1e300),
         ({"start": 1.0, "stop": 1.0}, "stop", 1.0),
         ({"start": "1", "stop": 2.0}, "start", "1"),
         ({"start": True, "stop": 2.0}, "start", True),

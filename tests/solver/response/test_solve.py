@@ -231,6 +231,8 @@ def test_an_estimate_without_contacts_is_rounding():
         ({"frequency_hz": -3.0}, "frequency_hz"),
         ({"frequency_hz": math.nan}, "frequency_hz"),
         ({"frequency_hz": "1.2"}, "frequency_hz"),
+        ({"frequency_hz": 1e300}, "frequency_hz"),
+        ({"frequency_hz": 1e-300}, "frequency_hz"),
         ({"frequency_hz": 1.2, "harmonics": -1}, "harmonics"),
         ({"frequency_hz": 1.2, "harmonics": 2.5}, "harmonics"),
         ({"frequency_hz": 1.2, "harmonics": 5000}, "harmonics"),
