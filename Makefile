@@ -5,6 +5,9 @@ BIN := .venv/bin
 # Bytecode is compiled on all cores, where pip would do it on one. Not to leave it to the first imports: where
 # Python is told to write none (PYTHONDONTWRITEBYTECODE) every process would take a second longer to start.
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile
+# The packages of parts of constraints.txt, of files whose digests stand there alone.
+PINNED = awk -v parts=" $(1) " '/^\# / {on = index(parts, " " $$2 " ")} on' constraints.txt \
+	  | $(PIP) --require-hashes -r /dev/stdin
 BYTECODE := $(BIN)/python -m compileall -q -j 0 .venv/lib stickslip solver optim service migrations
 PACKAGES := .venv/.packages
 STAMP := .venv/.up-to-date
@@ -27,7 +30,7 @@ help:
 	@echo "make lint       check the code: ruff, mypy, import-linter"
 	@echo "make bench      measure the solver and print tables; some of them: make bench BENCH='case-a chains'"
 	@echo "make docs       build the documentation site, reference and gallery too; it goes to site/"
-	@echo "make pins       renew the digests in pins/, after a version there was changed"
+	@echo "make pins       renew the digests in constraints.txt, after a version there was changed"
 	@echo "make sbom       list what an installation consists of, as CycloneDX, in sbom.cdx.json"
 	@echo "make serve      start the service on http://127.0.0.1:8000"
 	@echo "make clean      remove .venv, caches and demo-output/"
@@ -36,14 +39,14 @@ setup: $(STAMP)
 
 # The first kernels are compiled while the other packages are installed: pip keeps one core busy, no more.
 # What is imported is kept as bytecode, whatever PYTHONDONTWRITEBYTECODE says: else every process reads sources.
-$(PACKAGES): pyproject.toml pins/kernels.txt pins/package.txt
+$(PACKAGES): pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
 	  echo "stickslip needs Python 3.11 or newer, as in: make $(MAKECMDGOALS) PYTHON=python3.12" >&2; exit 1; }
 	$(PYTHON) -m venv .venv
-	$(PIP) --require-hashes -r pins/kernels.txt
+	$(call PINNED,kernels)
 	@echo "Installing the other packages, and compiling the kernels of a first design: half a minute on two cores."
 	PYTHONDONTWRITEBYTECODE= $(BIN)/python -m service.warm_up --first & kernels=$$!; \
-	  $(PIP) --require-hashes -r pins/package.txt || { kill $$kernels; exit 1; }; \
+	  $(call PINNED,package) || { kill $$kernels; exit 1; }; \
 	  wait $$kernels
 	$(PIP) --no-deps --no-build-isolation -e .
 	@touch $@
@@ -56,9 +59,9 @@ $(STAMP): $(PACKAGES)
 
 dev: $(DEV)
 
-$(DEV): $(PACKAGES) pins/image.txt pins/dev.txt
+$(DEV): $(PACKAGES)
 	$(BIN)/python -m service.warm_up & kernels=$$!; \
-	  $(PIP) --require-hashes -r pins/image.txt -r pins/dev.txt || { kill $$kernels; exit 1; }; \
+	  $(call PINNED,image dev) || { kill $$kernels; exit 1; }; \
 	  wait $$kernels
 	$(BYTECODE)
 	@touch $(STAMP) $@
@@ -97,10 +100,12 @@ docs: dev
 
 # Of all files of a version, for any system and any Python: which one is installed is another machine's affair.
 pins: dev
-	@for part in pins/*.txt; do \
-	  $(BIN)/uv pip compile $$part --output-file $$part --generate-hashes --no-deps --universal --python-version 3.12 \
-	    --no-header --no-annotate --quiet >/dev/null || exit 1; \
-	done
+	for part in kernels package image dev; do \
+	  echo "# $$part"; \
+	  awk -v part=$$part '/^# / {on = $$2 == part} on' constraints.txt | $(BIN)/uv pip compile - --generate-hashes \
+	    --no-deps --universal --python-version 3.12 --no-header --no-annotate --quiet || exit 1; \
+	done > .venv/pins
+	mv .venv/pins constraints.txt
 
 sbom: setup
 	$(BIN)/python deploy/sbom.py > sbom.cdx.json

@@ -1,7 +1,7 @@
 """What an installation consists of, as CycloneDX 1.6 on standard output: ``make sbom``.
 
-The packages of ``pins/`` but those of development, with the digests of their files, their licences and what
-needs what as far as they are installed here, and the scripts of others that the page brings along.
+The packages of ``constraints.txt`` but those of development, with the digests of their files, their licences
+and what needs what as far as they are installed here, and the scripts of others that the page brings along.
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parent.parent
-_PARTS = ("kernels", "package", "image")
 _PIN = re.compile(r"^([\w.-]+)==([\w.]+)[^\n]*((?:\n    --hash=sha256:[0-9a-f]{64}[^\n]*)*)", re.MULTILINE)
 _SCRIPT = re.compile(r"((?:@[\w-]+/)?[\w-]+)@(\d[\w.]*)")
 _BUILDS_ONLY = "esbuild"
@@ -24,16 +23,16 @@ _BUILDS_ONLY = "esbuild"
 
 def packages() -> Iterator[dict[str, Any]]:
     """Yield the packages of Python."""
-    for part in _PARTS:
-        for name, version, hashes in _PIN.findall((ROOT / "pins" / f"{part}.txt").read_text("utf-8")):
-            about = _component(_normal(name), version, "pypi")
-            digests = re.findall(r"sha256:(\w+)", hashes)
-            # A component has one digest of each kind: those of its files stand where those of archives do.
-            reference = {"type": "distribution", "url": about["purl"]}
-            about["externalReferences"] = [
-                {**reference, "hashes": [{"alg": "SHA-256", "content": one}]} for one in digests
-            ]
-            yield about | _licence(name)
+    running, _, _ = (ROOT / "constraints.txt").read_text("utf-8").partition("\n# dev\n")
+    for name, version, hashes in _PIN.findall(running):
+        about = _component(_normal(name), version, "pypi")
+        digests = re.findall(r"sha256:(\w+)", hashes)
+        # A component has one digest of each kind: those of its files stand where those of archives do.
+        reference = {"type": "distribution", "url": about["purl"]}
+        about["externalReferences"] = [
+            {**reference, "hashes": [{"alg": "SHA-256", "content": one}]} for one in digests
+        ]
+        yield about | _licence(name)
 
 
 def scripts() -> Iterator[dict[str, Any]]:
