@@ -17,6 +17,7 @@ from fastapi import APIRouter, BackgroundTasks, Request, Response
 from service.errors import NotFoundError
 from service.http.dependencies import TEXT, InContext, media, tagged
 from service.http.middleware.admission import LOGIN
+from service.http.routes.forms import prepare
 
 router = APIRouter(include_in_schema=False)
 
@@ -77,6 +78,7 @@ def index() -> bytes:
 @router.get("/")
 async def begun(context: InContext, tasks: BackgroundTasks) -> Response:
     """The page, whose live response is wanted in a moment."""
+    tasks.add_task(prepare, context.service.registry)
     tasks.add_task(context.service.previews.begin)
     tasks.add_task(context.service.answers.begin)
     headers = {**_HEADERS, "Cache-Control": "no-cache"}
