@@ -45,7 +45,7 @@ const median = async (draw) => {{
 }};
 """
 OURS = """
-const from = (end) => import(document.querySelector(`link[rel=modulepreload][href$="${end}"]`).href);
+const from = (path) => import(new URL(path, document.querySelector("script[type=module]").src));
 const { chart } = await from("charts/chart.js"), { heatmap } = await from("charts/heatmap.js");
 const axis = (name) => ({ name });
 const one = chart(host, { label: "measured", file: "measured" });

@@ -58,6 +58,9 @@ if TYPE_CHECKING:
     from solver.results.told import Told
 
 
+_PART_BYTES = 32 * 1024 * 1024  # of a file that is sent in parts
+
+
 class Client(Workbench):
     """Submits jobs to a service, watches them and fetches what they computed; a context manager.
 
@@ -323,7 +326,7 @@ class Client(Workbench):
         return self._transport.send("POST", "/v1/scenes/text", json=dict(body)).text
 
     def upload(self, file: Path | bytes, name: str | None = None, format: str | None = None) -> NewUpload:
-        """Upload a file of matrices or modes, given by its path or its bytes.
+        """Upload a file of matrices or modes, given by its path or its bytes; a large one in parts.
 
         Parameters
         ----------
@@ -335,7 +338,15 @@ class Client(Workbench):
         content = file if isinstance(file, bytes) else file.read_bytes()
         # Sending and looking at a large file takes its time.
         timeout = max(self._timeout, 120.0)
-        return self._sent(NewUpload, "POST", "/v1/uploads", params=query, content=content, timeout=timeout)
+
+        def sent(asked: Mapping[str, Any], data: bytes) -> NewUpload:
+            return self._sent(NewUpload, "POST", "/v1/uploads", params=asked, content=data, timeout=timeout)
+
+        if len(content) <= _PART_BYTES:
+            return sent(query, content)
+        starts = range(0, len(content), _PART_BYTES)
+        parts = [sent({**query, "format": "part"}, content[at : at + _PART_BYTES]).id for at in starts]
+        return sent({**query, "part": parts}, b"")
 
     def uploads(self, **filters: Any) -> Iterator[UploadAnswer]:
         """Every upload, newest first, page after page."""

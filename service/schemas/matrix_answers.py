@@ -61,7 +61,8 @@ class FormatsAnswer(AnswerModel):
     """The formats that can be uploaded."""
 
     items: list[FormatAnswer]
-    most_bytes: int = Field(description="Largest file accepted, the setting STICKSLIP_MAX_UPLOAD_BYTES.")
+    most_bytes: int = Field(description="Largest upload accepted, the setting STICKSLIP_MAX_UPLOAD_BYTES.")
+    most_parts: int = Field(description="Parts of a larger file, the setting STICKSLIP_MAX_UPLOAD_PARTS.")
 
 
 class MatrixAnswer(AnswerModel):

@@ -366,6 +366,9 @@ class Settings(ClientLimits):
     max_upload_bytes: int = Field(
         default=64 * 1024 * 1024, ge=1024, le=1024**3, description="Largest upload accepted [bytes]."
     )
+    max_upload_parts: int = Field(
+        default=8, ge=1, le=64, description="Parts of that size a larger file may be sent in."
+    )
     header_seconds: float = Field(
         default=10.0,
         ge=0.1,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import shutil
 import sys
@@ -10,7 +11,7 @@ import threading
 from collections import OrderedDict
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from multiprocessing.util import Finalize
 from pathlib import Path
 from typing import Any, TextIO
@@ -26,6 +27,8 @@ from service.settings.settings import Settings
 from service.uploads.inspection import contents, look_at, resolved_structure
 from solver.errors import Issue
 
+PART = "part"
+"""The format of a part of a larger file, which is not read."""
 _KEPT = 4
 _LARGEST_STRUCTURE = 16 * 1024 * 1024
 _REDUCE = (
@@ -43,6 +46,8 @@ class Arrived:
     format: str
     size: int
     sha256: str
+    parts: tuple[str, ...] = ()
+    """Uploads of the format `part`, which hold the file in its place."""
 
 
 def format_of(asked: str | None, name: str, content_type: str) -> str:
@@ -56,7 +61,7 @@ def format_of(asked: str | None, name: str, content_type: str) -> str:
     # Loaded here: a service that only lists does not need SciPy.
     from solver.matrices.readers import registry
 
-    known = registry.words()
+    known = (*registry.words(), PART)
     found = registry.word_of(name, content_type) if asked is None else asked
     if found in known:
         return found
@@ -83,14 +88,44 @@ class Uploads:
             If it holds no usable matrix or modes.
         StorageFullError
             If its owner may not store so much more.
+        InvalidRequestError
+            If a part is not there, or is none.
         """
+        parts = self._parts(arrived.parts, caller)
+        if not parts:
+            return self._add(arrived, caller)
+        size, known = 0, hashlib.sha256()
+        with arrived.path.open("wb") as file:
+            for part in parts:
+                data = self.repository.data(part.id)
+                size += file.write(data)
+                known.update(data)
+        for part_id in set(arrived.parts):  # before the file is stored: space for both is not needed
+            self.delete(part_id, caller)
+        return self._add(replace(arrived, size=size, sha256=known.hexdigest()), caller)
+
+    def _add(self, arrived: Arrived, caller: Caller) -> tuple[Upload, list[dict[str, Any]], bool]:
         self.storage.require(caller, arrived.size)
-        found = contents(arrived.path, self._seconds)
+        found = [] if arrived.format == PART else contents(arrived.path, self._seconds)
         row, added = self.repository.add(
             owner=caller.owner, name=arrived.name, format=arrived.format, size=arrived.size,
             sha256=arrived.sha256, data=arrived.path.read_bytes(),
         )  # fmt: skip
         return row, found, added
+
+    def _parts(self, ids: tuple[str, ...], caller: Caller) -> list[Upload]:
+        rows = []
+        for at, upload_id in enumerate(ids):
+            try:
+                rows.append(self.get(upload_id, caller))
+            except NotFoundError as error:
+                raise InvalidRequestError.of(
+                    ("part", at), error.detail, named=False, source="query"
+                ) from error
+            if rows[-1].format != PART:
+                wanted = f"must be an upload of the format {PART!r}"
+                raise InvalidRequestError.of(("part", at), wanted, rows[-1].format, source="query")
+        return rows
 
     def get(self, upload_id: str, caller: Caller = KEYLESS) -> Upload:
         """An upload.

@@ -158,9 +158,22 @@ band = [800.0, 1600.0]
     expect(page.locator("#editor-status")).to_contain_text("Nothing is wrong with this scene.")
     page.get_by_role("button", name="Use this scene").click()
     expect(page.locator("#live-status")).to_contain_text("peak")
-    page.route("**/v1/matrices/formats", lambda route: route.fulfill(json={"items": [], "most_bytes": 1000}))
+    page.route(
+        "**/v1/matrices/formats",
+        lambda route: route.fulfill(json={"items": [], "most_bytes": 100, "most_parts": 2}),
+    )
     page.set_input_files("#file", [scene, matrices])
     expect(page.locator("#editor")).to_contain_text(
-        "raise STICKSLIP_MAX_UPLOAD_BYTES there, or reduce the model first"
+        "raise STICKSLIP_MAX_UPLOAD_BYTES or STICKSLIP_MAX_UPLOAD_PARTS there, or reduce the model first"
     )
     expect(page.locator("#editor")).to_contain_text("--reduce")
+    page.unroute("**/v1/matrices/formats")
+    limits = {"items": [], "most_bytes": 8000, "most_parts": 8}  # less than the service takes in one piece
+    page.route("**/v1/matrices/formats", lambda route: route.fulfill(json=limits))
+    sent: list[str] = []
+    page.on("request", lambda request: sent.append(request.url) if "/v1/uploads?" in request.url else None)
+    with page.expect_response(lambda answer: "&part=" in answer.url) as joined:
+        page.set_input_files("#file", [scene, matrices])
+    assert joined.value.ok
+    expect(page.locator("#editor-status")).to_contain_text("Nothing is wrong with this scene.")
+    assert 2 <= sum("format=part" in url for url in sent) == sent[-1].count("&part=") <= 8

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 OF_MESH = 97  # the node of the outline of `fe-disk` at `ahead-lower`
 DRIVER = "GL Driver Message"  # of WebGL without a graphics card, on reading a frame
 DRAW = """async ([body, tau, wanted]) => {
-  const base = document.querySelector('link[href*="shape/stage.js"]').href.replace("shape/stage.js", "");
+  const base = new URL(".", document.querySelector("script[type=module]").src);
   const { stage } = await import(`${base}shape/stage.js`);
   const three = await import(`${base}vendor/three.js`);
   const headers = { "Content-Type": "application/json" };

@@ -9,6 +9,7 @@ import pytest
 from service_helpers import is_problem
 
 from service.http.routes import page
+from service.rendering.page_bundle import bundle
 from solver.results.notes import FLAGS
 
 FOLDER = Path(page.__file__).resolve().parents[2] / "page"
@@ -29,8 +30,8 @@ def test_the_page_and_its_files_are_served_under_a_strict_policy(shipped: httpx.
     addresses = re.findall(r'(?:href|src)="([^"#]+)"', found.text)
     assert all(address.startswith("/") for address in addresses)
     files = [address for address in addresses if address.startswith("/page/")]
-    named = {address.rpartition("/")[2] for address in files if address.endswith(".js")}
-    assert named == {path.name for path in MODULES} - ON_DEMAND
+    named = {address.rpartition("/")[2] for address in files}
+    assert named == {"icon.svg", "page.css", "page.js", "d3.js"}  # the rest is in them, or asked for later
     for address in files:
         answer = shipped.get(address)
         assert answer.status_code == 200
@@ -50,6 +51,33 @@ def test_a_file_of_another_version_is_not_kept(shipped: httpx.Client) -> None:
 )
 def test_nothing_else_is_served(shipped: httpx.Client, path: str) -> None:
     is_problem(shipped.get(f"/page/0123/{path}"), 404)
+
+
+def test_what_is_served_as_one_is_every_module_and_sheet() -> None:
+    served = {name: data.decode() for name, data in page.files().items()}
+    own = [path.relative_to(FOLDER).as_posix() for path in MODULES if path.parent.name != "vendor"]
+    assert sorted(re.findall(r"^// (js/\S+\.js)$", served["js/page.js"], flags=re.MULTILINE)) == sorted(own)
+    sheets = [path.read_text("utf-8") for path in (FOLDER / "css").glob("*.css")]
+    assert all(sheet in served["css/page.css"] for sheet in sheets)
+    assert len(served["css/page.css"]) == sum(map(len, sheets))
+
+
+@pytest.mark.parametrize(
+    ("a", "b", "words"),
+    [
+        (
+            'import { b } from "./b.js";\n',
+            'import { a } from "./a.js";\n',
+            "imports itself: a.js → b.js → a.js",
+        ),
+        ('import { b } from "./c.js";\n', "", "'c.js' is not there"),
+        ('import b from "./b.js";\n', "", "no import of names"),
+        ('import { b } from "./b.js";\n', "export default 1;\n", "no export of a declaration"),
+    ],
+)
+def test_a_module_that_cannot_be_put_with_the_others_is_named(a: str, b: str, words: str) -> None:
+    with pytest.raises(ValueError, match=re.escape(words)):
+        bundle({"a.js": a, "b.js": b}, "a.js")
 
 
 def test_the_page_has_words_for_every_flag() -> None:

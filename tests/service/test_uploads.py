@@ -1,5 +1,6 @@
 """Files of matrices: stored after a look at them in a process of its own, referred to by scenes."""
 
+import hashlib
 import io
 import signal
 import zipfile
@@ -19,6 +20,7 @@ from service_helpers import is_problem
 from upload_cases import npz, saved, upload
 
 import solver
+from service.client import Client
 from service.db.engine import Database
 from service.db.repositories import UploadRepository
 from service.errors import NotFoundError, UnreadableUploadError
@@ -114,6 +116,33 @@ def test_a_scene_refers_to_uploads_and_is_hashed_by_what_they_hold(
     assert kept.json()["status"] == "successful"
     problem = is_problem(shipped.post("/v1/jobs", json={**body, "scene": scene, "fresh": True}), 422)
     assert [one["pointer"] for one in problem["errors"]] == ["/scene/structure/M", "/scene/structure/K"]
+
+
+def test_a_large_file_comes_in_parts(shipped: httpx.Client, monkeypatch: pytest.MonkeyPatch) -> None:
+    data = npz(K=np.arange(1.0, 10.0).reshape(3, 3) + np.eye(3))
+    cut = len(data) // 3
+    ids = [
+        upload(shipped, "K.npz", piece, format="part").json()["id"]
+        for piece in (data[:cut], data[cut : 2 * cut], data[2 * cut :])
+    ]
+    put = {"name": "K.npz", "part": ids}
+    problem = is_problem(shipped.post("/v1/uploads", params=put, content=b"x"), 422)
+    assert problem["errors"][0]["pointer"] == "/part"
+    backwards = is_problem(shipped.post("/v1/uploads", params={**put, "part": [ids[0], "none"]}), 422)
+    assert backwards["errors"][0]["pointer"] == "/part/1"
+    found = shipped.post("/v1/uploads", params=put)
+    assert found.status_code == 201, found.text
+    assert found.json()["sha256"] == hashlib.sha256(data).hexdigest()
+    assert [one["rows"] for one in found.json()["contents"]] == [3]
+    assert all(shipped.get(f"/v1/uploads/{one}").status_code == 404 for one in ids)
+    whole = {**put, "part": [found.json()["id"]]}
+    assert is_problem(shipped.post("/v1/uploads", params=whole), 422)["errors"][0]["pointer"] == "/part/0"
+    many = is_problem(shipped.post("/v1/uploads", params={**put, "part": ["1"] * 9}), 413)
+    assert "STICKSLIP_MAX_UPLOAD_PARTS" in many["detail"]
+    assert "--reduce" in many["detail"]
+    monkeypatch.setattr("service.client.client._PART_BYTES", 100)
+    with Client(str(shipped.base_url)) as client:
+        assert client.upload(data, "K.npz").sha256 == hashlib.sha256(data).hexdigest()
 
 
 def test_what_does_not_fit_is_refused_with_pointers(shipped: httpx.Client, tmp_path: Path) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, lru_cache
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Body, Request, Response
@@ -11,10 +11,11 @@ from pydantic import BaseModel, ConfigDict, Field
 from service.errors import InvalidRequestError
 from service.http.dependencies import InContext, TypedRoute, tagged
 from service.jobs.kinds.bodies import body_model
-from service.jobs.registry import JobKind
+from service.jobs.registry import JobKind, Registry
 from service.jobs.strict_json import encoded
 from service.schemas.answers import AnswerModel, KindAnswer, KindList
 from service.schemas.law_answers import LawList, law_list
+from solver.contacts.laws.registry import laws as known_laws
 from solver.errors import SceneError
 from solver.scene.json_schema import plain, scene_schema
 from solver.scene.templates import TEMPLATES, template_schema, template_tables
@@ -97,19 +98,35 @@ def schema(request: Request) -> Response:
 laws = APIRouter(prefix="/v1/laws", tags=["scenes"])
 
 
-@laws.get("")
-def list_laws() -> LawList:
+@lru_cache(maxsize=1)
+def _laws(_known: tuple[str, ...]) -> bytes:
+    return law_list().model_dump_json().encode()
+
+
+@laws.get("", response_model=LawList)
+async def list_laws(request: Request) -> Response:
     """The contact laws of this service, each with its parameters: unit, words, what a slider covers."""
-    return law_list()
+    return tagged(request, _laws(tuple(known_laws())))
 
 
 kinds = APIRouter(prefix="/v1/kinds", tags=["jobs"])
 
 
-@kinds.get("")
-def list_kinds(context: InContext) -> KindList:
+@lru_cache(maxsize=4)
+def _kinds(registry: Registry) -> bytes:
+    return KindList(items=[_answer(kind) for kind in registry]).model_dump_json().encode()
+
+
+@kinds.get("", response_model=KindList)
+async def list_kinds(context: InContext) -> Response:
     """The kinds of job of this service, each with the schema of its body and of its result."""
-    return KindList(items=[_answer(kind) for kind in context.service.registry])
+    return tagged(context.request, _kinds(context.service.registry))
+
+
+def prepare(registry: Registry) -> None:
+    """Make what the page asks for first: the schemas of all laws and kinds, which are kept."""
+    _laws(tuple(known_laws()))
+    _kinds(registry)
 
 
 def _answer(kind: JobKind) -> KindAnswer:

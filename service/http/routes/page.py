@@ -17,6 +17,8 @@ from fastapi import APIRouter, BackgroundTasks, Request, Response
 from service.errors import NotFoundError
 from service.http.dependencies import TEXT, InContext, media, tagged
 from service.http.middleware.admission import LOGIN
+from service.http.routes.forms import prepare
+from service.rendering.page_bundle import bundle
 
 router = APIRouter(include_in_schema=False)
 
@@ -37,12 +39,13 @@ _TYPES = {
 }
 _FOR_EVER = "public, max-age=31536000, immutable"
 _VERSION = "%VERSION%"
-_MODULES = "%MODULES%"
+_ENTRY, _SCRIPT, _STYLE = "js/main.js", "js/page.js", "css/page.css"
+_SHEET = re.compile(r'<link rel="stylesheet" href="/page/%VERSION%/css/([\w-]+\.css)">\n')
 
 
 @cache
 def files() -> dict[str, bytes]:
-    """Every file of the page by its path, read once."""
+    """Every file of the page by its path, and its modules and style sheets as one each; read once."""
     found: dict[str, bytes] = {}
     pending: list[tuple[str, Traversable]] = [("", resources.files("service") / "page")]
     while pending:
@@ -51,6 +54,10 @@ def files() -> dict[str, bytes]:
             pending.extend((f"{path}/{child.name}".lstrip("/"), child) for child in item.iterdir())
         elif path[path.rfind(".") :] in _TYPES:
             found[path] = item.read_bytes()
+    texts = {path: data.decode() for path, data in found.items() if path.endswith(".js")}
+    found[_SCRIPT] = bundle(texts, _ENTRY).encode()
+    sheets = _SHEET.findall(found["index.html"].decode())
+    found[_STYLE] = b"".join(found[f"css/{name}"] for name in sheets)
     return found
 
 
@@ -65,18 +72,17 @@ def version() -> str:
 
 @cache
 def index() -> bytes:
-    """The page; it names its modules so that they are fetched together, but for those imported on demand."""
-    scripts = {path: data for path, data in files().items() if path.endswith(".js")}
-    later = re.findall(r'[^.]import\("[./]*([^"]+)"\)', b"".join(scripts.values()).decode())
-    modules = sorted(path for path in scripts if not path.endswith(tuple(later)))
-    links = "\n".join(f'<link rel="modulepreload" href="/page/{version()}/{path}">' for path in modules)
+    """The page, with its style sheets and its modules as one file each."""
     html = files()["index.html"].decode()
-    return html.replace(_MODULES, links).replace(_VERSION, version()).encode()
+    sheets = "".join(sheet[0] for sheet in _SHEET.finditer(html))
+    html = html.replace(sheets, f'<link rel="stylesheet" href="/page/{_VERSION}/{_STYLE}">\n')
+    return html.replace(_ENTRY, _SCRIPT).replace(_VERSION, version()).encode()
 
 
 @router.get("/")
 async def begun(context: InContext, tasks: BackgroundTasks) -> Response:
     """The page, whose live response is wanted in a moment."""
+    tasks.add_task(prepare, context.service.registry)
     tasks.add_task(context.service.previews.begin)
     tasks.add_task(context.service.answers.begin)
     headers = {**_HEADERS, "Cache-Control": "no-cache"}
@@ -103,7 +109,7 @@ async def file(hashed: str, path: str, request: Request) -> Response:
 reference = APIRouter(prefix="/docs", tags=["health"])
 
 _POLICY = "default-src 'none'; style-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
-_STYLE = """
+_REFERENCE_STYLE = """
 body { font: 16px/1.5 system-ui, sans-serif; color: #222; max-width: 60rem;
 margin: 2rem auto; padding: 0 1rem }
 h2 { margin-top: 2.5rem; font-size: 1.1rem; border-top: 1px solid #ccc; padding-top: 1rem }
@@ -126,7 +132,7 @@ def page(request: Request) -> Response:
 @reference.get("/style.css", response_class=Response, responses={200: media({"text/css": TEXT})})
 def style() -> Response:
     """How the reference looks."""
-    return Response(_STYLE, media_type="text/css")
+    return Response(_REFERENCE_STYLE, media_type="text/css")
 
 
 def _page(description: dict[str, Any]) -> Iterator[str]:

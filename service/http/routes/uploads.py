@@ -28,7 +28,7 @@ from service.schemas.matrix_answers import (
     UploadPage,
 )
 from service.schemas.pages import Cursor, Limit, ListQuery, newest
-from service.uploads.uploads import Arrived, file_name, format_of
+from service.uploads.uploads import PART, Arrived, file_name, format_of
 
 router = APIRouter(prefix="/v1/uploads", tags=["uploads"])
 
@@ -41,7 +41,7 @@ class _Words:
     ) -> dict[str, Any]:
         from solver.matrices.readers import registry
 
-        return {**handler(schema), "enum": list(registry.words())}
+        return {**handler(schema), "enum": [*registry.words(), PART]}
 
 
 FileName = Annotated[
@@ -68,7 +68,15 @@ class UploadQuery(ListQuery):
     cursor: Cursor = None
 
 
-_TOO_LARGE = "raise STICKSLIP_MAX_UPLOAD_BYTES, or reduce the model first: stickslip import FILES --reduce"
+_WHOLE: list[str] = []
+_TOO_LARGE = (
+    "send it in parts (`format=part`), raise STICKSLIP_MAX_UPLOAD_BYTES or STICKSLIP_MAX_UPLOAD_PARTS, or "
+    "reduce the model first: stickslip import FILES --reduce"
+)
+Parts = Annotated[
+    list[Annotated[str, Field(max_length=100)]],
+    Query(description="Ids of uploads of the format `part`, which in this order are the file; no body then."),
+]
 
 
 @router.post(
@@ -77,11 +85,15 @@ _TOO_LARGE = "raise STICKSLIP_MAX_UPLOAD_BYTES, or reduce the model first: stick
     response_model=NewUpload,
     responses={200: {"model": NewUpload, "description": "The same file was uploaded before."}},
 )
-async def upload(context: InContext, name: FileName = "matrices", form: Format = None) -> Response:
+async def upload(
+    context: InContext, name: FileName = "matrices", form: Format = None, part: Parts = _WHOLE
+) -> Response:
     """Store a file of a matrix, several matrices or modes: the body is the file.
 
     It is read at once, within limits, and refused if it holds nothing usable. In a scene, `upload:ID` stands
-    where `M`, `K`, `C` or `modes` of a structure of kind `matrices` would name a file.
+    where `M`, `K`, `C` or `modes` of a structure of kind `matrices` would name a file. A larger file comes in
+    parts, each an upload with `?format=part` that is not read; then a request without a body names them, and
+    they are deleted.
     """
     request, service, caller = context.request, context.service, context.caller
     media = request.headers.get("content-type", "").split(";")[0].strip().lower()
@@ -94,7 +106,11 @@ async def upload(context: InContext, name: FileName = "matrices", form: Format =
                 size, sha256 = await saved(request, file, settings.max_upload_bytes, settings.upload_seconds)
             except BodyTooLargeError as error:
                 raise BodyTooLargeError(f"{error.detail}: {_TOO_LARGE}") from error
-        arrived = Arrived(path=path, name=name, format=known, size=size, sha256=sha256)
+        if part and size:
+            raise InvalidRequestError.of(("part",), "goes without a body: its parts are the file", size)
+        if len(part) > settings.max_upload_parts:
+            raise BodyTooLargeError(f"a file may have {settings.max_upload_parts} parts: {_TOO_LARGE}")
+        arrived = Arrived(path=path, name=name, format=known, size=size, sha256=sha256, parts=tuple(part))
         row, found, added = await service.lanes.uploads.run(
             caller.owner, service.uploads.add, arrived, caller
         )
@@ -210,6 +226,7 @@ def formats(context: InContext) -> FormatsAnswer:
             for reader in readers()
         ],
         most_bytes=context.service.settings.max_upload_bytes,
+        most_parts=context.service.settings.max_upload_parts,
     )  # fmt: skip
 
 

@@ -220,12 +220,9 @@ function failed(error) {
 
 async function begin() {
   try {
-    await patiently(loadLaws);
-    await patiently(loadKinds);
-    await patiently(scenes);
+    await Promise.all([loadLaws, loadKinds, scenes].map(patiently));
     await patiently(open);
-    await listProjects();
-    await listRuns();
+    await Promise.all([listProjects(), listRuns()]);
   } catch (error) {
     failed(error);
   }

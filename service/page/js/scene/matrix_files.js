@@ -12,13 +12,21 @@ const plainName = (name) => name.replaceAll(/[^A-Za-z0-9_.\- ]/g, "_").replace(/
 
 const size = (bytes) => (bytes < 1e6 ? `${Math.max(1, Math.round(bytes / 1e3))} kB` : `${(bytes / 1e6).toPrecision(3)} MB`);
 
-// Stores a file; one that is too large is not sent at all.
+// Stores a file, a large one in parts; one that is too large is not sent at all.
 export async function uploaded(file, name, onProgress = () => undefined) {
-  const { most_bytes: most } = await request("/v1/matrices/formats");
-  if (file.size > most) {
-    throw new Error(`It has ${size(file.size)}, the service takes ${size(most)}: raise STICKSLIP_MAX_UPLOAD_BYTES there, or reduce the model first, stickslip import ${file.name} --reduce.`);
+  const { most_bytes: most, most_parts: parts } = await request("/v1/matrices/formats");
+  if (file.size > most * parts) {
+    throw new Error(`It has ${size(file.size)}, the service takes ${size(most * parts)}: raise STICKSLIP_MAX_UPLOAD_BYTES or STICKSLIP_MAX_UPLOAD_PARTS there, or reduce the model first, stickslip import ${file.name} --reduce.`);
   }
-  return sent(`/v1/uploads?name=${encodeURIComponent(plainName(name))}`, file, onProgress);
+  const address = `/v1/uploads?name=${encodeURIComponent(plainName(name))}`;
+  if (file.size <= most) return sent(address, file, onProgress);
+  const ids = [];
+  for (let at = 0; at < file.size; at += most) {
+    const part = file.slice(at, at + most);
+    const { id } = await sent(`${address}&format=part`, part, (share) => onProgress((at + share * part.size) / file.size));
+    ids.push(`&part=${id}`);
+  }
+  return sent(address + ids.join(""), null, () => undefined);
 }
 
 // The files of one model. `changed` is told when what was sent, or what a file is, changed.
