@@ -89,12 +89,16 @@ def test_every_slope_is_that_of_differences(path: str) -> None:
 def test_what_matters_most_comes_first_and_zeros_and_angles_have_no_per_cent() -> None:
     result = found("bladed-disk")
     shares = [result.peak_elasticities(row)[0] for row in result.rows]
-    with_share = [abs(share) for share in shares if math.isfinite(share)]
-    assert with_share == sorted(with_share, reverse=True)
+    # To six digits, as equals (μ and N0 of a contact) differ by rounding: those are in the order of the scene.
+    with_share = [float(f"{abs(share):.6g}") for share in shares if math.isfinite(share)]
+    known = solver.load_scene("bladed-disk").parameter_paths()
+    ranks = [(-share, known.index(row.path)) for share, row in zip(with_share, result.rows, strict=False)]
+    assert ranks == sorted(ranks)
+    assert len(set(with_share)) < len(with_share)
     assert all(math.isnan(share) for share in shares[len(with_share) :])
     without = {row.path for row in result.rows if not row.relative}
     assert {"root.N1", "root.N1_ratio", "shroud.N1_phase", "excitation.phase"} <= without
-    assert set(rows(result)) == set(solver.load_scene("bladed-disk").parameter_paths())
+    assert set(rows(result)) == set(known)
 
 
 def test_the_json_is_strict() -> None:

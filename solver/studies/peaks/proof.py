@@ -57,7 +57,9 @@ def result_of(
     if status in _AS_SEEN:
         found = _with_best_seen(tracker, found)
     best, look = found[0], seen(tracker, found[0].z)
-    active = tuple(_active(tracker, row) for row in _highest(best.rows))
+    # Which of equally high peaks is higher is rounding.
+    rows = sorted(_highest(best.rows), key=lambda row: float(row[OMEGA]))
+    active = tuple(_active(tracker, row) for row in rows)
     if status is TrackStatus.TRACKED:
         status = _refined(tracker, best, plateau)
     ends = None if plateau is None else (plateau.low, plateau.high)

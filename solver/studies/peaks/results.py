@@ -114,7 +114,7 @@ class LeastPeak(MadeOfResponses):
     peak: Annotated[
         float, "Highest peak there [m]; unless proven, OTHER_BRANCH or STOPPED, of the best response seen."
     ]
-    active: Annotated[tuple[ActivePeak, ...], "The peaks that are equally high there, highest first."]
+    active: Annotated[tuple[ActivePeak, ...], "The peaks that are equally high there, by frequency."]
     basins: Annotated[tuple[Basin, ...], "The local minima that were met, best first, as the optimum is."]
     branch: Annotated[Branch | None, "The response at the optimum, of the sweep that proves it, if any."]
     sweeps: Annotated[

@@ -68,7 +68,7 @@ def test_optimum_is_stationary_or_balanced(name: str, path: str, low: float, hig
 
 def test_the_bladed_disk_s_two_peaks_are_equally_high() -> None:
     best = least_peak(solver.load_scene("bladed-disk"), "shroud.N0", 20.0, 3000.0)
-    assert sorted(peak.frequency for peak in best.active) == pytest.approx([753.28, 765.75], abs=0.01)
+    assert [peak.frequency for peak in best.active] == pytest.approx([753.28, 765.75], abs=0.01)
     assert best.at == pytest.approx(185.461, abs=1e-3)
     assert best.peak == pytest.approx(0.10026156e-3, rel=1e-7)
 
