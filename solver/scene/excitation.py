@@ -6,13 +6,16 @@ import csv
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal, NamedTuple, Protocol, Self
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, Self
 
 from pydantic import BeforeValidator, Field, PlainSerializer, WithJsonSchema, model_validator
 
 from solver.contacts.fields import Angle, DofName, Part, Signed
 from solver.errors import SceneError, SettingError
 from solver.scene.scene_parameter import ActsOn, SceneParameter, changed
+
+if TYPE_CHECKING:
+    from solver.scene.scene import Scene
 
 Order = Annotated[int, Field(strict=True, ge=0, le=10_000)]
 HarmonicIndex = Annotated[int, Field(strict=True, ge=0, le=1_000)]
@@ -157,15 +160,7 @@ AMPLITUDE = "excitation.amplitude"
 PHASE = "excitation.phase"
 
 
-class HasExcitation(Protocol):
-    """What a scene holds, as far as the parameters of its forces go."""
-
-    @property
-    def excitation(self) -> tuple[Excitation, ...]:
-        """Every force."""
-
-
-def excitation_parameter(scene: HasExcitation, path: str) -> SceneParameter | None:
+def excitation_parameter(scene: Scene, path: str) -> SceneParameter | None:
     """Return what the amplitude or the phase of all forces is, if the path is one of them."""
     forces = scene.excitation
     if path == AMPLITUDE:
