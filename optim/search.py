@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Unpack
 import numpy as np
 
 from optim.criteria.evaluation import evaluate, natural_scales
-from optim.criteria.linearised import conditions, model_of
+from optim.criteria.linearised import Conditions, conditions, model_of
 from optim.criteria.rows import DesignEvaluation
 from optim.methods.afterwards import looked_after, settled_status
 from optim.methods.eased import Eased
@@ -273,13 +273,7 @@ def basins_of(search: DesignSearch, found: list[Local]) -> tuple[LocalOptimum, .
                 continue
             level.append(height)
         places.append(z)
-        basins.append(
-            LocalOptimum(
-                values=dict(local.evaluation.values), peak=local.evaluation.peaks[0].value,
-                objective=local.evaluation.objective, settled=local.settled, feasible=local.feasible,
-                proven=True,
-            )
-        )  # fmt: skip
+        basins.append(local.optimum)
     return tuple(basins)
 
 
@@ -309,28 +303,31 @@ def _by_curve(problem: Problem, on_progress: OnProgress, should_stop: ShouldStop
     from optim.methods.performance_curve import curve_optimum
 
     begun = time.perf_counter()
-    by_curve = curve_optimum(problem, on_progress=on_progress, should_stop=should_stop)
-    evaluation, found = by_curve.evaluation, None
-    if evaluation is not None and evaluation.good:
-        model = model_of(evaluation, problem.variables, evaluation.objective, natural_scales(problem))
-        found = conditions(model, problem.variables)
+    found = curve_optimum(problem, on_progress=on_progress, should_stop=should_stop)
+    evaluation = found.evaluation
     return DesignResult(
-        problem=problem, method=Method.PERFORMANCE_CURVE, status=by_curve.status, evaluation=evaluation,
-        conditions=found, basins=(), curve=by_curve.check,
+        problem=problem, method=Method.PERFORMANCE_CURVE, status=found.status, evaluation=evaluation,
+        conditions=_conditions(problem, evaluation), basins=(), curve=found.check,
         history=() if evaluation is None else (evaluation,),
         evaluations=0 if evaluation is None else 1, work=0.0 if evaluation is None else 1.0,
         seconds=time.perf_counter() - begun,
     )  # fmt: skip
 
 
+def _conditions(problem: Problem, evaluation: DesignEvaluation | None) -> Conditions | None:
+    """Return the first-order conditions of an optimum that no local search has ended in."""
+    if evaluation is None or not evaluation.good:
+        return None
+    model = model_of(evaluation, problem.variables, evaluation.objective, natural_scales(problem))
+    return conditions(model, problem.variables)
+
+
 def _of_tracked(problem: Problem, tracked: Tracked, seconds: float) -> DesignResult:
     """Put the result of the tracked peak together; its optimum is judged like that of any method."""
-    evaluation, status, found = tracked.evaluation, tracked.status, None
-    if evaluation is not None and evaluation.good:
-        model = model_of(evaluation, problem.variables, evaluation.objective, natural_scales(problem))
-        found = conditions(model, problem.variables)
-        if status is DesignStatus.OPTIMAL:
-            status = settled_status(found)
+    evaluation, status = tracked.evaluation, tracked.status
+    found = _conditions(problem, evaluation)
+    if found is not None and status is DesignStatus.OPTIMAL:
+        status = settled_status(found)
     return DesignResult(
         problem=problem, method=Method.TRACKED, status=status, evaluation=evaluation, conditions=found,
         basins=tracked.basins, history=() if evaluation is None else (evaluation,),

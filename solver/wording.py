@@ -3,7 +3,12 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Sequence
+import re
+from ast import literal_eval
+from collections.abc import Mapping, Sequence
+from inspect import cleandoc, get_annotations
+
+_DESCRIBED = re.compile(r"""Annotated\[(.+?)(?:, Field\(.+\))?, ('(?:[^'\\]|\\.)*'|"(?:[^"\\]|\\.)*")\]""")
 
 
 def nearest(name: str, known: Sequence[str]) -> str:
@@ -28,3 +33,26 @@ def quoted(value: object) -> str:
     except (RecursionError, ValueError):
         text = f"a {type(value).__name__}"
     return text if len(text) <= 80 else text[:77] + "..."
+
+
+def fields_said(kind: type) -> dict[str, tuple[str, str]]:
+    """The fields that a class says in its annotations, ``mass: Annotated[float, "Mass [kg]."]``.
+
+    Returns
+    -------
+    Name to type and words, of the class itself without those it is made from.
+    """
+    annotations = get_annotations(kind).items()
+    found = {name: _DESCRIBED.fullmatch(str(text)) for name, text in annotations}
+    return {name: (said[1], literal_eval(said[2])) for name, said in found.items() if said is not None}
+
+
+def every_field_said(kind: type) -> dict[str, tuple[str, str]]:
+    """The same of a class and of those it is made from."""
+    return {key: said for base in reversed(kind.__mro__) for key, said in fields_said(base).items()}
+
+
+def with_attributes(doc: str | None, said: Mapping[str, tuple[str, str]]) -> str:
+    """A docstring with a section of attributes: names with their types and words."""
+    rows = [f"{name} : {kind}\n    {words}" for name, (kind, words) in said.items()]
+    return "\n".join([cleandoc(doc or ""), *(["\nAttributes\n----------", *rows] if rows else [])])

@@ -242,8 +242,8 @@ class Searched:
         tuple[tuple[Real, float], ...],
         "Further local optima of the thinned runs, cost relative to that of the best.",
     ]
-    starts: Annotated[int, "Places tried; agreeing : searches of the first look that ended at the best."]
-    agreeing: int
+    starts: Annotated[int, "Places tried."]
+    agreeing: Annotated[int, "Searches of the first look that ended at the best."]
 
 
 def search(

@@ -12,7 +12,7 @@ from optim.criteria.linearised import Conditions, conditions, model_of
 from optim.criteria.rows import DesignEvaluation
 from optim.methods.enough_harmonics import MOST_HARMONICS
 from optim.methods.evaluator import DesignSearch, SearchStoppedError
-from optim.methods.kkt import KEPT, KKT_TOLERANCE
+from optim.methods.kkt import KEPT, KKT_TOLERANCE, optimum_at
 from optim.methods.plateau import DesignPlateau, Tick, nothing, plateau_of
 from optim.problem.problem import Method
 from optim.results.design import DesignResult, DesignStatus
@@ -105,10 +105,6 @@ def _improved(
     search = DesignSearch(result.problem, lambda _share, _count: tick(), should_stop)
     search.keep(begin)
     local = thorough_search(search, search.variables, begin, search.model)
-    basin = LocalOptimum(
-        values=dict(local.evaluation.values), peak=local.evaluation.peaks[0].value,
-        objective=local.evaluation.objective, settled=local.settled, feasible=local.feasible, proven=True,
-    )  # fmt: skip
     status = result.status
     if status in (DesignStatus.OPTIMAL, DesignStatus.AT_BOUND, DesignStatus.KINK):
         status = settled_status(local.conditions) if local.settled else DesignStatus.KINK
@@ -116,7 +112,7 @@ def _improved(
     return replace(
         result, method=Method.MINIMAX, status=status, evaluation=local.evaluation,
         conditions=local.conditions,
-        basins=(basin, *result.basins), history=(*result.history, *search.history),
+        basins=(local.optimum, *result.basins), history=(*result.history, *search.history),
         evaluations=result.evaluations + responses, work=result.work + responses,
     )  # fmt: skip
 
@@ -124,10 +120,7 @@ def _improved(
 def _merged(result: DesignResult, plateau: DesignPlateau) -> tuple[LocalOptimum, ...]:
     """Return the local optima with those of one plateau as one, at the design chosen."""
     chosen = plateau.evaluation
-    first = LocalOptimum(
-        values=dict(chosen.values), peak=chosen.peaks[0].value, objective=chosen.objective, settled=True,
-        feasible=all(basin.feasible for basin in result.basins[:1]), proven=True,
-    )  # fmt: skip
+    first = optimum_at(chosen, settled=True, feasible=all(basin.feasible for basin in result.basins[:1]))
     others = [
         basin
         for basin in result.basins[1:]

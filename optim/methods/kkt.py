@@ -11,6 +11,7 @@ import numpy as np
 from optim.criteria.linearised import Conditions, Model, conditions
 from optim.criteria.rows import DesignEvaluation
 from optim.problem.variables import BoundedVariable
+from optim.results.parts import LocalOptimum
 
 Evaluate = Callable[[Mapping[str, float]], DesignEvaluation]
 ModelOf = Callable[[DesignEvaluation], Model]
@@ -34,6 +35,19 @@ class Local:
     feasible: Annotated[bool, "Whether the limits are kept."]
     conditions: Annotated[Conditions, "Multipliers and residual."]
     standing: Annotated[tuple[float, float], "What designs are compared by; see `standing`."]
+
+    @property
+    def optimum(self) -> LocalOptimum:
+        """It as results tell it."""
+        return optimum_at(self.evaluation, settled=self.settled, feasible=self.feasible)
+
+
+def optimum_at(evaluation: DesignEvaluation, *, settled: bool, feasible: bool) -> LocalOptimum:
+    """Return a design whose responses were computed as a local optimum."""
+    return LocalOptimum(
+        values=dict(evaluation.values), peak=evaluation.peaks[0].value, objective=evaluation.objective,
+        settled=settled, feasible=feasible, proven=True,
+    )  # fmt: skip
 
 
 def standing(model: Model) -> tuple[float, float]:

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TypeGuard
+from enum import Enum
+from typing import TypeGuard, TypeVar
 
 from optim.errors import DesignError
 from solver.errors import Place
+
+Chosen = TypeVar("Chosen", bound=Enum)
 
 
 def is_number(value: object) -> TypeGuard[float]:
@@ -29,6 +32,20 @@ def number_pair(name: str | Place, pair: object) -> tuple[float, float]:
         if not is_number(value):
             raise DesignError(name, pair, "must be two finite numbers, low and high")
     return float(pair[0]), float(pair[1])
+
+
+def word(name: str | Place, value: object, words: type[Chosen]) -> Chosen:
+    """Return the member of an enum that a word, or itself, stands for.
+
+    Raises
+    ------
+    DesignError
+        Anything else.
+    """
+    known = [one.value for one in words]
+    if not isinstance(value, words) and value not in known:
+        raise DesignError(name, value, f"must be one of {', '.join(known)}")
+    return words(value)
 
 
 def whole(name: str | Place, value: object, *, least: int) -> int:

@@ -12,7 +12,7 @@ from optim.criteria.registry import by_weight, criteria, limit_keys, weight_word
 from optim.errors import DesignError
 from optim.problem.cases import LoadCase, read_cases
 from optim.problem.keys import BASINS, HARMONICS, MOST_BASINS, TOLERANCE
-from optim.problem.numbers import is_number, positive
+from optim.problem.numbers import is_number, positive, word
 from optim.problem.variables import BoundedVariable, check_variables
 from optim.problem.words import Method as Method
 from solver.balance.balance import check_harmonics
@@ -184,12 +184,7 @@ def _harmonics(harmonics: int | None) -> int:
 
 
 def _method(method: object) -> Method:
-    if method is None or isinstance(method, Method):
-        return method or Method.AUTO
-    known = [one.value for one in Method]
-    if method not in known:
-        raise DesignError("method", method, f"must be one of {', '.join(known)}")
-    return Method(method)
+    return Method.AUTO if method is None else word("method", method, Method)
 
 
 def _basins(basins: object) -> int:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optim.errors import DesignError
-from optim.problem.numbers import is_number
+from optim.problem.numbers import number_pair, word
 from optim.problem.words import Scaling
 from solver.balance.parameter import Kind, resolve
 from solver.errors import at
@@ -166,10 +166,7 @@ def _check_path(scene: Scene, key: str, path: str, low: float, high: float) -> N
 
 def _scaling(name: str, wanted: object, low: float, high: float) -> bool:
     """Return whether a variable is scaled logarithmically."""
-    known = ", ".join(scaling.value for scaling in Scaling)
-    if wanted not in [scaling.value for scaling in Scaling]:
-        raise DesignError(("scaling", name), wanted, f"must be one of {known}")
-    how = Scaling(wanted)
+    how = word(("scaling", name), wanted, Scaling)
     if how is Scaling.LOGARITHMIC and low <= 0.0:
         raise DesignError(("scaling", name), wanted, f"needs a lower bound > 0, which is {low:g}")
     return how is Scaling.LOGARITHMIC or (
@@ -178,16 +175,10 @@ def _scaling(name: str, wanted: object, low: float, high: float) -> bool:
 
 
 def _bounds(key: str, path: str, bounds: object) -> tuple[float, float]:
-    name = (key, path)
-    if not isinstance(bounds, Sequence) or isinstance(bounds, str) or len(bounds) != 2:
-        raise DesignError(name, bounds, "must be two numbers, low and high")
-    low, high = bounds
-    for value in (low, high):
-        if not is_number(value):
-            raise DesignError(name, bounds, "must be two finite numbers, low and high")
+    low, high = number_pair((key, path), bounds)
     if not low < high:
-        raise DesignError(name, bounds, "must have low < high")
-    return float(low), float(high)
+        raise DesignError((key, path), bounds, "must have low < high")
+    return low, high
 
 
 def _default(scene: Scene) -> dict[str, tuple[float, float]]:

@@ -26,7 +26,7 @@ from optim.methods.enough_harmonics import most_harmonics
 from optim.methods.evaluator import SearchStoppedError
 from optim.methods.kkt import KEPT
 from optim.problem.keys import FEWEST_SAMPLES, QUANTILE, SEED, DesignKeys, keywords
-from optim.problem.numbers import is_number, whole
+from optim.problem.numbers import is_number, whole, word
 from optim.problem.problem import pose
 from optim.problem.typed import Limit, with_limits
 from optim.problem.uncertainty_input import check_settings, read_uncertain
@@ -173,7 +173,9 @@ def robust_design(
     if posed.method is Method.PERFORMANCE_CURVE:
         raise DesignError("method", posed.method.value, "must be another one: a curve knows no uncertainty")
     over = read_uncertain(scene, posed.variables, uncertain)
-    search = RobustSearch(posed, over, _aim(aim), _quantile(quantile), on_progress, should_stop, on_best)
+    search = RobustSearch(
+        posed, over, word("aim", aim, Aim), _quantile(quantile), on_progress, should_stop, on_best
+    )
     wanted = SAMPLES[search.aim] if samples is None else whole("samples", samples, least=FEWEST_SAMPLES)
     drawn = over.draw(wanted, whole("seed", seed, least=0))
     for scenario in drawn:
@@ -182,15 +184,6 @@ def robust_design(
     if on_progress is not None:
         on_progress(1.0, search.responses)
     return replace(found, seconds=time.perf_counter() - begun)
-
-
-def _aim(aim: object) -> Aim:
-    if isinstance(aim, Aim):
-        return aim
-    known = [one.value for one in Aim]
-    if aim not in known:
-        raise DesignError("aim", aim, f"must be one of {', '.join(known)}")
-    return Aim(aim)
 
 
 def _quantile(share: object) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 
@@ -27,28 +28,18 @@ from solver.scene.scene import Scene
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Balance:
-    """A scene with its harmonics and the parameter λ of a run.
+    """A scene with its harmonics and the parameter λ of a run."""
 
-    Attributes
-    ----------
-    scene : Scene
-        What is solved.
-    parameter : Parameter
-        What λ is; its unit inside is that of `Parameter.inside`.
-    system : System
-        The arrays the compiled loops work on.
-    n_harmonics : int
-        Highest harmonic asked for. The system keeps `system.ks`: these, or the odd ones of them, and those
-        that forces and loads call for whatever was asked, see `solver.scene.harmonics.kept_harmonics`.
-    effects : Effects
-        What is paid for though the scene does not call for it.
-    """
-
-    scene: Scene
-    parameter: Parameter
-    system: System
-    n_harmonics: int
-    effects: Effects
+    scene: Annotated[Scene, "What is solved."]
+    parameter: Annotated[Parameter, "What λ is; its unit inside is that of `Parameter.inside`."]
+    system: Annotated[System, "The arrays the compiled loops work on."]
+    n_harmonics: Annotated[
+        int,
+        "Highest harmonic asked for. The system keeps `system.ks`: these, or the odd ones of them, and "
+        "those that forces and loads call for whatever was asked, see "
+        "`solver.scene.harmonics.kept_harmonics`.",
+    ]
+    effects: Annotated[Effects, "What is paid for though the scene does not call for it."]
 
     @property
     def highest_harmonic(self) -> int:

@@ -18,7 +18,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from hashlib import blake2b
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
@@ -42,18 +42,10 @@ _FASTEST = 1e150  # rad/s; what is faster does not resonate
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Poles:
-    """Resonances of one harmonic; the last axis counts them.
+    """Resonances of one harmonic; the last axis counts them."""
 
-    Attributes
-    ----------
-    at : (..., nm) array
-        ω at which the harmonic meets the resonance [rad/s].
-    half_width : (..., nm) array
-        Half of the width at half power, in ω [rad/s].
-    """
-
-    at: Real
-    half_width: Real
+    at: Annotated[Real, "ω at which the harmonic meets the resonance [rad/s], (..., nm)."]
+    half_width: Annotated[Real, "Half of the width at half power, in ω [rad/s], (..., nm)."]
 
 
 class ClosedLoop:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import Annotated
 
 import numpy as np
 
@@ -32,30 +33,18 @@ class Kind(IntEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Parameter:
-    """A parameter path resolved against a scene.
+    """A parameter path resolved against a scene."""
 
-    Attributes
-    ----------
-    path : str
-        As the user wrote it, for example ``shroud.N0``.
-    kind : Kind
-        What it changes.
-    active : (n_contacts,) array
-        Its share in the number of each contact it acts on (1.0 but for faces with several points), else 0.0.
-    column : int
-        Of the contact table, if it is a parameter of contacts.
-    unit : str
-        Unit of the values at the user boundary.
-    least : float
-        Smallest value that means something.
-    """
-
-    path: str
-    kind: Kind
-    active: Real
-    unit: str
-    least: float
-    column: int = 0
+    path: Annotated[str, "As the user wrote it, for example ``shroud.N0``."]
+    kind: Annotated[Kind, "What it changes."]
+    active: Annotated[
+        Real,
+        "Its share in the number of each contact it acts on (1.0 but for faces with several points), else "
+        "0.0, (n_contacts,).",
+    ]
+    unit: Annotated[str, "Unit of the values at the user boundary."]
+    least: Annotated[float, "Smallest value that means something."]
+    column: Annotated[int, "Of the contact table, if it is a parameter of contacts."] = 0
 
     @property
     def code(self) -> int:

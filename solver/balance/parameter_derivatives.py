@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Annotated
 
 import numpy as np
 
@@ -103,34 +104,24 @@ def excitation_slopes(balance: Balance, parameters: Sequence[Parameter]) -> tupl
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HarmonicMatrices:
-    """The linear part as matrices, for each kept harmonic, with its derivatives by structural parameters.
+    """The linear part as matrices, for each kept harmonic, with its derivatives by structural parameters."""
 
-    Attributes
-    ----------
-    K, C, M : (nk, n, n) array
-        Stiffness, damping and mass, of the mean none of the last two; contacts that alone hold a part in
-        place are in K.
-    L : (nk, nc, n) array
-        Relative motions u = L x.
-    observe : (n,) array
-        Selects the observed DOF.
-    forces : (nk, n) array
-        Complex force amplitudes [N].
-    by : mapping
-        (dK, dC, dM) of each structural path by its number, (nk, n, n) each.
-    forces_by, motions_by : mapping
-        Derivatives of the forces (nk, n) and of L (nk, nc, n) by those paths that change them.
-    """
-
-    K: Complex
-    C: Complex
-    M: Complex
-    L: Complex
-    observe: Complex
-    forces: Complex
-    by: dict[int, tuple[Complex, Complex, Complex]]
-    forces_by: dict[int, Complex] = field(default_factory=dict)
-    motions_by: dict[int, Complex] = field(default_factory=dict)
+    K: Annotated[Complex, "Stiffness, (nk, n, n); contacts that alone hold a part in place are in it."]
+    C: Annotated[Complex, "Damping, (nk, n, n); of the mean none."]
+    M: Annotated[Complex, "Mass, (nk, n, n); of the mean none."]
+    L: Annotated[Complex, "Relative motions u = L x, (nk, nc, n)."]
+    observe: Annotated[Complex, "Selects the observed DOF, (n,)."]
+    forces: Annotated[Complex, "Complex force amplitudes [N], (nk, n)."]
+    by: Annotated[
+        dict[int, tuple[Complex, Complex, Complex]],
+        "(dK, dC, dM) of each structural path by its number, (nk, n, n) each.",
+    ]
+    forces_by: Annotated[
+        dict[int, Complex], "Derivatives of the forces, (nk, n), by those paths that change them."
+    ] = field(default_factory=dict)
+    motions_by: Annotated[dict[int, Complex], "Those of L, (nk, nc, n), likewise."] = field(
+        default_factory=dict
+    )
 
 
 def modal_dampings(balance: Balance, parameters: Sequence[Parameter]) -> dict[int, Complex]:

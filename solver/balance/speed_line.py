@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
@@ -17,19 +18,12 @@ from solver.scene.scene import Scene
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SpeedLine:
-    """Polynomials of ω in place of numbers.
+    """Polynomials of ω in place of numbers."""
 
-    Attributes
-    ----------
-    follows : (m,) contacts whose N0 follows the speed; least : (m,) their N0 at rest [N].
-    load_rise : (2, n_contacts) what N0 gains by ω and ω².
-    level : (2, 3) factors of the excitation and of constant forces by 1, ω and ω².
-    """
-
-    follows: Integer
-    least: Real
-    load_rise: Real
-    level: Real
+    follows: Annotated[Integer, "(m,) contacts whose N0 follows the speed."]
+    least: Annotated[Real, "(m,) their N0 at rest [N]."]
+    load_rise: Annotated[Real, "(2, n_contacts) what N0 gains by ω and ω²."]
+    level: Annotated[Real, "(2, 3) factors of the excitation and of constant forces by 1, ω and ω²."]
 
 
 def speed_line(scene: Scene) -> SpeedLine:

@@ -8,6 +8,7 @@ DOF, so one class serves both. Only a structural parameter needs the matrices th
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import Annotated
 
 import numpy as np
 
@@ -22,27 +23,23 @@ class WholeMotion:
     """Z and what stands around it for each of nk harmonics; N modes or coordinates.
 
     A matrix is kept as its diagonal (nk, N) in modes, else whole (nk, N, N).
-
-    Attributes
-    ----------
-    inverse : Z⁻¹.
-    by_omega, by_omega_twice : ∂Z/∂ω, ∂²Z/∂ω².
-    by_structure : (∂Z/∂q, ∂²Z/∂q∂ω) of each structural path by its number; ∂²Z/∂q² = 0.
-    forces_by, motions_by : ∂f/∂q (nk, N) and ∂L/∂q (nk, nc, N) of those that change them.
-    contact : (nk, nc, N) u = L x; back : (nk, nc, N) the rows of (Lᴴ)ᵀ.
-    observe, forces : (nk, N).
     """
 
-    inverse: Complex
-    by_omega: Complex
-    by_omega_twice: Complex
-    by_structure: dict[int, tuple[Complex, Complex]]
-    contact: Complex
-    back: Complex
-    observe: Complex
-    forces: Complex
-    forces_by: dict[int, Complex] = field(default_factory=dict)
-    motions_by: dict[int, Complex] = field(default_factory=dict)
+    inverse: Annotated[Complex, "Z⁻¹."]
+    by_omega: Annotated[Complex, "∂Z/∂ω."]
+    by_omega_twice: Annotated[Complex, "∂²Z/∂ω²."]
+    by_structure: Annotated[
+        dict[int, tuple[Complex, Complex]],
+        "(∂Z/∂q, ∂²Z/∂q∂ω) of each structural path by its number; ∂²Z/∂q² = 0.",
+    ]
+    contact: Annotated[Complex, "(nk, nc, N) u = L x."]
+    back: Annotated[Complex, "(nk, nc, N) the rows of (Lᴴ)ᵀ."]
+    observe: Annotated[Complex, "(nk, N)."]
+    forces: Annotated[Complex, "(nk, N)."]
+    forces_by: Annotated[dict[int, Complex], "∂f/∂q, (nk, N), of those that change them."] = field(
+        default_factory=dict
+    )
+    motions_by: Annotated[dict[int, Complex], "∂L/∂q, (nk, nc, N), likewise."] = field(default_factory=dict)
 
     def push(self, i: int, x: Complex, forces: Complex) -> Complex:
         """Return what path i pushes at the motion x: ∂f/∂q − (∂L/∂q)ᴴ F − (∂Z/∂q) x, (nk, N).

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Annotated
 
 import numpy as np
 
@@ -56,68 +57,41 @@ def _in_place(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PointSolution:
-    """One attempt to solve the balance at one value of λ.
+    """One attempt to solve the balance at one value of λ."""
 
-    Attributes
-    ----------
-    converged : bool
-        Whether `u` satisfies the balance.
-    u : (n_unknowns,) array
-        Slip motions [m], contact after contact.
-    iterations : int
-        Newton iterations spent, the start-up ladder included.
-    residual : float
-        Relative residual at `u`.
-    ratchets : bool
-        There is no periodic motion: a part that contacts alone hold drifts a little further every period. `u`
-        is the motion it has where a constant force holds it.
-    above_friction : bool
-        It does because the mean load on it is more than friction can hold.
-    loses_power : bool
-        Residuals were small, but powers or mean forces did not balance.
-    """
-
-    converged: bool
-    u: Real
-    iterations: int
-    residual: float
-    ratchets: bool = False
-    above_friction: bool = False
-    loses_power: bool = False
+    converged: Annotated[bool, "Whether `u` satisfies the balance."]
+    u: Annotated[Real, "Slip motions [m], contact after contact, (n_unknowns,)."]
+    iterations: Annotated[int, "Newton iterations spent, the start-up ladder included."]
+    residual: Annotated[float, "Relative residual at `u`."]
+    ratchets: Annotated[
+        bool,
+        "There is no periodic motion: a part that contacts alone hold drifts a little further every "
+        "period. `u` is the motion it has where a constant force holds it.",
+    ] = False
+    above_friction: Annotated[bool, "It does because the mean load on it is more than friction can hold."] = (
+        False
+    )
+    loses_power: Annotated[bool, "Residuals were small, but powers or mean forces did not balance."] = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PointMeasures:
-    """What is observed at a solution, with slopes by λ (inside unit).
+    """What is observed at a solution, with slopes by λ (inside unit)."""
 
-    Attributes
-    ----------
-    observed : (n,) array
-        Coefficients of the observed DOF [m].
-    values : (MEASURES,) array
-        Indexed by the column names of `solver.balance.kernels.output`.
-    """
-
-    observed: Real
-    values: Real
+    observed: Annotated[Real, "Coefficients of the observed DOF [m], (n,)."]
+    values: Annotated[Real, "Indexed by the column names of `solver.balance.kernels.output`, (MEASURES,)."]
 
 
 @dataclass(frozen=True, slots=True)
 class Workspace:
-    """A balance with the scratch arrays of the compiled loops; not for two threads at once.
-
-    Attributes
-    ----------
-    loop : what is known of its resonances over the frequency.
-    springs : the contacts at solutions that were walked to.
-    """
+    """A balance with the scratch arrays of the compiled loops; not for two threads at once."""
 
     balance: Balance
     system: System
     linear: Receptance
     point: Evaluation
-    loop: ClosedLoop
-    springs: KnownSprings
+    loop: Annotated[ClosedLoop, "What is known of its resonances over the frequency."]
+    springs: Annotated[KnownSprings, "The contacts at solutions that were walked to."]
 
     @classmethod
     def of(

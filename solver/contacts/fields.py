@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, NamedTuple, TypeAlias
+from typing import Annotated, Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,8 @@ from pydantic import (
     WithJsonSchema,
 )
 from pydantic_core import PydanticKnownError
+
+from solver.wording import every_field_said, with_attributes
 
 Real: TypeAlias = NDArray[np.float64]
 LARGEST = 1e15
@@ -68,9 +70,17 @@ Samples = Annotated[int, Field(strict=True, ge=LEAST_SAMPLES, le=MOST_SAMPLES)]
 
 
 class Part(BaseModel):
-    """Root of everything in a scene: frozen, no unknown keys, no NaN."""
+    """Root of everything in a scene: frozen, no unknown keys, no NaN.
+
+    A field says its type, and in words what it is with its unit: ``m: Annotated[Positive, "Mass [kg]."]``.
+    The attributes in the docstring, and the descriptions of the JSON Schema of scenes, follow from that.
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **_: Any) -> None:
+        cls.__doc__ = with_attributes(cls.__dict__.get("__doc__"), every_field_said(cls))
 
 
 class End(NamedTuple):
@@ -91,7 +101,9 @@ def parse_end(text: str) -> End:
 class Element(Part):
     """Something that joins two ends."""
 
-    between: Between
+    between: Annotated[
+        Between, "The two ends; the relative motion is x(first) - x(second), and the force resists it."
+    ]
 
     @property
     def ends(self) -> tuple[End, End]:

@@ -92,27 +92,24 @@ Motions = Annotated[
 
 
 class InSpace(Part):
-    """A contact between bodies and nodes at a place, with directions; or one with motions written out.
+    """A contact between bodies and nodes at a place, with directions; or one with motions written out."""
 
-    Attributes
-    ----------
-    at : (3,) tuple or None
-        Position of the contact [m].
-    normal : (3,) tuple or None
-        Unit vector from the first end to the second. With it, `between` names bodies or nodes, and the law
-        acts along as many of the directions as it has: a friction law along the tangents, one that presses
-        along the normal too.
-    tangents : "auto", two (3,) tuples, or None
-        Both tangents; chosen if left out: the first in the plane xy.
-    motions : tuple of tables or None
-        In place of these, each relative motion of the law as a sum of DOFs: factor [1, or m of a rotation] by
-        the name of the DOF. `between` then says what the contact joins, and no more.
-    """
-
-    at: Vector | None = None
-    normal: Vector | None = None
-    tangents: Literal["auto"] | tuple[Vector, Vector] | None = None
-    motions: Motions | None = Field(default=None)
+    at: Annotated[Vector | None, "Position of the contact [m]."] = None
+    normal: Annotated[
+        Vector | None,
+        "Unit vector from the first end to the second. With it, `between` names bodies or nodes, and the "
+        "law acts along as many of the directions as it has: a friction law along the tangents, one that "
+        "presses along the normal too.",
+    ] = None
+    tangents: Annotated[
+        Literal["auto"] | tuple[Vector, Vector] | None,
+        "Both tangents; chosen if left out: the first in the plane xy.",
+    ] = None
+    motions: Annotated[
+        Motions | None,
+        "In place of these, each relative motion of the law as a sum of DOFs: factor [1, or m of a "
+        "rotation] by the name of the DOF. `between` then says what the contact joins, and no more.",
+    ] = Field(default=None)
 
     @model_validator(mode="after")
     def _complete(self) -> InSpace:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
@@ -17,19 +18,11 @@ LOGARITHMIC_FROM = 5.0  # ratio of the ends of the range from which equal ratios
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scale:
-    """A parameter with its range; z is the parameter or its logarithm.
+    """A parameter with its range; z is the parameter or its logarithm."""
 
-    Attributes
-    ----------
-    parameter : Parameter
-        Not the frequency.
-    start, stop : float
-        The range as it was asked for.
-    """
-
-    parameter: Parameter
-    start: float
-    stop: float
+    parameter: Annotated[Parameter, "Not the frequency."]
+    start: Annotated[float, "The range as it was asked for: its beginning."]
+    stop: Annotated[float, "Its end."]
 
     @property
     def logarithmic(self) -> bool:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -104,19 +105,14 @@ def _of_modes(structure: MatricesStructure, used: list[str], rows: dict[str, int
 
 @dataclass(frozen=True, slots=True)
 class MarchEquations:
-    """The equations of a scene, and what its coordinates are.
-
-    Attributes
-    ----------
-    observed : coordinate observed; one behind those of the DOFs where it is a sum of several.
-    index : coordinate of each DOF.
-    seen : coordinates that `observed` adds up, with their factors.
-    """
+    """The equations of a scene, and what its coordinates are."""
 
     system: kernel.System
-    observed: int
-    index: dict[str, int]
-    seen: tuple[tuple[int, float], ...]
+    observed: Annotated[
+        int, "Coordinate observed; one behind those of the DOFs where it is a sum of several."
+    ]
+    index: Annotated[dict[str, int], "Coordinate of each DOF."]
+    seen: Annotated[tuple[tuple[int, float], ...], "Coordinates that `observed` adds up, with their factors."]
 
 
 _IN_TIME = "cannot be marched in time: it is a term of the frequency domain; give dashpots or damping ratios"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 
@@ -22,26 +23,14 @@ _FAR = 0.3  # relative change of ω from a guess beyond which a point may be of 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ModePoints:
-    """A nonlinear mode at n amplitudes.
+    """A nonlinear mode at n amplitudes."""
 
-    Attributes
-    ----------
-    frequency_hz, damping_ratio : (n,) array
-        NaN where no point was found.
-    by_frequency, by_damping : (n, n_paths) array
-        Derivatives [Hz and 1 per unit of each].
-    states : (n, n_contacts) array
-        What each contact does; −1 where no point was found.
-    points : list of State or None
-        The unknowns, guesses of the next.
-    """
-
-    frequency_hz: Real
-    damping_ratio: Real
-    by_frequency: Real
-    by_damping: Real
-    states: Integer
-    points: list[ModeState | None]
+    frequency_hz: Annotated[Real, "NaN where no point was found, (n,)."]
+    damping_ratio: Annotated[Real, "Likewise, (n,)."]
+    by_frequency: Annotated[Real, "Derivatives [Hz per unit of each], (n, n_paths)."]
+    by_damping: Annotated[Real, "Derivatives [1 per unit of each], (n, n_paths)."]
+    states: Annotated[Integer, "What each contact does, (n, n_contacts); −1 where no point was found."]
+    points: Annotated[list[ModeState | None], "The unknowns, guesses of the next."]
 
 
 def mode_at_amplitudes(

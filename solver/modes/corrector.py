@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
@@ -21,37 +22,23 @@ _PATIENCE, _HOPE = 8, 0.9  # Newton steps along an arc within which the residual
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ModeState:
-    """A point of a nonlinear mode.
+    """A point of a nonlinear mode."""
 
-    Attributes
-    ----------
-    y : (m,) unknowns of `solver.modes.equations`.
-    log_amplitude : ln a.
-    mode : number of the mode of the structure that is carried in q.
-    phase : (N,) the force that harmonic 1 lags by a quarter of a period.
-    """
-
-    y: Real
-    log_amplitude: float
-    mode: int
-    phase: Complex
+    y: Annotated[Real, "(m,) unknowns of `solver.modes.equations`."]
+    log_amplitude: Annotated[float, "Ln a."]
+    mode: Annotated[int, "Number of the mode of the structure that is carried in q."]
+    phase: Annotated[Complex, "(N,) the force that harmonic 1 lags by a quarter of a period."]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Corrected:
-    """Where Newton's method ended.
+    """Where Newton's method ended."""
 
-    Attributes
-    ----------
-    state : the last point; `at` the equations there (None where they have no value).
-    residual : relative, see `relative_residual`.
-    """
-
-    state: ModeState
+    state: Annotated[ModeState, "The last point; `at` the equations there (None where they have no value)."]
     at: Evaluated | None
     converged: bool
     iterations: int
-    residual: float
+    residual: Annotated[float, "Relative, see `relative_residual`."]
 
 
 def scales(y: Real, size: int) -> Real:

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 
@@ -45,28 +45,23 @@ BESIDES = 4  # unknowns beside the motions: Re q, Im q, ω, ζ
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Evaluated:
-    """The equations at one point.
+    """The equations at one point."""
 
-    Attributes
-    ----------
-    residual : (m,) in the order of the unknowns; [m, √kg m, …, 1].
-    slopes : (m, m) the Jacobian, or what solves with it; `by_log_amplitude` (m,) is that by ln a.
-    x : (nk, N) motion of all coordinates; forces : (r, n) forces at the leading ports less the shift.
-    rough : (r n,) size that a residual of each motion is rounding of.
-    lag : size that the residual of the phase is relative to.
-    loose : (2, g, m) mean motions of parts that nothing holds where they are, and the forces of the contacts'
-        stiffnesses along them: a step takes these for the slope that is missing, and leaves such means
-        alone (`solver.balance.kernels.gauge`).
-    """
-
-    residual: Real
-    slopes: Real | SparseJacobian
+    residual: Annotated[Real, "(m,) in the order of the unknowns; [m, √kg m, …, 1]."]
+    slopes: Annotated[
+        Real | SparseJacobian,
+        "(m, m) the Jacobian, or what solves with it; `by_log_amplitude` (m,) is that by ln a.",
+    ]
     by_log_amplitude: Real
-    x: Complex
-    forces: Real
-    rough: Real
-    lag: float
-    loose: Real
+    x: Annotated[Complex, "(nk, N) motion of all coordinates."]
+    forces: Annotated[Real, "(r, n) forces at the leading ports less the shift."]
+    rough: Annotated[Real, "(r n,) size that a residual of each motion is rounding of."]
+    lag: Annotated[float, "Size that the residual of the phase is relative to."]
+    loose: Annotated[
+        Real,
+        "stiffnesses along them: a step takes these for the slope that is missing, and leaves such means "
+        "alone (`solver.balance.kernels.gauge`).",
+    ]
     dynamics: Dynamics
 
     @property

@@ -6,7 +6,7 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
@@ -32,20 +32,13 @@ MOST_POINTS = 2000
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ModeProblem:
-    """A scene made ready: its equations, the linear mode it begins with, and whether it may begin any time.
-
-    Attributes
-    ----------
-    rest : (r, n) the equilibrium at the leading ports.
-    turns : no load varies with a phase of its own: the motion may begin at any instant.
-    all_modes : the linear modes, slowest first.
-    """
+    """A scene made ready: equations, the linear mode it begins with, whether it may begin any time."""
 
     equations: Equations
     mode: LinearMode
-    all_modes: list[LinearMode]
-    rest: Real
-    turns: bool
+    all_modes: Annotated[list[LinearMode], "The linear modes, slowest first."]
+    rest: Annotated[Real, "(r, n) the equilibrium at the leading ports."]
+    turns: Annotated[bool, "No load varies with a phase of its own: the motion may begin at any instant."]
 
 
 @shows_progress("nonlinear mode")

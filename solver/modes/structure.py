@@ -10,7 +10,7 @@ than that of the structure alone.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,46 +32,41 @@ class ModeStructure:
     """What Z_k is made of; N coordinates.
 
     It is in modes (diagonals, (nk, N)), as matrices ((nk, N, N)), or as the entries of a pattern ((nk, L)).
-
-    Attributes
-    ----------
-    ks : (nk,) harmonics kept; `first` is the place of harmonic 1, `moving` says which are not the mean.
-    turns : (nk,) k, but 1 of the mean, whose C and M are its own.
-    K, C, M : stiffness, damping and inertia of each harmonic, as the balance has them.
-    mass : the mass of each harmonic, 0 of the mean; in modes 1.
-    fed : what −2ζω is multiplied by: the mass, or (M φ)(M φ)ᴴ where one mode φ alone is damped.
-    contact : (nk, r, N) motions of the leading ports; back : (nk, N, r) what their forces push.
-    constant : (N,) constant force on the mean; level : (3,) its factor by 1, ω, ω².
-    force : (N,) the excitation of harmonic 1.
-    observe : (nk, N).
-    shapes : (nk, n, N) the coordinates in those of the matrices.
-    modes : (N, m) modes of the structure alone that may be carried, M b of them in `carried`.
-    squares : (m,) their ω² [rad²/s²].
-    own : (4, m) ψᴴ K ψ, ψᴴ C ψ, ψᴴ M ψ and that of `fed` of harmonic 1, of these modes ψ.
-    pattern : where matrices have entries that are kept alone; None where whole ones or diagonals are.
     """
 
-    ks: Integer
+    ks: Annotated[
+        Integer,
+        "(nk,) harmonics kept; `first` is the place of harmonic 1, `moving` says which are not the mean.",
+    ]
     first: int
     moving: Flags
-    turns: Real
-    K: Complex
-    C: Complex
-    M: Complex
-    mass: Complex
-    fed: Complex
-    contact: Complex
-    back: Complex
-    constant: Complex
-    level: Real
-    force: Complex
-    observe: Complex
-    shapes: Complex
-    modes: Complex
+    turns: Annotated[Real, "(nk,) k, but 1 of the mean, whose C and M are its own."]
+    K: Annotated[Complex, "Stiffness of each harmonic, as the balance has it."]
+    C: Annotated[Complex, "Damping, likewise."]
+    M: Annotated[Complex, "Inertia, likewise."]
+    mass: Annotated[Complex, "The mass of each harmonic, 0 of the mean; in modes 1."]
+    fed: Annotated[
+        Complex, "What −2ζω is multiplied by: the mass, or (M φ)(M φ)ᴴ where one mode φ alone is damped."
+    ]
+    contact: Annotated[Complex, "(nk, r, N) motions of the leading ports."]
+    back: Annotated[Complex, "(nk, N, r) what their forces push."]
+    constant: Annotated[Complex, "(N,) constant force on the mean."]
+    level: Annotated[Real, "(3,) its factor by 1, ω, ω²."]
+    force: Annotated[Complex, "(N,) the excitation of harmonic 1."]
+    observe: Annotated[Complex, "(nk, N)."]
+    shapes: Annotated[Complex, "(nk, n, N) the coordinates in those of the matrices."]
+    modes: Annotated[
+        Complex, "(N, m) modes of the structure alone that may be carried, M b of them in `carried`."
+    ]
     carried: Complex
-    squares: Real
-    own: Complex
-    pattern: Pattern | None
+    squares: Annotated[Real, "(m,) their ω² [rad²/s²]."]
+    own: Annotated[
+        Complex, "(4, m) ψᴴ K ψ, ψᴴ C ψ, ψᴴ M ψ and that of `fed` of harmonic 1, of these modes ψ."
+    ]
+    pattern: Annotated[
+        Pattern | None,
+        "Where matrices have entries that are kept alone; None where whole ones or diagonals are.",
+    ]
 
     @property
     def is_diagonal(self) -> bool:

@@ -12,7 +12,7 @@ from __future__ import annotations
 import functools
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
@@ -96,31 +96,22 @@ class _Drifting:
     """The balance of a motion that drifts.
 
     g directions of drift, D = a · `ways` at the ports, m coefficients in all.
-
-    Attributes
-    ----------
-    start : (m,) the motion held by a constant force.
-    ways : (g, nc) motions of the ports that nothing holds.
-    shapes : (n_dofs, g) the same of the DOFs.
-    pulled : (g, nc) what dashpots add to the mean motions for a unit of drift in a period.
-    damped : (g, g) the mean forces of dashpots along the ways for it.
-    dragged : whether dashpots hold every way.
-    A : (m, m) motions for forces.
-    free : (m,) motions without contacts.
-    sliders : the contacts along which it drifts: number, friction, load, and what of it is there at rest.
     """
 
     workspace: Workspace
     p: float
-    start: Real
-    ways: Real
-    shapes: Real
-    pulled: Real
-    damped: Real
-    dragged: bool
-    A: Real
-    free: Real
-    sliders: tuple[tuple[int, Slider, Real, float], ...]
+    start: Annotated[Real, "(m,) the motion held by a constant force."]
+    ways: Annotated[Real, "(g, nc) motions of the ports that nothing holds."]
+    shapes: Annotated[Real, "(n_dofs, g) the same of the DOFs."]
+    pulled: Annotated[Real, "(g, nc) what dashpots add to the mean motions for a unit of drift in a period."]
+    damped: Annotated[Real, "(g, g) the mean forces of dashpots along the ways for it."]
+    dragged: Annotated[bool, "Whether dashpots hold every way."]
+    A: Annotated[Real, "(m, m) motions for forces."]
+    free: Annotated[Real, "(m,) motions without contacts."]
+    sliders: Annotated[
+        tuple[tuple[int, Slider, Real, float], ...],
+        "The contacts along which it drifts: number, friction, load, and what of it is there at rest.",
+    ]
 
     @classmethod
     def of(cls, workspace: Workspace, p: float, found: PointSolution) -> _Drifting | None:

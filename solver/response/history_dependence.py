@@ -31,6 +31,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
@@ -60,22 +61,15 @@ _BETWEEN = 2e-3
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class History:
-    """What a response does not say without its history.
+    """What a response does not say without its history."""
 
-    Attributes
-    ----------
-    mean_open : bool
-        Whether a start from rest may lead to another mean.
-    half_range_open : bool
-        Whether it may lead to another half peak to peak too.
-    mean_range : (float, float)
-        Bounds of the mean of the observed DOF over every history [m], residual forces from assembly
-        included; NaN where no bound is known.
-    """
-
-    mean_open: bool
-    half_range_open: bool
-    mean_range: tuple[float, float]
+    mean_open: Annotated[bool, "Whether a start from rest may lead to another mean."]
+    half_range_open: Annotated[bool, "Whether it may lead to another half peak to peak too."]
+    mean_range: Annotated[
+        tuple[float, float],
+        "Bounds of the mean of the observed DOF over every history [m], residual forces from assembly "
+        "included; NaN where no bound is known.",
+    ]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 
@@ -33,25 +34,13 @@ _ROUNDING = 1e-6  # of a bound, for what rounding leaves
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Start:
-    """Rest, as seen from the response at τ = 0, over all sectors.
+    """Rest, as seen from the response at τ = 0, over all sectors."""
 
-    Attributes
-    ----------
-    model : LinearModel
-        The structure.
-    stiffness : (n_ports,) array
-        Of the ports of what sticks [N/m], 0 elsewhere.
-    x, v : (sectors, n) arrays
-        Displacements [m] and velocities [m/s] of the response.
-    omega : float
-        [rad/s].
-    """
-
-    model: LinearModel
-    stiffness: Real
-    x: Real
-    v: Real
-    omega: float
+    model: Annotated[LinearModel, "The structure."]
+    stiffness: Annotated[Real, "Of the ports of what sticks [N/m], 0 elsewhere, (n_ports,)."]
+    x: Annotated[Real, "Displacements of the response [m], (sectors, n)."]
+    v: Annotated[Real, "Its velocities [m/s], (sectors, n)."]
+    omega: Annotated[float, "[rad/s]."]
 
     def distance(self, x: Real, v: Real) -> float:
         """Return the energy of displacements and velocities (sectors, n) [J]."""
@@ -66,21 +55,11 @@ class Start:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Transient:
-    """What is left of the start, in the modes of every nodal diameter; 2 n of them in each.
+    """What is left of the start, in the modes of every nodal diameter; 2 n of them in each."""
 
-    Attributes
-    ----------
-    rates : (sectors, 2 n) array
-        λ by τ.
-    amplitudes : (sectors, 2 n) array
-        Of the modes at the beginning of a period.
-    ports : (sectors, n_ports, 2 n) array
-        Their motions of the ports of sector 0.
-    """
-
-    rates: Complex
-    amplitudes: Complex
-    ports: Complex
+    rates: Annotated[Complex, "λ by τ, (sectors, 2 n)."]
+    amplitudes: Annotated[Complex, "Of the modes at the beginning of a period, (sectors, 2 n)."]
+    ports: Annotated[Complex, "Their motions of the ports of sector 0, (sectors, n_ports, 2 n)."]
 
     @classmethod
     def of(cls, start: Start) -> _Transient | None:

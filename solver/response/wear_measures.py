@@ -19,7 +19,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
@@ -47,28 +47,14 @@ class Change(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ContactCycle:
-    """All contacts over one period at a solution; copies, so that the workspace may go on.
+    """All contacts over one period at a solution; copies, so that the workspace may go on."""
 
-    Attributes
-    ----------
-    balance : Balance
-        What was solved.
-    U, F : (n_ports, n) array
-        Coefficients of motions [m] and forces [N].
-    dF_dU : (blocks, n, n) array
-        As in `solver.contacts.kernels.system.Evaluation`.
-    table : (n_contacts, ·) array
-        Parameters of the contacts at this λ.
-    load : (n_contacts, 1 + 2 K) array
-        Coefficients of the given normal loads [N].
-    """
-
-    balance: Balance
-    U: Real
-    F: Real
-    dF_dU: Real
-    table: Real
-    load: Real
+    balance: Annotated[Balance, "What was solved."]
+    U: Annotated[Real, "Coefficients of motions [m], (n_ports, n)."]
+    F: Annotated[Real, "Coefficients of forces [N], (n_ports, n)."]
+    dF_dU: Annotated[Real, "As in `solver.contacts.kernels.system.Evaluation`, (blocks, n, n)."]
+    table: Annotated[Real, "Parameters of the contacts at this λ, (n_contacts, ·)."]
+    load: Annotated[Real, "Coefficients of the given normal loads [N], (n_contacts, 1 + 2 K)."]
 
     @classmethod
     def of(cls, balance: Balance, u: Real, p: float, point: Evaluation) -> ContactCycle:

@@ -42,6 +42,7 @@ def declared(kind: type, path: str) -> tuple[Any, str]:
     text = str(getattr(text, "__forward_arg__", text))  # a named tuple wraps it
     found = eval(text, {}, _FieldNames({**vars(builtins), **vars(sys.modules[owner.__module__])}, owner))
     if rest:
+        found = get_args(found)[0] if get_origin(found) is Annotated else found  # a field of a scene
         kinds = get_args(found) if get_origin(found) in (Union, UnionType) else (found,)
         inner, words = declared(next(one for one in kinds if one is not NoneType), rest)
         return (inner | None if NoneType in kinds and inner is not None else inner), words

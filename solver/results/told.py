@@ -5,19 +5,18 @@ from __future__ import annotations
 import math
 import re
 from abc import ABC, abstractmethod
-from ast import literal_eval
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from enum import Enum
 from functools import cache
 from html import escape
-from inspect import cleandoc
 from typing import Any, ClassVar, Self
+
+from solver.wording import fields_said, with_attributes
 
 _MOST = 30
 _FEW = 6
 _DIGITS = 5
-_DESCRIBED = re.compile(r"Annotated\[(.+?), (['\"].+['\"])\]")
 _NUMBER = re.compile(r"[≤≥±\s]*[-+]?\d")
 UNIT = re.compile(r" ?\[([^]]+)\]")
 
@@ -163,14 +162,11 @@ class Told(ABC):
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
-        rows = []
-        for name, text in cls.__annotations__.items():
-            if (said := _DESCRIBED.fullmatch(str(text))) is not None:
-                kind, words = said[1], literal_eval(said[2])
-                cls.__annotations__[name], cls.WORDS = kind, {**cls.WORDS, name: words}
-                rows.append(f"{name} : {kind}\n    {words}")
-        if rows:  # else nothing is said, or dataclass made the class anew for its slots
-            cls.__doc__ = "\n".join([cleandoc(cls.__doc__ or ""), "\nAttributes\n----------", *rows])
+        said = fields_said(cls)
+        for name, (kind, words) in said.items():
+            cls.__annotations__[name], cls.WORDS = kind, {**cls.WORDS, name: words}
+        if said:  # else nothing is said, or dataclass made the class anew for its slots
+            cls.__doc__ = with_attributes(cls.__doc__, said)
 
     def to_json(self) -> dict[str, Any]:
         """Return it as one JSON object."""

@@ -21,25 +21,7 @@ WORDS: dict[str, dict[str, str]] = {
         "mistuning": "Factors that make the blades differ.",
         "stiffness_proportional_damping": "C gains this many times K [s].",
     },
-    "Scene": {
-        "name": "Name of the scene: letters, digits, - and _.",
-        "structure": "What vibrates; `kind` says how it is given.",
-        "contacts": "Where friction, gaps and nonlinear springs act.",
-        "excitation": "The force, or several.",
-        "observe": "The DOF whose amplitude counts, and the band of frequencies.",
-        "bodies": "Rigid bodies, held by contacts and springs.",
-        "nodes": "Positions of DOFs, for contacts with a place.",
-        "loads": "Constant forces.",
-        "dampers": "Dampers by their shape, which make their bodies and contacts themselves.",
-        "speed": "Speed of rotation [1/min]: loads bodies with a radius_of_rotation, and turns gyroscopic "
-        "terms.",
-        "couplings": "Entries of stiffness and damping that are no springs and dashpots.",
-        "aerodynamics": "Influence of the gas between the blades of a disk.",
-    },
-    "Observe": {
-        "dof": "The DOF whose amplitude counts; \"tip@3\" is the tip of sector 3.",
-        "band": "Frequencies of interest [low, high] [Hz].",
-    },
+    "Scene": {"dampers": "Dampers by their shape, which make their bodies and contacts themselves."},
     "MatricesStructure": {
         "M": "Mass matrix [kg]: a file (.npz, .mat, .mtx, Harwell-Boeing, …) or its rows.",
         "K": "Stiffness matrix [N/m]: a file or its rows.",

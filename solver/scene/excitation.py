@@ -6,13 +6,16 @@ import csv
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal, NamedTuple, Protocol, Self
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, Self
 
 from pydantic import BeforeValidator, Field, PlainSerializer, WithJsonSchema, model_validator
 
 from solver.contacts.fields import Angle, DofName, Part, Signed
 from solver.errors import SceneError, SettingError
 from solver.scene.scene_parameter import ActsOn, SceneParameter, changed
+
+if TYPE_CHECKING:
+    from solver.scene.scene import Scene
 
 Order = Annotated[int, Field(strict=True, ge=0, le=10_000)]
 HarmonicIndex = Annotated[int, Field(strict=True, ge=0, le=1_000)]
@@ -78,47 +81,42 @@ class Excitation(Part):
     """A force amplitude * cos(harmonic * omega t + phase), or a base that moves so; harmonic 0 is static.
 
     One of `dof`, `forces`, `ground` and `driven` says what it acts on.
-
-    Attributes
-    ----------
-    dof : str or None
-        The DOF a force acts on.
-    forces : table or None
-        Forces on many DOFs, such as a pressure: DOF to its factor of the amplitude, or to [factor, phase in
-        rad]; in a scene file also the name of a file (CSV) with rows dof, factor and maybe phase.
-    ground : table or None
-        The ground moves: DOF to its share of that motion when the structure moves along as a rigid body, or
-        to [share, phase in rad]. DOFs are then counted from the moving ground, as contacts to it are.
-    driven : table or None
-        These DOFs move as prescribed, each by its share or [share, phase in rad]; one that another excitation
-        drives moves with both.
-    motion : "acceleration", "velocity", "displacement" or None
-        What the amplitude of a base is of [m/s², m/s, m]; acceleration if left out.
-    amplitude : float
-        Force [N], or amplitude of the motion of the base.
-    phase : float
-        Phase [rad]; 0 for a static load.
-    harmonic : int
-        Multiple of the excitation frequency.
-    engine_order : int or None
-        Cyclic structures only: sector j has harmonic * engine_order * j * 2 pi / sectors added to the phase.
-        A wave that runs backward with the order i is the engine order sectors - i: the forces are the same.
-    pattern : "travelling", "standing" or None
-        Cyclic structures only: a travelling wave (also if left out), or the same angle as a factor
-        cos(harmonic * engine_order * j * 2 pi / sectors) instead of a phase, half the sum of the two waves
-        that run forward and backward. The loads of the contacts follow the same pattern.
     """
 
-    dof: DofName | None = None
-    forces: Pattern | None = None
-    ground: Pattern | None = None
-    driven: Pattern | None = None
-    motion: Motion | None = None
-    amplitude: Signed
-    phase: Angle = 0.0
-    harmonic: HarmonicIndex = 1
-    engine_order: Order | None = None
-    pattern: Literal["travelling", "standing"] | None = None
+    dof: Annotated[DofName | None, "The DOF a force acts on."] = None
+    forces: Annotated[
+        Pattern | None,
+        "Forces on many DOFs, such as a pressure: DOF to its factor of the amplitude, or to [factor, phase "
+        "in rad]; in a scene file also the name of a file (CSV) with rows dof, factor and maybe phase.",
+    ] = None
+    ground: Annotated[
+        Pattern | None,
+        "The ground moves: DOF to its share of that motion when the structure moves along as a rigid body, "
+        "or to [share, phase in rad]. DOFs are then counted from the moving ground, as contacts to it are.",
+    ] = None
+    driven: Annotated[
+        Pattern | None,
+        "These DOFs move as prescribed, each by its share or [share, phase in rad]; one that another "
+        "excitation drives moves with both.",
+    ] = None
+    motion: Annotated[
+        Motion | None, "What the amplitude of a base is of [m/s², m/s, m]; acceleration if left out."
+    ] = None
+    amplitude: Annotated[Signed, "Force [N], or amplitude of the motion of the base."]
+    phase: Annotated[Angle, "Phase [rad]; 0 for a static load."] = 0.0
+    harmonic: Annotated[HarmonicIndex, "Multiple of the excitation frequency."] = 1
+    engine_order: Annotated[
+        Order | None,
+        "Cyclic structures only: sector j has harmonic * engine_order * j * 2 pi / sectors added to the "
+        "phase. A wave that runs backward with the order i is the engine order sectors - i: the forces are "
+        "the same.",
+    ] = None
+    pattern: Annotated[
+        Literal["travelling", "standing"] | None,
+        "Cyclic structures only: a travelling wave (also if left out), or the same angle as a factor "
+        "cos(harmonic * engine_order * j * 2 pi / sectors) instead of a phase, half the sum of the two "
+        "waves that run forward and backward. The loads of the contacts follow the same pattern.",
+    ] = None
 
     @model_validator(mode="after")
     def _one_place(self) -> Self:
@@ -162,15 +160,7 @@ AMPLITUDE = "excitation.amplitude"
 PHASE = "excitation.phase"
 
 
-class HasExcitation(Protocol):
-    """What a scene holds, as far as the parameters of its forces go."""
-
-    @property
-    def excitation(self) -> tuple[Excitation, ...]:
-        """Every force."""
-
-
-def excitation_parameter(scene: HasExcitation, path: str) -> SceneParameter | None:
+def excitation_parameter(scene: Scene, path: str) -> SceneParameter | None:
     """Return what the amplitude or the phase of all forces is, if the path is one of them."""
     forces = scene.excitation
     if path == AMPLITUDE:

@@ -1,13 +1,14 @@
 """The scene file as JSON Schema (2020-12), so that editors complete and check it.
 
-Types, ranges and defaults are those of the models, descriptions those of their docstrings; what a schema
-cannot say (a DOF that must exist, low < high) is left to `load_scene`.
+Types, ranges, defaults and descriptions are those of the models' fields; what a schema cannot say (a DOF that
+must exist, low < high) is left to `load_scene`.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from inspect import cleandoc
 from typing import Any
 
 from pydantic import BaseModel
@@ -26,9 +27,10 @@ from solver.scene.bodies import shapes as scene_shapes
 from solver.scene.bodies.validation import further_ends
 from solver.scene.descriptions import EXAMPLES, WORDS
 from solver.scene.scene import Scene
+from solver.wording import every_field_said
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
-_ENTRY = re.compile(r"^(\w+(?:, \w+)*) : .*\n((?:    .*\n?)+)", re.MULTILINE)
+_ENTRY = re.compile(r"^(\w+) : .*\n((?:    .*\n?)+)", re.MULTILINE)
 _HOMES = (scene_parts, scene_bodies, scene_shapes, linear_terms, matrices_part, load_harmonics)
 
 
@@ -114,12 +116,11 @@ def _model(name: str) -> type[BaseModel]:
 
 
 def _describe(definition: dict[str, Any], model: type[BaseModel], name: str) -> None:
-    """Put the words of a model's docstring, and of those it is made from, into its schema."""
+    """Put the words of a model and of its fields into its schema."""
     words = words_of(model) | WORDS.get("*", {}) | WORDS.get(name, {})
     if issubclass(model, AnyContact):
         words |= {"law": _law_words(), **model.WORDS}
-    text = _docstring(model)
-    definition["description"] = " ".join(re.split(r"\n\s*(?:Attributes|Parameters)\n", text)[0].split())
+    definition["description"] = " ".join((model.__doc__ or "").partition("\nAttributes\n")[0].split())
     for key, given in definition["properties"].items():
         if key in words:
             given["description"] = words[key]
@@ -134,22 +135,13 @@ def _law_words() -> str:
 
 
 def words_of(model: type[BaseModel]) -> dict[str, str]:
-    """What the docstrings of a model, and of those it is made from, say of every attribute."""
-    return {key: text for base in reversed(model.__mro__) for key, text in _words(base).items()}
-
-
-def _words(model: type) -> dict[str, str]:
-    """What a numpy docstring says of every attribute."""
-    found = {}
-    for names, text in _ENTRY.findall(_docstring(model)):
-        for name in names.split(", "):
-            found[name] = " ".join(text.split())
-    return found
-
-
-def _docstring(model: type) -> str:
-    lines = (model.__doc__ or "").splitlines()
-    return "\n".join([line.removeprefix("    ") for line in lines]) + "\n"
+    """What a model, and those it is made from, say of every field: there, or in a section of attributes."""
+    found = {
+        name: " ".join(text.split())
+        for base in reversed(model.__mro__)
+        for name, text in _ENTRY.findall(f"{cleandoc(base.__doc__ or '')}\n")
+    }
+    return found | {key: words for key, (_, words) in every_field_said(model).items()}
 
 
 def _matrices(properties: dict[str, Any]) -> None:

@@ -57,13 +57,7 @@ class Entry(NamedTuple):
 
 
 class LinearTerm(Part, ABC):
-    """What adds entries to K and C.
-
-    Attributes
-    ----------
-    name : str or None
-        Makes its numbers parameters ``<name>.<key>``; terms of one name are set together.
-    """
+    """What adds entries to K and C."""
 
     KIND: ClassVar[str] = ""
     """Its `kind` in ``[[couplings]]``; one from outside has a field `kind` of that word."""
@@ -74,7 +68,9 @@ class LinearTerm(Part, ABC):
     PARAMETERS: ClassVar[Mapping[str, str]] = {}
     """Its fields that are parameters, with their units; what it adds is affine in each."""
 
-    name: Name | None = None
+    name: Annotated[
+        Name | None, "Makes its numbers parameters ``<name>.<key>``; terms of one name are set together."
+    ] = None
 
     @abstractmethod
     def entries(self, sectors: int) -> tuple[Entry, ...]:
@@ -92,30 +88,7 @@ class LinearTerm(Part, ABC):
 
 
 class Coupling(LinearTerm):
-    """Entries of stiffness and damping in the row of one DOF and the column of another.
-
-    Attributes
-    ----------
-    on : str
-        DOF in whose equation of motion it stands (with the sign of the left-hand side, as a spring's k).
-    of : str
-        DOF whose motion it multiplies.
-    offset : int
-        Cyclic structures only: `of` is that of the sector so many ahead (negative: behind).
-    antisymmetric : bool
-        Also the negative in the row of `of` and the column of `on`, as gyroscopic terms have it.
-    k : float
-        Stiffness [N/m].
-    k_imaginary : float
-        Imaginary part of the stiffness [N/m]: damping that does not depend on the frequency; none at rest.
-    c : float
-        Damping [N s/m].
-    gyroscopic : float
-        Damping per speed of rotation [N s/m per rad/s]: of a disk on tilting DOFs its polar moment of inertia
-        [kg m²].
-    k_omega2 : float
-        Stiffness per squared speed of rotation [N/m per (rad/s)²].
-    """
+    """Entries of stiffness and damping in the row of one DOF and the column of another."""
 
     KIND = "coupling"
     DOFS = ("on", "of")
@@ -124,15 +97,29 @@ class Coupling(LinearTerm):
         "k": "N/m", "k_imaginary": "N/m", "c": "N s/m", "gyroscopic": "N s^2/m", "k_omega2": "N s^2/m",
     }  # fmt: skip
 
-    on: DofName
-    of: DofName
-    offset: Offset = 0
-    antisymmetric: bool = False
-    k: Signed = 0.0
-    k_imaginary: Signed = 0.0
-    c: Signed = 0.0
-    gyroscopic: Signed = 0.0
-    k_omega2: Signed = 0.0
+    on: Annotated[
+        DofName,
+        "DOF in whose equation of motion it stands (with the sign of the left-hand side, as a spring's k).",
+    ]
+    of: Annotated[DofName, "DOF whose motion it multiplies."]
+    offset: Annotated[
+        Offset, "Cyclic structures only: `of` is that of the sector so many ahead (negative: behind)."
+    ] = 0
+    antisymmetric: Annotated[
+        bool, "Also the negative in the row of `of` and the column of `on`, as gyroscopic terms have it."
+    ] = False
+    k: Annotated[Signed, "Stiffness [N/m]."] = 0.0
+    k_imaginary: Annotated[
+        Signed,
+        "Imaginary part of the stiffness [N/m]: damping that does not depend on the frequency; none at rest.",
+    ] = 0.0
+    c: Annotated[Signed, "Damping [N s/m]."] = 0.0
+    gyroscopic: Annotated[
+        Signed,
+        "Damping per speed of rotation [N s/m per rad/s]: of a disk on tilting DOFs its polar moment of "
+        "inertia [kg m²].",
+    ] = 0.0
+    k_omega2: Annotated[Signed, "Stiffness per squared speed of rotation [N/m per (rad/s)²]."] = 0.0
 
     @model_validator(mode="after")
     def _apart(self) -> Self:
@@ -184,70 +171,54 @@ CouplingOfAnyKind = Annotated[LinearTerm, _OfAnyKind]
 
 
 class Influence(Part):
-    """What the motion of a blade does to another: pressure of the gas.
+    """What the motion of a blade does to another: pressure of the gas."""
 
-    Attributes
-    ----------
-    offset : int
-        The blade that moves is so many ahead of the one that feels it; 0 is the blade itself.
-    stiffness : float
-        Real part of the coefficient [N/m].
-    imaginary : float
-        Imaginary part [N/m] at e^{iωt}, ω > 0; of the blade itself, damping where positive.
-    damping : float
-        Damping [N s/m].
-    """
-
-    offset: Offset = 0
-    stiffness: Signed = 0.0
-    imaginary: Signed = 0.0
-    damping: Signed = 0.0
+    offset: Annotated[
+        Offset, "The blade that moves is so many ahead of the one that feels it; 0 is the blade itself."
+    ] = 0
+    stiffness: Annotated[Signed, "Real part of the coefficient [N/m]."] = 0.0
+    imaginary: Annotated[
+        Signed, "Imaginary part [N/m] at e^{iωt}, ω > 0; of the blade itself, damping where positive."
+    ] = 0.0
+    damping: Annotated[Signed, "Damping [N s/m]."] = 0.0
 
 
 class DiameterCoefficient(Part):
-    """What the gas does to a wave of one nodal diameter.
+    """What the gas does to a wave of one nodal diameter."""
 
-    Attributes
-    ----------
-    diameter : int
-        Nodal diameter of the wave x_{j+1} = x_j e^{2πi·diameter/sectors}; a wave the other way round is a
-        negative one, or sectors less so many.
-    stiffness, imaginary : float
-        Real and imaginary part of the coefficient [N/m]; damping where the imaginary part is positive.
-    damping : float
-        Damping [N s/m].
-    """
-
-    diameter: Offset
-    stiffness: Signed = 0.0
-    imaginary: Signed = 0.0
-    damping: Signed = 0.0
+    diameter: Annotated[
+        Offset,
+        "Nodal diameter of the wave x_{j+1} = x_j e^{2πi·diameter/sectors}; a wave the other way round is "
+        "a negative one, or sectors less so many.",
+    ]
+    stiffness: Annotated[
+        Signed,
+        "Real and imaginary part of the coefficient [N/m]; damping where the imaginary part is positive.",
+    ] = 0.0
+    imaginary: Annotated[
+        Signed,
+        "Real and imaginary part of the coefficient [N/m]; damping where the imaginary part is positive.",
+    ] = 0.0
+    damping: Annotated[Signed, "Damping [N s/m]."] = 0.0
 
 
 class Aerodynamics(LinearTerm):
     """Aerodynamic influence on one DOF of every blade, between neighbours or for each nodal diameter.
 
     The force on a blade is minus the sum of the coefficients times the motions.
-
-    Attributes
-    ----------
-    dof : str
-        DOF of a sector that the gas acts on and that moves the gas.
-    factor : float
-        Multiplies all coefficients.
-    influence : tuple of Influence
-        Coefficients between a blade and those so many ahead; or
-    nodal_diameters : tuple of DiameterCoefficient
-        coefficients of waves; 0 for those left out.
     """
 
     DOFS = ("dof",)
     PARAMETERS: ClassVar = {"factor": "1"}
 
-    dof: DofName
-    factor: Signed = 1.0
-    influence: tuple[Influence, ...] = ()
-    nodal_diameters: tuple[DiameterCoefficient, ...] = ()
+    dof: Annotated[DofName, "DOF of a sector that the gas acts on and that moves the gas."]
+    factor: Annotated[Signed, "Multiplies all coefficients."] = 1.0
+    influence: Annotated[
+        tuple[Influence, ...], "Coefficients between a blade and those so many ahead; or"
+    ] = ()
+    nodal_diameters: Annotated[
+        tuple[DiameterCoefficient, ...], "coefficients of waves; 0 for those left out."
+    ] = ()
 
     @model_validator(mode="after")
     def _one_way(self) -> Self:
@@ -299,21 +270,16 @@ Table = Annotated[tuple[tuple[NonNegative, Signed], ...], Field(min_length=2, ma
 
 
 class SpeedDependence(Part):
-    """A parameter that follows the speed of rotation.
+    """A parameter that follows the speed of rotation."""
 
-    Attributes
-    ----------
-    path : str
-        ``<contact>.N0`` (or of a group), or ``excitation.amplitude``.
-    polynomial : tuple of float or None
-        c0, c1, c2 of c0 + c1 speed + c2 speed², the speed in 1/min; or
-    table : tuple of (float, float) or None
-        two or three rows [speed in 1/min, value], through which the polynomial of least degree goes.
-    """
-
-    path: str
-    polynomial: Coefficients | None = None
-    table: Table | None = None
+    path: Annotated[str, "``<contact>.N0`` (or of a group), or ``excitation.amplitude``."]
+    polynomial: Annotated[
+        Coefficients | None, "c0, c1, c2 of c0 + c1 speed + c2 speed², the speed in 1/min; or"
+    ] = None
+    table: Annotated[
+        Table | None,
+        "two or three rows [speed in 1/min, value], through which the polynomial of least degree goes.",
+    ] = None
 
     @model_validator(mode="after")
     def _one_way(self) -> Self:

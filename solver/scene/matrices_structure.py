@@ -39,85 +39,62 @@ LossFactor = Annotated[float, Field(strict=True, ge=0.0, le=10.0, allow_inf_nan=
 
 
 class Reduction(Part):
-    """What a large model was before it was reduced onto the DOFs in use when its scene was loaded.
+    """What a large model was before it was reduced onto the DOFs in use when its scene was loaded."""
 
-    Attributes
-    ----------
-    dofs : int
-        DOFs of the full model.
-    modes : int
-        Fixed-interface modes kept beside the DOFs in use.
-    highest_hz : float
-        Frequency of the highest of them, 0 if there is none.
-    """
-
-    dofs: Annotated[int, Field(strict=True, ge=1)]
-    modes: Annotated[int, Field(strict=True, ge=0)]
-    highest_hz: NonNegative
+    dofs: Annotated[int, Field(strict=True, ge=1), "DOFs of the full model."]
+    modes: Annotated[int, Field(strict=True, ge=0), "Fixed-interface modes kept beside the DOFs in use."]
+    highest_hz: Annotated[NonNegative, "Frequency of the highest of them, 0 if there is none."]
 
 
 class MatricesStructure(Part):
-    """A structure given by its matrices, or by its modes; with `sectors` one sector of a disk.
-
-    Attributes
-    ----------
-    M, K, C : Matrix
-        Mass [kg], stiffness [N/m] and damping [N s/m]; C may be left out. M is symmetric, K and C too unless
-        `symmetric` is false.
-    symmetric : bool
-        False: K and C may differ from their transposes (bearings, circulatory forces).
-    G : Matrix or None
-        Gyroscopic matrix, antisymmetric: C gains it times the speed of rotation [N s/m per rad/s].
-    K_omega2 : Matrix or None
-        Stiffness per squared speed of rotation, symmetric: K gains it times the speed squared [N/m per
-        (rad/s)²]; stiffening by centrifugal load and softening together.
-    modes : Modes
-        Mass-normalised modes in place of the matrices.
-    dofs : DofTable
-        Names of the DOFs in use, each with its row (zero-based); a list names all rows.
-    damping_ratio : float, list or None
-        Damping ratio of every mode, or of each from the lowest on (the last one also of those above), added
-        to the rest.
-    loss_factor : float
-        Structural damping: the stiffness is K (1 + i loss_factor) at every frequency above 0.
-    stiffness_proportional_damping, mass_proportional_damping : float
-        C gains this many K [s] and M [1/s].
-    reduction : Reduction or None
-        Set when the model was reduced on loading.
-    sectors : int or None
-        Number of sectors of the disk of which the matrices are one.
-    cyclic : CyclicBoundary or None
-        How the sectors are joined.
-    diameters : DiameterMatrices or None
-        In place of M, K and C: a reduced sector, its matrices at each nodal diameter that was built.
-    parts : PartMatrices or None
-        Stiffness [N/m] of parts of the sector, such as its blade, which `mistuning` may name; part of K.
-    mistuning : Mistuning or None
-        Factors that make the sectors differ.
-    outline : SectorOutline or None
-        Of the mesh of the sector, to be drawn; set where a deck or a reduced sector tells it.
-    """
+    """A structure given by its matrices, or by its modes; with `sectors` one sector of a disk."""
 
     kind: Literal["matrices"]
-    symmetric: bool = True  # read before the matrices it speaks of
-    M: Matrix | None = None
-    K: Matrix | None = None
-    C: Matrix | None = None
-    G: Matrix | None = None
-    K_omega2: Matrix | None = None
-    modes: NormalModes | None = None
-    dofs: DofTable
-    damping_ratio: Ratios | None = None
-    loss_factor: LossFactor = 0.0
-    stiffness_proportional_damping: NonNegative = 0.0
-    mass_proportional_damping: NonNegative = 0.0
-    reduction: Reduction | None = None
-    sectors: Sectors | None = None
-    cyclic: CyclicBoundary | None = None
-    diameters: DiameterMatrices | None = None
-    parts: PartMatrices | None = None
-    mistuning: Mistuning | None = None
-    outline: SectorOutline | None = None
+    symmetric: Annotated[
+        bool, "False: K and C may differ from their transposes (bearings, circulatory forces)."
+    ] = True  # read before the matrices it speaks of
+    M: Annotated[Matrix | None, "Mass [kg], symmetric."] = None
+    K: Annotated[Matrix | None, "Stiffness [N/m], symmetric unless `symmetric` is false."] = None
+    C: Annotated[Matrix | None, "Damping [N s/m], likewise; may be left out."] = None
+    G: Annotated[
+        Matrix | None,
+        "Gyroscopic matrix, antisymmetric: C gains it times the speed of rotation [N s/m per rad/s].",
+    ] = None
+    K_omega2: Annotated[
+        Matrix | None,
+        "Stiffness per squared speed of rotation, symmetric: K gains it times the speed squared [N/m per "
+        "(rad/s)²]; stiffening by centrifugal load and softening together.",
+    ] = None
+    modes: Annotated[NormalModes | None, "Mass-normalised modes in place of the matrices."] = None
+    dofs: Annotated[
+        DofTable, "Names of the DOFs in use, each with its row (zero-based); a list names all rows."
+    ]
+    damping_ratio: Annotated[
+        Ratios | None,
+        "Damping ratio of every mode, or of each from the lowest on (the last one also of those above), "
+        "added to the rest.",
+    ] = None
+    loss_factor: Annotated[
+        LossFactor, "Structural damping: the stiffness is K (1 + i loss_factor) at every frequency above 0."
+    ] = 0.0
+    stiffness_proportional_damping: Annotated[NonNegative, "C gains this many K [s]."] = 0.0
+    mass_proportional_damping: Annotated[NonNegative, "C gains this many M [1/s]."] = 0.0
+    reduction: Annotated[Reduction | None, "Set when the model was reduced on loading."] = None
+    sectors: Annotated[Sectors | None, "Number of sectors of the disk of which the matrices are one."] = None
+    cyclic: Annotated[CyclicBoundary | None, "How the sectors are joined."] = None
+    diameters: Annotated[
+        DiameterMatrices | None,
+        "In place of M, K and C: a reduced sector, its matrices at each nodal diameter that was built.",
+    ] = None
+    parts: Annotated[
+        PartMatrices | None,
+        "Stiffness [N/m] of parts of the sector, such as its blade, which `mistuning` may name; part of K.",
+    ] = None
+    mistuning: Annotated[Mistuning | None, "Factors that make the sectors differ."] = None
+    outline: Annotated[
+        SectorOutline | None,
+        "Of the mesh of the sector, to be drawn; set where a deck or a reduced sector tells it.",
+    ] = None
 
     @property
     def n_coordinates(self) -> int:

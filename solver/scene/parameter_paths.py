@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping
-from typing import Any, TypeVar, cast
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numpy as np
 
@@ -17,7 +17,6 @@ from solver.contacts.laws.parts import LawQuantity
 from solver.errors import SettingError
 from solver.results.units import number
 from solver.scene.bodies import paths as of_bodies
-from solver.scene.bodies.kinematics import HasParts
 from solver.scene.bodies.shape_parts import own_parts, shape_parameter, shape_paths
 from solver.scene.excitation import AMPLITUDE as AMPLITUDE
 from solver.scene.excitation import PHASE as PHASE
@@ -32,11 +31,14 @@ from solver.scene.structure_parameters import (
 )
 from solver.wording import listing, nearest
 
+if TYPE_CHECKING:
+    from solver.scene.scene import Scene
+
 FREQUENCY = "frequency"
 LEAST_HZ, MOST_HZ = 1e-100, 1e100  # their squares, times any mass or stiffness, are numbers
 
 
-_SceneT = TypeVar("_SceneT", bound="HasParts")
+_SceneT = TypeVar("_SceneT", bound="Scene")
 
 
 def check_frequency(name: str, frequency_hz: float) -> float:
@@ -55,14 +57,14 @@ def check_frequency(name: str, frequency_hz: float) -> float:
     return float(frequency_hz)
 
 
-def contact_paths(scene: HasParts) -> tuple[str, ...]:
+def contact_paths(scene: Scene) -> tuple[str, ...]:
     """Return every path of groups of contacts and of contacts, but for those that a shape makes."""
     own = _own_contacts(scene)
     groups = (f"{c.group}.{key}" for c in own if c.group for key in c.parameters)
     return (*groups, *(f"{c.name}.{key}" for c in own for key in c.parameters))
 
 
-def contact_parameter(scene: HasParts, path: str) -> SceneParameter | None:
+def contact_parameter(scene: Scene, path: str) -> SceneParameter | None:
     """Return what a path of a contact or a group of them is, if it is one."""
     owner, _, key = path.rpartition(".")
     members = [
@@ -90,7 +92,7 @@ def contact_parameter(scene: HasParts, path: str) -> SceneParameter | None:
     )  # fmt: skip
 
 
-def _own_contacts(scene: HasParts) -> tuple[AnyContact, ...]:
+def _own_contacts(scene: Scene) -> tuple[AnyContact, ...]:
     """The contacts that no shape makes."""
     return own_parts(scene)["contacts"] if scene.dampers else scene.contacts
 
@@ -110,19 +112,19 @@ OWNERS: tuple[tuple[_Lister, _Maker], ...] = (
 """For every kind of owner what lists its paths and what makes the parameter of one; the first that does."""
 
 
-def parameter_paths(scene: HasParts) -> tuple[str, ...]:
+def parameter_paths(scene: Scene) -> tuple[str, ...]:
     """Every path that has a value in the scene."""
     return tuple(dict.fromkeys(path for listed, _ in OWNERS for path in listed(scene)))
 
 
-def find_parameter(scene: HasParts, path: object) -> SceneParameter | None:
+def find_parameter(scene: Scene, path: object) -> SceneParameter | None:
     """Return what a path is in a scene; None of what is none, and of the frequency."""
     if not isinstance(path, str) or path == FREQUENCY:
         return None
     return next((found for _, make in OWNERS if (found := make(scene, path)) is not None), None)
 
 
-def parameter_of(scene: HasParts, path: object) -> SceneParameter:
+def parameter_of(scene: Scene, path: object) -> SceneParameter:
     """Return what a path is in a scene.
 
     Raises
@@ -136,19 +138,19 @@ def parameter_of(scene: HasParts, path: object) -> SceneParameter:
     return found
 
 
-def changed_quantities(scene: HasParts, path: str) -> tuple[LawQuantity, ...]:
+def changed_quantities(scene: Scene, path: str) -> tuple[LawQuantity, ...]:
     """What a path changes in each contact it acts on; nothing of a path that is no contact's."""
     found = find_parameter(scene, path)
     return () if found is None else found.quantities
 
 
-def changes_loads(scene: HasParts, path: str) -> bool:
+def changes_loads(scene: Scene, path: str) -> bool:
     """Whether constant forces depend on a path."""
     found = find_parameter(scene, path)
     return found is not None and found.pulls
 
 
-def follows_speed(scene: HasParts, path: str) -> str | None:
+def follows_speed(scene: Scene, path: str) -> str | None:
     """The parameter that follows the speed and that a path would set, itself or its group's; else None."""
     found = find_parameter(scene, path) if scene.with_speed else None
     for each in scene.with_speed:
@@ -158,7 +160,7 @@ def follows_speed(scene: HasParts, path: str) -> str | None:
     return None
 
 
-def check_path(scene: HasParts, path: str) -> None:
+def check_path(scene: Scene, path: str) -> None:
     """Raise SettingError unless `path` is ``frequency`` or a path of the scene.
 
     Along an engine-order line the ``speed`` is one too.
@@ -170,7 +172,7 @@ def check_path(scene: HasParts, path: str) -> None:
         raise _unknown(scene, path, FREQUENCY)
 
 
-def value(scene: HasParts, path: str) -> float:
+def value(scene: Scene, path: str) -> float:
     """Value of a path; of a group, its first member's."""
     return parameter_of(scene, path).get()
 
@@ -208,7 +210,7 @@ def _number(path: str, new: object) -> float:
     return number
 
 
-def _unknown(scene: HasParts, path: object, *besides: str) -> SettingError:
+def _unknown(scene: Scene, path: object, *besides: str) -> SettingError:
     if path == FREQUENCY:
         return SettingError("path", path, "must name a value of the scene; the frequency belongs to the run")
     known = (*besides, *parameter_paths(scene))

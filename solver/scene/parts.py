@@ -41,21 +41,13 @@ from solver.scene.matrices_structure import Reduction as Reduction
 
 
 class _Grouped(Part):
-    """A part whose value may be set together with others'.
+    """A part whose value may be set together with others'."""
 
-    Attributes
-    ----------
-    name : str or None
-        Makes it a parameter ``structure.<name>``.
-    group : str or None
-        Makes the value of the whole group a parameter ``structure.<group>``.
-    factor : float or None
-        The part's value as a multiple of its group's; 1 if left out.
-    """
-
-    name: MemberName | None = None
-    group: Name | None = None
-    factor: Positive | None = None
+    name: Annotated[MemberName | None, "Makes it a parameter ``structure.<name>``."] = None
+    group: Annotated[Name | None, "Makes the value of the whole group a parameter ``structure.<group>``."] = (
+        None
+    )
+    factor: Annotated[Positive | None, "The part's value as a multiple of its group's; 1 if left out."] = None
 
     @model_validator(mode="after")
     def _factor_of_a_group(self) -> Self:
@@ -67,18 +59,10 @@ class _Grouped(Part):
 
 
 class Mass(_Grouped):
-    """A point mass: one degree of freedom.
+    """A point mass: one degree of freedom."""
 
-    Attributes
-    ----------
-    dof : str
-        The degree of freedom it makes.
-    m : float
-        Mass [kg].
-    """
-
-    dof: str
-    m: Positive
+    dof: Annotated[str, "The degree of freedom it makes."]
+    m: Annotated[Positive, "Mass [kg]."]
 
 
 class Spring(Element, _Grouped):
@@ -131,16 +115,12 @@ class _MassTable:
 
 
 class _Structure(Part):
-    """Masses, springs and dashpots.
-
-    Attributes
-    ----------
-    loss_factor : float
-        Structural damping: the stiffness is K (1 + i loss_factor) at every frequency above 0.
-    """
+    """Masses, springs and dashpots."""
 
     stiffness_proportional_damping: NonNegative = 0.0
-    loss_factor: LossFactor = 0.0
+    loss_factor: Annotated[
+        LossFactor, "Structural damping: the stiffness is K (1 + i loss_factor) at every frequency above 0."
+    ] = 0.0
     masses: Annotated[tuple[Mass, ...], _MassTable]
     springs: tuple[Spring, ...] = ()
     dampers: tuple[Damper, ...] = ()
@@ -152,17 +132,14 @@ class _Structure(Part):
 
 
 class LumpedStructure(_Structure):
-    """A structure of point masses.
-
-    Attributes
-    ----------
-    damping_ratio : float or list
-        Damping ratio of every mode, or of each from the lowest on (the last one also of those above), added
-        to the rest; bodies have none.
-    """
+    """A structure of point masses."""
 
     kind: Literal["lumped"]
-    damping_ratio: Ratios | None = None
+    damping_ratio: Annotated[
+        Ratios | None,
+        "Damping ratio of every mode, or of each from the lowest on (the last one also of those above), "
+        "added to the rest; bodies have none.",
+    ] = None
 
     @property
     def sector_count(self) -> int:
@@ -179,18 +156,16 @@ class CyclicStructure(_Structure):
     """One sector of a disk of `sectors` sectors; ``X@next`` is DOF X of the next one.
 
     The sectors are equal but for `mistuning`.
-
-    Attributes
-    ----------
-    axis : (3,) tuple or None
-        Direction of the axis the sectors are turned about, through the origin of all positions; needed where
-        contacts with a position reach into the next sector, which is turned by 2 pi / sectors.
     """
 
     kind: Literal["cyclic"]
     sectors: Sectors
     mistuning: Mistuning | None = None
-    axis: Vector | None = None
+    axis: Annotated[
+        Vector | None,
+        "Direction of the axis the sectors are turned about, through the origin of all positions; needed "
+        "where contacts with a position reach into the next sector, which is turned by 2 pi / sectors.",
+    ] = None
 
     @property
     def sector_count(self) -> int:
@@ -211,20 +186,16 @@ class Observe(Part):
     """The observed DOF and the frequency band of interest [Hz].
 
     ``tip@3`` in a cyclic scene is the tip of sector 3, ``tip`` that of sector 0.
-
-    Attributes
-    ----------
-    relative : bool
-        Where a base moves: the motion relative to it, not the absolute one.
-    measure : "max_abs" or "half_peak_to_peak"
-        What amplitudes, peaks and limits are of: max|x|, or (max x − min x)/2, which does not depend on the
-        mean.
     """
 
-    dof: DofName
-    relative: bool = False
-    measure: Literal["max_abs", "half_peak_to_peak"] = "max_abs"
-    band: tuple[Positive, Positive]
+    dof: Annotated[DofName, 'The DOF whose amplitude counts; "tip@3" is the tip of sector 3.']
+    relative: Annotated[bool, "Where a base moves: the motion relative to it, not the absolute one."] = False
+    measure: Annotated[
+        Literal["max_abs", "half_peak_to_peak"],
+        "What amplitudes, peaks and limits are of: max|x|, or (max x − min x)/2, which does not depend on "
+        "the mean.",
+    ] = "max_abs"
+    band: Annotated[tuple[Positive, Positive], "Frequencies of interest [low, high] [Hz]."]
 
     @property
     def centred(self) -> bool:
@@ -241,21 +212,13 @@ class Observe(Part):
 
 
 class Recovered(Part):
-    """A row of a recovery matrix: a quantity that may be observed like a DOF.
+    """A row of a recovery matrix: a quantity that may be observed like a DOF."""
 
-    Attributes
-    ----------
-    name : str
-        What `observe` and time histories call it.
-    unit : str
-        Its unit, for example MPa; amplitudes are in it.
-    terms : table
-        DOF to its factor [unit/m].
-    """
-
-    name: MemberName
-    unit: Annotated[str, Field(min_length=1, max_length=20)]
-    terms: Shares
+    name: Annotated[MemberName, "What `observe` and time histories call it."]
+    unit: Annotated[
+        str, Field(min_length=1, max_length=20), "Its unit, for example MPa; amplitudes are in it."
+    ]
+    terms: Annotated[Shares, "DOF to its factor [unit/m]."]
 
 
 LAW_TAG = "law "  # begins the tags of the union: no key of a contact has a space

@@ -111,65 +111,63 @@ _CHECKED = "checked"
 class Scene(Part):
     """A structure with friction contacts, how it is excited and what is observed. Frozen, SI units.
 
-    Parameters
-    ----------
-    name : str
-        Name of the scene.
-    structure : LumpedStructure, CyclicStructure or MatricesStructure
-        Masses, springs and dashpots, or matrices.
-    contacts : tuple of Contact and the classes of other laws
-        What is not linear: friction contacts, rubbing contacts, gaps, nonlinear springs; may be empty.
-    excitation : tuple of Excitation
-        The forces, at least one. A single one may be given without a list.
-    observe : Observe
-        The DOF whose amplitude counts, and the band of frequencies [Hz].
-    bodies : tuple of Body
-        Rigid bodies, held by contacts and springs; their DOFs stand behind those of the structure.
-    nodes : tuple of Node
-        Positions of DOFs, for contacts with a place.
-    loads : tuple of Load
-        Constant forces.
-    dampers : tuple of Wedge, Cylinder, Asymmetric, SplitRing, Shroud and Patch
-        Dampers by their shape; their bodies and contacts are among `bodies` and `contacts`.
-    speed : float or None
-        Speed of rotation [1/min], by which bodies with a `radius_of_rotation` are loaded and on which
-        gyroscopic terms and K_omega2 depend.
-    speed_order : float or None
-        The speed follows the frequency f along an engine-order line: speed = 60 f / speed_order [1/min]; in
-        place of `speed`.
-    with_speed : tuple of SpeedDependence
-        Normal loads and the amplitude of the excitation that follow the speed.
-    couplings : tuple of Coupling, and of kinds from outside
-        Entries of stiffness and damping that are no springs and dashpots: not symmetric, gyroscopic.
-    aerodynamics : tuple of Aerodynamics
-        Influence of the gas between blades, of a cyclic structure.
-    recovery : tuple of Recovered
-        Stresses, strains and other sums of DOFs that may be observed.
-
-    Raises
-    ------
-    SceneError
-        Lists everything that is wrong, each with a JSON pointer.
+    What is wrong with one is a SceneError that lists everything, each with a JSON pointer.
     """
 
     # The union of the laws is made on first use, when every module that brings one can be imported.
     model_config = ConfigDict(defer_build=True)
 
-    name: Name
-    structure: Annotated[Structure, Field(discriminator="kind")]
-    contacts: tuple[ContactOfAnyLaw, ...] = ()
-    excitation: tuple[Excitation, ...]
-    observe: Observe
-    bodies: tuple[Body, ...] = ()
-    nodes: tuple[Node, ...] = ()
-    loads: tuple[Load, ...] = ()
-    dampers: tuple[AnyShape, ...] = ()
-    speed: NonNegative | None = None
-    speed_order: Positive | None = None
-    with_speed: tuple[SpeedDependence, ...] = ()
-    couplings: tuple[CouplingOfAnyKind, ...] = ()
-    aerodynamics: tuple[Aerodynamics, ...] = ()
-    recovery: tuple[Recovered, ...] = ()
+    name: Annotated[Name, "Name of the scene: letters, digits, - and _."]
+    structure: Annotated[
+        Structure,
+        Field(discriminator="kind"),
+        "What vibrates: masses, springs and dashpots, or matrices; `kind` says how it is given.",
+    ]
+    contacts: Annotated[
+        tuple[ContactOfAnyLaw, ...],
+        "What is not linear: friction contacts, rubbing contacts, gaps, nonlinear springs; may be empty.",
+    ] = ()
+    excitation: Annotated[
+        tuple[Excitation, ...],
+        "The forces, at least one. A single one may be given without a list.",
+    ]
+    observe: Annotated[Observe, "The DOF whose amplitude counts, and the band of frequencies [Hz]."]
+    bodies: Annotated[
+        tuple[Body, ...],
+        "Rigid bodies, held by contacts and springs; their DOFs stand behind those of the structure.",
+    ] = ()
+    nodes: Annotated[tuple[Node, ...], "Positions of DOFs, for contacts with a place."] = ()
+    loads: Annotated[tuple[Load, ...], "Constant forces."] = ()
+    dampers: Annotated[
+        tuple[AnyShape, ...],
+        "Dampers by their shape; their bodies and contacts are among `bodies` and `contacts`.",
+    ] = ()
+    speed: Annotated[
+        NonNegative | None,
+        "Speed of rotation [1/min], by which bodies with a `radius_of_rotation` are loaded and on which "
+        "gyroscopic terms and K_omega2 depend.",
+    ] = None
+    speed_order: Annotated[
+        Positive | None,
+        "The speed follows the frequency f along an engine-order line: speed = 60 f / speed_order [1/min]; "
+        "in place of `speed`.",
+    ] = None
+    with_speed: Annotated[
+        tuple[SpeedDependence, ...],
+        "Normal loads and the amplitude of the excitation that follow the speed.",
+    ] = ()
+    couplings: Annotated[
+        tuple[CouplingOfAnyKind, ...],
+        "Entries of stiffness and damping that are no springs and dashpots: not symmetric, gyroscopic.",
+    ] = ()
+    aerodynamics: Annotated[
+        tuple[Aerodynamics, ...],
+        "Influence of the gas between blades, of a cyclic structure.",
+    ] = ()
+    recovery: Annotated[
+        tuple[Recovered, ...],
+        "Stresses, strains and other sums of DOFs that may be observed.",
+    ] = ()
 
     def __repr__(self) -> str:
         """Say in a line what it is; `to_dict` has all of it."""

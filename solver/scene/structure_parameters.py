@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 from solver.contacts.fields import LARGEST
 from solver.errors import SettingError
-from solver.scene.bodies.kinematics import HasParts
 from solver.scene.parts import Damper, Mass, MatricesStructure, Spring, Structure
 from solver.scene.scene_parameter import SceneParameter, Slope, changed
+
+if TYPE_CHECKING:
+    from solver.scene.scene import Scene
 
 STRUCTURE = "structure."
 _LOSS = "loss_factor"
@@ -21,7 +23,7 @@ _TERMS = ("couplings", "aerodynamics")
 _Named = Mass | Spring | Damper
 
 
-def structure_paths(scene: HasParts) -> tuple[str, ...]:
+def structure_paths(scene: Scene) -> tuple[str, ...]:
     """Return the paths of groups, then of masses, springs and dashpots, as in the tables.
 
     Of a structure given by its matrices, the proportional damping is what can be changed.
@@ -37,7 +39,7 @@ def structure_paths(scene: HasParts) -> tuple[str, ...]:
     return tuple(STRUCTURE + name for name in dict.fromkeys(names))
 
 
-def structure_parameter(scene: HasParts, path: str) -> SceneParameter | None:
+def structure_parameter(scene: Scene, path: str) -> SceneParameter | None:
     """Return what a path of the structure is, if it is one."""
     if not path.startswith(STRUCTURE):
         return None
@@ -98,13 +100,13 @@ def _share(part: _Named, name: str) -> float:
     return 1.0 if part.factor is None else part.factor
 
 
-def term_paths(scene: HasParts) -> tuple[str, ...]:
+def term_paths(scene: Scene) -> tuple[str, ...]:
     """Return the paths of couplings and aerodynamic influence that have a name."""
     named = (each for table in _TERMS for each in getattr(scene, table) if each.name is not None)
     return tuple(dict.fromkeys(f"{each.name}.{key}" for each in named for key in each.PARAMETERS))
 
 
-def term_parameter(scene: HasParts, path: str) -> SceneParameter | None:
+def term_parameter(scene: Scene, path: str) -> SceneParameter | None:
     """Return what a path of a coupling or of aerodynamic influence is, if it is one."""
     owner, _, key = path.rpartition(".")
     tables = {table: getattr(scene, table) for table in _TERMS}

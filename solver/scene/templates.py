@@ -32,37 +32,25 @@ def rounded(value: float) -> float:
 
 
 class Template(BaseModel):
-    """A case: its fields are the questions, `tables` is the scene.
-
-    Attributes
-    ----------
-    name : str
-        Name of the scene.
-    frequency_hz : float
-        Natural frequency of the blade's mode without the contact [Hz].
-    modal_mass : float
-        Modal mass of this mode, its shape scaled to 1 where the contact is [kg].
-    damping_ratio : float
-        Damping ratio of this mode without the contact.
-    force : float
-        Amplitude of the exciting force on this mode [N].
-    kt : float
-        Tangential stiffness of the contact, of a face if it has several [N/m].
-    mu : float
-        Friction coefficient.
-    """
+    """A case: its fields are the questions, `tables` is the scene."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
     NAME: ClassVar[str]
     TITLE: ClassVar[str]
 
-    name: Word
-    frequency_hz: Size = 300.0
-    modal_mass: Size = 0.15
-    damping_ratio: Annotated[float, Field(strict=True, ge=0.0, lt=1.0)] = 0.001
-    force: Size = 20.0
-    kt: Size = 1.0e6
-    mu: Annotated[float, Field(strict=True, gt=0.0, le=2.0)] = 0.3
+    name: Annotated[Word, "Name of the scene."]
+    frequency_hz: Annotated[Size, "Natural frequency of the blade's mode without the contact [Hz]."] = 300.0
+    modal_mass: Annotated[
+        Size, "Modal mass of this mode, its shape scaled to 1 where the contact is [kg]."
+    ] = 0.15
+    damping_ratio: Annotated[
+        float,
+        Field(strict=True, ge=0.0, lt=1.0),
+        "Damping ratio of this mode without the contact.",
+    ] = 0.001
+    force: Annotated[Size, "Amplitude of the exciting force on this mode [N]."] = 20.0
+    kt: Annotated[Size, "Tangential stiffness of the contact, of a face if it has several [N/m]."] = 1.0e6
+    mu: Annotated[float, Field(strict=True, gt=0.0, le=2.0), "Friction coefficient."] = 0.3
 
     @property
     def stiffness(self) -> float:
@@ -104,24 +92,16 @@ class Template(BaseModel):
 
 
 class DiskTemplate(Template):
-    """A case of a disk of equal blades: one sector, excited by an engine order.
+    """A case of a disk of equal blades: one sector, excited by an engine order."""
 
-    Attributes
-    ----------
-    blades : int
-        Number of blades of the disk.
-    engine_order : int
-        Engine order of the excitation: so many periods of the force around the disk.
-    radius : float
-        Distance of the contact from the axis of rotation [m].
-    kn : float
-        Normal stiffness of a face [N/m].
-    """
-
-    blades: Annotated[int, Field(strict=True, ge=3, le=500)] = 24
-    engine_order: Annotated[int, Field(strict=True, ge=1, le=1000)] = 4
-    radius: Size = 0.35
-    kn: Size = 1.5e6
+    blades: Annotated[int, Field(strict=True, ge=3, le=500), "Number of blades of the disk."] = 24
+    engine_order: Annotated[
+        int,
+        Field(strict=True, ge=1, le=1000),
+        "Engine order of the excitation: so many periods of the force around the disk.",
+    ] = 4
+    radius: Annotated[Size, "Distance of the contact from the axis of rotation [m]."] = 0.35
+    kn: Annotated[Size, "Normal stiffness of a face [N/m]."] = 1.5e6
 
     @property
     def half_phase(self) -> float:
@@ -167,19 +147,16 @@ class DiskTemplate(Template):
 
 
 class GroundDamper(Template):
-    """A blade with one mode and a friction damper to the ground.
-
-    Attributes
-    ----------
-    normal_load : float or None
-        Mean normal load [N]. Left out: friction of the size of the force, which is near the best.
-    """
+    """A blade with one mode and a friction damper to the ground."""
 
     NAME: ClassVar[str] = "ground-damper"
     TITLE: ClassVar[str] = "Blade with a damper to the ground"
 
     name: Word = "my-blade"
-    normal_load: Size | None = None
+    normal_load: Annotated[
+        Size | None,
+        "Mean normal load [N]. Left out: friction of the size of the force, which is near the best.",
+    ] = None
 
     @property
     def stiffening(self) -> float:
@@ -200,24 +177,22 @@ class GroundDamper(Template):
 
 
 class ShroudContact(DiskTemplate):
-    """Blades whose shrouds touch their neighbours', pressed together by their twist.
-
-    Attributes
-    ----------
-    angle : float
-        Angle of the normal of the faces against the direction around the disk; 0: they press and do not rub
-        [rad].
-    normal_load : float or None
-        Normal load of a face at rest [N]. Left out: friction of the size of the force.
-    """
+    """Blades whose shrouds touch their neighbours', pressed together by their twist."""
 
     NAME: ClassVar[str] = "shroud"
     TITLE: ClassVar[str] = "Shrouds that touch"
 
     name: Word = "my-shroud"
-    angle: Annotated[float, Field(strict=True, ge=0.0, le=1.4)] = 1.1
+    angle: Annotated[
+        float,
+        Field(strict=True, ge=0.0, le=1.4),
+        "Angle of the normal of the faces against the direction around the disk; 0: they press and do not "
+        "rub [rad].",
+    ] = 1.1
     radius: Size = 0.5
-    normal_load: Size | None = None
+    normal_load: Annotated[
+        Size | None, "Normal load of a face at rest [N]. Left out: friction of the size of the force."
+    ] = None
 
     @property
     def stiffening(self) -> float:
@@ -247,21 +222,14 @@ _ON_A_LINE, _ON_A_FACE = 1, 2
 
 
 class _Body(DiskTemplate):
-    """A damper with a body, in the plane of the disk.
+    """A damper with a body, in the plane of the disk."""
 
-    Attributes
-    ----------
-    damper_mass : float
-        Mass of the damper that belongs to one blade [kg].
-    width : float
-        Width of the damper around the disk; of a cylinder its diameter [m].
-    speed : float
-        Speed of rotation, which presses the damper outward with its mass times radius times Ω² [1/min].
-    """
-
-    damper_mass: Size = 0.004
-    width: Size = 0.012
-    speed: Size = 4000.0
+    damper_mass: Annotated[Size, "Mass of the damper that belongs to one blade [kg]."] = 0.004
+    width: Annotated[Size, "Width of the damper around the disk; of a cylinder its diameter [m]."] = 0.012
+    speed: Annotated[
+        Size,
+        "Speed of rotation, which presses the damper outward with its mass times radius times Ω² [1/min].",
+    ] = 4000.0
 
     @property
     def inclination(self) -> float:
@@ -316,22 +284,16 @@ class _Body(DiskTemplate):
 
 
 class PlatformDamper(_Body):
-    """A damper between the platforms of neighbouring blades, pressed outward by rotation.
-
-    Attributes
-    ----------
-    shape : str
-        Shape of the damper.
-    angle : float
-        Inclination of the faces; 0 is flat [rad].
-    """
+    """A damper between the platforms of neighbouring blades, pressed outward by rotation."""
 
     NAME: ClassVar[str] = "platform-damper"
     TITLE: ClassVar[str] = "Damper under the platforms"
 
     name: Word = "my-platform-damper"
-    shape: Literal["wedge", "cylinder"] = "wedge"
-    angle: Annotated[float, Field(strict=True, ge=0.0, le=1.2)] = 0.5
+    shape: Annotated[Literal["wedge", "cylinder"], "Shape of the damper."] = "wedge"
+    angle: Annotated[
+        float, Field(strict=True, ge=0.0, le=1.2), "Inclination of the faces; 0 is flat [rad]."
+    ] = 0.5
 
     @property
     def inclination(self) -> float:

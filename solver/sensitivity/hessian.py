@@ -101,56 +101,30 @@ def no_hessian(n: int) -> AmplitudeHessian:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Directions:
-    """What each of P parameters changes; the first is ω, the others are paths.
+    """What each of P parameters changes; the first is ω, the others are paths."""
 
-    Attributes
-    ----------
-    slopes, loads : (P, nc, COLUMNS), (P, nc, 3) array
-        Derivatives of the contact table and of the loads.
-    level, phase : (P,) array
-        Relative change of all forces, and turn of all that are not static [rad].
-    """
-
-    slopes: Real
-    loads: Real
-    level: Real
-    phase: Real
+    slopes: Annotated[Real, "Derivatives of the contact table, (P, nc, COLUMNS)."]
+    loads: Annotated[Real, "Derivatives of the loads, (P, nc, 3)."]
+    level: Annotated[Real, "Relative change of all forces, (P,)."]
+    phase: Annotated[Real, "Turn of all that are not static [rad], (P,)."]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Responses:
-    """The solution and its derivatives along each of P parameters.
+    """The solution and its derivatives along each of P parameters."""
 
-    Attributes
-    ----------
-    x : (nk, N) array
-        The whole motion of each harmonic.
-    dx : (P, nk, N) array
-        Its derivatives.
-    dU : (P, nc, n) array
-        Those of the slip motions [m].
-    """
-
-    x: Complex
-    dx: Complex
-    dU: Real
+    x: Annotated[Complex, "The whole motion of each harmonic, (nk, N)."]
+    dx: Annotated[Complex, "Its derivatives, (P, nk, N)."]
+    dU: Annotated[Real, "Those of the slip motions [m], (P, nc, n)."]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Adjoint:
-    """What the amplitude weighs: the weights of the contact forces, and the adjoint motion of each harmonic.
+    """What the amplitude weighs: weights of the contact forces, the adjoint motion of each harmonic."""
 
-    Attributes
-    ----------
-    w : (nc, n) array
-    y : (nk, N) array
-    turn : (nk,) array
-        ξ e^{ikτ} at the extremum.
-    """
-
-    w: Real
-    y: Complex
-    turn: Complex
+    w: Annotated[Real, "(nc, n)."]
+    y: Annotated[Complex, "(nk, N)."]
+    turn: Annotated[Complex, "ξ e^{ikτ} at the extremum, (nk,)."]
 
 
 def lagrangian_hessian(

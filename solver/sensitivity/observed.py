@@ -14,6 +14,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
+from typing import Annotated
 
 import numpy as np
 
@@ -42,18 +43,15 @@ class Quantity(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Observed:
-    """What is measured at a solution.
+    """What is measured at a solution."""
 
-    Attributes
-    ----------
-    values : (1,) array, of a complex amplitude (2,) its real and imaginary part [m].
-    slopes : (1 or 2, n_paths) array, their derivatives at a fixed frequency [m per unit of each].
-    states : (n_contacts,) array of state codes, see `solver.response.contact_response.state_of`.
-    """
-
-    values: Real
-    slopes: Real
-    states: Integer
+    values: Annotated[Real, "(1,) array, of a complex amplitude (2,) its real and imaginary part [m]."]
+    slopes: Annotated[
+        Real, "(1 or 2, n_paths) array, their derivatives at a fixed frequency [m per unit of each]."
+    ]
+    states: Annotated[
+        Integer, "(n_contacts,) array of state codes, see `solver.response.contact_response.state_of`."
+    ]
 
 
 class ObservedSensitivities(Sensitivities):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
@@ -38,19 +39,14 @@ _TAIL = 4
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DenseBytes:
-    """The memory that dense matrices take [bytes].
+    """The memory that dense matrices take [bytes]."""
 
-    Attributes
-    ----------
-    structure : int
-        Of the linear part: the matrices, their modes, and what finding these takes.
-    balance : int
-        Of the balance, of the larger one in which its error is estimated, and of what resonances are looked
-        for in.
-    """
-
-    structure: int
-    balance: int
+    structure: Annotated[int, "Of the linear part: the matrices, their modes, and what finding these takes."]
+    balance: Annotated[
+        int,
+        "Of the balance, of the larger one in which its error is estimated, and of what resonances are "
+        "looked for in.",
+    ]
 
     @property
     def total(self) -> int:

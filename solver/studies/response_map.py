@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 
@@ -99,23 +100,15 @@ def response_map(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Strip:
-    """Some consecutive rows of a map.
+    """Some consecutive rows of a map."""
 
-    Attributes
-    ----------
-    first : int
-        Row of the map that is its first.
-    values : (rows, F, ROW_VALUES) array
-        Of `solver.studies.kernels.map_rows`; NaN where no solution was found.
-    stopped : bool
-        Whether it was left before its last row.
-    """
-
-    first: int
-    values: Real
+    first: Annotated[int, "Row of the map that is its first."]
+    values: Annotated[
+        Real, "Of `solver.studies.kernels.map_rows`, (rows, F, ROW_VALUES); NaN where no solution was found."
+    ]
     newton_iterations: int
     seconds: float
-    stopped: bool = False
+    stopped: Annotated[bool, "Whether it was left before its last row."] = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -123,21 +116,12 @@ class MapGrid:
     """The points of a map, in strips of rows that need nothing of each other.
 
     The division depends on the map alone, so that its numbers do not depend on who solves which strip.
-
-    Attributes
-    ----------
-    scene : Scene
-        With the values that stay fixed.
-    scale : Scale
-        The parameter with its range.
-    steps, frequencies : int
-        Points each way.
     """
 
-    scene: Scene
-    scale: Scale
-    steps: int
-    frequencies: int
+    scene: Annotated[Scene, "With the values that stay fixed."]
+    scale: Annotated[Scale, "The parameter with its range."]
+    steps: Annotated[int, "Points that way."]
+    frequencies: Annotated[int, "Points the other way."]
     harmonics: int
     effects: Effects | None
 

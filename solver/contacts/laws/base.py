@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any, ClassVar, Self, cast
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self, cast
 
 from pydantic import model_validator
 
@@ -30,17 +30,7 @@ _ALONG = {"between": TANGENT_1, "between_second": TANGENT_2, "normal_between": N
 
 
 class AnyContact(Element, InSpace):
-    """What all contacts have.
-
-    Attributes
-    ----------
-    name : str
-        Name in parameter paths.
-    between : (str, str)
-        Its ends; the relative motion is x(first) - x(second), and the force resists it.
-    group : str or None
-        A name that sets several contacts at once in parameter paths.
-    """
+    """What all contacts have."""
 
     LAW: ClassVar[str]
     """The word of `law` in a scene."""
@@ -76,8 +66,8 @@ class AnyContact(Element, InSpace):
     NORMAL_PORT: ClassVar[int | None] = None
     """The port whose motion changes the normal load, by the stiffness it begins with."""
 
-    name: MemberName
-    group: Name | None = None
+    name: Annotated[MemberName, "Name in parameter paths."]
+    group: Annotated[Name | None, "A name that sets several contacts at once in parameter paths."] = None
 
     @model_validator(mode="after")
     def _a_motion_each(self) -> Self:

@@ -32,19 +32,8 @@ class SlidesOnALine(FrictionContact):
 class Contact(SlidesOnALine):
     """A friction contact: elastic Coulomb with a given normal load N(t) = N0 + N1 cos(omega t + N1_phase).
 
-    Attributes
-    ----------
-    kt : float
-        Tangential contact stiffness [N/m]; infinite of a rigid contact, see `solver.response.exact`.
-    mu : float
-        Friction coefficient.
-    N0 : float
-        Mean normal load [N].
-    N1, N1_ratio : float or None
-        Amplitude of the load [N], or that amplitude as a multiple of N0; one of them or neither (no
-        variation). `N1_value` is the amplitude whichever was given. Where N1 > N0 the contact opens.
-    N1_phase : float
-        Phase of the load [rad].
+    Of `N1` and `N1_ratio` one is given, or neither (no variation); `N1_value` is the amplitude whichever was.
+    Where N1 > N0 the contact opens. With an infinite `kt` it is rigid, see `solver.response.exact`.
     """
 
     LAW: ClassVar[str] = "coulomb"

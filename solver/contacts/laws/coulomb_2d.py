@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from solver.contacts.fields import Between, NonNegative, Real, Samples
 from solver.contacts.kernels import columns
@@ -17,20 +17,17 @@ if TYPE_CHECKING:
 
 
 class SlidesInAPlane(FrictionContact):
-    """Friction in two directions.
-
-    Attributes
-    ----------
-    between_second : (str, str) or None
-        The ends of the motion in the second direction. Left out where `normal` is given.
-    limit : "circle", "box" or None
-        |T| <= mu N for the whole force (also if left out), or each direction by itself.
-    """
+    """Friction in two directions."""
 
     RUBBING: ClassVar[tuple[int, ...]] = (0, 1)
 
-    between_second: Between | None = None
-    limit: Literal["circle", "box"] | None = None
+    between_second: Annotated[
+        Between | None, "The ends of the motion in the second direction. Left out where `normal` is given."
+    ] = None
+    limit: Annotated[
+        Literal["circle", "box"] | None,
+        "|T| <= mu N for the whole force (also if left out), or each direction by itself.",
+    ] = None
 
     @property
     def kernel(self) -> str:
@@ -114,13 +111,7 @@ class SlidesInAPlane(FrictionContact):
 
 
 class PlanarContact(SlidesInAPlane):
-    """A friction contact that slides in two directions.
-
-    Attributes
-    ----------
-    samples : int or None
-        Read and left aside: the samples a period of the circular limit when it was not yet exact to rounding.
-    """
+    """A friction contact that slides in two directions."""
 
     LAW: ClassVar[str] = "coulomb-2d"
     FORCE: ClassVar[str] = "friction in two directions with one limit"
@@ -130,7 +121,11 @@ class PlanarContact(SlidesInAPlane):
 
     law: Literal["coulomb-2d"]
     N0: NonNegative
-    samples: Samples | None = None
+    samples: Annotated[
+        Samples | None,
+        "Read and left aside: the samples a period of the circular limit when it was not yet exact to "
+        "rounding.",
+    ] = None
 
     @property
     def evaluation(self) -> str:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import model_validator
 
-from solver.contacts.fields import Between, Positive, Real
+from solver.contacts.fields import Between, Positive, Real, Signed
 from solver.contacts.kernels import columns
 from solver.contacts.laws.coulomb_2d import SlidesInAPlane
 from solver.contacts.laws.friction import FrictionContact
@@ -20,22 +20,6 @@ class SpaceContact(SlidesInAPlane):
     """A contact in space: two directions it slides in and, if given, a normal motion v that changes the load.
 
     N = N0 + N1 cos(omega t + N1_phase) + kn v; the friction force is 0 and the normal force too while N <= 0.
-
-    Attributes
-    ----------
-    normal_between : (str, str) or None
-        The ends of the normal motion v = x(first) - x(second), v > 0 presses; None: the load is given. Left
-        out where `normal` is given: the load then moves if there is a `kn`.
-    kt, kt_second : float
-        Tangential stiffness of the first and of the second direction [N/m]; the second is the first's if
-        left out.
-    kn : float or None
-        Normal contact stiffness [N/m]; given together with `normal_between` or `normal`.
-    N0 : float
-        Mean load, or load at v = 0 [N]; -kn * gap for an initial gap.
-    prestressed : bool
-        Whether v counts from the state in which a positive N0 is in equilibrium already: the force on the
-        normal pair is then max(N, 0) - max(N0, 0). Else it is the whole max(N, 0).
     """
 
     LAW: ClassVar[str] = "coulomb-3d"
@@ -53,10 +37,6 @@ class SpaceContact(SlidesInAPlane):
             column=columns.KN, unit="N/m", least=0.0, wanted="must be a number > 0 and <= 1e15 [N/m]"
         ),
     }  # fmt: skip
-    WORDS: ClassVar[Mapping[str, str]] = {
-        **FrictionContact.WORDS,
-        "N0": "Mean load, or load at v = 0 [N]; -kn times the gap for an initial gap.",
-    }
     END_KEYS: ClassVar[tuple[str, ...]] = ("between", "between_second", "normal_between")
     NEEDED_ENDS: ClassVar[tuple[str, ...]] = ("between_second",)
     HELD: ClassVar[tuple[RestStiffness, ...]] = (
@@ -65,10 +45,25 @@ class SpaceContact(SlidesInAPlane):
     )  # fmt: skip
 
     law: Literal["coulomb-3d"]
-    normal_between: Between | None = None
-    kt_second: Positive | None = None
-    kn: Positive | None = None
-    prestressed: bool = False
+    normal_between: Annotated[
+        Between | None,
+        "The ends of the normal motion v = x(first) - x(second), v > 0 presses; None: the load is given. "
+        "Left out where `normal` is given: the load then moves if there is a `kn`.",
+    ] = None
+    N0: Annotated[Signed, "Mean load, or load at v = 0 [N]; -kn times the gap for an initial gap."]
+    kt_second: Annotated[
+        Positive | None,
+        "Tangential stiffness of the first and of the second direction [N/m]; the second is the first's if "
+        "left out.",
+    ] = None
+    kn: Annotated[
+        Positive | None, "Normal contact stiffness [N/m]; given together with `normal_between` or `normal`."
+    ] = None
+    prestressed: Annotated[
+        bool,
+        "Whether v counts from the state in which a positive N0 is in equilibrium already: the force on "
+        "the normal pair is then max(N, 0) - max(N0, 0). Else it is the whole max(N, 0).",
+    ] = False
 
     @model_validator(mode="after")
     def _load_moves_or_is_given(self) -> SpaceContact:

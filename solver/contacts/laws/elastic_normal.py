@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
-from solver.contacts.fields import Between, Stiffness
+from solver.contacts.fields import Between, Signed, Stiffness
 from solver.contacts.kernels import columns
 from solver.contacts.laws.coulomb import SlidesOnALine
 from solver.contacts.laws.friction import FrictionContact
@@ -18,19 +18,6 @@ class ElasticNormalContact(SlidesOnALine):
     """A rubbing contact: the load moves with the parts, N = N0 + N1 cos(omega t + N1_phase) + kn v.
 
     The friction is that of `Contact`, without force while N <= 0; max(N, 0) acts on the normal pair.
-
-    Attributes
-    ----------
-    normal_between : (str, str) or None
-        The ends of the normal motion v = x(first) - x(second); v > 0 presses. Left out where `normal` is
-        given.
-    kn : float
-        Normal contact stiffness [N/m].
-    N0 : float
-        Load [N] at v = 0; -kn * gap for an initial gap.
-    prestressed : bool
-        Whether v counts from the state in which a positive N0 is in equilibrium already: the force on the
-        normal pair is then max(N, 0) - max(N0, 0). Else it is the whole max(N, 0).
     """
 
     LAW: ClassVar[str] = "elastic-normal"
@@ -50,10 +37,6 @@ class ElasticNormalContact(SlidesOnALine):
             column=columns.KN, unit="N/m", least=0.0, wanted="must be a number > 0 and <= 1e15 [N/m], or inf"
         ),
     }  # fmt: skip
-    WORDS: ClassVar[Mapping[str, str]] = {
-        **FrictionContact.WORDS,
-        "N0": "Load [N] at v = 0; -kn times the gap for an initial gap.",
-    }
     END_KEYS: ClassVar[tuple[str, ...]] = ("between", "normal_between")
     NEEDED_ENDS: ClassVar[tuple[str, ...]] = ("normal_between",)
     HELD: ClassVar[tuple[RestStiffness, ...]] = (
@@ -63,10 +46,19 @@ class ElasticNormalContact(SlidesOnALine):
     OPENS: ClassVar[bool] = True
 
     law: Literal["elastic-normal"]
-    normal_between: Between | None = None
+    normal_between: Annotated[
+        Between | None,
+        "The ends of the normal motion v = x(first) - x(second); v > 0 presses. Left out where `normal` is "
+        "given.",
+    ] = None
+    N0: Annotated[Signed, "Load [N] at v = 0; -kn times the gap for an initial gap."]
     kt: Stiffness
-    kn: Stiffness
-    prestressed: bool = False
+    kn: Annotated[Stiffness, "Normal contact stiffness [N/m]."]
+    prestressed: Annotated[
+        bool,
+        "Whether v counts from the state in which a positive N0 is in equilibrium already: the force on "
+        "the normal pair is then max(N, 0) - max(N0, 0). Else it is the whole max(N, 0).",
+    ] = False
 
     @property
     def moving(self) -> tuple[float, bool]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, ClassVar, Self, cast
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self, cast
 
 import numpy as np
 from pydantic import ConfigDict, Field, field_validator, model_validator
@@ -37,11 +37,6 @@ class FrictionContact(AnyContact):
 
     A scene may give the load as a list, `load = [N0, {order, amplitude, phase}, ...]`: N0, N1 and N1_phase
     are then read from its first entries, so that both ways of writing give equal contacts.
-
-    Attributes
-    ----------
-    higher_load : tuple of LoadHarmonic or None
-        The harmonics of the load from the second on, ascending.
     """
 
     model_config = ConfigDict(serialize_by_alias=True)
@@ -72,25 +67,23 @@ class FrictionContact(AnyContact):
         ),
     }  # fmt: skip
     WORDS: ClassVar[Mapping[str, str]] = {
-        "kt": "Tangential contact stiffness [N/m].",
-        "mu": "Friction coefficient.",
-        "N0": "Mean normal load [N].",
-        "N1": "Amplitude of the normal load [N]; in place of N1_ratio.",
-        "N1_ratio": "Amplitude of the normal load as a multiple of N0; in place of N1.",
-        "N1_phase": "Phase of the normal load [rad]: N0 + N1 cos(ωt + N1_phase).",
         "load": "The normal load as a Fourier list: its mean [N], which may stand as N0 instead, then for "
         "each harmonic amplitude cos(order ωt + phase) a table of `order`, `amplitude` [N], `phase` [rad].",
     }
     HELD: ClassVar[tuple[RestStiffness, ...]] = (RestStiffness(columns.KT),)
     RUBBING: ClassVar[tuple[int, ...]] = (0,)
 
-    kt: Positive
-    mu: Friction
-    N0: Signed
-    N1: Signed | None = None
-    N1_ratio: Signed | None = None
-    N1_phase: Angle = 0.0
-    higher_load: tuple[LoadHarmonic, ...] | None = Field(default=None, alias="load")
+    kt: Annotated[Positive, "Tangential contact stiffness [N/m]."]
+    mu: Annotated[Friction, "Friction coefficient."]
+    N0: Annotated[Signed, "Mean normal load [N]."]
+    N1: Annotated[Signed | None, "Amplitude of the normal load [N]; in place of N1_ratio."] = None
+    N1_ratio: Annotated[
+        Signed | None, "Amplitude of the normal load as a multiple of N0; in place of N1."
+    ] = None
+    N1_phase: Annotated[Angle, "Phase of the normal load [rad]: N0 + N1 cos(ωt + N1_phase)."] = 0.0
+    higher_load: Annotated[
+        tuple[LoadHarmonic, ...] | None, "The harmonics of the load from the second on, ascending."
+    ] = Field(default=None, alias="load")
 
     @model_validator(mode="before")
     @classmethod

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 import numpy as np
 
@@ -19,15 +19,7 @@ if TYPE_CHECKING:
 
 
 class GapSpring(AnyContact):
-    """A spring on one side: F = k max(u - gap, 0).
-
-    Attributes
-    ----------
-    k : float
-        Stiffness once the gap is closed [N/m].
-    gap : float
-        Gap [m]; negative if the spring is pressed at rest.
-    """
+    """A spring on one side: F = k max(u - gap, 0)."""
 
     LAW: ClassVar[str] = "gap"
     FORCE: ClassVar[str] = "`k max(u - gap, 0)`"
@@ -44,8 +36,8 @@ class GapSpring(AnyContact):
     OPENS: ClassVar[bool] = True
 
     law: Literal["gap"]
-    k: NonNegative
-    gap: Signed
+    k: Annotated[NonNegative, "Stiffness once the gap is closed [N/m]."]
+    gap: Annotated[Signed, "Gap [m]; negative if the spring is pressed at rest."]
 
     @property
     def stiffnesses(self) -> tuple[float, ...]:

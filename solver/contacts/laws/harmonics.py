@@ -24,21 +24,11 @@ Order = Annotated[int, Field(strict=True, ge=1, le=MOST_ORDER)]
 
 
 class LoadHarmonic(Part):
-    """A harmonic of a normal load: amplitude * cos(order * omega t + phase).
+    """A harmonic of a normal load: amplitude * cos(order * omega t + phase)."""
 
-    Attributes
-    ----------
-    order : int
-        Its multiple of the frequency.
-    amplitude : float
-        Amplitude [N].
-    phase : float
-        Phase [rad].
-    """
-
-    order: Order
-    amplitude: Signed
-    phase: Angle = 0.0
+    order: Annotated[Order, "Its multiple of the frequency."]
+    amplitude: Annotated[Signed, "Amplitude [N]."]
+    phase: Annotated[Angle, "Phase [rad]."] = 0.0
 
     def in_sector(self, turn: float, *, standing: bool) -> LoadHarmonic:
         """Return it in a sector that the wave's first harmonic reaches an angle later [rad]."""

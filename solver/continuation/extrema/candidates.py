@@ -8,6 +8,7 @@ sweep shows it for nothing.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
@@ -21,24 +22,12 @@ _HIDDEN = 1e-9  # relative distance below max|x| from which a curve is hidden
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rival:
-    """A peak, as near as the points of the branch are.
+    """A peak, as near as the points of the branch are."""
 
-    Attributes
-    ----------
-    value : float
-        The higher of the two points it lies between [m].
-    omega : float
-        rad/s.
-    solution : (n_unknowns,) array
-        Slip motions there [m].
-    sign : float
-        1 for a peak of max x, −1 for one of −min x.
-    """
-
-    value: float
-    omega: float
-    solution: Real
-    sign: float
+    value: Annotated[float, "The higher of the two points it lies between [m]."]
+    omega: Annotated[float, "rad/s."]
+    solution: Annotated[Real, "Slip motions there [m], (n_unknowns,)."]
+    sign: Annotated[float, "1 for a peak of max x, −1 for one of −min x."]
 
 
 def rivals(branch: Branch) -> list[Rival]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise, product
-from typing import Protocol
+from typing import Annotated, Protocol
 
 import numpy as np
 
@@ -18,19 +18,11 @@ _UNKNOWN = -2  # row of a node whose stiffness was not asked for
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Resonance:
-    """A resonance between two nodes.
+    """A resonance between two nodes."""
 
-    Attributes
-    ----------
-    at, half_width : float
-        ω [rad/s].
-    harmonic : int
-        Number of the harmonic in `System.ks` that meets it.
-    """
-
-    at: float
-    half_width: float
-    harmonic: int
+    at: Annotated[float, "ω [rad/s]."]
+    half_width: Annotated[float, "Likewise [rad/s]."]
+    harmonic: Annotated[int, "Number of the harmonic in `System.ks` that meets it."]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

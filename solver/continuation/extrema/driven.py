@@ -17,6 +17,7 @@ the least of √(Σ|·|²) and √(‖·‖₁ ‖·‖∞). No eigenvalue is ne
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
@@ -30,20 +31,14 @@ _MOST_ENTRIES = 1_000_000  # of the matrices that are looked at together
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Way:
-    """Ways between two points each, S of them, for one harmonic each.
+    """Ways between two points each, S of them, for one harmonic each."""
 
-    Attributes
-    ----------
-    numbers : (S,) of the harmonics in `System.ks`, not the mean.
-    at : (S, 2) ω at both ends [rad/s].
-    stiffness : (S, 2, nc, nc) of the contacts against small changes of the harmonic [N/m].
-    forces : (S, 2, nc) amplitudes of it [N], less what the shift carries.
-    """
-
-    numbers: Integer
-    at: Real
-    stiffness: Complex
-    forces: Complex
+    numbers: Annotated[Integer, "(S,) of the harmonics in `System.ks`, not the mean."]
+    at: Annotated[Real, "(S, 2) ω at both ends [rad/s]."]
+    stiffness: Annotated[
+        Complex, "(S, 2, nc, nc) of the contacts against small changes of the harmonic [N/m]."
+    ]
+    forces: Annotated[Complex, "(S, 2, nc) amplitudes of it [N], less what the shift carries."]
 
     def only(self, some: Integer | Flags) -> Way:
         """Return some of them."""

@@ -16,6 +16,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import pairwise
+from typing import Annotated
 
 import numpy as np
 
@@ -51,51 +52,30 @@ MOST_NODES = 6000  # that one search adds
 
 @dataclass(slots=True)
 class Search:
-    """What a search did.
+    """What a search did."""
 
-    Attributes
-    ----------
-    nodes : list of Node
-        The branch with what was added.
-    solved : int
-        Resonances that were solved for.
-    left : list of (float, str)
-        Places (λ) where a resonance that matters was not solved for, and why.
-    unseen : float
-        Highest amplitude predicted at the resonances that do not matter [m].
-    """
-
-    nodes: list[PointRow]
-    solved: int = 0
-    left: list[tuple[float, str]] = field(default_factory=list)
-    unseen: float = 0.0
+    nodes: Annotated[list[PointRow], "The branch with what was added."]
+    solved: Annotated[int, "Resonances that were solved for."] = 0
+    left: Annotated[
+        list[tuple[float, str]], "Places (λ) where a resonance that matters was not solved for, and why."
+    ] = field(default_factory=list)
+    unseen: Annotated[float, "Highest amplitude predicted at the resonances that do not matter [m]."] = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Intervals:
-    """Intervals between neighbouring nodes of a branch: P of them, N nodes.
+    """Intervals between neighbouring nodes of a branch: P of them, N nodes."""
 
-    Attributes
-    ----------
-    begin : (P,) which node each begins at.
-    numbers : (N,) of the nodes in their table.
-    solutions : (N, nt + 1) motions, λ last.
-    observed, states : (N, …) see `solver.continuation.branch.Branch`.
-    amplitude : (N,) of the nodes [m].
-    at : (N,) λ of the nodes [rad/s].
-    low, high, length : (P,) of each [rad/s].
-    """
-
-    begin: Integer
-    numbers: Integer
-    solutions: Real
-    observed: Real
-    states: Integer
-    amplitude: Real
-    at: Real
-    low: Real
-    high: Real
-    length: Real
+    begin: Annotated[Integer, "(P,) which node each begins at."]
+    numbers: Annotated[Integer, "(N,) of the nodes in their table."]
+    solutions: Annotated[Real, "(N, nt + 1) motions, λ last."]
+    observed: Annotated[Real, "(N, …), see `solver.continuation.branch.Branch`."]
+    states: Annotated[Integer, "Likewise."]
+    amplitude: Annotated[Real, "(N,) of the nodes [m]."]
+    at: Annotated[Real, "(N,) λ of the nodes [rad/s]."]
+    low: Annotated[Real, "Lower end of each [rad/s], (P,)."]
+    high: Annotated[Real, "Upper end [rad/s], (P,)."]
+    length: Annotated[Real, "Length [rad/s], (P,)."]
 
     @classmethod
     def of(cls, nodes: list[PointRow], begin: Integer, table: NodeTable) -> _Intervals:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
@@ -29,22 +30,16 @@ _MOVES = 1e-7  # of the largest change of a motion: less is none
 
 @dataclass(frozen=True, slots=True)
 class Panels:
-    """The orbit at the nodes of all panels, and as series: all that is read off it.
+    """The orbit at the nodes of all panels, and as series: all that is read off it."""
 
-    Attributes
-    ----------
-    tau, weights : (m,) nodes and weights; w : (m, nw) states there; modes : the mode of each panel.
-    series : (panels, DEGREE + 1, nw) by the share of the panel; starts, widths : (panels,) [rad].
-    """
-
-    tau: Real
-    weights: Real
-    w: Real
-    modes: list[Mode]
+    tau: Annotated[Real, "Nodes, (m,)."]
+    weights: Annotated[Real, "Their weights, (m,)."]
+    w: Annotated[Real, "States there, (m, nw)."]
+    modes: Annotated[list[Mode], "The mode of each panel."]
     states: list[MemberState]
-    series: Real
-    starts: Real
-    widths: Real
+    series: Annotated[Real, "(panels, DEGREE + 1, nw) by the share of the panel."]
+    starts: Annotated[Real, "(panels,) [rad]."]
+    widths: Annotated[Real, "Likewise."]
 
     def values(self, rows: Real) -> Real:
         """Return rows of a mode, one a panel (panels, nw), at all nodes."""

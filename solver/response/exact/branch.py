@@ -52,20 +52,12 @@ class Point:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Orbits:
-    """The exact orbits of a scene as a function of one parameter.
+    """The exact orbits of a scene as a function of one parameter."""
 
-    Attributes
-    ----------
-    scene : what vibrates, with the values that stay fixed.
-    parameter : what is varied.
-    n_harmonics : how many are given of each motion, at least.
-    frequency_hz : NaN if it is the parameter.
-    """
-
-    scene: Scene
-    parameter: Parameter
-    n_harmonics: int
-    frequency_hz: float
+    scene: Annotated[Scene, "What vibrates, with the values that stay fixed."]
+    parameter: Annotated[Parameter, "What is varied."]
+    n_harmonics: Annotated[int, "How many are given of each motion, at least."]
+    frequency_hz: Annotated[float, "NaN if it is the parameter."]
 
     @classmethod
     def of(cls, scene: Scene, path: str, harmonics: int, frequency_hz: float | None) -> Orbits:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
+from typing import Annotated
 
 import numpy as np
 
@@ -38,25 +39,15 @@ class Ended(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Orbit:
-    """A periodic motion.
+    """A periodic motion."""
 
-    Attributes
-    ----------
-    pieces : the period, piece after piece, from the angle `pieces[0].tau` on.
-    residual : distance of the state after a period, relative to its largest number.
-    error : what rounding may have left in the state [m].
-    multipliers : Floquet multipliers.
-    open_directions : (nw, ·) changes of the first state that are periodic too.
-    periods, steps : marched, and of Newton's method.
-    """
-
-    pieces: list[FlowPiece]
-    residual: float
-    error: float
-    multipliers: Complex
-    open_directions: Real
-    periods: int
-    steps: int
+    pieces: Annotated[list[FlowPiece], "The period, piece after piece, from the angle `pieces[0].tau` on."]
+    residual: Annotated[float, "Distance of the state after a period, relative to its largest number."]
+    error: Annotated[float, "What rounding may have left in the state [m]."]
+    multipliers: Annotated[Complex, "Floquet multipliers."]
+    open_directions: Annotated[Real, "(nw, ·) changes of the first state that are periodic too."]
+    periods: Annotated[int, "Marched."]
+    steps: Annotated[int, "Of Newton's method."]
 
 
 def find(

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -34,25 +34,18 @@ _EVENTS = "where contacts are followed by their events (kt = inf, kn = inf, exac
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Member:
-    """A friction contact as a part of a slider.
+    """A friction contact as a part of a slider."""
 
-    Attributes
-    ----------
-    contact : its number in the scene; slider : that of its slider.
-    factor : its motion is that times the slider's.
-    mu : friction coefficient; given : (nw,) row of its load without what a rigid normal contact adds.
-    normal : (n,) row of its normal motion, None under a given load; kn [N/m], may be infinite.
-    rest : part of its normal force that is in equilibrium at rest [N].
-    """
-
-    contact: int
-    slider: int
-    factor: float
-    mu: float
-    given: Real
-    normal: Real | None = None
+    contact: Annotated[int, "Its number in the scene."]
+    slider: Annotated[int, "That of its slider."]
+    factor: Annotated[float, "Its motion is that times the slider's."]
+    mu: Annotated[float, "Friction coefficient."]
+    given: Annotated[Real, "(nw,) row of its load without what a rigid normal contact adds."]
+    normal: Annotated[
+        Real | None, "(n,) row of its normal motion, None under a given load; kn [N/m], may be infinite."
+    ] = None
     kn: float = 0.0
-    rest: float = 0.0
+    rest: Annotated[float, "Part of its normal force that is in equilibrium at rest [N]."] = 0.0
 
     @property
     def rigid_normal(self) -> bool:
@@ -80,24 +73,15 @@ class MemberState:
 
 @dataclass(slots=True)
 class Mode:
-    """One of the linear systems.
+    """One of the linear systems."""
 
-    Attributes
-    ----------
-    A : (nw, nw) array, w' = A w.
-    forces, limits : (sliders, nw) rows of the force of every slider and of its limit [N].
-    loads : (members, nw) rows of the normal loads [N].
-    conditions : (nc, nw) rows that are positive as long as the mode lasts; ends : what each of them ends in.
-    to_rates : (nw, nw) removes what constraints forbid of the rates.
-    """
-
-    A: Real
-    forces: Real
-    limits: Real
-    loads: Real
-    conditions: Real
-    ends: list[tuple[int, int, int]]
-    to_rates: Real
+    A: Annotated[Real, "(nw, nw) array, w' = A w."]
+    forces: Annotated[Real, "Rows of the force of every slider [N], (sliders, nw)."]
+    limits: Annotated[Real, "Rows of its limit [N], (sliders, nw)."]
+    loads: Annotated[Real, "(members, nw) rows of the normal loads [N]."]
+    conditions: Annotated[Real, "(nc, nw) rows that are positive as long as the mode lasts."]
+    ends: Annotated[list[tuple[int, int, int]], "What each of them ends in."]
+    to_rates: Annotated[Real, "(nw, nw) removes what constraints forbid of the rates."]
     steps: Any = None  # what `flow` keeps of it
 
 

@@ -17,7 +17,7 @@ so that the motions of the contacts follow from their forces, which are the unkn
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.polynomial import legendre
@@ -72,27 +72,15 @@ _END = (GAUSS.end @ GAUSS.right, GAUSS.weights @ GAUSS.right)  # of rates and of
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Blocks:
-    """A structure in coordinates y in which it falls into b blocks of k, with p motions of contacts.
+    """A structure in coordinates y in which it falls into b blocks of k, with p motions of contacts."""
 
-    Attributes
-    ----------
-    basis, inverse : (n, n) arrays
-        x = basis y, y = inverse x.
-    stiffness, damping : (b, k, k) arrays
-        K and C by τ and per unit of mass.
-    inputs : (n, p) array, outputs : (p, n) array
-        y'' = −inputs f and u = outputs y.
-    fastest : float
-        A bound of what is fastest, in units of the excitation frequency.
-    """
-
-    basis: Real
-    inverse: Real
-    stiffness: Real
-    damping: Real
-    inputs: Real
+    basis: Annotated[Real, "x = basis y, (n, n)."]
+    inverse: Annotated[Real, "y = inverse x, (n, n)."]
+    stiffness: Annotated[Real, "K by τ and per unit of mass, (b, k, k)."]
+    damping: Annotated[Real, "C likewise, (b, k, k)."]
+    inputs: Annotated[Real, "y'' = −inputs f and u = outputs y, (p, n)."]
     outputs: Real
-    fastest: float
+    fastest: Annotated[float, "A bound of what is fastest, in units of the excitation frequency."]
 
     @property
     def whole(self) -> tuple[Real, Real]:

@@ -21,7 +21,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,18 +43,10 @@ LEAST_STEP = 1e-6  # rad: where a force goes to 0 its direction turns ever faste
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PeriodElement:
-    """A contact, or a part of one, over the period; where no piece lasts it exerts no force (separation).
+    """A contact, or a part of one, over the period; where no piece lasts it exerts no force (separation)."""
 
-    Attributes
-    ----------
-    ports : (m, n) array
-        u = ports x.
-    pieces : tuple of Piece
-        Its states, one after the other.
-    """
-
-    ports: Real
-    pieces: tuple[StatePiece, ...]
+    ports: Annotated[Real, "u = ports x, (m, n)."]
+    pieces: Annotated[tuple[StatePiece, ...], "Its states, one after the other."]
 
     @property
     def held(self) -> bool:
@@ -82,26 +74,23 @@ class LinearPart:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Monodromy:
-    """The map of a perturbation over one period.
+    """The map of a perturbation over one period."""
 
-    Attributes
-    ----------
-    matrix : (2 n + s, 2 n + s) array
-        Of the state: displacements [m], velocities by τ [m/rad], and the s numbers that are remembered at
-        τ = 0 [m]: places of sliders that are held, and turns of forces that slip in space.
-    sliders : tuple of int
-        The elements these numbers belong to; one with two of them is there twice.
-    reduced : square array
-        The same map without what cannot decay nor grow: sliders held all the time, and displacements that
-        nothing resists.
-    neutral : int
-        How many multipliers were left out, all of them exactly 1.
-    """
-
-    matrix: Real
-    sliders: tuple[int, ...]
-    reduced: Real
-    neutral: int
+    matrix: Annotated[
+        Real,
+        "Of the state, (2 n + s, 2 n + s): displacements [m], velocities by τ [m/rad], and the s numbers "
+        "that are remembered at τ = 0 [m]: places of sliders that are held, and turns of forces that slip "
+        "in space.",
+    ]
+    sliders: Annotated[
+        tuple[int, ...], "The elements these numbers belong to; one with two of them is there twice."
+    ]
+    reduced: Annotated[
+        Real,
+        "The same map without what cannot decay nor grow: sliders held all the time, and displacements "
+        "that nothing resists.",
+    ]
+    neutral: Annotated[int, "How many multipliers were left out, all of them exactly 1."]
 
 
 def monodromy(

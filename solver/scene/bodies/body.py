@@ -41,38 +41,26 @@ def body_dofs(name: str, plane: object) -> tuple[str, ...]:
 
 
 class Body(Part):
-    """A rigid body, whose DOFs ``<name>.x`` … ``<name>.rz`` are its motions at the centre of mass.
+    """A rigid body, whose DOFs ``<name>.x`` … ``<name>.rz`` are its motions at the centre of mass."""
 
-    Attributes
-    ----------
-    name : str
-        Name in `between` of contacts, in DOFs and in parameter paths.
-    mass : float
-        Mass [kg].
-    inertia : float, (3,) or (3, 3)
-        Moments of inertia at the centre of mass [kg m²]: the principal ones along x, y, z, or the tensor; one
-        number, about z, for a body in the plane.
-    at : (3,) tuple
-        Position of the centre of mass [m].
-    plane : "xy" or None
-        A body in this plane moves along x and y and turns about z: three DOFs.
-    radius_of_rotation : float or None
-        Distance of the centre of mass from the axis of rotation [m]: at a `speed` the body is loaded by
-        mass * radius * speed² along `out`.
-    out : (3,) tuple or None
-        Unit vector of that load.
-    group : str or None
-        A name that sets several bodies at once in parameter paths.
-    """
-
-    name: MemberName
-    mass: Positive
-    inertia: Positive | tuple[Positive, Positive, Positive] | tuple[Row, Row, Row]
-    at: Vector = (0.0, 0.0, 0.0)
-    plane: Literal["xy"] | None = None
-    radius_of_rotation: NonNegative | None = None
-    out: Vector | None = None
-    group: Name | None = None
+    name: Annotated[MemberName, "Name in `between` of contacts, in DOFs and in parameter paths."]
+    mass: Annotated[Positive, "Mass [kg]."]
+    inertia: Annotated[
+        Positive | tuple[Positive, Positive, Positive] | tuple[Row, Row, Row],
+        "Moments of inertia at the centre of mass [kg m²]: the principal ones along x, y, z, or the "
+        "tensor; one number, about z, for a body in the plane.",
+    ]
+    at: Annotated[Vector, "Position of the centre of mass [m]."] = (0.0, 0.0, 0.0)
+    plane: Annotated[
+        Literal["xy"] | None, "A body in this plane moves along x and y and turns about z: three DOFs."
+    ] = None
+    radius_of_rotation: Annotated[
+        NonNegative | None,
+        "Distance of the centre of mass from the axis of rotation [m]: at a `speed` the body is loaded by "
+        "mass * radius * speed² along `out`.",
+    ] = None
+    out: Annotated[Vector | None, "Unit vector of that load."] = None
+    group: Annotated[Name | None, "A name that sets several bodies at once in parameter paths."] = None
 
     @field_validator("out")
     @classmethod
@@ -184,22 +172,15 @@ NodeDofs = Annotated[
 
 
 class Node(Part):
-    """A position in the structure, and the DOFs that move it: a lumped mass, or a node of a matrix model.
+    """A position in the structure, and the DOFs that move it: a lumped mass, or a node of a matrix model."""
 
-    Attributes
-    ----------
-    name : str
-        Name in `between` of contacts.
-    at : (3,) tuple
-        Position [m].
-    dofs : table
-        DOF of each component of its motion: x, y, z, and rx, ry, rz if it turns. It does not move along
-        components that are left out.
-    """
-
-    name: MemberName
-    at: Vector
-    dofs: NodeDofs
+    name: Annotated[MemberName, "Name in `between` of contacts."]
+    at: Annotated[Vector, "Position [m]."]
+    dofs: Annotated[
+        NodeDofs,
+        "DOF of each component of its motion: x, y, z, and rx, ry, rz if it turns. It does not move along "
+        "components that are left out.",
+    ]
 
     @property
     def place(self) -> Place:
@@ -208,27 +189,13 @@ class Node(Part):
 
 
 class Load(Part):
-    """A constant force, on a DOF or on a body or node.
+    """A constant force, on a DOF or on a body or node."""
 
-    Attributes
-    ----------
-    name : str or None
-        Makes it a parameter ``<name>.force``.
-    dof : str or None
-        The DOF it acts on; or
-    on : str or None
-        the body or node it acts on, at its centre of mass or position.
-    direction : (3,) tuple or None
-        Unit vector of the force on a body or node.
-    force : float
-        Force [N].
-    """
-
-    name: MemberName | None = None
-    dof: DofName | None = None
-    on: MemberName | None = None
-    direction: Vector | None = None
-    force: Signed
+    name: Annotated[MemberName | None, "Makes it a parameter ``<name>.force``."] = None
+    dof: Annotated[DofName | None, "The DOF it acts on; or"] = None
+    on: Annotated[MemberName | None, "the body or node it acts on, at its centre of mass or position."] = None
+    direction: Annotated[Vector | None, "Unit vector of the force on a body or node."] = None
+    force: Annotated[Signed, "Force [N]."]
 
     @model_validator(mode="after")
     def _one_place(self) -> Load:

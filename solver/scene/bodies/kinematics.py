@@ -14,102 +14,20 @@ take these forms from here.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import lru_cache
-from typing import Any, NamedTuple, Protocol, Self
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from solver.contacts.fields import NEXT, Between, Vector, parse_end
-from solver.contacts.frames import Axes, cross, unit
+from solver.contacts.frames import cross, unit
 from solver.contacts.laws.base import AnyContact
 from solver.scene.bodies.body import REVOLUTIONS, Body, Load, Node, Place
-from solver.scene.bodies.shapes import AnyShape
-from solver.scene.linear_terms import Aerodynamics, LinearTerm, SpeedDependence
 from solver.scene.parts import Excitation, LumpedStructure, Structure
 from solver.scene.scene_parameter import Forces, Term
 from solver.scene.scene_parameter import Form as Form
 
-
-class InContact(Protocol):
-    """What a contact says of its motions."""
-
-    @property
-    def directions(self) -> tuple[int, ...]:
-        """Which of its axes each of its motions is along."""
-
-    @property
-    def between(self) -> Between:
-        """Its ends."""
-
-    @property
-    def at(self) -> Vector | None:
-        """Its position."""
-
-    @property
-    def axes(self) -> Axes | None:
-        """Its directions."""
-
-    @property
-    def motions(self) -> tuple[tuple[tuple[str, float], ...], ...] | None:
-        """Its motions written out."""
-
-    @property
-    def pairs(self) -> tuple[Between, ...]:
-        """The ends of each relative motion, of one without a place."""
-
-
-class HasParts(Protocol):
-    """What a scene holds, as far as motions and parameters go; see `solver.scene.scene.Scene`."""
-
-    @property
-    def structure(self) -> Structure:
-        """The linear part."""
-
-    @property
-    def contacts(self) -> tuple[AnyContact, ...]:
-        """Every contact."""
-
-    @property
-    def bodies(self) -> tuple[Body, ...]:
-        """Every rigid body."""
-
-    @property
-    def nodes(self) -> tuple[Node, ...]:
-        """Every position."""
-
-    @property
-    def loads(self) -> tuple[Load, ...]:
-        """Every constant force."""
-
-    @property
-    def speed_order(self) -> float | None:
-        """Order of the line along which the speed follows the frequency."""
-
-    @property
-    def couplings(self) -> tuple[LinearTerm, ...]:
-        """Entries of K and C that are no springs and dashpots."""
-
-    @property
-    def aerodynamics(self) -> tuple[Aerodynamics, ...]:
-        """Influence of the gas between blades."""
-
-    @property
-    def speed(self) -> float | None:
-        """Speed of rotation [1/min]."""
-
-    @property
-    def with_speed(self) -> tuple[SpeedDependence, ...]:
-        """What follows the speed."""
-
-    @property
-    def excitation(self) -> tuple[Excitation, ...]:
-        """Every force."""
-
-    @property
-    def dampers(self) -> tuple[AnyShape, ...]:
-        """Every damper given by its shape."""
-
-    def model_copy(self, *, update: Mapping[str, Any] | None = None) -> Self:
-        """Return a copy with other parts."""
+if TYPE_CHECKING:
+    from solver.scene.scene import Scene
 
 
 def dof_names(structure: Structure, bodies: tuple[Body, ...]) -> tuple[str, ...]:
@@ -118,12 +36,12 @@ def dof_names(structure: Structure, bodies: tuple[Body, ...]) -> tuple[str, ...]
     return own if not bodies else (*own, *(dof for body in bodies for dof in body.dofs))
 
 
-def contact_forms(scene: HasParts) -> tuple[tuple[Form, ...], ...]:
+def contact_forms(scene: Scene) -> tuple[tuple[Form, ...], ...]:
     """The relative motions of every contact."""
     return tuple(forms_of(scene, contact) for contact in scene.contacts)
 
 
-def forms_of(scene: HasParts, contact: InContact) -> tuple[Form, ...]:
+def forms_of(scene: Scene, contact: AnyContact) -> tuple[Form, ...]:
     """The relative motions of one contact, in the order its law has them."""
     if contact.motions is not None:
         return tuple(_written(motion) for motion in contact.motions)
@@ -134,7 +52,7 @@ def forms_of(scene: HasParts, contact: InContact) -> tuple[Form, ...]:
 
 
 def placed_forms(
-    scene: HasParts, between: Between, at: Sequence[Any], directions: Sequence[Sequence[Any]]
+    scene: Scene, between: Between, at: Sequence[Any], directions: Sequence[Sequence[Any]]
 ) -> tuple[Form, ...]:
     """The motions of the first end against the second along directions at a point.
 
@@ -182,7 +100,7 @@ def _turned_back(vector: Sequence[Any], turn: _Turn) -> Sequence[Any]:
     return tuple(c * vector[i] + s * across[i] + along * k[i] for i in range(3))
 
 
-def _end(scene: HasParts, text: str) -> _Located:
+def _end(scene: Scene, text: str) -> _Located:
     end = parse_end(text)
     if end.dof is None:
         return _Located(None, _STILL, False)
@@ -238,7 +156,7 @@ def written_form(form: Form) -> tuple[tuple[str, float], ...]:
     return tuple((f"{t.dof}@{NEXT}" if t.next else t.dof, t.factor) for t in form)
 
 
-def static_forces(scene: HasParts) -> tuple[Excitation, ...]:
+def static_forces(scene: Scene) -> tuple[Excitation, ...]:
     """The constant forces of loads and of rotation as forces on DOFs; along a line those at 1 rad/s."""
     if not scene.loads and scene.speed is None and scene.speed_order is None:
         return ()
@@ -248,7 +166,7 @@ def static_forces(scene: HasParts) -> tuple[Excitation, ...]:
     return static(tuple(found))
 
 
-def spin_of(scene: HasParts) -> float:
+def spin_of(scene: Scene) -> float:
     """Speed of rotation [rad/s]; 1 along a line, where it follows the frequency."""
     return (scene.speed or 0.0) * REVOLUTIONS if scene.speed_order is None else 1.0
 
@@ -258,7 +176,7 @@ def static(parts: Forces) -> tuple[Excitation, ...]:
     return tuple(Excitation(dof=dof, amplitude=force, harmonic=0) for dof, force in parts)
 
 
-def towards(scene: HasParts, load: Load, force: float) -> list[tuple[str, float]]:
+def towards(scene: Scene, load: Load, force: float) -> list[tuple[str, float]]:
     """A force where a load acts, by DOFs."""
     if load.dof is not None:
         return [(load.dof, force)]

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from solver.contacts.fields import LARGEST
 from solver.errors import SettingError
 from solver.scene.bodies.body import MOMENTS, REVOLUTIONS, Body
-from solver.scene.bodies.kinematics import HasParts, outward, spin_of, towards
+from solver.scene.bodies.kinematics import outward, spin_of, towards
 from solver.scene.scene_parameter import SceneParameter, Slope, changed
+
+if TYPE_CHECKING:
+    from solver.scene.scene import Scene
 
 SPEED = "speed"
 FORCE = "force"
@@ -18,13 +21,13 @@ BODY_UNITS = {
 }  # fmt: skip
 
 
-def body_paths(scene: HasParts) -> tuple[str, ...]:
+def body_paths(scene: Scene) -> tuple[str, ...]:
     """Return every path of bodies and their groups."""
     grouped = dict.fromkeys(f"{b.group}.{key}" for b in scene.bodies if b.group for key in b.parameters)
     return (*grouped, *(f"{body.name}.{key}" for body in scene.bodies for key in body.parameters))
 
 
-def body_parameter(scene: HasParts, path: str) -> SceneParameter | None:
+def body_parameter(scene: Scene, path: str) -> SceneParameter | None:
     """Return what a path of a body or of a group of them is, if it is one."""
     owner, _, key = path.rpartition(".")
     members = [b for b in scene.bodies if owner in (b.name, b.group) and key in b.parameters]
@@ -49,7 +52,7 @@ def set_in(body: Body, path: str, key: str, new: float, unit: str) -> Body:
     return changed(body, body.changed_by(key, new), path, new, wanted)
 
 
-def _slope(scene: HasParts, members: list[Body], key: str) -> Slope:
+def _slope(scene: Scene, members: list[Body], key: str) -> Slope:
     """Return what it adds: inertia, and the load of rotation m r Ω²."""
     if key in MOMENTS:
         return Slope(masses={body.name: body.mass_derivative(key) for body in members})
@@ -60,12 +63,12 @@ def _slope(scene: HasParts, members: list[Body], key: str) -> Slope:
     return Slope(masses=masses, forces=tuple(forces))
 
 
-def load_paths(scene: HasParts) -> tuple[str, ...]:
+def load_paths(scene: Scene) -> tuple[str, ...]:
     """Return the paths of named loads."""
     return tuple(f"{load.name}.{FORCE}" for load in scene.loads if load.name is not None)
 
 
-def load_parameter(scene: HasParts, path: str) -> SceneParameter | None:
+def load_parameter(scene: Scene, path: str) -> SceneParameter | None:
     """Return what a path of a load is, if it is one."""
     owner, _, key = path.rpartition(".")
     load = next((each for each in scene.loads if owner and each.name == owner and key == FORCE), None)
@@ -83,12 +86,12 @@ def load_parameter(scene: HasParts, path: str) -> SceneParameter | None:
     )  # fmt: skip
 
 
-def speed_paths(scene: HasParts) -> tuple[str, ...]:
+def speed_paths(scene: Scene) -> tuple[str, ...]:
     """Return the speed of a scene that has one."""
     return () if scene.speed is None else (SPEED,)
 
 
-def speed_parameter(scene: HasParts, path: str) -> SceneParameter | None:
+def speed_parameter(scene: Scene, path: str) -> SceneParameter | None:
     """Return what the speed is, if the path is that of a scene that has one."""
     if path != SPEED or scene.speed is None:
         return None

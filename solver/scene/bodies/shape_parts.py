@@ -5,17 +5,20 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from functools import cache, lru_cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pydantic import TypeAdapter, ValidationError
 
 from solver.contacts.laws.base import AnyContact
 from solver.errors import SettingError
-from solver.scene.bodies.kinematics import HasParts, placed_forms
+from solver.scene.bodies.kinematics import placed_forms
 from solver.scene.bodies.paths import BODY_UNITS, body_parameter
 from solver.scene.bodies.shapes import POINTS, AnyShape
 from solver.scene.parts import ContactOfAnyLaw
 from solver.scene.scene_parameter import ActsOn, Form, SceneParameter, Slope, Term
+
+if TYPE_CHECKING:
+    from solver.scene.scene import Scene
 
 _UNITS = {
     **dict.fromkeys(("angle", "curved_angle"), "rad"), **dict.fromkeys(("width", "length", "radius"), "m"),
@@ -35,14 +38,14 @@ def contacts_of(shape: AnyShape) -> tuple[AnyContact, ...]:
     return tuple(_reader().validate_python(table) for table in shape.contacts())
 
 
-def with_shapes(scene: HasParts) -> dict[str, Any]:
+def with_shapes(scene: Scene) -> dict[str, Any]:
     """The bodies and contacts of a scene that has no parts of its shapes yet, and those of the shapes."""
     bodies = tuple(body for shape in scene.dampers for body in shape.bodies)
     contacts = tuple(contact for shape in scene.dampers for contact in contacts_of(shape))
     return {"bodies": (*scene.bodies, *bodies), "contacts": (*scene.contacts, *contacts)}
 
 
-def own_parts(scene: HasParts) -> dict[str, Any]:
+def own_parts(scene: Scene) -> dict[str, Any]:
     """The bodies and contacts of a scene that are not parts of its shapes."""
     made = {contact.name for shape in scene.dampers for contact in contacts_of(shape)}
     shapes = {shape.name for shape in scene.dampers}
@@ -52,12 +55,12 @@ def own_parts(scene: HasParts) -> dict[str, Any]:
     }
 
 
-def shape_paths(scene: HasParts) -> tuple[str, ...]:
+def shape_paths(scene: Scene) -> tuple[str, ...]:
     """Every path of the shapes."""
     return tuple(f"{shape.name}.{key}" for shape in scene.dampers for key in shape.parameters)
 
 
-def shape_parameter(scene: HasParts, path: str) -> SceneParameter | None:
+def shape_parameter(scene: Scene, path: str) -> SceneParameter | None:
     """Return what a path of a shape is, if it is one: of its contacts, its body, or their places."""
     owner, _, key = path.rpartition(".")
     shape = next((each for each in scene.dampers if each.name == owner and key in each.parameters), None)
@@ -81,7 +84,7 @@ def shape_parameter(scene: HasParts, path: str) -> SceneParameter | None:
     return whole if body is None else replace(whole, slope=body.slope, by_hand=body.by_hand)
 
 
-def _with_shape(scene: HasParts, shape: AnyShape, key: str, path: str, new: float) -> dict[str, Any]:
+def _with_shape(scene: Scene, shape: AnyShape, key: str, path: str, new: float) -> dict[str, Any]:
     """The fields of a scene that change where a number of a shape is set."""
     try:
         made = type(shape).model_validate({**shape.__dict__, **_update(shape, key, new)})
@@ -103,7 +106,7 @@ def _update(shape: AnyShape, key: str, new: float) -> dict[str, object]:
     return {key: new} if hasattr(shape, key) else shape.bodies[0].changed_by(key, new)
 
 
-def _of_face(scene: HasParts, shape: AnyShape, key: str, whole: SceneParameter) -> SceneParameter:
+def _of_face(scene: Scene, shape: AnyShape, key: str, whole: SceneParameter) -> SceneParameter:
     """A number of a face, of which each of its contacts has its share."""
     parts = shape.shares if key in shape.SHARED else (1.0,) * len(shape.shares)
     shares = {contact.name: part for contact, part in zip(contacts_of(shape), parts, strict=True)}
@@ -116,7 +119,7 @@ def _of_face(scene: HasParts, shape: AnyShape, key: str, whole: SceneParameter) 
     )  # fmt: skip
 
 
-def _moved(scene: HasParts, shape: AnyShape, key: str) -> dict[str, tuple[Form, ...]]:
+def _moved(scene: Scene, shape: AnyShape, key: str) -> dict[str, tuple[Form, ...]]:
     """Derivatives of the motions of each contact, by its name, by a number of the geometry.
 
     They are those of the very lines that give the motions, with a symbol for the parameter.

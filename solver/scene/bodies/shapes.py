@@ -30,27 +30,7 @@ class Spot(NamedTuple):
 
 
 class Shape(Part):
-    """What all shapes have.
-
-    Attributes
-    ----------
-    name : str
-        Name of the damper and of its body, in DOFs and parameter paths.
-    at : (3,) tuple
-        Position of the centre of mass; of a shroud, of the middle of its face [m].
-    out : (3,) tuple
-        Unit vector outward: along it the centrifugal load acts.
-    axial : (3,) tuple
-        Unit vector along the axis of rotation.
-    law : str
-        Contact law of every point.
-    kt, kn : float
-        Tangential and normal stiffness of a face [N/m], shared out over its points.
-    mu : float
-        Friction coefficient.
-    N0 : float
-        Preload of a face at rest [N], shared out over its points.
-    """
+    """What all shapes have."""
 
     SHAPE: ClassVar[str]
     GEOMETRY: ClassVar[tuple[str, ...]]
@@ -60,15 +40,19 @@ class Shape(Part):
     SHARED: ClassVar[tuple[str, ...]] = ("kt", "kn", "N0")
     """Those that are shared out over the points of a face."""
 
-    name: Name
-    at: Vector = (0.0, 0.0, 0.0)
-    out: Vector = (0.0, 1.0, 0.0)
-    axial: Vector = (0.0, 0.0, 1.0)
-    law: Literal["coulomb-3d", "elastic-normal"]
-    kt: Positive
-    kn: Positive
-    mu: Friction
-    N0: Signed = 0.0
+    name: Annotated[Name, "Name of the damper and of its body, in DOFs and parameter paths."]
+    at: Annotated[Vector, "Position of the centre of mass; of a shroud, of the middle of its face [m]."] = (
+        0.0,
+        0.0,
+        0.0,
+    )
+    out: Annotated[Vector, "Unit vector outward: along it the centrifugal load acts."] = (0.0, 1.0, 0.0)
+    axial: Annotated[Vector, "Unit vector along the axis of rotation."] = (0.0, 0.0, 1.0)
+    law: Annotated[Literal["coulomb-3d", "elastic-normal"], "Contact law of every point."]
+    kt: Annotated[Positive, "Tangential and normal stiffness of a face [N/m], shared out over its points."]
+    kn: Annotated[Positive, "Tangential and normal stiffness of a face [N/m], shared out over its points."]
+    mu: Annotated[Friction, "Friction coefficient."]
+    N0: Annotated[Signed, "Preload of a face at rest [N], shared out over its points."] = 0.0
 
     @model_validator(mode="after")
     def _directions(self) -> Shape:
@@ -124,21 +108,13 @@ MOST_PAIRS = 1000
 
 
 class PatchPoint(Part):
-    """Two nodes of a patch that lie on each other, or a node and the ground.
+    """Two nodes of a patch that lie on each other, or a node and the ground."""
 
-    Attributes
-    ----------
-    between : (str, str)
-        Nodes of the first and the second face.
-    at : (3,) tuple
-        Where they are [m].
-    area : float
-        Part of the face that belongs to them; in any unit, as only the share of it counts.
-    """
-
-    between: tuple[EndName, EndName]
-    at: Vector
-    area: Positive = 1.0
+    between: Annotated[tuple[EndName, EndName], "Nodes of the first and the second face."]
+    at: Annotated[Vector, "Where they are [m]."]
+    area: Annotated[
+        Positive, "Part of the face that belongs to them; in any unit, as only the share of it counts."
+    ] = 1.0
 
 
 class Patch(Shape):
@@ -147,21 +123,14 @@ class Patch(Shape):
     Stiffness and preload of the face are shared out over its points by their areas: a pressure that is even
     over the face presses each point by its share. The parts were pressed together so when they were meshed:
     the preload does not deform them once more.
-
-    Attributes
-    ----------
-    normal : (3,) tuple
-        Unit vector across the face, from the first to the second.
-    pairs : tuple of PatchPoint
-        Its points.
     """
 
     SHAPE: ClassVar[str] = "patch"
     GEOMETRY: ClassVar[tuple[str, ...]] = ()
 
     shape: Literal["patch"]
-    normal: Vector
-    pairs: Annotated[tuple[PatchPoint, ...], Field(min_length=1, max_length=MOST_PAIRS)]
+    normal: Annotated[Vector, "Unit vector across the face, from the first to the second."]
+    pairs: Annotated[tuple[PatchPoint, ...], Field(min_length=1, max_length=MOST_PAIRS), "Its points."]
 
     @model_validator(mode="after")
     def _across(self) -> Self:
@@ -206,15 +175,9 @@ def _spread(points: int) -> list[float]:
 
 
 class _Faced(Shape):
-    """A shape with faces of its own, over which points are spread.
+    """A shape with faces of its own, over which points are spread."""
 
-    Attributes
-    ----------
-    points : int
-        Points of a face.
-    """
-
-    points: Points = 1
+    points: Annotated[Points, "Points of a face."] = 1
 
     @property
     def parameters(self) -> tuple[str, ...]:
@@ -252,27 +215,15 @@ class _Faced(Shape):
 
 
 class _Underplatform(_Faced):
-    """A body between two platforms, pressed on them by rotation.
+    """A body between two platforms, pressed on them by rotation."""
 
-    Attributes
-    ----------
-    between : (str, str)
-        Nodes of the left and the right platform.
-    mass : float
-        Mass [kg].
-    inertia : float, (3,) or (3, 3)
-        As of a body.
-    plane : "xy" or None
-        As of a body.
-    radius_of_rotation : float
-        Distance of the centre of mass from the axis of rotation [m].
-    """
-
-    between: tuple[EndName, EndName]
-    mass: Positive
-    inertia: Positive | tuple[Positive, Positive, Positive] | tuple[Row, Row, Row]
-    plane: Literal["xy"] | None = None
-    radius_of_rotation: NonNegative
+    between: Annotated[tuple[EndName, EndName], "Nodes of the left and the right platform."]
+    mass: Annotated[Positive, "Mass [kg]."]
+    inertia: Annotated[Positive | tuple[Positive, Positive, Positive] | tuple[Row, Row, Row], "As of a body."]
+    plane: Annotated[Literal["xy"] | None, "As of a body."] = None
+    radius_of_rotation: Annotated[
+        NonNegative, "Distance of the centre of mass from the axis of rotation [m]."
+    ]
 
     @property
     def bodies(self) -> tuple[Body, ...]:
@@ -309,25 +260,15 @@ class _Underplatform(_Faced):
 
 
 class Wedge(_Underplatform):
-    """A wedge with two flat faces.
-
-    Attributes
-    ----------
-    angle : float
-        Inclination of both faces [rad].
-    width : float
-        Distance between the middles of the faces [m].
-    length : float
-        Length of a face, down which its points lie [m].
-    """
+    """A wedge with two flat faces."""
 
     SHAPE: ClassVar[str] = "wedge"
     GEOMETRY: ClassVar[tuple[str, ...]] = ("angle", "width", "length")
 
     shape: Literal["wedge"]
-    angle: Inclination
-    width: Positive
-    length: NonNegative = 0.0
+    angle: Annotated[Inclination, "Inclination of both faces [rad]."]
+    width: Annotated[Positive, "Distance between the middles of the faces [m]."]
+    length: Annotated[NonNegative, "Length of a face, down which its points lie [m]."] = 0.0
 
     def spots(self, values: Mapping[str, Any]) -> Iterator[Spot]:
         """The points of both faces."""
@@ -336,25 +277,15 @@ class Wedge(_Underplatform):
 
 
 class Cylinder(_Underplatform):
-    """A cylinder that touches both platforms along lines.
-
-    Attributes
-    ----------
-    angle : float
-        Inclination of both platforms [rad].
-    radius : float
-        Radius [m].
-    length : float
-        Length of the lines, along which the points lie [m].
-    """
+    """A cylinder that touches both platforms along lines."""
 
     SHAPE: ClassVar[str] = "cylinder"
     GEOMETRY: ClassVar[tuple[str, ...]] = ("angle", "radius", "length")
 
     shape: Literal["cylinder"]
-    angle: Inclination
-    radius: Positive
-    length: NonNegative = 0.0
+    angle: Annotated[Inclination, "Inclination of both platforms [rad]."]
+    radius: Annotated[Positive, "Radius [m]."]
+    length: Annotated[NonNegative, "Length of the lines, along which the points lie [m]."] = 0.0
 
     def spots(self, values: Mapping[str, Any]) -> Iterator[Spot]:
         """The points of both lines."""
@@ -363,29 +294,23 @@ class Cylinder(_Underplatform):
 
 
 class Asymmetric(_Underplatform):
-    """A damper with a flat face on the left and a curved one on the right.
-
-    Attributes
-    ----------
-    angle, curved_angle : float
-        Inclination of the flat face and of the platform under the curved one [rad].
-    width : float
-        Twice the distance of the middle of the flat face from the centre of mass [m].
-    radius : float
-        Radius of the curved face about the centre of mass [m].
-    length : float
-        Length of both faces, along which their points lie [m].
-    """
+    """A damper with a flat face on the left and a curved one on the right."""
 
     SHAPE: ClassVar[str] = "asymmetric"
     GEOMETRY: ClassVar[tuple[str, ...]] = ("angle", "curved_angle", "width", "radius", "length")
 
     shape: Literal["asymmetric"]
-    angle: Inclination
-    curved_angle: Inclination
-    width: Positive
-    radius: Positive
-    length: NonNegative = 0.0
+    angle: Annotated[
+        Inclination, "Inclination of the flat face and of the platform under the curved one [rad]."
+    ]
+    curved_angle: Annotated[
+        Inclination, "Inclination of the flat face and of the platform under the curved one [rad]."
+    ]
+    width: Annotated[
+        Positive, "Twice the distance of the middle of the flat face from the centre of mass [m]."
+    ]
+    radius: Annotated[Positive, "Radius of the curved face about the centre of mass [m]."]
+    length: Annotated[NonNegative, "Length of both faces, along which their points lie [m]."] = 0.0
 
     def spots(self, values: Mapping[str, Any]) -> Iterator[Spot]:
         """The points of the flat face and of the curved one."""
@@ -396,19 +321,15 @@ class Asymmetric(_Underplatform):
 class SplitRing(_Underplatform):
     """The part of a split ring that belongs to a sector, pressed on the rim from within by rotation.
 
-    Attributes
-    ----------
-    between : (str, str)
-        Node of the rim, on the left and on the right half of the face: the same, or that of the next sector.
-    width : float
-        Length of the face around the rim [m].
+    `between` are the nodes of the rim on the left and on the right half of the face: the same, or that of the
+    next sector.
     """
 
     SHAPE: ClassVar[str] = "split-ring"
     GEOMETRY: ClassVar[tuple[str, ...]] = ("width",)
 
     shape: Literal["split-ring"]
-    width: Positive
+    width: Annotated[Positive, "Length of the face around the rim [m]."]
 
     def spots(self, values: Mapping[str, Any]) -> Iterator[Spot]:
         """The points of both halves of the face."""
@@ -417,25 +338,18 @@ class SplitRing(_Underplatform):
 
 
 class Shroud(_Faced):
-    """The faces with which the shrouds of two blades touch, pressed on each other by their twist.
-
-    Attributes
-    ----------
-    between : (str, str)
-        Nodes of both shrouds.
-    angle : float
-        Angle of the normal of the face against the circumferential direction, about `out` [rad].
-    length : float
-        Length of the face, along which its points lie [m].
-    """
+    """The faces with which the shrouds of two blades touch, pressed on each other by their twist."""
 
     SHAPE: ClassVar[str] = "shroud"
     GEOMETRY: ClassVar[tuple[str, ...]] = ("angle", "length")
 
     shape: Literal["shroud"]
-    between: tuple[EndName, EndName]
-    angle: Inclination
-    length: NonNegative = 0.0
+    between: Annotated[tuple[EndName, EndName], "Nodes of both shrouds."]
+    angle: Annotated[
+        Inclination,
+        "Angle of the normal of the face against the circumferential direction, about `out` [rad].",
+    ]
+    length: Annotated[NonNegative, "Length of the face, along which its points lie [m]."] = 0.0
 
     def spots(self, values: Mapping[str, Any]) -> Iterator[Spot]:
         """The points of the face."""

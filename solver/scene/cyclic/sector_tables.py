@@ -14,21 +14,25 @@ Row = Annotated[int, Field(strict=True, ge=-1, le=10_000_000)]
 
 
 class CyclicBoundary(Part):
-    """The boundaries of a sector: the high one is the low one of the next sector, turned about the axis.
+    """The boundaries of a sector: the high one is the low one of the next sector, turned about the axis."""
 
-    Attributes
-    ----------
-    axis : (3,) tuple or None
-        Direction of the axis of the disk, through the origin; displacements turn by 2 pi / sectors about it
-        from the low boundary to the high one.
-    low_rows, high_rows : tuple of tuples of int, or None
-        Rows (zero-based) of the boundaries in pairs: three components of a vector, -1 where a boundary
-        condition holds one, or a row alone, which does not turn. None where the model is reduced already.
-    """
-
-    axis: Vector | None = None
-    low_rows: tuple[tuple[Row, ...], ...] | None = None
-    high_rows: tuple[tuple[Row, ...], ...] | None = None
+    axis: Annotated[
+        Vector | None,
+        "Direction of the axis of the disk, through the origin; displacements turn by 2 pi / sectors about "
+        "it from the low boundary to the high one.",
+    ] = None
+    low_rows: Annotated[
+        tuple[tuple[Row, ...], ...] | None,
+        "Rows (zero-based) of the boundaries in pairs: three components of a vector, -1 where a boundary "
+        "condition holds one, or a row alone, which does not turn. None where the model is reduced "
+        "already.",
+    ] = None
+    high_rows: Annotated[
+        tuple[tuple[Row, ...], ...] | None,
+        "Rows (zero-based) of the boundaries in pairs: three components of a vector, -1 where a boundary "
+        "condition holds one, or a row alone, which does not turn. None where the model is reduced "
+        "already.",
+    ] = None
 
     @field_validator("low_rows", "high_rows", mode="before")
     @classmethod
@@ -49,25 +53,24 @@ Seed = Annotated[int, Field(strict=True, ge=0, le=2**63 - 1)]
 
 
 class Mistuning(Part):
-    """Blades that are not quite equal: one factor for each sector, on the parts `of` names.
+    """Blades that are not quite equal: one factor for each sector, on the parts `of` names."""
 
-    Attributes
-    ----------
-    of : tuple of str
-        Names of springs (the factor multiplies k), dashpots (c) and masses, or DOFs (their mass). Of a sector
-        given by matrices: K, M, or names of its `parts`.
-    spread : float or None
-        Standard deviation of the factors: 1 + spread * z, z independent and normal.
-    seed : int or None
-        Of the random numbers z: numpy's Generator with PCG64; 1 if left out.
-    values : tuple of float or None
-        The factors themselves, one for each sector, instead of `spread` and `seed`.
-    """
-
-    of: Annotated[tuple[MemberName, ...], Field(min_length=1)]
-    spread: NonNegative | None = None
-    seed: Seed | None = None
-    values: tuple[Positive, ...] | None = None
+    of: Annotated[
+        tuple[MemberName, ...],
+        Field(min_length=1),
+        "Names of springs (the factor multiplies k), dashpots (c) and masses, or DOFs (their mass). Of a "
+        "sector given by matrices: K, M, or names of its `parts`.",
+    ]
+    spread: Annotated[
+        NonNegative | None, "Standard deviation of the factors: 1 + spread * z, z independent and normal."
+    ] = None
+    seed: Annotated[Seed | None, "Of the random numbers z: numpy's Generator with PCG64; 1 if left out."] = (
+        None
+    )
+    values: Annotated[
+        tuple[Positive, ...] | None,
+        "The factors themselves, one for each sector, instead of `spread` and `seed`.",
+    ] = None
 
     @model_validator(mode="after")
     def _drawn_or_given(self) -> Mistuning:

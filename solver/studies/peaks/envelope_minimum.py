@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
@@ -36,24 +36,15 @@ _MOST = 60
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Lowest:
-    """The place of a least highest peak.
+    """The place of a least highest peak."""
 
-    Attributes
-    ----------
-    z : float
-        Where.
-    rows : mapping of line to row
-        The lines near the top there, solved, the highest first; empty if they are not solved.
-    height : float
-        The highest line there [m].
-    bracketed : bool
-        It falls towards there from both sides, as far as there is a range.
-    """
-
-    z: float
-    rows: Mapping[int, Real]
-    height: float
-    bracketed: bool
+    z: Annotated[float, "Where."]
+    rows: Annotated[
+        Mapping[int, Real],
+        "The lines near the top there, solved, the highest first; empty if they are not solved.",
+    ]
+    height: Annotated[float, "The highest line there [m]."]
+    bracketed: Annotated[bool, "It falls towards there from both sides, as far as there is a range."]
 
     @property
     def solved(self) -> bool:

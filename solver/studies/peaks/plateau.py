@@ -11,6 +11,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 
@@ -42,22 +43,12 @@ Prove = Callable[[Tracker, float], LeastPeak]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Plateau:
-    """An interval of the least highest peak, and the place chosen in it; z is the tracker's.
+    """An interval of the least highest peak, and the place chosen in it; z is the tracker's."""
 
-    Attributes
-    ----------
-    low, high : float
-        Its ends.
-    chosen : Lowest
-        The place.
-    by : ChosenBy
-        What decided.
-    """
-
-    low: float
-    high: float
-    chosen: Lowest
-    by: ChosenBy
+    low: Annotated[float, "Its lower end."]
+    high: Annotated[float, "Its upper one."]
+    chosen: Annotated[Lowest, "The place."]
+    by: Annotated[ChosenBy, "What decided."]
 
 
 def interval(tracker: Tracker, best: Lowest) -> tuple[float, float] | None:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Annotated, Protocol
 
 import numpy as np
 
@@ -26,32 +26,19 @@ _HALVINGS = 12
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Seed:
-    """A peak from which a line is to be followed.
+    """A peak from which a line is to be followed."""
 
-    Attributes
-    ----------
-    z, omega : float
-        Where; rad/s.
-    u : (n_unknowns,) array
-        Slip motions near it [m].
-    sign, place : float
-        1 for a peak of max x, −1 for one of −min x, 0 for the larger; the instant τ of it (NaN: not known).
-    fixed : bool
-        The amplitude at an end of the band.
-    within : (float, float)
-        z as far as which it is followed at most.
-    height : float
-        m, as far as it is known (NaN).
-    """
-
-    z: float
-    omega: float
-    u: Real
-    sign: float
-    place: float
-    fixed: bool
-    within: tuple[float, float] = (-math.inf, math.inf)
-    height: float = math.nan
+    z: Annotated[float, "Where."]
+    omega: Annotated[float, "Its frequency [rad/s]."]
+    u: Annotated[Real, "Slip motions near it [m], (n_unknowns,)."]
+    sign: Annotated[float, "1 for a peak of max x, −1 for one of −min x, 0 for the larger."]
+    place: Annotated[float, "The instant τ of it; NaN: not known."]
+    fixed: Annotated[bool, "The amplitude at an end of the band."]
+    within: Annotated[tuple[float, float], "z as far as which it is followed at most."] = (
+        -math.inf,
+        math.inf,
+    )
+    height: Annotated[float, "m, as far as it is known (NaN)."] = math.nan
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

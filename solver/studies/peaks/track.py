@@ -9,6 +9,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import Enum
+from typing import Annotated
 
 import numpy as np
 
@@ -30,31 +31,23 @@ from solver.studies.peaks.work_limit import Allowance, HaltedError
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrackingPace:
-    """How closely peaks are followed.
+    """How closely peaks are followed."""
 
-    Attributes
-    ----------
-    first_step, largest_step, smallest_step : float
-        Shares of the range.
-    height_error, omega_error : float
-        Relative errors of the trapezoidal rule allowed in a step.
-    above : float
-        Where a line is higher than this times the least highest peak of a sweep so far, it only has to show
-        that it is; infinity: it is followed closely everywhere.
-    slack : float
-        Share of what it is higher by that its height may be wrong by then.
-    climb_from : float
-        Share of the range: step at which a peak that Newton's method does not find is looked for uphill.
-    """
-
-    first_step: float
-    largest_step: float
-    smallest_step: float
-    height_error: float
-    omega_error: float
-    above: float
-    slack: float
-    climb_from: float
+    first_step: Annotated[float, "Share of the range."]
+    largest_step: Annotated[float, "Likewise."]
+    smallest_step: Annotated[float, "Likewise."]
+    height_error: Annotated[float, "Relative error of the trapezoidal rule allowed in a step."]
+    omega_error: Annotated[float, "Likewise."]
+    above: Annotated[
+        float,
+        "Where a line is higher than this times the least highest peak of a sweep so far, it only has to "
+        "show that it is; infinity: it is followed closely everywhere.",
+    ]
+    slack: Annotated[float, "Share of what it is higher by that its height may be wrong by then."]
+    climb_from: Annotated[
+        float,
+        "Share of the range: step at which a peak that Newton's method does not find is looked for uphill.",
+    ]
 
 
 EVERYWHERE = TrackingPace(
@@ -75,28 +68,18 @@ class LineEnd(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Line:
-    """One peak over the parameter, ascending in z (the parameter or its logarithm).
+    """One peak over the parameter, ascending in z (the parameter or its logarithm)."""
 
-    Attributes
-    ----------
-    rows : (P, COLUMNS) array
-        Columns named in `solver.continuation.extrema.kernels.peak_continuation`; derivatives are by z.
-    solutions, tangents : (P, n_unknowns) array
-        Slip motions [m] and their derivatives by z.
-    sign : float
-        1 for a peak of max x, −1 for one of −min x.
-    fixed : bool
-        The amplitude at an end of the band, not a stationary peak.
-    ends : (LineEnd, LineEnd)
-        Why it ends below and above.
-    """
-
-    rows: Real
-    solutions: Real
-    tangents: Real
-    sign: float
-    fixed: bool
-    ends: tuple[LineEnd, LineEnd]
+    rows: Annotated[
+        Real,
+        "Columns named in `solver.continuation.extrema.kernels.peak_continuation`, (P, COLUMNS); "
+        "derivatives are by z.",
+    ]
+    solutions: Annotated[Real, "Slip motions [m], (P, n_unknowns)."]
+    tangents: Annotated[Real, "Their derivatives by z, (P, n_unknowns)."]
+    sign: Annotated[float, "1 for a peak of max x, −1 for one of −min x."]
+    fixed: Annotated[bool, "The amplitude at an end of the band, not a stationary peak."]
+    ends: Annotated[tuple[LineEnd, LineEnd], "Why it ends below and above."]
 
     @property
     def low(self) -> float:
@@ -132,24 +115,12 @@ class Line:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Glance:
-    """One walk over the band at one z with fewer harmonics, its peaks as near as its points are.
+    """One walk over the band at one z with fewer harmonics, its peaks as near as its points are."""
 
-    Attributes
-    ----------
-    z : float
-        Where.
-    crests : tuple of Rival
-        Peaks of max|x|, highest first.
-    ks : array of int
-        The harmonics kept.
-    iterations : int
-        Newton iterations spent.
-    """
-
-    z: float
-    crests: tuple[Rival, ...]
-    ks: Integer
-    iterations: int
+    z: Annotated[float, "Where."]
+    crests: Annotated[tuple[Rival, ...], "Peaks of max|x|, highest first."]
+    ks: Annotated[Integer, "The harmonics kept."]
+    iterations: Annotated[int, "Newton iterations spent."]
 
 
 def glance_at(
@@ -223,18 +194,12 @@ def sweep_within(scene: Scene, harmonics: int, effects: Effects | None, allowanc
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Look:
-    """One sweep over the band at one z; surprising if it found what no line had reached.
-
-    Attributes
-    ----------
-    peaks : tuple of Peak
-        Those of the branch that count, highest first.
-    """
+    """One sweep over the band at one z; surprising if it found what no line had reached."""
 
     z: float
     branch: Branch
     surprising: bool
-    peaks: tuple[Peak, ...]
+    peaks: Annotated[tuple[Peak, ...], "Those of the branch that count, highest first."]
 
     @property
     def top(self) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import ClassVar, Self
+from typing import Annotated, ClassVar, Self
 
 import numpy as np
 from pydantic import PrivateAttr
@@ -22,21 +22,18 @@ _FORM = {"steps": 1, "reversals": 2, "alone": 4}  # bits of `solver.contacts.ker
 
 
 class HistoryContact(AnyContact):
-    """A law given by functions of the motion and its history.
-
-    Attributes
-    ----------
-    samples : int or None
-        Nodes of a period at which the law is followed; 32 for each harmonic if left out, or 16 where they
-        begin anew at every reversal.
-    """
+    """A law given by functions of the motion and its history."""
 
     DEFINITION: ClassVar[HistoryLaw]
     KERNEL: ClassVar[str] = "solver.contacts.kernels.history.law:history_law"
     HELD: ClassVar[tuple[RestStiffness, ...]] = (RestStiffness(columns.KT),)
     WORDS: ClassVar[Mapping[str, str]] = {}
 
-    samples: Samples | None = None
+    samples: Annotated[
+        Samples | None,
+        "Nodes of a period at which the law is followed; 32 for each harmonic if left out, or 16 where "
+        "they begin anew at every reversal.",
+    ] = None
     _omega: float = PrivateAttr(default=math.nan)
 
     @classmethod
