@@ -19,7 +19,7 @@ from service.errors import OverloadedError, RetryLaterError, TooManyRequestsErro
 
 _P = ParamSpec("_P")
 _T = TypeVar("_T")
-_READING, _WRITING, _FILES, _DRAWING, _UPLOADS = 16, 16, 4, 2, 2
+_READING, _WRITING, _FILES, _DRAWING, _UPLOADS, _REPORTS = 16, 16, 4, 2, 2, 1
 _LINKS = 2  # requests by links at a time
 _LONG = 3.0
 _RETRY_SECONDS = 2
@@ -129,7 +129,7 @@ class Lane:
 
 
 class Lanes:
-    """The lanes of a service: look-ups, changes of the database, stored arrays, pictures, uploaded files."""
+    """The lanes of a service: look-ups, changes, stored arrays, pictures, uploaded files, reports."""
 
     def __init__(self, seconds: float) -> None:
         self.reads = Lane(_READING, seconds)
@@ -138,8 +138,9 @@ class Lanes:
         self.files = Lane(_FILES, _LONG * seconds)
         self.pictures = Lane(_DRAWING, _LONG * seconds)
         self.uploads = Lane(_UPLOADS, _LONG * seconds)
+        self.reports = Lane(_REPORTS, _LONG * seconds)
 
     def guard(self, require: Callable[[str], None]) -> None:
         """Have `require` refuse owners (by what it raises) before anything is done for them."""
-        for lane in (self.reads, self.writes, self.files, self.pictures, self.uploads):
+        for lane in (self.reads, self.writes, self.files, self.pictures, self.uploads, self.reports):
             lane.require = require

@@ -77,6 +77,8 @@ _PAGE = "/page/"
 _SHARED = "/v1/shared"
 """What a link to a run shows, by the token in the query."""
 _MONITORED = frozenset({"/metrics"})
+_COMPUTED = re.compile(r"/v1/jobs/[^/]+/report/?")
+"""What is computed when it is asked for."""
 _READING = frozenset({"GET", "HEAD", "OPTIONS"})
 _OURS = frozenset({"same-origin", "none"})
 _BEARER = "bearer "
@@ -90,7 +92,8 @@ def scope_of(method: str, path: str) -> callers.Scope | None:
         return None
     if path in _MONITORED:
         return callers.Scope.MONITOR
-    return callers.Scope.READ if method in _READING else callers.Scope.SUBMIT
+    reads = method in _READING and not _COMPUTED.fullmatch(path)
+    return callers.Scope.READ if reads else callers.Scope.SUBMIT
 
 
 def by_link(path: str) -> bool:
