@@ -20,7 +20,7 @@ log = logging.getLogger("stickslip.notices")
 _CHANNEL = "stickslip"
 _SEND = "SELECT pg_notify(%s, notice) FROM unnest(%s::text[]) AS notice"
 _AGAIN_SECONDS = 2.0
-_ACCEPTED, _ENDED, _CANCEL = "accepted", "ended", "cancel"
+_ACCEPTED, _ENDED, _CANCEL, _WATCH, _LIVE = "accepted", "ended", "cancel", "watch", "live"
 
 OfJob = Callable[[str], None]
 
@@ -38,14 +38,17 @@ class Notices:
         Called with the id of a job that ended at another service.
     cancel : callable
         Called with the id of a running job whose cancel was asked for at another service.
+    watched, live : callable
+        Called with what another service says of a job that it watches, and of one that it runs.
     """
 
     def __init__(
-        self, connect: Callable[[], Any], *, accepted: Callable[[], None], ended: OfJob, cancel: OfJob
-    ) -> None:
+        self, connect: Callable[[], Any], *, accepted: Callable[[], None], ended: OfJob, cancel: OfJob,
+        watched: OfJob, live: OfJob,
+    ) -> None:  # fmt: skip
         self._connect = connect
         self._accepted = accepted
-        self._of_job = {_ENDED: ended, _CANCEL: cancel}
+        self._of_job = {_ENDED: ended, _CANCEL: cancel, _WATCH: watched, _LIVE: live}
         self._waiting: deque[str] = deque()
         self._wake_reader, self._wake_writer = mp.get_context("spawn").Pipe(duplex=False)
         self._awake = threading.Lock()
@@ -76,6 +79,14 @@ class Notices:
     def tell_cancel(self, job_id: str) -> None:
         """The cancel of a running job was asked for."""
         self._tell(f"{_CANCEL}:{job_id}")
+
+    def tell_watch(self, text: str) -> None:
+        """A job is watched here."""
+        self._tell(f"{_WATCH}:{text}")
+
+    def tell_live(self, text: str) -> None:
+        """A job that runs here got this far."""
+        self._tell(f"{_LIVE}:{text}")
 
     def _tell(self, notice: str) -> None:
         self._waiting.append(notice)

@@ -19,6 +19,7 @@ from service.http.metrics import Metrics, RequestMetrics
 from service.http.middleware.admission import Admission, ConcurrencyLimits, by_link
 from service.http.middleware.connections import Connections
 from service.http.middleware.every_answer import HeadAsGet, HeadersAndAudit, RequestLog
+from service.http.reports import Reports
 from service.http.routes import (
     events,
     forms,
@@ -113,6 +114,7 @@ def _guard(app: FastAPI, service: Service) -> None:
     app.state.probe = Probe(service)
     app.state.looks = Looks(service)
     app.state.large = LargeAnswers()
+    app.state.reports = Reports(service.lanes.reports)
     app.state.authenticator = Authenticator(service.keys, settings, service.jobs.now)
     app.state.connections = Connections(
         settings.connections, settings.header_seconds, settings.write_seconds, settings.unsent_bytes

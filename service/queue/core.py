@@ -39,11 +39,12 @@ from service.jobs.kinds.bodies import KIND
 from service.jobs.outputs import OnProgress
 from service.jobs.registry import ABOUT_THE_RUN, JobKind, JobRequest, Registry
 from service.jobs.strict_json import validated
+from service.queue.elsewhere import Elsewhere
 from service.queue.lanes import Lanes
 from service.queue.meters import Meters
 from service.queue.queue import JobQueue
 from service.queue.retention import Retention
-from service.queue.running import Event, Waiters
+from service.queue.running import Event, Live, Waiters
 from service.queue.scene_store import SceneStore
 from service.settings import traces
 from service.settings.kinds import registry_of
@@ -132,6 +133,7 @@ class Service:
             self.jobs, executor_of(settings, self.registry), settings, self.waiters, self.meters
         )
         self.retention = Retention(self.database, settings, self.jobs.now)
+        self._elsewhere: Elsewhere | None = None
         self._notices = None if self.database.exclusive else self._make_notices()
         self.stopping = threading.Event()
         self._open = False
@@ -142,7 +144,11 @@ class Service:
             accepted=self.queue.wake,
             ended=self.waiters.ended_elsewhere,
             cancel=self.queue.cancel_running,
+            watched=lambda text: elsewhere.watched(text),
+            live=lambda text: elsewhere.told(text),
         )
+        elsewhere = Elsewhere(self.waiters, self.queue.live, made.tell_watch, made.tell_live)
+        self._elsewhere = elsewhere
         self.waiters.relay = made.tell_ended
         return made
 
@@ -180,7 +186,8 @@ class Service:
             self.database.close()
             raise
         self.retention.start()
-        if self._notices is not None:
+        if self._notices is not None and self._elsewhere is not None:
+            self._elsewhere.start()
             self._notices.start()
         log.info("database %s, %d workers", self.database.name, self.settings.workers)
 
@@ -191,7 +198,8 @@ class Service:
         self.answers.close()
         self.retention.stop()
         self.queue.stop()
-        if self._notices is not None:
+        if self._notices is not None and self._elsewhere is not None:
+            self._elsewhere.stop()
             self._notices.stop()
         self.database.close()
         traces.flush()
@@ -308,6 +316,11 @@ class Service:
         """
         found: SweepRecord | None = self.stored.get(sweep_id, SWEEP)
         return visible(found, caller.sees, f"there is no sweep {sweep_id!r}")
+
+    def live(self, job_id: str) -> Live | None:
+        """How far a job is that somebody watches, newer than its row, whichever service runs it."""
+        here = self.queue.live(job_id)
+        return here if here is not None or self._elsewhere is None else self._elsewhere.live(job_id)
 
     def dismiss(self, job_id: str, caller: Caller = KEYLESS) -> JobRow:
         """Cancel a job. A running one ends within the grace; the row given back may say `running` still.

@@ -21,7 +21,7 @@ from service.queue.meters import Meters
 
 _P = ParamSpec("_P")
 _T = TypeVar("_T")
-_READING, _WRITING, _FILES, _DRAWING, _UPLOADS = 16, 16, 4, 2, 2
+_READING, _WRITING, _FILES, _DRAWING, _UPLOADS, _REPORTS = 16, 16, 4, 2, 2, 1
 _LINKS = 2  # requests by links at a time
 _LONG = 3.0
 _RETRY_SECONDS = 2
@@ -140,7 +140,7 @@ class Lane:
 
 
 class Lanes:
-    """The lanes of a service: look-ups, changes of the database, stored arrays, pictures, uploaded files."""
+    """The lanes of a service: look-ups, changes, stored arrays, pictures, uploaded files, reports."""
 
     def __init__(self, seconds: float, meters: Meters) -> None:
         def lane(name: str, threads: int, seconds: float) -> Lane:
@@ -152,8 +152,9 @@ class Lanes:
         self.files = lane("files", _FILES, _LONG * seconds)
         self.pictures = lane("pictures", _DRAWING, _LONG * seconds)
         self.uploads = lane("uploads", _UPLOADS, _LONG * seconds)
+        self.reports = lane("reports", _REPORTS, _LONG * seconds)
 
     def guard(self, require: Callable[[str], None]) -> None:
         """Have `require` refuse owners (by what it raises) before anything is done for them."""
-        for lane in (self.reads, self.writes, self.files, self.pictures, self.uploads):
+        for lane in (self.reads, self.writes, self.files, self.pictures, self.uploads, self.reports):
             lane.require = require

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from datetime import datetime
-from typing import Annotated, Any, ClassVar, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import AwareDatetime, BaseModel, ConfigDict, Field
 
@@ -17,6 +17,13 @@ from service.schemas.pages import Cursor, Limit, ListQuery
 
 _REVISION = "Counts the changes; the `ETag`, for `If-Match` of a change."
 _DELETED = "When it was put in the bin; null outside of it."
+
+
+class PendingReport(AnswerModel):
+    """A report that is not there yet."""
+
+    job_id: str
+    status: Literal["computing", "making"] = Field(description="The job itself, or its report.")
 
 
 class RunAnswer(JobAnswer):

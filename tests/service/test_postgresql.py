@@ -1,5 +1,6 @@
 """Several dispatchers and several services on one PostgreSQL database."""
 
+import asyncio
 import os
 import signal
 import subprocess
@@ -18,6 +19,7 @@ from private_kinds import PRIVATE
 from service_helpers import PATIENCE, pids, settings_of, until
 from sqlalchemy import make_url, select, text, update
 
+from service.auth.callers import KEYLESS
 from service.cli import main
 from service.client.client import Client
 from service.db import postgresql, revisions
@@ -26,9 +28,11 @@ from service.db.engine import Database
 from service.db.models import Job, JobState
 from service.db.repositories import JobRepository, NewJob
 from service.errors import DatabaseError, DatabaseInUseError, ServiceProblem
+from service.http.routes.events import job_events
 from service.jobs.outputs import JobOutput
 from service.queue.core import Service
 from service.queue.health import check
+from service.schemas.answers import JobPoints, JobProgress
 
 SCRIPT = Path(__file__).with_name("serve_private.py")
 NEW = NewJob(kind="iteration", request={}, spec={}, spec_hash="", request_hash="", max_attempts=3, fresh=True)
@@ -193,6 +197,45 @@ def test_two_services_in_one_process_share_the_jobs(url: str) -> None:
         away = next(service for service in services if service.queue.live_progress(long) is None)
         away.dismiss(long)
         assert away.wait(long, PATIENCE).state is JobState.DISMISSED, "wherever it runs"
+
+
+def test_who_watches_at_one_service_gets_the_points_that_another_finds(url: str) -> None:
+    """Each once and in order, with the best design, long before its row has it; of others nothing is told."""
+    with ExitStack() as stack:
+        services = [Service(settings_of(url)(poll_seconds=0.2), PRIVATE) for _ in "ab"]
+        for service in services:
+            service.start()
+            stack.callback(service.stop)
+        until(lambda: all(service.queue.status().ready for service in services))
+        body = {"kind": "iteration", "seconds": 600.0, "tells": True}
+        job = services[0].submit(body)[0].id
+        until(lambda: any(service.queue.live(job) for service in services))
+        runs, away = sorted(services, key=lambda service: service.queue.live(job) is None)
+        assert runs._elsewhere is not None
+        assert runs._elsewhere._watched == {}, "nobody watches elsewhere"
+        until(lambda: (live := runs.queue.live(job)) is not None and len(live.found) > 250)
+
+        async def watched() -> tuple[list[tuple[float, float]], list[JobProgress]]:
+            points: list[tuple[float, float]] = []
+            progress: list[JobProgress] = []
+            async for event in job_events(away, job, KEYLESS):
+                if isinstance(event.data, JobPoints):
+                    assert event.data.start == len(points)
+                    points += event.data.points
+                elif isinstance(event.data, JobProgress):
+                    progress.append(event.data)
+                if len(points) > 600:
+                    break
+            return points, progress
+
+        points, progress = asyncio.run(asyncio.wait_for(watched(), 60.0))
+        live = runs.queue.live(job)
+        assert live is not None
+        assert points == list(live.found)[: len(points)]
+        assert progress[-1].best is not None
+        assert progress[-1].best["values"]["step"] > 250
+        runs.dismiss(job)
+        until(lambda: runs._elsewhere is not None and not runs._elsewhere._watched)
 
 
 Start = Callable[[], "tuple[subprocess.Popen[bytes], Client]"]

@@ -54,7 +54,7 @@ TABLE: dict[str, tuple[tuple[int, ...], Any]] = {
     "GET /v1/jobs/{job_id}": (OWNED, None),
     "GET /v1/jobs/{job_id}/results": (OWNED, None),
     # They have no results that a report tells either.
-    "GET /v1/jobs/{job_id}/report": ((401, 401, 404, 401, 401, 409, 409, 409), None),
+    "GET /v1/jobs/{job_id}/report": ((401, 401, 404, 401, 401, 403, 409, 409), None),
     # The jobs of these tests have no scene, as is said to those who may see them.
     "GET /v1/jobs/{job_id}/scene": ((401, 401, 404, 401, 401, 404, 404, 404), None),
     "GET /v1/jobs/{job_id}/events": (OWNED, None),

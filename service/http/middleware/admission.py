@@ -81,6 +81,8 @@ OWNER = "owner"
 NO_KEY = "(no key)"
 """The owner, to those who count, of a request whose key is not known."""
 _MONITORED = frozenset({"/metrics"})
+_COMPUTED = re.compile(r"/v1/jobs/[^/]+/report/?")
+"""What is computed when it is asked for."""
 _READING = frozenset({"GET", "HEAD", "OPTIONS"})
 _OURS = frozenset({"same-origin", "none"})
 _BEARER = "bearer "
@@ -94,7 +96,8 @@ def scope_of(method: str, path: str) -> callers.Scope | None:
         return None
     if path in _MONITORED:
         return callers.Scope.MONITOR
-    return callers.Scope.READ if method in _READING else callers.Scope.SUBMIT
+    reads = method in _READING and not _COMPUTED.fullmatch(path)
+    return callers.Scope.READ if reads else callers.Scope.SUBMIT
 
 
 def by_link(path: str) -> bool:

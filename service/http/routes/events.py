@@ -25,7 +25,7 @@ _LEAST_SECONDS = 0.1
 _EVENTS_A_SECOND = 200.0
 _LOOK_AGAIN_SECONDS = 5.0
 _GATHER_SECONDS = 0.02
-# A job that another service runs tells nothing but what it writes.
+# Until another service has told how far the job is that it runs, its row is looked at.
 _LOOK_ELSEWHERE_SECONDS = 0.5
 _RETRY_MILLISECONDS = 1000
 _POINTS_OF_AN_EVENT = 2000
@@ -172,7 +172,7 @@ async def job_events(
         row = await looks.row(job_id, caller)
         looked = said = loop.time()
         while not service.stopping.is_set():
-            live = service.queue.live(job_id)
+            live = service.queue.live(job_id) if row.state.finished else service.live(job_id)
             for event in story.news(row, live):
                 yield event
                 said = loop.time()

@@ -7,6 +7,7 @@ The revision of what can be changed is the `ETag` of its answers and stands in `
 from __future__ import annotations
 
 import re
+import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -18,6 +19,7 @@ from fastapi import APIRouter, Body, Depends, Header, Query, Request, Response
 from service.auth.authenticator import Authenticator
 from service.auth.callers import KEYLESS, LINK_READERS, Caller, Scope
 from service.db.models import JobState
+from service.db.repositories import JobRow
 from service.db.repositories.runs import RunRow
 from service.errors import ConflictError, NotFoundError
 from service.http.dependencies import (
@@ -29,12 +31,16 @@ from service.http.dependencies import (
     as_json,
     listing,
     media,
+    preferred_wait,
     service_behind,
+    wait_for_end,
 )
-from service.http.in_lane import drawing, reading, writing, writing_files
+from service.http.in_lane import reading, writing, writing_files
 from service.http.middleware.admission import address_of
+from service.http.reports import Reports
 from service.http.routes.jobs import results_answer
 from service.http.routes.stored import SWEEP_FORMS, SweepForm, sweep_answer
+from service.jobs.strict_json import digest
 from service.rendering.representations import JSON, chosen
 from service.schemas.answers import JobScene, ResultsAnswer, SweepAnswer, SweepDetail
 from service.schemas.comparisons import comparison
@@ -44,6 +50,7 @@ from service.schemas.workbench_answers import (
     NewLink,
     NewProject,
     NewShareAnswer,
+    PendingReport,
     ProjectAnswer,
     ProjectChanges,
     ProjectPage,
@@ -219,31 +226,78 @@ Json = Mapping[str, Any]
 _BINARY = {"type": "string", "format": "binary"}
 
 
+_LATER: dict[str, Any] = {
+    "model": PendingReport,
+    "description": "With `Prefer`: it is not there yet, `/v1/runs/events` tells the run again when it is.",
+    "headers": {
+        "Location": {"description": "Where it will be.", "schema": {"type": "string"}},
+        "Retry-After": {"description": "Seconds to wait.", "schema": {"type": "integer"}},
+    },
+}
+_RETRY_SECONDS = 2
+
+
 @reports.get(
     "/{job_id}/report",
     response_class=Response,
-    responses={200: media({"text/html": TEXT, "application/pdf": _BINARY})},
+    responses={200: media({"text/html": TEXT, "application/pdf": _BINARY}), 202: _LATER},
 )
-@drawing
-def report(
+async def report(
     job_id: str,
     context: InContext,
     form: Annotated[Literal["html", "pdf"] | None, Query(alias="format")] = None,
     accept: Annotated[str | None, Header(max_length=500)] = None,
+    prefer: Annotated[
+        str | None,
+        Header(max_length=200, description="`respond-async`, or `wait=N`: how long is waited [s]."),
+    ] = None,
 ) -> Response:
     """The design report of a job of the kind `design` or `pareto`: a page that needs nothing else, or a PDF.
 
-    `format` goes before `Accept`. It is made anew each time, in a process with limits.
+    `format` goes before `Accept`. It is made once, in a process with limits, and kept. With `Prefer` the
+    answer is 202 while the job is computed or its report made; without, it waits for the report.
     """
     from service.rendering.report.making import FORMS, report_apart
 
+    service, owner = context.service, context.caller.owner
     wanted = FORMS[form] if form is not None else chosen(accept, tuple(FORMS.values()))
     suffix = next(name for name, kind in FORMS.items() if kind == wanted)
-    made = report_apart(*_designed(context, job_id), suffix, context.service.settings.report_seconds)
+    seconds = _patience(prefer, service.settings.max_wait_seconds)
+    begun = time.monotonic()
+    if seconds is not None and not await wait_for_end(context, job_id, seconds, _has_ended):
+        return _not_yet(context, job_id, "computing")
+    designed = await service.lanes.reads.run(owner, _designed, context, job_id)
+    key = digest([*designed, suffix])
+    left = None if seconds is None else max(seconds - (time.monotonic() - begun), 0.0)
+    kept: Reports = context.request.app.state.reports
+    made = await kept.get(
+        key, owner, partial(report_apart, *designed, suffix, service.settings.report_seconds), left,
+        partial(service.waiters.ended, job_id),
+    )  # fmt: skip
+    if made is None:
+        return _not_yet(context, job_id, "making")
     name = f"report-{job_id}.{suffix}"
     return Response(
         made, media_type=wanted, headers={"Content-Disposition": f'attachment; filename="{name}"'}
     )
+
+
+def _patience(prefer: str | None, longest: float) -> float | None:
+    """How long a caller wants to wait; None for as long as it takes [s]."""
+    if prefer is not None and "respond-async" in prefer.lower():
+        return preferred_wait({"prefer": prefer}, longest) or 0.0
+    return preferred_wait({"prefer": prefer or ""}, longest)
+
+
+def _has_ended(row: JobRow) -> bool:
+    return row.state.finished
+
+
+def _not_yet(context: Context, job_id: str, status: Literal["computing", "making"]) -> Response:
+    url = context.request.url
+    where = f"{url.path}?{url.query}" if url.query else url.path
+    headers = {"Location": where, "Retry-After": str(_RETRY_SECONDS)}
+    return as_json(PendingReport(job_id=job_id, status=status), 202, headers=headers)
 
 
 def _designed(context: Context, job_id: str) -> tuple[Json, Json, Json, Json]:

@@ -9,14 +9,13 @@ import base64
 import json
 import multiprocessing as mp
 import re
-import threading
 from collections.abc import Mapping
 from datetime import date
 from importlib.metadata import version
 from multiprocessing.connection import Connection
 from typing import Any
 
-from service.errors import ConflictError, InputError, QueueFullError
+from service.errors import ConflictError, InputError
 from service.rendering.report.sections import Designed
 from service.workers.processes import start
 
@@ -105,8 +104,6 @@ def _beginning(text: str) -> str:
 
 MEMORY_BYTES = 2 * 1024**3
 _MOST_BYTES = 64 * 1024**2
-_PATIENCE_SECONDS = 10.0
-_ONE = threading.BoundedSemaphore(1)
 
 
 def report_apart(
@@ -126,30 +123,23 @@ def report_apart(
     ------
     ConflictError
         It takes more time or memory than it may, or there is nothing to report; the message says what to do.
-    QueueFullError
-        If others are being made for long.
     """
-    if not _ONE.acquire(timeout=_PATIENCE_SECONDS):
-        raise QueueFullError("other reports are being made: try again later", retry_after=5)
-    try:
-        ours, theirs = mp.Pipe(duplex=False)
-        with ours:
-            argument = {"scene": dict(scene), "problem": dict(problem), "result": dict(result),
-                        "about": dict(about), "form": form}  # fmt: skip
-            process = start(_main, (theirs, argument, seconds), "report")
-            theirs.close()
-            try:
-                if not ours.poll(seconds):
-                    raise ConflictError(_beyond(f"longer than {seconds:g} s"))
-                answer = json.loads(ours.recv_bytes(_MOST_BYTES))
-            except (EOFError, OSError) as error:
-                raise ConflictError(_beyond("more memory or time than there is for it")) from error
-            finally:
-                process.kill()
-                process.join()
-                process.close()
-    finally:
-        _ONE.release()
+    ours, theirs = mp.Pipe(duplex=False)
+    with ours:
+        argument = {"scene": dict(scene), "problem": dict(problem), "result": dict(result),
+                    "about": dict(about), "form": form}  # fmt: skip
+        process = start(_main, (theirs, argument, seconds), "report")
+        theirs.close()
+        try:
+            if not ours.poll(seconds):
+                raise ConflictError(_beyond(f"longer than {seconds:g} s"))
+            answer = json.loads(ours.recv_bytes(_MOST_BYTES))
+        except (EOFError, OSError) as error:
+            raise ConflictError(_beyond("more memory or time than there is for it")) from error
+        finally:
+            process.kill()
+            process.join()
+            process.close()
     if "error" in answer:
         raise ConflictError(answer["error"])
     return base64.b64decode(answer["report"])
