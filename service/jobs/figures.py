@@ -90,6 +90,29 @@ def figures(table: Mapping[str, Any]) -> Iterator[FigureValue]:
             yield from figures({name: value["value"], f"{name}_at": value["at"]})
 
 
+_LONGEST_WORDS = 500
+_DEEP = 2
+
+
+def alone(result: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the numbers, words and truths in a result that stand alone, by their keys joined by dots.
+
+    Of lists of objects only how many they have, such as ``peaks.count``; curves are no figures. They are
+    stored beside the result, to be compared with those of another one.
+    """
+    return dict(_alone("", result, 1))
+
+
+def _alone(prefix: str, table: Mapping[str, Any], depth: int) -> Iterator[tuple[str, Any]]:
+    for key, value in table.items():
+        if isinstance(value, bool | int | float) or (isinstance(value, str) and len(value) <= _LONGEST_WORDS):
+            yield f"{prefix}{key}", value
+        elif isinstance(value, Mapping) and depth < _DEEP:
+            yield from _alone(f"{prefix}{key}.", value, depth + 1)
+        elif isinstance(value, list) and all(isinstance(row, Mapping) for row in value):
+            yield f"{prefix}{key}.count", len(value)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StoredRecord:
     """What of a result can be asked for. Every further field is a figure; those of parts are tuples.

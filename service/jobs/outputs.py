@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Protocol, Self
 
 from service.jobs.figures import (
@@ -127,12 +127,15 @@ class JobOutput:
         The result as it is stored, if the worker has encoded it already; `result` is then empty.
     figures : tuple of FigureValue
         The figures of a result that is encoded.
+    alone : mapping
+        What of such a result is compared with another's.
     """
 
     result: dict[str, Any]
     sweeps: tuple[SweepRecord, ...] = ()
     encoded: JsonText | None = None
     figures: tuple[FigureValue, ...] = ()
+    alone: Mapping[str, Any] = field(default_factory=dict)
     design: DesignRecord | None = None
     shortfall: str | None = None
 

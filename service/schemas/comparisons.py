@@ -17,7 +17,6 @@ from service.schemas.workbench_answers import Comparison, Figure, InputDifferenc
 SCENE, SETTINGS = "scene", "settings"
 _CONTACTS = "contacts"
 _LONGEST = 500  # characters of a value that is shown as it is
-_DEEP = 2
 
 Json = Mapping[str, Any]
 
@@ -86,24 +85,6 @@ def _shown(value: Any) -> Any:
     return f"{kind} of {size}, sha256 {digest(value)[:16]}"
 
 
-def figures(result: Json | None) -> dict[str, Any]:
-    """The numbers, words and truths in a result that stand alone, by their keys joined by dots.
-
-    Of lists of objects only how many they have, such as ``peaks.count``; curves are no figures.
-    """
-    return dict(_figures("", result or {}, 1))
-
-
-def _figures(prefix: str, table: Json, depth: int) -> Iterator[tuple[str, Any]]:
-    for key, value in table.items():
-        if isinstance(value, bool | int | float) or (isinstance(value, str) and len(value) <= _LONGEST):
-            yield f"{prefix}{key}", value
-        elif isinstance(value, Mapping) and depth < _DEEP:
-            yield from _figures(f"{prefix}{key}.", value, depth + 1)
-        elif isinstance(value, list) and all(isinstance(row, Mapping) for row in value):
-            yield f"{prefix}{key}.count", len(value)
-
-
 _MOST_INPUTS = 500
 _MOST_COUNTED = 10_000
 
@@ -131,7 +112,7 @@ def _inputs(service: Service, row: RunRow) -> dict[str, Any]:
 
 def _results(service: Service, row: RunRow) -> dict[str, Any]:
     """The figures of a run; none if it has no result."""
-    return figures(service.jobs.result(row.job.result_of or row.job.id))
+    return service.jobs.figures(row.job.result_of or row.job.id)
 
 
 def _beside(a: dict[str, Any], b: dict[str, Any]) -> list[Figure]:

@@ -26,7 +26,7 @@ from typing import Any
 from service.errors import UnknownKindError
 from service.jobs import strict_json
 from service.jobs.checkpoints import Checkpoints, KeptPieces
-from service.jobs.figures import figures
+from service.jobs.figures import alone, figures
 from service.jobs.outputs import Best, FailureKind, JobFailure, JobOutput, Pace, Point, ResultPiece
 from service.jobs.registry import RunOn, WarmUp
 from service.settings import logs, traces
@@ -398,8 +398,8 @@ def _stopped(kept: Checkpoints) -> Done:
 
 def checked(output: JobOutput) -> JobOutput:
     """The output with its result encoded, so that the service does not have to; TypeError if it cannot be."""
-    told = tuple(figures(output.result))
-    return replace(output, result={}, encoded=strict_json.encoded(output.result), figures=told)
+    told, encoded = tuple(figures(output.result)), strict_json.encoded(output.result)
+    return replace(output, result={}, encoded=encoded, figures=told, alone=alone(output.result))
 
 
 def failure_of(task: Task, error: Exception) -> JobFailure:

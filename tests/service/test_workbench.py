@@ -10,13 +10,13 @@ from typing import Any
 import httpx
 import pytest
 from service_helpers import ServedClient, is_problem, new_job, until
-from sqlalchemy import delete
+from sqlalchemy import delete, update
 
 from service.auth.allowances import Buckets
 from service.client import Client
 from service.db.clock import utc_now
 from service.db.engine import Database
-from service.db.models import Job, JobState
+from service.db.models import Job, JobResult, JobState
 from service.db.repositories import JobRepository
 from service.db.repositories.owned import Projects
 from service.db.repositories.rows import RunWords
@@ -28,7 +28,9 @@ from service.errors import (
     ServiceProblem,
     StorageFullError,
 )
-from service.schemas.comparisons import differences, figures
+from service.jobs.figures import alone
+from service.jobs.strict_json import JsonText
+from service.schemas.comparisons import differences
 from solver.scene.scene import load_scene
 
 WAITED = {"Prefer": "wait=60"}
@@ -188,6 +190,15 @@ def test_two_runs_are_compared(http: ServedClient) -> None:
     assert found["inputs"] == [{"path": "size", "part": "settings", "a": 20, "b": 30}]
     values = [http.get(f"/v1/jobs/{one}/results").json()["result"]["eigenvalue"] for one in (a, b)]
     assert {"name": "eigenvalue", "a": values[0], "b": values[1]} in found["results"]
+    with http.service.database.writing() as connection:  # results are not read, their figures are
+        texts = {one: http.service.jobs.result_text(one) for one in (a, b)}
+        connection.execute(update(JobResult).where(JobResult.job_id.in_((a, b))).values(body={}))
+    assert http.get("/v1/runs/compare", params={"a": a, "b": b}).json()["results"] == found["results"]
+    with http.service.database.writing() as connection:  # an earlier version stored none
+        for one, body in texts.items():
+            values = {"body": JsonText(body), "figures": None}
+            connection.execute(update(JobResult).where(JobResult.job_id == one).values(**values))
+    assert http.get("/v1/runs/compare", params={"a": a, "b": b}).json()["results"] == found["results"]
     same = http.get("/v1/runs/compare", params={"a": a, "b": a}).json()
     assert (same["inputs"], same["more_inputs"]) == ([], 0)
     is_problem(http.get("/v1/runs/compare", params={"a": a, "b": "none"}), 404)
@@ -211,7 +222,7 @@ def test_differences_have_the_paths_of_parameters() -> None:
         "harmonics": ("settings", 5, 7),
     }
     result = {"peak": {"value": 1.0, "at": 2.0, "deep": {"x": 1}}, "curve": [1.0], "peaks": [{}, {}]}
-    assert figures(result) == {"peak.value": 1.0, "peak.at": 2.0, "peaks.count": 2}
+    assert alone(result) == {"peak.value": 1.0, "peak.at": 2.0, "peaks.count": 2}
 
 
 def test_a_link_shows_its_run_and_nothing_else(http: ServedClient, monkeypatch: pytest.MonkeyPatch) -> None:

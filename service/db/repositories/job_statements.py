@@ -33,6 +33,7 @@ BY_ID = select(*(_C[name] for name in ROW)).where(_C.id == bindparam("job"))
 SEVERAL = select(*(_C[name] for name in ROW)).where(_C.id.in_(bindparam("jobs", expanding=True)))
 SCENE = select(_C.scene_name, _C.scene_hash).where(_C.id == bindparam("job"))
 RESULT = select(_RESULT.c.body).where(_RESULT.c.job_id == bindparam("job"))
+FIGURES = select(_RESULT.c.figures).where(_RESULT.c.job_id == bindparam("job"))
 RESULT_TEXT = select(cast(_RESULT.c.body, Text)).where(_RESULT.c.job_id == bindparam("job"))
 ADD_STORED = (
     update(_JOB).where(_C.id == bindparam("job")).values(stored_bytes=_C.stored_bytes + bindparam("more"))

@@ -33,6 +33,7 @@ from service.db.repositories.rows import Attempt, JobRow, NewJob, RecoveredJobs
 from service.db.repositories.runs import in_the_bin, insert_words, require_project
 from service.db.repositories.waiting import Room, Turns, require_share
 from service.errors import IdempotencyError
+from service.jobs.figures import alone
 from service.jobs.outputs import Best, JobFailure, JobOutput, ResultPiece
 from service.jobs.strict_json import JsonText, encoded
 
@@ -173,6 +174,15 @@ class JobRepository:
         """The result of a job as its JSON, None if it has none."""
         with self._db.reading() as connection:
             return connection.execute(job_statements.RESULT_TEXT, {"job": job_id}).scalar_one_or_none()
+
+    def figures(self, job_id: str) -> dict[str, Any]:
+        """What of the result of a job is compared with another's; empty if it has none."""
+        with self._db.reading() as connection:
+            row = connection.execute(job_statements.FIGURES, {"job": job_id}).one_or_none()
+        if row is None:
+            return {}
+        # Of a result that an earlier version stored.
+        return alone(self.result(job_id) or {}) if row.figures is None else dict(row.figures)
 
     def spec(self, job_id: str) -> dict[str, Any]:
         """What a job computes; empty if there is none of this id."""
@@ -396,7 +406,10 @@ class JobRepository:
         job_id, owner = attempt.job_id, attempt.owner
         body = _text_of(output)
         text = body.encode()
-        written = {"job_id": job_id, "body": body, "sha256": hashlib.sha256(text).hexdigest()}
+        written = {
+            "job_id": job_id, "body": body, "sha256": hashlib.sha256(text).hexdigest(),
+            "figures": encoded(output.alone or alone(output.result)),
+        }  # fmt: skip
         connection.execute(job_statements.INSERT_RESULT, written)
         insert_results(connection, job_id, output.sweeps, created, owner)
         about = connection.execute(job_statements.SCENE, {"job": job_id}).one()
