@@ -14,8 +14,8 @@ from launch import served
 for _library in ("OMP", "OPENBLAS", "MKL"):
     os.environ[f"{_library}_NUM_THREADS"] = "1"
 
-# As every command sets it. Workers are forked off one process as long as no setting is changed: each that starts
-# after a test of the command, in this process, would begin from nothing.
+# As every command sets it. Workers are forked off one process as long as no setting is changed: each that
+# starts after a test of the command, in this process, would begin from nothing.
 os.environ.setdefault("STICKSLIP_PROGRESS", "0")
 
 # Certificates of authorities are looked up in an empty folder: to read a list of all takes each client 30 ms,
