@@ -80,7 +80,8 @@ def write_netcdf(data: Dataset, path: Path) -> None:
         file.Conventions = b"CF-1.10"
         given = {_KIND: data.kind, _ROWS: json.dumps(list(data.rows)), **data.attributes}
         for key, value in given.items():
-            setattr(file, key, value.encode() if isinstance(value, str) else value)
+            exact = np.float64(value) if isinstance(value, float) else value  # of 4 bytes otherwise
+            setattr(file, key, exact.encode() if isinstance(exact, str) else exact)
 
 
 def read_netcdf(path: Path) -> Dataset:

@@ -7,15 +7,15 @@ import io
 import json
 import re
 import tempfile
-import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from itertools import chain, count
 from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.errors import ResultFileError, SettingError
+from solver.errors import MissingExtraError, ResultFileError, SettingError
 from solver.results.base import Shown
 from solver.results.dataset import ROW, Attribute, Dataset, Variable
 from solver.results.files import csv_text, read_netcdf, read_parquet, whole, write_netcdf, write_parquet
@@ -95,7 +95,9 @@ def load(file: str | Path) -> Dataset:
         raise SettingError("file", str(file), f"must end in one of {', '.join(SUFFIXES)}")
     try:
         return read(path)
-    except (OSError, ValueError, KeyError, TypeError, IndexError, EOFError, zipfile.BadZipFile) as error:
+    except MissingExtraError:
+        raise
+    except Exception as error:  # what four libraries raise at a damaged file is a long list, and grows
         raise ResultFileError(f"{str(file)!r} cannot be read as a result: {error}") from error
 
 
@@ -111,7 +113,13 @@ def _write_csv(data: Dataset, path: Path) -> None:
 
 
 def _read_csv(path: Path) -> Dataset:
-    names, *rows = list(csv.reader(io.StringIO(path.read_text("utf-8"), newline=""), strict=True))
+    lines = list(csv.reader(io.StringIO(path.read_text("utf-8"), newline=""), strict=True))
+    if not lines:
+        raise ValueError("it is empty, and should begin with a line of names")
+    names, *rows = lines
+    for line, row in enumerate(rows, start=2):
+        if len(row) != len(names):
+            raise ValueError(f"line {line} must have {len(names)} cells as the first has, got {len(row)}")
     columns = [_column([row[i] for row in rows]) for i in range(len(names))]
     variables = {
         name: Variable(dims=(ROW,), values=values) for name, values in zip(names, columns, strict=True)
@@ -126,7 +134,7 @@ def _column(texts: list[str]) -> NDArray[Any]:
     for kind in (np.int64, np.float64):
         try:
             return np.array([kind(text or "nan") for text in texts])
-        except ValueError:
+        except (ValueError, OverflowError):
             continue
     return np.array([text[1:] if text[:1] == "'" else text for text in texts])
 
@@ -150,7 +158,7 @@ def _write_npz(data: Dataset, path: Path) -> None:
 
 
 def _read_npz(path: Path) -> Dataset:
-    with np.load(path, allow_pickle=False) as archive:
+    with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
         about = json.loads(str(archive[_ABOUT]))
         return _whole(about, {name: archive[name] for name in about["variables"]})
 
@@ -158,18 +166,24 @@ def _read_npz(path: Path) -> Dataset:
 def _write_mat(data: Dataset, path: Path) -> None:
     from scipy.io import savemat
 
-    struct: dict[str, Any] = {_field(name): _for_matlab(v.values) for name, v in data.variables.items()}
-    struct["units"] = {_field(name): v.unit or "1" for name, v in data.variables.items()}
-    struct["attributes"] = {
-        _field(name): value for name, value in {"kind": data.kind, **data.attributes}.items()
-    }
+    attributes = {"kind": data.kind, **data.attributes}
+    fields, words = _fields(data.variables), _fields(attributes)
+    struct: dict[str, Any] = {fields[name]: _for_matlab(v.values) for name, v in data.variables.items()}
+    struct["units"] = {fields[name]: v.unit or "1" for name, v in data.variables.items()}
+    struct["attributes"] = {words[name]: value for name, value in attributes.items()}
     struct["about"] = json.dumps(_about(data))
     savemat(path, {_ABOUT: struct}, long_field_names=True, oned_as="column", do_compression=True)
 
 
-def _field(name: str) -> str:
-    """The name of a field that MATLAB allows."""
-    return re.sub(r"[^A-Za-z0-9_]", "_", name)[:63]
+def _fields(names: Iterable[str]) -> dict[str, str]:
+    """Names of fields that MATLAB allows, no two alike."""
+    fields: dict[str, str] = {}
+    for name in names:
+        plain = re.sub(r"[^A-Za-z0-9_]", "_", name)
+        others = (f"{plain[: 62 - len(str(i))]}_{i}" for i in count(2))
+        taken = set(fields.values())
+        fields[name] = next(field for field in chain([plain[:63]], others) if field not in taken)
+    return fields
 
 
 def _for_matlab(values: NDArray[Any]) -> NDArray[Any]:
@@ -182,7 +196,7 @@ def _read_mat(path: Path) -> Dataset:
 
     struct = loadmat(path, simplify_cells=True)[_ABOUT]
     about = json.loads(str(struct["about"]))
-    return _whole(about, {name: struct[_field(name)] for name in about["variables"]})
+    return _whole(about, {name: struct[field] for name, field in _fields(about["variables"]).items()})
 
 
 def _about(data: Dataset) -> dict[str, Any]:
