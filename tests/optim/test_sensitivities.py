@@ -89,7 +89,7 @@ def test_every_slope_is_that_of_differences(path: str) -> None:
 def test_what_matters_most_comes_first_and_zeros_and_angles_have_no_per_cent() -> None:
     result = found("bladed-disk")
     shares = [result.peak_elasticities(row)[0] for row in result.rows]
-    # To six digits, as equals (μ and N0 of a contact) differ by rounding: those are in the order of the scene.
+    # To six digits: equals (μ and N0 of a contact) differ by rounding and are in the order of the scene.
     with_share = [float(f"{abs(share):.6g}") for share in shares if math.isfinite(share)]
     known = solver.load_scene("bladed-disk").parameter_paths()
     ranks = [(-share, known.index(row.path)) for share, row in zip(with_share, result.rows, strict=False)]
