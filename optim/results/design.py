@@ -261,7 +261,10 @@ class DesignResult(MadeOfResponses, Drawn):
         """What holds the optimum in place, in words: equally high peaks, bounds, limits."""
         if self.evaluation is None or not self.evaluation.rows:
             return ()
-        held = [self._words(row.what, row) for row in self.evaluation.highest(SAME_HEIGHT)]
+        # Peaks by frequency: which of equally high ones is higher is rounding.
+        rows = self.evaluation.highest(SAME_HEIGHT)
+        rows.sort(key=lambda row: row.at_hz if row.quantity is PEAK else math.inf)
+        held = [self._words(row.what, row) for row in rows]
         for variable in self.problem.variables:
             value = self.evaluation.values[variable.name]
             for bound, name in ((variable.low, "lower"), (variable.high, "upper")):
