@@ -6,6 +6,7 @@ import threading
 from collections import Counter, deque
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 from distributed import Future
 
@@ -118,27 +119,15 @@ class Work:
 
 @dataclass(slots=True, kw_only=True)
 class Flight:
-    """An order on its way.
-
-    Attributes
-    ----------
-    begun : int
-        What its worker said when it began; 0 before.
-    worker : str
-        The address of that.
-    threads : int
-        How many orders that computes at a time.
-    deadline : float
-        When it is to have ended, once it was let go (monotonic) [s].
-    """
+    """An order on its way."""
 
     work: Work
     index: int | None
     future: Future
-    begun: int = 0
-    worker: str = ""
-    threads: int = 0
-    deadline: float = 0.0
+    begun: Annotated[int, "What its worker said when it began; 0 before."] = 0
+    worker: Annotated[str, "The address of that."] = ""
+    threads: Annotated[int, "How many orders that computes at a time."] = 0
+    deadline: Annotated[float, "When it is to have ended, once it was let go (monotonic) [s]."] = 0.0
 
     def leaving(self, deadline: float) -> Flight:
         """This one, let go."""
