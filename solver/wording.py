@@ -7,7 +7,9 @@ import re
 from ast import literal_eval
 from collections.abc import Mapping, Sequence
 from inspect import cleandoc, get_annotations
+from typing import TypeVar
 
+Documented = TypeVar("Documented")
 _DESCRIBED = re.compile(r"""Annotated\[(.+?)(?:, Field\(.+\))?, ('(?:[^'\\]|\\.)*'|"(?:[^"\\]|\\.)*")\]""")
 
 
@@ -56,3 +58,9 @@ def with_attributes(doc: str | None, said: Mapping[str, tuple[str, str]]) -> str
     """A docstring with a section of attributes: names with their types and words."""
     rows = [f"{name} : {kind}\n    {words}" for name, (kind, words) in said.items()]
     return "\n".join([cleandoc(doc or ""), *(["\nAttributes\n----------", *rows] if rows else [])])
+
+
+def documented(kind: type[Documented]) -> type[Documented]:
+    """Give a class a docstring with what its annotations say of its fields."""
+    kind.__doc__ = with_attributes(kind.__doc__, every_field_said(kind))
+    return kind

@@ -18,6 +18,7 @@ from optim.criteria.key import WORD
 from optim.criteria.key import Form as Form  # with `Criterion` and `Key` all that a criterion is made of
 from optim.criteria.key import Key as Key
 from solver.results.told import Piece
+from solver.wording import documented
 
 if TYPE_CHECKING:
     from optim.criteria.response_gradients import Sensitivity
@@ -65,61 +66,44 @@ def registered(name: str) -> Criterion:
     return {one.name: one for one in criteria()}[name]
 
 
+@documented
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
 class Criterion:
-    """A quantity that designs are judged by: minimised, limited, or both. Two are one if they are the same.
+    """A quantity that designs are judged by: minimised, limited, or both. Only itself is equal to it."""
 
-    Attributes
-    ----------
-    name : str
-        The word in results and reports (``quantity`` of a row).
-    unit : str
-        Of its values.
-    help : str
-        What it is, a sentence of Markdown.
-    rows : callable
-        The rows of a response: each smooth number with its gradient, and its second derivatives if the
-        solver has them. `Judged.row` makes them.
-    smaller_is_better : bool
-        If not, rows have its negative (they are kept from above), and it can be limited from below alone.
-    weight : str
-        The word in `weights` by which it is minimised; empty if it is only limited.
-    keys : tuple of Key
-        The keys of its limit.
-    read : callable
-        What its keys that were given come to, as its `rows` use it; raises DesignError.
-    ranges : callable or None
-        Frequencies [Hz] beyond the band of a case at which it is judged, from what was read; None for the
-        response over the band.
-    scale : callable
-        What an excess over a limit of 0 is relative to, in a scene.
-    always : bool
-        Whether its rows are wanted if nobody asks: results show them.
-    each_blade : bool
-        Whether it is that of every blade of a mistuned disk.
-    limit_name : str
-        How results call its limit.
-    with_place : bool
-        Whether they say which row has the limit.
-    on_a_front : bool
-        Whether its limit may be given for a front of peak against band.
-    """
-
-    name: str
-    unit: str
-    help: str
-    rows: Callable[[Judged], list[CriterionRow]]
-    smaller_is_better: bool = True
-    weight: str = ""
-    keys: tuple[Key, ...] = ()
-    read: Callable[[CriterionContext], object] = positive_limit
-    ranges: Callable[[Any, LoadCase], Ranges] | None = None
-    scale: Callable[[Scene], float] = _unscaled
-    always: bool = False
-    each_blade: bool = False
-    limit_name: str = ""
-    with_place: bool = True
-    on_a_front: bool = True
+    name: Annotated[str, "The word in results and reports (``quantity`` of a row)."]
+    unit: Annotated[str, "Of its values."]
+    help: Annotated[str, "What it is, a sentence of Markdown."]
+    rows: Annotated[
+        Callable[[Judged], list[CriterionRow]],
+        "The rows of a response: each smooth number with its gradient, and its second derivatives if the "
+        "solver has them. `Judged.row` makes them.",
+    ]
+    smaller_is_better: Annotated[
+        bool,
+        "If not, rows have its negative (they are kept from above), and it can be limited from below alone.",
+    ] = True
+    weight: Annotated[str, "The word in `weights` by which it is minimised; empty if it is only limited."] = (
+        ""
+    )
+    keys: Annotated[tuple[Key, ...], "The keys of its limit."] = ()
+    read: Annotated[
+        Callable[[CriterionContext], object],
+        "What its keys that were given come to, as its `rows` use it; raises DesignError.",
+    ] = positive_limit
+    ranges: Annotated[
+        Callable[[Any, LoadCase], Ranges] | None,
+        "Frequencies [Hz] beyond the band of a case at which it is judged, from what was read; None for "
+        "the response over the band.",
+    ] = None
+    scale: Annotated[
+        Callable[[Scene], float], "What an excess over a limit of 0 is relative to, in a scene."
+    ] = _unscaled
+    always: Annotated[bool, "Whether its rows are wanted if nobody asks: results show them."] = False
+    each_blade: Annotated[bool, "Whether it is that of every blade of a mistuned disk."] = False
+    limit_name: Annotated[str, "How results call its limit."] = ""
+    with_place: Annotated[bool, "Whether they say which row has the limit."] = True
+    on_a_front: Annotated[bool, "Whether its limit may be given for a front of peak against band."] = True
 
     def __post_init__(self) -> None:
         if not self.keys and not self.weight:
@@ -231,23 +215,19 @@ def of_sector(contact: AnyContact) -> str:
     return contact.name.partition("@")[0]
 
 
+@documented
 @dataclass(frozen=True, kw_only=True)
 class Judged:
-    """The response of a case of a problem.
+    """The response of a case of a problem."""
 
-    Attributes
-    ----------
-    problem, case : what is judged.
-    branch : the response, which covers its range and has a peak.
-    gradients : compute them (otherwise they are NaN).
-    hertz : (low, high) [Hz] of a response beyond the band; None for that over the band.
-    """
-
-    problem: Goals
+    problem: Annotated[Goals, "What is judged."]
     case: LoadCase
-    branch: Branch
-    gradients: bool
-    hertz: tuple[float, float] | None = None
+    branch: Annotated[Branch, "The response, which covers its range and has a peak."]
+    gradients: Annotated[bool, "Compute them (otherwise they are NaN)."]
+    hertz: Annotated[
+        tuple[float, float] | None,
+        "(low, high) [Hz] of a response beyond the band; None for that over the band.",
+    ] = None
 
     @cached_property
     def sensitivity(self) -> Sensitivity | None:

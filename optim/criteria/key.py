@@ -9,6 +9,8 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
+from solver.wording import documented
+
 WORD = re.compile(r"[a-z][a-z0-9_]*")
 _FLAG = re.compile(r"--[a-z][a-z0-9-]*")
 
@@ -48,39 +50,22 @@ class Option:
         return {Form.BOUNDS: 3, Form.RANGES: 2}.get(self.form, 1)
 
 
+@documented
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Key:
-    """A key that limits a criterion: of problem files, REST bodies and `optim.design`, with its option.
+    """A key that limits a criterion: of problem files, REST bodies and `optim.design`, with its option."""
 
-    Attributes
-    ----------
-    name : str
-        The key.
-    help : str
-        What it means, with its unit; a sentence.
-    annotation : type
-        Its values in a body: a type that pydantic understands, without None.
-    form, flag, metavar, word, example
-        Those of its option, see `Option`.
-    option_help : str
-        Help of the option; `help` if empty.
-    examples : tuple
-        Values of the key.
-    needs_limit : bool
-        Whether it is refused without the key ``limit``.
-    """
-
-    name: str
-    help: str
-    annotation: Any
-    form: Form
-    flag: str
-    metavar: str
-    option_help: str = ""
-    word: str = ""
-    example: str = ""
-    examples: tuple[Any, ...] = ()
-    needs_limit: bool = False
+    name: Annotated[str, "The key."]
+    help: Annotated[str, "What it means, with its unit; a sentence."]
+    annotation: Annotated[Any, "Its values in a body: a type that pydantic understands, without None."]
+    form: Annotated[Form, "That of its option, see `Option`."]
+    flag: Annotated[str, "Likewise."]
+    metavar: Annotated[str, "Likewise."]
+    option_help: Annotated[str, "Help of the option; `help` if empty."] = ""
+    word: Annotated[str, "Likewise."] = ""
+    example: Annotated[str, "Likewise."] = ""
+    examples: Annotated[tuple[Any, ...], "Values of the key."] = ()
+    needs_limit: Annotated[bool, "Whether it is refused without the key ``limit``."] = False
 
     def __post_init__(self) -> None:
         if not WORD.fullmatch(self.name):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import enum
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -70,24 +71,14 @@ NO_LIMITS = KeyLimits()
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Caller:
-    """Who asks.
+    """Who asks."""
 
-    Attributes
-    ----------
-    owner : str
-        Whom what they make belongs to.
-    scopes : frozenset of Scope
-        What they may do, with what is included.
-    key_id : str or None
-        Of their key; None without one.
-    limits : KeyLimits
-        Of their key.
-    """
-
-    owner: str = NOBODY
-    scopes: frozenset[Scope] = frozenset({Scope.READ, Scope.SUBMIT, Scope.MONITOR})
-    key_id: str | None = None
-    limits: KeyLimits = field(default=NO_LIMITS)
+    owner: Annotated[str, "Whom what they make belongs to."] = NOBODY
+    scopes: Annotated[frozenset[Scope], "What they may do, with what is included."] = frozenset(
+        {Scope.READ, Scope.SUBMIT, Scope.MONITOR}
+    )
+    key_id: Annotated[str | None, "Of their key; None without one."] = None
+    limits: Annotated[KeyLimits, "Of their key."] = field(default=NO_LIMITS)
 
     @property
     def sees(self) -> str | None:

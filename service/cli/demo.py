@@ -9,6 +9,7 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
@@ -35,27 +36,13 @@ _LOOK_SECONDS = 0.1
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DemoCase:
-    """What the demonstration designs and draws of a scene.
+    """What the demonstration designs and draws of a scene."""
 
-    Attributes
-    ----------
-    scene : str
-        Name of a shipped scene.
-    contact : str
-        The contact whose normal load is chosen.
-    bounds : (float, float)
-        Between which it is chosen [N].
-    shown : tuple of float
-        Loads whose responses are drawn beside the optimum's [N].
-    steps : int
-        Loads at which the peak is drawn, over the bounds.
-    """
-
-    scene: str
-    contact: str
-    bounds: tuple[float, float]
-    shown: tuple[float, ...]
-    steps: int = 24
+    scene: Annotated[str, "Name of a shipped scene."]
+    contact: Annotated[str, "The contact whose normal load is chosen."]
+    bounds: Annotated[tuple[float, float], "Between which it is chosen [N]."]
+    shown: Annotated[tuple[float, ...], "Loads whose responses are drawn beside the optimum's [N]."]
+    steps: Annotated[int, "Loads at which the peak is drawn, over the bounds."] = 24
 
     @property
     def variable(self) -> str:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import groupby
 from operator import itemgetter
-from typing import Any
+from typing import Annotated, Any
 
 import typer
 from typer.core import TyperCommand, TyperGroup
@@ -22,27 +22,16 @@ STUDY = "study"
 
 @dataclass(frozen=True, slots=True)
 class CommandEntry:
-    """A command in the table.
+    """A command in the table."""
 
-    Attributes
-    ----------
-    name : str
-        As the user writes it.
-    home : str
-        Module of `service.cli` and function, ``"commands.scenes.scenes"``; `STUDY` for that of a study.
-    summary : str
-        The first line of the function's docstring, which `--help` shows.
-    keyed : bool
-        It talks to a service, and takes ``--key-file``.
-    group : bool
-        What stands there is the class of a group, not a function.
-    """
-
-    name: str
-    home: str
-    summary: str
-    keyed: bool = False
-    group: bool = False
+    name: Annotated[str, "As the user writes it."]
+    home: Annotated[
+        str,
+        'Module of `service.cli` and function, ``"commands.scenes.scenes"``; `STUDY` for that of a study.',
+    ]
+    summary: Annotated[str, "The first line of the function's docstring, which `--help` shows."]
+    keyed: Annotated[bool, "It talks to a service, and takes ``--key-file``."] = False
+    group: Annotated[bool, "What stands there is the class of a group, not a function."] = False
 
     def command(self) -> Deferred:
         """Return it as help lists it."""

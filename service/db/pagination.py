@@ -8,7 +8,7 @@ import json
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 from urllib.parse import urlencode
 
 from pydantic import BaseModel
@@ -34,20 +34,12 @@ _PLANNING = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Condition:
-    """A condition on rows, in two forms: the ids that meet it, and whether a row does.
-
-    Attributes
-    ----------
-    few : int
-        Up to so many rows it leads a query (see `met`).
-    apart : bool
-        It is about rows of another table.
-    """
+    """A condition on rows, in two forms: the ids that meet it, and whether a row does."""
 
     ids: Select[Any]
     holds: ColumnElement[bool]
-    few: int = FEW
-    apart: bool = False
+    few: Annotated[int, "Up to so many rows it leads a query (see `met`)."] = FEW
+    apart: Annotated[bool, "It is about rows of another table."] = False
 
 
 def plain_conditions(

@@ -9,7 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Annotated, Any
 
 from service.errors import BodyTooLargeError, InvalidRequestError, MalformedBodyError, issues_to_json
 from service.jobs.common.measurements import look_at, read_measurements
@@ -46,18 +46,13 @@ class NeededError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class LookedUp:
-    """What the service has looked up for a task, as a `SceneSource`.
+    """What the service has looked up for a task, as a `SceneSource`."""
 
-    Attributes
-    ----------
-    scenes : mapping
-        Stored scenes by name; None for a name that has none.
-    uploads : mapping
-        Scenes with what their uploads hold, or what is wrong with these, by the digest of the scene.
-    """
-
-    scenes: Mapping[str, Any]
-    uploads: Mapping[str, Any]
+    scenes: Annotated[Mapping[str, Any], "Stored scenes by name; None for a name that has none."]
+    uploads: Annotated[
+        Mapping[str, Any],
+        "Scenes with what their uploads hold, or what is wrong with these, by the digest of the scene.",
+    ]
 
     def scene_body(self, name: str) -> Mapping[str, object] | None:
         """Tables and lists of a stored scene, or None."""

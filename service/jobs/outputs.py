@@ -5,7 +5,7 @@ from __future__ import annotations
 import enum
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple, Protocol, Self
+from typing import Annotated, Any, NamedTuple, Protocol, Self
 
 from service.jobs.figures import (
     RECORDS,
@@ -110,34 +110,24 @@ class Found(Protocol):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JobOutput:
-    """What a run gives back.
+    """What a run gives back."""
 
-    Attributes
-    ----------
-    result : dict
-        JSON, with the keys of the command's ``--json``.
-    sweeps : tuple of SweepRecord
-        Every branch computed on the way.
-    design : DesignRecord or None
-        The design, if the job was to find one.
-    shortfall : str or None
-        If the computation did not reach its goal: the status, a sentence that says what to try. The job
-        then fails with it; result and sweeps are kept.
-    encoded : JsonText or None
-        The result as it is stored, if the worker has encoded it already; `result` is then empty.
-    figures : tuple of FigureValue
-        The figures of a result that is encoded.
-    alone : mapping
-        What of such a result is compared with another's.
-    """
-
-    result: dict[str, Any]
-    sweeps: tuple[SweepRecord, ...] = ()
-    encoded: JsonText | None = None
-    figures: tuple[FigureValue, ...] = ()
-    alone: Mapping[str, Any] = field(default_factory=dict)
-    design: DesignRecord | None = None
-    shortfall: str | None = None
+    result: Annotated[dict[str, Any], "JSON, with the keys of the command's ``--json``."]
+    sweeps: Annotated[tuple[SweepRecord, ...], "Every branch computed on the way."] = ()
+    encoded: Annotated[
+        JsonText | None,
+        "The result as it is stored, if the worker has encoded it already; `result` is then empty.",
+    ] = None
+    figures: Annotated[tuple[FigureValue, ...], "The figures of a result that is encoded."] = ()
+    alone: Annotated[Mapping[str, Any], "What of such a result is compared with another's."] = field(
+        default_factory=dict
+    )
+    design: Annotated[DesignRecord | None, "The design, if the job was to find one."] = None
+    shortfall: Annotated[
+        str | None,
+        "If the computation did not reach its goal: the status, a sentence that says what to try. The job "
+        "then fails with it; result and sweeps are kept.",
+    ] = None
 
     def records(self, kind: str, scene_name: str | None, scene_hash: str | None) -> list[StoredRecord]:
         """Return what is stored of it beside its sweeps: the design, or the figures of the result.

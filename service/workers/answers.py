@@ -9,7 +9,7 @@ import signal
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 from service.auth.allowances import Buckets
 from service.errors import (
@@ -43,24 +43,12 @@ _WITHOUT_MEMORY = ("SIGABRT", "SIGSEGV", "SIGBUS")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AnswerLimits:
-    """What may be computed for answers.
+    """What may be computed for answers."""
 
-    Attributes
-    ----------
-    workers : int
-        Processes.
-    seconds : float
-        Processor time of one computation [s].
-    memory_bytes : int
-        Memory of one computation.
-    budget_seconds : int
-        Processor time of an owner in a minute [s].
-    """
-
-    workers: int
-    seconds: float
-    memory_bytes: int
-    budget_seconds: int
+    workers: Annotated[int, "Processes."]
+    seconds: Annotated[float, "Processor time of one computation [s]."]
+    memory_bytes: Annotated[int, "Memory of one computation."]
+    budget_seconds: Annotated[int, "Processor time of an owner in a minute [s]."]
 
     @property
     def of_an_owner(self) -> int:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Annotated, Protocol
 
 from service.db.repositories import Attempt
 from service.jobs.outputs import Best, JobFailure, JobOutput, Point, ResultPiece
@@ -102,21 +102,9 @@ class Executor(Protocol):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ExecutorStatus:
-    """How an executor is.
+    """How an executor is."""
 
-    Attributes
-    ----------
-    workers : int
-        How many attempts it could run at a time when all is well.
-    ready : int
-        How many workers are up, busy ones too.
-    busy : int
-        How many run an attempt.
-    trouble : str or None
-        Why workers do not come up.
-    """
-
-    workers: int
-    ready: int
-    busy: int
-    trouble: str | None = None
+    workers: Annotated[int, "How many attempts it could run at a time when all is well."]
+    ready: Annotated[int, "How many workers are up, busy ones too."]
+    busy: Annotated[int, "How many run an attempt."]
+    trouble: Annotated[str | None, "Why workers do not come up."] = None

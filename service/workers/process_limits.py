@@ -8,6 +8,7 @@ import signal
 import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Annotated
 
 _MATRICES = "solver.linear"
 """The modules whose caches hold matrices and modes."""
@@ -15,18 +16,16 @@ _MATRICES = "solver.linear"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ProcessLimits:
-    """What a worker process may use; where the system cannot limit it, nothing happens.
+    """What a worker process may use; where the system cannot limit it, nothing happens."""
 
-    Attributes
-    ----------
-    memory_bytes : int or None
-        Address space beyond that of the process when it is ready: a task that wants more meets MemoryError.
-    processor_seconds : float or None
-        Of one task; the system ends the process that takes more, whatever it is at [s].
-    """
-
-    memory_bytes: int | None = None
-    processor_seconds: float | None = None
+    memory_bytes: Annotated[
+        int | None,
+        "Address space beyond that of the process when it is ready: a task that wants more meets "
+        "MemoryError.",
+    ] = None
+    processor_seconds: Annotated[
+        float | None, "Of one task; the system ends the process that takes more, whatever it is at [s]."
+    ] = None
 
     def for_threads(self, number: int) -> ProcessLimits:
         """Those of a process in which so many tasks are computed at a time."""

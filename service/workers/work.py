@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 from distributed import Future
 
@@ -45,26 +46,14 @@ class Work:
 
 @dataclass(slots=True, kw_only=True)
 class Flight:
-    """An order on its way.
-
-    Attributes
-    ----------
-    begun : int
-        What its worker said when it began; 0 before.
-    worker : str
-        The address of that.
-    threads : int
-        How many orders that computes at a time.
-    deadline : float
-        When it is to have ended, once it was let go (monotonic) [s].
-    """
+    """An order on its way."""
 
     work: Work
     future: Future
-    begun: int = 0
-    worker: str = ""
-    threads: int = 0
-    deadline: float = 0.0
+    begun: Annotated[int, "What its worker said when it began; 0 before."] = 0
+    worker: Annotated[str, "The address of that."] = ""
+    threads: Annotated[int, "How many orders that computes at a time."] = 0
+    deadline: Annotated[float, "When it is to have ended, once it was let go (monotonic) [s]."] = 0.0
 
     def leaving(self, deadline: float) -> Flight:
         """This one, let go."""

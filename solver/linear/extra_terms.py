@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.linear.model import ExtraTerms, Terms
-from solver.matrices.sectors.blocks import full_elimination
 from solver.matrices.values import frozen
 from solver.scene.bodies.body import REVOLUTIONS
+from solver.scene.cyclic.sector_blocks import full_elimination
 from solver.scene.linear_terms import Entry
 from solver.scene.scene import MatricesStructure, Scene
 from solver.scene.scene_parameter import Slope

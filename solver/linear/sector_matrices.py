@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from solver.linear.structure_matrices import block_diag, bodies_mass, modal_damping, ratio_of_modes
 from solver.matrices.normal_modes import hermitian
-from solver.matrices.sectors.blocks import at_diameter, full_elimination
 from solver.matrices.values import frozen
 from solver.scene.bodies.body import Body
+from solver.scene.cyclic.sector_blocks import at_diameter, full_elimination
 from solver.scene.parts import MatricesStructure
 
 Matrices = tuple[NDArray[Any], NDArray[Any], NDArray[Any]]

@@ -10,10 +10,10 @@ from solver.contacts.fields import NonNegative, Part, Vector
 from solver.matrices.sectors.diameters import DiameterMatrices
 from solver.matrices.sectors.outline import SectorOutline
 from solver.matrices.sectors.parts import PartMatrices
-from solver.matrices.sectors.validation import check_sector
 from solver.matrices.validation import DofTable, antisymmetric, check_matrices, symmetric
 from solver.matrices.values import MOST_MODES, Matrix, NormalModes
 from solver.scene.cyclic.sector_tables import CyclicBoundary, Mistuning, Sectors
+from solver.scene.cyclic.sector_validation import check_sector
 
 Ratio = Annotated[float, Field(strict=True, ge=0.0, le=10.0, allow_inf_nan=False)]
 

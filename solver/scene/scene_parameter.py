@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, TypeVar
 
 from pydantic import ValidationError
 
 from solver.contacts.fields import Part, Real
 from solver.contacts.laws.parts import LawQuantity, Span, usual_span
 from solver.errors import SettingError
+from solver.wording import documented
 
 if TYPE_CHECKING:
     from solver.scene.linear_terms import Entry
@@ -40,85 +41,59 @@ class ActsOn(Enum):
     STRUCTURE = "matrices, constant forces or places of contacts"
 
 
+@documented
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Slope:
-    """What a unit of a parameter adds to the linear equations of a scene.
+    """What a unit of a parameter adds to the linear equations of a scene."""
 
-    Attributes
-    ----------
-    parts : tuple of (int, float)
-        Masses, springs and dashpots, counted in this order, and what each gains.
-    masses : mapping
-        Mass matrix of bodies, by their names.
-    forces, second_forces : tuple of (str, float)
-        Constant forces by DOFs, and by the unit squared.
-    motions : mapping
-        Relative motions of contacts, by their names.
-    entries : tuple of Entry
-        Entries of K and C.
-    damping : "K", "M" or None
-        C gains the stiffness or the mass of a structure given by its matrices.
-    loss : bool
-        K gains i times the stiffness of what moves.
-    speed : bool
-        The matrices are those of a speed higher by 1/min.
-    """
-
-    parts: tuple[tuple[int, float], ...] = ()
-    masses: Mapping[str, Real] = field(default_factory=dict)
-    forces: Forces = ()
-    second_forces: Forces = ()
-    motions: Mapping[str, tuple[Form, ...]] | None = None
-    entries: tuple[Entry, ...] = ()
-    damping: Literal["K", "M"] | None = None
-    loss: bool = False
-    speed: bool = False
+    parts: Annotated[
+        tuple[tuple[int, float], ...],
+        "Masses, springs and dashpots, counted in this order, and what each gains.",
+    ] = ()
+    masses: Annotated[Mapping[str, Real], "Mass matrix of bodies, by their names."] = field(
+        default_factory=dict
+    )
+    forces: Annotated[Forces, "Constant forces by DOFs."] = ()
+    second_forces: Annotated[Forces, "Likewise, by the unit squared."] = ()
+    motions: Annotated[
+        Mapping[str, tuple[Form, ...]] | None, "Relative motions of contacts, by their names."
+    ] = None
+    entries: Annotated[tuple[Entry, ...], "Entries of K and C."] = ()
+    damping: Annotated[
+        Literal["K", "M"] | None, "C gains the stiffness or the mass of a structure given by its matrices."
+    ] = None
+    loss: Annotated[bool, "K gains i times the stiffness of what moves."] = False
+    speed: Annotated[bool, "The matrices are those of a speed higher by 1/min."] = False
 
 
+@documented
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SceneParameter:
-    """A parameter path resolved against a scene.
+    """A parameter path resolved against a scene."""
 
-    Attributes
-    ----------
-    get : callable
-        Gives its value; of a group, its first member's. Raises SettingError where it has none.
-    with_value : callable
-        Gives the fields of the scene that change where it is set. Raises SettingError for a bad value.
-    unit : str
-        Of its values.
-    least : float
-        Smallest value that means something.
-    acts_on : ActsOn
-        What it changes:
-    slope : callable
-        what a unit of it adds to the linear equations; or
-    contacts : mapping
-        by the place of each contact in the scene the share of a unit that its number gains, and
-    quantities : tuple of LawQuantity
-        what that number is in each of them.
-    listed : bool
-        Whether it may be set: numbers of contacts that a shape makes are set by those of the shape.
-    in_steps : bool
-        Whether it is a whole number.
-    moves_contacts : bool
-        Whether it is of the geometry that places contacts.
-    by_hand : bool
-        Whether it is worth a slider.
-    """
-
-    get: Callable[[], float]
-    with_value: Callable[[float], Mapping[str, Any]]
-    unit: str
-    least: float = 0.0
-    acts_on: ActsOn = ActsOn.STRUCTURE
-    slope: Callable[[], Slope] = Slope
-    contacts: Mapping[int, float] = field(default_factory=dict)
-    quantities: tuple[LawQuantity, ...] = ()
-    listed: bool = True
-    in_steps: bool = False
-    moves_contacts: bool = False
-    by_hand: bool = True
+    get: Annotated[
+        Callable[[], float],
+        "Gives its value; of a group, its first member's. Raises SettingError where it has none.",
+    ]
+    with_value: Annotated[
+        Callable[[float], Mapping[str, Any]],
+        "Gives the fields of the scene that change where it is set. Raises SettingError for a bad value.",
+    ]
+    unit: Annotated[str, "Of its values."]
+    least: Annotated[float, "Smallest value that means something."] = 0.0
+    acts_on: Annotated[ActsOn, "What it changes:"] = ActsOn.STRUCTURE
+    slope: Annotated[Callable[[], Slope], "what a unit of it adds to the linear equations; or"] = Slope
+    contacts: Annotated[
+        Mapping[int, float],
+        "by the place of each contact in the scene the share of a unit that its number gains, and",
+    ] = field(default_factory=dict)
+    quantities: Annotated[tuple[LawQuantity, ...], "what that number is in each of them."] = ()
+    listed: Annotated[
+        bool, "Whether it may be set: numbers of contacts that a shape makes are set by those of the shape."
+    ] = True
+    in_steps: Annotated[bool, "Whether it is a whole number."] = False
+    moves_contacts: Annotated[bool, "Whether it is of the geometry that places contacts."] = False
+    by_hand: Annotated[bool, "Whether it is worth a slider."] = True
 
     def span(self, key: str) -> Span | None:
         """Return what its slider covers, as the parameter `key` of its owner; None without a slider."""

@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 from service.cli.options.inputs import relative
 from service.errors import InputError
@@ -20,24 +20,15 @@ MOST_UNNAMED = 200
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sources:
-    """What a scene is made of.
+    """What a scene is made of."""
 
-    Attributes
-    ----------
-    roles : dict
-        File of each of M, K and C, or of ``modes``.
-    mapping : Path or None
-        File of the labels of the rows.
-    units : str
-        Of the files.
-    parts : dict
-        File of each part of the sector that mistuning may scale; None for K and M of the whole.
-    """
-
-    roles: dict[str, Path]
-    mapping: Path | None
-    units: str
-    parts: dict[str, Path | None] = field(default_factory=dict)
+    roles: Annotated[dict[str, Path], "File of each of M, K and C, or of ``modes``."]
+    mapping: Annotated[Path | None, "File of the labels of the rows."]
+    units: Annotated[str, "Of the files."]
+    parts: Annotated[
+        dict[str, Path | None],
+        "File of each part of the sector that mistuning may scale; None for K and M of the whole.",
+    ] = field(default_factory=dict)
 
     def table(self, target: Path) -> dict[str, object]:
         """The table [structure] of a scene at `target` that refers to the files."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from service.cli.importing.scene import split
 from service.errors import InputError
@@ -22,18 +22,10 @@ _METRES = {"SI": 1.0, "mm": 1e-3, "in": 0.0254}
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PatchTables:
-    """What patches add to a scene.
+    """What patches add to a scene."""
 
-    Attributes
-    ----------
-    dofs : dict
-        DOFs of their nodes that had no name, each with its label.
-    tables : dict
-        The tables [[nodes]] and [[dampers]].
-    """
-
-    dofs: dict[str, int | str]
-    tables: dict[str, list[dict[str, Any]]]
+    dofs: Annotated[dict[str, int | str], "DOFs of their nodes that had no name, each with its label."]
+    tables: Annotated[dict[str, list[dict[str, Any]]], "The tables [[nodes]] and [[dampers]]."]
 
 
 class Patches:

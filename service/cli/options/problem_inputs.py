@@ -51,21 +51,13 @@ File = Annotated[
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ProblemFlags:
-    """What was given on the command line of a design problem, as it was written.
+    """What was given on the command line of a design problem, as it was written."""
 
-    Attributes
-    ----------
-    file : str or None
-        Of ``--problem``.
-    values : list of str or None
-        Of ``--set``.
-    keys : mapping
-        Key to its option and what was given to it.
-    """
-
-    file: str | None = None
-    values: list[str] | None = None
-    keys: Mapping[str, tuple[Option, Any]] = field(default_factory=dict)
+    file: Annotated[str | None, "Of ``--problem``."] = None
+    values: Annotated[list[str] | None, "Of ``--set``."] = None
+    keys: Annotated[Mapping[str, tuple[Option, Any]], "Key to its option and what was given to it."] = field(
+        default_factory=dict
+    )
 
 
 _OFFERED: dict[Form, Callable[..., list[str]]] = {
@@ -118,21 +110,11 @@ SCENE_FILES = (".toml", ".json")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Description:
-    """A design problem as it was given.
+    """A design problem as it was given."""
 
-    Attributes
-    ----------
-    body : dict
-        The keys of the REST body, `scene` among them.
-    options : mapping
-        Key to the option that gave it, for what is not the file's.
-    file : Path or None
-        Where the other keys come from.
-    """
-
-    body: dict[str, Any]
-    options: Mapping[str, str]
-    file: Path | None
+    body: Annotated[dict[str, Any], "The keys of the REST body, `scene` among them."]
+    options: Annotated[Mapping[str, str], "Key to the option that gave it, for what is not the file's."]
+    file: Annotated[Path | None, "Where the other keys come from."]
 
     def refusal(self, issues: Sequence[Issue]) -> InputError:
         """What is wrong, with the option or the key of the file that has to change."""

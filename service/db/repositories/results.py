@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
 from functools import partial
-from typing import Any
+from typing import Annotated, Any
 from weakref import WeakKeyDictionary, WeakSet
 
 from sqlalchemy import (
@@ -83,43 +83,28 @@ _NAMES = select(Quantity.id, Quantity.name, Quantity.label).where(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Filter:
-    """Which results to list; every condition must hold.
+    """Which results to list; every condition must hold."""
 
-    Attributes
-    ----------
-    of : str
-        Of what.
-    owner : str or None
-        Whose; None for everybody's.
-    equal : mapping
-        Column name to value.
-    ranges : mapping
-        Name of a figure to (lowest, highest), each None for open.
-    words : mapping
-        Name of a word to the word.
-    part : str or None
-        Name of a part it must have; None for any.
-    part_ranges : mapping
-        As `ranges`, of the parts; one part must meet all of them.
-    run : str or None
-        With the run of this job, be it that an earlier job computed them; None for any.
-    sort : str
-        ``created`` (by the order in which they were stored) or the name of a figure; results without it are
-        left out.
-    descending : bool
-        Largest or newest first.
-    """
-
-    of: str
-    owner: str | None = NOBODY
-    equal: Mapping[str, object] = field(default_factory=dict)
-    ranges: Mapping[str, Range] = field(default_factory=dict)
-    words: Mapping[str, str] = field(default_factory=dict)
-    part: str | None = None
-    part_ranges: Mapping[str, Range] = field(default_factory=dict)
-    run: str | None = None
-    sort: str = CREATED
-    descending: bool = True
+    of: Annotated[str, "Of what."]
+    owner: Annotated[str | None, "Whose; None for everybody's."] = NOBODY
+    equal: Annotated[Mapping[str, object], "Column name to value."] = field(default_factory=dict)
+    ranges: Annotated[Mapping[str, Range], "Name of a figure to (lowest, highest), each None for open."] = (
+        field(default_factory=dict)
+    )
+    words: Annotated[Mapping[str, str], "Name of a word to the word."] = field(default_factory=dict)
+    part: Annotated[str | None, "Name of a part it must have; None for any."] = None
+    part_ranges: Annotated[
+        Mapping[str, Range], "As `ranges`, of the parts; one part must meet all of them."
+    ] = field(default_factory=dict)
+    run: Annotated[
+        str | None, "With the run of this job, be it that an earlier job computed them; None for any."
+    ] = None
+    sort: Annotated[
+        str,
+        "``created`` (by the order in which they were stored) or the name of a figure; results without it "
+        "are left out.",
+    ] = CREATED
+    descending: Annotated[bool, "Largest or newest first."] = True
 
 
 class ResultRepository:

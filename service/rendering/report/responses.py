@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Annotated, Any, TypeAlias
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -41,18 +41,10 @@ class ReportLine:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sweeps:
-    """How the responses of a report are computed.
+    """How the responses of a report are computed."""
 
-    Attributes
-    ----------
-    harmonics : int
-        Highest harmonic kept.
-    limit : float or None
-        Amplitude [m] at which the band is measured.
-    """
-
-    harmonics: int
-    limit: float | None
+    harmonics: Annotated[int, "Highest harmonic kept."]
+    limit: Annotated[float | None, "Amplitude [m] at which the band is measured."]
 
     def of(self, scene: Scene) -> AnyBranch | None:
         """The response over the scene's band; None where it has no point."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from html import escape
 from importlib.metadata import PackageNotFoundError, version
-from typing import Any
+from typing import Annotated, Any
 
 import solver
 from service.jobs.registry import ABOUT_THE_RUN
@@ -29,25 +29,18 @@ _PACKAGES = ("stickslip", "numpy", "scipy", "numba", "casadi", "cvxpy", "clarabe
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Designed:
-    """What a report is of.
+    """What a report is of."""
 
-    Attributes
-    ----------
-    scene : Scene
-        As it was given, with its values set.
-    problem : mapping
-        The arguments of the design layer.
-    result : mapping
-        The JSON of `optim.DesignResult`, `optim.ParetoResult`, `optim.RobustResult` or
-        `optim.Identification`.
-    about : mapping
-        What is known of the run, as `service.rendering.report.about.About`.
-    """
-
-    scene: Scene
-    problem: Json
-    result: Json
-    about: Json = field(default_factory=dict)
+    scene: Annotated[Scene, "As it was given, with its values set."]
+    problem: Annotated[Json, "The arguments of the design layer."]
+    result: Annotated[
+        Json,
+        "The JSON of `optim.DesignResult`, `optim.ParetoResult`, `optim.RobustResult` or "
+        "`optim.Identification`.",
+    ]
+    about: Annotated[Json, "What is known of the run, as `service.rendering.report.about.About`."] = field(
+        default_factory=dict
+    )
 
     @property
     def harmonics(self) -> int:

@@ -6,7 +6,9 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
+
+from solver.wording import documented
 
 if TYPE_CHECKING:
     from solver.matrices.labels import Label
@@ -20,43 +22,12 @@ class MatrixFileError(ValueError):
     """A file that holds no usable matrix; the message names the file and where it is damaged."""
 
 
+@documented
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reader:
     """A format of files that hold matrices, modes, the labels of rows, or nodes.
 
     Commands, uploads, the page, error messages and the table in docs/matrices.md follow from it.
-
-    Attributes
-    ----------
-    name : str
-        What people call the format.
-    suffixes : tuple of str
-        Endings of its files, lower case, with their dots; several readers may share one.
-    help : str
-        What the files hold and which program writes them, a sentence of Markdown.
-    word : str
-        Of ``?format=`` of an upload; an ending without its dot, that of a file whose name tells no format.
-    media : tuple of str
-        Content types that tell the format of an upload.
-    recognises : callable or None
-        Whether a file that begins with these bytes (200 at most) has the format. It tells readers that share
-        an ending apart and names the format of a file with a wrong ending; None where nothing tells.
-    matrix : callable or None
-        Reads the matrix of a key (``M``, ``K``, ``C``) from a file: an array, a sparse array, or a
-        `solver.matrices.readers.arrays.Labelled` with the node and component of each row. It may raise any
-        error whose message says where the file is damaged.
-    names : callable or None
-        Names of the arrays of a file that may hold several; None for a format of one matrix.
-    modes : callable or None
-        Reads the arrays ``modes``, ``omega2`` or ``frequencies_hz``, and maybe ``damping_ratio``.
-    labels : callable or None
-        Reads the labels of all rows, in order.
-    nodes : callable or None
-        Reads positions and sets of nodes, a `solver.matrices.sectors.decks.Deck`.
-    global_rows : bool
-        Whether rows are along the global axes whatever frames a deck gives to nodes, as in CalculiX.
-    roles : mapping
-        Ending to ``M``, ``K`` or ``C``, where the ending tells which matrix a file holds.
 
     Raises
     ------
@@ -64,19 +35,50 @@ class Reader:
         An ending or word of the wrong form, or a reader that reads nothing.
     """
 
-    name: str
-    suffixes: tuple[str, ...]
-    help: str
-    word: str
-    media: tuple[str, ...] = ()
-    recognises: Callable[[bytes], bool] | None = None
-    matrix: Callable[[Path, str], Any] | None = None
-    names: Callable[[Path], list[str]] | None = None
-    modes: Callable[[Path], dict[str, Any]] | None = None
-    labels: Callable[[Path], tuple[Label, ...]] | None = None
-    nodes: Callable[[Path], Any] | None = None
-    global_rows: bool = False
-    roles: Mapping[str, str] = field(default_factory=dict)
+    name: Annotated[str, "What people call the format."]
+    suffixes: Annotated[
+        tuple[str, ...], "Endings of its files, lower case, with their dots; several readers may share one."
+    ]
+    help: Annotated[str, "What the files hold and which program writes them, a sentence of Markdown."]
+    word: Annotated[
+        str,
+        "Of ``?format=`` of an upload; an ending without its dot, that of a file whose name tells no format.",
+    ]
+    media: Annotated[tuple[str, ...], "Content types that tell the format of an upload."] = ()
+    recognises: Annotated[
+        Callable[[bytes], bool] | None,
+        "Whether a file that begins with these bytes (200 at most) has the format. It tells readers that "
+        "share an ending apart and names the format of a file with a wrong ending; None where nothing "
+        "tells.",
+    ] = None
+    matrix: Annotated[
+        Callable[[Path, str], Any] | None,
+        "Reads the matrix of a key (``M``, ``K``, ``C``) from a file: an array, a sparse array, or a "
+        "`solver.matrices.readers.arrays.Labelled` with the node and component of each row. It may raise "
+        "any error whose message says where the file is damaged.",
+    ] = None
+    names: Annotated[
+        Callable[[Path], list[str]] | None,
+        "Names of the arrays of a file that may hold several; None for a format of one matrix.",
+    ] = None
+    modes: Annotated[
+        Callable[[Path], dict[str, Any]] | None,
+        "Reads the arrays ``modes``, ``omega2`` or ``frequencies_hz``, and maybe ``damping_ratio``.",
+    ] = None
+    labels: Annotated[
+        Callable[[Path], tuple[Label, ...]] | None, "Reads the labels of all rows, in order."
+    ] = None
+    nodes: Annotated[
+        Callable[[Path], Any] | None,
+        "Reads positions and sets of nodes, a `solver.matrices.sectors.decks.Deck`.",
+    ] = None
+    global_rows: Annotated[
+        bool, "Whether rows are along the global axes whatever frames a deck gives to nodes, as in CalculiX."
+    ] = False
+    roles: Annotated[
+        Mapping[str, str],
+        "Ending to ``M``, ``K`` or ``C``, where the ending tells which matrix a file holds.",
+    ] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         wrong = [suffix for suffix in self.suffixes if not _SUFFIX.fullmatch(suffix)]

@@ -13,11 +13,16 @@ from typing import Annotated, TypeVar
 
 from solver.contacts.laws.harmonics import is_phase
 from solver.errors import SettingError
-from solver.matrices.sectors.blocks import added_by_mistuning, annulus_matrices, annulus_of, full_elimination
 from solver.matrices.validation import DofTable
 from solver.matrices.values import MOST_DOFS, Matrix
 from solver.results.told import Piece
 from solver.scene.bodies.kinematics import forms_of, written_form
+from solver.scene.cyclic.sector_blocks import (
+    added_by_mistuning,
+    annulus_matrices,
+    annulus_of,
+    full_elimination,
+)
 from solver.scene.linear_terms import Coupling, LinearTerm
 from solver.scene.parameter_paths import changed_quantities
 from solver.scene.parts import Recovered

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,14 +12,16 @@ from numpy.typing import NDArray
 from solver.errors import SettingError
 from solver.matrices.sectors.elimination import Circulant, Elimination, elimination
 from solver.matrices.sectors.parts import WHOLE, PartsAcross
-from solver.matrices.sectors.validation import Sector
+
+if TYPE_CHECKING:
+    from solver.scene.matrices_structure import MatricesStructure
 
 FloatArray = NDArray[np.float64]
 Matrices = tuple[NDArray[Any], NDArray[Any], NDArray[Any]]
 
 
 @lru_cache(maxsize=16)
-def full_elimination(sector: Sector) -> Elimination:
+def full_elimination(sector: MatricesStructure) -> Elimination:
     """How the high boundary of a full sector follows the low one."""
     cyclic, M = sector.cyclic, sector.M
     if cyclic is None or cyclic.low_rows is None or cyclic.high_rows is None or M is None:
@@ -28,14 +30,14 @@ def full_elimination(sector: Sector) -> Elimination:
 
 
 @lru_cache(maxsize=16)
-def _circulants(sector: Sector) -> tuple[Circulant, Circulant, Circulant]:
+def _circulants(sector: MatricesStructure) -> tuple[Circulant, Circulant, Circulant]:
     """K, C and M of a full sector, its high boundary eliminated."""
     eliminated = full_elimination(sector)
     K, C, M = (eliminated.of(matrix) for matrix in _given(sector))
     return K, C, M
 
 
-def _given(sector: Sector) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _given(sector: MatricesStructure) -> tuple[FloatArray, FloatArray, FloatArray]:
     """K, C and M as they stand in the scene; no damping is 0."""
     if sector.M is None or sector.K is None:
         raise ValueError("a structure given by its matrices needs M and K")
@@ -46,7 +48,7 @@ def _given(sector: Sector) -> tuple[FloatArray, FloatArray, FloatArray]:
     )
 
 
-def at_diameter(sector: Sector, n: int) -> Matrices:
+def at_diameter(sector: MatricesStructure, n: int) -> Matrices:
     """K, C and M of a sector at nodal diameter n, from 0 to half the sectors, as they are given.
 
     What has no sectors is as it is at 0.
@@ -65,7 +67,7 @@ def at_diameter(sector: Sector, n: int) -> Matrices:
     return K, C, M
 
 
-def annulus_matrices(sector: Sector) -> Matrices:
+def annulus_matrices(sector: MatricesStructure) -> Matrices:
     """K, C and M of all sectors, sector after sector, real.
 
     Of a full sector they are its own blocks; of a reduced one X_jl = 1/N Σ_n X_n e^{jn(j−l)α}, with the
@@ -85,7 +87,7 @@ def annulus_matrices(sector: Sector) -> Matrices:
     return K, C, M
 
 
-def annulus_of(sector: Sector, matrix: NDArray[Any]) -> NDArray[Any]:
+def annulus_of(sector: MatricesStructure, matrix: NDArray[Any]) -> NDArray[Any]:
     """A further matrix of a full sector for all sectors, as `annulus_matrices` has K, C and M."""
     return _of_all_sectors(full_elimination(sector).of(matrix), sector.sectors or 1)
 
@@ -104,7 +106,7 @@ def _written_out(folded: NDArray[Any], count: int) -> NDArray[np.float64]:
     return np.ascontiguousarray(blocks.transpose(0, 2, 1, 3).reshape(count * n, count * n))
 
 
-def scalable(sector: Sector) -> tuple[str, ...]:
+def scalable(sector: MatricesStructure) -> tuple[str, ...]:
     """Names that mistuning of a sector may give."""
     if sector.diameters is not None:
         return () if sector.diameters.parts is None else sector.diameters.parts.names
@@ -112,7 +114,7 @@ def scalable(sector: Sector) -> tuple[str, ...]:
 
 
 def added_by_mistuning(
-    sector: Sector, of: Sequence[str], factors: Sequence[float]
+    sector: MatricesStructure, of: Sequence[str], factors: Sequence[float]
 ) -> tuple[FloatArray, FloatArray]:
     """What factors on parts of each sector add to K and M of all sectors, sector after sector.
 
@@ -144,11 +146,11 @@ def added_by_mistuning(
     return K, M
 
 
-def _size(sector: Sector) -> int:
+def _size(sector: MatricesStructure) -> int:
     return sector.diameters.size if sector.diameters is not None else full_elimination(sector).kept.size
 
 
-def _sector_by_sector(sector: Sector, name: str, deviations: FloatArray) -> FloatArray:
+def _sector_by_sector(sector: MatricesStructure, name: str, deviations: FloatArray) -> FloatArray:
     """Add a part of a full sector: its high boundary is the low one of the next sector."""
     eliminated = full_elimination(sector)
     P = _matrix(sector, name)
@@ -165,7 +167,7 @@ def _sector_by_sector(sector: Sector, name: str, deviations: FloatArray) -> Floa
     return whole.reshape(count * n, count * n)
 
 
-def _matrix(sector: Sector, name: str) -> FloatArray:
+def _matrix(sector: MatricesStructure, name: str) -> FloatArray:
     if name in WHOLE:
         given = sector.K if name == "K" else sector.M
         if given is None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from typing import Any, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,59 +11,15 @@ from solver.matrices.sectors.diameters import DiameterMatrices
 from solver.matrices.sectors.elimination import Elimination, elimination
 from solver.matrices.sectors.parts import PartMatrices
 from solver.matrices.validation import DofTable, check_definite
-from solver.matrices.values import Matrix, NormalModes
+from solver.matrices.values import Matrix
+
+if TYPE_CHECKING:
+    from solver.scene.matrices_structure import MatricesStructure
 
 _REAL = 1e-9  # imaginary part, relative to the largest entry, that counts as none
 
 
-class Sector(Protocol):
-    """A structure of kind ``matrices``, as far as its sectors go."""
-
-    def __hash__(self) -> int:
-        """Of its content."""
-
-    @property
-    def sectors(self) -> int | None:
-        """Number of sectors."""
-
-    @property
-    def cyclic(self) -> Any:
-        """Boundaries and axis."""
-
-    @property
-    def diameters(self) -> DiameterMatrices | None:
-        """The reduced sector."""
-
-    @property
-    def symmetric(self) -> bool:
-        """Whether K and C are symmetric."""
-
-    @property
-    def modes(self) -> NormalModes | None:
-        """Modes in place of the matrices."""
-
-    @property
-    def M(self) -> Matrix | None:
-        """Mass of a full sector [kg]."""
-
-    @property
-    def K(self) -> Matrix | None:
-        """Stiffness of a full sector [N/m]."""
-
-    @property
-    def C(self) -> Matrix | None:
-        """Damping of a full sector [N s/m]."""
-
-    @property
-    def dofs(self) -> DofTable:
-        """The DOFs in use."""
-
-    @property
-    def parts(self) -> PartMatrices | None:
-        """Stiffness of parts of a full sector [N/m]."""
-
-
-def check_sector(sector: Sector, spinning: Collection[str]) -> None:
+def check_sector(sector: MatricesStructure, spinning: Collection[str]) -> None:
     """Raise ValueError unless matrices with boundaries, or those of nodal diameters, are there and fit.
 
     `spinning` names the matrices given that go with the speed of rotation.
@@ -73,7 +29,7 @@ def check_sector(sector: Sector, spinning: Collection[str]) -> None:
         raise ValueError(f"`sectors` = {count}: a sector is given by its matrices, not by `modes`")
     low, high = (None, None) if sector.cyclic is None else (sector.cyclic.low_rows, sector.cyclic.high_rows)
     if sector.diameters is None:
-        if low is None or high is None:
+        if sector.cyclic is None or low is None or high is None:
             raise ValueError(
                 f"`sectors` = {count} needs the boundaries in [structure.cyclic]: `low` and `high` in a "
                 "scene file, `low_rows` and `high_rows` in a request"
