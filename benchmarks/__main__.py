@@ -43,6 +43,7 @@ def _cases() -> dict[str, Callable[[], None]]:
         space,
         space_kernel,
         space_peers,
+        spreading,
         start,
         stored_runs,
         stored_sweeps,
@@ -93,6 +94,7 @@ def _cases() -> dict[str, Callable[[], None]]:
         "charts": charts.charts,
         "new-user": new_user.new_user,
         "cluster": cluster.mistuning_study,
+        "spreading": spreading.spreading,
         "mistuned": mistuned.mistuned_disks,
     }
 

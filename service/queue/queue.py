@@ -108,7 +108,9 @@ class JobQueue:
         with self._lock:
             running = list(self._running.values())
         for entry in running:
-            self._ask_to_stop(entry, StopReason.SHUTDOWN)
+            entry.stop = entry.stop or StopReason.SHUTDOWN
+            with _about(entry.attempt):
+                log.info("job %s is told to stop: %s", entry.attempt.job_id, entry.stop.value)
         self._executor.close()
 
     def wake(self) -> None:

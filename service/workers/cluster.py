@@ -5,12 +5,12 @@ from __future__ import annotations
 import logging
 import pickle
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from distributed import Client, Future, Security
 
-from service.workers.tasks import TOPIC, Order, TaskAnswer, compute
+from service.workers.tasks import TOPIC, Order, TaskAnswer, ask_to_stop, compute
 
 log = logging.getLogger("stickslip.executor")
 
@@ -84,6 +84,13 @@ class Cluster:
             compute, order, key=f"stickslip-{order.kind}-{order.token}", pure=False, retries=0,
             priority=priority,
         )  # fmt: skip
+
+    def ask_to_stop(self, workers: Mapping[str, list[str]]) -> None:
+        """Have orders end with what they kept: their tokens by the address of the worker."""
+        client = self._client
+        if client is not None and client.status == "running":
+            for worker, tokens in workers.items():
+                client.run(ask_to_stop, tokens, workers=[worker], wait=False, on_error="ignore")
 
     def restart(self, worker: str) -> None:
         """End the process of a worker by force; its nanny starts another one."""
@@ -163,8 +170,8 @@ class Cluster:
         self._on_lost(trouble)
 
 
-def answer_of(future: Future) -> TaskAnswer:
-    """What a worker answered.
+def answer_of(future: Future, seconds: float = _ANSWER_SECONDS) -> TaskAnswer:
+    """What a worker answered, within so long.
 
     Raises
     ------
@@ -172,7 +179,7 @@ def answer_of(future: Future) -> TaskAnswer:
         Whatever became of the order instead.
     """
     # From a worker, which the scheduler trusts; never from a request.
-    answer = pickle.loads(future.result(timeout=_ANSWER_SECONDS))
+    answer = pickle.loads(future.result(timeout=seconds))
     if not isinstance(answer, TaskAnswer):
         raise TypeError(f"a worker answered {type(answer).__name__}")
     return answer

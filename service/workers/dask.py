@@ -12,7 +12,7 @@ import itertools
 import logging
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from importlib.metadata import version
 from queue import SimpleQueue
@@ -121,7 +121,8 @@ class DaskExecutor:
         """Let everything go and close the connection."""
         with self._lock:
             self._closing = True
-            running = list(self._work)
+            running, flights = list(self._work), dict(self._flights)
+        self._take_what_is_kept(flights)
         for work in running:
             self._end(work, Stopped())
         self._pool.shutdown()
@@ -129,6 +130,23 @@ class DaskExecutor:
         self._notes.put(None)
         if self._listener.ident is not None:
             self._listener.join()
+
+    def _take_what_is_kept(self, flights: Mapping[str, Flight]) -> None:
+        """Have orders end, and store what they kept for the next attempt, within the grace."""
+        begun = {token: flight for token, flight in flights.items() if flight.begun}
+        workers: dict[str, list[str]] = {}
+        for token, flight in begun.items():
+            workers.setdefault(flight.worker, []).append(token)
+        self._cluster.ask_to_stop(workers)
+        end = time.monotonic() + self._grace_seconds
+        for flight in begun.values():
+            try:
+                answer = answer_of(flight.future, max(end - time.monotonic(), 0.01))
+            except Exception as error:  # noqa: BLE001 - all that may become of a future; the job is tried again
+                log.info("job %s gave nothing back: %r", flight.work.attempt.job_id, error)
+                continue
+            for kept in answer.kept:
+                self._sink.kept(flight.work.attempt, kept.pieces, anew=kept.anew)
 
     def status(self) -> ExecutorStatus:
         """How the cluster is."""

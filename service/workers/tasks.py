@@ -44,6 +44,8 @@ _GONE = (Status.closing, Status.closing_gracefully, Status.closed, Status.failed
 
 log = logging.getLogger("stickslip.worker")
 
+_to_stop: set[str] = set()
+
 _warming = threading.Lock()
 _warmed: set[WarmUp] = set()
 
@@ -106,14 +108,16 @@ class TaskAnswer:
 class _Unwanted:
     """`should_stop` of one order: whether the cluster still wants its task; remembers that it does not."""
 
-    def __init__(self, worker: Worker, key: object) -> None:
-        self._worker = worker
+    def __init__(self, worker: Worker, key: object, token: str = "") -> None:
+        self._worker, self._token = worker, token
         self._tasks: Mapping[object, Any] = worker.state.tasks
         self._key = key
         self.obeyed = False
 
     def __call__(self) -> bool:
         task = self._tasks.get(self._key)
+        if self._token in _to_stop:
+            self.obeyed = True
         if task is None or task.state in ("cancelled", "resumed") or self._worker.status in _GONE:
             self.obeyed = True
         return self.obeyed
@@ -170,11 +174,11 @@ class _Colleagues:
             return found
 
     def end(self, *, recall: bool) -> None:
-        """Let go what is underway, and take the thread again."""
-        if recall and self._client is not None:
-            self._client.cancel(list(self._underway.values()), force=True)
-            self._underway.clear()
-        if self._seceded:
+        """Let go what is underway, and take the thread again; an order that ends early needs none."""
+        for future in self._underway.values():
+            future.release()
+        self._underway.clear()
+        if self._seceded and not recall:
             self._seceded = False
             rejoin()
 
@@ -226,6 +230,11 @@ class _OrderStop:
         return self.obeyed
 
 
+async def ask_to_stop(tokens: list[str]) -> None:
+    """On a worker: have orders end now, with what they kept; those of other workers are not known here."""
+    _to_stop.update(tokens)
+
+
 def compute(order: Order) -> bytes:
     """Compute an order; every error becomes an answer.
 
@@ -262,12 +271,13 @@ def _answer(order: Order) -> TaskAnswer:
 
     # The time tells a second start of an order from the first one, even in the same process.
     say(begun=time.time_ns(), threads=worker.state.nthreads)
-    stop = _OrderStop(_Unwanted(worker, worker.get_current_task()))
+    stop = _OrderStop(_Unwanted(worker, worker.get_current_task(), order.token))
     try:
         with traces.span("compute", order.trace, job=order.job_id, kind=order.kind):
             return _computed(order, worker.state.nthreads, Throttle(send, order.pace.progress_seconds), stop)
     finally:
         order.limits.forget()
+        _to_stop.discard(order.token)
         say(over=True)
 
 
