@@ -28,6 +28,7 @@ from sqlalchemy.exc import DBAPIError
 from sqlalchemy.pool import ConnectionPoolEntry, NullPool
 
 from service.db import postgresql
+from service.db.array_store import ArrayStore
 from service.db.clock import utc_now
 from service.db.group_commit import GroupedWrites
 from service.db.lock import FileLock, make_private
@@ -205,12 +206,19 @@ class Database:
         Most connections to PostgreSQL at a time.
     seconds : float
         Longest time for a statement, for a lock, for a connection [s].
+    arrays : str or None
+        Where large arrays are, if that is outside of the database (see `ArrayStore`).
     """
 
     def __init__(
-        self, url: str, connections: int = CONNECTIONS, seconds: float = BUSY_TIMEOUT_SECONDS
+        self,
+        url: str,
+        connections: int = CONNECTIONS,
+        seconds: float = BUSY_TIMEOUT_SECONDS,
+        arrays: str | None = None,
     ) -> None:
         self.url = url
+        self.arrays = None if arrays is None else ArrayStore(arrays)
         self._seconds = seconds
         self._here = threading.local()
         self._wrote = -math.inf

@@ -207,10 +207,14 @@ class ContactValues:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StoredArray:
-    """An array as it is stored: NumPy's npy bytes, never pickle, and their SHA-256 in hexadecimal."""
+    """An array as it is stored: NumPy's npy bytes, never pickle, and their SHA-256 in hexadecimal.
+
+    Of one outside of the database a row has the `size` [bytes] in place of the bytes.
+    """
 
     sha256: str
     data: bytes
+    size: int | None = None
 
     @classmethod
     def of_bytes(cls, data: bytes) -> Self:

@@ -112,7 +112,9 @@ class Service:
     ) -> None:
         self.settings = settings
         self.registry = registry_of(settings.kinds) if registry is None else registry
-        self.database = Database(settings.database, settings.database_connections, settings.database_seconds)
+        self.database = Database(
+            settings.database, settings.database_connections, settings.database_seconds, settings.arrays
+        )
         self.jobs = JobRepository(self.database, now)
         self.stored = ResultRepository(self.database)
         self.keys = KeyRepository(self.database)

@@ -225,10 +225,15 @@ def prune_database(
     uploads: bool = False,
     dry_run: bool = False,
     vacuum: bool = False,
+    arrays: str | None = None,
 ) -> Pruned:
     """Delete the jobs that ended longer ago than `seconds`, and uploads as old, or count them.
 
     What was put in the bin longer ago goes with them, designs too.
+
+    Parameters
+    ----------
+    arrays : where large arrays are, if that is outside of the database.
 
     Raises
     ------
@@ -247,7 +252,7 @@ def prune_database(
     wrong = off_head(url, "needs")
     if wrong is not None:
         raise DatabaseError(wrong)
-    database = Database(url)
+    database = Database(url, arrays=arrays)
     try:
         before = JobRepository(database).now() - timedelta(seconds=seconds)
         if dry_run:

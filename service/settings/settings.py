@@ -139,6 +139,11 @@ class Settings(ClientLimits):
         description="Where jobs and results are kept: sqlite:///relative/path, sqlite:////absolute/path or "
         "postgresql://user:password@host/name.",
     )
+    arrays: str | None = Field(
+        default=None,
+        description="Where large arrays of sweeps are kept: a folder, or a URL of fsspec such as "
+        "s3://bucket/arrays (extra `stores`); unset: in the database.",
+    )
     database_connections: int = Field(
         default=CONNECTIONS, ge=2, le=1000, description="Connections to PostgreSQL at most."
     )

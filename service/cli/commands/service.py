@@ -117,10 +117,11 @@ def prune(
     """
     from service.queue.retention import prune_database
 
-    url = settings_of(database=database).database
+    settings = settings_of(database=database)
     found = prune_database(
-        url, older_than, keep_designs=keep_designs, uploads=uploads, dry_run=dry_run, vacuum=vacuum
-    )
+        settings.database, older_than, keep_designs=keep_designs, uploads=uploads, dry_run=dry_run,
+        vacuum=vacuum, arrays=settings.arrays,
+    )  # fmt: skip
     if as_json:
         print_json({**asdict(found), "deleted": not dry_run})
     else:
@@ -139,8 +140,9 @@ def check(database: options.Database = None, as_json: options.Json = False) -> N
     from service.db.engine import shown
     from service.db.repositories.integrity import check as look
 
-    url = settings_of(database=database).database
-    found = look(url)
+    settings = settings_of(database=database)
+    url = settings.database
+    found = look(url, settings.arrays)
     if as_json:
         print_json(found.to_json())
     else:

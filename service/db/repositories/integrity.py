@@ -10,11 +10,13 @@ from typing import Any
 from sqlalchemy import ColumnElement, Connection, Engine, Select, Text, and_, cast, exists, func, select, text
 from sqlalchemy.exc import DBAPIError
 
+from service.db.array_store import ArrayStore
 from service.db.engine import database_name, database_path, is_sqlite, read_engine
 from service.db.models import Job, JobResult, JobState, Project, Result, Run, SweepArray
+from service.db.repositories.results import whole
 from service.db.revisions import head_revision, off_head
 from service.errors import DamagedDatabaseError, DatabaseError, WrongRevisionError
-from service.jobs.figures import SWEEP, StoredArray
+from service.jobs.figures import SWEEP
 
 # A job that ends as `successful` wrote its result with the same transaction, unless it repeats another's.
 # One that failed may have kept what it computed short of its goal.
@@ -79,12 +81,30 @@ def _runs(*conditions: ColumnElement[bool]) -> Select[Any]:
     return select(func.count()).select_from(Run).join(Job, Job.id == Run.job_id).where(and_(*conditions))
 
 
-def arrays(engine: Engine) -> Iterator[tuple[str, str, StoredArray]]:
-    """Yield sweep, name and bytes of every stored array, one at a time."""
-    query = select(SweepArray.sweep_id, SweepArray.name, SweepArray.sha256, SweepArray.data)
+_ARRAYS = select(
+    Result.job_id, SweepArray.sweep_id, SweepArray.name, SweepArray.sha256, SweepArray.data, SweepArray.size
+).join(Result, Result.id == SweepArray.sweep_id)
+
+
+def damaged_arrays(engine: Engine, store: ArrayStore | None) -> Iterator[str]:
+    """Yield what is wrong with arrays, one at a time, wherever they are."""
     with engine.connect().execution_options(stream_results=True, max_row_buffer=16) as connection:
-        for sweep_id, name, sha256, data in connection.execute(query):
-            yield sweep_id, name, StoredArray(sha256=sha256, data=data)
+        for row in connection.execute(_ARRAYS):
+            try:
+                whole(store, row).array()
+            except (DatabaseError, ValueError) as error:
+                yield f"array `{row.name}` of sweep {row.sweep_id}: {error}"
+
+
+def unneeded(connection: Connection, store: ArrayStore) -> list[str]:
+    """Return what is said of arrays outside of the database whose job is gone; no harm but their space."""
+    jobs = list(store.jobs())
+    known = set[str]()
+    for begin in range(0, len(jobs), _AT_ONCE):
+        some = jobs[begin : begin + _AT_ONCE]
+        known.update(connection.execute(select(Job.id).where(Job.id.in_(some))).scalars())
+    gone = len(jobs) - len(known)
+    return [f"{store.place} has arrays of {gone} jobs that are not there"] if gone else []
 
 
 def damaged_results(engine: Engine) -> Iterator[str]:
@@ -108,6 +128,7 @@ def contents(connection: Connection) -> Contents:
     )
 
 
+_AT_ONCE = 500
 MOST_NAMED = 20  # damaged arrays and results that are named one by one
 
 
@@ -144,8 +165,12 @@ class Findings:
         }  # fmt: skip
 
 
-def check(url: str) -> Findings:
+def check(url: str, arrays: str | None = None) -> Findings:
     """Read a database from end to end; a service may be using it.
+
+    Parameters
+    ----------
+    arrays : where large arrays are, if that is outside of the database.
 
     Raises
     ------
@@ -160,18 +185,14 @@ def check(url: str) -> Findings:
     wrong = off_head(url, "checks")
     if wrong is not None:
         raise WrongRevisionError(wrong)
+    store = None if arrays is None else ArrayStore(arrays)
     engine = read_engine(url)
     try:
         with engine.begin() as connection:
             trouble = [*damage(connection), *contradictions(connection)]
             held = contents(connection)
-        damaged = []
-        for sweep_id, name, stored in arrays(engine):
-            try:
-                stored.array()
-            except (DatabaseError, ValueError) as error:
-                damaged.append(f"array `{name}` of sweep {sweep_id}: {error}")
-        damaged += damaged_results(engine)
+            trouble += [] if store is None else unneeded(connection, store)
+        damaged = [*damaged_arrays(engine, store), *damaged_results(engine)]
     except DBAPIError as error:
         raise DamagedDatabaseError(f"{name} cannot be read: {error.orig}") from error
     finally:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterable, Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from datetime import datetime
 from typing import Any
 
@@ -264,18 +264,20 @@ class JobRepository:
         """Commit state, result and sweeps together, unless the job was lost or its cancel asked for."""
         finished = self.now()
         values = {"ended": finished, "more": _bytes_of(output)}
+        placed = self._placed(attempt, output)
 
         def write(connection: Connection) -> bool:
             if not _guarded(connection, job_statements.SUCCEED, attempt, values):
                 return False
             drop_checkpoint(connection, attempt.job_id)
-            self._store(connection, attempt, output, finished)
+            self._store(connection, attempt, placed, finished)
             return True
 
         return self._db.grouped(write)
 
     def fail(self, attempt: Attempt, failure: JobFailure, output: JobOutput | None = None) -> bool:
         """Commit a failure for good, with what was computed all the same."""
+        placed = None if output is None else self._placed(attempt, output)
         with self._db.writing() as connection:
             finished = self.now()
             changed = change_owned(
@@ -288,10 +290,10 @@ class JobRepository:
             )
             if changed:
                 drop_checkpoint(connection, attempt.job_id)
-            if changed and output is not None:
+            if changed and output is not None and placed is not None:
                 more = {"job": attempt.job_id, "more": _bytes_of(output)}
                 connection.execute(job_statements.ADD_STORED, more)
-                self._store(connection, attempt, output, finished)
+                self._store(connection, attempt, placed, finished)
             return changed
 
     def lose(self, attempt: Attempt, reason: str) -> RecoveredJobs:
@@ -400,6 +402,20 @@ class JobRepository:
         connection.execute(job_statements.INSERT_JOB, written | stored)
         insert_words(connection, written["id"], new.words, now)
         return JobRow(**{name: written[name] for name in job_statements.ROW})
+
+    def _placed(self, attempt: Attempt, output: JobOutput) -> JobOutput:
+        """The output with its large arrays outside of the database, if that is where they belong.
+
+        If the row is not written after all, they stay for the attempt that writes it, and go with the job.
+        """
+        store = self._db.arrays
+        if store is None:
+            return output
+        sweeps = (
+            (one, {name: store.put(attempt.job_id, array) for name, array in one.arrays.items()})
+            for one in output.sweeps
+        )
+        return replace(output, sweeps=tuple(replace(one, arrays=arrays) for one, arrays in sweeps))
 
     @staticmethod
     def _store(connection: Connection, attempt: Attempt, output: JobOutput, created: datetime) -> None:

@@ -28,6 +28,7 @@ from sqlalchemy import (
 from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.orm import aliased
 
+from service.db.array_store import ArrayStore
 from service.db.clock import new_id
 from service.db.engine import Database
 from service.db.models import NOBODY, Figure, Job, Quantity, Result, SweepArray
@@ -48,6 +49,7 @@ from service.db.pagination import (
 )
 from service.db.postgresql import lock_quantities
 from service.db.repositories.runs import in_the_bin
+from service.errors import DatabaseError
 from service.jobs.figures import RECORDS, SWEEP, KindRecord, StoredArray, StoredRecord
 
 Name = tuple[str, str]
@@ -124,13 +126,14 @@ class ResultRepository:
 
     def arrays(self, result_id: str) -> dict[str, StoredArray]:
         """The arrays of a sweep, by name."""
-        query = select(SweepArray.name, SweepArray.sha256, SweepArray.data).where(
-            SweepArray.sweep_id == result_id
+        query = (
+            select(Result.job_id, SweepArray.name, SweepArray.sha256, SweepArray.data, SweepArray.size)
+            .join(Result, Result.id == SweepArray.sweep_id)
+            .where(SweepArray.sweep_id == result_id)
         )
         with self._db.reading() as connection:
-            return {
-                row.name: StoredArray(sha256=row.sha256, data=row.data) for row in connection.execute(query)
-            }
+            rows = connection.execute(query).all()
+        return {row.name: whole(self._db.arrays, row) for row in rows}
 
     def page(self, wanted: Filter, limit: int, after: Position | None = None) -> list[tuple[Any, Position]]:
         """A page of results, each with its place; `after` is that of the last one of the page before.
@@ -164,6 +167,21 @@ class ResultRepository:
             figures[number].append((*self._names[quantity], value))
         heads = ({name: row[name] for name in _HEAD} for row in rows)
         return [_record(of).stored(head, figures[head["number"]]) for head in heads]
+
+
+def whole(store: ArrayStore | None, row: Any) -> StoredArray:
+    """An array with its bytes, from a row with its job, digest, bytes and size.
+
+    Raises
+    ------
+    DatabaseError
+        If it is outside of the database and cannot be had from there.
+    """
+    if row.size is None:
+        return StoredArray(sha256=row.sha256, data=row.data)
+    if store is None:
+        raise DatabaseError("it is outside of the database: `arrays` (STICKSLIP_ARRAYS) must say where")
+    return StoredArray(sha256=row.sha256, data=store.get(row.job_id, row.sha256))
 
 
 def _record(of: str) -> type[StoredRecord]:
@@ -350,7 +368,8 @@ def insert_results(
             {"quantity": ids[one.name, one.label], "value": one.value, "result": number} for one in told
         ]
         arrays += [
-            {"sweep_id": result_id, "name": name, "sha256": stored.sha256, "data": stored.data}
+            {"sweep_id": result_id, "name": name}
+            | {"sha256": stored.sha256, "data": stored.data, "size": stored.size}
             for name, stored in getattr(record, "arrays", {}).items()
         ]
     if figures:

@@ -97,10 +97,22 @@ class RetentionRepository:
         query = select(Result.id).select_from(_SWEEPS).where(Job.id.in_(jobs), free).limit(most)
         with self._db.writing() as connection:
             ids = list(connection.execute(query).scalars())
+            outside = _outside(connection, ids) if ids else []
             if ids:
                 _uncount(connection, ids)
                 connection.execute(delete(Result).where(Result.id.in_(ids)))
+        self._delete_outside(outside)
         return len(ids)
+
+    def _delete_outside(self, jobs: Sequence[str]) -> None:
+        """Delete what jobs have outside of the database and no row refers to any more."""
+        if self._db.arrays is None:
+            return
+        for job in jobs:
+            left = select(SweepArray.sha256).join(Result, Result.id == SweepArray.sweep_id)
+            with self._db.reading() as connection:
+                digests = connection.execute(left.where(Result.job_id == job)).scalars().all()
+            self._db.arrays.keep(job, digests)
 
     def delete_jobs(self, jobs: Sequence[str], *, keep_designs: bool) -> int:
         """Delete these jobs, whose sweeps are deleted, with their results; how many were."""
@@ -152,10 +164,21 @@ class RetentionRepository:
             return connection.execute(statement).rowcount
 
 
+def _outside(connection: Connection, sweeps: Sequence[str]) -> Sequence[str]:
+    """The jobs of those sweeps that have arrays outside of the database."""
+    query = select(Result.job_id).distinct().join(SweepArray, SweepArray.sweep_id == Result.id)
+    return (
+        connection.execute(query.where(Result.id.in_(sweeps), SweepArray.size.is_not(None))).scalars().all()
+    )
+
+
 def _uncount(connection: Connection, sweeps: Sequence[str]) -> None:
     """Take what sweeps store from what their jobs are said to."""
     freed = (
-        select(Result.job_id, func.sum(func.length(SweepArray.data)).label("bytes"))
+        select(
+            Result.job_id,
+            func.sum(func.coalesce(SweepArray.size, func.length(SweepArray.data))).label("bytes"),
+        )
         .join(SweepArray, SweepArray.sweep_id == Result.id)
         .where(Result.id.in_(sweeps))
         .group_by(Result.job_id)
