@@ -6,7 +6,7 @@ import tempfile
 import threading
 import time
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,7 @@ import httpx
 import pytest
 from fastapi import FastAPI
 
+import solver
 from service.db import revisions
 from service.db.engine import Database
 from service.db.repositories import NewJob
@@ -59,6 +60,16 @@ def settings_of(url: str) -> MakeSettings:
         return load_settings(**{**defaults, **values})
 
     return make
+
+
+class Shipped:
+    """The shipped scenes, without a database."""
+
+    def scene_body(self, name: str) -> Mapping[str, object] | None:
+        return solver.load_scene(name).to_dict() if name in solver.shipped_scenes() else None
+
+    def with_uploads(self, body: Mapping[str, object]) -> Mapping[str, object]:
+        return body
 
 
 class ServedClient(httpx.Client):

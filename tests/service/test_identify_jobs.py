@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from typing import Any
 
 import pytest
+from service_helpers import Shipped
 
-import solver
 from service.cli.commands.client import submit
 from service.cli.options.inputs import join_words
 from service.errors import InvalidRequestError
@@ -21,14 +21,6 @@ BODY: Mapping[str, Any] = {
     "data": [{"frequency": [1.0, 1.1, 1.2, 1.4], "amplitude": [1.93, 2.12, 1.775, 1.245]}],
     "unknowns": {"damper.mu": [0.1, 0.6]},
 }
-
-
-class Shipped:
-    def scene_body(self, name: str) -> Mapping[str, object] | None:
-        return solver.load_scene(name).to_dict()
-
-    def with_uploads(self, body: Mapping[str, object]) -> Mapping[str, object]:
-        return body
 
 
 def test_it_finds_what_the_data_say() -> None:

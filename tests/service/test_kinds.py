@@ -11,14 +11,6 @@ import solver
 from service.jobs.common.records import contact_values
 from service.jobs.common.scenes import MAX_HARMONICS
 
-
-class Shipped:
-    """The shipped scenes, without a database."""
-
-    def scene_body(self, name: str) -> dict[str, object] | None:
-        return solver.load_scene(name).to_dict() if name in solver.shipped_scenes() else None
-
-
 WAIT = {"Prefer": "wait=60"}
 
 

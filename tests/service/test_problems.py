@@ -6,7 +6,7 @@ from typing import Any
 
 import httpx
 import pytest
-from service_helpers import is_problem, job_ids
+from service_helpers import Shipped, is_problem, job_ids
 
 import optim
 import solver
@@ -46,13 +46,6 @@ EVERY_KEY: dict[str, Any] = {
     "basins": 3,
 }
 NO_KEYS = {"limits", "on_best", "scene", "on_progress", "should_stop"}
-
-
-class Shipped:
-    """The shipped scenes, without a database."""
-
-    def scene_body(self, name: str) -> dict[str, object] | None:
-        return solver.load_scene(name).to_dict() if name in solver.shipped_scenes() else None
 
 
 def pointers(change: dict[str, Any]) -> list[str]:

@@ -7,6 +7,7 @@ from enum import Enum
 from typing import Any
 
 import pytest
+from service_helpers import Shipped
 
 import optim
 import solver
@@ -18,16 +19,6 @@ from solver.results.told import Told, json_keys, json_value
 
 FORCE = "excitation.amplitude"
 OF_DISKS = ("interference", "mistuning")
-
-
-class Shipped:
-    """The shipped scenes, without a database."""
-
-    def scene_body(self, name: str) -> Mapping[str, object] | None:
-        return solver.load_scene(name).to_dict()
-
-    def with_uploads(self, body: Mapping[str, object]) -> Mapping[str, object]:
-        return body
 
 
 def asked(kind: str, name: str) -> dict[str, Any]:

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import pytest
+from service_helpers import Shipped
 
 import solver
 from service.jobs.kinds import SHIPPED
@@ -73,16 +74,6 @@ SOMETIMES = {
     "limit_cycles",
     "motions",
 }
-
-
-class Shipped:
-    """The shipped scenes, without a database."""
-
-    def scene_body(self, name: str) -> Mapping[str, object] | None:
-        return solver.load_scene(name).to_dict() if name in solver.shipped_scenes() else None
-
-    def with_uploads(self, body: Mapping[str, object]) -> Mapping[str, object]:
-        return body
 
 
 @pytest.mark.parametrize("case", BODIES)
