@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import typer
 from typer.core import TyperGroup
@@ -20,7 +20,7 @@ from service.cli.options.key_options import KeyOption, key_options
 from service.cli.options.parameters import keyword, with_parameters
 from service.cli.progress import bar
 from service.errors import InputError
-from service.jobs.study import Answer, Study, Watch
+from service.jobs.study import Answer, Study, Watch, Writable
 from service.rendering.text import show
 from solver.errors import SettingError
 from solver.results.views import on_demand
@@ -29,15 +29,7 @@ from solver.results.watch import stopped_by_interrupt
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from solver.results.dataset import Dataset
     from solver.scene.scene import Scene
-
-
-class Result(Protocol):
-    """What can be written as a table."""
-
-    def to_dataset(self) -> Dataset:
-        """The result as named arrays."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,7 +56,7 @@ class Outputs:
         return cls(picture=output_path("--plot", plot, PICTURES), file=output_path("--out", out, FILES))
 
     def write(
-        self, result: Result, draw: Callable[[], Figure] | None, *, scene: Scene | None = None
+        self, result: Writable, draw: Callable[[], Figure] | None, *, scene: Scene | None = None
     ) -> None:  # fmt: skip
         """Write what was asked for.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import enum
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Annotated, Any, NamedTuple, Protocol, Self
+from typing import Annotated, Any, NamedTuple, Protocol
 
 from service.jobs.figures import (
     RECORDS,
@@ -97,17 +97,6 @@ class Pace:
     traces: bool = False
 
 
-class Found(Protocol):
-    """A result of a computation."""
-
-    @property
-    def status(self) -> enum.Enum:
-        """How it ended; the value is a sentence that says what to try."""
-
-    def to_json(self) -> dict[str, Any]:
-        """The result as JSON."""
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JobOutput:
     """What a run gives back."""
@@ -142,22 +131,6 @@ class JobOutput:
         return [
             KindRecord(of=kind, scene_name=scene_name, scene_hash=scene_hash, status=status, values=values)
         ]
-
-    @classmethod
-    def of(
-        cls, found: Found, *, reached: bool, sweeps: tuple[SweepRecord, ...] = (),
-        design: DesignRecord | None = None,
-    ) -> Self:  # fmt: skip
-        """Return the output of a computation that says of itself how it ended.
-
-        Parameters
-        ----------
-        found : its result.
-        reached : whether that is what was asked for.
-        sweeps, design : to be stored.
-        """
-        shortfall = None if reached else str(found.status.value)
-        return cls(result=found.to_json(), sweeps=sweeps, design=design, shortfall=shortfall)
 
 
 class FailureKind(enum.StrEnum):

@@ -169,20 +169,7 @@ Tags = Annotated[tuple[Tag, ...], Field(max_length=MOST_TAGS), AfterValidator(_e
 
 
 class JobRequest(BaseModel):
-    """What every kind of job takes; the models of the kinds derive from it.
-
-    Attributes
-    ----------
-    fresh : bool
-        Compute again even if the same thing was computed before.
-    priority : int
-        Of one owner's jobs those of a higher priority run first; equal ones in the order they came.
-    max_seconds : float or None
-        Longest time an attempt at it may take [s]; that of the service if left out.
-    project, name, notes, tags
-        What is said of the run (`ABOUT_THE_RUN`). They are no part of what is computed: a dump of the model
-        leaves them out.
-    """
+    """What every kind of job takes; the models of the kinds derive from it."""
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True, validate_by_name=True)
 
@@ -199,6 +186,7 @@ class JobRequest(BaseModel):
         le=1e7,
         description="Longest time an attempt may take [s]; at most, and if left out, that of the service.",
     )
+    # What is said of the run is no part of what is computed: a dump of the model leaves it out.
     project: str | None = Field(
         default=None, max_length=36, exclude=True, description="Id of the project the run belongs to."
     )
@@ -217,6 +205,7 @@ class Flag(NamedTuple):
 
 
 ABOUT_THE_RUN = ("project", "name", "notes", "tags")
+ABOUT_THE_JOB = ("fresh", "priority", "max_seconds", *ABOUT_THE_RUN)
 
 
 class SceneSource(Protocol):

@@ -22,10 +22,9 @@ from optim.identification.data.table import known_units
 from optim.identification.readers.registry import data_formats
 from optim.problem.keys import ROBUST, CaseRequest, DesignKeys, FrontKeys, options
 from optim.problem.words import MethodWord, ScalingWord
-from service.jobs.common.problem import ABOUT_THE_JOB
 from service.jobs.common.scenes import HarmonicRequest, SceneRequest
 from service.jobs.kinds import SHIPPED
-from service.jobs.registry import JobKind, JobRequest, Registry
+from service.jobs.registry import ABOUT_THE_JOB, JobKind, JobRequest, Registry
 from service.jobs.studies.design import Design
 from service.jobs.studies.pareto import Pareto
 from service.settings.settings import ClientLimits, Settings

@@ -15,10 +15,14 @@ Limit = Annotated[int, Field(ge=1, le=10_000)]
 Cursor = Annotated[str | None, Field(max_length=500)]
 
 
-class ListQuery(BaseModel):
-    """What to list; the fields stand in the queries themselves, in the order of the reference."""
+class AskedModel(BaseModel):
+    """Root of what is asked: no other keys, no number that is not finite."""
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True)
+
+
+class ListQuery(AskedModel):
+    """What to list; the fields stand in the queries themselves, in the order of the reference."""
 
     path: ClassVar[str]
     """Of the list."""

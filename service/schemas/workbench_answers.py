@@ -6,14 +6,14 @@ from dataclasses import asdict
 from datetime import datetime
 from typing import Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import AwareDatetime, BaseModel, ConfigDict, Field
+from pydantic import AwareDatetime, BaseModel, Field
 
 from service.db.models import JobState, Project, Share
 from service.db.repositories.runs import RunFilter, RunRow
 from service.jobs.outputs import AttemptProgress
 from service.jobs.registry import LONGEST_TAG, MOST_TAGS, Notes, ProjectName, RunName, Tags
 from service.schemas.answers import AnswerModel, JobAnswer, Page, Peak
-from service.schemas.pages import Cursor, Limit, ListQuery
+from service.schemas.pages import AskedModel, Cursor, Limit, ListQuery
 
 _REVISION = "Counts the changes; the `ETag`, for `If-Match` of a change."
 _DELETED = "When it was put in the bin; null outside of it."
@@ -184,16 +184,13 @@ class SmallCurve(AnswerModel):
 
 
 class RunSummary(AnswerModel):
-    """What was asked of a run and what came out, in figures; null where there is none.
-
-    Attributes
-    ----------
-    values : at the optimum, else those that were identified or set.
-    """
+    """What was asked of a run and what came out, in figures; null where there is none."""
 
     id: str
     request: dict[str, Any] | None
-    values: dict[str, float | None]
+    values: dict[str, float | None] = Field(
+        description="At the optimum, else those that were identified or set."
+    )
     peak: Peak | None = Field(
         description="The highest peak [m] and its frequency [Hz]; of a robust design the worst."
     )
@@ -207,7 +204,6 @@ class RunSummary(AnswerModel):
     curve: SmallCurve | None
 
 
-_CHANGES = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 Text = Annotated[
     str | None, Field(min_length=1, max_length=200, description="In the name or the notes, in any case.")
 ]
@@ -255,10 +251,8 @@ class ProjectQuery(ListQuery):
     cursor: Cursor = None
 
 
-class RunChanges(BaseModel):
+class RunChanges(AskedModel):
     """What is to be changed of a run; what is left out stays as it is."""
-
-    model_config = _CHANGES
 
     project: ProjectId | None = Field(default=None, description="Id of a project; null for none.")
     name: RunName = ""
@@ -266,28 +260,22 @@ class RunChanges(BaseModel):
     tags: Tags = Field(default=(), description="In place of those it has.")
 
 
-class NewProject(BaseModel):
+class NewProject(AskedModel):
     """A project to be made."""
-
-    model_config = _CHANGES
 
     name: ProjectName
     notes: Notes = ""
 
 
-class ProjectChanges(BaseModel):
+class ProjectChanges(AskedModel):
     """What is to be changed of a project; what is left out stays as it is."""
-
-    model_config = _CHANGES
 
     name: ProjectName = "-"
     notes: Notes = ""
 
 
-class NewLink(BaseModel):
+class NewLink(AskedModel):
     """A link to be made."""
-
-    model_config = _CHANGES
 
     days: float | None = Field(
         default=None,

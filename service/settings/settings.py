@@ -130,10 +130,6 @@ def _postgresql_url(parsed: URL) -> str:
 class Settings(ClientLimits):
     """The settings of one service; frozen. `STICKSLIP_PORT` in the environment sets `port`, and so on."""
 
-    model_config = SettingsConfigDict(
-        env_prefix="STICKSLIP_", frozen=True, extra="forbid", allow_inf_nan=False
-    )
-
     database: str = Field(
         default="sqlite:///./stickslip.db",
         description="Where jobs and results are kept: sqlite:///relative/path, sqlite:////absolute/path or "

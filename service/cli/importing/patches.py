@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 GROUND = "ground"
 _NEXT = "@next"
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
-_METRES = {"SI": 1.0, "mm": 1e-3, "in": 0.0254}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,10 +48,12 @@ class Patches:
         self, texts: Sequence[str] | None, deck: Deck | None, units: str,
         turn: tuple[int, Sequence[float]] | None, tolerance: float | None,
     ) -> None:  # fmt: skip
+        from solver.matrices.values import METRES
+
         self._dampers: list[dict[str, Any]] = []
         self._nodes: dict[int, tuple[float, float, float]] = {}
         self._turn = turn
-        self._tolerance, self._metres = tolerance, _METRES[units]
+        self._tolerance, self._metres = tolerance, METRES[units]
         if not texts:
             return
         if deck is None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -125,39 +125,30 @@ def bounds(option: str, texts: Sequence[str], wanted: str = "LO HI") -> dict[str
     return variables
 
 
-def words_by_path(option: str, texts: Sequence[str]) -> dict[str, str]:
-    """Paths with a word each, PATH=WORD."""
-    words: dict[str, str] = {}
+def by_name(
+    option: str, texts: Sequence[str], example: str, wanted: str = "PATH=VALUE", *, once: bool = False
+) -> dict[str, str]:
+    """The texts NAME=WORD of a repeatable option; where a name may come again the last one counts."""
+    found: dict[str, str] = {}
     for text in texts:
-        path, _, word = (part.strip() for part in text.partition("="))
-        if not path or not word:
-            raise InputError(f"`{option}` takes PATH=WORD, for example {DISK_LOAD}=logarithmic, got {text!r}")
-        words[path] = word
-    return words
+        name, equals, word = (part.strip() for part in text.partition("="))
+        if not equals or not name:
+            raise InputError(f"`{option}` takes {wanted}, for example {example}, got {text!r}")
+        if once and name in found:
+            raise InputError(f"`{option}` names {name!r} twice; keep one")
+        found.pop(name, None)
+        found[name] = word
+    return found
 
 
-def lists_by_path(option: str, texts: Sequence[str]) -> dict[str, list[float]]:
-    """Paths with numbers each, PATH=V,V,…"""
-    lists: dict[str, list[float]] = {}
-    for text in texts:
-        path, equals, numbers = text.partition("=")
-        if not equals or not path.strip():
-            raise InputError(f"`{option}` takes PATH=V,V,…, for example {DISK_LOAD}=100,400, got {text!r}")
-        lists[path.strip()] = [part(option, text, word) for word in numbers.split(",")]
-    return lists
+def numbers(option: str, words: Mapping[str, str]) -> dict[str, float]:
+    """The numbers of the words of `by_name`."""
+    return {name: part(option, f"{name}={word}", word) for name, word in words.items()}
 
 
-def settings(texts: Sequence[str] | None) -> dict[str, float]:
+def settings(texts: Sequence[str] | None, option: str = "--set") -> dict[str, float]:
     """The values of ``--set``, in the given order."""
-    values: dict[str, float] = {}
-    for text in texts or ():
-        path, equals, value = text.partition("=")
-        path = path.strip()
-        if not equals or not path:
-            raise InputError(f"`--set` takes PATH=VALUE, for example {DISK_LOAD}=150, got {text!r}")
-        values.pop(path, None)
-        values[path] = part("--set", text, value)
-    return values
+    return numbers(option, by_name(option, texts or (), f"{DISK_LOAD}=150"))
 
 
 def scene(name: str, texts: Sequence[str] | None) -> Scene:

@@ -20,6 +20,7 @@ from service.cli.options.inputs import number, whole_number
 from service.cli.options.parameters import Command, keyword, parameters_of
 from service.errors import InputError
 from service.jobs.registry import Flag, JobKind
+from solver.scene.descriptions import DISK_LOAD
 
 SCENE = "scene"
 Schema = Mapping[str, Any]
@@ -91,8 +92,14 @@ class KeyOption:
         if of_each.get("type") == "array" and of_each.get("maxItems") == 2:
             return inputs.bounds(self.flag, texts, self.metavar.partition(" ")[2] or _PAIR)
         if of_each.get("type") == "array":
-            return inputs.lists_by_path(self.flag, texts)
-        return inputs.words_by_path(self.flag, texts) if "enum" in of_each else inputs.settings(texts)
+            lists = inputs.by_name(self.flag, texts, f"{DISK_LOAD}=100,400", "PATH=V,V,…")
+            return {
+                path: [inputs.part(self.flag, f"{path}={words}", word) for word in words.split(",")]
+                for path, words in lists.items()
+            }
+        if "enum" in of_each:
+            return inputs.by_name(self.flag, texts, f"{DISK_LOAD}=logarithmic", "PATH=WORD")
+        return inputs.settings(texts, self.flag)
 
     def _read(self, text: str) -> Any:
         try:

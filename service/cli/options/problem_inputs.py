@@ -243,19 +243,6 @@ def _of_flags(flags: ProblemFlags) -> dict[str, Any]:
     return {key: value for key, value in given.items() if value is not None}
 
 
-def _table(option: str, texts: Sequence[str], example: str) -> dict[str, str]:
-    """The names and words of a repeatable option NAME=WORD."""
-    found: dict[str, str] = {}
-    for text in texts:
-        name, equals, word = text.partition("=")
-        if not equals or not name.strip():
-            raise InputError(f"`{option}` takes NAME=VALUE, for example {example}, got {text!r}")
-        if name.strip() in found:
-            raise InputError(f"`{option}` names {name.strip()!r} twice; keep one")
-        found[name.strip()] = word.strip()
-    return found
-
-
 def _ranges(option: str, texts: Sequence[str], example: str) -> list[list[float]]:
     """The ranges of a repeatable option LO HI."""
     found = []
@@ -279,11 +266,11 @@ def _value(option: Option, given: Any) -> Any:
     if option.form is Form.NAMES:
         return dict.fromkeys(given, option.word)
     if option.form is Form.WORDS_BY_PATH:
-        return _table(flag, given, example)
+        return inputs.by_name(flag, given, example, "NAME=VALUE", once=True)
     if option.form is Form.NUMBER_OR_TABLE and len(given) == 1 and "=" not in given[0]:
         return inputs.part(flag, given[0], given[0])
     if option.form in (Form.NUMBERS_BY_PATH, Form.NUMBERS_BY_WORD, Form.NUMBER_OR_TABLE):
-        return {n: inputs.part(flag, f"{n}={w}", w) for n, w in _table(flag, given, example).items()}
+        return inputs.numbers(flag, inputs.by_name(flag, given, example, "NAME=VALUE", once=True))
     return given
 
 

@@ -6,7 +6,7 @@ from functools import cache, lru_cache
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Body, Request, Response
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import ConfigDict, Field
 
 from service.errors import InvalidRequestError
 from service.http.dependencies import InContext, TypedRoute, tagged
@@ -15,6 +15,7 @@ from service.jobs.registry import JobKind, Registry
 from service.jobs.strict_json import encoded
 from service.schemas.answers import AnswerModel, KindAnswer, KindList
 from service.schemas.law_answers import LawList, law_list
+from service.schemas.pages import AskedModel
 from solver.contacts.laws.registry import laws as known_laws
 from solver.errors import SceneError
 from solver.scene.json_schema import plain, scene_schema
@@ -25,30 +26,26 @@ templates = APIRouter(prefix="/v1", tags=["scenes"], route_class=TypedRoute)
 _ANSWERS: dict[str, Any] = {"template": "platform-damper", "answers": {"frequency_hz": 420, "blades": 60}}
 
 
-class FillRequest(BaseModel):
+class FillRequest(AskedModel):
     """A template and answers to its questions; those left out have defaults."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, json_schema_extra={"examples": [_ANSWERS]})
+    model_config = ConfigDict(json_schema_extra={"examples": [_ANSWERS]})
 
     template: str = Field(max_length=100)
-    answers: dict[str, Any] = {}
+    answers: dict[str, Any] = Field(default={})
 
 
 FillBody = Annotated[FillRequest, Body(openapi_examples={"answers": {"value": _ANSWERS}})]
 
 
 class TemplateAnswer(AnswerModel):
-    """A template: a case of which a scene is made.
-
-    Attributes
-    ----------
-    title : for people.
-    questions : JSON Schema of the answers, each with unit, range and default.
-    """
+    """A template: a case of which a scene is made."""
 
     name: str
-    title: str
-    questions: dict[str, Any]
+    title: str = Field(description="For people.")
+    questions: dict[str, Any] = Field(
+        description="JSON Schema of the answers, each with unit, range and default."
+    )
 
 
 class TemplateList(AnswerModel):

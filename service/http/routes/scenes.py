@@ -24,7 +24,7 @@ from service.jobs.kinds.previews import PREVIEWS
 from service.jobs.studies.plan import EXAMPLE, Plan, plan_result
 from service.queue.scene_store import shipped
 from service.schemas.answers import SceneAnswer, SceneDetail, SceneList
-from service.schemas.pages import Cursor, Limit, ListQuery, page_of
+from service.schemas.pages import AskedModel, Cursor, Limit, ListQuery, page_of
 from solver.scene.descriptions import DAMPER_LOAD
 
 texts = APIRouter(prefix="/v1/scenes", tags=["scenes"], route_class=TypedRoute)
@@ -37,10 +37,10 @@ _WEDGE: dict[str, Any] = {"scene": "platform-wedge"}
 MOST_CHARACTERS = 4_000_000
 
 
-class ReadRequest(BaseModel):
+class ReadRequest(AskedModel):
     """The text of a scene file."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, json_schema_extra={"examples": [_FILE]})
+    model_config = ConfigDict(json_schema_extra={"examples": [_FILE]})
 
     text: str = Field(max_length=MOST_CHARACTERS)
     form: Literal["toml", "json"] = "toml"
@@ -54,10 +54,10 @@ class TextRequest(SceneRequest):
     comments: list[Annotated[str, Field(max_length=2000)]] = Field(default=[], max_length=50)
 
 
-class EditRequest(BaseModel):
+class EditRequest(AskedModel):
     """The TOML of a scene, and the tables it is to hold if these were changed."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, json_schema_extra={"examples": [_EDIT]})
+    model_config = ConfigDict(json_schema_extra={"examples": [_EDIT]})
 
     text: str = Field(max_length=MOST_CHARACTERS)
     scene: dict[str, Any] | None = None

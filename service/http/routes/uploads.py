@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, GetJsonSchemaHandler
 from pydantic_core import CoreSchema
 
 from service.errors import BodyTooLargeError, InvalidRequestError
-from service.http.dependencies import LISTED, InContext, JsonBody, TypedRoute, listing, saved
+from service.http.dependencies import LISTED, Context, InContext, JsonBody, TypedRoute, listing, saved
 from service.http.in_lane import computed, reading, writing
 from service.jobs import answering
 from service.jobs.common.scenes import SceneRequest
@@ -27,7 +27,7 @@ from service.schemas.matrix_answers import (
     UploadedArray,
     UploadPage,
 )
-from service.schemas.pages import Cursor, Limit, ListQuery, newest
+from service.schemas.pages import AskedModel, Cursor, Limit, ListQuery, newest
 from service.uploads.uploads import PART, Arrived, file_name, format_of
 
 router = APIRouter(prefix="/v1/uploads", tags=["uploads"])
@@ -163,20 +163,14 @@ _EXAMPLE: dict[str, Any] = {
 }
 
 
-class _Strict(BaseModel):
-    """No other keys."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class ContactPlace(_Strict):
+class ContactPlace(AskedModel):
     """A contact to begin with: between which DOFs, or a DOF and `ground`."""
 
     name: Name
     between: Annotated[list[Name], Field(min_length=2, max_length=2)]
 
 
-class OfDof(_Strict):
+class OfDof(AskedModel):
     """A DOF by its name."""
 
     dof: Name
@@ -188,21 +182,19 @@ class ForceOnDof(OfDof):
     engine_order: Annotated[int, Field(strict=True, ge=0, le=10_000)] | None = None
 
 
-class MatricesRequest(_Strict):
-    """Uploads to be looked at, or a structure that refers to them; with its DOFs, the scene it begins.
+class MatricesRequest(AskedModel):
+    """Uploads to be looked at, or a structure that refers to them; with its DOFs, the scene it begins."""
 
-    Attributes
-    ----------
-    uploads : list of str
-        Ids, in place of `structure`: which is M, K, C or names the rows is found out.
-    structure : dict or None
-        Tables of a structure of kind `matrices`; of a sector with `sectors` and `cyclic`.
-    """
+    model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE]})
 
-    model_config = ConfigDict(extra="forbid", frozen=True, json_schema_extra={"examples": [_EXAMPLE]})
-
-    uploads: list[UploadId] = Field(default=[], max_length=6, description="Ids, in place of `structure`.")
-    structure: dict[Annotated[str, Field(max_length=100)], Any] | None = None
+    uploads: list[UploadId] = Field(
+        default=[],
+        max_length=6,
+        description="Ids, in place of `structure`: which is M, K, C or names the rows is found out.",
+    )
+    structure: dict[Annotated[str, Field(max_length=100)], Any] | None = Field(
+        default=None, description="Of kind `matrices`; of a sector with `sectors` and `cyclic`."
+    )
     name: Name = "my-model"
     contacts: list[ContactPlace] = Field(default=[], max_length=100)
     excitation: ForceOnDof | None = Field(
@@ -261,19 +253,15 @@ _FILES: dict[str, Any] = {"scene": "two-dof", "files": [{"name": "rig.csv", "tex
 MOST_CHARACTERS, MOST_FILES = 2_000_000, 50
 
 
-class ColumnChoice(BaseModel):
+class ColumnChoice(AskedModel):
     """What a column of an export is."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     quantity: str = Field(max_length=210, description="Such as `frequency`, or a parameter path.")
     unit: str | None = Field(default=None, max_length=20, description="That of the heading if left out.")
 
 
-class MeasuredFile(BaseModel):
+class MeasuredFile(AskedModel):
     """A file of measured data in CSV."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     name: str = Field(min_length=1, max_length=200)
     text: str = Field(max_length=MOST_CHARACTERS)
@@ -334,12 +322,13 @@ async def read_measurements(body: ReadBody, context: InContext) -> Response:
 
     The first thing that is wrong with each file is told with its line and column.
     """
-    words = {
-        "request": body,
-        "files": [file.model_dump() for file in body.files],
-    }
-    found = await computed(context, answering.MEASURED, words, about="files")
-    return Response(found, media_type="application/json")
+    return await _of_files(answering.MEASURED, body, context)
+
+
+async def _of_files(task: str, body: MeasurementsRequest, context: Context) -> Response:
+    """What a task finds in the texts of files."""
+    words = {"request": body, "files": [file.model_dump() for file in body.files]}
+    return Response(await computed(context, task, words, about="files"), media_type="application/json")
 
 
 class ExportColumn(BaseModel):
@@ -385,6 +374,4 @@ async def look_at_measurements(body: ReadBody, context: InContext) -> Response:
 
     Separators, decimal commas, lines above the headings and a line of units below them are told apart.
     """
-    words = {"request": body, "files": [file.model_dump() for file in body.files]}
-    found = await computed(context, answering.LOOK, words, about="files")
-    return Response(found, media_type="application/json")
+    return await _of_files(answering.LOOK, body, context)

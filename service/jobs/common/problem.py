@@ -11,7 +11,7 @@ from optim.criteria.key import Ranges as Ranges
 from optim.problem.keys import ROBUST, ProblemKeys
 from service.jobs.common.scenes import HarmonicRequest
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
-from service.jobs.registry import ABOUT_THE_RUN, JobKind
+from service.jobs.registry import ABOUT_THE_JOB, JobKind
 from service.jobs.study import Study
 from solver.errors import Issue
 
@@ -58,7 +58,6 @@ class ProblemRequest(ProblemKeys, Study, HarmonicRequest):
 
 
 ABOUT_THE_SCENE = ("scene", "set")
-ABOUT_THE_JOB = ("fresh", "priority", "max_seconds", *ABOUT_THE_RUN)
 
 
 def arguments(request: ProblemRequest) -> dict[str, Any]:

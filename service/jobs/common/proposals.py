@@ -25,21 +25,15 @@ Proposed = Mapping[str, Any] | str
 
 
 class StudyProposal(BaseModel):
-    """A study of a scene as it would be asked.
-
-    Attributes
-    ----------
-    kind : of the job.
-    body : keys beside the scene; what is left out has the default of the schema.
-    points : of a response that cost as much, about; times the cost of a point in the plan its time.
-    refused : why this scene has no such study.
-    """
+    """A study of a scene as it would be asked."""
 
     model_config = ConfigDict(frozen=True)
 
     kind: str
     body: dict[str, Any] = Field(description="Keys beside the scene that the scene itself suggests.")
-    points: int | None = Field(description="Points of a response that cost as much, about; null: not known.")
+    points: int | None = Field(
+        description="Points of a response, as the plan prices one, that cost as much, about; null: not known."
+    )
     refused: str | None = Field(description="Why the scene has no such study; null: it has.")
 
 

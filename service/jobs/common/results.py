@@ -54,32 +54,16 @@ class KnownResult(KindResult):
 
 
 class EndedResult(KindResult):
-    """A result that says how the computation ended.
+    """A result that says how the computation ended."""
 
-    Attributes
-    ----------
-    completed : bool
-        Whether it came to its end.
-    status : str
-        How it ended, and what to try if it did not.
-    """
-
-    completed: bool
+    completed: bool = Field(description="Whether it came to its end.")
     status: str = Field(description="How it ended, and what to try if it fell short.")
 
 
 class ReachedResult(KindResult):
-    """The result of a search.
+    """The result of a search."""
 
-    Attributes
-    ----------
-    reached : bool
-        Whether the goal was reached.
-    status : str
-        How it ended, and what to try if it did not.
-    """
-
-    reached: bool
+    reached: bool = Field(description="Whether the goal was reached.")
     status: str = Field(description="How it ended, and what to try if it fell short.")
 
 

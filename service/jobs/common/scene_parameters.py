@@ -49,18 +49,11 @@ class SceneParameterAnswer(BaseModel):
 
 
 class SceneParameterList(BaseModel):
-    """What is known of a scene beside its tables.
+    """What is known of a scene beside its tables."""
 
-    Attributes
-    ----------
-    items : its parameters, those of a part one after the other.
-    joints : what a drawing shows between its parts.
-    studies : what its studies begin with.
-    """
-
-    items: list[SceneParameterAnswer]
-    joints: list[JointAnswer]
-    studies: list[StudyProposal]
+    items: list[SceneParameterAnswer] = Field(description="Those of a part one after the other.")
+    joints: list[JointAnswer] = Field(description="What a drawing shows between its parts.")
+    studies: list[StudyProposal] = Field(description="What its studies begin with.")
 
 
 def scene_parameters(scene: Scene) -> SceneParameterList:

@@ -63,15 +63,7 @@ SceneReference = Annotated[
 
 
 class SceneRequest(JobRequest):
-    """A request about a scene.
-
-    Attributes
-    ----------
-    scene : str or dict
-        Name of a shipped or stored scene, or the scene itself.
-    set : dict
-        Values put on parameter paths before anything is computed.
-    """
+    """A request about a scene."""
 
     scene: SceneReference = Field(description="Name of a shipped or stored scene, or the scene as an object.")
     set: Annotated[dict[ParameterPath, Number], BeforeValidator(_few)] = Field(
@@ -80,13 +72,7 @@ class SceneRequest(JobRequest):
 
 
 class HarmonicRequest(SceneRequest):
-    """A request answered by harmonic balance.
-
-    Attributes
-    ----------
-    harmonics : int
-        Highest harmonic of the balance.
-    """
+    """A request answered by harmonic balance."""
 
     harmonics: Annotated[Harmonics, Flag(metavar="H")] = Field(
         default=11, description="Highest harmonic of the balance."

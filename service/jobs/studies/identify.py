@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from functools import cache
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -15,7 +14,7 @@ from service.jobs.common.results import KindResult, Table, answered
 from service.jobs.common.scenes import HarmonicRequest, Number, ParameterPath
 from service.jobs.common.sizes import balance_issues
 from service.jobs.registry import Flag
-from service.jobs.study import Answer, Study, Watch
+from service.jobs.study import Study
 from solver.errors import Issue, SceneError, SettingError
 
 if TYPE_CHECKING:
@@ -139,14 +138,6 @@ class Identify(Study, HarmonicRequest):
         except SettingError as error:
             return [error.issue.at(*(error.place or ("data",)))]
         return []
-
-    @classmethod
-    def compute(cls, scene: Scene, asked: Mapping[str, Any], watch: Watch) -> Answer:
-        """Fit; the data may be files too, for the command."""
-        import optim
-
-        found = optim.identify(scene, **asked, **watch._asdict())
-        return Answer.of(found)
 
 
 STUDY = Identify

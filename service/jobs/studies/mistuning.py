@@ -19,7 +19,7 @@ from service.jobs.figures import StoredArray
 from service.jobs.outputs import JobOutput, OnProgress, ShouldStop
 from service.jobs.parts import Division, JobPart, PartOutput, PartStoppedError
 from service.jobs.registry import Flag, JobKind
-from service.jobs.study import Study
+from service.jobs.study import Answer, Study
 from solver.errors import Issue, SceneError, SettingError
 from solver.results.known import Known
 
@@ -229,11 +229,8 @@ def join(spec: Mapping[str, Any], outputs: Mapping[int, PartOutput]) -> JobOutpu
     # The first of those that are equally high.
     highest = max(others, key=lambda part: part.result["largest"], default=None)
     sweeps = [part for part in (parts[0], highest) if part is not None]
-    return JobOutput.of(
-        study,
-        reached=study.reached,
-        sweeps=tuple(record for part in sweeps for record in unpacked(part.result["sweeps"], part.arrays)),
-    )
+    records = [record for part in sweeps for record in unpacked(part.result["sweeps"], part.arrays)]
+    return Mistuning.output(Answer.of(study), records)
 
 
 def _peaks(part: PartOutput) -> list[BladePeaks]:

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from pydantic import ConfigDict
 
-import optim
 from optim.problem.keys import PointsOfFront, of_front
 from service.jobs.common.problem import ProblemRequest
 from service.jobs.common.results import answered
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
 from service.jobs.figures import SweepRecord
-from service.jobs.study import Answer, Watch
 from solver.errors import Issue
 from solver.scene.descriptions import DISK_LOAD
 
@@ -46,13 +43,6 @@ class _Pareto(PointsOfFront, ProblemRequest):
         points = POINTS_OF_A_SWEEP * len(self.cases or [1]) * (self.points or 1)
         words = "points of the responses of a front"
         return balance_issues("points", scene, self.harmonics, points, words)
-
-    @classmethod
-    def compute(cls, scene: Scene, asked: Mapping[str, Any], watch: Watch) -> Answer:
-        """Follow the front."""
-
-        found = optim.pareto_front(scene, **asked, **watch._asdict())
-        return Answer.of(found)
 
     @classmethod
     def sweeps(cls, found: Front) -> tuple[SweepRecord, ...]:

@@ -11,7 +11,7 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import Annotated, Any
 
 import solver
-from service.jobs.registry import ABOUT_THE_RUN
+from service.jobs.registry import ABOUT_THE_JOB
 from service.rendering.report.about import about_section
 from service.rendering.report.responses import ReportLine, comparison_figure
 from solver.continuation.branch import AnyBranch
@@ -56,7 +56,7 @@ def title_section(given: Designed, title: str, status: str) -> str:
 
 KINDS = ("design", "pareto", "identify")
 """Kinds of job with a report."""
-_NOT_OF_A_PROBLEM = ("kind", "scene", "set", "fresh", "priority", "max_seconds", *ABOUT_THE_RUN)
+_NOT_OF_A_PROBLEM = ("kind", "scene", "set", *ABOUT_THE_JOB)
 
 
 def problem_of_request(request: Json) -> dict[str, Any]:

@@ -23,7 +23,7 @@ from service.cli.options.parameters import Command, keyed, keyword, with_paramet
 from service.cli.options.problem_inputs import FLAGS, ProblemFlags, takes_problem
 from service.cli.table import TOP, CommandEntry
 from service.errors import InputError
-from service.jobs.registry import ABOUT_THE_RUN, JobKind
+from service.jobs.registry import ABOUT_THE_JOB, JobKind
 from service.settings.kinds import registry_here
 
 if TYPE_CHECKING:
@@ -59,7 +59,6 @@ class SubmitGroup(TyperGroup):
 
 
 _DATA, _COLUMN = "key_data", "--column"
-_OF_ALL = ("fresh", "priority", "max_seconds", *ABOUT_THE_RUN)
 
 
 def command_of(kind: JobKind) -> Any:
@@ -123,7 +122,7 @@ def _tables(name: str, data: str, columns: Sequence[str] | None) -> str:
 
 def _beside_a_problem(option: KeyOption, of_problems: Container[str], known: Container[str] | None) -> bool:
     """Whether an option stands beside those of every problem; further keys are for the problem file."""
-    if option.key in _OF_ALL:
+    if option.key in ABOUT_THE_JOB:
         return True
     return option.key not in of_problems and (known is None or option.flag in known)
 
