@@ -104,6 +104,11 @@ def renamed(**words: str) -> Callable[[Callable[_Given, _Found]], Callable[_Give
 
 
 def _scene_of(given: object) -> object:
-    """Return the scene of that name or file; what is none of both as it is."""
-    named = isinstance(given, str | os.PathLike)
-    return import_module("solver.scene.scene").load_scene(given) if named else given
+    """Return a scene as it is, or that of a name or file."""
+    scenes = import_module("solver.scene.scene")
+    if isinstance(given, str | os.PathLike):
+        return scenes.load_scene(given)
+    if not isinstance(given, scenes.Scene):
+        wanted = "must be a Scene (`Scene.from_dict` makes one of a table), a shipped one's name or a file"
+        raise import_module("solver.errors").SettingError("scene", type(given).__name__, wanted)
+    return given

@@ -9,6 +9,7 @@ from typing import Annotated
 
 import numpy as np
 
+from solver.contacts.fields import LARGEST
 from solver.contacts.kernels import columns
 from solver.contacts.kernels import system as kernel
 from solver.errors import SettingError
@@ -81,6 +82,8 @@ class Parameter:
             return check_frequency(name, value)
         if value < self.least:
             raise SettingError(name, value, f"must be >= 0, a value of `{self.path}`")
+        if abs(value) > LARGEST:
+            raise SettingError(name, value, f"must be at most {LARGEST:g}, a value of `{self.path}`")
         return float(value)
 
 

@@ -8,9 +8,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping
+from numbers import Real
 from typing import TYPE_CHECKING, Any, TypeVar, cast
-
-import numpy as np
 
 from solver.contacts.laws.base import AnyContact
 from solver.contacts.laws.parts import LawQuantity
@@ -49,7 +48,7 @@ def check_frequency(name: str, frequency_hz: float) -> float:
     SettingError
         Not a number above 0, or one whose square floating-point numbers cannot tell.
     """
-    number = isinstance(frequency_hz, (int, float, np.number)) and not isinstance(frequency_hz, bool)
+    number = isinstance(frequency_hz, Real) and not isinstance(frequency_hz, bool)
     if not number or not 0.0 < frequency_hz < math.inf:
         raise SettingError(name, frequency_hz, "must be a frequency > 0 Hz")
     if not LEAST_HZ <= frequency_hz <= MOST_HZ:

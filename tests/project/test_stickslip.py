@@ -139,6 +139,8 @@ def test_the_name_of_a_scene_does_where_a_scene_does(tmp_path: Path) -> None:
     assert stickslip.plan(scene=file, harmonics=3).unknowns == stickslip.plan("two-dof", harmonics=3).unknowns
     with pytest.raises(stickslip.SceneError, match="did you mean"):
         stickslip.sweep("two-dofs")
+    with pytest.raises(stickslip.SettingError, match=r"`scene` must be a Scene .* got 'dict'"):
+        stickslip.solve({"name": "two-dof"}, frequency_hz=1.0)  # type: ignore[arg-type]
     assert pickle.loads(pickle.dumps(stickslip.solve)) is stickslip.solve
 
 

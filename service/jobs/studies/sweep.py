@@ -33,7 +33,6 @@ from service.jobs.registry import Flag, JobKind, Json, ReadSweep, StoredSweep
 from service.jobs.study import Answer, Study, Watch
 from solver.errors import Issue, Naming, SettingError, Shown
 from solver.scene.descriptions import DISK_LOAD
-from solver.scene.parameter_paths import check_frequency
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -105,6 +104,8 @@ class Sweep(Study, HarmonicRequest):
 
     def issues(self, scene: Scene) -> list[Issue]:
         """Return what is wrong with parameter and range."""
+        from solver.scene.parameter_paths import check_frequency
+
         path, order, ends = self.parameter, scene.speed_order, [self.start, self.stop]
         if path == SPEED and order is not None:  # the frequency in other units
             path, ends = FREQUENCY, [None if end is None else end * order / 60.0 for end in ends]

@@ -132,6 +132,7 @@ def test_what_a_branch_holds():
         ({"start": True, "stop": 2.0}, "start", True),
         ({"parameter": "damper.N0", "start": 1.0, "stop": 2.0}, "frequency_hz", None),
         ({"parameter": "damper.N0", "start": -1.0, "stop": 2.0, "frequency_hz": 1.0}, "start", -1.0),
+        ({"parameter": "damper.N0", "start": 1.0, "stop": 1e300, "frequency_hz": 1.0}, "stop", 1e300),
         ({"parameter": "damper.N0", "start": 1.0, "frequency_hz": 1.0}, "stop", None),
         ({"parameter": "damper.N0", "stop": 1.0, "frequency_hz": 1.0}, "start", None),
         ({"parameter": "damper.kt", "start": math.nan, "stop": 2.0, "frequency_hz": 1.0}, "start", None),
