@@ -18,8 +18,47 @@ from service.jobs.outputs import Silent
 
 LOAD = {"parameter": "damper.N0", "from": 50, "to": 200}
 _DISK = {"scene": "bladed-disk"}
+_CASE = {"name": "one"}
+_UNCERTAIN = {"damper.mu": [0.25, 0.35], "damper.kt": {"deviation": 0.1}}
 _OF_ALL = ("scene", "set", "fresh", "priority", "max_seconds", "project", "name", "notes", "tags")
 _WRONG: tuple[Any, ...] = ("x", -1, [], None)
+# Beside a variable, `damper.N0` from 20 to 1000.
+_DESIGN: tuple[dict[str, Any], ...] = (
+    {"variables": {"damper.N0": [-1, 1], "frequency": [1, 2]}}, {"variables": {"damper.N0": [1]}},
+    {"variables": {"damper.N0": [1, "x"]}}, {"variables": {"damper.N0": 5}},
+    {"variables": {"damper.N0,,damper.kt": [1, 2]}}, {"variables": {}}, {"variables": ["damper.N0"]},
+    {"variables": {"damper.N0": [1, 2], "damper.N0,damper.kt": [1, 2]}},
+    {"scaling": {"damper.N0": "cubic"}}, {"scaling": {"damper.kt": "linear"}},
+    {"variables": {"damper.N0": [0, 9]}, "scaling": {"damper.N0": "logarithmic"}},
+    {"cases": []}, {"cases": [3]}, {"cases": [{"colour": "red"}]}, {"cases": [{"band": [1, "x"]}]},
+    {"cases": [_CASE, {"band": [5, 1]}, {"band": [0, 1]}]}, {"cases": [{"name": ""}]},
+    {"cases": [_CASE, _CASE]}, {"cases": [{"set": {"bumper.N0": 5, "damper.mu": -1}}]},
+    {"cases": [_CASE, {"set": {"damper.mu": -1}}]}, {"cases": [{"observe": []}]},
+    {"cases": [{"engine_order": 2}]}, {"cases": [{"order": 0}]}, {"cases": [{"weight": 0}]},
+    {"weights": {"width": 1}}, {"weights": {"peak": -1}}, {"weights": {"peak": 0}}, {"max_peak": 0},
+    {"max_band_hz": 0}, {"forbidden_hz": [[1, 2]]}, {"forbidden_hz": [[1, 2], [2, 1]], "limit": 1},
+    {"forbidden_hz": [[1, 2, 3]]}, {"forbidden_hz": [1, 2]}, {"speeds_rpm": [[0, 9]], "limit": 1},
+    {"speeds_rpm": []}, {"max_friction_work": 0}, {"max_friction_work": "little"},
+    {"max_friction_work": {"damper": -1}}, {"max_friction_work": {"bumper": 1}},
+    {"contact_states": {"damper": "sticks"}}, {"contact_states": {"bumper": "never-separates"}},
+    {"harmonics": 0}, {"start": {"damper.N0": 1}}, {"start": {"damper.N0": 30, "damper.kt": 1}},
+    {"start": {}}, {"method": "tracked", "max_peak": 1}, {"basins": 0}, {"basins": 21},
+    {
+        "variables": {"damper.N9": [1, 2]}, "cases": [{"observe": "m9"}],
+        "contact_states": {"x": "never-separates"},
+    },
+    {"uncertain": {}}, {"uncertain": 5}, {"uncertain": {"damper.mu": 0.3}},
+    {"uncertain": {"damper.mu": {"deviation": -1}}}, {"uncertain": {"bumper.mu": [0.1, 0.2]}},
+    {"uncertain": {"damper.N0": [50, 60]}}, {"uncertain": {"damper.mu": [-0.1, 0.2]}},
+    {"uncertain": [{"damper.mu": 0.3}, {"damper.mu": "much"}]},
+    {"uncertain": {"mistuning": {"of": "tip", "spread": 0.01}}}, {"uncertain": {"mistuning": {"of": 5}}},
+    {"uncertain": {"half_axes": {"damper.mu": 0}, "relative": True}},
+    {"uncertain": _UNCERTAIN, "aim": "best"}, {"uncertain": _UNCERTAIN, "quantile": 1},
+    {"uncertain": _UNCERTAIN, "samples": 1},
+    {"uncertain": _UNCERTAIN, "seed": -1}, {"uncertain": _UNCERTAIN, "basins": 3},
+    {"aim": "mean", "samples": 5}, {"uncertain": {"damper.mu": 1}, "method": "x"},
+    {"uncertain": {"damper.mu": 1}, "max_friction_work": {"x": 1}},
+)  # fmt: skip
 _MEANT: dict[str, tuple[dict[str, Any], ...]] = {
     "sweep": (
         {"from": 2, "to": 2}, {"from": -1}, {"parameter": "damper.N2"}, {"parameter": "damper.N0"},
@@ -91,6 +130,8 @@ def bodies() -> Iterator[Body]:
     """What is meant to be refused, and every key of every kind with what it hardly takes."""
     for kind, changes in _MEANT.items():
         yield from (Body(kind, change, {"scene": "two-dof"}) for change in changes)
+    one_variable = {"scene": "two-dof", "variables": {"damper.N0": [20, 1000]}}
+    yield from (Body("design", change, one_variable) for change in _DESIGN)
     for one in SHIPPED:
         schema = one.request.model_json_schema()
         example = schema["examples"][0]
