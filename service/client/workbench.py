@@ -26,7 +26,7 @@ from service.schemas.workbench_answers import (
 ModelT = TypeVar("ModelT", bound=BaseModel)
 
 
-class Asking:
+class Requests:
     """What all methods of a client go through."""
 
     _transport: Transport
@@ -56,7 +56,7 @@ class Asking:
             yield from page.items
 
 
-class Workbench(Asking):
+class Workbench(Requests):
     """Projects, runs and links to them.
 
     Where a `revision` is given, a change is refused (`ServiceProblem` with status 412) if what is changed has

@@ -34,7 +34,7 @@ class _Known:
 
 
 @dataclass(slots=True)
-class _Watched:
+class _FollowedJob:
     """A job that runs here: until when others want to hear of it, and how many of its points they know."""
 
     until: float
@@ -66,7 +66,7 @@ class Elsewhere:
         self._ask, self._tell = ask, tell
         self._lock = threading.Lock()
         self._known: dict[str, _Known] = {}
-        self._watched: dict[str, _Watched] = {}
+        self._watched: dict[str, _FollowedJob] = {}
         self._listening = ExitStack()
 
     def start(self) -> None:
@@ -106,7 +106,7 @@ class Elsewhere:
             before = self._watched.get(job_id)
             if before is not None and before.tag == live.tag:
                 count = min(count, before.points)
-            self._watched[job_id] = _Watched(time.monotonic() + _WATCHED_SECONDS, live.tag, count)
+            self._watched[job_id] = _FollowedJob(time.monotonic() + _WATCHED_SECONDS, live.tag, count)
         self._say(job_id)
 
     def told(self, text: str) -> None:

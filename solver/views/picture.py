@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from solver.arrays import Real
 from solver.contacts.fields import parse_end
 from solver.contacts.frames import cross, unit
-from solver.matrices.sectors.outline_motion import OutlineMotion
+from solver.matrices.sectors.diameters import DiameterMatrices
 from solver.scene.bodies.body import Body
 from solver.scene.bodies.kinematics import places, point_motion
 from solver.scene.bodies.shapes import Cylinder, Wedge
@@ -252,10 +252,10 @@ def _say(scene: Scene, picture: Picture, parts: Parts) -> None:
         return
     moving = {dof for moves in picture.moves for factors in moves for dof in factors}
     left = [dof for dof in scene.dofs if dof not in moving and not dof.startswith(COORDINATE)]
-    if left and motion_of_mesh(scene) is None:
+    if left and moved_mesh(scene) is None:
         listed = ", ".join(left[:6]) + (f" and {len(left) - 6} more" if len(left) > 6 else "")
         picture.notes.append(f"Without a place, so not drawn: {listed}.")
-    if "mesh" in picture.roles and motion_of_mesh(scene) is None:
+    if "mesh" in picture.roles and moved_mesh(scene) is None:
         picture.notes.append(
             "The mesh is drawn at rest: its file tells the motion of the nodes named alone. `stickslip "
             "import --nodes … --reduce` writes one that tells all."
@@ -265,12 +265,13 @@ def _say(scene: Scene, picture: Picture, parts: Parts) -> None:
         picture.notes.append(f"Contacts without a place: {', '.join(undrawn)}.")
 
 
-def motion_of_mesh(scene: Scene) -> OutlineMotion | None:
-    """Return how the coordinates of a sector move the points of its mesh, the first ones, if it is known."""
+def moved_mesh(scene: Scene) -> DiameterMatrices | None:
+    """Return the sector of a scene whose `motion` of the points of its mesh, the first ones, is known."""
     structure = scene.structure
     if not isinstance(structure, MatricesStructure) or structure.diameters is None:
         return None
-    return None if structure.outline is None else structure.diameters.motion
+    known = structure.outline is not None and structure.diameters.motion is not None
+    return structure.diameters if known else None
 
 
 COORDINATE = "coordinate "

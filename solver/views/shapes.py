@@ -18,14 +18,15 @@ from solver.arrays import Complex, Integer, Real
 from solver.errors import SettingError
 from solver.linear.assembly import linear_model
 from solver.linear.model import LinearModel
+from solver.matrices.sectors.diameters import DiameterMatrices
 from solver.matrices.sectors.outline_motion import OutlineMotion
 from solver.modes.nonlinear_mode import at_nodal_diameter, pose
 from solver.modes.records import diameter_of
 from solver.response.solution import Solution
 from solver.response.time_history import all_coordinates
 from solver.scene.cyclic.annulus import written_out
-from solver.scene.scene import MatricesStructure, Scene
-from solver.views.picture import Picture, motion_of_mesh, picture_of
+from solver.scene.scene import Scene
+from solver.views.picture import Picture, moved_mesh, picture_of
 
 FAINT = 1e-3
 """Harmonics that move every point less than this share of the largest motion are left out."""
@@ -153,8 +154,11 @@ def _shape(
     for j in range(count):
         own = amplitudes[[row[f"{dof}@{j}" if whole else dof] for dof in scene.dofs]]
         motions[j] = np.einsum("pcd,dk->kpc", factors, own)
-    if (mesh := motion_of_mesh(scene)) is not None:
-        motions[:, :, : mesh.points] = _of_mesh(mesh, scene, model, coordinates, whole=whole)
+    sector = moved_mesh(scene)
+    if sector is not None and sector.motion is not None:
+        turning = None if whole else model.diameters(np.arange(coordinates.shape[1])).tolist()
+        found = _of_mesh(sector, sector.motion, coordinates, scene.structure.sector_count, turning)
+        motions[:, :, : sector.motion.points] = found
     sizes = np.linalg.norm(motions, axis=-1).max(axis=(0, 2), initial=0.0)
     kept = np.flatnonzero(sizes >= FAINT * sizes.max(initial=0.0))
     kept = kept if sizes.any() else np.array([1], dtype=np.int64)
@@ -171,21 +175,20 @@ def _shape(
 
 
 def _of_mesh(
-    mesh: OutlineMotion, scene: Scene, model: LinearModel, coordinates: Complex, *, whole: bool
+    sector: DiameterMatrices, mesh: OutlineMotion, coordinates: Complex, count: int, waves: list[int] | None
 ) -> Complex:
-    """The motion of the points of a mesh, (sectors, H + 1, n_points, 3); of all sectors as a sum of waves."""
-    structure = scene.structure
-    assert isinstance(structure, MatricesStructure)
-    assert structure.diameters is not None
-    count, n, built = structure.sector_count, structure.n_coordinates, structure.diameters.diameters
+    """The motion of the points of a mesh, (sectors, H + 1, n_points, 3).
+
+    Without the waves of the harmonics the coordinates are those of all sectors, a sum of waves each.
+    """
+    n, built = sector.size, sector.diameters
 
     def moved(wave: int, q: Complex) -> Complex:
         back = 2 * wave > count  # it runs backward: the complex conjugate of the one ahead
         found = mesh.at(built.index(min(wave, count - wave)), q.conj() if back else q)
         return found.conj() if back else found
 
-    if not whole:
-        waves = model.diameters(np.arange(coordinates.shape[1])).tolist()
+    if waves is not None:
         still = np.zeros((mesh.points, 3), np.complex128)
         return np.array(
             [[moved(m, q) if q.any() else still for m, q in zip(waves, coordinates[:n].T, strict=True)]]
