@@ -15,8 +15,3 @@ export const SHADES = (() => {
   }
   return table;
 })();
-
-export const shade = (share) => {
-  const i = 4 * Math.round(255 * Math.min(Math.max(share, 0), 1));
-  return `rgb(${SHADES[i]},${SHADES[i + 1]},${SHADES[i + 2]})`;
-};

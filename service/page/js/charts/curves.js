@@ -4,7 +4,7 @@ import { length, lengthUnit, number } from "../base/format.js";
 import { current } from "../scene/scenes.js";
 
 // The amplitudes of the points that are stable, and of those that are not with their neighbours; null elsewhere.
-export function byStability({ amplitude, unstable }) {
+function byStability({ amplitude, unstable }) {
   if (!unstable?.length) return { stable: amplitude, unstable: null };
   const inside = (i, more) => unstable.some(([first, last]) => i >= first - more && i <= last + more);
   return {

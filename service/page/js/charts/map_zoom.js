@@ -32,19 +32,19 @@ function lookAt(self, x, y) {
 
 const seen = (self) => [self.window ?? self.whole, self.windowY ?? self.wholeY];
 
-export function zoomMap(self, factor, at = null) {
+function zoomMap(self, factor, at = null) {
   if (!self.shown) return;
   const [x, y] = seen(self);
   lookAt(self, stretch(x, self.whole, self.xs.log, { factor, at: at?.x ?? null }), stretch(y, self.wholeY, self.ys.log, { factor, at: at?.y ?? null }));
 }
 
-export function panMap(self, right, up) {
+function panMap(self, right, up) {
   if (!self.shown) return;
   const [x, y] = seen(self);
   lookAt(self, self.window && stretch(x, self.whole, self.xs.log, { by: right }), self.windowY && stretch(y, self.wholeY, self.ys.log, { by: up }));
 }
 
-export const wholeMap = (self) => self.shown && lookAt(self, null, null);
+const wholeMap = (self) => self.shown && lookAt(self, null, null);
 
 // Buttons of the zoom, and of the axes.
 export function mapButtons(self, label, at) {

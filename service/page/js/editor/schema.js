@@ -37,7 +37,7 @@ function nodeOf(scene, path) {
 const variants = (node) => (node.oneOf ?? []).map(resolved);
 
 // The key by which the variants of a table are told: the one with a word of its own in each.
-export function tagOf(node) {
+function tagOf(node) {
   const all = variants(node);
   const [first] = all;
   if (!first) return "";
@@ -55,7 +55,7 @@ function variantOf(node, row) {
 }
 
 // The schema of one row of a section.
-export function rowSchema(scene, path, row) {
+function rowSchema(scene, path, row) {
   if (path === "structure/masses") return resolved({ $ref: "#/$defs/_MassEntry" });
   const node = nodeOf(scene, path);
   const many = node?.type === "array" ? node : (node?.anyOf ?? []).find((each) => each.type === "array");

@@ -61,6 +61,12 @@ export async function request(path, options) {
   return answer.status === 204 ? null : answer.json();
 }
 
+// Every item of a list that comes in pages.
+export async function everyItem(path) {
+  const { items, next } = await request(path);
+  return next ? [...items, ...(await everyItem(next))] : items;
+}
+
 // Sends a file and tells the share of it that is on its way: `fetch` does not say that.
 export function sent(path, file, onProgress) {
   return new Promise((resolve, reject) => {

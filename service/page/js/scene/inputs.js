@@ -11,7 +11,7 @@ const CLOSE = 1e-9;
 const same = (a, b) => a === b || Math.abs(a - b) <= CLOSE * Math.max(Math.abs(a), Math.abs(b));
 
 // The paths that a study varies itself: what they are set to does not matter to it.
-export const variedBy = ({ variables, unknowns, parameter }) =>
+const variedBy = ({ variables, unknowns, parameter }) =>
   [...Object.keys(variables ?? {}), ...Object.keys(unknowns ?? {}), parameter ?? ""].flatMap((names) => names.split(",")).map((name) => name.trim()).filter(Boolean);
 
 const said = (path, value) => (value === undefined || value === null ? "as it follows from others" : quantity(path, value));

@@ -8,7 +8,7 @@ export const ownName = (end) => end.split("@")[0];
 
 // Distance of every DOF from the ground over the springs; what hangs on contacts alone is one farther than its
 // neighbour, and what hangs on nothing comes last.
-export function layersOf(dofs, springs, contacts) {
+function layersOf(dofs, springs, contacts) {
   const layers = new Map([[GROUND, 0]]);
   spread(layers, springs);
   spread(layers, [...springs, ...contacts]);

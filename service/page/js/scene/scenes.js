@@ -1,6 +1,6 @@
 // The scene that is looked at: its tables, its values as set, its paths.
 
-import { request } from "../network/api.js";
+import { everyItem, request } from "../network/api.js";
 import { state } from "../base/address.js";
 import { learnUnits } from "../base/format.js";
 
@@ -9,15 +9,7 @@ export const current = { body: null, parameters: new Map(), joints: [], studies:
 
 const FORCE = "excitation";
 
-export async function listScenes() {
-  const items = [];
-  for (let path = "/v1/scenes"; path; ) {
-    const page = await request(path);
-    items.push(...page.items);
-    path = page.next;
-  }
-  return items;
-}
+export const listScenes = () => everyItem("/v1/scenes");
 
 export async function loadScene(name) {
   const [{ scene }, { items, joints, studies }] = await Promise.all([

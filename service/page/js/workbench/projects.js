@@ -1,6 +1,6 @@
 // Projects: the one that is open gathers what is computed from now on, and lists what was.
 
-import { request, post } from "../network/api.js";
+import { everyItem, post, request } from "../network/api.js";
 import { state, write } from "../base/address.js";
 import { byId, el, say, show } from "../base/dom.js";
 import { on, tell } from "../base/events.js";
@@ -28,13 +28,7 @@ export const projectsKnown = () => projects;
 
 // Every project of the owner; one that a link names and that is not there is left.
 export async function listProjects() {
-  const found = [];
-  for (let path = "/v1/projects"; path; ) {
-    const page = await request(path);
-    found.push(...page.items);
-    path = page.next;
-  }
-  projects = found;
+  projects = await everyItem("/v1/projects");
   if (state.project && !opened()) {
     state.project = "";
     write();

@@ -13,7 +13,7 @@ const VALUES = ["N0", "N1", "kt", "mu"];
 const FORMS = [["CSV", "text/csv", ""], ["npz", "application/x-npz", ""], ["Parquet", "application/vnd.apache.parquet", ""], ["SVG", "image/svg+xml", "/plot.svg"], ["PNG", "image/png", "/plot.png"]];
 
 // The values that stayed fixed, as paths.
-export function fixedIn({ contacts, excitation_amplitude: force }) {
+function fixedIn({ contacts, excitation_amplitude: force }) {
   const values = Object.fromEntries(Object.entries(contacts).flatMap(([name, contact]) => VALUES.filter((key) => contact[key] !== null).map((key) => [`${name}.${key}`, contact[key]])));
   return force === null ? values : { ...values, "excitation.amplitude": force };
 }

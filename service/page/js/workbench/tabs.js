@@ -32,7 +32,7 @@ export function startTabs() {
 // The tab of the address as it is now.
 export const restoreTab = () => openTab(known(state.tab) ? state.tab : FIRST_TAB);
 
-export function openTab(name) {
+function openTab(name) {
   if (name !== state.tab) {
     step();
     byId("panel").scrollTop = 0;
