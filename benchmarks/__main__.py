@@ -10,7 +10,7 @@ from benchmarks.harness import WrongResultError
 
 GROUPS = {
     "chains": ("chain-8", "chain-32", "one-slider"),
-    "service": ("load", "latency", "requests", "lists", "runs", "figures", "scale"),
+    "service": ("load", "latency", "requests", "lists", "runs", "figures", "workers", "scale"),
 }
 
 
@@ -39,7 +39,7 @@ def _cases() -> dict[str, Callable[[], None]]:
         service_load,
         service_pruning,
         service_requests,
-        service_scale,
+        service_workers,
         space,
         space_kernel,
         space_peers,
@@ -49,6 +49,7 @@ def _cases() -> dict[str, Callable[[], None]]:
         stored_sweeps,
         sweep_costs,
         truth,
+        users,
     )  # fmt: skip
 
     return {
@@ -89,7 +90,8 @@ def _cases() -> dict[str, Callable[[], None]]:
         "runs": stored_runs.stored_runs,
         "requests": service_requests.requests,
         "pruning": service_pruning.pruning,
-        "scale": service_scale.scale,
+        "workers": service_workers.workers,
+        "scale": users.scale,
         "page": page.page,
         "charts": charts.charts,
         "new-user": new_user.new_user,

@@ -16,7 +16,7 @@ from typing import Any
 from sqlalchemy import insert, text
 
 from benchmarks.harness import expect, table
-from benchmarks.service_scale import own_postgresql
+from benchmarks.service_workers import own_postgresql
 from service.db import revisions
 from service.db.clock import utc_now
 from service.db.engine import Database

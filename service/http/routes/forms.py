@@ -60,14 +60,19 @@ class TemplateScene(AnswerModel):
     scene: dict[str, Any]
 
 
-@templates.get("/templates")
-def list_templates() -> TemplateList:
+@templates.get("/templates", response_model=TemplateList)
+def list_templates(request: Request) -> Response:
     """The cases of which scenes can be made, each with its questions."""
+    return tagged(request, _templates())
+
+
+@cache
+def _templates() -> bytes:
     items = [
         TemplateAnswer(name=name, title=each.TITLE, questions=template_schema(each))
         for name, each in TEMPLATES.items()
     ]
-    return TemplateList(items=items)
+    return TemplateList(items=items).model_dump_json().encode()
 
 
 @templates.post("/templates")

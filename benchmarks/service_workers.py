@@ -238,7 +238,7 @@ def own_postgresql() -> Iterator[Callable[[], str]]:
         yield lambda: stack.enter_context(cluster.database())
 
 
-def scale() -> None:
+def workers() -> None:
     """Queue and database with 100 times as many simulated workers as there are cores."""
     rows = []
     with tempfile.TemporaryDirectory() as folder, own_postgresql() as new_database:
