@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from solver.scene.scene import Scene
 
 
-_SCENE_FILES = (".toml", ".json")
+SCENE_FILES = (".toml", ".json")
 
 
 def scenes(incomplete: str) -> list[str]:
@@ -25,7 +25,7 @@ def scenes(incomplete: str) -> list[str]:
     found = sorted(beside.iterdir()) if beside.is_dir() else []
     start = incomplete[: len(incomplete) - len(Path(incomplete + "x").name) + 1]
     named = [start + path.name + "/" * path.is_dir() for path in found if not path.name.startswith(".")]
-    files = [name for name in named if name.endswith((*_SCENE_FILES, "/"))]
+    files = [name for name in named if name.endswith((*SCENE_FILES, "/"))]
     return [name for name in (*shipped_scenes(), *files) if name.startswith(incomplete)]
 
 

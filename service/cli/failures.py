@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import re
 import sys
 from collections.abc import Iterable, Mapping
 
 from service import errors
+from service.settings.logs import CONTROL
 from solver.errors import Issue, SceneError, SettingError, SolverError
 
 FELL_SHORT = 1
@@ -21,7 +21,6 @@ _STATE = (
     errors.RetryLaterError,
     errors.JobFailedError,
 )
-_CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")
 
 
 def refused(
@@ -64,7 +63,7 @@ REPORTED = (SolverError, errors.ServiceError, errors.InputError, ShortfallError)
 def report(error: Exception) -> int:
     """Print an error of `REPORTED`; return the exit status."""
     for line in _lines(error):
-        sys.stderr.write(_CONTROL.sub("?", f"stickslip: {line}") + "\n")
+        sys.stderr.write(CONTROL.sub("?", f"stickslip: {line}") + "\n")
     return _status(error)
 
 

@@ -31,7 +31,7 @@ def about(**fields: object) -> Iterator[None]:
 
 
 # All but the end of a line and the tabulator, which a traceback has: a terminal would obey the others.
-_CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")
+CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")
 
 
 # Of a key or a link (`service.db.tokens`): its id may be told, its secret may not, wherever it was written.
@@ -52,7 +52,7 @@ class TextFormatter(logging.Formatter):
         """The line of a record."""
         fields = _FIELDS.get()
         shown = "".join(f" [{name} {fields[name]}]" for name in _SHOWN if name in fields)
-        return _SECRET.sub(r"\1***", _CONTROL.sub(_escaped, super().format(record) + shown))
+        return _SECRET.sub(r"\1***", CONTROL.sub(_escaped, super().format(record) + shown))
 
 
 class JsonFormatter(logging.Formatter):

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from datetime import UTC, datetime, timedelta
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -12,6 +11,7 @@ import typer
 
 from service.cli.commands.service import settings_of
 from service.cli.options import shared as options
+from service.cli.options.inputs import age
 from service.errors import InputError
 from service.rendering.text import print_json, print_table, say
 
@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from service.db.models import ApiKey
     from service.db.repositories.owned import KeyRepository
     from service.db.tokens import Made
-
-_PERIOD = re.compile(r"([1-9][0-9]{0,5})([dh])")
 
 Owner = Annotated[
     str,
@@ -150,9 +148,8 @@ def _limits(words: Sequence[str]) -> KeyLimits:
 
 def _time(text: str, now: datetime) -> datetime:
     """A time from now on, or a date."""
-    period = _PERIOD.fullmatch(text)
-    if period is not None:
-        return now + timedelta(hours=int(period[1]) * (24 if period[2] == "d" else 1))
+    with suppress(typer.BadParameter):
+        return now + timedelta(seconds=age(text))
     try:
         date = datetime.fromisoformat(text)
     except ValueError:

@@ -17,6 +17,7 @@ import typer
 from optim.criteria.key import Form, Option
 from optim.problem.keys import DesignKeys, FrontKeys, options
 from service.cli import completion
+from service.cli.completion import SCENE_FILES
 from service.cli.failures import refused
 from service.cli.options import inputs, shared
 from service.cli.options.inputs import number, whole_number
@@ -103,9 +104,6 @@ def takes_problem(keys: Mapping[str, Option]) -> Callable[[Command], Command]:
         return with_parameters(wrapped, chain.from_iterable(listed))
 
     return taking
-
-
-SCENE_FILES = (".toml", ".json")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -57,9 +57,7 @@ def period_of(solution: Solution, samples: int) -> dict[str, Any]:
 
     Returns
     -------
-    ``time`` [s], ``displacement`` of the observed DOF [m], and for each contact its name, state, ``slip``
-    [m], ``force`` [N], ``load`` [N], ``motion`` (0 stick, 1 slip, 2 separation; null where the law has no
-    such) and ``shares`` of the period.
+    The JSON of a `Period`.
     """
     from solver.jit import fourier
 

@@ -108,11 +108,18 @@ def unpacked(
     )
 
 
-def _variables(result: DesignResult | RobustResult) -> tuple[VariableValues, ...]:
-    return tuple(
-        VariableValues(name=v.name, value=result.optimum.get(v.name), low=v.low, high=v.high)
-        for v in result.problem.variables
-    )
+def _record(result: DesignResult | RobustResult, **own: Any) -> DesignRecord:
+    """The columns that a design and a robust one have alike, with its own."""
+    problem = result.problem
+    return DesignRecord(
+        scene_name=problem.scene.name, scene_hash=digest(problem.scene.to_dict()), reached=result.reached,
+        status=result.status.value, harmonics=problem.harmonics, seconds=result.seconds,
+        variables=tuple(
+            VariableValues(name=v.name, value=result.optimum.get(v.name), low=v.low, high=v.high)
+            for v in problem.variables
+        ),
+        **own,
+    )  # fmt: skip
 
 
 def design_record(result: DesignResult) -> DesignRecord:
@@ -125,52 +132,40 @@ def design_record(result: DesignResult) -> DesignRecord:
         from optim.methods.kkt import KEPT
 
         feasible = evaluation.violation(natural_scales(problem)) <= KEPT
-    return DesignRecord(
-        scene_name=result.scene,
-        scene_hash=digest(problem.scene.to_dict()),
+    return _record(
+        result,
         method=result.method.value,
         robust=False,
-        reached=result.reached,
         feasible=feasible,
-        status=result.status.value,
         objective=None if evaluation is None else json_number(evaluation.objective),
         peak=None if peak is None else peak.value,
         peak_at=None if peak is None else peak.at,
         limit=result.limit,
         band_hz=result.band_hz,
-        harmonics=problem.harmonics,
         evaluations=result.evaluations,
         work=json_number(result.work),
-        seconds=result.seconds,
-        variables=_variables(result),
     )
 
 
 def robust_record(result: RobustResult) -> DesignRecord:
     """The robust design with the columns people filter by; its peak is the worst over the uncertainty."""
-    problem, side = result.problem, result.robust
+    side = result.robust
     worst = None if side is None or side.worst is None else side.worst
     rows = () if worst is None else worst.rows
     peak = max((r for r in rows if r.quantity.name == "peak"), key=lambda row: row.value, default=None)
     bands = [row.value for row in rows if row.quantity.name == "band"]
-    return DesignRecord(
-        scene_name=problem.scene.name,
-        scene_hash=digest(problem.scene.to_dict()),
+    return _record(
+        result,
         method=result.aim.value,
         robust=True,
-        reached=result.reached,
         feasible=side is not None and side.feasible,
-        status=result.status.value,
         objective=json_number(result.objective),
         peak=None if peak is None else peak.value,
         peak_at=None if peak is None else json_number(peak.at_hz),
-        limit=problem.limit,
+        limit=result.problem.limit,
         band_hz=max(bands, default=None),
-        harmonics=problem.harmonics,
         evaluations=result.designs,
         work=float(result.responses),
-        seconds=result.seconds,
-        variables=_variables(result),
     )
 
 

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from html import escape
-from typing import Any
 
 import optim
 from optim.views.tables.design import design, front
@@ -14,20 +12,20 @@ from service.rendering.report.sections import (
     Designed,
     Json,
     again_section,
-    bounds_of,
     branch_table,
     by_path,
     motion_section,
+    optimum_section,
     plan_section,
     response_section,
     scene_section,
     title_section,
+    violation_pair,
 )
 from solver.errors import SolverError
-from solver.scene.parameter_paths import parameter
 from solver.scene.scene import Scene
 from solver.views.plots import style
-from solver.views.plots.html import block_html, image, page, pairs, table
+from solver.views.plots.html import block_html, image, page, pairs
 
 _MOST_PARAMETERS = 8
 
@@ -58,7 +56,8 @@ def design_report(given: Designed) -> str:
     words = f"Amplitude of {scene.observe.dof} over frequency, as given and at the optimum{case.where}"
     parts = [
         title_section(given, f"Damper of {given.scene.name}", chosen["status"]),
-        _figures(given, chosen, lines, case.where),
+        optimum_section(given, {"optimum": chosen["optimum"]}),
+        f"<h2>Before and after{escape(case.where)}</h2>{branch_table(lines)}",
         response_section(scene, lines, words),
         *_holds(given, chosen),
         _sensitivities(given, after),
@@ -87,19 +86,6 @@ def _chosen(result: Json) -> Json:
     return {**point, "optimum": point["values"], "peak": peak, "status": result["status"]}
 
 
-def _figures(given: Designed, chosen: Json, lines: Sequence[ReportLine], where: str) -> str:
-    """The optimum, and what it changes."""
-    rows: list[list[Any]] = []
-    for name, value in chosen["optimum"].items():
-        path = name.split(",")[0].strip()
-        before = parameter(path, given.scene.value(path))
-        rows.append([name, before, parameter(path, value), bounds_of(given, name)])
-    return (
-        f"<h2>Optimum</h2>{table(['variable', 'as given', 'optimum', 'bounds'], rows)}"
-        f"<h2>Before and after{escape(where)}</h2>{branch_table(lines)}"
-    )
-
-
 def _holds(given: Designed, chosen: Json) -> list[str]:
     """What holds the optimum: limits, active rows with multipliers, local optima."""
     if _is_front(given.result):
@@ -109,9 +95,7 @@ def _holds(given: Designed, chosen: Json) -> list[str]:
     parts = ["<h2>What holds it</h2>", pairs(first.pairs)]
     conditions = given.result.get("conditions")
     if conditions is not None:
-        worst = max(conditions["violation"], 0.0)
-        violation = f"{worst:.1e}" if worst > 0.0 else "none"
-        parts.append(pairs([("largest relative violation of a limit", violation)]))
+        parts.append(pairs([violation_pair(conditions["violation"])]))
     return parts + [f"<h3>{escape(one.title)}</h3>{block_html(one)}" for one in tables]
 
 

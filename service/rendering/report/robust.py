@@ -12,18 +12,18 @@ from service.rendering.report.sections import (
     Designed,
     Json,
     again_section,
-    bounds_of,
     branch_table,
     by_path,
     motion_section,
+    optimum_section,
     plan_section,
     response_section,
     scene_section,
     title_section,
+    violation_pair,
 )
 from solver.continuation.branch import AnyBranch
 from solver.results import units
-from solver.scene.parameter_paths import parameter
 from solver.scene.scene import Scene
 from solver.views.plots import style
 from solver.views.plots.html import image, page, pairs, table
@@ -61,7 +61,7 @@ def robust_report(given: Designed) -> str:
     title = f"Robust damper of {given.scene.name}"
     parts = [
         title_section(given, title, found["status"]),
-        _optima(given),
+        optimum_section(given, {f"{name} optimum": side["values"] for name, side in _sides(found)}),
         _uncertain(found),
         _over_the_uncertainty(found),
         f"<h2>Responses</h2>{branch_table(lines)}",
@@ -105,18 +105,6 @@ def _written_out(branch: AnyBranch) -> bool:
     return any("@" in contact.name for contact in branch.scene.contacts)
 
 
-def _optima(given: Designed) -> str:
-    """Both optima beside what was given."""
-    sides = _sides(given.result)
-    rows: list[list[Any]] = []
-    for name in given.result["optimum"]:
-        path = name.split(",")[0].strip()
-        values = [parameter(path, side["values"][name]) for _, side in sides]
-        rows.append([name, parameter(path, given.scene.value(path)), *values, bounds_of(given, name)])
-    heads = ["variable", "as given", *(f"{name} optimum" for name, _ in sides), "bounds"]
-    return f"<h2>Optimum</h2>{table(heads, rows)}" if rows else ""
-
-
 def _uncertain(found: Json) -> str:
     """What is not known, and what is minimised over it."""
     aim = found["aim"] if found["quantile"] is None else f"{100.0 * found['quantile']:g} % {found['aim']}"
@@ -139,8 +127,7 @@ def _holds(found: Json) -> str:
     """What holds the robust optimum, and how well the search closed."""
     told = effort_pairs(found)
     if found["violation"] is not None:
-        worst = max(found["violation"], 0.0)
-        told.append(("largest relative violation of a limit", f"{worst:.1e}" if worst > 0.0 else "none"))
+        told.append(violation_pair(found["violation"]))
     told.append(("search with nothing uncertain", found["nominal_status"]))
     parts = ["<h2>What holds it</h2>", pairs(told)]
     held = [cut for cut in found["cuts"] if abs(cut["multiplier"]) > _COUNTS]

@@ -69,11 +69,22 @@ def by_path(values: Mapping[str, float]) -> dict[str, float]:
     return {path.strip(): value for paths, value in values.items() for path in paths.split(",")}
 
 
-def bounds_of(given: Designed, name: str) -> str:
-    """The bounds of a variable, with its unit; empty if they were not given."""
-    bounds = (given.problem.get("variables") or {}).get(name)
-    path = name.split(",")[0].strip()
-    return "" if bounds is None else f"{units.number(bounds[0], 6)} to {parameter(path, bounds[1])}"
+def optimum_section(given: Designed, optima: Mapping[str, Mapping[str, float]]) -> str:
+    """Every variable as given, at each of the optima, and its bounds if they were given."""
+    rows: list[list[Any]] = []
+    bounds = given.problem.get("variables") or {}
+    for name in next(iter(optima.values()), {}):
+        path = name.split(",")[0].strip()
+        low, high = bounds.get(name, (None, None))
+        within = "" if low is None else f"{units.number(low, 6)} to {parameter(path, high)}"
+        found = [parameter(path, values[name]) for values in optima.values()]
+        rows.append([name, parameter(path, given.scene.value(path)), *found, within])
+    return f"<h2>Optimum</h2>{table(['variable', 'as given', *optima, 'bounds'], rows)}" if rows else ""
+
+
+def violation_pair(violation: float) -> tuple[str, str]:
+    """How much a limit is exceeded, if any is."""
+    return "largest relative violation of a limit", f"{violation:.1e}" if violation > 0.0 else "none"
 
 
 def branch_table(lines: Sequence[ReportLine]) -> str:

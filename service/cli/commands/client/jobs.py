@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
+from service.cli.completion import SCENE_FILES
 from service.cli.failures import BAD_INPUT, FELL_SHORT
-from service.cli.options import inputs, problem_inputs
+from service.cli.options import inputs
 from service.cli.options import shared as options
 from service.cli.options.inputs import amount, count
 from service.cli.options.parameters import given_key
@@ -200,7 +201,7 @@ def results(
 
 def scene_of(name: str) -> Any:
     """The scene for a body: a scene file goes with it, a name is looked up by the service."""
-    return scene_to_submit(name) if name.endswith(problem_inputs.SCENE_FILES) else name
+    return scene_to_submit(name) if name.endswith(SCENE_FILES) else name
 
 
 def hand_in(url: str, body: Mapping[str, Any], *, wait: bool, as_json: bool) -> None:
