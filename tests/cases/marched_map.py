@@ -85,8 +85,9 @@ class MarchedMap:
 
     def _row(self, c: int) -> np.ndarray:
         found = np.zeros(self.state.x.size)
-        place = slice(self.system.L_start[c], self.system.L_start[c + 1])
-        found[self.system.L_column[place]] = self.system.L_value[place]
+        L = self.system.L
+        place = slice(L.start[c], L.start[c + 1])
+        found[L.column[place]] = L.value[place]
         return found
 
     def numbers(self, state: kernel.State) -> np.ndarray:

@@ -180,7 +180,7 @@ def trajectory(point: Point, damping: float, move: np.ndarray, periods: int) -> 
     """(x, v) at the ends of periods, from a point's motion moved by (x, v, place of the slider if held)."""
     omega, (contact,) = PERIOD * point.frequency_hz, UNSTABLE.contacts
     system = equations_of_motion(UNSTABLE, omega).system
-    system = system._replace(B_value=np.full_like(system.B_value, damping / omega))
+    system = system._replace(B=system.B._replace(value=np.full_like(system.B.value, damping / omega)))
     orders = np.arange(1, point.slip.size // 2 + 1)
     x, v = point.slip[0] + point.slip[1::2].sum(), float(orders @ point.slip[2::2])
     (here,) = [piece for piece in states_of(point.slip) if piece.holds_at(0.0)]
