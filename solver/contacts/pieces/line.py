@@ -43,6 +43,8 @@ def friction_pieces(
     SettingError
         A motion that cannot be followed.
     """
+    if kn is not None:
+        _presses_or_opens(load)
     found = segments_of(slip, load, kt, mu)
     if found.state == FAILED:
         raise SettingError("solution", "motion", "must be one of every contact that can be followed")
@@ -70,6 +72,13 @@ def friction_pieces(
     return tuple(pieces)
 
 
+def _presses_or_opens(load: Real) -> None:
+    """Raise SettingError where a contact touches all the time without a force."""
+    if not np.any(load):
+        wanted = "must press or open every contact: what touches without a force is stiff to one side alone"
+        raise SettingError("solution", "motion", wanted)
+
+
 def _slope(coefficients: Real, tau: float) -> float:
     """Return the derivative by τ of full coefficients."""
     return float(
@@ -81,6 +90,7 @@ def gap_pieces(motion: Real, stiffness: float, gap: float) -> tuple[StatePiece, 
     """Return when a spring on one side is closed; the force is continuous, so that nothing jumps."""
     opening = motion.copy()
     opening[0] -= gap
+    _presses_or_opens(opening)
     rows = segments_of(np.zeros(opening.size), opening, 1.0, 1.0).rows
     closed = ((float(row.begin), float(row.end)) for row in rows)
     return tuple(spring(*when, np.array([[stiffness]])) for when in closed if when[1] - when[0] > SHORTEST)

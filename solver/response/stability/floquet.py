@@ -21,6 +21,7 @@ from solver.results.watch import OnProgress, ShouldStop, shows_progress
 from solver.scene.cyclic.annulus import annulus
 from solver.scene.scene import Scene
 
+ROUNDING = 1e-14  # of the largest motion, one that is none
 Motions = tuple[Real, ...]  # of every contact, (ports, 2H + 1) full coefficients [m]
 
 
@@ -153,7 +154,9 @@ def scene_monodromy(
 def _parts(scene: Scene, motions: Motions) -> dict[str, tuple[ContactPart, ...]]:
     """The states of every contact; those of the next sector are the same a part of a period earlier."""
     own: dict[str, tuple[ContactPart, ...]] = {}
-    for contact, moved in zip(scene.contacts, motions, strict=True):
+    rounding = ROUNDING * max((float(np.abs(each).max(initial=0.0)) for each in motions), default=0.0)
+    for contact, found in zip(scene.contacts, motions, strict=True):
+        moved = np.where(np.abs(found).max(axis=1, keepdims=True) > rounding, found, 0.0)
         parts = contact.perturbed(moved, contact.normal_load(moved))
         if parts is None:
             wanted = f"must have contacts whose law says how it is perturbed ({contact.LAW} does not)"

@@ -4,14 +4,16 @@ import time
 
 import numpy as np
 import pytest
+from law_scene_cases import CUBIC, GAP, RUB, scene
 from marched_map import MarchedMap
 from moving_scenes import KINDS, bending_scene, moving_scene
 
-from solver import Branch, SettingError, Solution, bifurcations, solve, stability, sweep
+from solver import Branch, Scene, SettingError, Solution, bifurcations, solve, stability, sweep
 from solver.balance.workspace import PointSolution, Workspace
 from solver.response.contact_response import ContactState
 from solver.response.solve import describe
 from solver.response.stability.floquet import scene_monodromy
+from solver.results.known import Stable
 
 
 def matrix_of(solution: Solution) -> np.ndarray:
@@ -139,3 +141,18 @@ def test_a_law_that_does_not_say_is_refused(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(type(scene.contacts[0]), "perturbed", lambda *_: None)
     with pytest.raises(SettingError, match="must have contacts whose law says how it is perturbed"):
         stability(solution)
+
+
+@pytest.mark.parametrize("law", ["gap", "elastic-normal"])
+@pytest.mark.parametrize("phase", [0.0, 0.7])
+def test_what_touches_without_a_force_has_no_multipliers(law: str, phase: float):
+    """It moves by rounding, which opened and closed it: multipliers of 0.8 to 2.2, by the origin of time."""
+    touch = {"gap": GAP | {"between": ["v", "ground"], "gap": 0.0}, "elastic-normal": RUB | {"N0": 0.0}}
+    raw = scene(CUBIC, touch[law]).to_dict()
+    raw["structure"]["springs"] = raw["structure"]["springs"][:2]  # nothing between u and v: v is at rest
+    raw["excitation"] = {"dof": "u", "amplitude": 1.0, "phase": phase}
+    solution = solve(Scene.from_dict(raw), frequency_hz=0.2, harmonics=5)
+    assert solution.converged
+    with pytest.raises(SettingError, match="touches without a force"):
+        stability(solution)
+    assert solution.stability.stable is Stable.NOT_KNOWN
