@@ -270,12 +270,16 @@ def _say(scene: Scene, picture: Picture, parts: Parts) -> None:
         picture.notes.append(f"Contacts without a place: {', '.join(undrawn)}.")
 
 
-def motion_of_mesh(scene: Scene) -> OutlineMotion | None:
-    """Return how the coordinates of a sector move the points of its mesh, the first ones, if it is known."""
+def motion_of_mesh(scene: Scene) -> tuple[OutlineMotion, tuple[int, ...]] | None:
+    """Return how the coordinates of a sector move the points of its mesh, the first ones, if it is known.
+
+    With it the nodal diameters that it is known at.
+    """
     structure = scene.structure
     if not isinstance(structure, MatricesStructure) or structure.diameters is None:
         return None
-    return None if structure.outline is None else structure.diameters.motion
+    motion = None if structure.outline is None else structure.diameters.motion
+    return None if motion is None else (motion, structure.diameters.diameters)
 
 
 COORDINATE = "coordinate "

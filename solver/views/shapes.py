@@ -23,7 +23,7 @@ from solver.modes.records import diameter_of
 from solver.response.solution import Solution
 from solver.response.time_history import all_coordinates
 from solver.scene.cyclic.annulus import written_out
-from solver.scene.scene import MatricesStructure, Scene
+from solver.scene.scene import Scene
 from solver.views.picture import Picture, motion_of_mesh, picture_of
 
 FAINT = 1e-3
@@ -170,8 +170,9 @@ def _shape(
     for j in range(count):
         own = amplitudes[[row[f"{dof}@{j}" if whole else dof] for dof in scene.dofs]]
         motions[j] = np.einsum("pcd,dk->kpc", factors, own)
-    if (mesh := motion_of_mesh(scene)) is not None:
-        motions[:, :, : mesh.points] = _of_mesh(mesh, scene, model, coordinates, whole=whole)
+    if (known := motion_of_mesh(scene)) is not None:
+        sectors = scene.structure.sector_count
+        motions[:, :, : known[0].points] = _of_mesh(*known, sectors, model, coordinates, whole=whole)
     sizes = np.linalg.norm(motions, axis=-1).max(axis=(0, 2), initial=0.0)
     kept = np.flatnonzero(sizes >= FAINT * sizes.max(initial=0.0))
     kept = kept if sizes.any() else np.array([1], dtype=np.int64)
@@ -188,13 +189,11 @@ def _shape(
 
 
 def _of_mesh(
-    mesh: OutlineMotion, scene: Scene, model: LinearModel, coordinates: Complex, *, whole: bool
-) -> Complex:
+    mesh: OutlineMotion, built: tuple[int, ...], count: int, model: LinearModel, coordinates: Complex,
+    *, whole: bool,
+) -> Complex:  # fmt: skip
     """The motion of the points of a mesh, (sectors, H + 1, n_points, 3); of all sectors as a sum of waves."""
-    structure = scene.structure
-    assert isinstance(structure, MatricesStructure)
-    assert structure.diameters is not None
-    count, n, built = structure.sector_count, structure.n_coordinates, structure.diameters.diameters
+    n = mesh.shares.shape[2]
 
     def moved(wave: int, q: Complex) -> Complex:
         back = 2 * wave > count  # it runs backward: the complex conjugate of the one ahead
