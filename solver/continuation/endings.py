@@ -9,7 +9,6 @@ from solver.contacts.kernels.columns import KT
 from solver.continuation.kernels import state as walk_states
 from solver.continuation.kernels.pseudo_arclength import begin_walk
 from solver.continuation.kernels.state import Control, walk_by_value
-from solver.continuation.segment import Stretch
 from solver.jit.fourier import Real
 
 STIFFEST = 1e7
@@ -18,22 +17,14 @@ MANY, NEAR, STILL = 24, 1e-7, 1e-3  # points within such shares of the range and
 AHEAD = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2)  # of the range, where it is looked why a branch went no further
 
 
-def too_stiff(workspace: Workspace, stretches: list[Stretch]) -> bool:
-    """Return whether a contact yields less than rounding leaves of its motion, where the branch ended.
+def too_stiff(workspace: Workspace, first: float, last: float) -> bool:
+    """Return whether a contact yields less than rounding leaves of its motion, at two λ (inside unit).
 
     The structure gives way by A per force, an elastic contact by 1/kt: with A kt above `STIFFEST` the force
     kt (u − w) of a contact about to slip is the difference of two motions that agree to the last digits. A
     resonance that nothing damps makes A large too, but at its own place alone: the beginning of the branch
     has to say the same.
     """
-    rows = [
-        stretch.solutions[place, -1] for stretch in stretches if len(stretch.solutions) for place in (0, -1)
-    ]
-    return bool(rows) and too_stiff_between(workspace, float(rows[0]), float(rows[-1]))
-
-
-def too_stiff_between(workspace: Workspace, first: float, last: float) -> bool:
-    """Return the same of two values of λ (inside unit)."""
     both = [np.abs(np.diagonal(workspace.receptance(at).A[0], axis1=1, axis2=2)) for at in (first, last)]
     A = np.minimum(*both)
     system = workspace.balance.system

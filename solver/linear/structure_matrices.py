@@ -9,13 +9,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.contacts.fields import End
 from solver.errors import SettingError
 from solver.matrices.normal_modes import undamped_modes
 from solver.matrices.values import frozen
 from solver.scene.bodies.body import Body
 from solver.scene.bodies.kinematics import dof_names
 from solver.scene.matrices_structure import Ratios
-from solver.scene.scene import CyclicStructure, End, LumpedStructure
+from solver.scene.parts import CyclicStructure, LumpedStructure
 
 FloatArray = NDArray[np.float64]
 _SAME = 1e-9  # relative distance of two squared frequencies below which their quotient is a derivative

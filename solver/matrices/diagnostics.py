@@ -13,7 +13,8 @@ from scipy.sparse.linalg import ArpackNoConvergence, eigsh
 from solver.errors import FieldError
 from solver.matrices.load_set import MatrixSet
 from solver.matrices.sectors.elimination import Elimination
-from solver.matrices.validation import ASYMMETRY, one_triangle
+from solver.matrices.validation import one_triangle
+from solver.matrices.values import ASYMMETRY
 
 FloatArray = NDArray[np.float64]
 _RIGID = 1e-3  # a frequency below this share of the next one counts as zero

@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.matrices.values import Matrix, Named, NormalModes
+from solver.matrices.values import ASYMMETRY, Matrix, Named, NormalModes
 
-ASYMMETRY = 1e-8  # largest difference from the transpose, relative to the largest entry, taken for rounding
 _NAME = re.compile(r"[A-Za-z0-9_-]{1,80}(@[0-9]{1,9})?")
 
 
@@ -58,11 +57,6 @@ class DofTable(Named):
     def write(self) -> dict[str, int]:
         """The table that `read` reads."""
         return dict(zip(self, self.rows, strict=True))
-
-
-def differs(array: NDArray[Any], turned: NDArray[Any]) -> bool:
-    """Whether an array differs from what it should be when turned over, by more than rounding."""
-    return bool(np.abs(array - turned).max() > ASYMMETRY * np.abs(array).max())
 
 
 def one_triangle(array: Any) -> str | None:

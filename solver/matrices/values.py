@@ -26,6 +26,7 @@ METRES = {"SI": 1.0, "mm": 1e-3, "in": 0.0254}
 FloatArray = NDArray[np.float64]
 ArrayOf = TypeVar("ArrayOf", bound=NDArray[Any])
 MOST_DOFS = 2000
+ASYMMETRY = 1e-8  # largest difference from the transpose, relative to the largest entry, taken for rounding
 MOST_MODES = 2000
 _ENTRY_KEYS = ("size", "rows", "columns", "values")
 MODES_KEYS = ("omega2", "frequencies_hz", "modes", "damping_ratio")
@@ -311,3 +312,8 @@ def _entries(data: dict[str, object]) -> FloatArray:
     array = np.zeros((size, size))
     np.add.at(array, (rows.astype(np.int64), columns.astype(np.int64)), values)
     return array
+
+
+def differs(array: NDArray[Any], turned: NDArray[Any]) -> bool:
+    """Whether an array differs from what it should be when turned over, by more than rounding."""
+    return bool(np.abs(array - turned).max() > ASYMMETRY * np.abs(array).max())

@@ -21,6 +21,7 @@ import numpy as np
 from solver.balance.balance import Balance
 from solver.balance.kernels.residual import evaluate
 from solver.balance.kernels.slopes import take_slopes
+from solver.balance.whole_motion import Amplitudes
 from solver.contacts.kernels.system import (
     UNHELD,
     by_reference,
@@ -38,7 +39,6 @@ from solver.modes.kernels.assembly import (
 )
 from solver.modes.sparse import Factors, Layout, SparseJacobian
 from solver.modes.structure import Dynamics, ModeStructure, structure_of
-from solver.sensitivity.gradient import Amplitudes
 
 BESIDES = 4  # unknowns beside the motions: Re q, Im q, ω, ζ
 

@@ -19,6 +19,7 @@ import numpy as np
 from solver.balance.balance import Balance, build
 from solver.balance.kernels.residual import contact_values
 from solver.balance.parameter import Kind
+from solver.balance.whole_motion import Amplitudes
 from solver.balance.workspace import ALONG, PointSolution, Workspace
 from solver.contacts.kernels.columns import PRESTRESSED
 from solver.contacts.kernels.system import UNHELD
@@ -28,7 +29,6 @@ from solver.jit.fourier import Complex, Integer, Real
 from solver.jit.separate import apart
 from solver.linear.assembly import linear_model
 from solver.linear.contact_table import port_stiffnesses
-from solver.sensitivity.gradient import Amplitudes
 
 if TYPE_CHECKING:
     from solver.continuation.branch import Branch

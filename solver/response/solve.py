@@ -88,14 +88,12 @@ def solve(
         good_enough = good_enough and reached
     if not found.converged:
         # Loaded here: it brings the kernels of a walk along, which an answer does without.
-        from solver.continuation.endings import too_stiff_between
+        from solver.continuation.endings import too_stiff
 
         failed = _failure(workspace.balance, frequency_hz, found, time.perf_counter() - begun)
         if not found.ratchets and (workspace.law_fails(omega) or workspace.law_fails(omega, found.u)):
             failed = replace(failed, status=SolutionStatus.LAW_FAILED)
-        elif failed.status is SolutionStatus.NOT_CONVERGED and too_stiff_between(
-            workspace, omega, NEARBY * omega
-        ):
+        elif failed.status is SolutionStatus.NOT_CONVERGED and too_stiff(workspace, omega, NEARBY * omega):
             failed = replace(failed, status=SolutionStatus.TOO_STIFF)
         elif failed.status is SolutionStatus.NOT_CONVERGED and found.loses_power:
             failed = replace(failed, status=SolutionStatus.POWER_LOST)

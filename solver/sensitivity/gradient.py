@@ -35,12 +35,12 @@ from solver.balance.parameter_derivatives import (
     resolved,
 )
 from solver.balance.speed_line import check_no_line
-from solver.balance.whole_motion import WholeMotion, times, whole_motion
+from solver.balance.whole_motion import Amplitudes, WholeMotion, times, whole_motion
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.columns import KT, MU
 from solver.contacts.kernels.system import evaluation_by_value
 from solver.errors import SettingError
-from solver.jit.fourier import Complex, Integer, Real, cosine_position
+from solver.jit.fourier import Complex, Integer, Real
 from solver.linear.contact_table import second_numbers
 from solver.results.told import Piece
 from solver.sensitivity.hessian import (
@@ -76,34 +76,6 @@ class Gradient(Piece):
     value: Annotated[float, "max|x| of the observed DOF [m]."]
     by_frequency: Annotated[float, "[m/Hz]."]
     by_parameters: Annotated[Real, "At a fixed frequency [m per unit of each], (n_paths,)."]
-
-
-class Amplitudes:
-    """Real coefficients of kept harmonics as complex amplitudes v̂ = v_c − i v_s."""
-
-    def __init__(self, balance: Balance) -> None:
-        ks = balance.system.ks
-        self.ks = ks
-        self._cosines = np.array([cosine_position(ks, i) for i in range(ks.size)])
-        self._sines = np.where(ks > 0, self._cosines + 1, 0)
-        self._moving = (ks > 0).astype(np.float64)
-        self._size = balance.n_coefficients
-
-    def of(self, coefficients: Real) -> Complex:
-        """Return the amplitudes (..., nk) of coefficients (..., n)."""
-        sines = coefficients[..., self._sines] * self._moving
-        return np.asarray(coefficients[..., self._cosines] - 1j * sines)
-
-    def coefficients(self, amplitudes: Complex) -> Real:
-        """Return the coefficients (..., n) of amplitudes (..., nk)."""
-        found = np.empty((*amplitudes.shape[:-1], self._size))
-        found[..., self._sines] = -amplitudes.imag
-        found[..., self._cosines] = amplitudes.real
-        return found
-
-    def turn(self, tau: float) -> Complex:
-        """Return e^{ikτ}, (nk,)."""
-        return np.asarray(np.exp(1j * tau * self.ks))
 
 
 class Sensitivities:

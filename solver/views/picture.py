@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 from solver.arrays import Real
 from solver.contacts.fields import parse_end
 from solver.contacts.frames import cross, unit
-from solver.matrices.sectors.outline_motion import OutlineMotion
+from solver.matrices.sectors.diameters import DiameterMatrices
 from solver.scene.bodies.body import Body
 from solver.scene.bodies.kinematics import places, point_motion
 from solver.scene.bodies.shapes import Cylinder, Wedge
@@ -33,38 +34,32 @@ Vector = tuple[float, float, float]
 
 @dataclass(slots=True)
 class Picture:
-    """One sector of a disk, or the whole of another structure.
+    """One sector of a disk, or the whole of another structure."""
 
-    Attributes
-    ----------
-    points : list
-        Places at rest [m]; of unit size where the scene tells none.
-    names, roles : list of str
-        Of each point: ``mesh``, ``node``, ``mass``, ``body``, ``contact`` or ``ground``.
-    moves : list
-        For each point and direction the factor of each DOF in its motion.
-    edges, ahead, faces : lists
-        Numbers of points: of the ends of lines, of lines whose second end is of the next sector, and of the
-        corners of triangles.
-    contacts : dict
-        Number of the point of each contact that is drawn.
-    to_scale : bool
-        Whether the scene tells the places.
-    notes : list of str
-        What is not drawn, and why.
-    """
-
-    to_scale: bool
+    to_scale: Annotated[bool, "Whether the scene tells the places."]
     axis: Vector
-    points: list[Sequence[float]] = field(default_factory=list)
-    names: list[str] = field(default_factory=list)
-    roles: list[str] = field(default_factory=list)
-    moves: list[Sequence[Mapping[str, float]]] = field(default_factory=list)
-    edges: list[tuple[int, int]] = field(default_factory=list)
-    ahead: list[tuple[int, int]] = field(default_factory=list)
-    faces: list[tuple[int, int, int]] = field(default_factory=list)
-    contacts: dict[str, int] = field(default_factory=dict)
-    notes: list[str] = field(default_factory=list)
+    points: Annotated[
+        list[Sequence[float]], "Places at rest [m]; of unit size where the scene tells none."
+    ] = field(default_factory=list)
+    names: Annotated[list[str], "Of each point."] = field(default_factory=list)
+    roles: Annotated[list[str], "``mesh``, ``node``, ``mass``, ``body``, ``contact`` or ``ground``."] = field(
+        default_factory=list
+    )
+    moves: Annotated[
+        list[Sequence[Mapping[str, float]]],
+        "For each point and direction the factor of each DOF in its motion.",
+    ] = field(default_factory=list)
+    edges: Annotated[list[tuple[int, int]], "Numbers of points: the ends of lines."] = field(
+        default_factory=list
+    )
+    ahead: Annotated[list[tuple[int, int]], "Those of lines whose second end is of the next sector."] = field(
+        default_factory=list
+    )
+    faces: Annotated[list[tuple[int, int, int]], "The corners of triangles."] = field(default_factory=list)
+    contacts: Annotated[dict[str, int], "Number of the point of each contact that is drawn."] = field(
+        default_factory=dict
+    )
+    notes: Annotated[list[str], "What is not drawn, and why."] = field(default_factory=list)
 
     def add(self, at: Sequence[float], name: str, role: str, moves: Sequence[Mapping[str, float]]) -> int:
         """Draw a point, and return its number."""
@@ -257,10 +252,10 @@ def _say(scene: Scene, picture: Picture, parts: Parts) -> None:
         return
     moving = {dof for moves in picture.moves for factors in moves for dof in factors}
     left = [dof for dof in scene.dofs if dof not in moving and not dof.startswith(COORDINATE)]
-    if left and motion_of_mesh(scene) is None:
+    if left and moved_mesh(scene) is None:
         listed = ", ".join(left[:6]) + (f" and {len(left) - 6} more" if len(left) > 6 else "")
         picture.notes.append(f"Without a place, so not drawn: {listed}.")
-    if "mesh" in picture.roles and motion_of_mesh(scene) is None:
+    if "mesh" in picture.roles and moved_mesh(scene) is None:
         picture.notes.append(
             "The mesh is drawn at rest: its file tells the motion of the nodes named alone. `stickslip "
             "import --nodes … --reduce` writes one that tells all."
@@ -270,16 +265,13 @@ def _say(scene: Scene, picture: Picture, parts: Parts) -> None:
         picture.notes.append(f"Contacts without a place: {', '.join(undrawn)}.")
 
 
-def motion_of_mesh(scene: Scene) -> tuple[OutlineMotion, tuple[int, ...]] | None:
-    """Return how the coordinates of a sector move the points of its mesh, the first ones, if it is known.
-
-    With it the nodal diameters that it is known at.
-    """
+def moved_mesh(scene: Scene) -> DiameterMatrices | None:
+    """Return the sector of a scene whose `motion` of the points of its mesh, the first ones, is known."""
     structure = scene.structure
     if not isinstance(structure, MatricesStructure) or structure.diameters is None:
         return None
-    motion = None if structure.outline is None else structure.diameters.motion
-    return None if motion is None else (motion, structure.diameters.diameters)
+    known = structure.outline is not None and structure.diameters.motion is not None
+    return structure.diameters if known else None
 
 
 COORDINATE = "coordinate "

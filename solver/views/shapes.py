@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from solver.arrays import Complex, Integer, Real
 from solver.errors import SettingError
 from solver.linear.assembly import linear_model
 from solver.linear.model import LinearModel
+from solver.matrices.sectors.diameters import DiameterMatrices
 from solver.matrices.sectors.outline_motion import OutlineMotion
 from solver.modes.nonlinear_mode import at_nodal_diameter, pose
 from solver.modes.records import diameter_of
@@ -24,7 +26,7 @@ from solver.response.solution import Solution
 from solver.response.time_history import all_coordinates
 from solver.scene.cyclic.annulus import written_out
 from solver.scene.scene import Scene
-from solver.views.picture import Picture, motion_of_mesh, picture_of
+from solver.views.picture import Picture, moved_mesh, picture_of
 
 FAINT = 1e-3
 """Harmonics that move every point less than this share of the largest motion are left out."""
@@ -33,39 +35,21 @@ _INSTANTS = 96
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Shape:
-    """How a scene moves over one period.
+    """How a scene moves over one period."""
 
-    Attributes
-    ----------
-    picture : Picture
-        Points at rest, and what is drawn between them.
-    unit : str
-        Of the motions: m, or 1/√kg of a mode that is linear.
-    frequency_hz : float
-        [Hz].
-    nodal_diameter : int or None
-        Of harmonic 1, negative for a wave that travels backward; None where it is no wave.
-    turn : float
-        Phase of harmonic 1 from a sector to the next [rad].
-    harmonics : (nk,) array
-        The mean, if it is there, and those that move something.
-    motions : (ns, nk, n_points, 3) array
-        Complex amplitudes; of one sector, or of each where all were solved.
-    amplitude : (ns, n_points) array
-        Largest motion of each point about its mean over the period.
-    states : dict
-        What every contact does, where it is known.
-    """
-
-    picture: Picture
-    unit: str
-    frequency_hz: float
-    nodal_diameter: int | None
-    turn: float
-    harmonics: Integer
-    motions: Complex
-    amplitude: Real
-    states: dict[str, str]
+    picture: Annotated[Picture, "Points at rest, and what is drawn between them."]
+    unit: Annotated[str, "Of the motions: m, or 1/√kg of a mode that is linear."]
+    frequency_hz: Annotated[float, "Its frequency [Hz]."]
+    nodal_diameter: Annotated[
+        int | None, "Of harmonic 1, negative for a wave that travels backward; None where it is no wave."
+    ]
+    turn: Annotated[float, "Phase of harmonic 1 from a sector to the next [rad]."]
+    harmonics: Annotated[Integer, "The mean, if it is there, and those that move something, (nk,)."]
+    motions: Annotated[
+        Complex, "Complex amplitudes, (ns, nk, n_points, 3); of one sector, or of each where all were solved."
+    ]
+    amplitude: Annotated[Real, "Largest motion of each point about its mean over the period, (ns, n_points)."]
+    states: Annotated[dict[str, str], "What every contact does, where it is known."]
 
 
 def deflection_shape(scene: Scene, solution: Solution) -> Shape:
@@ -170,9 +154,11 @@ def _shape(
     for j in range(count):
         own = amplitudes[[row[f"{dof}@{j}" if whole else dof] for dof in scene.dofs]]
         motions[j] = np.einsum("pcd,dk->kpc", factors, own)
-    if (known := motion_of_mesh(scene)) is not None:
-        sectors = scene.structure.sector_count
-        motions[:, :, : known[0].points] = _of_mesh(*known, sectors, model, coordinates, whole=whole)
+    sector = moved_mesh(scene)
+    if sector is not None and sector.motion is not None:
+        turning = None if whole else model.diameters(np.arange(coordinates.shape[1])).tolist()
+        found = _of_mesh(sector, sector.motion, coordinates, scene.structure.sector_count, turning)
+        motions[:, :, : sector.motion.points] = found
     sizes = np.linalg.norm(motions, axis=-1).max(axis=(0, 2), initial=0.0)
     kept = np.flatnonzero(sizes >= FAINT * sizes.max(initial=0.0))
     kept = kept if sizes.any() else np.array([1], dtype=np.int64)
@@ -189,19 +175,20 @@ def _shape(
 
 
 def _of_mesh(
-    mesh: OutlineMotion, built: tuple[int, ...], count: int, model: LinearModel, coordinates: Complex,
-    *, whole: bool,
-) -> Complex:  # fmt: skip
-    """The motion of the points of a mesh, (sectors, H + 1, n_points, 3); of all sectors as a sum of waves."""
-    n = mesh.shares.shape[2]
+    sector: DiameterMatrices, mesh: OutlineMotion, coordinates: Complex, count: int, waves: list[int] | None
+) -> Complex:
+    """The motion of the points of a mesh, (sectors, H + 1, n_points, 3).
+
+    Without the waves of the harmonics the coordinates are those of all sectors, a sum of waves each.
+    """
+    n, built = sector.size, sector.diameters
 
     def moved(wave: int, q: Complex) -> Complex:
         back = 2 * wave > count  # it runs backward: the complex conjugate of the one ahead
         found = mesh.at(built.index(min(wave, count - wave)), q.conj() if back else q)
         return found.conj() if back else found
 
-    if not whole:
-        waves = model.diameters(np.arange(coordinates.shape[1])).tolist()
+    if waves is not None:
         still = np.zeros((mesh.points, 3), np.complex128)
         return np.array(
             [[moved(m, q) if q.any() else still for m, q in zip(waves, coordinates[:n].T, strict=True)]]

@@ -278,3 +278,26 @@ def springs_response(system: System, A: Complex, stiffness: Real, free: Complex,
                 total -= system.span[c, a] * inverse[a, b] * driven[b]
         motions[c] = total
     return True
+
+
+@apart
+def on_springs(
+    system: System, linear: Receptance, i: int, stiffness: Real, free: Complex, motions: Complex
+) -> bool:
+    """Solve (I + A k) motions = free at harmonic number i, (nc,) each; False if there is no such motion."""
+    if is_reduced(system, linear):
+        return springs_response(system, linear.A[0, i], stiffness, free, motions)
+    nc = stiffness.size
+    matrix, inverse = np.empty((nc, nc), np.complex128), np.empty((nc, nc), np.complex128)
+    for c in range(nc):
+        for d in range(nc):
+            matrix[c, d] = linear.A[0, i, c, d] * stiffness[d]
+        matrix[c, c] += 1.0
+    if not invert(matrix, inverse):
+        return False
+    for c in range(nc):
+        motion = complex(0.0)
+        for d in range(nc):
+            motion += inverse[c, d] * free[d]
+        motions[c] = motion
+    return True

@@ -25,7 +25,7 @@ import math
 
 import numpy as np
 
-from solver.balance.kernels.newton import on_springs
+from solver.balance.kernels.coordinates import on_springs
 from solver.contacts.kernels.system import Evaluation, Receptance, System
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Real, coefficient_count, cosine_position, magnitude

@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from solver.balance.kernels.coordinates import is_reduced, springs_response
+from solver.balance.kernels.coordinates import on_springs
 from solver.balance.kernels.gauge import rebase
 from solver.balance.kernels.jacobian import factorise, step_back
 from solver.balance.kernels.residual import contact_values, evaluate
@@ -20,8 +20,8 @@ from solver.contacts.kernels.columns import KT, MU
 from solver.contacts.kernels.normal_load import largest_load, least_load
 from solver.contacts.kernels.system import SIZE, Evaluation, Receptance, System
 from solver.jit.decorators import compiled
-from solver.jit.fourier import Complex, Integer, Real, coefficient_count, cosine_position
-from solver.jit.lapack import copy_to, invert, set_to
+from solver.jit.fourier import Integer, Real, coefficient_count, cosine_position
+from solver.jit.lapack import copy_to, set_to
 from solver.jit.separate import apart
 from solver.linear.kernels.receptance import receptance
 
@@ -205,29 +205,6 @@ def stuck_start(system: System, linear: Receptance, p: float, u: Real) -> float:
             needed += 1.05 * row[system.held[normal, 0]] * _reach(system, u, normal)
         added = max(added, needed)
     return added
-
-
-@apart
-def on_springs(
-    system: System, linear: Receptance, i: int, stiffness: Real, free: Complex, motions: Complex
-) -> bool:
-    """Solve (I + A k) motions = free at harmonic number i, (nc,) each; False if there is no such motion."""
-    if is_reduced(system, linear):
-        return springs_response(system, linear.A[0, i], stiffness, free, motions)
-    nc = stiffness.size
-    matrix, inverse = np.empty((nc, nc), np.complex128), np.empty((nc, nc), np.complex128)
-    for c in range(nc):
-        for d in range(nc):
-            matrix[c, d] = linear.A[0, i, c, d] * stiffness[d]
-        matrix[c, c] += 1.0
-    if not invert(matrix, inverse):
-        return False
-    for c in range(nc):
-        motion = complex(0.0)
-        for d in range(nc):
-            motion += inverse[c, d] * free[d]
-        motions[c] = motion
-    return True
 
 
 @compiled

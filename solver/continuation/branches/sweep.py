@@ -145,7 +145,8 @@ def _swept(
             break
         if count >= settings.most_points:
             break
-    if status in _LOST and too_stiff(workspace, stretches):
+    rows = [one.solutions[place, -1] for one in stretches if len(one.solutions) for place in (0, -1)]
+    if status in _LOST and rows and too_stiff(workspace, float(rows[0]), float(rows[-1])):
         status = BranchStatus.TOO_STIFF
     peaks = settings.peaks and (settings.unfinished_peaks or status is BranchStatus.COMPLETED)
     earlier = 0.0 if course.resume is None else course.resume.seconds

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from solver.errors import SettingError
 from solver.matrices.sectors.outline_motion import OutlineMotion
 from solver.matrices.sectors.parts import PartsAcross
-from solver.matrices.validation import differs
-from solver.matrices.values import MOST_DOFS, ByContent, Matrix
+from solver.matrices.values import MOST_DOFS, ByContent, Matrix, differs
 
 ComplexArray = NDArray[np.complex128]
 _KEYS = ("diameters", "M", "K", "C", "parts", "motion")

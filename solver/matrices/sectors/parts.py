@@ -10,8 +10,7 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.matrices.validation import differs
-from solver.matrices.values import ByContent, Matrix, Named
+from solver.matrices.values import ByContent, Matrix, Named, differs
 
 ComplexArray = NDArray[np.complex128]
 WHOLE = ("K", "M")  # names for the stiffness and the mass of a whole sector

@@ -12,8 +12,7 @@ import numpy as np
 from solver.contacts.kernels.system import System
 from solver.continuation.extrema.kernels.peak_continuation import COLUMNS, Ridge, Z, begin_track, step_track
 from solver.continuation.extrema.kernels.peak_state import Summit
-from solver.studies.peaks.seeds import Seed
-from solver.studies.peaks.track import LineEnd
+from solver.studies.peaks.seeds import LineEnd, Seed
 
 MOST_ROWS = 600
 _EASY, _SHORTER = 4, 0.8  # Newton steps beyond which the next step is shorter, and by how much

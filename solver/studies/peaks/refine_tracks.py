@@ -15,7 +15,7 @@ import numpy as np
 
 from solver.continuation.between import dense_between
 from solver.continuation.extrema.kernels.peak_continuation import HEIGHT, Z
-from solver.studies.peaks.track import Line
+from solver.studies.peaks.seeds import Line
 from solver.studies.peaks.tracker import Place, Tracker
 
 ALLOWED = 0.25  # share of what an interval is higher by that its cubic may be wrong by

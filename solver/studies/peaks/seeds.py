@@ -10,18 +10,83 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import Enum
 from typing import Annotated, Protocol
 
 import numpy as np
 
 from solver.balance.balance import Balance
-from solver.continuation.extrema.kernels.peak_continuation import HEIGHT, OMEGA, PLACE, SLOPE, Z
+from solver.continuation.extrema.kernels.peak_continuation import (
+    DHEIGHT,
+    DOMEGA,
+    HEIGHT,
+    OMEGA,
+    PLACE,
+    SLOPE,
+    Z,
+)
 from solver.jit import fourier
 from solver.jit.fourier import Integer, Real
-from solver.studies.peaks.track import Line, LineEnd
 
 CROSSING = 3.0  # smallest steps within which two crossings are one
 _HALVINGS = 12
+
+
+class LineEnd(Enum):
+    """Why a line ends where it does; the value is what a user reads."""
+
+    ARRIVED = "the end of the range"
+    VANISHED = "the peak vanishes"
+    LEFT_BAND = "the peak leaves the band"
+    TOO_LONG = "too many steps"
+    NOT_FOUND = "not found again"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Line:
+    """One peak over the parameter, ascending in z (the parameter or its logarithm)."""
+
+    rows: Annotated[
+        Real,
+        "Columns named in `solver.continuation.extrema.kernels.peak_continuation`, (P, COLUMNS); "
+        "derivatives are by z.",
+    ]
+    solutions: Annotated[Real, "Slip motions [m], (P, n_unknowns)."]
+    tangents: Annotated[Real, "Their derivatives by z, (P, n_unknowns)."]
+    sign: Annotated[float, "1 for a peak of max x, −1 for one of −min x."]
+    fixed: Annotated[bool, "The amplitude at an end of the band, not a stationary peak."]
+    ends: Annotated[tuple[LineEnd, LineEnd], "Why it ends below and above."]
+
+    @property
+    def low(self) -> float:
+        """Smallest z it covers."""
+        return float(self.rows[0, Z])
+
+    @property
+    def high(self) -> float:
+        """Largest z it covers."""
+        return float(self.rows[-1, Z])
+
+    def heights(self, z: Real) -> Real:
+        """Return the height by cubics between the rows; −inf beyond the line."""
+        return self._cubic(z, HEIGHT, DHEIGHT)
+
+    def frequencies(self, z: Real) -> Real:
+        """Return ω likewise [rad/s]."""
+        return self._cubic(z, OMEGA, DOMEGA)
+
+    def _cubic(self, z: Real, value: int, slope: int) -> Real:
+        rows = self.rows
+        if len(rows) == 1:
+            return np.where(z == rows[0, Z], rows[0, value], -np.inf)
+        right = np.clip(np.searchsorted(rows[:, Z], z), 1, len(rows) - 1)
+        a, b = rows[right - 1], rows[right]
+        length = b[:, Z] - a[:, Z]
+        t = (z - a[:, Z]) / length
+        r = 1.0 - t
+        cubic = (1.0 + 2.0 * t) * r * r * a[:, value] + t * t * (3.0 - 2.0 * t) * b[:, value]
+        cubic += t * r * length * (r * a[:, slope] - t * b[:, slope])
+        return np.where((z >= self.low) & (z <= self.high), cubic, -np.inf)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

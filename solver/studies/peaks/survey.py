@@ -18,7 +18,8 @@ from solver.continuation.peaks import Peak
 from solver.jit.fourier import Real
 from solver.scene.scene import Scene
 from solver.studies.peaks.results import TrackStatus
-from solver.studies.peaks.track import Glance, Line, Look, TrackingPace, glance_at, sweep_within
+from solver.studies.peaks.seeds import Line
+from solver.studies.peaks.track import Glance, Look, TrackingPace, glance_at, sweep_within
 from solver.studies.peaks.work_limit import Allowance, HaltedError
 
 SAME = (

@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from enum import Enum
 from typing import Annotated
 
 import numpy as np
@@ -19,11 +18,10 @@ from solver.balance.workspace import Workspace
 from solver.continuation.branch import Branch
 from solver.continuation.branches.sweep import sweep, walk
 from solver.continuation.extrema.candidates import Rival, crests
-from solver.continuation.extrema.kernels.peak_continuation import DHEIGHT, DOMEGA, HEIGHT, OMEGA, Z
 from solver.continuation.peaks import Peak
 from solver.continuation.segment import Course, Stretch
 from solver.continuation.settings import ContinuationSettings
-from solver.jit.fourier import Integer, Real
+from solver.jit.fourier import Integer
 from solver.scene.scene import Scene
 from solver.studies.peaks.results import TrackStatus
 from solver.studies.peaks.work_limit import Allowance, HaltedError
@@ -54,63 +52,6 @@ EVERYWHERE = TrackingPace(
     first_step=0.02, largest_step=0.125, smallest_step=1e-4, height_error=3e-3, omega_error=1e-3,
     above=math.inf, slack=0.0, climb_from=math.inf,
 )  # fmt: skip
-
-
-class LineEnd(Enum):
-    """Why a line ends where it does; the value is what a user reads."""
-
-    ARRIVED = "the end of the range"
-    VANISHED = "the peak vanishes"
-    LEFT_BAND = "the peak leaves the band"
-    TOO_LONG = "too many steps"
-    NOT_FOUND = "not found again"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Line:
-    """One peak over the parameter, ascending in z (the parameter or its logarithm)."""
-
-    rows: Annotated[
-        Real,
-        "Columns named in `solver.continuation.extrema.kernels.peak_continuation`, (P, COLUMNS); "
-        "derivatives are by z.",
-    ]
-    solutions: Annotated[Real, "Slip motions [m], (P, n_unknowns)."]
-    tangents: Annotated[Real, "Their derivatives by z, (P, n_unknowns)."]
-    sign: Annotated[float, "1 for a peak of max x, −1 for one of −min x."]
-    fixed: Annotated[bool, "The amplitude at an end of the band, not a stationary peak."]
-    ends: Annotated[tuple[LineEnd, LineEnd], "Why it ends below and above."]
-
-    @property
-    def low(self) -> float:
-        """Smallest z it covers."""
-        return float(self.rows[0, Z])
-
-    @property
-    def high(self) -> float:
-        """Largest z it covers."""
-        return float(self.rows[-1, Z])
-
-    def heights(self, z: Real) -> Real:
-        """Return the height by cubics between the rows; −inf beyond the line."""
-        return self._cubic(z, HEIGHT, DHEIGHT)
-
-    def frequencies(self, z: Real) -> Real:
-        """Return ω likewise [rad/s]."""
-        return self._cubic(z, OMEGA, DOMEGA)
-
-    def _cubic(self, z: Real, value: int, slope: int) -> Real:
-        rows = self.rows
-        if len(rows) == 1:
-            return np.where(z == rows[0, Z], rows[0, value], -np.inf)
-        right = np.clip(np.searchsorted(rows[:, Z], z), 1, len(rows) - 1)
-        a, b = rows[right - 1], rows[right]
-        length = b[:, Z] - a[:, Z]
-        t = (z - a[:, Z]) / length
-        r = 1.0 - t
-        cubic = (1.0 + 2.0 * t) * r * r * a[:, value] + t * t * (3.0 - 2.0 * t) * b[:, value]
-        cubic += t * r * length * (r * a[:, slope] - t * b[:, slope])
-        return np.where((z >= self.low) & (z <= self.high), cubic, -np.inf)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -22,7 +22,7 @@ from solver.scene.scene import Scene
 from solver.studies.peaks.minimise_peak import COMPETES, MOST_LOOKS, THOROUGHLY, halted, prove
 from solver.studies.peaks.proof import EQUAL
 from solver.studies.peaks.results import CompetingPeak, Exchange, LeastPeak, PeakTrack, TrackStatus
-from solver.studies.peaks.track import Line, LineEnd
+from solver.studies.peaks.seeds import Line, LineEnd
 from solver.studies.peaks.tracker import Tracker
 from solver.studies.peaks.work_limit import RESPONSES, Allowance, HaltedError
 

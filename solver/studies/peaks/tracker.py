@@ -46,6 +46,8 @@ from solver.studies.peaks.followed_peak import MOST_ROWS, FollowedPeak
 from solver.studies.peaks.seeds import (
     CROSSING,
     BandEndCrossing,
+    Line,
+    LineEnd,
     Seed,
     crossings,
     entries,
@@ -55,7 +57,7 @@ from solver.studies.peaks.seeds import (
     passes,
 )
 from solver.studies.peaks.survey import SAME, Looking
-from solver.studies.peaks.track import EVERYWHERE, Glance, Line, LineEnd, Look, TrackingPace
+from solver.studies.peaks.track import EVERYWHERE, Glance, Look, TrackingPace
 from solver.studies.peaks.work_limit import Allowance
 
 Place = tuple[Real, Real, Real]  # row (COLUMNS,), solution and tangent (n_unknowns,) of a line at one z
