@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Annotated, Any, ClassVar
 
+from solver.arrays import FloatOrNaN
 from solver.results import units
 from solver.results.notes import flag_words
 from solver.results.told import Piece, json_keys
@@ -29,10 +30,14 @@ class Known(Piece):
         "What it is to be judged by: ``max_abs``, or ``half_peak_to_peak`` where the mean is free, so that "
         "max|x| depends on the history.",
     ] = MAX_ABS
-    peak_max_abs: Annotated[float, "max|x| of the peak [m]; NaN if not known."] = math.nan
-    error_estimate: Annotated[float, "Its estimated error [m]; NaN if not known."] = math.nan
-    peak_half_peak_to_peak: Annotated[float, "Half peak to peak [m], if that is the measure."] = math.nan
-    half_peak_to_peak_error: Annotated[float, "Its estimated error [m], likewise."] = math.nan
+    peak_max_abs: Annotated[FloatOrNaN, "max|x| of the peak [m]; NaN if not known."] = math.nan
+    error_estimate: Annotated[FloatOrNaN, "Estimated error of max|x| of the peak [m]; NaN if not known."] = (
+        math.nan
+    )
+    peak_half_peak_to_peak: Annotated[FloatOrNaN, "Half peak to peak [m], if that is the measure."] = math.nan
+    half_peak_to_peak_error: Annotated[FloatOrNaN, "Estimated error of half peak to peak [m], likewise."] = (
+        math.nan
+    )
     flags: Annotated[
         tuple[str, ...], "What the responses assume or leave open, see `solver.results.notes.FLAGS`."
     ] = ()
@@ -52,7 +57,7 @@ class Known(Piece):
         return self.error_estimate if self.measure == MAX_ABS else self.half_peak_to_peak_error
 
     @property
-    def relative(self) -> float:
+    def relative(self) -> FloatOrNaN:
         """Estimated error relative to the peak; infinite if one of them is not known."""
         return _relative(self.error, self.value)
 

@@ -38,21 +38,6 @@ class PeakAt(BaseModel):
     at: float
 
 
-class KnownResult(KindResult):
-    """How well the peaks of a result that is made of responses are known: that of the least known one."""
-
-    measure: str = Field(
-        description="What the peak is judged by: max_abs, or half_peak_to_peak where its mean is free."
-    )
-    peak_max_abs: Amplitude
-    error_estimate: float | None = Field(description="Of max|x| of the peak [m].")
-    peak_half_peak_to_peak: Amplitude
-    half_peak_to_peak_error: Amplitude
-    relative_error: float | None = Field(description="Of the measure; null if it is not known.")
-    flags: list[str] = Field(description="What the responses assume or leave open.")
-    peaks_open: list[Any] = Field(description="Why of some responses a higher peak may hide between points.")
-
-
 class EndedResult(KindResult):
     """A result that says how the computation ended."""
 
@@ -82,20 +67,20 @@ def result_model(
     """
     # Loaded here: the help of a command whose model is written out needs no numbers.
     from solver.results.base import MadeOfResponses
+    from solver.results.known import Known
     from solver.results.read_back import declared
     from solver.results.told import json_keys
 
-    keys = {key: path for key, path in json_keys(kind).items() if not only or key in only}
-    parts: dict[type[KindResult], bool] = {
-        KnownResult: issubclass(kind, MadeOfResponses) and not only,
-        EndedResult: "completed" in keys, ReachedResult: "reached" in keys,
-    }  # fmt: skip
+    known = (Known,) if issubclass(kind, MadeOfResponses) and not only else ()
+    keys = {key: (of, path) for of in (*known, kind) for key, path in json_keys(of).items()}
+    keys = {key: place for key, place in keys.items() if not only or key in only}
+    parts: dict[type[KindResult], bool] = {EndedResult: "completed" in keys, ReachedResult: "reached" in keys}
     bases = tuple(part for part, has in parts.items() if has)
     shared = {key for base in bases for key in base.model_fields}
     own: dict[str, Any] = {}
-    for key, path in keys.items():
+    for key, place in keys.items():
         if key not in shared:
-            of, words = declared(kind, path)
+            of, words = declared(*place)
             kept = Table if of is None else _json_type(of)
             given, default = one if isinstance(one := types.pop(key, kept), tuple) else (one, ...)
             field = default if isinstance(default, FieldInfo) else Field(default, description=words or None)
