@@ -35,6 +35,9 @@ class Meters:
             "Leases that ran out: noticed by the attempt that had it, or of jobs taken back from another.",
             ("noticed",), registry=None,
         )  # fmt: skip
+        # From 0: a monitor sees what is added to a series, not that there is one.
+        for noticed in ("own", "taken back"):
+            self.lost.labels(noticed)
         self.lanes = Histogram(
             "stickslip_lane_wait_seconds", "Time a request waited for its turn.",
             ("lane",), buckets=_LANE_SECONDS, registry=None,
