@@ -184,7 +184,9 @@ def test_the_alerts_are_rules_of_prometheus() -> None:
 def test_every_metric_that_is_watched_is_there(behind: tuple[ServedClient, str], name: str) -> None:
     client, key = behind
     bearer = {"Authorization": f"Bearer {key}"}
-    for path in ("/v1/jobs", "/metrics"):
+    job = client.post("/v1/jobs", headers=bearer, json={"kind": "iteration"}).json()["id"]
+    # The times of an attempt are there once one has ended.
+    for path in (f"/v1/jobs/{job}/events", "/metrics"):
         text = client.get(path, headers=bearer).text
     there = set(re.findall(r"(?m)^(stickslip_\w+)[{ ]", text))
     watched = set(re.findall(r"\bstickslip_\w+", (DEPLOY / name).read_text(encoding="utf-8")))
