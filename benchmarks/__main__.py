@@ -4,106 +4,67 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable
 
 from benchmarks.harness import WrongResultError
+from solver.results.views import on_demand
 
 GROUPS = {
     "chains": ("chain-8", "chain-32", "one-slider"),
     "service": ("load", "latency", "requests", "lists", "runs", "figures", "workers", "scale"),
 }
-
-
-def _cases() -> dict[str, Callable[[], None]]:
-    from benchmarks import (
-        against_peers,
-        beam,
-        charts,
-        classes,
-        cluster,
-        designing,
-        disk,
-        exponents,
-        identify,
-        large,
-        mistuned,
-        modes,
-        modes_peers,
-        new_user,
-        page,
-        reduction,
-        responses,
-        robustness,
-        savings,
-        sector,
-        service_load,
-        service_pruning,
-        service_requests,
-        service_workers,
-        space,
-        space_kernel,
-        space_peers,
-        spreading,
-        start,
-        stored_runs,
-        stored_sweeps,
-        sweep_costs,
-        truth,
-        users,
-    )  # fmt: skip
-
-    return {
-        "responses": responses.responses,
-        "solves": responses.solves,
-        "designs": responses.designs,
-        "start": start.start,
-        "classes": classes.classes,
-        "case-a": against_peers.case_a_response,
-        "chain-8": against_peers.chain_of_8,
-        "chain-32": against_peers.chain_of_32,
-        "one-slider": against_peers.one_slider,
-        "optimum": against_peers.optimum,
-        "one-variable": designing.one_variable,
-        "five-variables": designing.five_variables,
-        "robust": designing.robust,
-        "identify": identify.identify,
-        "disk": disk.disk_response,
-        "map": disk.disk_map,
-        "exponents": exponents.exponents,
-        "beam": beam.beams,
-        "modes": modes.modes,
-        "modes-peers": modes_peers.modes_peers,
-        "space-peers": space_peers.space_peers,
-        "savings": savings.savings,
-        "space": space.space,
-        "space-kernel": space_kernel.space_kernel,
-        "stages": sweep_costs.stages,
-        "figures": stored_sweeps.figures,
-        "two-hundred": large.two_hundred_contacts,
-        "reduction": reduction.reduction,
-        "sector": sector.sector,
-        "robustness": robustness.robustness,
-        "truth": truth.truth,
-        "load": service_load.load,
-        "latency": service_load.latency,
-        "lists": service_load.lists,
-        "runs": stored_runs.stored_runs,
-        "requests": service_requests.requests,
-        "pruning": service_pruning.pruning,
-        "workers": service_workers.workers,
-        "scale": users.scale,
-        "page": page.page,
-        "charts": charts.charts,
-        "new-user": new_user.new_user,
-        "cluster": cluster.mistuning_study,
-        "spreading": spreading.spreading,
-        "mistuned": mistuned.mistuned_disks,
-    }
+CASES = {
+    "responses": "responses:responses",
+    "solves": "responses:solves",
+    "designs": "responses:designs",
+    "start": "start:start",
+    "classes": "classes:classes",
+    "case-a": "against_peers:case_a_response",
+    "chain-8": "against_peers:chain_of_8",
+    "chain-32": "against_peers:chain_of_32",
+    "one-slider": "against_peers:one_slider",
+    "optimum": "against_peers:optimum",
+    "one-variable": "designing:one_variable",
+    "five-variables": "designing:five_variables",
+    "robust": "designing:robust",
+    "identify": "identify:identify",
+    "disk": "disk:disk_response",
+    "map": "disk:disk_map",
+    "exponents": "exponents:exponents",
+    "beam": "beam:beams",
+    "modes": "modes:modes",
+    "modes-peers": "modes_peers:modes_peers",
+    "space-peers": "space_peers:space_peers",
+    "savings": "savings:savings",
+    "space": "space:space",
+    "space-kernel": "space_kernel:space_kernel",
+    "stages": "sweep_costs:stages",
+    "figures": "stored_sweeps:figures",
+    "two-hundred": "large:two_hundred_contacts",
+    "reduction": "reduction:reduction",
+    "sector": "sector:sector",
+    "robustness": "robustness:robustness",
+    "truth": "truth:truth",
+    "load": "service_load:load",
+    "latency": "service_load:latency",
+    "lists": "service_load:lists",
+    "runs": "stored_runs:stored_runs",
+    "requests": "service_requests:requests",
+    "pruning": "service_pruning:pruning",
+    "workers": "service_workers:workers",
+    "scale": "users:scale",
+    "page": "page:page",
+    "charts": "charts:charts",
+    "new-user": "new_user:new_user",
+    "cluster": "cluster:mistuning_study",
+    "spreading": "spreading:spreading",
+    "mistuned": "mistuned:mistuned_disks",
+}
+"""The function of each case, in a module of this package."""
 
 
 def main() -> int:
     """Run what is asked for; 1 if a result was wrong."""
-    cases = _cases()
+    cases = {name: on_demand(f"benchmarks.{place}") for name, place in CASES.items()}
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
     listed = "; ".join(f"{name}: {(case.__doc__ or '').splitlines()[0]}" for name, case in cases.items())
     parser.add_argument("case", nargs="*", metavar="CASE", help=listed.replace("%", "%%"))
