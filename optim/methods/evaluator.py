@@ -55,8 +55,8 @@ class DesignSearch:
         self._known: dict[tuple[float, ...], DesignEvaluation] = {}
         # By identity, with the evaluation itself, which so keeps its place in memory.
         self._models: dict[int, tuple[DesignEvaluation, Model]] = {}
-        # Of another search: by another measure, or with other harmonics.
         self._ahead: Ahead[tuple[float, ...], DesignEvaluation] = Ahead(should_stop)
+        # Of another search: by another measure, or with other harmonics.
         self._earlier = {self._place(one.values): one for one in before}
 
     def __call__(self, values: Mapping[str, float]) -> DesignEvaluation:

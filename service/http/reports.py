@@ -78,6 +78,8 @@ class Reports:
             report = await self._lane.run(owner, make)
         finally:
             self._owners[owner] -= 1
+            if not self._owners[owner]:
+                del self._owners[owner]
             self._forget_failed()
         self._keep(key, report)
         return report

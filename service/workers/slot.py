@@ -46,10 +46,9 @@ _STUCK_SECONDS = 0.25
 # What waits in a pipe together must fit into its buffer: nobody should wait for a busy process to read.
 _SMALL_BYTES = 8 * 1024
 
-_tokens = itertools.count(1)
-
-
 _MOST_ERRANDS = 2  # one is computed, one waits
+
+_tokens = itertools.count(1)
 
 
 @dataclass(frozen=True, slots=True)

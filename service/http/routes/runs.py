@@ -284,9 +284,9 @@ async def report(
 
 def _patience(prefer: str | None, longest: float) -> float | None:
     """How long a caller wants to wait; None for as long as it takes [s]."""
-    if prefer is not None and "respond-async" in prefer.lower():
-        return preferred_wait({"prefer": prefer}, longest) or 0.0
-    return preferred_wait({"prefer": prefer or ""}, longest)
+    said = prefer or ""
+    seconds = preferred_wait({"prefer": said}, longest)
+    return 0.0 if seconds is None and "respond-async" in said.lower() else seconds
 
 
 def _has_ended(row: JobRow) -> bool:
