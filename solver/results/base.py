@@ -82,6 +82,7 @@ class MadeOfResponses(Shown):
     """
 
     __slots__ = ()
+    READ: ClassVar = {"known": Known.of_result}
 
     @abstractmethod
     def known_parts(self) -> Iterable[Known]:

@@ -7,6 +7,7 @@ import inspect
 import math
 import sys
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import fields, is_dataclass
 from enum import Enum
 from functools import cache
@@ -172,10 +173,9 @@ def _partial(kind: type[Read]) -> type[Read]:
             return by_path[name]
         if name in read and not hasattr(kind, name):
             return read[name]
-        if name == "known" and "measure" in read:
-            from solver.results.known import Known
-
-            return Known.of_result(self.to_json())
+        if name in kind.READ:
+            with suppress(KeyError):  # an earlier version did not write all of it
+                return kind.READ[name](self.to_json())
         raise AttributeError(
             f"{name!r} of {kind.__name__} is not in the JSON that this was read from, which has "
             f"{', '.join(read)}: compute it again"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from enum import Enum
 from functools import cache
@@ -154,10 +154,13 @@ class Told(ABC):
         the way is None; if empty all fields.
     WORDS : mapping
         What each field is in words.
+    READ : mapping
+        What a property is by the JSON alone, where its own way needs more than that has.
     """
 
     __slots__ = ()
     JSON: ClassVar[str] = ""
+    READ: ClassVar[Mapping[str, Callable[[Mapping[str, Any]], Any]]] = {}
     WORDS: ClassVar[Mapping[str, str]] = {}
 
     def __init_subclass__(cls) -> None:
