@@ -11,7 +11,13 @@ from pydantic import BaseModel, ConfigDict, Field
 from service.jobs.common.periods import period_of
 from service.jobs.common.results import KindResult
 from service.jobs.common.scenes import FrequencyHz, Number, check, require, resolved, stored_scene
-from service.jobs.kinds.preview_request import POINT_UNKNOWNS, PreviewRequest, harmonics_in_time, scene_of
+from service.jobs.kinds.preview_request import (
+    POINT_UNKNOWNS,
+    PreviewRequest,
+    harmonics_in_time,
+    require_drawable,
+    scene_of,
+)
 from service.jobs.outputs import JobOutput, Progress, ShouldStop
 from service.jobs.registry import Resolved, SceneSource
 from service.jobs.studies.modes import Diameter
@@ -24,7 +30,6 @@ if TYPE_CHECKING:
 SAMPLES = 96
 """Of what a contact does over the period."""
 DIGITS = 6
-LEAST_HZ = 1e-9
 MOST_TOLD = 2000
 Point = Annotated[list[float], Field(min_length=3, max_length=3)]
 Amplitudes = list[list[list[Point]]]
@@ -120,8 +125,8 @@ def resolve_shape(request: ShapePreviewRequest, source: SceneSource) -> Resolved
     if sum(each is not None for each in (request.frequency_hz, request.mode, request.motion)) != 1:
         named = Naming("must be given, or {mode} or {motion} in its place; one of them")
         require([Issue(("frequency_hz",), named, request.frequency_hz)])
-    if request.frequency_hz is not None and request.frequency_hz < LEAST_HZ:
-        require([Issue(("frequency_hz",), f"must be at least {LEAST_HZ:g}", request.frequency_hz)])
+    if request.frequency_hz is not None:
+        require_drawable(request.frequency_hz)
     if request.frequency_hz is not None and request.nodal_diameter is not None:
         require([Issue(("nodal_diameter",), Naming("needs {mode} or {motion}"), request.nodal_diameter)])
     scene = scene_of(request, source, 1, request.harmonics)
