@@ -253,6 +253,9 @@ COMMANDS = {
             "results", "commands.client.jobs.results",
             "Print what a job computed, or list the stored designs.", keyed=True,
         ),
+        CommandEntry(
+            "mcp", "commands.client.mcp.mcp", "Let a language model use a running service.", keyed=True
+        ),
         CommandGroup("runs", "Name, find, compare and delete runs of a service.", RUNS),
         CommandGroup("projects", "Gather runs in projects.", PROJECTS),
         CommandGroup("db", "Look after the database.", DATABASE),

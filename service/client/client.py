@@ -321,6 +321,10 @@ class Client(Workbench):
         scene: dict[str, Any] = self._posted("/v1/templates", asked)["scene"]
         return scene
 
+    def scene_parameters(self, body: Mapping[str, Any]) -> dict[str, Any]:
+        """The parameters of a scene with unit, value and range: ``POST /v1/scenes/parameters``."""
+        return self._posted("/v1/scenes/parameters", body)
+
     def scene_text(self, body: Mapping[str, Any]) -> str:
         """A scene with its values set, as TOML: the body of ``POST /v1/scenes/text``."""
         return self._transport.send("POST", "/v1/scenes/text", json=dict(body)).text

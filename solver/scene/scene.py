@@ -209,7 +209,7 @@ class Scene(Part):
     @model_validator(mode="wrap")
     @classmethod
     def _report_everything(
-        cls, data: Any, handler: ModelWrapValidatorHandler[Scene], info: ValidationInfo
+        cls, data: Any, handler: ModelWrapValidatorHandler[Scene], info: ValidationInfo[Any]
     ) -> Scene:
         if isinstance(data, Scene):
             return data
