@@ -29,6 +29,7 @@ class ModePoints:
     damping_ratio: Annotated[Real, "Likewise, (n,)."]
     by_frequency: Annotated[Real, "Derivatives [Hz per unit of each], (n, n_paths)."]
     by_damping: Annotated[Real, "Derivatives [1 per unit of each], (n, n_paths)."]
+    by_amplitude: Annotated[Real, "Derivatives of both by the amplitude [Hz, 1 per √kg m], (n, 2)."]
     states: Annotated[Integer, "What each contact does, (n, n_contacts); −1 where no point was found."]
     points: Annotated[list[ModeState | None], "The unknowns, guesses of the next."]
 
@@ -59,7 +60,7 @@ def mode_at_amplitudes(
         found = _along_the_curve(problem, logs)
     sensitivities = ModeSensitivities(problem.equations, paths, turns=problem.turns)
     n, contacts = logs.size, len(problem.equations.balance.scene.contacts)
-    values, slopes = np.full((n, 2), math.nan), np.full((n, 2, len(paths)), math.nan)
+    values, slopes = np.full((n, 2), math.nan), np.full((n, 2, len(paths) + 1), math.nan)
     states = np.full((n, contacts), -1, dtype=np.int64)
     for i, one in enumerate(found):
         if one is None:
@@ -69,8 +70,9 @@ def mode_at_amplitudes(
         slopes[i] = by_omega / (2.0 * math.pi), by_zeta
         states[i] = problem.equations.point.states
     return ModePoints(
-        frequency_hz=values[:, 0], damping_ratio=values[:, 1], by_frequency=slopes[:, 0],
-        by_damping=slopes[:, 1], states=states, points=[None if one is None else one.state for one in found],
+        frequency_hz=values[:, 0], damping_ratio=values[:, 1], by_frequency=slopes[:, 0, :-1],
+        by_damping=slopes[:, 1, :-1], by_amplitude=slopes[:, :, -1] / amplitudes[:, None], states=states,
+        points=[None if one is None else one.state for one in found],
     )  # fmt: skip
 
 

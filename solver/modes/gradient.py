@@ -70,7 +70,7 @@ def mode_gradient(
     problem = pose(found.scene, found.mode, None, found.n_harmonics, whole=found.whole_matrices)
     sensitivities = ModeSensitivities(problem.equations, paths, turns=problem.turns)
     rows = [sensitivities.at(found.points[i]) for i in chosen]
-    both = np.array(rows, dtype=np.float64).reshape(len(rows), 2, len(tuple(paths)))
+    both = np.array(rows, dtype=np.float64).reshape(len(rows), 2, len(paths) + 1)[:, :, :-1]
     return ModeGradient(
         paths=tuple(paths), frequency_hz=both[:, 0] / (2.0 * math.pi), damping_ratio=both[:, 1]
     )
@@ -105,10 +105,10 @@ class ModeSensitivities:
         self._matrices = matrices_of_paths(balance, self._parameters, whole=True)
 
     def at(self, state: ModeState) -> tuple[Real, Real]:
-        """Return the derivatives of ω [rad/s] and ζ by the paths at a point."""
+        """Return the derivatives of ω [rad/s] and ζ at a point by the paths, then by ln a; (n_paths + 1,)."""
         equations, count = self._equations, len(self._parameters)
         at = equations.evaluate(state.y, state.log_amplitude, state.phase, state.mode)
-        nothing = np.full(count, math.nan)
+        nothing = np.full(count + 1, math.nan)
         if at is None:
             return nothing, nothing
         columns = scales(state.y, equations.size)
@@ -120,7 +120,10 @@ class ModeSensitivities:
             adjoint = np.linalg.lstsq((scaled / rows[:, None]).T, units, rcond=1e-13)[0] / rows[:, None]
         except np.linalg.LinAlgError:
             return nothing, nothing
-        changes = np.array([self._residual(i, state, at) for i in range(count)]).reshape(count, state.y.size)
+        changes = np.zeros((count + 1, state.y.size))
+        for i in range(count):
+            changes[i] = self._residual(i, state, at)
+        changes[count, equations.size + 3] = -1.0  # ln √(xᴴ M x) = ln a
         found = -changes @ adjoint
         return found[:, 0], found[:, 1]
 
