@@ -42,6 +42,7 @@ def test_a_scene_that_is_not_there_is_refused(shipped: httpx.Client) -> None:
     assert refused.json()["errors"][0]["pointer"] == "/scene"
 
 
+@pytest.mark.few(keep=("two-dof", "platform-wedge"))
 @pytest.mark.parametrize("name", solver.shipped_scenes())
 def test_a_study_is_taken_as_it_is_proposed(shipped: httpx.Client, name: str) -> None:
     """Every proposal goes through the checks of a job; what is refused is refused there too."""

@@ -388,7 +388,7 @@ def test_texts_are_found_as_by_looking_at_every_one(
         name, notes = ("".join(chance.choices("aBÜüé%_\"'/* -\n", k=chance.randrange(12))) for _ in range(2))
         return RunWords(name=name, notes=notes)
 
-    made = [jobs.submit(new_job(owner="ann", words=words()), queue_limit=1000)[0].id for _ in range(60)]
+    made = [jobs.submit(new_job(owner="ann", words=words()), queue_limit=1000)[0].id for _ in range(36)]
     said = {one: runs.seen(one, "ann").words for one in made}
     for one in list(said)[::7]:
         said[one] = runs.change(one, {"name": f"{said[one].name}new", "notes": "other"}, None, "ann").words
@@ -397,7 +397,7 @@ def test_texts_are_found_as_by_looking_at_every_one(
     with database.writing() as connection:
         connection.execute(delete(Job).where(Job.id.in_(deleted)))
     pieces = {text[i : i + n] for one in said.values() for text in (one.name, one.notes)
-              for n in (1, 2, 3, 4, 6) for i in range(0, len(text) - n + 1, 3)}  # fmt: skip
+              for n in (1, 2, 3, 6) for i in range(0, len(text) - n + 1, 4)}  # fmt: skip
     hit = 0
     for text in sorted(pieces | {one.name for one in gone if one.name}):
         if len(text) < 3 and not text.isascii():
@@ -407,4 +407,4 @@ def test_texts_are_found_as_by_looking_at_every_one(
         found = {row.id for row in runs.page(RunFilter(sees="ann", text=text), 100)}
         assert found == wanted, repr(text)
         hit += bool(wanted)
-    assert hit > 100
+    assert hit > 60
