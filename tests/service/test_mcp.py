@@ -1,24 +1,29 @@
 """The tools for language models, asked by their protocol of a process, as programs with a model ask them."""
 
+from __future__ import annotations
+
 import asyncio
 import os
 import sys
 from collections.abc import Awaitable, Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pytest
-from mcp import Client, StdioServerParameters
-from mcp_types import TextContent
 from service_helpers import ServedClient
 
 import solver
+
+if TYPE_CHECKING:
+    from mcp import Client
 
 Ask = Callable[..., Awaitable[dict[str, Any]]]
 
 
 def asked(service: ServedClient, conversation: Callable[[Client, Ask], Awaitable[None]]) -> None:
     """Hold a conversation with `stickslip mcp` in front of a service."""
+    from mcp import Client, StdioServerParameters  # a second for every process that collects tests
+
     command = StdioServerParameters(
         command=str(Path(sys.executable).parent / "stickslip"), args=["mcp", "--url", str(service.base_url)],
         env=dict(os.environ),
@@ -41,9 +46,8 @@ def asked(service: ServedClient, conversation: Callable[[Client, Ask], Awaitable
 async def refused(model: Client, tool: str, **given: Any) -> str:
     answer = await model.call_tool(tool, given)
     assert answer.is_error
-    content = answer.content[0]
-    assert isinstance(content, TextContent)
-    return content.text
+    text: str = answer.content[0].text
+    return text
 
 
 def test_a_model_finds_a_scene_computes_and_designs(shipped: ServedClient, tmp_path: Path) -> None:

@@ -1,16 +1,12 @@
 """Answers as functions for other programs: their derivatives are differences of the whole answer."""
 
 from collections.abc import Iterator
+from typing import Any
 
-import jax
-import jax.numpy as jnp
 import numpy as np
-import openmdao.api as om
 import pytest
 
 import solver
-import stickslip.jax
-import stickslip.openmdao
 from optim.doors import functions
 from optim.doors.functions import ExactFunction
 
@@ -19,11 +15,13 @@ DISK = solver.load_scene("bladed-disk")
 PATHS = ["damper.N0", "damper.kt", "damper.mu", "structure.k1"]
 
 
-@pytest.fixture(autouse=True)
-def _in_64_bits() -> Iterator[None]:
-    jax.config.update("jax_enable_x64", True)
-    yield
-    jax.config.update("jax_enable_x64", False)
+@pytest.fixture
+def jax() -> Iterator[Any]:
+    """JAX with 64 bits; imported here, it takes each process that collects tests half a second."""
+    module = pytest.importorskip("jax", reason="jax is not installed")
+    module.config.update("jax_enable_x64", True)
+    yield module
+    module.config.update("jax_enable_x64", False)
 
 
 def at(scene: solver.Scene, paths: list[str], **others: float) -> np.ndarray:
@@ -63,7 +61,10 @@ def test_gradients_are_differences_of_the_answer(name: str) -> None:
     assert np.abs((found - gradient) * x).max() <= tolerance * scale
 
 
-def test_jax_differentiates_both_ways_compiles_and_maps() -> None:
+def test_jax_differentiates_both_ways_compiles_and_maps(jax: Any) -> None:
+    import stickslip.jax
+
+    jnp = jax.numpy
     x = jnp.array(at(TWO, PATHS))
     exact = functions.peak(TWO, PATHS)
     peak = stickslip.jax.peak(TWO, PATHS)
@@ -75,14 +76,17 @@ def test_jax_differentiates_both_ways_compiles_and_maps() -> None:
     both = jax.vmap(peak)(jnp.stack([x, 1.1 * x]))
     np.testing.assert_allclose(both, [exact(x)[0], exact(1.1 * x)[0]], rtol=1e-12)
 
-    def of_load(log_load: jax.Array) -> jax.Array:
+    def of_load(log_load: Any) -> Any:
         return jnp.log(peak(x.at[0].set(jnp.exp(log_load))))
 
     wanted = gradient[0] * x[0] / value
     np.testing.assert_allclose(jax.grad(of_load)(jnp.log(x[0])), wanted, rtol=1e-9)
 
 
-def test_jax_is_told_what_is_wrong() -> None:
+def test_jax_is_told_what_is_wrong(jax: Any) -> None:
+    import stickslip.jax
+
+    jnp = jax.numpy
     peak = stickslip.jax.peak(TWO, PATHS)
     with pytest.raises(solver.SettingError, match=r"shape \(4,\): damper.N0"):
         peak(jnp.ones(3))
@@ -109,6 +113,9 @@ def test_what_has_no_answer_is_no_number() -> None:
 
 
 def test_openmdao_finds_the_least_peak() -> None:
+    om = pytest.importorskip("openmdao.api", reason="openmdao is not installed")
+    import stickslip.openmdao
+
     problem = om.Problem(reports=None)
     function = stickslip.openmdao.peak(TWO, ["damper.N0", "damper.kt"])
     problem.model.add_subsystem("damper", stickslip.openmdao.FrictionComponent(function, TWO), promotes=["*"])
