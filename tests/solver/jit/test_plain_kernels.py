@@ -1,4 +1,4 @@
-"""The plain way of the kernels gives the same: the tests of the contact force pass with it."""
+"""The plain way of the kernels gives the same: for a spring, and with the long tests for friction."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 ROOT = Path(__file__).parent.parent.parent.parent
 PLAIN = {**os.environ, "STICKSLIP_PLAIN_KERNELS": "1"}
@@ -17,27 +18,30 @@ PRIVATE = "('solver.jit.cache', 'solver.jit.slots', 'solver.jit.tables')"
 NUMBERS = f"""
 import json, sys
 import numpy as np
-from law_cases import COULOMB_BOX, Element, evaluate, row_of
+from law_cases import COULOMB_BOX, POLYNOMIAL, Element, evaluate, row_of
 
-U = np.random.default_rng(0).normal(size=(3, 7))
+laws = {{"polynomial": (POLYNOMIAL, 1), "coulomb-box": (COULOMB_BOX, 3)}}
+law, ports = laws[sys.argv[1]]
+U = np.random.default_rng(0).normal(size=(ports, 7))
 row = row_of(KT=2.0, KT_SECOND=1.0, MU=0.3, KN=1.0)
-answer = evaluate(Element(law=COULOMB_BOX, U=U, load=np.array([1.0, 0.3, 0.2]), row=row))
+answer = evaluate(Element(law=law, U=U, load=np.array([1.0, 0.3, 0.2]), row=row))
 print(json.dumps([answer.F.tolist(), answer.dF_dU.ravel().tolist(), [answer.state, answer.piece]]))
 print(json.dumps([name for name in {PRIVATE} if name in sys.modules]))
 """
 
 
-def numbers(environment: dict[str, str]) -> tuple[list[list[float]], list[str]]:
+def numbers(law: str, environment: dict[str, str]) -> tuple[list[list[float]], list[str]]:
     """What a law called by its number gives in a process, and which private modules it loaded."""
     path = os.pathsep.join([str(ROOT), str(ROOT / "tests" / "cases")])
     found = subprocess.run(
-        [sys.executable, "-c", NUMBERS], env={**environment, "PYTHONPATH": path}, cwd=ROOT, check=True,
+        [sys.executable, "-c", NUMBERS, law], env={**environment, "PYTHONPATH": path}, cwd=ROOT, check=True,
         capture_output=True, text=True,
     )  # fmt: skip
     values, private = map(json.loads, found.stdout.splitlines())
     return values, private
 
 
+@pytest.mark.long
 def test_the_tests_of_the_contact_force_pass() -> None:
     path = "tests/solver/contacts/test_contact_force.py"
     ran = subprocess.run(
@@ -48,8 +52,10 @@ def test_the_tests_of_the_contact_force_pass() -> None:
     assert "[100%]" in ran.stdout
 
 
-def test_a_law_called_by_its_number_is_the_same_and_asks_for_nothing_private() -> None:
-    (plain, none), (usual, some) = numbers(PLAIN), numbers({**os.environ, "STICKSLIP_PLAIN_KERNELS": "0"})
+@pytest.mark.parametrize("law", ["polynomial", pytest.param("coulomb-box", marks=pytest.mark.long)])
+def test_a_law_called_by_its_number_is_the_same_and_asks_for_nothing_private(law: str) -> None:
+    plain, none = numbers(law, PLAIN)
+    usual, some = numbers(law, {**os.environ, "STICKSLIP_PLAIN_KERNELS": "0"})
     assert none == []
     assert len(some) == 3
     for one, other in zip(plain, usual, strict=True):
