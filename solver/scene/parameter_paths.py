@@ -178,11 +178,29 @@ def value(scene: Scene, path: str) -> float:
 
 def with_values(scene: _SceneT, values: Mapping[str, float]) -> _SceneT:
     """The scene with other values; only what changes is checked again."""
-    for path, new in values.items():
+    for path in values:
         if not isinstance(path, str):
             raise _unknown(scene, path)
+    if len(values) > 1:
+        _check_together(scene, values)
+    for path, new in values.items():
         scene = _with_value(scene, path, _number(path, new))
     return scene
+
+
+def _check_together(scene: Scene, values: Mapping[str, float]) -> None:
+    """Raise SettingError where two paths say one number of a contact in two ways, as N1 and N1_ratio do."""
+    owners = dict[str | None, dict[str, str]]()
+    for path in values:
+        owner, _, key = path.rpartition(".")
+        owners.setdefault(owner, {})[key] = path
+    for contact in scene.contacts:
+        said = {**owners.get(contact.group, {}), **owners.get(contact.name, {})}
+        for key in filter(contact.parameters.__contains__, said if len(said) > 1 else ()):
+            for other in contact.changed_by(key, 0.0):
+                if other != key and other in said:
+                    wanted = f"cannot be set together with `{said[other]}`: give one of both"
+                    raise SettingError(said[key], values[said[key]], wanted)
 
 
 def _with_value(scene: _SceneT, path: str, new: float) -> _SceneT:

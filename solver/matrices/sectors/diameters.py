@@ -120,7 +120,8 @@ class DiameterMatrices(ByContent):
         good = isinstance(counts, list | tuple) and 0 < len(counts) <= _MOST
         if not good or any(isinstance(n, bool) or not isinstance(n, int) for n in counts):
             raise ValueError("`diameters` must be a list of whole numbers")
-        arrays = {key: _stack(key, data[key], len(counts)) for key in ("M", "K", "C") if data.get(key)}
+        given = ("M", "K") if data.get("C") is None else ("M", "K", "C")
+        arrays = {key: _stack(key, data[key], len(counts)) for key in given}
         parts = None if data.get("parts") is None else PartsAcross.read(data["parts"])
         motion = None if data.get("motion") is None else OutlineMotion.read(data["motion"])
         return cls(diameters=tuple(counts), parts=parts, motion=motion, **arrays)

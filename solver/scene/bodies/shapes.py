@@ -13,7 +13,7 @@ from abc import abstractmethod
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, ValidationError, model_validator
 
 from solver.contacts.fields import EndName, Friction, Name, NonNegative, Part, Positive, Signed, Vector
 from solver.contacts.frames import cross, dot, frame, is_unit, unit
@@ -224,6 +224,14 @@ class _Underplatform(_Faced):
     radius_of_rotation: Annotated[
         NonNegative, "Distance of the centre of mass from the axis of rotation [m]."
     ]
+
+    @model_validator(mode="after")
+    def _whose_body_is_one(self) -> Self:
+        try:
+            _ = self.bodies
+        except ValidationError as error:
+            raise ValueError(str(error.errors()[0]["ctx"]["error"])) from error
+        return self
 
     @property
     def bodies(self) -> tuple[Body, ...]:

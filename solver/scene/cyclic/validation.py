@@ -77,9 +77,9 @@ def _matrix_parts(structure: dict[str, Any]) -> list[str]:
     reduced, parts = structure.get("diameters"), structure.get("parts")
     if reduced is None:
         return [*WHOLE, *map(str, parts if isinstance(parts, dict | list | tuple) else ())]
-    kept = reduced.get("parts") if isinstance(reduced, dict) else reduced.parts
+    kept = reduced.get("parts") if isinstance(reduced, dict) else getattr(reduced, "parts", None)
     names = kept.names if isinstance(kept, PartsAcross) else kept
-    return list(map(str, names or ()))
+    return list(map(str, names if isinstance(names, dict | list | tuple) else ()))
 
 
 def _factor_issues(mistuning: dict[str, Any], sectors: object) -> Iterator[Issue]:

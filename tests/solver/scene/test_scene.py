@@ -199,6 +199,21 @@ def test_all_mistakes_are_listed_at_once():
         Scene.from_dict(raw)
 
 
+@pytest.mark.parametrize("kept", [[], [1], "x", {"parts": 3}, {"diameters": [0], "M": [], "K": {}}])
+def test_what_is_no_table_of_nodal_diameters_is_refused_by_name(kept: object):
+    raw: Raw = load_scene("fe-disk").to_dict()
+    raw["structure"] |= {"diameters": kept, "mistuning": {"of": ["K"], "values": [1.0]}}
+    with pytest.raises(SceneError, match=r"`diameters` must be|`M` must have a table"):
+        Scene.from_dict(raw)
+
+
+def test_a_shape_whose_body_is_none_is_refused_by_its_name():
+    raw: Raw = load_scene("platform-cylinder").to_dict()
+    raw["dampers"][0]["inertia"] = 3.0
+    with pytest.raises(SceneError, match=r"`inertia` of body .* must be three moments"):
+        Scene.from_dict(raw)
+
+
 def test_missing_keys_are_listed():
     assert set(issues({})) == {"/name", "/structure", "/excitation", "/observe"}
     raw = lumped(contacts=[{}])
@@ -275,6 +290,20 @@ def test_n1_follows_n0_only_when_tied():
     assert scene.with_values({"damper.N0": 0.0, "damper.N1": 0.0}).value("damper.N1_ratio") == 0.0
     with pytest.raises(SettingError, match="undefined with N0 = 0"):
         untied.with_values({"damper.N0": 0.0}).value("damper.N1_ratio")
+
+
+@pytest.mark.parametrize("paths", [("damper.N1", "damper.N1_ratio"), ("damper.N1_ratio", "damper.N1")])
+def test_an_amplitude_is_not_set_in_two_ways(paths: tuple[str, str]):
+    wanted = f"`{paths[0]}` cannot be set together with `{paths[1]}`.*got 0.5"
+    with pytest.raises(SettingError, match=wanted):
+        load_scene("two-dof").with_values(dict(zip(paths, (0.5, 0.7), strict=True)))
+
+
+def test_nor_by_its_group():
+    scene = Scene.from_dict(lumped())
+    with pytest.raises(SettingError, match=r"`both.N1` cannot be set together with `right.N1_ratio`"):
+        scene.with_values({"right.N1_ratio": 0.5, "both.N1": 0.7})
+    assert scene.with_values({"left.N1_ratio": 0.5, "right.N1": 0.7}).value("right.N1") == 0.7
 
 
 def test_a_contact_without_n1_has_a_constant_load():
