@@ -341,7 +341,7 @@ class Client(Workbench):
         query = words({"name": name or (path.name if path else None), "format": format})
         content = file if isinstance(file, bytes) else file.read_bytes()
         # Sending and looking at a large file takes its time.
-        timeout = max(self._timeout, 120.0)
+        timeout = max(self._timeout, 120.0 * max(1.0, len(content) / _PART_BYTES))
 
         def sent(asked: Mapping[str, Any], data: bytes) -> NewUpload:
             return self._sent(NewUpload, "POST", "/v1/uploads", params=asked, content=data, timeout=timeout)

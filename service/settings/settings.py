@@ -384,7 +384,7 @@ class Settings(ClientLimits):
         default=300.0, ge=0.1, le=86400.0, description="Time an upload may take to arrive [s]."
     )
     inspection_seconds: float = Field(
-        default=30.0, ge=1.0, le=3600.0, description="Time reading an uploaded file may take [s]."
+        default=30.0, ge=1.0, le=3600.0, description="Time of each 16 MiB that reading uploads may take [s]."
     )
     report_seconds: float = Field(
         default=60.0, ge=1.0, le=3600.0, description="Time making a report of a design may take [s]."

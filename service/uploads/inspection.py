@@ -27,7 +27,13 @@ MEMORY_BYTES = 2 * 1024**3
 _LEAST_BYTES = 512 * 1024**2
 _TIMES = 16
 """Memory of a reader for each byte of its files: lines, and what is read of them, as Python keeps it."""
+_USUAL_BYTES = 16 * 1024**2
+"""Files that are larger together have more time, in proportion."""
 _PATIENCE_SECONDS = 30.0
+_TOO_LONG = (
+    "reading it takes longer than {:g} s: raise STICKSLIP_INSPECTION_SECONDS (of each 16 MiB), or reduce "
+    "the model first, stickslip import FILES --reduce"
+)
 _DESCRIBE, _RESOLVE, _LOOK = "describe", "resolve", "look"
 
 
@@ -82,17 +88,19 @@ def look_at(asked: Mapping[str, Any], folder: Path, seconds: float, most_bytes: 
 
 def _ask(task: str, folder: Path, argument: Any, seconds: float, most_bytes: int) -> Any:
     memory = min(_LEAST_BYTES + _TIMES * _size(folder), MEMORY_BYTES)
+    sent = sum(file.stat().st_size for file in folder.iterdir())  # never what an archive says of itself
+    seconds *= max(1.0, sent / _USUAL_BYTES)
     ours, theirs = mp.Pipe(duplex=False)
     with _budget.taken(memory), ours:
         process = start(_main, (theirs, task, str(folder), argument, seconds, memory), "reader")
         theirs.close()
         try:
             if not ours.poll(seconds):
-                raise UnreadableUploadError(f"reading it takes longer than {seconds:g} s")
+                raise UnreadableUploadError(_TOO_LONG.format(seconds))
             answer = json.loads(ours.recv_bytes(most_bytes))
         except EOFError as error:
             process.join(1.0)
-            raise UnreadableUploadError(_end(process.status())) from error
+            raise UnreadableUploadError(_end(process.status(), seconds)) from error
         except OSError as error:
             message = f"what it holds takes more than {most_bytes} bytes as text"
             raise UnreadableUploadError(message) from error
@@ -118,8 +126,10 @@ def _size(folder: Path) -> int:
     return found
 
 
-def _end(code: int | None) -> str:
-    """What is said of a file whose reader ended without an answer."""
+def _end(code: int | None, seconds: float) -> str:
+    """What is said of a file whose reader ended without an answer within so much time [s]."""
+    if code is not None and -code == signal.SIGXCPU:
+        return _TOO_LONG.format(seconds)
     if code is not None and -code in (signal.SIGSEGV, signal.SIGBUS, signal.SIGABRT, signal.SIGFPE):
         return "it is damaged: its reader ended at it"
     return "reading it takes more memory or time than there is for it"

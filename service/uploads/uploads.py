@@ -109,7 +109,7 @@ class Uploads:
         found = [] if arrived.format == PART else contents(arrived.path, self._seconds)
         row, added = self.repository.add(
             owner=caller.owner, name=arrived.name, format=arrived.format, size=arrived.size,
-            sha256=arrived.sha256, data=arrived.path.read_bytes(),
+            sha256=arrived.sha256, data=arrived.path.read_bytes(), shared=arrived.format != PART,
         )  # fmt: skip
         return row, found, added
 

@@ -145,6 +145,28 @@ def test_a_large_file_comes_in_parts(shipped: httpx.Client, monkeypatch: pytest.
         assert client.upload(data, "K.npz").sha256 == hashlib.sha256(data).hexdigest()
 
 
+def test_files_that_share_a_part_do_not_share_its_fate(shipped: httpx.Client) -> None:
+    data = npz(K=np.arange(1.0, 10.0).reshape(3, 3) + 2.0 * np.eye(3))
+    cut = len(data) // 2
+    both = [
+        [upload(shipped, "K.npz", piece, format="part").json()["id"] for piece in (data[:cut], data[cut:])]
+        for _ in range(2)
+    ]
+    for ids, status in zip(both, (201, 200), strict=True):
+        found = shipped.post("/v1/uploads", params={"name": "K.npz", "part": ids})
+        assert found.status_code == status, found.text
+        assert found.json()["sha256"] == hashlib.sha256(data).hexdigest()
+
+
+def test_the_time_to_read_files_grows_with_them(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = tmp_path / "K.npz"
+    file.write_bytes(npz(K=np.eye(12)))
+    with pytest.raises(UnreadableUploadError, match=r"raise STICKSLIP_INSPECTION_SECONDS .* --reduce"):
+        inspection.contents(file, 0.001)
+    monkeypatch.setattr("service.uploads.inspection._USUAL_BYTES", 1)
+    assert [one["rows"] for one in inspection.contents(file, 0.1)] == [12]
+
+
 def test_what_does_not_fit_is_refused_with_pointers(shipped: httpx.Client, tmp_path: Path) -> None:
     small = upload(shipped, "K.npz", npz(K=np.eye(3))).json()["id"]
     mass = upload(shipped, "M.npz", npz(M=M)).json()["id"]
@@ -277,8 +299,9 @@ def test_a_reader_that_takes_too_long_or_dies_is_ended(
         inspection.contents(tmp_path / "M.npz", 0.01)
     monkeypatch.setattr(inspection, "_budget", inspection._Budget(inspection._LEAST_BYTES + 10**6))
     assert inspection.contents(tmp_path / "M.npz", 30.0)[0]["rows"] == len(M), "its place is free again"
-    assert "damaged" in inspection._end(-signal.SIGSEGV)
-    assert "memory or time" in inspection._end(-signal.SIGKILL)
+    assert "damaged" in inspection._end(-signal.SIGSEGV, 1.0)
+    assert "memory or time" in inspection._end(-signal.SIGKILL, 1.0)
+    assert "longer than 1 s" in inspection._end(-signal.SIGXCPU, 1.0)
     with pytest.raises(UnreadableUploadError, match="more than 10 bytes"):
         inspection.resolved_structure({"kind": "matrices", "M": "M.npz"}, tmp_path, 30.0, 10)
 

@@ -344,16 +344,18 @@ class UploadRepository(Rows[Upload]):
     table = Upload
 
     def add(
-        self, *, owner: str, name: str, format: str, size: int, sha256: str, data: bytes
+        self, *, owner: str, name: str, format: str, size: int, sha256: str, data: bytes, shared: bool = True
     ) -> tuple[Upload, bool]:
         """Store a file, or find the same one of the same owner and format; whether it was stored.
 
-        One that is there already counts as new from now on: who sent it is about to use it.
+        One that is there already counts as new from now on: who sent it is about to use it. What is not
+        `shared` has a row of its own: whoever sent it deletes it.
         """
         same = (Upload.owner == owner, Upload.sha256 == sha256, Upload.format == format)
         with self._db.writing() as connection:
             now = self._now()
-            for known in self._read(connection, self._select.where(*same).order_by(Upload.id).limit(1)):
+            known_rows = self._select.where(*same).order_by(Upload.id).limit(1)
+            for known in self._read(connection, known_rows) if shared else ():
                 known.created = now
                 connection.execute(update(Upload).where(Upload.id == known.id).values(created=now))
                 return known, False

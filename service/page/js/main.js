@@ -13,7 +13,7 @@ import { loadKinds } from "./scene/kinds.js";
 import { loadLaws } from "./scene/laws.js";
 import { forget, resume, run } from "./network/jobs.js";
 import { finishLogin, startLogin } from "./network/login.js";
-import { showResponse, startLive } from "./views/live.js";
+import { showResponse, startLive, wishFirst } from "./views/live.js";
 import { startIdentify } from "./identify/view.js";
 import { startModes } from "./modes/view.js";
 import { startMap } from "./views/map.js";
@@ -219,6 +219,8 @@ function failed(error) {
 }
 
 async function begin() {
+  state.scene ||= FIRST;
+  wishFirst();
   try {
     await Promise.all([loadLaws, loadKinds, scenes].map(patiently));
     await patiently(open);

@@ -23,6 +23,8 @@ let took = 0;
 const LONG = 0.3;
 const COARSE = 5;
 let latest = null;
+// What the first response is of, which is asked for before the scene is known, and its answer.
+let early = null;
 // The response of the study, with what it was computed for and its linear limits.
 let study = null;
 
@@ -48,7 +50,10 @@ export function startLive() {
   on("scene", () => {
     latest = null;
     buildSliders();
-    refresh();
+    if (early?.values !== valuesNow()) refresh();
+    else if (early.answer) drawn(...early.answer);
+    else sayLate();
+    early = null;
   });
   on("scene-contact", buildSliders);
   on("values", () => {
@@ -57,10 +62,20 @@ export function startLive() {
   });
 }
 
-export function refresh() {
-  if (!current.body) return;
+// The first response comes while the page is being filled.
+export function wishFirst() {
+  early = { values: valuesNow() };
+  wish(asked().harmonics);
+}
+
+function sayLate() {
   clearTimeout(slow);
   slow = setTimeout(() => { byId("live-status").textContent = `The response is being computed${takes("sweep") && `, ${takes("sweep")}`} …`; }, SLOW_MS);
+}
+
+export function refresh() {
+  if (!current.body) return;
+  sayLate();
   wish(Math.max(took, secondsOf("sweep")) > LONG && asked().harmonics > COARSE ? COARSE : asked().harmonics);
 }
 
@@ -71,6 +86,7 @@ const wish = (harmonics) => ask({ kind: "sweep", ...asked(), harmonics }, { scen
 // What is too large to be followed live is computed by a job, whose response takes the place of this one.
 function refused(error, token) {
   clearTimeout(slow);
+  early = null;
   if (token.scene !== state.scene) return;
   if (error.retryAfter || error.status === 409) {
     byId("live-status").textContent = error.message;
@@ -119,6 +135,10 @@ function redraw() {
 function drawn(answer, { milliseconds, token }) {
   clearTimeout(slow);
   if (token.scene !== state.scene) return;
+  if (!current.body) {
+    if (early) early.answer = [answer, { milliseconds, token }];
+    return;
+  }
   latest = answer;
   redraw();
   tell("states", { states: answer.states, at: answer.peak?.at });
