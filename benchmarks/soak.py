@@ -109,8 +109,11 @@ def _probe(base: str, log: Log) -> None:
 
 def _children(pid: int) -> list[int]:
     """Every process below one."""
-    tasks = Path(f"/proc/{pid}/task").iterdir()
-    found = [int(child) for task in tasks for child in (task / "children").read_text().split()]
+    found: list[int] = []
+    with contextlib.suppress(FileNotFoundError, ProcessLookupError):
+        for task in Path(f"/proc/{pid}/task").iterdir():
+            with contextlib.suppress(FileNotFoundError, ProcessLookupError):  # the thread ended meanwhile
+                found += map(int, (task / "children").read_text().split())
     return found + [below for child in found for below in _children(child)]
 
 

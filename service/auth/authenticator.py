@@ -15,12 +15,12 @@ from typing import Any
 
 from sqlalchemy.exc import SQLAlchemyError
 
-from service.auth.allowances import Buckets
+from service.auth.allowances import Buckets, Shared
 from service.auth.callers import KEYLESS, NO_LIMITS, Caller, KeyLimits, Scope, included
 from service.db.clock import Clock
 from service.db.models import ApiKey
 from service.db.repositories.owned import KEYS, KeyRepository
-from service.db.tokens import Made, matches
+from service.db.tokens import Made, digest_of, matches
 from service.errors import ForbiddenError, InvalidRequestError, TooManyRequestsError, UnauthorizedError
 from service.settings.settings import Settings
 from solver.errors import Issue, Shown
@@ -123,6 +123,10 @@ class Authenticator:
         self._failures = Buckets(steady=steady)
         self._links = Buckets(steady=steady)
 
+    def shared(self) -> dict[str, Shared]:
+        """What counts at all services of a database together."""
+        return {"requests": self._requests, "failures": self._failures, "by link": self._links}
+
     def known(self, token: str | None) -> bool:
         """Whether `admit` can answer at once, without the database."""
         key_id = None if token is None else id_of(token)
@@ -191,7 +195,8 @@ class Authenticator:
             There were as many as may be made.
         """
         most = self._settings.requests_per_minute
-        waits = [self._links.take(name, most) for name in (f"from {_neighbourhood(address)}", f"by {token}")]
+        names = (f"from {_neighbourhood(address)}", f"by {digest_of(token)}")
+        waits = [self._links.take(name, most) for name in names]
         if max(waits) > 0.0:
             raise TooManyRequestsError(
                 f"by links {most} requests a minute may be made", math.ceil(max(waits))

@@ -8,6 +8,7 @@ and deleted after it, so that a crash leaves a file too many and never one too f
 from __future__ import annotations
 
 import contextlib
+import os
 from collections.abc import Collection, Iterator
 from typing import Any
 
@@ -44,13 +45,19 @@ class ArrayStore:
                 f"got {place!r}: {error}"
             ) from error
         self._files, self._root = found[0], found[1].rstrip("/")
+        self._in_folder = "file" in self._files.protocol
 
     def put(self, job_id: str, array: StoredArray) -> StoredArray:
         """Write an array of a job, unless it is small; what its row is to hold."""
         if len(array.data) < OUTSIDE_BYTES:
             return array
         self._files.makedirs(f"{self._root}/{job_id}", exist_ok=True)
-        self._files.pipe_file(self._file(job_id, array.sha256), array.data)
+        file = self._file(job_id, array.sha256)
+        self._files.pipe_file(file, array.data)
+        if self._in_folder and os.name == "posix":
+            # Its row is to be on disk after it, and with it what names it.
+            for path in (file, f"{self._root}/{job_id}", self._root):
+                _to_disk(path)
         return StoredArray(sha256=array.sha256, data=b"", size=len(array.data))
 
     def get(self, job_id: str, sha256: str) -> bytes:
@@ -86,3 +93,12 @@ class ArrayStore:
 
     def _file(self, job_id: str, sha256: str) -> str:
         return f"{self._root}/{job_id}/{sha256}.npy"
+
+
+def _to_disk(path: str) -> None:
+    """Wait until a file, or what a folder names, has reached the disk."""
+    opened = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(opened)
+    finally:
+        os.close(opened)

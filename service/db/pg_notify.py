@@ -21,6 +21,7 @@ _CHANNEL = "stickslip"
 _SEND = "SELECT pg_notify(%s, notice) FROM unnest(%s::text[]) AS notice"
 _AGAIN_SECONDS = 2.0
 _ACCEPTED, _ENDED, _CANCEL, _WATCH, _LIVE = "accepted", "ended", "cancel", "watch", "live"
+_USED = "used"
 
 OfJob = Callable[[str], None]
 
@@ -40,15 +41,17 @@ class Notices:
         Called with the id of a running job whose cancel was asked for at another service.
     watched, live : callable
         Called with what another service says of a job that it watches, and of one that it runs.
+    used : callable
+        Called with what another service says of what owners use there.
     """
 
     def __init__(
         self, connect: Callable[[], Any], *, accepted: Callable[[], None], ended: OfJob, cancel: OfJob,
-        watched: OfJob, live: OfJob,
+        watched: OfJob, live: OfJob, used: OfJob,
     ) -> None:  # fmt: skip
         self._connect = connect
         self._accepted = accepted
-        self._of_job = {_ENDED: ended, _CANCEL: cancel, _WATCH: watched, _LIVE: live}
+        self._of_job = {_ENDED: ended, _CANCEL: cancel, _WATCH: watched, _LIVE: live, _USED: used}
         self._waiting: deque[str] = deque()
         self._wake_reader, self._wake_writer = mp.get_context("spawn").Pipe(duplex=False)
         self._awake = threading.Lock()
@@ -88,6 +91,10 @@ class Notices:
         """A job that runs here got this far."""
         self._tell(f"{_LIVE}:{text}")
 
+    def tell_used(self, text: str) -> None:
+        """Owners use so much here."""
+        self._tell(f"{_USED}:{text}")
+
     def _tell(self, notice: str) -> None:
         self._waiting.append(notice)
         self._wake()
@@ -106,6 +113,8 @@ class Notices:
             try:
                 with self._connect() as connection:
                     connection.add_notify_handler(self._hear)
+                    # A notice need not outlive the server: nobody waits for its disk.
+                    connection.execute("SET synchronous_commit = off")
                     connection.execute(f"LISTEN {_CHANNEL}")
                     self._accepted()
                     self._converse(connection)

@@ -120,11 +120,11 @@ def _guard(app: FastAPI, service: Service) -> None:
         settings.connections, settings.header_seconds, settings.write_seconds, settings.unsent_bytes
     )
     service.lanes.guard(app.state.connections.require_taken)
+    concurrency = ConcurrencyLimits(settings)
+    service.share(app.state.authenticator.shared() | concurrency.shared())
     # The last one added is the outermost.
     app.add_middleware(HeadAsGet)
-    app.add_middleware(
-        Admission, authenticator=app.state.authenticator, concurrency=ConcurrencyLimits(settings)
-    )
+    app.add_middleware(Admission, authenticator=app.state.authenticator, concurrency=concurrency)
     app.add_middleware(HostCheck, hosts=settings.hosts)
     app.add_middleware(RequestMetrics, metrics=app.state.metrics)
     app.add_middleware(RequestLog)

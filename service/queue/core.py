@@ -13,7 +13,7 @@ from importlib.metadata import version
 from queue import Empty, SimpleQueue
 from typing import Any
 
-from service.auth.allowances import Storage, highest_priority, share
+from service.auth.allowances import Shared, Storage, highest_priority, share
 from service.auth.callers import KEYLESS, Caller
 from service.db import revisions
 from service.db.clock import Clock
@@ -46,6 +46,7 @@ from service.queue.queue import JobQueue
 from service.queue.retention import Retention
 from service.queue.running import Event, Live, Waiters
 from service.queue.scene_store import SceneStore
+from service.queue.together import Together
 from service.settings import traces
 from service.settings.kinds import registry_of
 from service.settings.settings import Settings
@@ -136,6 +137,7 @@ class Service:
         )
         self.retention = Retention(self.database, settings, self.jobs.now)
         self._elsewhere: Elsewhere | None = None
+        self._together: Together | None = None
         self._notices = None if self.database.exclusive else self._make_notices()
         self.stopping = threading.Event()
         self._open = False
@@ -148,11 +150,19 @@ class Service:
             cancel=self.queue.cancel_running,
             watched=lambda text: elsewhere.watched(text),
             live=lambda text: elsewhere.told(text),
+            used=lambda text: together.heard(text),
         )
+        self._together = together = Together(made.tell_used)
+        self.share(self.lanes.shared() | self.answers.shared())
         elsewhere = Elsewhere(self.waiters, self.queue.live, made.tell_watch, made.tell_live)
         self._elsewhere = elsewhere
         self.waiters.relay = made.tell_ended
         return made
+
+    def share(self, limits: Mapping[str, Shared]) -> None:
+        """Keep limits together with other services of the database, if it may have any; before `start`."""
+        if self._together is not None:
+            self._together.add(limits)
 
     def open(self) -> None:
         """Lock SQLite's file and check or make the tables; nothing happens if that was done before.
@@ -191,6 +201,8 @@ class Service:
         if self._notices is not None and self._elsewhere is not None:
             self._elsewhere.start()
             self._notices.start()
+        if self._together is not None:
+            self._together.start()
         log.info("database %s, %d workers", self.database.name, self.settings.workers)
 
     def stop(self) -> None:
@@ -200,6 +212,8 @@ class Service:
         self.answers.close()
         self.retention.stop()
         self.queue.stop()
+        if self._together is not None:
+            self._together.stop()
         if self._notices is not None and self._elsewhere is not None:
             self._elsewhere.stop()
             self._notices.stop()

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any
 
-from service.auth.allowances import Buckets
+from service.auth.allowances import Buckets, Shared
 from service.errors import (
     BodyTooLargeError,
     InvalidRequestError,
@@ -77,6 +77,10 @@ class Answers(WarmPool):
         self._limits = limits
         self._budgets = Buckets()
         self._ended_one: set[str] = set()
+
+    def shared(self) -> dict[str, Shared]:
+        """What counts at all services of a database together."""
+        return {"budgets": self._budgets}
 
     async def ask(self, task: str, spec: dict[str, Any], owner: str = "", about: str = "scene") -> Any:
         """What a task finds.

@@ -1,5 +1,6 @@
 """Large arrays outside of the database: the same to who reads, deleted with their run, checked."""
 
+import os
 import shutil
 from pathlib import Path
 
@@ -7,9 +8,10 @@ import pytest
 from service_helpers import MakeSettings
 
 from service.client.embedded import EmbeddedService
-from service.db.array_store import OUTSIDE_BYTES
+from service.db.array_store import OUTSIDE_BYTES, ArrayStore
 from service.db.repositories.integrity import check
 from service.errors import ConfigurationError, DatabaseError
+from service.jobs.figures import StoredArray
 from service.queue.core import Service
 from service.queue.retention import prune_database
 
@@ -48,6 +50,19 @@ def test_arrays_are_the_same_wherever_they_are(make_settings: MakeSettings, plac
     service = Service(settings)
     assert list(service.database.arrays.jobs()) == []
     service.database.close()
+
+
+def test_an_array_is_on_disk_before_its_row(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With the folders that name it; the system is asked, as a power cut cannot be had here."""
+    synced: list[int] = []
+    monkeypatch.setattr(
+        "service.db.array_store.os.fsync", lambda opened: synced.append(os.fstat(opened).st_ino)
+    )
+    data = bytes(OUTSIDE_BYTES)
+    ArrayStore(str(tmp_path / "arrays")).put("job", StoredArray(sha256="digest", data=data, size=len(data)))
+    file = tmp_path / "arrays" / "job" / "digest.npy"
+    assert file.read_bytes() == data
+    assert synced == [path.stat().st_ino for path in (file, file.parent, file.parent.parent)]
 
 
 def test_what_is_damaged_or_left_over_is_named(make_settings: MakeSettings, tmp_path: Path) -> None:
