@@ -38,7 +38,7 @@ class ArrayStore:
         try:
             from fsspec.core import url_to_fs
 
-            found: tuple[Any, str] = url_to_fs(place)
+            found: tuple[Any, str] = url_to_fs(place, use_listings_cache=False)
         except (ImportError, ValueError) as error:
             raise ConfigurationError(
                 f"`arrays` (STICKSLIP_ARRAYS) must be a folder or a URL of fsspec (extra `stores`), "

@@ -101,8 +101,11 @@ def put_tags(connection: Connection, job_id: str, tags: tuple[str, ...]) -> None
 _NEVER_LEADS = -1
 _FEW_TEXTS = 5000
 _LETTERS = 3  # of the pieces that the indexes of texts know
-_OF_JOBS = [getattr(Job, field.name) for field in fields(JobRow) if field.name != "request"]
-_OF_RUNS = (Run.project_id, Run.name, Run.notes, Run.revision, Run.changed, Run.deleted)
+# Of the tables themselves, as in `jobs`.
+_OF_JOBS = [Job.__table__.c[field.name] for field in fields(JobRow) if field.name != "request"]
+_OF_RUNS = [
+    Run.__table__.c[name] for name in ("project_id", "name", "notes", "revision", "changed", "deleted")
+]
 _LISTED = select(*_OF_JOBS, *_OF_RUNS).outerjoin(Run, Run.job_id == Job.id)
 _WHOLE = select(*_OF_JOBS, Job.request, *_OF_RUNS).outerjoin(Run, Run.job_id == Job.id)
 _OF_ROW = [field.name for field in fields(JobRow)]
