@@ -84,9 +84,7 @@ def correct(
             break
         state, at, norm, iterations = new, there, left, iterations + 1
         norms.append(norm)
-    if norm <= good:
-        return Corrected(state=state, at=at, converged=True, iterations=iterations, residual=norm)
-    return Corrected(state=state, at=at, converged=False, iterations=iterations, residual=norm)
+    return Corrected(state=state, at=at, converged=norm <= good, iterations=iterations, residual=norm)
 
 
 def _left(at: Evaluated | None, state: ModeState, size: int) -> float:
