@@ -23,6 +23,7 @@ from service.db.models import JobState
 from service.errors import ConfigurationError
 from service.http.app import create_app
 from service.http.middleware.connections import Connections
+from service.http.routes.forms import prepare
 from service.jobs.registry import Registry
 from service.queue.core import Service
 from service.settings import logs
@@ -139,14 +140,15 @@ def _config(app: FastAPI, settings: Settings) -> uvicorn.Config:
 
 
 def _begin_answers(service: Service) -> None:
-    """Start the processes that compute answers when a worker is ready: nothing is to delay readiness.
+    """Start the processes that compute answers when a worker is ready, and make what the page asks for first.
 
-    Who asks for an answer before starts them at once.
+    Nothing is to delay readiness; who asks for either before gets it at once.
     """
     while not service.queue.status().ready:
         if service.stopping.wait(_TICK_SECONDS):
             return
     service.answers.begin()
+    prepare(service.registry)
 
 
 def _end_by_force_after(seconds: float) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from functools import cache, lru_cache
 from typing import Annotated, Any
 
@@ -127,8 +128,12 @@ async def list_kinds(context: InContext) -> Response:
 
 def prepare(registry: Registry) -> None:
     """Make what the page asks for first: the schemas of all laws and kinds, which are kept."""
-    _laws(tuple(known_laws()))
-    _kinds(registry)
+    with _PREPARING:
+        _laws(tuple(known_laws()))
+        _kinds(registry)
+
+
+_PREPARING = threading.Lock()  # they are made once, though both a start and a first visitor want them
 
 
 def _answer(kind: JobKind) -> KindAnswer:
