@@ -1,4 +1,9 @@
 from .balance.simplifications import Effects as Effects
+from .certificate.certificate import (
+    Certificate as Certificate,
+    CertificateStatus as CertificateStatus,
+    certify as certify,
+)
 from .contacts.laws.history.definition import LawParameter as LawParameter
 from .contacts.laws.history.register import register_law as register_law
 from .contacts.segments import Shares as Shares

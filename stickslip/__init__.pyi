@@ -34,6 +34,7 @@ from solver import (
     Solution as Solution,
     SolverError as SolverError,
     accuracy_study as accuracy_study,
+    certify as certify,
     load as load,
     load_scene as load_scene,
     march as march,

@@ -3,6 +3,8 @@
 from solver import (
     AllSolutions as AllSolutions,
     AmplitudeRange as AmplitudeRange,
+    Certificate as Certificate,
+    CertificateStatus as CertificateStatus,
     FoundSolution as FoundSolution,
     Growth as Growth,
     MarchStart as MarchStart,

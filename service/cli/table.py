@@ -240,6 +240,10 @@ COMMANDS = {
             "report", "commands.report.report",
             "Write the report of a design or an identification that the service computed.",
         ),
+        CommandEntry(
+            "check-proof", "commands.certificates.check_proof",
+            "Check the proof of a response, in a file that `solve --certify --json` wrote.",
+        ),
         CommandEntry("demo", "commands.service.demo", "Run the main job end to end, with pictures."),
     ),
     "Service": (

@@ -46,6 +46,7 @@ def solve_result() -> type[KindResult]:
         "starts": (int, "Random starts that were made."),
         "stopped": (bool, "Whether the search was ended before its end."),
         "note": (str, "What is known of the list."),
+        "certificate": (Table, "Of `certify`: whether it is proved, in which bounds, and the proof."),
     }
     beside: dict[str, Any] = {
         key: (kind | None, Field(None, description=words)) for key, (kind, words) in further.items()
@@ -76,6 +77,10 @@ class Solve(Study, HarmonicRequest):
     exact: Annotated[bool, Field(strict=True)] = Field(
         default=False, description="Follow the events of the contacts in place of harmonics, to rounding."
     )
+    certify: Annotated[bool, Field(strict=True)] = Field(
+        default=False,
+        description="Prove the response and enclose its amplitude, where contacts are piecewise linear.",
+    )
     every: Annotated[bool, Field(strict=True)] = Field(
         default=False,
         alias="all",
@@ -90,7 +95,9 @@ class Solve(Study, HarmonicRequest):
 
     def issues(self, _scene: Scene) -> list[Issue]:
         """Return what does not go together, and words of effects that are none."""
-        alone = {"accuracy": self.accuracy, "exact": self.exact or None} if self.every else {}
+        alone: dict[str, Any] = {}
+        if self.every:
+            alone = {"accuracy": self.accuracy, "exact": self.exact or None, "certify": self.certify or None}
         return effects_issues(self.effects) + [
             Issue((key,), Naming("does not go with {all}"), Shown(f"{given!r}: leave one of them out"))
             for key, given in alone.items()
@@ -108,10 +115,18 @@ class Solve(Study, HarmonicRequest):
 
         given = with_effects(asked)
         search = {key: given.pop(key) for key in ("starts", "seed") if key in given}
+        proof = given.pop("certify", False)
         if not given.pop("every", False):
             one = solver.solve(scene, **given)
-            shown = one if one.converged else None
-            return Answer(shown, one.to_json(), one.reached, one.status.value, one.plot)
+            plain = one if one.converged else None
+            answer = Answer(plain, one.to_json(), one.reached, one.status.value, one.plot)
+            if not proof or not one.converged:
+                return answer
+            proved = solver.certify(one)
+            return answer._replace(
+                json=answer.json | {"certificate": proved.to_json()}, reached=one.reached and proved.reached,
+                status=answer.status if proved.reached else proved.status.value,
+            )  # fmt: skip
         given = {key: value for key, value in given.items() if key != "exact"}
         found = solver.solve_all(scene, **given, **search, **watch._asdict())
         largest = found.solutions[0].solution if found.solutions else solver.solve(scene, **given)

@@ -92,13 +92,7 @@ def follow(system: Piecewise, near: Orbit) -> Orbit | Ended:
         return find(system, *system.at_rest())
     w = system.mode(piece.state).to_rates @ piece.w
     w[system.nd :] = system.harmonics_at(piece.tau)
-    march = Flow(system, w, piece.state.copy(), piece.tau)
-    march.run(PERIOD)
-    found: Orbit | Ended | None = _newton(system, march, 1)
-    if found is None:
-        start = march.w.copy()
-        start[system.nd :] = system.harmonics_at(march.tau)
-        found = find(system, start, march.state, tau=march.tau % PERIOD, most_periods=_FOLLOWED)
+    found = beside(system, w, piece.state.copy(), piece.tau)
     if isinstance(found, Orbit) and (found.open_directions.size or grazed(system, found)):
         try:
             rested = find(system, *system.at_rest(), most_periods=MOST_GRAZED)
@@ -106,6 +100,23 @@ def follow(system: Piecewise, near: Orbit) -> Orbit | Ended:
             return found
         return rested if isinstance(rested, Orbit) else found
     return found
+
+
+def beside(system: Piecewise, w: Real, state: MemberState, tau: float) -> Orbit | Ended:
+    """Find the periodic motion near a start at an angle; give up soon.
+
+    Raises
+    ------
+    LiftsError, NoMotionError
+    """
+    march = Flow(system, w, state, tau)
+    march.run(PERIOD)
+    found = _newton(system, march, 1)
+    if found is not None:
+        return found
+    start = march.w.copy()
+    start[system.nd :] = system.harmonics_at(march.tau)
+    return find(system, start, march.state, tau=march.tau % PERIOD, most_periods=_FOLLOWED)
 
 
 def grazed(system: Piecewise, orbit: Orbit) -> bool:

@@ -54,6 +54,7 @@ def solution(found: Json) -> Iterator[Block]:
     if found["error_estimate"] is not None:
         of = "half peak to peak" if "mean_undetermined" in found["flags"] else "max|x|"
         pairs.append(("estimated error", f"{units.length(found['error_estimate'])} of {of}"))
+    pairs += _proof(found.get("certificate"))
     pairs.append(("harmonics 1 to 5", ", ".join(units.length(a) for a in found["harmonics"][1:6])))
     pairs += [(f"contact {name}", state) for name, state in found["contacts"].items()]
     if "stable" in found:
@@ -66,6 +67,17 @@ def solution(found: Json) -> Iterator[Block]:
         pairs.append(("mean, any history", f"{units.length(low)} to {units.length(high)}"))
     pairs += [("residual", f"{found['residual']:.1e}"), ("time", units.duration(found["seconds"]))]
     yield Summary(title, pairs)
+
+
+def _proof(proof: Json | None) -> Pairs:
+    """Return what is proved of a response, or why nothing is."""
+    if proof is None:
+        return []
+    if not proof["certified"]:
+        return [("proved", f"no: {proof['reason'] or proof['status']}")]
+    low, high = proof["half_peak_to_peak" if proof["held"] else "max_abs"]
+    what = "half peak to peak" if proof["held"] else "max|x|"
+    return [("proved", f"{what} from {low!r} to {high!r} m")]
 
 
 def _drift(found: Json) -> list[tuple[str, str]]:

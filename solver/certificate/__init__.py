@@ -1,0 +1,1 @@
+"""Periodic responses with proofs: certificates, and the checker that stands alone."""

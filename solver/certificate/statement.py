@@ -1,0 +1,134 @@
+"""What a certificate states: the system in exact numbers, and the order of events of an orbit."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from solver.certificate.checker import Orbit as CheckedOrbit
+from solver.certificate.checker import System
+from solver.contacts.laws.parts import Follows, Row
+from solver.jit.fourier import Real
+from solver.linear.assembly import linear_model
+from solver.linear.structure_matrices import elements_of
+from solver.response.exact.flow import FlowPiece
+from solver.response.exact.orbit import Orbit
+from solver.response.exact.piecewise import FREE, STICK, MemberState, Piecewise
+from solver.scene.parts import LumpedStructure
+
+_AT_ONCE = 1e-7  # rad: events this near each other may be one
+_APART = 1e-9  # rad between events that floats do not tell apart
+
+
+def system_of(piecewise: Piecewise, frequency_hz: float) -> dict[str, Any]:
+    """Return a scene as a system: springs as they are in it, so that no sum of theirs is rounded."""
+    scene, n = piecewise.scene, piecewise.n
+    model, structure = linear_model(scene), scene.structure
+    zero = np.zeros(1, np.int64)
+    K, C, M = (np.real(each[0]) for each in model.at(zero, np.ones(1, np.bool_)))
+    springs: list[Any] = []
+
+    if (
+        isinstance(structure, LumpedStructure)
+        and not scene.bodies
+        and model.extra is None
+        and not structure.damping_ratio
+    ):
+        elements = elements_of(structure, ())
+        at = {dof: i for i, dof in enumerate(elements.dofs)}
+        every = [*elements.springs, *((ends, 0.0, c) for ends, c in elements.dampers)]
+        for ends, k, c in every:
+            terms = [
+                [at[end.dof], sign]
+                for end, sign in zip(ends, (1.0, -1.0), strict=True)
+                if end.dof is not None
+            ]
+            springs.append([terms, k, c + elements.beta * k])
+        K, C = np.zeros((n, n)), np.zeros((n, n))
+    contacts, first = [], 0
+    for contact in scene.contacts:
+        ports = piecewise.ports[first : first + len(contact.end_keys)]
+        contacts += [_contact(row, ports) for row in contact.rows()]
+        first += len(contact.end_keys)
+    return {
+        "frequency_hz": frequency_hz, "mass": M.tolist(), "damping": C.tolist(), "stiffness": K.tolist(),
+        "springs": springs, "contacts": contacts,
+        "forces": [
+            {"row": _terms(np.real(force.vector)), "wave": [force.harmonic, force.amplitude, force.phase]}
+            for force in model.forces if force.amplitude != 0.0
+        ],
+        "observe": _terms(model.observe),
+    }  # fmt: skip
+
+
+def _contact(row: Row, ports: Real) -> dict[str, Any]:
+    along = {"name": row.name, "row": _terms(ports[row.port])}
+    if row.follows is Follows.GAP:
+        return along | {"k": row.kt, "gap": row.gap}
+    waves = [(row.N1, row.N1_phase), *row.higher]
+    load = [[0, row.N0, 0.0], *([k, *wave] for k, wave in enumerate(waves, start=1) if wave[0] != 0.0)]
+    moves = row.normal_port is not None
+    return along | {
+        "kt": None if math.isinf(row.kt) else row.kt, "mu": row.mu, "load": load, "kn": row.kn,
+        "normal": _terms(ports[row.normal_port]) if moves else [], "rest": row.rest,
+        "presses": bool(row.presses) and moves,
+    }  # fmt: skip
+
+
+def _terms(row: Real) -> list[list[Any]]:
+    return [[int(i), float(row[i])] for i in np.flatnonzero(row)]
+
+
+def orbit_of(piecewise: Piecewise, orbit: Orbit, system: System) -> tuple[dict[str, Any], list[float]]:
+    """Return the order of events of an orbit, and its unknowns in floats."""
+    first, w = orbit.pieces[0], orbit.pieces[0].w
+    states = [_words(piecewise, piece.state) for piece in orbit.pieces]
+    events: list[dict[str, Any]] = []
+    times: list[float] = []
+    for i, piece in enumerate(orbit.pieces[1:], start=1):
+        before = orbit.pieces[i - 1]
+        for j, (old, new) in enumerate(zip(states[i - 1], states[i], strict=True)):
+            for word in () if old == new else _way(piecewise, before, piece.w, j, old, new):
+                events.append({"contact": j, "to": word})
+                times.append(
+                    max(piece.tau, times[-1] + _APART) if times and times[-1] >= piece.tau else piece.tau
+                )
+    moved = {each["contact"] for each in events}
+    sliders = {
+        member.contact: float(w[piecewise.elastic_at[member.slider]])
+        for member in piecewise.members
+        if not piecewise.rigid[member.slider] and first.state.sliders[member.slider] == STICK
+    }
+    found = {
+        "begins": first.tau, "states": states[0], "events": events,
+        "fixed_sliders": {str(j): value for j, value in sliders.items() if j not in moved},
+    }  # fmt: skip
+    for _ in range(2):  # those that come to rest together, then those that go on together
+        for i in range(1, len(events)):
+            if times[i] - times[i - 1] < _AT_ONCE and CheckedOrbit(system, found).together(i):
+                events[i]["at_once"] = True
+    lasting = [*w[: 2 * piecewise.n].tolist(), *(value for j, value in sorted(sliders.items()) if j in moved)]
+    return found, [*lasting, *(at for at, each in zip(times, events, strict=True) if "at_once" not in each)]
+
+
+def _way(piecewise: Piecewise, before: FlowPiece, w: Real, j: int, old: str, new: str) -> list[str]:
+    """Return the states a contact goes through, those included that last no longer than floats tell."""
+    slider = next((member.slider for member in piecewise.members if member.contact == j), None)
+    if slider is None or piecewise.rigid[slider]:
+        return [new]
+    if old == "stick" and new == "open":
+        return ["slip+" if before.mode.forces[slider] @ w > 0.0 else "slip-", new]
+    return ["stick", new] if {old, new} == {"slip+", "slip-"} else [new]
+
+
+def _words(piecewise: Piecewise, state: MemberState) -> list[str]:
+    """Return what every contact does."""
+    words = {1: "slip+", -1: "slip-", STICK: "stick", FREE: "open"}
+    found = {}
+    for i, member in enumerate(piecewise.members):
+        found[member.contact] = words[int(state.sliders[member.slider])] if state.closed[i] else "open"
+    for (number, *_), pressed in zip(piecewise.gaps, state.pressed, strict=True):
+        found[number] = "closed" if pressed else "open"
+    return [found[j] for j in range(len(found))]

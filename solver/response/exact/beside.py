@@ -1,0 +1,54 @@
+"""The exact orbit beside a solution of the balance: the march begins where that motion is at τ = 0."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from solver.jit.fourier import Real
+from solver.response.exact.flow import LiftsError, NoMotionError
+from solver.response.exact.orbit import Orbit, beside, find
+from solver.response.exact.piecewise import FREE, STICK, MemberState, Piecewise
+from solver.response.solution import Solution
+from solver.response.time_history import all_coordinates
+
+_START = np.zeros(1)  # the angle
+
+
+def orbit_beside(solution: Solution) -> tuple[Piecewise, Orbit | None]:
+    """Return the system of a solution that converged and the periodic motion near it; None if none is found.
+
+    Sliders begin where the forces of the balance hold them, so that what sticks throughout keeps its force.
+
+    Raises
+    ------
+    SettingError
+        A part of the scene that has no place in an exact solution, see `Piecewise`.
+    """
+    system = Piecewise(solution.scene, 2.0 * math.pi * solution.frequency_hz)
+    try:
+        if system.rigid.any() or any(member.rigid_normal for member in system.members):
+            found = find(system, *system.at_rest())  # it is exact itself
+        else:
+            found = beside(system, *_begun(system, solution), 0.0)
+    except (LiftsError, NoMotionError):
+        return system, None
+    return system, found if isinstance(found, Orbit) else None
+
+
+def _begun(system: Piecewise, solution: Solution) -> tuple[Real, MemberState]:
+    """Return the state of a solution at τ = 0; what slips there is told by its force at once."""
+    n, (w, state), amplitudes = system.n, system.at_rest(), all_coordinates(solution)
+    w[:n] = amplitudes.real.sum(axis=0)
+    w[n : 2 * n] = -(np.arange(len(amplitudes)) @ amplitudes.imag)
+    for i, member in enumerate(system.members):
+        load, at = float(member.given @ w), float(system.d[member.slider] @ w[:n])
+        state.closed[i] = load > 0.0
+        state.sliders[member.slider] = STICK if load > 0.0 else FREE
+        force = solution.contacts[member.contact].force_over(solution.scene.contacts[member.contact], _START)
+        held = np.clip(float(force[0]), -member.mu * load, member.mu * load) if load > 0.0 else 0.0
+        w[system.elastic_at[member.slider]] = at - held / system.kt[member.slider]
+    for i, (_, row, _, gap) in enumerate(system.gaps):
+        state.pressed[i] = row @ w[:n] > gap
+    return w, state

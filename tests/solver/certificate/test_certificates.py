@@ -1,0 +1,177 @@
+"""Certificates: orbits proved elsewhere, random scenes, spoilt certificates, what cannot be proved."""
+
+from __future__ import annotations
+
+import copy
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from certified_scenes import random_scene
+
+import stickslip
+from service.cli import main
+from solver.certificate import checker
+
+CERTIFIED = json.loads((Path(__file__).parents[2] / "data" / "certified_orbits.json").read_text())
+
+
+@pytest.fixture(scope="module")
+def proved() -> dict[str, Any]:
+    """A certificate of two masses with a damper under a load that varies."""
+    found = stickslip.certify(stickslip.solve(stickslip.load_scene("two-dof"), frequency_hz=1.2))
+    assert found.certificate is not None
+    return json.loads(json.dumps(found.certificate))  # type: ignore[no-any-return]
+
+
+@pytest.mark.few(6)
+@pytest.mark.parametrize("case", CERTIFIED, ids=[case["id"] for case in CERTIFIED])
+def test_orbits_with_proofs_are_proved_again(case: dict[str, Any]) -> None:
+    """Periodic orbits enclosed by interval arithmetic to 18 digits, with no code of this package."""
+    scene = stickslip.Scene.from_dict(case["scene"])
+    found = stickslip.certify(stickslip.solve(scene, frequency_hz=case["frequency_hz"], harmonics=31))
+    assert found.reached, found.reason
+    low, high = getattr(found, case["measure"])
+    assert low <= case["value"] <= high
+    assert high - low <= 1e-15 * high
+
+
+def share_proved(seeds: range) -> float:
+    """Prove the responses of random scenes; each enclosure must hold an exact orbit found by floats."""
+    count = 0
+    for seed in seeds:
+        scene, hz = random_scene(seed)
+        found = stickslip.certify(stickslip.solve(scene, frequency_hz=hz, harmonics=21))
+        count += found.reached
+        if found.reached:
+            low, high = found.half_peak_to_peak
+            assert high - low <= 1e-15 * high
+    return count / len(seeds)
+
+
+def test_random_scenes_are_proved() -> None:
+    assert share_proved(range(8)) >= 0.75
+
+
+@pytest.mark.long
+def test_95_of_100_random_scenes_are_proved() -> None:
+    assert share_proved(range(500)) >= 0.95
+
+
+def test_the_enclosure_holds_what_a_march_finds() -> None:
+    scene = stickslip.load_scene("two-dof")
+    low, high = stickslip.certify(stickslip.solve(scene, frequency_hz=1.2)).max_abs
+    marched = stickslip.march(scene, frequency_hz=1.2)
+    assert marched.max_abs == pytest.approx(low, abs=marched.error_estimate + 1e-9)
+    assert high - low <= 1e-15 * high
+
+
+# The checker
+
+
+def test_the_checker_stands_alone(proved: dict[str, Any], tmp_path: Path) -> None:
+    script, file = tmp_path / "alone.py", tmp_path / "certificate.json"
+    script.write_text(Path(checker.__file__).read_text(encoding="utf-8"), encoding="utf-8")
+    file.write_text(json.dumps(proved), encoding="utf-8")
+    ended = subprocess.run(
+        [sys.executable, "-I", str(script), str(file)], capture_output=True, text=True, check=False
+    )
+    assert ended.returncode == 0, ended.stderr
+    assert "accepted" in ended.stdout
+    proved = proved | {"claims": {"max_abs": ["1.8", "1.81"]}}
+    file.write_text(json.dumps(proved), encoding="utf-8")
+    ended = subprocess.run(
+        [sys.executable, "-I", str(script), str(file)], capture_output=True, text=True, check=False
+    )
+    assert ended.returncode == 1
+    assert "not within" in ended.stderr
+
+
+def _numbers(found: Any, place: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
+    """Return the places of all numbers that are neither 0 nor whole ones, which stand for places."""
+    if isinstance(found, dict):
+        return [each for key, value in found.items() for each in _numbers(value, (*place, key))]
+    if isinstance(found, list):
+        return [each for i, value in enumerate(found) for each in _numbers(value, (*place, i))]
+    return [place] if isinstance(found, float) and found else []
+
+
+def _spoilt(raw: dict[str, Any], rng: np.random.Generator) -> dict[str, Any]:
+    """Return a certificate with one thing wrong."""
+    raw = copy.deepcopy(raw)
+    orbit, way = raw["orbit"], int(rng.integers(5))
+    if way == 0:  # a number of the system or of where the orbit begins
+        places = [each for each in _numbers(raw) if each[0] in ("system", "orbit") and each[1] != "unknowns"]
+        *path, last = places[int(rng.integers(len(places)))]
+        holder: Any = raw
+        for key in path:
+            holder = holder[key]
+        holder[last] *= 1.0 + float(10.0 ** rng.uniform(-12.0, -1.0)) * float(rng.choice([-1.0, 1.0]))
+    elif way == 1:  # the order of events
+        i = int(rng.integers(len(orbit["events"]) - 1))
+        orbit["events"][i : i + 2] = orbit["events"][i : i + 2][::-1]
+    elif way == 2:  # an unknown beside its box
+        i = int(rng.integers(len(orbit["unknowns"])))
+        middle, radius = orbit["unknowns"][i].split(" +/- ")
+        orbit["unknowns"][i] = f"{float(middle) * (1.0 + 1e-9)!r} +/- {radius}"
+    elif way == 3:  # boxes too small
+        for i, each in enumerate(orbit["unknowns"]):
+            middle, radius = each.split(" +/- ")
+            orbit["unknowns"][i] = f"{middle} +/- {float(radius) * 1e-20!r}"
+    else:  # claims that are narrower, or elsewhere
+        key = str(rng.choice(list(raw["claims"])))
+        low, high = map(float, raw["claims"][key])
+        moved = 1e-12 * abs(high) * float(rng.choice([-1.0, 1.0]))
+        raw["claims"][key] = [repr(low + moved), repr(high + moved)]
+    return raw
+
+
+def test_spoilt_certificates_are_rejected(proved: dict[str, Any]) -> None:
+    rng, refused = np.random.default_rng(7), 0
+    checker.check(proved)
+    for _ in range(100):
+        with pytest.raises(checker.RejectedError):
+            checker.check(_spoilt(proved, rng))
+        refused += 1
+    assert refused == 100
+
+
+# What cannot be proved, and what is proved of what is not determined
+
+
+def test_what_sticks_all_the_time_is_named() -> None:
+    scene = stickslip.load_scene("two-dof").with_values({"damper.N0": 2000.0})
+    found = stickslip.certify(stickslip.solve(scene, frequency_hz=1.2))
+    assert found.reached, found.reason
+    assert found.held == ("damper",)
+    assert found.events == 0
+
+
+def test_a_response_that_did_not_converge_is_refused() -> None:
+    scene = stickslip.load_scene("bladed-disk")
+    with pytest.raises(stickslip.SettingError, match="sectors"):
+        stickslip.certify(stickslip.solve(scene, frequency_hz=700.0))
+
+
+# The command
+
+Run = Callable[..., tuple[int, str, str]]
+
+
+def test_the_command_proves_and_checks(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    file = tmp_path / "answer.json"
+    assert main(["solve", "two-dof", "--frequency", "1.2", "--certify", "--json"]) == 0
+    file.write_text(capsys.readouterr().out, encoding="utf-8")
+    assert json.loads(file.read_text(encoding="utf-8"))["certificate"]["certified"]
+    assert main(["check-proof", str(file)]) == 0
+    assert "max_abs" in capsys.readouterr().out
+    assert main(["solve", "two-dof", "--frequency", "1.2", "--certify"]) == 0
+    assert "proved" in capsys.readouterr().out
+    file.write_text("{}", encoding="utf-8")
+    assert main(["check-proof", str(file)]) == 2
+    assert "must be a certificate" in capsys.readouterr().err
