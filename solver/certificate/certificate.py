@@ -68,9 +68,7 @@ class Certificate(Piece):
     ]
     bits: Annotated[int, "Precision it was proved with."]
     seconds: Annotated[float, "Time taken [s]."]
-    certificate: Annotated[
-        dict[str, Any] | None, "What `stickslip check-proof` checks; None if not proved."
-    ]
+    certificate: Annotated[dict[str, Any] | None, "What `stickslip check-proof` checks; None if not proved."]
 
     @property
     def reached(self) -> bool:
