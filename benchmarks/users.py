@@ -77,7 +77,8 @@ class User:
                 await self._hand_in()
             else:
                 await self._read()
-            await asyncio.sleep(self._chance.expovariate(1.0 / pause))
+            left = max(0.0, until - time.monotonic())
+            await asyncio.sleep(min(left, self._chance.expovariate(1.0 / pause)))
         if self._streams is not None:
             self._streams[1].close()
 
