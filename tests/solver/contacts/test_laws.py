@@ -91,10 +91,15 @@ def test_every_derivative(law: str):
         # One event may be so near a corner that the differences, not the derivatives, lose digits; a circle
         # is exact to 1e-9 of its force, of which a small step makes more.
         steps = (1e-4, 1e-5, 1e-6) if law == "plane" else (1e-6,)
-        errors = [found for step in steps if (found := derivative_errors(element, names, step)) is not None]
+        errors: list[float] = []
+        for step in steps:
+            if (found := derivative_errors(element, names, step)) is not None:
+                errors.append(max(found.values()))
+                if errors[-1] < 2e-5:
+                    break
         if errors:
             seen[evaluate(element).state] += 1
-            assert min(max(found.values()) for found in errors) < 2e-5, errors
+            assert errors[-1] < 2e-5, errors
     assert min(seen[state] for state in states) >= 2, seen
     assert sum(seen.values()) >= 40
 

@@ -75,7 +75,7 @@ def test_a_resonance_without_damping_ends_the_branch() -> None:
 
 
 def test_friction_above_a_quarter_of_pi_of_the_force_bounds_it() -> None:
-    bounded = stickslip.sweep(one_mass(0.8), start=0.15, stop=0.2)
+    bounded = stickslip.sweep(one_mass(0.8), start=0.17, stop=0.2)
     assert bounded.reached
     assert bounded.amplitude[-1] == pytest.approx(with_stops(0.4 * math.pi, 0.8), rel=1e-10)
     i = int(np.argmax(bounded.amplitude))
@@ -86,7 +86,7 @@ def test_friction_above_a_quarter_of_pi_of_the_force_bounds_it() -> None:
 
 @pytest.mark.few(2)
 @pytest.mark.parametrize(
-    ("scene", "low", "high"), [(damped(0.4, 0.02), 0.13, 0.19), (damped(0.7, 0.1), 0.1, 0.2)]
+    ("scene", "low", "high"), [(damped(0.7, 0.1), 0.1, 0.2), (damped(0.4, 0.02), 0.13, 0.19)]
 )
 def test_the_highest_peak_is_the_maximum_of_single_solves(
     scene: stickslip.Scene, low: float, high: float
