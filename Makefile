@@ -71,7 +71,7 @@ demo: $(PACKAGES)
 	PYTHONDONTWRITEBYTECODE= $(BIN)/stickslip demo
 	@$(MAKE) --no-print-directory setup
 
-# The kernels are compiled before, so that not every process does it. Four processes for two cores: tests of the
+# The kernels are compiled before, so that not every process does it. Three processes for two cores: tests of the
 # service also wait, and a process computes for little more than half of its time. A file is of one of them, in
 # the order of the folders: services first, at the end what is short.
 # They may write bytecode: what is read again by hundreds of processes, and the tests themselves.
@@ -79,7 +79,7 @@ demo: $(PACKAGES)
 test: style
 	$(BIN)/python -m service.warm_up
 	$(BIN)/mypy & types=$$!; \
-	  PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n 4 --dist loadscope --no-loadscope-reorder $(PYTEST); tests=$$?; \
+	  PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n 3 --dist loadscope --no-loadscope-reorder $(PYTEST); tests=$$?; \
 	  wait $$types && exit $$tests
 
 test-long: dev

@@ -60,6 +60,7 @@ BODIES: dict[str, tuple[str, Mapping[str, Any]]] = {
 ON_THE_WAY = {"accuracy", "design", "map", "pareto", "peaks"}
 """Kinds whose sweeps are steps on the way to another result."""
 SOMETIMES = {
+    "certificate",
     "drift_per_period",
     "mean_range",
     "history",

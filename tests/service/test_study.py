@@ -27,7 +27,7 @@ BESIDES = {
 }  # fmt: skip
 # Keys that Python takes otherwise: as one of three words, as a pair, or by a function of its own.
 OTHERWISE: Mapping[str, set[str]] = {
-    "controlled": {"no_stability"}, "march": {"history"}, "solve": {"every"},
+    "controlled": {"no_stability"}, "march": {"history"}, "solve": {"every", "certify"},
     "sweep": {"multipliers", "switched"},
     "modes": {
         "start", "stop", "performance", "aero_damping", "motions", "exact_peaks", "disturbance",

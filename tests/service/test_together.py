@@ -178,7 +178,7 @@ def test_two_processes_keep_the_limits_of_an_owner_together(pair: tuple[str, lis
         with ExitStack() as streams:
             for _ in range(3):
                 words = ("GET", f"http://127.0.0.1:{services[0].port}/v1/jobs/{job}/events")
-                assert streams.enter_context(httpx.stream(*words, headers=bob)).status_code == 200
+                until(lambda: streams.enter_context(httpx.stream(*words, headers=bob)).status_code == 200)
             until(lambda: status_of(other) == 429)
         until(lambda: status_of(other) == 200)
         other.delete(f"/v1/jobs/{job}", headers=bob)

@@ -36,21 +36,19 @@ from solver.jit.trig_polynomial import FALLING, RISING, at_point, bracketed_root
 def contact_intervals(c: Real, s: Real, degree: int, value: Real, slope: Real, out: Real) -> int:
     """Fill `out` with [begin, end] of every interval with N > 0, when N < 0 somewhere; return their number.
 
-    The intervals are unwrapped: an end may exceed 2π. −1 means N never becomes negative, but for rounding.
+    The intervals are unwrapped: an end may exceed 2π. −1 means N never becomes negative.
     """
     n = value.size
     delta = 2.0 * math.pi / n
-    low, touches = 0.0, 0.0
-    for k in range(degree + 1):
-        touches -= ROUNDING * math.hypot(c[k], s[k])
+    low = 0.0
     negative = -1
     for j in range(n):
-        if value[j] < touches:
+        if value[j] < 0.0:
             negative = j
             break
     if negative < 0:
         above, low = _smallest(c, s, degree, value, slope)
-        if above >= touches:
+        if above >= 0.0:
             return -1
     else:
         low = negative * delta
@@ -97,11 +95,10 @@ def contact_intervals(c: Real, s: Real, degree: int, value: Real, slope: Real, o
 def one_wave(mean: float, cosine: float, sine: float, out: Real) -> int:
     """Fill `out` with the interval where mean + cosine cos τ + sine sin τ > 0; as `contact_intervals`.
 
-    With ψ its phase and R its amplitude it is |τ − ψ| < h, tan²(h/2) = (R + mean)/(R − mean). Where both are
-    equal it touches 0 and does not open, whichever of them rounding makes larger.
+    With ψ its phase and R its amplitude it is |τ − ψ| < h, tan²(h/2) = (R + mean)/(R − mean).
     """
     amplitude = math.hypot(cosine, sine)
-    if mean >= amplitude * (1.0 - ROUNDING):
+    if mean >= amplitude:
         return -1 if mean > 0.0 else 0
     if mean <= -amplitude:
         return 0
@@ -296,9 +293,9 @@ def _march_circle(
     if high_minus + high_plus <= tol:
         row = segments[0]
         row.motion, row.begin, row.end = STICK, 0.0, 2.0 * math.pi
-        if high_minus > tol:
+        if high_minus > 0.0:
             row.direction, row.onset, row.began = -1.0, at_minus, AFTER_SLIP
-        elif high_plus > tol:
+        elif high_plus > 0.0:
             row.direction, row.onset, row.began = 1.0, at_plus, AFTER_SLIP
         else:
             row.direction, row.onset, row.began = 1.0, 0.0, UNLOADED
