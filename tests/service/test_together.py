@@ -176,8 +176,8 @@ def test_two_processes_keep_the_limits_of_an_owner_together(pair: tuple[str, lis
 
         assert status_of(other) == 200
         with ExitStack() as streams:
+            words = ("GET", f"http://127.0.0.1:{services[0].port}/v1/jobs/{job}/events")
             for _ in range(3):
-                words = ("GET", f"http://127.0.0.1:{services[0].port}/v1/jobs/{job}/events")
                 until(lambda: streams.enter_context(httpx.stream(*words, headers=bob)).status_code == 200)
             until(lambda: status_of(other) == 429)
         until(lambda: status_of(other) == 200)
