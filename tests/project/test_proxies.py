@@ -188,7 +188,8 @@ def test_every_metric_that_is_watched_is_there(behind: tuple[ServedClient, str],
     # The times of an attempt are there once one has ended.
     for path in (f"/v1/jobs/{job}/events", "/metrics"):
         text = client.get(path, headers=bearer).text
-    there = set(re.findall(r"(?m)^(stickslip_\w+)[{ ]", text))
+    # What has labels has no line of its own until it has been counted once.
+    there = set(re.findall(r"(?m)^(?:# TYPE )?(stickslip_\w+)[{ ]", text))
     watched = set(re.findall(r"\bstickslip_\w+", (DEPLOY / name).read_text(encoding="utf-8")))
     assert watched
     assert watched <= there
