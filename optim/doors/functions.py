@@ -15,7 +15,6 @@ import numpy as np
 
 from solver.balance.balance import build
 from solver.balance.workspace import Workspace
-from solver.continuation.branch import Branch
 from solver.continuation.branches.sweep import sweep
 from solver.errors import SettingError
 from solver.jit.fourier import Real
@@ -37,7 +36,10 @@ class ExactFunction:
     name: Annotated[str, "What it is, for programs that name their quantities."]
     unit: Annotated[str, "Of its value."]
     paths: Annotated[tuple[str, ...], "What it depends on, in the order of its argument."]
-    evaluate: Annotated[Callable[[Real], tuple[float, Real]], "Value and gradient at (n_paths,) values."]
+    evaluate: Annotated[
+        Callable[[dict[str, float]], tuple[float, Real] | None],
+        "Value and gradient, (n_paths,), at values by path; None where there is no answer.",
+    ]
 
     def __call__(self, x: Real) -> tuple[float, Real]:
         """Return value and gradient.
@@ -50,8 +52,8 @@ class ExactFunction:
         values = np.asarray(x, dtype=np.float64)
         if values.shape != (len(self.paths),):
             raise SettingError("x", values.shape, f"must have the shape ({len(self.paths)},), a value a path")
-        value, slopes = self.evaluate(values)
-        return value, slopes if math.isfinite(value) else np.full(len(self.paths), math.nan)
+        found = self.evaluate(dict(zip(self.paths, values.tolist(), strict=True)))
+        return found or (math.nan, np.full(len(self.paths), math.nan))
 
 
 def solve(
@@ -69,13 +71,12 @@ def solve(
         wanted = f"must be given, or {FREQUENCY!r} be one of the paths, not both"
         raise SettingError("frequency_hz", frequency_hz, wanted)
 
-    def evaluate(x: Real) -> tuple[float, Real]:
-        values = dict(zip(paths, x.tolist(), strict=True))
-        hertz = values.pop(FREQUENCY, frequency_hz)
+    def evaluate(values: dict[str, float]) -> tuple[float, Real] | None:
+        hertz = values.pop(FREQUENCY) if frequency_hz is None else frequency_hz
         balance = build(scene.with_values(values), harmonics=harmonics)
         found = Workspace.of(balance).solve(2.0 * math.pi * hertz)
         if not found.converged:
-            return math.nan, x
+            return None
         slopes = Sensitivities(balance, tuple(values)).gradient(found.u, hertz)
         by = dict(zip(values, slopes.by_parameters.tolist(), strict=True)) | {FREQUENCY: slopes.by_frequency}
         return slopes.value, np.array([by[path] for path in paths])
@@ -86,10 +87,10 @@ def solve(
 def peak(scene: Scene, paths: Sequence[str], *, harmonics: int = 11) -> ExactFunction:
     """The highest peak of the frequency response [m]; parameters as of `solve`."""
 
-    def evaluate(x: Real) -> tuple[float, Real]:
-        branch = _branch(scene, paths, x, harmonics)
-        if branch is None or branch.peak is None:
-            return math.nan, x
+    def evaluate(values: dict[str, float]) -> tuple[float, Real] | None:
+        branch = sweep(scene.with_values(values), harmonics=harmonics)
+        if not branch.reached or branch.peak is None:
+            return None
         found = peak_gradient(Sensitivities(branch.balance, paths), branch.peak)
         return found.value, found.gradient
 
@@ -112,11 +113,10 @@ def least_peak(
     if parameter in paths:
         raise SettingError("paths", parameter, "must not hold the parameter that is chosen")
 
-    def evaluate(x: Real) -> tuple[float, Real]:
-        here = scene.with_values(dict(zip(paths, x.tolist(), strict=True)))
-        found = minimise_peak(here, parameter, start, stop, harmonics=harmonics)
+    def evaluate(values: dict[str, float]) -> tuple[float, Real] | None:
+        found = minimise_peak(scene.with_values(values), parameter, start, stop, harmonics=harmonics)
         if not found.reached or found.branch is None:
-            return math.nan, x
+            return None
         sensitivities = Sensitivities(found.branch.balance, paths)
         slopes = np.zeros(len(paths))
         for active, share in zip(found.active, _shares(found.active), strict=True):
@@ -147,8 +147,7 @@ def damping_ratio(
     if AMPLITUDE not in paths:
         raise SettingError("paths", list(paths), f"must hold {AMPLITUDE!r}, at which the mode is looked at")
 
-    def evaluate(x: Real) -> tuple[float, Real]:
-        values = dict(zip(paths, x.tolist(), strict=True))
+    def evaluate(values: dict[str, float]) -> tuple[float, Real] | None:
         at = np.array([values.pop(AMPLITUDE)])
         found = mode_at_amplitudes(
             scene.with_values(values), at, tuple(values), mode=mode, nodal_diameter=nodal_diameter,
@@ -156,15 +155,11 @@ def damping_ratio(
         )  # fmt: skip
         by = dict(zip(values, found.by_damping[0].tolist(), strict=True))
         by[AMPLITUDE] = float(found.by_amplitude[0, 1])
+        if math.isnan(found.damping_ratio[0]):
+            return None
         return float(found.damping_ratio[0]), np.array([by[path] for path in paths])
 
     return ExactFunction("damping_ratio", "", tuple(paths), evaluate)
-
-
-def _branch(scene: Scene, paths: Sequence[str], x: Real, harmonics: int) -> Branch | None:
-    """The frequency response at the values; None if it was not followed to its end."""
-    branch = sweep(scene.with_values(dict(zip(paths, x.tolist(), strict=True))), harmonics=harmonics)
-    return branch if branch.reached else None
 
 
 def _shares(active: Sequence[ActivePeak]) -> list[float]:
