@@ -45,7 +45,7 @@ def test_the_worst_case_is_that_of_a_grid_over_the_intervals() -> None:
     assert result.robust is not None
     grid = [
         peak_at({"damper.N0": result.optimum["damper.N0"], "damper.kt": kt, "damper.mu": mu})
-        for kt, mu in itertools.product(np.linspace(24.0, 36.0, 3), np.linspace(0.2, 0.4, 3))
+        for kt, mu in itertools.product(np.linspace(24.0, 36.0, 5), np.linspace(0.2, 0.4, 5))
     ]
     assert result.robust.worst_peak == pytest.approx(max(grid), rel=1e-6)
     assert result.objective == pytest.approx(result.robust.worst_peak, rel=1e-6)
