@@ -16,7 +16,7 @@ RESPONSES = 100.0  # frequency responses whose work may be spent
 LEAST_UNIT = 200.0  # Newton iterations: a response that is nearly linear takes fewer
 LONGEST = 30.0  # times a response that one may take
 AFTERWARDS = 0.25  # s that may be spent on what was found once the end has come
-_EVERY = 0.4  # s between two questions to the caller
+_EVERY = 0.1  # s between two questions to the caller
 
 
 class HaltedError(Exception):

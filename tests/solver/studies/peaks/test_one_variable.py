@@ -253,9 +253,9 @@ def test_stop_is_heard_within_a_second(after: float, ask: Any, monkeypatch: pyte
     """Of processor time, so that a busy machine does not count."""
     monkeypatch.setattr(allowance, "time", _ProcessTime)
     scene = three_contacts()
-    solver.sweep(scene)
-    begun = time.process_time()
-    found = ask(scene, "c0.N0", 0.17, 17.0, should_stop=lambda: time.process_time() - begun > after)
+    for _ in range(2):  # kernels are loaded in the first run of a process
+        begun = time.process_time()
+        found = ask(scene, "c0.N0", 0.17, 17.0, should_stop=lambda: time.process_time() - begun > after)  # noqa: B023
     assert found.status is TrackStatus.STOPPED
     assert time.process_time() - begun - after < 1.0
 
