@@ -69,7 +69,7 @@ class ChangeSearch:
         return self._checked(grown, np.array(kinds), top)
 
     def _hiding(self, nodes: list[PointRow], top: float) -> NDArray[np.bool_]:
-        """Return in which intervals a contact may change and change back, with a maximum between, (P − 1,)."""
+        """Return where a contact may change and change back with a maximum between, (P − 1,)."""
         seen, table, rows = self._solver.look(nodes, top), self._solver.table, numbers_of(nodes)
         stands = np.maximum(seen.measures[1:, MAX_ABS], seen.measures[:-1, MAX_ABS])
         may = (np.diff(seen.measures[:, PIECE]) == 0.0) & (stands >= self._worth * top)
