@@ -48,6 +48,7 @@ from solver import (
     solve_all as solve_all,
     stability as stability,
     sweep as sweep,
+    transient as transient,
 )
 
 __version__: str

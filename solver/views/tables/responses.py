@@ -210,6 +210,23 @@ def march(found: Json) -> Iterator[Block]:
     yield Summary("Time march", pairs)
 
 
+def transient(found: Json) -> Iterator[Block]:
+    """What a run through a range of frequencies came to."""
+    begin, end = units.number(found["begin_hz"]), units.number(found["end_hz"])
+    pairs = []
+    if found["max_abs"] is not None:
+        at = f"{units.number(found['at_hz'])} Hz, after {units.number(found['at_seconds'])} s"
+        pairs.append(("largest max|x|", f"{units.length(found['max_abs'])} at {at}"))
+    if found["error_estimate"] is not None:
+        pairs.append(("estimated error", f"{found['error_estimate']:.1e} of it"))
+    took = f"{units.number(found['ramp_seconds'])} s"
+    if found["ring_down_seconds"] > 0.0:
+        took += f", then {units.number(found['ring_down_seconds'])} s without excitation"
+    pairs += [("run", took), ("steps", f"{found['steps_per_period']} a period of the highest frequency")]
+    pairs.append(("time", units.duration(found["seconds"])))
+    yield Summary(f"{found['scene']} from {begin} to {end} Hz", pairs)
+
+
 def _amplitudes(found: Json) -> Pairs:
     names = {"max_abs": "max|x|", "half_peak_to_peak": "half peak to peak", "mean": "mean"}
     known = {key: found[key] for key in names if found[key] is not None}
