@@ -10,7 +10,7 @@ connection pooler between service and server has to pool sessions, not transacti
 from __future__ import annotations
 
 import math
-import select
+import selectors
 from collections.abc import Callable
 from typing import Any
 
@@ -102,10 +102,10 @@ def _require_silence(connection: Any, _record: ConnectionPoolEntry, _proxy: obje
 
     To ask the server at each transaction would be one more answer to wait for.
     """
-    heard = select.poll()
-    heard.register(connection.fileno(), select.POLLIN)
-    if heard.poll(0):
-        raise DisconnectionError("the server ended the connection while it lay idle")
+    with selectors.DefaultSelector() as heard:
+        heard.register(connection.fileno(), selectors.EVENT_READ)
+        if heard.select(0):
+            raise DisconnectionError("the server ended the connection while it lay idle")
 
 
 def _execute(cursor: Any, statement: str, parameters: Any, context: Any) -> bool:

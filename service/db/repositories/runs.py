@@ -326,7 +326,7 @@ def _tags(connection: Connection, jobs: Sequence[str]) -> dict[str, list[str]]:
 
 def _sweeps(connection: Connection, jobs: Sequence[str]) -> dict[str, int]:
     """How many sweeps are stored with each of the jobs."""
-    return {job_id: count for job_id, count in connection.execute(_SWEEPS, {"jobs": jobs})}
+    return {row[0]: row[1] for row in connection.execute(_SWEEPS, {"jobs": jobs})}
 
 
 MOST_SHARES = 20
