@@ -6,6 +6,7 @@ import re
 import shutil
 import subprocess
 import sys
+from functools import cache
 from importlib import import_module
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
@@ -16,12 +17,15 @@ ROOT = Path(__file__).resolve().parent.parent.parent
 sys.path.insert(0, str(ROOT / "docs"))
 from site_pages import MODULES, public_names  # noqa: E402
 
-NAMES = [(module, name) for module in MODULES for name in public_names(module)]
+
+@cache
+def names() -> list[tuple[str, str]]:
+    return [(module, name) for module in MODULES for name in public_names(module)]
 
 
 def test_every_public_name_has_a_docstring() -> None:
-    assert [f"{module}.{name}" for module, name in NAMES if not own_docstring(named(module, name))] == []
-    assert [member for module, name in NAMES for member in undescribed(named(module, name))] == []
+    assert [f"{module}.{name}" for module, name in names() if not own_docstring(named(module, name))] == []
+    assert [member for module, name in names() for member in undescribed(named(module, name))] == []
 
 
 def named(module: str, name: str) -> object:
@@ -64,7 +68,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_the_site_builds_without_a_warning_and_has_every_public_name(site: Path) -> None:
-    for module, name in NAMES:
+    for module, name in names():
         page = (site / f"reference-{module.replace('.', '-')}.html").read_text(encoding="utf-8")
         assert re.search(rf'<h2 id="[\w-]+">{name}<', page), f"{module}.{name} is not in the reference"
 
@@ -135,7 +139,7 @@ def test_make_builds_it() -> None:
 def test_what_names_refer_to_exists_in_docstrings() -> None:
     """Names in backquotes that begin with a package of ours can be imported."""
     wrong = []
-    for module, name in NAMES:
+    for module, name in names():
         text = own_docstring(named(module, name))
         for path in re.findall(r"`((?:solver|optim)\.[\w.]+)`", text):
             owner, _, last = path.rpartition(".")

@@ -3,10 +3,10 @@
 from pathlib import Path
 
 import pytest
+from service_helpers import with_tables
 from sqlalchemy import Select, Update
 from sqlalchemy.dialects import sqlite
 
-from service.db import revisions
 from service.db.engine import Database
 from service.db.repositories import job_statements, owned, waiting
 
@@ -28,11 +28,9 @@ BY_KEY = "sqlite_autoindex_job_1"
     ],
 )
 def test_it_goes_by_its_index(tmp_path: Path, statement: Select[tuple[object]] | Update, index: str) -> None:
-    url = f"sqlite:///{tmp_path}/jobs.db"
-    revisions.upgrade(url)
     compiled = statement.compile(dialect=sqlite.dialect())
     values = tuple(None for _ in compiled.positiontup or ())
-    database = Database(url)
+    database = Database(with_tables(tmp_path))
     try:
         with database.reading() as connection:
             rows = connection.exec_driver_sql(f"EXPLAIN QUERY PLAN {compiled}", values).all()
