@@ -104,7 +104,6 @@ def test_the_optimum_equals_brute_force_on_the_whole_fine_grid(name: str) -> Non
     assert min(peaks) == pytest.approx(result.peak.value, rel=2e-5)
 
 
-@pytest.mark.few(3)
 @pytest.mark.parametrize(
     "f0", [1.0, 1e4, *(pytest.param(f0, marks=pytest.mark.long) for f0 in (10.0, 1e2, 1e3))]
 )

@@ -55,7 +55,7 @@ def share_proved(seeds: range) -> float:
 
 
 def test_random_scenes_are_proved() -> None:
-    assert share_proved(range(4)) >= 0.75
+    assert share_proved(range(8)) >= 0.75
 
 
 @pytest.mark.long

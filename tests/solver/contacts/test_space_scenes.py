@@ -68,7 +68,6 @@ def test_reference_is_reached(name: str, dof: str) -> None:
     assert shares.slip == pytest.approx(case["share"]["slip"], abs=6e-3)
 
 
-@pytest.mark.few(5)
 @pytest.mark.parametrize("moves", [False, True])
 @pytest.mark.parametrize("limit", ["circle", "box"])
 @pytest.mark.parametrize("seed", [1, 2, 3])

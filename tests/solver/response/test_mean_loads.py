@@ -58,7 +58,6 @@ def test_the_limit_along_the_axis_of_a_wedge() -> None:
     assert ABOVE not in solve(pulled_wedge(0.98 * limit, 0.1), frequency_hz=345.0, harmonics=3).flags
 
 
-@pytest.mark.few(keep=("two blades, 5 N", "two blades, pressed", "loose mass"))
 @pytest.mark.parametrize("name", CREEPS)
 def test_what_creeps_drifts_as_the_march_does(name: str) -> None:
     scene, frequency_hz = CREEPS[name]

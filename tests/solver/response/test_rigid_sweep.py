@@ -78,11 +78,6 @@ def test_friction_above_a_quarter_of_pi_of_the_force_bounds_it() -> None:
     bounded = stickslip.sweep(one_mass(0.8), start=0.17, stop=0.2)
     assert bounded.reached
     assert bounded.amplitude[-1] == pytest.approx(with_stops(0.4 * math.pi, 0.8), rel=1e-10)
-
-
-@pytest.mark.long
-def test_the_highest_point_under_that_bound_is_what_a_march_finds() -> None:
-    bounded = stickslip.sweep(one_mass(0.8), start=0.17, stop=0.2)
     i = int(np.argmax(bounded.amplitude))
     marched = stickslip.march(one_mass(0.8), frequency_hz=float(bounded.values[i]))
     near = 5e-5 + 3.0 * marched.error_estimate

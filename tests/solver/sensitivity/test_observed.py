@@ -30,7 +30,6 @@ def measured(scene: solver.Scene, at_hz: float, quantity: Quantity) -> np.ndarra
     return np.array(values[quantity])
 
 
-@pytest.mark.few(2)
 @pytest.mark.parametrize("quantity", Quantity)
 @pytest.mark.parametrize(("name", "at_hz"), POINTS)
 def test_derivatives_against_differences_of_solve(name: str, at_hz: float, quantity: Quantity) -> None:

@@ -83,7 +83,6 @@ def test_all_parameters_at_once_equal_one_at_a_time(case: str) -> None:
         assert slope == pytest.approx(measured.values[SLOPE], rel=1e-8, abs=floor), path
 
 
-@pytest.mark.few(2)
 @pytest.mark.parametrize("case", [case for case in CASES if "symmetric" not in case])
 def test_the_gradient_equals_differences_through_the_solve(case: str) -> None:
     balance, u, hz = solved(case)

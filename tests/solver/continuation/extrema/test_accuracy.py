@@ -140,7 +140,6 @@ PEAKS = {
 }
 
 
-@pytest.mark.few(3)
 @pytest.mark.parametrize("name", PEAKS)
 @pytest.mark.parametrize("harmonics", [3, 7])
 def test_the_peak_of_a_branch(name: str, harmonics: int):

@@ -80,7 +80,6 @@ def test_the_least_does_not_depend_on_where_the_first_sweep_is() -> None:
     assert places == pytest.approx([places[0]] * 4, rel=1e-8)
 
 
-@pytest.mark.few(2)
 @pytest.mark.parametrize(("name", "path", "start", "stop"), RANGES)
 def test_every_point_is_the_highest_peak_of_a_sweep(name: str, path: str, start: float, stop: float) -> None:
     track = tracked(name, path, start, stop)
@@ -95,7 +94,6 @@ def test_every_point_is_the_highest_peak_of_a_sweep(name: str, path: str, start:
             assert track.frequency[index] == pytest.approx(at, rel=1e-5)
 
 
-@pytest.mark.few(2)
 @pytest.mark.parametrize(("name", "path", "start", "stop"), RANGES)
 def test_nothing_higher_between_the_points(name: str, path: str, start: float, stop: float) -> None:
     """At values no one asked for: sweeps lie on the cubics through the tracked points."""
@@ -110,7 +108,6 @@ def test_nothing_higher_between_the_points(name: str, path: str, start: float, s
         assert ends.min() - curve - 1e-9 * ends.max() <= found <= ends.max() + curve + 1e-9 * ends.max()
 
 
-@pytest.mark.few(2)
 @pytest.mark.parametrize(("name", "path", "start", "stop"), RANGES)
 def test_slopes_against_differences_of_sweeps(name: str, path: str, start: float, stop: float) -> None:
     track = tracked(name, path, start, stop)
