@@ -23,12 +23,13 @@ from solver.results.files import whole
 from solver.results.told import Piece
 
 if TYPE_CHECKING:
-    from solver.certificate.checker import Orbit, RejectedError
+    from solver.certificate.checker import Orbit, RejectedError, System
     from solver.response.exact.orbit import Orbit as ExactOrbit
     from solver.response.exact.piecewise import Piecewise
 
-_BITS = (128, 256, 512, 1024)
+_BITS = (128, 256)
 _NEWTON, _WIDER, _MOVES = 12, 4, 6  # steps; boxes tried; contacts moved
+_GROWN = 1e10  # by which balls grow before a state is unknown anew
 _SLOW = 1e-4  # by which a step falls with a derivative that still serves
 _NARROW = 1e-16  # relative width of what is claimed; else more bits
 _DIGITS = 25
@@ -150,65 +151,99 @@ def _proved(raw: dict[str, Any], piecewise: Piecewise, found: ExactOrbit) -> dic
         for bits in _BITS:
             ctx.prec = raw["bits"] = bits
             system = System(raw["system"])
-            if "orbit" not in raw:
-                raw["orbit"], start = orbit_of(piecewise, found, system)
-            for step in range(_MOVES):
-                orbit = Orbit(system, raw["orbit"])
-                try:
-                    image = _included(raw, orbit, start)
-                except RejectedError:
-                    if bits == _BITS[-1]:
-                        raise
-                    break
-                try:
-                    low, high = orbit.extremes(image)
-                except RejectedError as error:
-                    if not _moved_inward(raw, error, step):
-                        raise
-                    continue
-                if bits == _BITS[-1] or (low.rad() + high.rad()) <= _NARROW * (high - low):
-                    return _claimed(raw, low, high)
-                break
+            raw["orbit"], start = orbit_of(piecewise, found, system)
+            try:
+                start = _anew(raw["orbit"], Orbit(system, raw["orbit"]), start)
+                low, high = _kept_inward(raw, system, start)
+            except RejectedError as error:
+                if bits == _BITS[-1] or error.contact >= 0:
+                    raise
+                continue
+            if bits == _BITS[-1] or (low.rad() + high.rad()) <= _NARROW * (high - low):
+                return _claimed(raw, low, high)
         raise AssertionError
     finally:
         ctx.prec = kept
 
 
-def _included(raw: dict[str, Any], orbit: Orbit, start: list[float]) -> list[Any]:
-    """Put a box of the unknowns that holds exactly one orbit into the certificate; return its image."""
+def _anew(raw: dict[str, Any], orbit: Orbit, start: list[float]) -> list[Any]:
+    """Let the state be unknown anew before balls have grown too much; return the unknowns then."""
+    from flint import arb
+
+    if any(orbit.system.rigid(j) for j in range(len(orbit.system.contacts))):
+        return list(start)
+    found, grown = list(start[: len(orbit.first)]), 0.0
+    for (_, before, _, begun, *_), (z, _) in zip(
+        orbit.pieces, orbit.shoot([arb(each) for each in start])[2], strict=True
+    ):
+        if not before:
+            continue
+        found.append(start[begun])
+        radius = max(float(z[i, 0].rad()) for i in range(orbit.system.n))
+        grown = grown or radius
+        if radius > _GROWN * grown:
+            grown = radius
+            raw["events"][before[-1]]["anew"] = True
+            found += [z[at, 0].mid() for at in orbit.lasting(orbit.modes[before[-1] + 1])]
+    return found
+
+
+def _kept_inward(raw: dict[str, Any], system: System, start: list[Any]) -> tuple[Any, Any]:
+    """Prove an orbit, contacts that stick at the edge of their limit moved inward; return its extremes."""
+    from solver.certificate.checker import Orbit, RejectedError
+
+    for step in range(_MOVES):
+        orbit = Orbit(system, raw["orbit"])
+        try:
+            return _enclosed(raw, orbit, start)
+        except RejectedError as error:
+            if not _moved_inward(raw, error, step):
+                raise
+            last = error
+    raise last
+
+
+def _enclosed(raw: dict[str, Any], orbit: Orbit, start: list[Any]) -> tuple[Any, Any]:
+    """Put a box of the unknowns that holds exactly one orbit into the certificate; return its extremes."""
     from flint import arb, ctx
 
     from solver.certificate.checker import RejectedError, isolated
 
-    y, n = [arb(each) for each in start], orbit.system.n
-    sizes = [max(map(abs, start[:n]))] * n + [max(map(abs, start[n : 2 * n]))] * n
-    sizes += [sizes[0]] * (len(orbit.lasting) - 2 * n)
-    sizes += [1.0] * (len(y) - len(sizes))
-    fine, inverse, before = arb(2) ** (-ctx.prec * 3 // 5), None, math.inf
+    y = [arb(each) for each in start]
+    sizes, inverse, before = _sizes(orbit, y), None, math.inf
     for _ in range(_NEWTON):
-        value, slope, _ = orbit.shoot(y, derivative=inverse is None)
-        if inverse is None:
-            inverse = isolated(slope)
-        steps = [each[0] for each in (inverse * value).tolist()]
+        value, slope, _ = orbit.shoot(y, [arb(0)] * len(y) if inverse is None else None)
+        inverse = isolated(slope) if inverse is None else inverse
+        steps = (inverse * value).entries()
         y = [(each - step).mid() for each, step in zip(y, steps, strict=True)]
-        now = max(float(step.abs_upper()) / (size or 1.0) for step, size in zip(steps, sizes, strict=True))
+        now = max(float(step.abs_upper()) / size for step, size in zip(steps, sizes, strict=True))
         if now <= 2.0 ** (-ctx.prec // 2):
             break
         if now > _SLOW * before:
             inverse = None
         before = now
-    radii = [(fine + now) * (size or 1.0) for size in sizes]
+    radii = [(arb(2) ** (-ctx.prec * 3 // 5) + now) * size for size in sizes]
     for wider in range(_WIDER):
         box = [_written(each, radius * 4 ** (2 * wider + 1)) for each, radius in zip(y, radii, strict=True)]
         try:
-            image: list[Any] = orbit.included([arb(each) for each in box])
-        except RejectedError:
-            if wider == _WIDER - 1:
+            extremes = orbit.extremes([arb(each) for each in box])
+        except RejectedError as error:
+            if wider == _WIDER - 1 or error.contact >= 0:
                 raise
             continue
         raw["orbit"]["unknowns"] = box
-        return image
+        return extremes
     raise AssertionError
+
+
+def _sizes(orbit: Orbit, y: list[Any]) -> list[float]:
+    """Return what a change of each unknown is compared with: the largest of its kind, and 1 of instants."""
+    n, sizes = orbit.system.n, [1.0] * orbit.size
+    sliding, rate = (max(abs(float(each)) for each in y[k : k + n]) or 1.0 for k in (0, n))
+    for start, states in [(0, orbit.first), *((piece[4] + 1, piece[6]) for piece in orbit.pieces)]:
+        for k, at in enumerate(states, start=start):
+            sizes[k] = rate if n <= at < 2 * n else sliding
+    return sizes
 
 
 def _written(middle: Any, radius: Any) -> str:
