@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from solver.response.exact.piecewise import Piecewise
 
 _BITS = (128, 256)
-_NEWTON, _WIDER, _MOVES = 12, 4, 6  # steps; boxes tried; contacts moved
+_NEWTON, _WIDER, _MOVES = 12, 4, 8  # steps; boxes tried; contacts moved
 _GROWN = 1e10  # by which balls grow before a state is unknown anew
 _SLOW = 1e-4  # by which a step falls with a derivative that still serves
 _NARROW = 1e-16  # relative width of what is claimed; else more bits
@@ -279,6 +279,6 @@ def _moved_inward(raw: dict[str, Any], error: RejectedError, step: int) -> bool:
     if key not in fixed or abs(error.follows) != 1:
         return False
     contact = raw["system"]["contacts"][error.contact]
-    force = 10.0 * abs(error.margin) + 10.0**step * _MOVED * contact["mu"] * abs(contact["load"][0][1])
+    force = 10.0**step * _MOVED * contact["mu"] * abs(contact["load"][0][1])
     fixed[key] += error.follows * force / contact["kt"]
     return True

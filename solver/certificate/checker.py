@@ -162,7 +162,7 @@ class System:
         """Return a length near, e^{A length/2^i} down to norm(A) length/2^i ≤ REACH, A times the first, and
         weights and size of the norm."""
         mantissa, exponent = math.frexp(float(length.mid()))
-        whole = math.ldexp(round(mantissa * 2**34), exponent - 34)
+        whole = math.ldexp(round(mantissa * 2**38), exponent - 38)
         if (mode, whole) not in self.made:
             A, n = self.mode(mode)[0], self.n
             stiffest = max(sum(float(A[n + i, k].abs_upper()) for k in range(n)) for i in range(n))
@@ -171,7 +171,12 @@ class System:
             sizes = arb_mat([[abs(each) for each in row] for row in A.tolist()]) * column(weights)
             norm = max((each / w).upper() for each, w in zip(sizes.entries(), weights, strict=True))
             depth = max(0, math.ceil(math.log2(float(norm) * whole / REACH)))
-            powers = [(A * (arb(whole) / 2**depth)).exp()]
+            there = [k for k in range(self.d) if any(A[i, k] != 0 or A[k, i] != 0 for i in range(self.d))]  # others stay, alone
+            small = arb_mat([[A[i, k] for k in there] for i in there]) * (arb(whole) / 2**depth)
+            powers = [identity(self.d)]
+            for i, row in zip(there, small.exp().tolist(), strict=True):
+                for k, each in zip(there, row, strict=True):
+                    powers[0][i, k] = each
             for _ in range(depth):
                 powers.insert(0, powers[0] * powers[0])
             sizes = [[abs(each) for each in row] for row in powers[0].transpose().tolist()]
@@ -339,10 +344,10 @@ class Orbit:
             for k in group:
                 j, old, state, _ = self.events[k]
                 if state == 0 and system.contacts[j].get("kt") is not None:  # the slider stays where it is
-                    slides = unit(d, 2 * system.n + j).transpose() * (
-                        system.stops(j, old) - unit(d, 2 * system.n + j)
-                    )
-                    z, D = z + slides * z, D + slides * D if away is not None else D
+                    at, row = 2 * system.n + j, system.stops(j, old)
+                    z[at, 0] = (row * z)[0, 0]
+                    for c, each in enumerate((row * D).entries() if away is not None else ()):
+                        D[at, c] = each
             for k, at in enumerate(new, start=ended + 1):
                 zero(unit(d, at), k, first)
             for k, at in enumerate(new, start=ended + 1):

@@ -31,7 +31,7 @@ def orbit_beside(solution: Solution) -> tuple[Piecewise, Orbit | None]:
         if system.rigid.any() or any(member.rigid_normal for member in system.members):
             found = find(system, *system.at_rest())  # it is exact itself
         else:
-            found = beside(system, *_begun(system, solution), 0.0)
+            found = beside(system, *_begun(system, solution), 0.0, polish=1)
     except (LiftsError, NoMotionError):
         return system, None
     return system, found if isinstance(found, Orbit) else None
