@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 _BITS = (128, 256)
 _NEWTON, _WIDER, _MOVES = 12, 4, 8  # steps; boxes tried; contacts moved
-_GROWN = 1e10  # by which balls grow before a state is unknown anew
+_GROWN = 1e11  # by which balls grow before a state is unknown anew
 _SLOW = 1e-4  # by which a step falls with a derivative that still serves
 _NARROW = 1e-16  # relative width of what is claimed; else more bits
 _DIGITS = 25
@@ -170,21 +170,18 @@ def _anew(raw: dict[str, Any], orbit: Orbit, start: list[float]) -> list[Any]:
     """Let the state be unknown anew before balls have grown too much; return the unknowns then."""
     from flint import arb
 
-    if any(orbit.system.rigid(j) for j in range(len(orbit.system.contacts))):
+    if any(orbit.system.rigid):
         return list(start)
-    found, grown = list(start[: len(orbit.first)]), 0.0
-    for (_, before, _, begun, *_), (z, _) in zip(
-        orbit.pieces, orbit.shoot([arb(each) for each in start])[2], strict=True
-    ):
-        if not before:
-            continue
-        found.append(start[begun])
+    found, grown = list(start[: len(orbit.anew[0][1])]), 0.0
+    starts = orbit.shoot([arb(each) for each in start])[2]
+    for piece, (group, (z, *_)) in enumerate(zip(orbit.groups, starts[1:], strict=True), start=1):
+        found.append(start[orbit.at[piece]])
         radius = max(float(z[i, 0].rad()) for i in range(orbit.system.n))
         grown = grown or radius
         if radius > _GROWN * grown:
             grown = radius
-            raw["events"][before[-1]]["anew"] = True
-            found += [z[at, 0].mid() for at in orbit.lasting(orbit.modes[before[-1] + 1])]
+            raw["events"][group[-1]]["anew"] = True
+            found += [z[at, 0].mid() for at in orbit.lasting(orbit.modes[group[-1] + 1])]
     return found
 
 
@@ -240,7 +237,7 @@ def _sizes(orbit: Orbit, y: list[Any]) -> list[float]:
     """Return what a change of each unknown is compared with: the largest of its kind, and 1 of instants."""
     n, sizes = orbit.system.n, [1.0] * orbit.size
     sliding, rate = (max(abs(float(each)) for each in y[k : k + n]) or 1.0 for k in (0, n))
-    for start, states in [(0, orbit.first), *((piece[4] + 1, piece[6]) for piece in orbit.pieces)]:
+    for start, states in orbit.anew.values():
         for k, at in enumerate(states, start=start):
             sizes[k] = rate if n <= at < 2 * n else sliding
     return sizes
@@ -276,7 +273,7 @@ def _decimal(exact: Any, rounding: str) -> str:
 def _moved_inward(raw: dict[str, Any], error: RejectedError, step: int) -> bool:
     """Take a little of its force from a contact that sticks all the time at the edge of its limit."""
     fixed, key = raw["orbit"]["fixed_sliders"], str(error.contact)
-    if key not in fixed or abs(error.follows) != 1:
+    if key not in fixed or error.follows not in (1, -1):
         return False
     contact = raw["system"]["contacts"][error.contact]
     force = 10.0**step * _MOVED * contact["mu"] * abs(contact["load"][0][1])

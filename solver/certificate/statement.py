@@ -117,7 +117,7 @@ def orbit_of(piecewise: Piecewise, orbit: Orbit, system: System) -> tuple[dict[s
 
 
 def _hardly(states: list[str], events: list[dict[str, Any]], times: list[float]) -> list[int]:
-    """Return the events, the last first, of slips that hardly last: after shakedown what sticks stands there."""
+    """Return the events, the last first, of slips that hardly last: shaken down, a contact stands there."""
     found: list[int] = []
     before: dict[int, tuple[str, int]] = {}  # of a contact: what it did, and its last event
     for i, each in enumerate(events):
