@@ -118,7 +118,7 @@ def certify(solution: Solution) -> Certificate:
         raise MissingExtraError("python-flint", "proof") from error
     if not solution.converged:
         raise SettingError("solution", solution.status.value, "must have converged")
-    piecewise, orbit = orbit_beside(solution)
+    piecewise, orbit = orbit_beside(solution, polish=1)  # exact numbers go on from there
     raw: dict[str, Any] = {"certifies": "periodic orbit", "scene": solution.scene.name}
     status, reason, bounds = CertificateStatus.NO_ORBIT, "", {}
     if orbit is not None:
