@@ -19,7 +19,8 @@ _START = np.zeros(1)  # the angle
 def orbit_beside(solution: Solution, polish: int = POLISH) -> tuple[Piecewise, Orbit | None]:
     """Return the system of a solution that converged and the periodic motion near it; None if none is found.
 
-    `polish`: Newton's steps beyond convergence. Sliders begin where the forces of the balance hold them, so that what sticks throughout keeps its force.
+    Sliders begin where the forces of the balance hold them, so that what sticks throughout keeps its force.
+    `polish`: Newton's steps beyond convergence.
 
     Raises
     ------
