@@ -23,7 +23,7 @@ from solver.results.files import whole
 from solver.results.told import Piece
 
 if TYPE_CHECKING:
-    from solver.certificate.checker import Orbit, RejectedError, System
+    from solver.certificate.checker import Orbit, RejectedError
     from solver.response.exact.orbit import Orbit as ExactOrbit
     from solver.response.exact.piecewise import Piecewise
 
@@ -33,6 +33,8 @@ _GROWN = 1e11  # by which balls grow before a state is unknown anew
 _SLOW = 1e-4  # by which a step falls with a derivative that still serves
 _NARROW = 1e-16  # relative width of what is claimed; else more bits
 _DIGITS = 25
+_PEAK_BITS, _PEAK_WIDTH = 256, 1e-21  # half the relative width of the range a peak is proved in
+_PEAK_STEP, _PEAK_LEAST, _PEAK_TRIES = 1e-4, 1e-14, 60  # of the parabolas that find it, relative
 _MOVED = 1e-9  # of its limit, by which the force of what sticks at the edge of it is moved inward
 
 
@@ -52,7 +54,8 @@ class Certificate(Piece):
     """A proof of a periodic response, or why there is none."""
 
     JSON: ClassVar = (
-        "certified=reached status reason max_abs half_peak_to_peak events held bits seconds certificate"
+        "certified=reached status reason max_abs frequency_hz half_peak_to_peak events held bits seconds"
+        " certificate"
     )
 
     status: Annotated[CertificateStatus, "Whether it was proved."]
@@ -60,6 +63,7 @@ class Certificate(Piece):
     max_abs: Annotated[
         tuple[float, float], "Bounds of the largest |x| of the observed DOF [m]; NaN if there are none."
     ]
+    frequency_hz: Annotated[tuple[float, float], "The frequency; of a peak, bounds of it [Hz]."]
     half_peak_to_peak: Annotated[tuple[float, float], "Bounds of (max x - min x) / 2 [m]."]
     events: Annotated[int, "Changes of a contact's state in a period."]
     held: Annotated[
@@ -92,7 +96,7 @@ class Certificate(Piece):
             temporary.write_text(json.dumps(self.certificate), encoding="utf-8")
 
 
-def certify(solution: Solution) -> Certificate:
+def certify(solution: Solution, *, peak: bool = False) -> Certificate:
     """Prove a periodic response of piecewise linear contacts, and enclose its amplitude.
 
     Between two events all is linear, so the orbit is a zero of finitely many equations: Krawczyk's operator
@@ -102,6 +106,7 @@ def certify(solution: Solution) -> Certificate:
     Parameters
     ----------
     solution : one that converged, of contacts of the laws coulomb, elastic-normal and gap.
+    peak : prove the peak of max|x| over the frequency beside it instead.
 
     Raises
     ------
@@ -124,18 +129,18 @@ def certify(solution: Solution) -> Certificate:
     if orbit is not None:
         raw["system"] = system_of(piecewise, solution.frequency_hz)
         try:
-            bounds = _proved(raw, piecewise, orbit)
+            bounds = (_peak_proved if peak else _proved)(raw, piecewise, orbit)
             status = CertificateStatus.CERTIFIED
         except RejectedError as error:
             status, reason = CertificateStatus.NOT_CERTIFIED, str(error)
     unknown = (math.nan, math.nan)
     contacts, course = raw.get("system", {}).get("contacts", ()), raw.get("orbit", {})
     return Certificate(
-        status=status, reason=reason, max_abs=bounds.get("max_abs", unknown),
+        status=status, reason=reason, max_abs=bounds.get("peak", bounds.get("max_abs", unknown)),
+        frequency_hz=bounds.get("frequency_hz", (solution.frequency_hz, solution.frequency_hz)),
         half_peak_to_peak=bounds.get("half_peak_to_peak", unknown), events=len(course.get("events", ())),
         held=tuple(contacts[int(j)]["name"] for j in course.get("fixed_sliders", ())),
-        bits=raw.get("bits", 0),
-        seconds=time.perf_counter() - begun, certificate=raw if bounds else None,
+        bits=raw.get("bits", 0), seconds=time.perf_counter() - begun, certificate=raw if bounds else None,
     )  # fmt: skip
 
 
@@ -143,27 +148,100 @@ def _proved(raw: dict[str, Any], piecewise: Piecewise, found: ExactOrbit) -> dic
     """Complete a certificate by the box of its unknowns and by what it claims; return that as floats."""
     from flint import ctx
 
-    from solver.certificate.checker import Orbit, RejectedError, System
-    from solver.certificate.statement import orbit_of
+    from solver.certificate.checker import RejectedError
 
     kept = ctx.prec
     try:
         for bits in _BITS:
             ctx.prec = raw["bits"] = bits
-            system = System(raw["system"])
-            raw["orbit"], start = orbit_of(piecewise, found, system)
             try:
-                start = _anew(raw["orbit"], Orbit(system, raw["orbit"]), start)
-                low, high = _kept_inward(raw, system, start)
+                low, high = _kept_inward(raw, _stated(raw, piecewise, found))
             except RejectedError as error:
                 if bits == _BITS[-1] or error.contact >= 0:
                     raise
                 continue
             if bits == _BITS[-1] or (low.rad() + high.rad()) <= _NARROW * (high - low):
-                return _claimed(raw, low, high)
+                return _claimed(raw, {"max_abs": high.max(-low), "half_peak_to_peak": (high - low) / 2})
         raise AssertionError
     finally:
         ctx.prec = kept
+
+
+def _peak_proved(
+    raw: dict[str, Any], piecewise: Piecewise, found: ExactOrbit
+) -> dict[str, tuple[float, float]]:
+    """Complete a certificate of a peak: orbits below, at and above it, and over that range; as `_proved`."""
+    from flint import arb, ctx
+
+    from solver.certificate.checker import prove
+
+    kept = ctx.prec
+    try:
+        ctx.prec = raw["bits"] = _PEAK_BITS
+        raw["certifies"] = "peak"
+        y = _stated(raw, piecewise, found)
+        at, y = _summit(raw, y)
+        width = at * _PEAK_WIDTH
+        spans = [f"{_digits(at)} +/- {(width * 1.01).str(5, radius=False)}"]
+        spans += [_digits(at + k * width) for k in (-1, 0, 1)]
+        raw["at"] = []
+        for span in spans:
+            orbit, thick = _orbit_at(raw, span), not raw["at"]
+            y, now = (y, arb(0)) if thick else _settled(orbit, y)
+            box, _ = _boxed(orbit, y, now + (_PEAK_WIDTH if thick else 0))
+            raw["at"].append({"frequency_hz": span, "unknowns": box})
+        return _claimed(raw, prove(raw))
+    finally:
+        ctx.prec = kept
+
+
+def _summit(raw: dict[str, Any], y: list[Any]) -> tuple[Any, list[Any]]:
+    """Return the frequency where parabolas through three heights have their top, with the unknowns there."""
+    from flint import arb
+
+    from solver.certificate.checker import RejectedError
+
+    at, step = arb(raw["system"]["frequency_hz"]), _PEAK_STEP
+    for _ in range(_PEAK_TRIES):
+        heights = []
+        try:
+            for k in (-1, 1, 0):
+                orbit = _orbit_at(raw, _digits(at * (1 + k * step)))
+                y, now = _settled(orbit, y)
+                low, high = _boxed(orbit, y, now)[1]
+                heights.append(high.max(-low).mid())
+        except RejectedError:
+            if step < _PEAK_LEAST:
+                raise
+            step /= 8.0
+            continue
+        left, right, top = heights
+        bends = left - 2 * top + right
+        if not bends < 0:
+            raise RejectedError(f"max|x| has no peak near {float(at):.9g} Hz: it does not bend down there")
+        shift = step * (left - right) / (2 * bends)
+        at = (at * (1 + max(-4 * step, min(4 * step, shift)))).mid()
+        if abs(shift) < _PEAK_WIDTH / 100:
+            return at, y
+        if abs(shift) < step:
+            step = max(step**1.5, _PEAK_LEAST)
+    raise RejectedError(f"max|x| has no peak that was found near {float(at):.9g} Hz")
+
+
+def _stated(raw: dict[str, Any], piecewise: Piecewise, found: ExactOrbit) -> list[Any]:
+    """Put the order of events into a certificate, and where states are unknown anew; return the unknowns."""
+    from solver.certificate.checker import Orbit, System
+    from solver.certificate.statement import orbit_of
+
+    system = System(raw["system"])
+    raw["orbit"], start = orbit_of(piecewise, found, system)
+    return _anew(raw["orbit"], Orbit(system, raw["orbit"]), start)
+
+
+def _orbit_at(raw: dict[str, Any], frequency_hz: str | float) -> Orbit:
+    from solver.certificate.checker import Orbit, System
+
+    return Orbit(System(raw["system"] | {"frequency_hz": frequency_hz}), raw["orbit"])
 
 
 def _anew(raw: dict[str, Any], orbit: Orbit, start: list[float]) -> list[Any]:
@@ -185,51 +263,60 @@ def _anew(raw: dict[str, Any], orbit: Orbit, start: list[float]) -> list[Any]:
     return found
 
 
-def _kept_inward(raw: dict[str, Any], system: System, start: list[Any]) -> tuple[Any, Any]:
+def _kept_inward(raw: dict[str, Any], start: list[Any]) -> tuple[Any, Any]:
     """Prove an orbit, contacts that stick at the edge of their limit moved inward; return its extremes."""
-    from solver.certificate.checker import Orbit, RejectedError
+    from solver.certificate.checker import RejectedError
 
     for step in range(_MOVES):
-        orbit = Orbit(system, raw["orbit"])
+        orbit = _orbit_at(raw, raw["system"]["frequency_hz"])
         try:
-            return _enclosed(raw, orbit, start)
+            raw["orbit"]["unknowns"], extremes = _boxed(orbit, *_settled(orbit, start))
         except RejectedError as error:
             if not _moved_inward(raw, error, step):
                 raise
             last = error
+        else:
+            return extremes
     raise last
 
 
-def _enclosed(raw: dict[str, Any], orbit: Orbit, start: list[Any]) -> tuple[Any, Any]:
-    """Put a box of the unknowns that holds exactly one orbit into the certificate; return its extremes."""
+def _settled(orbit: Orbit, start: list[Any]) -> tuple[list[Any], float]:
+    """Return the unknowns by Newton's method, and its last step relative to their sizes."""
     from flint import arb, ctx
 
-    from solver.certificate.checker import RejectedError, isolated
+    from solver.certificate.checker import isolated
 
     y = [arb(each) for each in start]
-    sizes, inverse, before = _sizes(orbit, y), None, math.inf
+    sizes, inverse, now = _sizes(orbit, y), None, math.inf
     for _ in range(_NEWTON):
         value, slope, _ = orbit.shoot(y, [arb(0)] * len(y) if inverse is None else None)
         inverse = isolated(slope) if inverse is None else inverse
         steps = (inverse * value).entries()
         y = [(each - step).mid() for each, step in zip(y, steps, strict=True)]
-        now = max(float(step.abs_upper()) / size for step, size in zip(steps, sizes, strict=True))
+        before, now = now, max(
+            float(step.abs_upper()) / size for step, size in zip(steps, sizes, strict=True)
+        )  # fmt: skip
         if now <= 2.0 ** (-ctx.prec // 2):
             break
         if now > _SLOW * before:
             inverse = None
-        before = now
-    radii = [(arb(2) ** (-ctx.prec * 3 // 5) + now) * size for size in sizes]
+    return y, now
+
+
+def _boxed(orbit: Orbit, y: list[Any], now: Any) -> tuple[list[str], tuple[Any, Any]]:
+    """Return a box of the unknowns that holds exactly one orbit, and the extremes of its motion."""
+    from flint import arb, ctx
+
+    from solver.certificate.checker import RejectedError
+
+    radii = [(arb(2) ** (-ctx.prec * 3 // 5) + now) * size for size in _sizes(orbit, y)]
     for wider in range(_WIDER):
         box = [_written(each, radius * 4 ** (2 * wider + 1)) for each, radius in zip(y, radii, strict=True)]
         try:
-            extremes = orbit.extremes([arb(each) for each in box])
+            return box, orbit.extremes([arb(each) for each in box])
         except RejectedError as error:
             if wider == _WIDER - 1 or error.contact >= 0:
                 raise
-            continue
-        raw["orbit"]["unknowns"] = box
-        return extremes
     raise AssertionError
 
 
@@ -243,16 +330,20 @@ def _sizes(orbit: Orbit, y: list[Any]) -> list[float]:
     return sizes
 
 
-def _written(middle: Any, radius: Any) -> str:
-    """Return a ball as text with the digits of the precision it has."""
+def _digits(middle: Any) -> str:
+    """Return a number as text with the digits of the precision."""
     from flint import ctx
 
-    return f"{middle.str(ctx.prec * 3 // 10, radius=False)} +/- {radius.upper().str(5, radius=False)}"
+    return str(middle.str(ctx.prec * 3 // 10, radius=False))
 
 
-def _claimed(raw: dict[str, Any], low: Any, high: Any) -> dict[str, tuple[float, float]]:
-    """Put what is proved of the extremes into the certificate; return it as floats; all rounded outward."""
-    found = {"max_abs": high.max(-low), "half_peak_to_peak": (high - low) / 2}
+def _written(middle: Any, radius: Any) -> str:
+    """Return a ball as text."""
+    return f"{_digits(middle)} +/- {radius.upper().str(5, radius=False)}"
+
+
+def _claimed(raw: dict[str, Any], found: dict[str, Any]) -> dict[str, tuple[float, float]]:
+    """Put what is proved into the certificate; return it as floats; all rounded outward."""
     raw["claims"] = {
         name: [_decimal(each.lower(), ROUND_FLOOR), _decimal(each.upper(), ROUND_CEILING)]
         for name, each in found.items()

@@ -20,7 +20,7 @@ from flint import arb, arb_mat, arb_poly, ctx
 STICK, OPEN, CLOSES = 0, 2, 3  # ±1 slips; CLOSES follows an open contact, the next piece tells how
 STATES = {"stick": STICK, "closed": STICK, "slip+": 1, "slip-": -1, "open": OPEN}
 WORDS = {STICK: "rests", 1: "slips forward", -1: "slips backward", OPEN: "opens", CLOSES: "closes"}
-DEGREE, REACH, DEPTH = 32, 2.0, 70  # of Taylor polynomials; norm(A) times their length; halvings at most
+REACH, DEPTH = 2.0, 70  # norm(A) times the length of Taylor polynomials at most; halvings at most
 
 
 class RejectedError(Exception):
@@ -350,10 +350,10 @@ class Orbit:
             states = arb_mat([[*old, *new] for old, new in zip(states.tolist(), later, strict=True)])
         begun = {key: order for k in before for key, order in self.begun(k).items()}
         ends, count, motion = {self.ended(k) for k in after}, states.ncols(), []
-        each = arb(whole) / count
+        each, degree = arb(whole) / count, ctx.prec // 4
         last = each + length - whole
         rows = arb_mat([row.entries() for *_, row in conditions] + [self.system.observe.entries()])
-        terms, lack = self.system.series(mode, states, length, last.upper().max(each.upper()), DEGREE)
+        terms, lack = self.system.series(mode, states, length, last.upper().max(each.upper()), degree)
         values, lacks = [(rows * term).tolist() for term in terms], (rows * lack).entries()
         for r, (j, follows) in enumerate([*((j, follows) for j, follows, _ in conditions), (-1, 0)]):
             for number in range(count):
@@ -366,7 +366,7 @@ class Orbit:
                 if order:
                     p, rest = arb_poly(p.coeffs()[order:]), rest / h**order
                 if number == count - 1 and (j, follows) in ends:  # p is 0 at h
-                    p, rest = arb_poly(p(arb_poly([h, -1])).coeffs()[1:]), rest * (2 * DEGREE) / h
+                    p, rest = arb_poly(p(arb_poly([h, -1])).coeffs()[1:]), rest * (2 * degree) / h
                 if not (p(arb(0).union(h.upper())) + rest) > 0:
                     margin = least([(p, rest, h.upper())], arb(0))
                     name = self.system.contacts[j]["name"]
@@ -406,12 +406,26 @@ def least(parts: list[Any], enough: Any = None) -> Any:
 
 
 def prove(raw: dict[str, Any]) -> dict[str, Any]:
-    """Return enclosures of max |x| and of half the range [m] that a certificate proves."""
-    ctx.prec = raw["bits"]
-    orbit, box = Orbit(System(raw["system"]), raw["orbit"]), [arb(each) for each in raw["orbit"]["unknowns"]]
-    require(len(box) == orbit.size, f"there must be {orbit.size} unknowns, got {len(box)}")
-    low, high = orbit.extremes(box)
-    return {"max_abs": high.max(-low), "half_peak_to_peak": (high - low) / 2}
+    """Return enclosures of max |x| and of half the range [m], or of a peak and of its frequency [Hz].
+
+    A peak is proved by orbits over a range of the frequency, a branch, and at three values in it: what is
+    reached in the middle is more than at both ends and at most what is reached over the range.
+    """
+    ctx.prec, found = raw["bits"], []
+    alone = [{"frequency_hz": raw["system"]["frequency_hz"], "unknowns": raw["orbit"].get("unknowns")}]
+    for at in raw.get("at", alone):
+        orbit = Orbit(System(raw["system"] | {"frequency_hz": at["frequency_hz"]}), raw["orbit"])
+        require(len(at["unknowns"]) == orbit.size, f"there must be {orbit.size} unknowns")
+        box = [arb(each) for each in at["unknowns"]]
+        low, high = orbit.extremes(box)
+        found.append(([arb(at["frequency_hz"]), *box], high.max(-low), (high - low) / 2))
+    if "at" not in raw:
+        return {"max_abs": found[0][1], "half_peak_to_peak": found[0][2]}
+    (over, most, _), (before, left, _), (at, top, _), (after, right, _) = found
+    inside = all(a.contains(b) for one in (before, at, after) for a, b in zip(over, one, strict=True))
+    require(inside and before[0] < at[0] < after[0], "the three are not in their order on one branch")
+    require(left < top > right, f"it is no peak: {left.str(30)}, {top.str(30)}, {right.str(30)}")
+    return {"peak": top.lower().union(most.upper()), "frequency_hz": before[0].union(after[0])}
 
 
 def check(raw: dict[str, Any]) -> None:
