@@ -19,8 +19,10 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 from solver.errors import MissingExtraError, SettingError
 from solver.response.exact.beside import orbit_beside
 from solver.response.solution import Solution
+from solver.response.solve import solve
 from solver.results.files import whole
 from solver.results.told import Piece
+from solver.scene.cyclic.annulus import annulus
 
 if TYPE_CHECKING:
     from solver.certificate.checker import Orbit, RejectedError
@@ -123,6 +125,10 @@ def certify(solution: Solution, *, peak: bool = False) -> Certificate:
         raise MissingExtraError("python-flint", "proof") from error
     if not solution.converged:
         raise SettingError("solution", solution.status.value, "must have converged")
+    if solution.scene.structure.has_sectors:  # a disk written out is a system like any other
+        solution = solve(
+            annulus(solution.scene), frequency_hz=solution.frequency_hz, harmonics=solution.n_harmonics
+        )
     piecewise, orbit = orbit_beside(solution, polish=1)  # exact numbers go on from there
     raw: dict[str, Any] = {"certifies": "periodic orbit", "scene": solution.scene.name}
     status, reason, bounds = CertificateStatus.NO_ORBIT, "", {}
