@@ -11,11 +11,12 @@ import json
 import math
 import time
 from dataclasses import dataclass
-from decimal import ROUND_CEILING, ROUND_FLOOR, Decimal, localcontext
 from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
+from solver.certificate.boxes import boxed, claimed, orbit_at, set_out, settled
+from solver.certificate.summits import least_proved, peak_proved
 from solver.errors import MissingExtraError, SettingError
 from solver.response.exact.beside import orbit_beside
 from solver.response.solution import Solution
@@ -23,20 +24,16 @@ from solver.response.solve import solve
 from solver.results.files import whole
 from solver.results.told import Piece
 from solver.scene.cyclic.annulus import annulus
+from solver.scene.scene import Scene
 
 if TYPE_CHECKING:
-    from solver.certificate.checker import Orbit, RejectedError
+    from solver.certificate.checker import RejectedError
     from solver.response.exact.orbit import Orbit as ExactOrbit
     from solver.response.exact.piecewise import Piecewise
 
 _BITS = (128, 256)
-_NEWTON, _WIDER, _MOVES = 12, 4, 8  # steps; boxes tried; contacts moved
-_GROWN = 1e11  # by which balls grow before a state is unknown anew
-_SLOW = 1e-4  # by which a step falls with a derivative that still serves
+_MOVES = 8  # contacts moved
 _NARROW = 1e-16  # relative width of what is claimed; else more bits
-_DIGITS = 25
-_PEAK_BITS, _PEAK_WIDTH = 256, 1e-21  # half the relative width of the range a peak is proved in
-_PEAK_STEP, _PEAK_LEAST, _PEAK_TRIES = 1e-4, 1e-14, 60  # of the parabolas that find it, relative
 _MOVED = 1e-9  # of its limit, by which the force of what sticks at the edge of it is moved inward
 
 
@@ -56,8 +53,8 @@ class Certificate(Piece):
     """A proof of a periodic response, or why there is none."""
 
     JSON: ClassVar = (
-        "certified=reached status reason max_abs frequency_hz half_peak_to_peak events held bits seconds"
-        " certificate"
+        "certified=reached status reason max_abs frequency_hz load_factor half_peak_to_peak events held bits"
+        " seconds certificate"
     )
 
     status: Annotated[CertificateStatus, "Whether it was proved."]
@@ -66,6 +63,9 @@ class Certificate(Piece):
         tuple[float, float], "Bounds of the largest |x| of the observed DOF [m]; NaN if there are none."
     ]
     frequency_hz: Annotated[tuple[float, float], "The frequency; of a peak, bounds of it [Hz]."]
+    load_factor: Annotated[
+        tuple[float, float], "Of a least peak, bounds of the load where it is, over the load of the scene."
+    ]
     half_peak_to_peak: Annotated[tuple[float, float], "Bounds of (max x - min x) / 2 [m]."]
     events: Annotated[int, "Changes of a contact's state in a period."]
     held: Annotated[
@@ -98,7 +98,7 @@ class Certificate(Piece):
             temporary.write_text(json.dumps(self.certificate), encoding="utf-8")
 
 
-def certify(solution: Solution, *, peak: bool = False) -> Certificate:
+def certify(solution: Solution, *, peak: bool = False, least_over: str = "") -> Certificate:
     """Prove a periodic response of piecewise linear contacts, and enclose its amplitude.
 
     Between two events all is linear, so the orbit is a zero of finitely many equations: Krawczyk's operator
@@ -109,11 +109,14 @@ def certify(solution: Solution, *, peak: bool = False) -> Certificate:
     ----------
     solution : one that converged, of contacts of the laws coulomb, elastic-normal and gap.
     peak : prove the peak of max|x| over the frequency beside it instead.
+    least_over : the path of a load, such as ``damper.N0``, over which that peak is least near this solution;
+        prove the least peak. With N0 all of the load varies, its harmonics likewise.
 
     Raises
     ------
     SettingError
-        It did not converge, or the scene has a part that has no place in an exact solution.
+        It did not converge, the scene has a part that has no place in an exact solution, or the path is none
+        of a load.
     MissingExtraError
         Without python-flint.
     """
@@ -135,19 +138,33 @@ def certify(solution: Solution, *, peak: bool = False) -> Certificate:
     if orbit is not None:
         raw["system"] = system_of(piecewise, solution.frequency_hz)
         try:
-            bounds = (_peak_proved if peak else _proved)(raw, piecewise, orbit)
+            if least_over:
+                raw["varies"] = _loads_of(solution.scene, least_over)
+            proved = least_proved if least_over else peak_proved if peak else _proved
+            bounds = proved(raw, piecewise, orbit)
             status = CertificateStatus.CERTIFIED
         except RejectedError as error:
             status, reason = CertificateStatus.NOT_CERTIFIED, str(error)
     unknown = (math.nan, math.nan)
     contacts, course = raw.get("system", {}).get("contacts", ()), raw.get("orbit", {})
+    heights = (bounds[key] for key in ("least_peak", "peak", "max_abs") if key in bounds)
     return Certificate(
-        status=status, reason=reason, max_abs=bounds.get("peak", bounds.get("max_abs", unknown)),
+        status=status, reason=reason, max_abs=next(heights, unknown),
         frequency_hz=bounds.get("frequency_hz", (solution.frequency_hz, solution.frequency_hz)),
+        load_factor=bounds.get("load_factor", (1.0, 1.0)),
         half_peak_to_peak=bounds.get("half_peak_to_peak", unknown), events=len(course.get("events", ())),
         held=tuple(contacts[int(j)]["name"] for j in course.get("fixed_sliders", ())),
         bits=raw.get("bits", 0), seconds=time.perf_counter() - begun, certificate=raw if bounds else None,
     )  # fmt: skip
+
+
+def _loads_of(scene: Scene, path: str) -> list[int]:
+    """Return the numbers of the contacts whose load a path is."""
+    name, _, key = path.rpartition(".")
+    found = [i for i, each in enumerate(scene.contacts) if name in (each.name, each.group)]
+    if key != "N0" or not found or any(scene.contacts[i].load is None for i in found):
+        raise SettingError("least_over", path, "must be the path of a load, such as damper.N0")
+    return found
 
 
 def _proved(raw: dict[str, Any], piecewise: Piecewise, found: ExactOrbit) -> dict[str, tuple[float, float]]:
@@ -161,112 +178,16 @@ def _proved(raw: dict[str, Any], piecewise: Piecewise, found: ExactOrbit) -> dic
         for bits in _BITS:
             ctx.prec = raw["bits"] = bits
             try:
-                low, high = _kept_inward(raw, _stated(raw, piecewise, found))
+                low, high = _kept_inward(raw, set_out(raw, piecewise, found))
             except RejectedError as error:
                 if bits == _BITS[-1] or error.contact >= 0:
                     raise
                 continue
             if bits == _BITS[-1] or (low.rad() + high.rad()) <= _NARROW * (high - low):
-                return _claimed(raw, {"max_abs": high.max(-low), "half_peak_to_peak": (high - low) / 2})
+                return claimed(raw, {"max_abs": high.max(-low), "half_peak_to_peak": (high - low) / 2})
         raise AssertionError
     finally:
         ctx.prec = kept
-
-
-def _peak_proved(
-    raw: dict[str, Any], piecewise: Piecewise, found: ExactOrbit
-) -> dict[str, tuple[float, float]]:
-    """Complete a certificate of a peak: orbits below, at and above it, and over that range; as `_proved`."""
-    from flint import arb, ctx
-
-    from solver.certificate.checker import prove
-
-    kept = ctx.prec
-    try:
-        ctx.prec = raw["bits"] = _PEAK_BITS
-        raw["certifies"] = "peak"
-        y = _stated(raw, piecewise, found)
-        at, y = _summit(raw, y)
-        width = at * _PEAK_WIDTH
-        spans = [f"{_digits(at)} +/- {(width * 1.01).str(5, radius=False)}"]
-        spans += [_digits(at + k * width) for k in (-1, 0, 1)]
-        raw["at"] = []
-        for span in spans:
-            orbit, thick = _orbit_at(raw, span), not raw["at"]
-            y, now = (y, arb(0)) if thick else _settled(orbit, y)
-            box, _ = _boxed(orbit, y, now + (_PEAK_WIDTH if thick else 0))
-            raw["at"].append({"frequency_hz": span, "unknowns": box})
-        return _claimed(raw, prove(raw))
-    finally:
-        ctx.prec = kept
-
-
-def _summit(raw: dict[str, Any], y: list[Any]) -> tuple[Any, list[Any]]:
-    """Return the frequency where parabolas through three heights have their top, with the unknowns there."""
-    from flint import arb
-
-    from solver.certificate.checker import RejectedError
-
-    at, step = arb(raw["system"]["frequency_hz"]), _PEAK_STEP
-    for _ in range(_PEAK_TRIES):
-        heights = []
-        try:
-            for k in (-1, 1, 0):
-                orbit = _orbit_at(raw, _digits(at * (1 + k * step)))
-                y, now = _settled(orbit, y)
-                low, high = _boxed(orbit, y, now)[1]
-                heights.append(high.max(-low).mid())
-        except RejectedError:
-            if step < _PEAK_LEAST:
-                raise
-            step /= 8.0
-            continue
-        left, right, top = heights
-        bends = left - 2 * top + right
-        if not bends < 0:
-            raise RejectedError(f"max|x| has no peak near {float(at):.9g} Hz: it does not bend down there")
-        shift = step * (left - right) / (2 * bends)
-        at = (at * (1 + max(-4 * step, min(4 * step, shift)))).mid()
-        if abs(shift) < _PEAK_WIDTH / 100:
-            return at, y
-        if abs(shift) < step:
-            step = max(step**1.5, _PEAK_LEAST)
-    raise RejectedError(f"max|x| has no peak that was found near {float(at):.9g} Hz")
-
-
-def _stated(raw: dict[str, Any], piecewise: Piecewise, found: ExactOrbit) -> list[Any]:
-    """Put the order of events into a certificate, and where states are unknown anew; return the unknowns."""
-    from solver.certificate.checker import Orbit, System
-    from solver.certificate.statement import orbit_of
-
-    system = System(raw["system"])
-    raw["orbit"], start = orbit_of(piecewise, found, system)
-    return _anew(raw["orbit"], Orbit(system, raw["orbit"]), start)
-
-
-def _orbit_at(raw: dict[str, Any], frequency_hz: str | float) -> Orbit:
-    from solver.certificate.checker import Orbit, System
-
-    return Orbit(System(raw["system"] | {"frequency_hz": frequency_hz}), raw["orbit"])
-
-
-def _anew(raw: dict[str, Any], orbit: Orbit, start: list[float]) -> list[Any]:
-    """Let the state be unknown anew before balls have grown too much; return the unknowns then."""
-    from flint import arb
-
-    if any(orbit.system.rigid):
-        return list(start)
-    found, grown = list(start[: len(orbit.anew[0][1])]), 0.0
-    starts = orbit.shoot([arb(each) for each in start])[2]
-    for piece, (group, (z, *_)) in enumerate(zip(orbit.groups, starts[1:], strict=True), start=1):
-        found.append(start[orbit.at[piece]])
-        radius = max(float(z[i, 0].rad()) for i in range(orbit.system.n))
-        grown = grown or radius
-        if radius > _GROWN * grown:
-            grown = radius
-            raw["events"][group[-1]]["anew"] = True
-            found += [z[at, 0].mid() for at in orbit.lasting(orbit.modes[group[-1] + 1])]
-    return found
 
 
 def _kept_inward(raw: dict[str, Any], start: list[Any]) -> tuple[Any, Any]:
@@ -274,9 +195,9 @@ def _kept_inward(raw: dict[str, Any], start: list[Any]) -> tuple[Any, Any]:
     from solver.certificate.checker import RejectedError
 
     for step in range(_MOVES):
-        orbit = _orbit_at(raw, raw["system"]["frequency_hz"])
+        orbit = orbit_at(raw)
         try:
-            raw["orbit"]["unknowns"], extremes = _boxed(orbit, *_settled(orbit, start))
+            raw["orbit"]["unknowns"], extremes = boxed(orbit, *settled(orbit, start))
         except RejectedError as error:
             if not _moved_inward(raw, error, step):
                 raise
@@ -284,87 +205,6 @@ def _kept_inward(raw: dict[str, Any], start: list[Any]) -> tuple[Any, Any]:
         else:
             return extremes
     raise last
-
-
-def _settled(orbit: Orbit, start: list[Any]) -> tuple[list[Any], float]:
-    """Return the unknowns by Newton's method, and its last step relative to their sizes."""
-    from flint import arb, ctx
-
-    from solver.certificate.checker import isolated
-
-    y = [arb(each) for each in start]
-    sizes, inverse, now = _sizes(orbit, y), None, math.inf
-    for _ in range(_NEWTON):
-        value, slope, _ = orbit.shoot(y, [arb(0)] * len(y) if inverse is None else None)
-        inverse = isolated(slope) if inverse is None else inverse
-        steps = (inverse * value).entries()
-        y = [(each - step).mid() for each, step in zip(y, steps, strict=True)]
-        before, now = now, max(
-            float(step.abs_upper()) / size for step, size in zip(steps, sizes, strict=True)
-        )  # fmt: skip
-        if now <= 2.0 ** (-ctx.prec // 2):
-            break
-        if now > _SLOW * before:
-            inverse = None
-    return y, now
-
-
-def _boxed(orbit: Orbit, y: list[Any], now: Any) -> tuple[list[str], tuple[Any, Any]]:
-    """Return a box of the unknowns that holds exactly one orbit, and the extremes of its motion."""
-    from flint import arb, ctx
-
-    from solver.certificate.checker import RejectedError
-
-    radii = [(arb(2) ** (-ctx.prec * 3 // 5) + now) * size for size in _sizes(orbit, y)]
-    for wider in range(_WIDER):
-        box = [_written(each, radius * 4 ** (2 * wider + 1)) for each, radius in zip(y, radii, strict=True)]
-        try:
-            return box, orbit.extremes([arb(each) for each in box])
-        except RejectedError as error:
-            if wider == _WIDER - 1 or error.contact >= 0:
-                raise
-    raise AssertionError
-
-
-def _sizes(orbit: Orbit, y: list[Any]) -> list[float]:
-    """Return what a change of each unknown is compared with: the largest of its kind, and 1 of instants."""
-    n, sizes = orbit.system.n, [1.0] * orbit.size
-    sliding, rate = (max(abs(float(each)) for each in y[k : k + n]) or 1.0 for k in (0, n))
-    for start, states in orbit.anew.values():
-        for k, at in enumerate(states, start=start):
-            sizes[k] = rate if n <= at < 2 * n else sliding
-    return sizes
-
-
-def _digits(middle: Any) -> str:
-    """Return a number as text with the digits of the precision."""
-    from flint import ctx
-
-    return str(middle.str(ctx.prec * 3 // 10, radius=False))
-
-
-def _written(middle: Any, radius: Any) -> str:
-    """Return a ball as text."""
-    return f"{_digits(middle)} +/- {radius.upper().str(5, radius=False)}"
-
-
-def _claimed(raw: dict[str, Any], found: dict[str, Any]) -> dict[str, tuple[float, float]]:
-    """Put what is proved into the certificate; return it as floats; all rounded outward."""
-    raw["claims"] = {
-        name: [_decimal(each.lower(), ROUND_FLOOR), _decimal(each.upper(), ROUND_CEILING)]
-        for name, each in found.items()
-    }
-    return {
-        name: (math.nextafter(float(each.lower()), -math.inf), math.nextafter(float(each.upper()), math.inf))
-        for name, each in found.items()
-    }
-
-
-def _decimal(exact: Any, rounding: str) -> str:
-    """Return a number rounded to decimals."""
-    mantissa, exponent = map(int, exact.man_exp())
-    with localcontext(prec=_DIGITS, rounding=rounding):
-        return str(+Decimal(mantissa << exponent) if exponent >= 0 else Decimal(mantissa) / (1 << -exponent))
 
 
 def _moved_inward(raw: dict[str, Any], error: RejectedError, step: int) -> bool:

@@ -20,7 +20,7 @@ from flint import arb, arb_mat, arb_poly, ctx
 STICK, OPEN, CLOSES = 0, 2, 3  # ±1 slips; CLOSES follows an open contact, the next piece tells how
 STATES = {"stick": STICK, "closed": STICK, "slip+": 1, "slip-": -1, "open": OPEN}
 WORDS = {STICK: "rests", 1: "slips forward", -1: "slips backward", OPEN: "opens", CLOSES: "closes"}
-REACH, DEPTH = 2.0, 70  # norm(A) times the length of Taylor polynomials at most; halvings at most
+REACH = 2.0  # norm(A) times the length of Taylor polynomials, at most
 
 
 class RejectedError(Exception):
@@ -301,7 +301,7 @@ class Orbit:
                 if group:
                     end = system.after(mode, start, lasts, 6)
                     D += A * end * unit(D.ncols(), self.at[piece + 1] - first)
-            z = system.after(mode, z, length, 6)
+            z = system.after(mode, z, length, ctx.prec // 20)
             for k in group:
                 j, old_state, new = self.events[k]
                 if k == group[0]:
@@ -396,7 +396,7 @@ def least(parts: list[Any], enough: Any = None) -> Any:
             bound = value = p(low).min(p(high)) + rest
         best = best.min(value.upper())
         near = best.abs_upper() * arb(2) ** (-ctx.prec * 3 // 5) + 8 * value.rad()  # no halving tells more
-        if monotone or depth > DEPTH or bound.lower() >= (best - near if enough is None else enough):
+        if monotone or depth > ctx.prec or bound.lower() >= (best - near if enough is None else enough):
             bottom = bottom.min(bound.lower())
         elif enough is not None and best <= enough:
             return best
@@ -405,27 +405,55 @@ def least(parts: list[Any], enough: Any = None) -> Any:
     return best.min(bottom).union(best) if enough is None else bottom
 
 
-def prove(raw: dict[str, Any]) -> dict[str, Any]:
-    """Return enclosures of max |x| and of half the range [m], or of a peak and of its frequency [Hz].
+def stated(raw: dict[str, Any], at: dict[str, Any]) -> System:
+    """Return the system at a frequency, the loads of the contacts that vary times a factor."""
+    contacts, factor = list(raw["system"]["contacts"]), arb(at.get("load_factor", 1))
+    for j in raw.get("varies", ()):
+        load = [[order, arb(amplitude) * factor, phase] for order, amplitude, phase in contacts[j]["load"]]
+        contacts[j] = contacts[j] | {"load": load}
+    frequency = at.get("frequency_hz", raw["system"]["frequency_hz"])
+    return System(raw["system"] | {"frequency_hz": frequency, "contacts": contacts})
 
-    A peak is proved by orbits over a range of the frequency, a branch, and at three values in it: what is
-    reached in the middle is more than at both ends and at most what is reached over the range.
-    """
-    ctx.prec, found = raw["bits"], []
-    alone = [{"frequency_hz": raw["system"]["frequency_hz"], "unknowns": raw["orbit"].get("unknowns")}]
-    for at in raw.get("at", alone):
-        orbit = Orbit(System(raw["system"] | {"frequency_hz": at["frequency_hz"]}), raw["orbit"])
-        require(len(at["unknowns"]) == orbit.size, f"there must be {orbit.size} unknowns")
-        box = [arb(each) for each in at["unknowns"]]
-        low, high = orbit.extremes(box)
-        found.append(([arb(at["frequency_hz"]), *box], high.max(-low), (high - low) / 2))
-    if "at" not in raw:
-        return {"max_abs": found[0][1], "half_peak_to_peak": found[0][2]}
+
+def summit(found: list[Any]) -> tuple[Any, Any]:
+    """Return enclosures of a peak and of its frequency, proved by a branch over a range and orbits in it:
+    what is reached in the middle is more than at both ends, and at most what is reached over the range."""
     (over, most, _), (before, left, _), (at, top, _), (after, right, _) = found
     inside = all(a.contains(b) for one in (before, at, after) for a, b in zip(over, one, strict=True))
-    require(inside and before[0] < at[0] < after[0], "the three are not in their order on one branch")
+    require(inside and before[1] < at[1] < after[1], "the three are not in their order on one branch")
     require(left < top > right, f"it is no peak: {left.str(30)}, {top.str(30)}, {right.str(30)}")
-    return {"peak": top.lower().union(most.upper()), "frequency_hz": before[0].union(after[0])}
+    return top.lower().union(most.upper()), before[1].union(after[1])
+
+
+def prove(raw: dict[str, Any]) -> dict[str, Any]:
+    """Return enclosures of max |x| and half the range [m], or of a peak or a least peak and where it is.
+
+    Of three peaks that in the middle is the least, and for every load between max |x| is not below the last
+    orbit's at its frequency.
+    """
+    ctx.prec, found = raw["bits"], []
+    for at in raw.get("at", [raw["orbit"]]):
+        system, box = stated(raw, at), [arb(each) for each in at["unknowns"]]
+        orbit = Orbit(system, raw["orbit"])
+        require(len(box) == orbit.size, f"there must be {orbit.size} unknowns, got {len(box)}")
+        low, high = orbit.extremes(box)
+        where = [arb(at.get("load_factor", 1)), arb(at.get("frequency_hz", 0))]
+        found.append(([*where, *box], high.max(-low), (high - low) / 2))
+    if raw["certifies"] == "periodic orbit":
+        return {"max_abs": found[0][1], "half_peak_to_peak": found[0][2]}
+    if raw["certifies"] == "peak":
+        peak, frequency = summit(found)
+        return {"peak": peak, "frequency_hz": frequency}
+    (one, _), (least_peak, frequency), (other, _) = (summit(found[k : k + 4]) for k in (0, 4, 8))
+    (over, least_reached, _), factors = found[12], [at["load_factor"] for at in raw["at"][:12]]
+    require(factors == [factors[4 * (i // 4)] for i in range(12)], "a peak is of one load")
+    loads = [each[0][0] for each in found[:12:4]]
+    ordered = loads[0] < loads[1] < loads[2] and all(over[0].contains(load) for load in loads)
+    require(ordered, "the loads are not three in their order, or not all between are looked at")
+    told = f"it is not the least: {one.str(30)}, {least_peak.str(30)}, {other.str(30)}"
+    require(one > least_peak < other, told)
+    least_peak = least_reached.lower().union(least_peak.upper())
+    return {"least_peak": least_peak, "load_factor": loads[0].union(loads[2]), "frequency_hz": frequency}
 
 
 def check(raw: dict[str, Any]) -> None:
