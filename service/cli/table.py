@@ -197,6 +197,7 @@ COMMANDS = {
             "map", STUDY, "Map the response over frequency and a parameter, with the ridge of its peaks."
         ),
         CommandEntry("march", STUDY, "March in time until the motion repeats."),
+        CommandEntry("transient", STUDY, "Run through a range of frequencies in time."),
         CommandEntry("accuracy", STUDY, "Measure what accuracy costs."),
         CommandEntry(
             "sensitivities", STUDY,

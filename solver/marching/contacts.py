@@ -10,7 +10,7 @@ from scipy.sparse import csr_array
 
 from solver.contacts.laws.base import AnyContact
 from solver.contacts.laws.parts import Row
-from solver.marching.kernels.state import SparseRows
+from solver.marching.kernels.state import SparseRows, steady
 from solver.scene.bodies.kinematics import Form
 
 
@@ -52,7 +52,7 @@ def columns(placed: Sequence[tuple[Row, tuple[Form, ...]]], index: dict[str, int
     numbers = {name: np.array([getattr(row, name) for row in found], dtype=np.float64) for name in scalars}
     laws = np.array([row.follows.value for row in found], dtype=np.int64)
     motions = {"L": sparse_rows(L), "normal": sparse_rows(selection(normal, index, n))}
-    swings = {"waves": waves[0], "wave_phases": waves[1]}
+    swings = {"waves": waves[0], "wave_phases": waves[1], **steady(waves[0])}
     return {**numbers, **counts, **motions, **swings, "law": laws, "powers": powers, "numbers": own}
 
 

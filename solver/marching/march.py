@@ -33,6 +33,7 @@ FloatArray = NDArray[np.float64]
 LEAST_STEPS = 64
 FINER = 8  # times the least steps, where steps are of a lower order
 MOST_STEPS = 1_000_000
+PERIODS = 20_000  # at most, for each step size
 SAMPLES_PER_PERIOD = 2048
 REPEATS = 1e-7  # relative change of velocities, forces and of the drift at which a part is said to drift
 BALANCING = 30  # products with full matrices, of mixed units, in the bound of the fastest motion
@@ -80,7 +81,7 @@ def march(
     frequency_hz: float,
     steps_per_period: int | None = None,
     tolerance: float = 1e-10,
-    max_periods: int = 20_000,
+    max_periods: int = PERIODS,
     tractions: Mapping[str, float] | None = None,
     start: MarchStart | None = None,
     on_progress: Callable[[float, int], None] | None = None,
@@ -126,28 +127,57 @@ def march(
     """
     begin = time.perf_counter()
     _check(frequency_hz, tolerance, max_periods)
-    scene = scene.at_frequency(frequency_hz)
-    whole = annulus(scene) if scene.structure.has_sectors else scene
+    if start is not None and tractions is not None:
+        raise SettingError("tractions", dict(tractions), "must be those of `start` where that is given")
+    scene = whole(scene.at_frequency(frequency_hz))
     omega = 2.0 * math.pi * frequency_hz
-    equations = equations_of_motion(whole, omega)
-    rigid = whole.rigid_contact is not None
+    equations = equations_of_motion(scene, omega)
+    rigid = scene.rigid_contact is not None
     system = equations.system
     if rigid:
         system = system._replace(kt=_finite(system.kt), kn=_finite(system.kn))
-    steps = _steps(system, scene.forces, steps_per_period, moreau.STEPS if rigid else 0)
+    steps = steps_for(system, scene.forces, steps_per_period, moreau.STEPS if rigid else 0)
     plan = _Plan(
         system=equations.system, dof=equations.observed, tolerance=tolerance, max_periods=max_periods,
         on_progress=on_progress, should_stop=should_stop,
     )  # fmt: skip
-    names = tuple(row.name for row in rows(whole.contacts))
-    if start is not None and tractions is not None:
-        raise SettingError("tractions", dict(tractions), "must be those of `start` where that is given")
+    names = row_names(scene)
     begins = state_at(equations, start or MarchStart(tractions=tractions or {}), names, omega)
     if rigid:
         found = _twice_rigid(plan, equations, begins, steps, names, frequency_hz)
     else:
         found = _twice(plan, begins, steps, names, frequency_hz)
     return replace(found, seconds=time.perf_counter() - begin)
+
+
+def whole(scene: Scene) -> Scene:
+    """Return a scene as it is marched: a cyclic one as its annulus."""
+    return annulus(scene) if scene.structure.has_sectors else scene
+
+
+def row_names(scene: Scene) -> tuple[str, ...]:
+    """Return the names of what contacts are marched as."""
+    return tuple(row.name for row in rows(scene.contacts))
+
+
+def settled_state(
+    scene: Scene, frequency_hz: float, tolerance: float, should_stop: Callable[[], bool] | None
+) -> tuple[kernel.State, MarchStatus]:
+    """March a scene as its annulus, without rigid contacts, from rest until it repeats.
+
+    Returns
+    -------
+    The state at the angle 0, velocities by that angle, and how the march ended.
+    """
+    omega = 2.0 * math.pi * frequency_hz
+    equations = equations_of_motion(scene, omega)
+    plan = _Plan(
+        system=equations.system, dof=equations.observed, tolerance=tolerance, max_periods=PERIODS,
+        on_progress=None, should_stop=should_stop,
+    )  # fmt: skip
+    begins = state_at(equations, MarchStart(), row_names(scene), omega)
+    run = _run(plan, begins, steps_for(equations.system, scene.forces, None), done=0)
+    return run.state, run.status
 
 
 def _twice(
@@ -160,7 +190,7 @@ def _twice(
     if plan.on_progress is not None and fine.settled:
         plan.on_progress(1.0, periods)
     return describe(
-        record=fine.record, coarse=coarse.record, order=_order(plan.system),
+        record=fine.record, coarse=coarse.record, order=order_of(plan.system),
         transient=_left_to_decay(coarse.changes, fine.changes), periods=periods, contacts=names,
         frequency_hz=frequency_hz, steps_per_period=fine.steps, status=fine.status, drift=fine.drift,
     )  # fmt: skip
@@ -207,14 +237,16 @@ def _check(frequency_hz: float, tolerance: float, max_periods: int) -> None:
         raise SettingError("max_periods", max_periods, "must be a whole number from 1 to 1e8")
 
 
-def _steps(system: kernel.System, forces: tuple[Excitation, ...], wanted: int | None, least: int = 0) -> int:
+def steps_for(
+    system: kernel.System, forces: tuple[Excitation, ...], wanted: int | None, least: int = 0
+) -> int:
     """Steps of the finer run: the fastest motion turns less than 0.375 rad in one of them."""
     full = system.W.value.size > system.W.start.size - 1 or bool(np.any(np.abs(system.L.value) != 1.0))
     turns = 2.0 * math.pi * _fastest(system, BALANCING if full else 1)
     load = int(np.max(np.nonzero(system.waves)[1], initial=0)) + 1
     harmonic = max(load, *(force.harmonic for force in forces))
     least = max(least, LEAST_STEPS, 2 * math.ceil(turns / 1.5), 16 * harmonic)
-    finer = 2 if _order(system) == kernel.ORDER else FINER
+    finer = 2 if order_of(system) == kernel.ORDER else FINER
     chosen = max(2 * LEAST_STEPS, finer * least) if wanted is None else wanted
     if isinstance(chosen, Integral) and chosen % 2 == 0 and least <= chosen <= MOST_STEPS:
         return int(chosen)
@@ -222,7 +254,7 @@ def _steps(system: kernel.System, forces: tuple[Excitation, ...], wanted: int | 
     raise SettingError("steps_per_period", chosen, f"must be an even number up to {MOST_STEPS}; {needs}")
 
 
-def _order(system: kernel.System) -> int:
+def order_of(system: kernel.System) -> int:
     """Order of the steps: less than that of the series with laws given by functions."""
     given = system.law == kernel.HISTORY
     if np.any(given & (system.in_steps == 1)):
@@ -265,10 +297,10 @@ def _largest(matrix: csr_array, products: int) -> float:
 
 def _run(plan: _Plan, start: kernel.State, steps: int, *, done: int) -> _Run:
     """March until the motion repeats, then one period more with a record."""
-    state = _copied(start)
+    state = copied(start)
     nothing = _record(plan, 0)
     status, changes, fraction = MarchStatus.MAX_PERIODS, np.empty(0), 0.9 if done else 0.0
-    drift, places = 0.0, [_copied(state)]
+    drift, places = 0.0, [copied(state)]
     many = max(1, min(MOST_PERIODS, int(WORK / (steps * (state.x.size + 8 * state.force.size)))))
     while changes.size < plan.max_periods:
         chunk = np.empty(min(many, plan.max_periods - changes.size))
@@ -279,7 +311,7 @@ def _run(plan: _Plan, start: kernel.State, steps: int, *, done: int) -> _Run:
         if code != kernel.RAN:
             status = _STATUS[code]
             break
-        places = [*places[-2:], _copied(state)]
+        places = [*places[-2:], copied(state)]
         drift = _drift(places) / chunk.size
         if drift > 0.0:
             status = MarchStatus.RATCHETS
@@ -298,7 +330,8 @@ def _run(plan: _Plan, start: kernel.State, steps: int, *, done: int) -> _Run:
     return _Run(state=state, record=record, status=status, steps=steps, changes=changes, drift=drift)
 
 
-def _copied(state: kernel.State) -> kernel.State:
+def copied(state: kernel.State) -> kernel.State:
+    """Return a state that is moved on without the other."""
     x, v, force, mode, own = (each.copy() for each in state)
     return kernel.State(x, v, force, mode, own)  # type: ignore[arg-type]
 

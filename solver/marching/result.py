@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
 
-from solver.arrays import FloatOrNaN, Real
+from solver.arrays import FloatOrNaN, Integer, Real
 from solver.results.base import Drawn
 from solver.results.views import Data, Views
 
@@ -164,17 +164,31 @@ def describe(
 
 def _extremes(record: Record) -> tuple[float, float]:
     """Least and largest displacement of the period: of the cubics through samples and their slopes."""
-    x, v = record.x, record.v
-    h = 2.0 * math.pi / x.size
-    x1, v0, v1 = np.roll(x, -1), h * v, h * np.roll(v, -1)
+    x, h = record.x, 2.0 * math.pi / record.x.size
+    _, _, between = turning_points(np.append(x, x[:1]), h * np.append(record.v, record.v[:1]))
+    values = np.concatenate([x, between])
+    return float(values.min()), float(values.max())
+
+
+def turning_points(x: Real, slopes: Real) -> tuple[Integer, Real, Real]:
+    """Return where the cubics through samples turn between them.
+
+    Parameters
+    ----------
+    x, slopes : samples and their slopes a step, (n + 1,).
+
+    Returns
+    -------
+    Numbers of the steps, the places 0 to 1 within them, and the values there.
+    """
+    x0, x1, v0, v1 = x[:-1], x[1:], slopes[:-1], slopes[1:]
     turning = np.flatnonzero(v0 * v1 < 0.0)
-    a = (2.0 * x + v0 - 2.0 * x1 + v1)[turning]
-    b = (-3.0 * x - 2.0 * v0 + 3.0 * x1 - v1)[turning]
-    v0, x0 = v0[turning], x[turning]
+    a = (2.0 * x0 + v0 - 2.0 * x1 + v1)[turning]
+    b = (-3.0 * x0 - 2.0 * v0 + 3.0 * x1 - v1)[turning]
+    v0, x0 = v0[turning], x0[turning]
     root = np.sqrt(np.maximum(b**2 - 3.0 * a * v0, 0.0))
     s = np.clip(-v0 / (b + np.where(v0 > 0.0, -root, root)), 0.0, 1.0)
-    values = np.concatenate([x, x0 + s * (v0 + s * (b + s * a))])
-    return float(values.min()), float(values.max())
+    return turning, s, x0 + s * (v0 + s * (b + s * a))
 
 
 def _step_error(max_abs: float, coarse: Record, order: int) -> float:

@@ -29,13 +29,15 @@ def asked(kind: str, name: str) -> dict[str, Any]:
     near = {"from": 0.98 * middle, "to": 1.02 * middle}
     ends = [0.5 * force, 1.5 * force]
     over = {"parameter": FORCE, "from": 0.99 * force, "to": 1.01 * force}
-    rough = {} if kind in ("accuracy", "interference", "march") else {"harmonics": 1}
+    rough = {} if kind in ("accuracy", "interference", "march", "transient") else {"harmonics": 1}
     at = [low, middle, high]
     own: dict[str, dict[str, Any]] = {
         "solve": {"frequency_hz": middle}, "sweep": near, "peaks": {**over, "checks": 1},
         "map": {**over, "steps": 2, "frequencies": 2, "ridge": name == "two-dof"},
         "design": {"variables": {FORCE: ends}}, "pareto": {"variables": {FORCE: ends}, "points": 3},
-        "march": {"frequency_hz": middle, "max_periods": 3}, "controlled": {"amplitude": 1e-5, **near},
+        "march": {"frequency_hz": middle, "max_periods": 3},
+        "transient": {"begin_hz": low, "end_hz": middle, "ramp_seconds": 10.0 / middle, "from_rest": True},
+        "controlled": {"amplitude": 1e-5, **near},
         "accuracy": {"frequency_hz": middle, "harmonics": [1, 2], "samples": [16], "repeats": 1},
         "campbell": {"speeds_rpm": [[60 * middle, 61 * middle]]}, "interference": {"speed_rpm": 3000},
         "mistuning": {"of": [scene.observe.dof], "samples": 1, **near}, "modes": {"from": 1e-5, "to": 2e-5},

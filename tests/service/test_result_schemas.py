@@ -55,6 +55,7 @@ BODIES: dict[str, tuple[str, Mapping[str, Any]]] = {
         },
     ),
     "march": ("march", {**MARCH, "history": True}),
+    "transient": ("transient", {"scene": "two-dof", "begin_hz": 0.9, "end_hz": 1.2, "ramp_seconds": 20.0}),
     "a march that does not settle": ("march", {**MARCH, "max_periods": 1}),
 }
 ON_THE_WAY = {"accuracy", "design", "map", "pareto", "peaks"}

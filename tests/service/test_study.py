@@ -43,6 +43,7 @@ OF_PYTHON: Mapping[str, set[str]] = {
     "map": {"effects"},
     "peaks": {"effects"},
     "march": {"start", "tractions"},
+    "transient": {"start"},
     "modes": {"amplitudes", "errors", "found", "most_points", "stability"},
     "controlled": {"errors", "most_points", "stability"},
 }

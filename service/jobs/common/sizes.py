@@ -157,18 +157,23 @@ def _unknown_issues(scene: Scene, harmonics: int, sectors: int) -> list[Issue]:
     return [Issue(("scene",), f"must have contacts for at most {MOST_UNKNOWNS} unknowns", got)]
 
 
-def march_issues(scene: Scene, steps_per_period: int | None, max_periods: int) -> list[Issue]:
-    """Refuse a march of more steps than one job should make, or of too large matrices."""
+def march_issues(
+    scene: Scene, steps_per_period: int | None, periods: int, of_periods: str = "max_periods"
+) -> list[Issue]:
+    """Refuse a march of more steps than one job should make, or of too large matrices.
+
+    `of_periods` is the key that says how many periods there are.
+    """
     # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
     from solver.studies.memory import march_bytes
 
     if not _fits(needed := march_bytes(scene)):
         return [_too_much("scene", needed)]
     dofs = whole_disk_dofs(scene)
-    steps = (steps_per_period or FEWEST_STEPS) * max_periods * dofs
+    steps = (steps_per_period or FEWEST_STEPS) * periods * dofs
     if steps <= MOST_STEPS:
         return []
-    key = "max_periods" if steps_per_period is None else "steps_per_period"
+    key = of_periods if steps_per_period is None else "steps_per_period"
     words = "steps of a period × periods × DOFs"
     return [Issue((key,), f"`{key}`: {words} must be at most {MOST_STEPS}", steps, named=False)]
 

@@ -23,6 +23,7 @@ from service.jobs.studies.plan import Plan
 from service.jobs.studies.sensitivities import Sensitivities
 from service.jobs.studies.solve import Solve
 from service.jobs.studies.sweep import Sweep
+from service.jobs.studies.transient import Transient
 from service.jobs.study import Study
 
 
@@ -43,6 +44,7 @@ SHIPPED = Registry(
         Pareto.as_kind(),
         Solve.as_kind(),
         March.as_kind(),
+        Transient.as_kind(),
         Accuracy.as_kind(),
         Campbell.as_kind(),
         Interference.as_kind(),

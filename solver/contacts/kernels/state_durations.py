@@ -36,19 +36,21 @@ from solver.jit.trig_polynomial import FALLING, RISING, at_point, bracketed_root
 def contact_intervals(c: Real, s: Real, degree: int, value: Real, slope: Real, out: Real) -> int:
     """Fill `out` with [begin, end] of every interval with N > 0, when N < 0 somewhere; return their number.
 
-    The intervals are unwrapped: an end may exceed 2π. −1 means N never becomes negative.
+    The intervals are unwrapped: an end may exceed 2π. −1 means N never becomes negative, but for rounding.
     """
     n = value.size
     delta = 2.0 * math.pi / n
-    low = 0.0
+    low, touches = 0.0, 0.0
+    for k in range(degree + 1):
+        touches -= ROUNDING * math.hypot(c[k], s[k])
     negative = -1
     for j in range(n):
-        if value[j] < 0.0:
+        if value[j] < touches:
             negative = j
             break
     if negative < 0:
         above, low = _smallest(c, s, degree, value, slope)
-        if above >= 0.0:
+        if above >= touches:
             return -1
     else:
         low = negative * delta
@@ -95,10 +97,11 @@ def contact_intervals(c: Real, s: Real, degree: int, value: Real, slope: Real, o
 def one_wave(mean: float, cosine: float, sine: float, out: Real) -> int:
     """Fill `out` with the interval where mean + cosine cos τ + sine sin τ > 0; as `contact_intervals`.
 
-    With ψ its phase and R its amplitude it is |τ − ψ| < h, tan²(h/2) = (R + mean)/(R − mean).
+    With ψ its phase and R its amplitude it is |τ − ψ| < h, tan²(h/2) = (R + mean)/(R − mean). Where both are
+    equal it touches 0 and does not open, whichever of them rounding makes larger.
     """
     amplitude = math.hypot(cosine, sine)
-    if mean >= amplitude:
+    if mean >= amplitude * (1.0 - ROUNDING):
         return -1 if mean > 0.0 else 0
     if mean <= -amplitude:
         return 0
@@ -293,9 +296,9 @@ def _march_circle(
     if high_minus + high_plus <= tol:
         row = segments[0]
         row.motion, row.begin, row.end = STICK, 0.0, 2.0 * math.pi
-        if high_minus > 0.0:
+        if high_minus > tol:
             row.direction, row.onset, row.began = -1.0, at_minus, AFTER_SLIP
-        elif high_plus > 0.0:
+        elif high_plus > tol:
             row.direction, row.onset, row.began = 1.0, at_plus, AFTER_SLIP
         else:
             row.direction, row.onset, row.began = 1.0, 0.0, UNLOADED

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from solver.balance.kernels.output import HIGH, LOW, MAX_ABS, PIECE
 from solver.continuation.extrema.kernels.intervals import BENT, MATTERS, STEEP, WORTH_POLISHING
 from solver.continuation.extrema.node_table import PointRow
-from solver.continuation.extrema.nodes import NodeSolver
+from solver.continuation.extrema.nodes import NodeSolver, numbers_of
 from solver.jit.fourier import Integer, Real
 
 # Up to these departures from what the points beside an interval foretell a change in it hides no maximum:
@@ -22,6 +22,9 @@ FORETOLD, STEEPER = 1e-3, 12.0
 FORETOLD_BESIDE = 1e-2  # the first of them, of an interval beside a change
 MOST_CHANGES = 16  # in one interval of the branch
 MOST_HALVINGS = 4  # of what a change leaves on either side of it
+# A contact whose motion, by its slope at an end, changes over an interval by so many times its size may do
+# something else in between and the same again at the other end.
+CHANGES_ALL = 2.0
 BESIDE = 4.0  # times steeper than usual the curves have to be beside a change for no check
 CURVES = [HIGH, LOW]
 _APART, _BEFORE, _BEHIND, _BETWEEN = 0, 1, 2, 3  # an interval and changes
@@ -42,6 +45,11 @@ class ChangeSearch:
     def run(self, nodes: list[PointRow]) -> list[PointRow]:
         """Return the nodes with those added."""
         top = max(node.measures[MAX_ABS] for node in nodes)
+        for _ in range(MOST_HALVINGS):
+            hiding = self._hiding(nodes, top)
+            if not hiding.any():
+                break
+            nodes, _, _ = self._solver.halved(nodes, hiding)
         wanted = self._wanted(nodes, top)
         if not wanted.any():
             return nodes
@@ -59,6 +67,26 @@ class ChangeSearch:
         grown += nodes[begun:]
         kinds += [_APART] * (len(nodes) - 1 - begun)
         return self._checked(grown, np.array(kinds), top)
+
+    def _hiding(self, nodes: list[PointRow], top: float) -> NDArray[np.bool_]:
+        """Return where a contact may change and change back with a maximum between, (P − 1,)."""
+        seen, table, rows = self._solver.look(nodes, top), self._solver.table, numbers_of(nodes)
+        stands = np.maximum(seen.measures[1:, MAX_ABS], seen.measures[:-1, MAX_ABS])
+        may = (np.diff(seen.measures[:, PIECE]) == 0.0) & (stands >= self._worth * top)
+        if may.any():
+            may &= self._departs(nodes, top, FORETOLD).all(axis=0)
+        at = np.flatnonzero(may)
+        if at.size == 0:
+            return np.asarray(may, dtype=bool)
+        balance = self._solver.workspace.balance
+        shape = (2, at.size, balance.n_ports, balance.n_coefficients)
+        ends = np.array([rows[at], rows[at + 1]])
+        onward = np.abs(table.tangents[ends, -1])
+        length = np.abs(seen.at[at + 1] - seen.at[at])
+        sizes = np.linalg.norm(table.solutions[ends, :-1].reshape(shape), axis=-1).max(axis=0)
+        slopes = np.linalg.norm(table.tangents[ends, :-1].reshape(shape), axis=-1) * length[:, None]
+        may[at] = (slopes > CHANGES_ALL * onward[..., None] * sizes).any(axis=(0, 2))
+        return np.asarray(may, dtype=bool)
 
     def _wanted(self, nodes: list[PointRow], top: float) -> NDArray[np.bool_]:
         """Return in which intervals a change may hide a maximum, (P − 1,)."""

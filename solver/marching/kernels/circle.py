@@ -31,7 +31,6 @@ from solver.marching.kernels.state import (
     load_rise,
     normal_slip,
     slip,
-    swing,
 )
 
 SLIP = 1  # the mode of a contact in space that slips
@@ -50,7 +49,7 @@ def load_size(system: System, series: Series, c: int) -> float:
     Not from the whole series: near the pole its last terms are large where the step is cut.
     """
     moved = abs(normal_slip(system, series.x[0], c)) + abs(normal_slip(system, series.x[1], c))
-    return abs(system.N0[c]) + swing(system, c) + system.kn[c] * moved
+    return abs(system.N0[c]) + system.swing[c] + system.kn[c] * moved
 
 
 @compiled

@@ -64,9 +64,9 @@ from solver.marching.kernels.state import (
     power_series,
     product,
     pull_back,
+    push_series,
     slip,
-    swing,
-    wave,
+    turn_matrices,
 )
 
 
@@ -81,9 +81,8 @@ def _contact_series(system: System, state: State, series: Series, k: int) -> Non
             continue
         if law in (ELASTIC_NORMAL, CIRCLE):
             series.load[k, c] += system.kn[c] * normal_slip(system, series.x[k], c)
-            series.normal[k, c] = 0.0 if mode == SEPARATED else series.load[k, c]
-            if k == 0:
-                series.normal[k, c] -= system.rest[c]
+            if mode != SEPARATED:
+                series.normal[k, c] += series.load[k, c]
         if law == CIRCLE:
             series.load[k, c + 1] = series.load[k, c]
             circle_series(system, state, series, c, k)
@@ -102,15 +101,13 @@ def _contact_series(system: System, state: State, series: Series, k: int) -> Non
 
 
 @compiled
-def _pull(system: System, tau: float, k: int, scale: float, series: Series) -> None:
+def _pull(system: System, k: int, series: Series) -> None:
     """Fill in coefficient k of what forces and contacts pull at each DOF."""
     f, pull = series.force[k], series.pull
     for i in range(pull.size):
         pull[i] = 0.0
     for e in range(system.force_dof.size):
-        harmonic = system.force_harmonic[e]
-        turn = wave(k, harmonic * tau + system.force_phase[e])
-        pull[system.force_dof[e]] += system.force_amplitude[e] * turn * scale * float(harmonic) ** k
+        pull[system.force_dof[e]] += series.push[k, e]
     for c in range(system.kt.size):
         pull_back(system.L, c, f[c], pull)
         if system.law[c] in (ELASTIC_NORMAL, CIRCLE) and system.presses[c] > 0.0:
@@ -125,18 +122,17 @@ def _expand(system: System, state: State, tau: float, h: float, series: Series) 
         series.x[0, i] = state.x[i]
         series.v[0, i] = state.v[i]
     load_series(system, tau, h, series)
+    push_series(system, tau, h, series)
     _contact_series(system, state, series, 0)
-    scale = 1.0  # h^k / k!
     for k in range(ORDER):
         x, v, rise, pull = series.x[k], series.v[k], series.v[k + 1], series.pull
-        _pull(system, tau, k, scale, series)
+        _pull(system, k, series)
         for i in range(n):
             rise[i] = product(system.W, pull, i)
             rise[i] -= product(system.A, x, i)
             rise[i] -= product(system.B, v, i)
             rise[i] *= h / (k + 1)
             series.x[k + 1, i] = h / (k + 1) * v[i]
-        scale *= h / (k + 1)
         _contact_series(system, state, series, k + 1)
 
 
@@ -197,7 +193,7 @@ def _next_change(
         return circle_change(system, state, series, c, q)
     if law == GAP:
         return _gap_change(system, series, c, mode, q)
-    margin = abs(system.N0[c]) + swing(system, c)
+    margin = abs(system.N0[c]) + system.swing[c]
     if law == ELASTIC_NORMAL:
         margin += system.kn[c] * motion_size(system, series, c, True)
     margin *= 1e-13
@@ -286,20 +282,21 @@ def _sample(system: System, series: Series, place: float, index: int, dof: int, 
 
 @apart
 def _step(
-    system: System, state: State, step: int, steps: int, dof: int, record: Record, series: Series, q: Real
-) -> bool:
-    """Go over one step of the grid, cut at every change of state; False if the changes do not end."""
-    h = 2.0 * math.pi / steps
-    start = step * h
-    gone, small, per_step = 0.0, 0, record.x.size // steps
-    sample = 0
+    system: System, state: State, start: float, h: float, dof: int, record: Record, at: int, per_step: int,
+    series: Series, q: Real,
+) -> bool:  # fmt: skip
+    """Go over one step of the grid, cut at every change of state; False if the changes do not end.
+
+    `at`: place in the record of the first of `per_step` samples.
+    """
+    gone, small, sample = 0.0, 0, 0
     while True:
         rest = h - gone
         _expand_all(system, state, start + gone, rest, series)
         when, target, which = NONE, STICK, -1
         far = 1.0
         for c in range(system.kt.size):
-            if system.law[c] != COULOMB or system.mu[c] * (system.N0[c] + swing(system, c)) > 0.0:
+            if system.law[c] != COULOMB or system.mu[c] * (system.N0[c] + system.swing[c]) > 0.0:
                 s, mode = _next_change(system, state, series, rest, c, q)
                 if s < when:
                     when, target, which = s, mode, c
@@ -308,7 +305,7 @@ def _step(
         end = min(when, far)
         while sample < per_step and sample / per_step * h <= gone + end * rest:
             place = max((sample / per_step * h - gone) / rest, 0.0)
-            _sample(system, series, place, step * per_step + sample, dof, record)
+            _sample(system, series, place, at + sample, dof, record)
             sample += 1
         if any_history(system):
             advance_history(system, state, series, rest, end)
@@ -356,23 +353,31 @@ def run_periods(
     return _run_periods(held, here, steps, tolerance, dof, kept, change)
 
 
+@compiled
+def _scratch(system: System, state: State) -> Series:
+    """Return the series of a step, to be filled."""
+    n, n_contacts, rows = state.x.size, system.kt.size, ORDER + 1
+    return new_series(
+        np.empty((rows, n)), np.empty((rows, n)), np.empty((rows, n_contacts)), np.empty((rows, n_contacts)),
+        np.empty((rows, system.force_dof.size)), np.empty((2, rows)), np.empty(n),
+        np.empty((rows, n_contacts)), np.empty((n_contacts, system.powers.shape[1], rows)),
+        np.zeros((n_contacts, TURN_ROWS, rows)), np.zeros((n_contacts, rows)),
+    )  # fmt: skip
+
+
 @apart
 def _run_periods(
     system: System, state: State, steps: int, tolerance: float, dof: int, record: Record, change: Real
 ) -> tuple[int, int]:
     """As `run_periods`, all of it by reference."""
-    n, n_contacts, rows = state.x.size, system.kt.size, ORDER + 1
-    series = new_series(
-        np.empty((rows, n)), np.empty((rows, n)), np.empty((rows, n_contacts)), np.empty((rows, n_contacts)),
-        np.empty(n), np.empty((rows, n_contacts)), np.empty((n_contacts, system.powers.shape[1], rows)),
-        np.zeros((n_contacts, TURN_ROWS, rows)), np.zeros((n_contacts, rows)),
-    )  # fmt: skip
-    q = np.empty(rows)
+    n, n_contacts = state.x.size, system.kt.size
+    series, q = _scratch(system, state), np.empty(ORDER + 1)
+    h, per_step = 2.0 * math.pi / steps, record.x.size // steps
     for period in range(change.size):
         x, v, force = state.x.copy(), state.v.copy(), state.force.copy()
         top_x, top_v, top_force = 0.0, 0.0, 0.0
         for step in range(steps):
-            if not _step(system, state, step, steps, dof, record, series, q):
+            if not _step(system, state, step * h, h, dof, record, step * per_step, per_step, series, q):
                 return CHATTER, period
             for i in range(n):
                 top_x = max(top_x, abs(state.x[i]))
@@ -388,3 +393,29 @@ def _run_periods(
         if change[period] < tolerance:
             return SETTLED, period + 1
     return RAN, change.size
+
+
+@compiled
+def run_steps(
+    system: System, state: State, first: int, count: int, h: float, dof: int, record: Record
+) -> int:
+    """March `count` steps h from τ = first · h on; return RAN, CHATTER or NOT_FINITE.
+
+    `record` takes a sample where each step begins, (count,).
+    """
+    held, here, kept = new_system(*system), new_state(*state), new_record(*record)
+    return _run_steps(held, here, first, count, h, dof, kept)
+
+
+@apart
+def _run_steps(
+    system: System, state: State, first: int, count: int, h: float, dof: int, record: Record
+) -> int:
+    """As `run_steps`, all of it by reference."""
+    series, q = _scratch(system, state), np.empty(ORDER + 1)
+    for step in range(count):
+        start = (first + step) * h
+        turn_matrices(system, start + 0.5 * h)
+        if not _step(system, state, start, h, dof, record, step, 1, series, q):
+            return CHATTER
+    return RAN if finite(state) else NOT_FINITE

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from solver.results import units
@@ -13,6 +13,7 @@ from solver.scene.parameter_paths import parameter
 Json = Mapping[str, Any]
 Pairs = list[tuple[str, str]]
 
+ROUNDING = 1e-14  # share of the largest harmonic that may be left where there is none
 _ACCURACY_COLUMNS = ("", "harmonics", "contact forces", "max|x|", "error", "ms", "iterations")
 _SOLUTION_COLUMNS = ("half peak to peak", "mean", "", "largest multiplier", "found by", "residual forces")
 _EFFECT_COLUMNS = ("used", "effect", "reason")
@@ -55,7 +56,7 @@ def solution(found: Json) -> Iterator[Block]:
         of = "half peak to peak" if "mean_undetermined" in found["flags"] else "max|x|"
         pairs.append(("estimated error", f"{units.length(found['error_estimate'])} of {of}"))
     pairs += _proof(found.get("certificate"))
-    pairs.append(("harmonics 1 to 5", ", ".join(units.length(a) for a in found["harmonics"][1:6])))
+    pairs.append(("harmonics 1 to 5", _harmonics(found["harmonics"])))
     pairs += [(f"contact {name}", state) for name, state in found["contacts"].items()]
     if "stable" in found:
         pairs.append(("stable", f"{found['stable']}: {found['stable_ground']}"))
@@ -67,6 +68,12 @@ def solution(found: Json) -> Iterator[Block]:
         pairs.append(("mean, any history", f"{units.length(low)} to {units.length(high)}"))
     pairs += [("residual", f"{found['residual']:.1e}"), ("time", units.duration(found["seconds"]))]
     yield Summary(title, pairs)
+
+
+def _harmonics(amplitudes: Sequence[float]) -> str:
+    """Return the first five; what rounding leaves of one is 0."""
+    least = ROUNDING * max(amplitudes)
+    return ", ".join(units.length(a if a > least else 0.0) for a in amplitudes[1:6])
 
 
 def _proof(proof: Json | None) -> Pairs:
@@ -201,6 +208,23 @@ def march(found: Json) -> Iterator[Block]:
     pairs.append(("periods", f"{found['periods']} of {found['steps_per_period']} steps"))
     pairs.append(("time", units.duration(found["seconds"])))
     yield Summary("Time march", pairs)
+
+
+def transient(found: Json) -> Iterator[Block]:
+    """What a run through a range of frequencies came to."""
+    begin, end = units.number(found["begin_hz"]), units.number(found["end_hz"])
+    pairs = []
+    if found["max_abs"] is not None:
+        at = f"{units.number(found['at_hz'])} Hz, after {units.number(found['at_seconds'])} s"
+        pairs.append(("largest max|x|", f"{units.length(found['max_abs'])} at {at}"))
+    if found["error_estimate"] is not None:
+        pairs.append(("estimated error", f"{found['error_estimate']:.1e} of it"))
+    took = f"{units.number(found['ramp_seconds'])} s"
+    if found["ring_down_seconds"] > 0.0:
+        took += f", then {units.number(found['ring_down_seconds'])} s without excitation"
+    pairs += [("run", took), ("steps", f"{found['steps_per_period']} a period of the highest frequency")]
+    pairs.append(("time", units.duration(found["seconds"])))
+    yield Summary(f"{found['scene']} from {begin} to {end} Hz", pairs)
 
 
 def _amplitudes(found: Json) -> Pairs:

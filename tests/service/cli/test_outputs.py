@@ -19,6 +19,7 @@ COMMANDS = {
     "solve": "two-dof --frequency 1.2 --harmonics 3",
     "sweep": "two-dof --from 0.8 --to 1.4 --harmonics 3",
     "march": "two-dof --frequency 1.2",
+    "transient": "two-dof --from 0.9 --to 1.2 --rate 0.02",
     "peaks": "two-dof --parameter damper.N0 --from 50 --to 200 --harmonics 3",
     "map": "two-dof --parameter damper.N0 --from 50 --to 200 --steps 3 --frequencies 5 --harmonics 3",
     "mistuning": "bladed-disk --of tip --samples 2 --harmonics 1 --from 740 --to 780",
@@ -71,6 +72,7 @@ def results() -> dict[str, Any]:
     return {
         "solve": solver.solve(scene, frequency_hz=1.2, harmonics=3),
         "march": solver.march(scene, frequency_hz=1.2),
+        "transient": solver.transient(scene, begin_hz=0.9, end_hz=1.2, rate_hz_per_s=0.02),
         "map": solver.response_map(scene, "damper.N0", 50, 200, steps=3, frequencies=5, harmonics=3),
         "peaks": solver.track_peak(scene, "damper.N0", 50, 200, harmonics=3),
         "mistuning": solver.mistuning_study(

@@ -329,3 +329,36 @@ def test_what_did_not_converge_has_no_motion():
         with pytest.raises(SettingError, match="must have converged") as error:
             call(failed)
         assert error.value.name == "solution"
+
+
+@pytest.mark.parametrize("loads", [{"N1_ratio": 1.0}, {"load": [{"order": 2, "amplitude": 100.0}]}])
+def test_a_load_that_touches_zero_does_not_open_by_rounding(loads: dict[str, Any]):
+    """Whether the least of it is 1e-17 N or -1e-17 N is a matter of the origin of time."""
+    raw: dict[str, Any] = two_dof(N0=100.0).to_dict()
+    contact = raw["contacts"][0]
+    contact.pop("N1_ratio")
+    found = []
+    for phase in np.linspace(-3.0, 3.0, 23).tolist():
+        given = {"N1_phase": phase, **loads}
+        if "load" in loads:
+            given = {"load": [{**loads["load"][0], "phase": 2.0 * phase}]}
+        raw["contacts"][0] = contact | given
+        raw["excitation"]["phase"] = phase
+        found.append(solve(Scene.from_dict(raw), frequency_hz=1.198))
+    assert {each.flags for each in found} == {()}
+    assert [each.contacts[0].state.name for each in found] == ["SLIPPING"] * len(found)
+    np.testing.assert_allclose([each.max_abs for each in found], found[0].max_abs, rtol=1e-10)
+
+
+@pytest.mark.parametrize("phase", np.linspace(-3.0, 3.0, 13).tolist())
+def test_a_part_at_rest_under_a_load_that_touches_zero_stays(phase: float):
+    """Rounding decided whether the contact that alone holds it held anything."""
+    raw = loose_mass().to_dict()
+    raw["structure"]["masses"]["still"] = 1.0  # type: ignore[index]
+    touching = {"kt": 40.0, "mu": 0.3, "N0": 30.0, "N1_ratio": 1.0, "N1_phase": phase}
+    still = {"name": "still", "between": ["still", "ground"], **touching}
+    raw["contacts"].append(still)  # type: ignore[attr-defined]
+    solution = solve(Scene.from_dict(raw), frequency_hz=1.7)
+    assert solution.converged
+    assert solution.contacts[-1].state.name == "STUCK"
+    assert solution.max_abs == pytest.approx(solved("loose mass").max_abs, rel=1e-9)

@@ -228,7 +228,7 @@ def test_too_few_periods():
 
 
 def test_growth_without_bound(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(marching, "_steps", lambda *_: 4)
+    monkeypatch.setattr(marching, "steps_for", lambda *_: 4)
     result = march(load_scene("two-dof"), frequency_hz=0.01, max_periods=100)
     assert result.status is MarchStatus.NOT_FINITE
     assert result.to_json()["max_abs"] is None

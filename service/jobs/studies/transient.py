@@ -1,0 +1,87 @@
+"""The study `transient`: a run through a range of frequencies in time."""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+from typing import TYPE_CHECKING, Annotated
+
+from pydantic import ConfigDict, Field
+
+from service.jobs.common.results import answered
+from service.jobs.common.scenes import Number, PositiveNumber, check
+from service.jobs.common.sizes import march_issues
+from service.jobs.registry import Flag
+from service.jobs.study import Study
+from solver.errors import Issue
+
+if TYPE_CHECKING:
+    from solver.marching.ramp import Ramp
+    from solver.scene.scene import Scene
+
+_NotNegative = Annotated[Number, Field(ge=0.0)]
+
+
+class Transient(Study):
+    """Run through a range of frequencies in time.
+
+    A run-up, run-down or sine sweep at a constant rate, with a ring-down behind it if wanted.
+    """
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [{"scene": "two-dof", "begin_hz": 0.5, "end_hz": 1.6, "rate_hz_per_s": 0.01}]
+        }
+    )
+    NAME, FUNCTION = "transient", "solver:transient"
+    RESULT = answered("solver.marching.transient_result:TransientResult", "TransientResult")
+    TOLD = "solver.views.tables.responses:transient"
+    SHOWS, COUNTED = "the largest amplitude of a run ([transients](transients.md))", "turns"
+    FIGURE, EMPTY = "solver.views.plots.transients:transient_figure", ("time", "nothing was run through")
+
+    begin_hz: Annotated[_NotNegative | None, Flag("--from", "F")] = Field(
+        default=None, description="Frequency at the beginning [Hz]; that of the scene's band."
+    )
+    end_hz: Annotated[_NotNegative | None, Flag("--to", "F")] = Field(
+        default=None, description="Frequency at the end [Hz]; below the first one in a run-down."
+    )
+    rate_hz_per_s: Annotated[PositiveNumber | None, Flag("--rate", "R")] = Field(
+        default=None, description="How fast the frequency changes [Hz/s]; or give `ramp_seconds`."
+    )
+    ramp_seconds: Annotated[PositiveNumber | None, Flag(metavar="T")] = Field(
+        default=None, description="How long it takes from the one to the other [s]."
+    )
+    ring_down_seconds: Annotated[_NotNegative, Flag(metavar="T")] = Field(
+        default=0.0, description="How long the motion is followed after that without excitation [s]."
+    )
+    from_rest: Annotated[bool, Field(strict=True)] = Field(
+        default=False, description="Begin at rest instead of in the motion that repeats at the beginning."
+    )
+    tolerance: Annotated[float, Field(strict=True, ge=1e-12, le=0.1), Flag(metavar="E")] = Field(
+        default=1e-6, description="Of the largest amplitude, relative."
+    )
+    steps_per_period: Annotated[int | None, Field(strict=True, ge=16, le=1_000_000), Flag("--steps", "N")] = (
+        Field(default=None, description="Steps in a period of the highest frequency; chosen if left out.")
+    )
+
+    def ramps(self, scene: Scene) -> tuple[Ramp, ...]:
+        """Return what is to be run through; SettingError names what is wrong."""
+        # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
+        from solver.marching.transient import ramps_of
+
+        keys = ("begin_hz", "end_hz", "rate_hz_per_s", "ramp_seconds", "ring_down_seconds")
+        return ramps_of(scene, **{key: getattr(self, key) for key in keys})
+
+    def issues(self, scene: Scene) -> list[Issue]:
+        """Return what is wrong with the range and the rate."""
+        return check(partial(self.ramps, scene))
+
+    def sizes(self, scene: Scene) -> list[Issue]:
+        """Return what is too large."""
+        ramps = self.ramps(scene)
+        periods = sum(ramp.seconds for ramp in ramps) * max(ramps[0].begin_hz, ramps[0].end_hz)
+        key = "rate_hz_per_s" if self.ramp_seconds is None else "ramp_seconds"
+        return march_issues(scene, self.steps_per_period, math.ceil(periods), key)
+
+
+STUDY = Transient

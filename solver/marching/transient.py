@@ -1,0 +1,318 @@
+"""A run through a range of frequencies: run-up, run-down, a sine sweep, a ring-down.
+
+What happens between two changes of state is followed by the Taylor steps of the march, every change located;
+the frequency, and along an engine-order line what follows the speed, change within the steps.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass
+from numbers import Real
+
+import numpy as np
+
+from solver import arrays
+from solver.errors import SettingError
+from solver.marching.equations import MarchEquations, equations_of_motion
+from solver.marching.kernels import state as kernel
+from solver.marching.kernels import taylor as stepping
+from solver.marching.march import copied, order_of, row_names, settled_state, steps_for, whole
+from solver.marching.ramp import Ramp, check, equations_over
+from solver.marching.result import MarchStatus, turning_points
+from solver.marching.start import MarchStart, state_at
+from solver.marching.transient_result import TransientResult, TransientStatus
+from solver.results.watch import OnProgress, ShouldStop, shows_progress
+from solver.scene.scene import Scene
+
+MOST_WINDOWS = 2000  # of the envelope, over the whole run
+MOST_STEPS = 2**28  # of a run
+MOST = 1e9  # Hz and s
+FINEST = 5  # times that steps are halved to meet the tolerance
+SETTLED = 1e-10  # relative change over a period at the first frequency
+_CHUNK = 16_384  # steps between two looks at progress and stop
+_BETWEEN_SAMPLES = 4  # order of the cubics between samples
+_SHARE = 0.5  # of what is left, that one more run with finer steps counts as
+_STATUS = {kernel.CHATTER: TransientStatus.CHATTER, kernel.NOT_FINITE: TransientStatus.NOT_FINITE}
+
+
+@shows_progress("transient")
+def transient(
+    scene: Scene,
+    *,
+    begin_hz: float | None = None,
+    end_hz: float | None = None,
+    rate_hz_per_s: float | None = None,
+    ramp_seconds: float | None = None,
+    ring_down_seconds: float = 0.0,
+    from_rest: bool = False,
+    start: MarchStart | None = None,
+    tolerance: float = 1e-6,
+    steps_per_period: int | None = None,
+    on_progress: OnProgress = None,
+    should_stop: ShouldStop = None,
+) -> TransientResult:
+    """Run through a range of frequencies at a constant rate, then perhaps let the motion ring down.
+
+    Along an engine-order line (`speed_order`) loads, forces and matrices follow the speed as it changes. The
+    run is made with steps and with half of them until the largest amplitude changes by less than the
+    tolerance.
+
+    Parameters
+    ----------
+    scene : what is run through; a cyclic scene as its whole annulus.
+    begin_hz, end_hz : frequency at the beginning and at the end [Hz], the scene's band if left out; a
+        run-down begins at the higher one.
+    rate_hz_per_s, ramp_seconds : how fast the frequency changes [Hz/s], or how long that takes [s]; one of
+        them, the latter where both frequencies are equal.
+    ring_down_seconds : how long the motion is followed after that, with no force but constant ones [s].
+    from_rest : begin at rest, contacts without force; else in the motion that repeats at `begin_hz`.
+    start : a motion to begin with instead of both.
+    tolerance : of the largest amplitude, relative.
+    steps_per_period : steps in a period of the highest frequency; chosen by the tolerance when left out.
+    on_progress : called with the fraction done and the turns of the excitation.
+    should_stop : asked now and then; True ends the run with the status STOPPED.
+
+    Raises
+    ------
+    SettingError
+        An argument out of its range, a base that moves, a rigid contact.
+    """
+    began = time.perf_counter()
+    ramps = ramps_of(
+        scene, begin_hz=begin_hz, end_hz=end_hz, rate_hz_per_s=rate_hz_per_s, ramp_seconds=ramp_seconds,
+        ring_down_seconds=ring_down_seconds,
+    )  # fmt: skip
+    run = _Run(scene, ramps)
+    if not (isinstance(tolerance, Real) and 1e-12 <= tolerance <= 0.1):
+        raise SettingError("tolerance", tolerance, "must be a number from 1e-12 to 0.1")
+    if start is not None and from_rest:
+        raise SettingError("from_rest", from_rest, "must not be given beside `start`")
+    state, status = _start(run, start, from_rest=from_rest, should_stop=should_stop)
+    if state is None:
+        return _result(run, _Envelope(run, 0), status, math.nan, began)
+    watch = _Watch(on_progress, should_stop)
+    steps = run.steps(steps_per_period)
+    found, status = _followed(run, state, steps // 2, watch)
+    error = math.nan
+    for _ in range(FINEST if steps_per_period is None else 1):
+        if status is not TransientStatus.FINISHED:
+            break
+        coarse = found.largest
+        found, status = _followed(run, state, steps, watch)
+        error = abs(found.largest - coarse) / (2.0**run.order - 1.0)
+        error /= found.largest if found.largest > 0.0 else 1.0
+        if error <= tolerance or 2 * steps * run.periods > MOST_STEPS:
+            break
+        steps *= 2
+    if status is TransientStatus.FINISHED and error > tolerance:
+        status = TransientStatus.INACCURATE
+    if on_progress is not None and found.complete:
+        on_progress(1.0, int(run.cycles))
+    return _result(run, found, status, error, began)
+
+
+class _Run:
+    """A scene and its ramps, time τ = omega t of the highest frequency."""
+
+    def __init__(self, scene: Scene, ramps: tuple[Ramp, ...]) -> None:
+        self.scene, self.ramps = scene, ramps
+        self.omega = 2.0 * math.pi * max(ramps[0].begin_hz, ramps[0].end_hz)
+        self.turned = [0.0]  # cycles of the excitation at the end of each
+        self.equations: list[MarchEquations] = []
+        for ramp in ramps:
+            self.equations.append(equations_over(scene, ramp, self.omega, self.turned[-1]))
+            self.turned.append(self.turned[-1] + float(ramp.cycles(np.array(ramp.seconds))))
+        self.names = row_names(whole(scene))
+
+    @property
+    def cycles(self) -> float:
+        """Turns of the excitation in the whole run."""
+        return self.turned[-1]
+
+    @property
+    def periods(self) -> float:
+        """Periods of the highest frequency in the whole run."""
+        return sum(ramp.seconds for ramp in self.ramps) * self.omega / (2.0 * math.pi)
+
+    @property
+    def order(self) -> int:
+        """Order of the largest amplitude in the step."""
+        system = self.equations[0].system
+        return 2 if system.A_course.size else min(order_of(system), _BETWEEN_SAMPLES)
+
+    def steps(self, wanted: int | None) -> int:
+        """Steps in a period of the highest frequency, of the finer of the first two runs."""
+        first = self.ramps[0]
+        ends = {first.begin_hz, first.end_hz}
+        scenes = [whole(self.scene.at_frequency(hertz)) for hertz in ends]
+        steps = max(
+            steps_for(equations_of_motion(scene, self.omega).system, scene.forces, wanted) for scene in scenes
+        )
+        if steps * self.periods > MOST_STEPS:
+            most = MOST_STEPS / steps / self.periods
+            wanted_seconds = (
+                f"must be so that at most {MOST_STEPS:.0e} steps are made: {most:.2g} of the time"
+            )
+            raise SettingError("ramp_seconds", first.seconds, wanted_seconds)
+        return steps
+
+
+class _Envelope:
+    """The extremes of the observed motion in windows of at least one turn of the excitation."""
+
+    def __init__(self, run: _Run, steps: int) -> None:
+        self._run, self.steps = run, steps
+        count = max(1, min(int(run.cycles), MOST_WINDOWS))
+        self._turns = run.cycles / count  # in a window
+        self.high, self.low = np.full(count, -np.inf), np.full(count, np.inf)
+        self.time, self.frequency_hz = np.full(count, np.nan), np.full(count, np.nan)
+        self.largest, self.at_seconds, self.at_hz = 0.0, math.nan, math.nan
+        self.complete = False
+
+    def add(self, number: int, begin: float, step: float, x: arrays.Real, slopes: arrays.Real) -> None:
+        """Take samples of a ramp, (n + 1,), the first at `begin` [s], with their slopes a step [m]."""
+        ramp = self._run.ramps[number]
+        before = sum(each.seconds for each in self._run.ramps[:number])
+        at, place, between = turning_points(x, slopes)
+        seconds = begin + step * np.arange(x.size)
+        turned = self._run.turned[number] + ramp.cycles(seconds[:-1])
+        window = np.minimum((turned / self._turns).astype(np.int64), self.high.size - 1)
+        for where, when, values in (
+            (window, seconds[:-1], x[:-1]), (window, seconds[1:], x[1:]),
+            (window[at], begin + step * (at + place), between),
+        ):  # fmt: skip
+            np.maximum.at(self.high, where, values)
+            np.minimum.at(self.low, where, values)
+            top = int(np.argmax(np.abs(values))) if values.size else 0
+            if values.size and abs(values[top]) > self.largest:
+                self.largest, self.at_seconds = float(abs(values[top])), before + float(when[top])
+                self.at_hz = float(ramp.frequency(when[top : top + 1])[0])
+        first = np.flatnonzero(np.isnan(self.time[window]))[::-1]  # the earliest of a window is written last
+        self.time[window[first]] = before + seconds[first]
+        self.frequency_hz[window[first]] = ramp.frequency(seconds[first])
+
+
+@dataclass(slots=True)
+class _Watch:
+    """Who watches a run that is made several times: the share done rises in steps that become smaller."""
+
+    on_progress: OnProgress
+    should_stop: ShouldStop
+    done: float = 0.0
+
+    def part(self, share: float, cycles: float) -> bool:
+        """Tell the share done of one more run; return whether to stop."""
+        if self.on_progress is not None:
+            self.on_progress(self.done + share * (1.0 - self.done) * _SHARE, int(cycles))
+        return self.should_stop is not None and self.should_stop()
+
+    def end(self) -> None:
+        """One more run is complete."""
+        self.done += (1.0 - self.done) * _SHARE
+
+
+def _followed(run: _Run, start: kernel.State, steps: int, watch: _Watch) -> tuple[_Envelope, TransientStatus]:
+    """Follow a run with so many steps in a period of the highest frequency."""
+    state, envelope = copied(start), _Envelope(run, steps)
+    for number, (ramp, equations) in enumerate(zip(run.ramps, run.equations, strict=True)):
+        system, dof = equations.system, equations.observed
+        system = system._replace(
+            A=system.A._replace(value=system.A.value.copy()), B=system.B._replace(value=system.B.value.copy())
+        )
+        whole_steps = math.ceil(ramp.seconds * run.omega / (2.0 * math.pi) * steps)
+        h = ramp.seconds * run.omega / whole_steps
+        for first in range(0, whole_steps, _CHUNK):
+            count = min(_CHUNK, whole_steps - first)
+            rows = np.empty((system.kt.size, count))
+            record = kernel.Record(np.empty(count), np.empty(count), rows, rows.copy(), rows.copy())
+            code = stepping.run_steps(system, state, first, count, h, dof, record)
+            if code != kernel.RAN:
+                return envelope, _STATUS[code]
+            x, v = np.append(record.x, state.x[dof]), np.append(record.v, state.v[dof])
+            envelope.add(number, first * h / run.omega, h / run.omega, x, h * v)
+            share = sum(s.seconds for s in run.ramps[:number]) + (first + count) * h / run.omega
+            cycles = run.turned[number] + float(ramp.cycles(np.array((first + count) * h / run.omega)))
+            if watch.part(share / sum(s.seconds for s in run.ramps), cycles):
+                return envelope, TransientStatus.STOPPED
+    envelope.complete = True
+    watch.end()
+    return envelope, TransientStatus.FINISHED
+
+
+def ramps_of(
+    scene: Scene, *, begin_hz: float | None, end_hz: float | None, rate_hz_per_s: float | None,
+    ramp_seconds: float | None, ring_down_seconds: float,
+) -> tuple[Ramp, ...]:  # fmt: skip
+    """Return what is to be run through, by the arguments of `transient`.
+
+    Raises
+    ------
+    SettingError
+        An argument out of its range, a scene that cannot be run through.
+    """
+    check(scene)
+    low, high = scene.observe.band
+    begin = _number("begin_hz", low if begin_hz is None else begin_hz)
+    end = _number("end_hz", high if end_hz is None else end_hz)
+    if max(begin, end) == 0.0:
+        raise SettingError("end_hz", end, "must be > 0, or `begin_hz`")
+    rate, seconds = rate_hz_per_s, ramp_seconds
+    if rate is not None and seconds is not None:
+        raise SettingError("rate_hz_per_s", rate, "must not be given beside `ramp_seconds`")
+    if seconds is None:
+        if begin == end:
+            raise SettingError("ramp_seconds", None, "must be given where both frequencies are equal")
+        if rate is None:
+            raise SettingError("rate_hz_per_s", None, "must be given, or `ramp_seconds`")
+        seconds = abs(end - begin) / _number("rate_hz_per_s", rate, above=True)
+    ramps = [Ramp(begin, end, _number("ramp_seconds", seconds, above=True))]
+    if _number("ring_down_seconds", ring_down_seconds) > 0.0:
+        ramps.append(Ramp(end, end, ring_down_seconds, driven=False))
+    return tuple(ramps)
+
+
+def _number(key: str, value: object, *, above: bool = False) -> float:
+    if isinstance(value, Real) and not isinstance(value, bool):
+        number = float(value)
+        if 0.0 <= number < MOST and (number > 0.0 or not above):
+            return number
+    raise SettingError(key, value, f"must be a number {'>' if above else '>='} 0 and < {MOST:g}")
+
+
+def _start(
+    run: _Run, start: MarchStart | None, *, from_rest: bool, should_stop: ShouldStop
+) -> tuple[kernel.State | None, TransientStatus]:
+    """Return the state a run begins with; None where the motion at the first frequency does not repeat."""
+    if start is not None or from_rest:
+        begins = state_at(run.equations[0], start or MarchStart(), run.names, run.omega)
+        return begins, TransientStatus.FINISHED
+    hertz = run.ramps[0].begin_hz
+    if hertz == 0.0:
+        raise SettingError("begin_hz", hertz, "must be > 0, or the run begin from rest (`from_rest`)")
+    scene = whole(run.scene.at_frequency(hertz))
+    state, status = settled_state(scene, hertz, SETTLED, should_stop)
+    if status is MarchStatus.STOPPED:
+        return None, TransientStatus.STOPPED
+    if status is not MarchStatus.CONVERGED:
+        return None, TransientStatus.NOT_SETTLED
+    state.v[:] *= 2.0 * math.pi * hertz / run.omega
+    return state, TransientStatus.FINISHED
+
+
+def _result(
+    run: _Run, found: _Envelope, status: TransientStatus, error: float, began: float
+) -> TransientResult:
+    """Read the result; of a run that did not end, as far as it went."""
+    seen = np.isfinite(found.time)
+    first, *rest = run.ramps
+    some = bool(np.any(seen))
+    return TransientResult(
+        scene=run.scene.name, dof=run.scene.observe.dof, status=status,
+        max_abs=found.largest if some else math.nan, at_hz=found.at_hz, at_seconds=found.at_seconds,
+        time=found.time[seen], frequency_hz=found.frequency_hz[seen], high=found.high[seen],
+        low=found.low[seen], begin_hz=first.begin_hz, end_hz=first.end_hz, ramp_seconds=first.seconds,
+        ring_down_seconds=sum(each.seconds for each in rest), steps_per_period=found.steps,
+        error_estimate=error, seconds=time.perf_counter() - began,
+    )  # fmt: skip

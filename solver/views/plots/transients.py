@@ -1,0 +1,39 @@
+"""The envelope of a run through a range of frequencies."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from solver.results import units
+from solver.views.plots import style
+from solver.views.plots.style import Into
+from solver.views.plots.tracks import numbers
+
+
+def transient_figure(found: Mapping[str, Any], *, ax: Into = None) -> Figure:
+    """Draw the extremes of the motion over time, and the amplitude over the frequency while that changes.
+
+    Parameters
+    ----------
+    found : as its `to_json` gives it, with at least one window.
+    """
+    time, frequency, high, low = (numbers(found[name]) for name in ("time", "frequency_hz", "high", "low"))
+    unit = units.length_unit(found["max_abs"])
+    high, low = high * unit.per_metre, low * unit.per_metre
+    largest = found["max_abs"] * unit.per_metre
+    with style.styled():
+        page, (over_time, over_frequency) = style.figure(9.2, 3.6, columns=2, into=ax)
+        over_time.fill_between(time, low, high, color=style.BLUE, alpha=0.8, linewidth=0.0)
+        over_time.axvline(found["at_seconds"], color=style.VERMILION, linewidth=0.8)
+        ramp = time <= found["ramp_seconds"]
+        over_frequency.plot(frequency[ramp], np.maximum(high, -low)[ramp], color=style.BLUE)
+        over_frequency.plot([found["at_hz"]], [largest], "o", color=style.VERMILION, markersize=4.0)
+        over_time.set_title(found["scene"])
+        over_frequency.set_title(f"largest {unit.show(found['max_abs'])} at {found['at_hz']:.5g} Hz")
+        style.label(over_time, "time [s]", f"{found['dof']} [{unit.name}]")
+        style.label(over_frequency, "frequency [Hz]", f"max |{found['dof']}| in a turn [{unit.name}]")
+    return page
