@@ -70,8 +70,8 @@ class System:
         for force in raw["forces"]:
             held -= self.row(force["row"]).transpose() * self.wave([force["wave"]])
         self.free -= self.pull * held
-        self.observe, self.u, self.v, self.load = self.row(raw["observe"]), [], [], []  # type: ignore[var-annotated]
-        self.rigid, self.constant = [c.get("kt", 1) is None for c in self.contacts], []  # type: ignore[var-annotated]
+        self.observe, self.u, self.v, self.load = self.row(raw["observe"]), [], [], []
+        self.rigid, self.constant = [c.get("kt", 1) is None for c in self.contacts], []
         for c in self.contacts:
             self.u.append(self.row(c["row"]))
             self.v.append(self.row(c["row"], n))
@@ -182,7 +182,7 @@ class Orbit:
 
     def __init__(self, system: System, raw: dict[str, Any]) -> None:
         mode = tuple(STATES[word] for word in raw["states"])
-        self.system, self.begins, self.modes, self.events = system, arb(raw["begins"]), [mode], []  # type: ignore[var-annotated]
+        self.system, self.begins, self.modes, self.events = system, arb(raw["begins"]), [mode], []
         self.groups: list[list[int]] = []  # events at one instant
         for i, each in enumerate(raw["events"]):
             j, new = each["contact"], STATES[each["to"]]
