@@ -232,7 +232,8 @@ def test_what_is_no_peak_says_so() -> None:
     scene = stickslip.load_scene("two-dof")
     found = stickslip.certify(stickslip.solve(scene, frequency_hz=1.6), peak=True)
     assert not found.reached
-    assert "no extreme" in found.reason
+    assert found.certificate is None
+    assert "slips forward" in found.reason  # uphill, where other events happen
 
 
 @pytest.mark.long
