@@ -95,7 +95,7 @@ def _half_width() -> Any:
 
 def _least_step() -> float:
     """Return the step at which a parabola is off by less than that, and its values still differ enough."""
-    return float(_half_width()) ** 0.65
+    return float(float(_half_width()) ** 0.65)
 
 
 class _Summits:
