@@ -11,27 +11,29 @@ import json
 import math
 import time
 from dataclasses import dataclass
-from decimal import ROUND_CEILING, ROUND_FLOOR, Decimal, localcontext
 from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
+from solver.certificate.boxes import boxed, claimed, orbit_at, set_out, settled
+from solver.certificate.summits import least_proved, peak_proved
 from solver.errors import MissingExtraError, SettingError
 from solver.response.exact.beside import orbit_beside
 from solver.response.solution import Solution
+from solver.response.solve import solve
 from solver.results.files import whole
 from solver.results.told import Piece
+from solver.scene.cyclic.annulus import annulus
+from solver.scene.scene import Scene
 
 if TYPE_CHECKING:
-    from solver.certificate.checker import Orbit, RejectedError
+    from solver.certificate.checker import RejectedError
     from solver.response.exact.orbit import Orbit as ExactOrbit
     from solver.response.exact.piecewise import Piecewise
 
-_BITS = (128, 256, 512, 1024)
-_NEWTON, _WIDER, _MOVES = 12, 4, 6  # steps; boxes tried; contacts moved
-_SLOW = 1e-4  # by which a step falls with a derivative that still serves
+_BITS = (128, 256)
+_MOVES = 8  # contacts moved
 _NARROW = 1e-16  # relative width of what is claimed; else more bits
-_DIGITS = 25
 _MOVED = 1e-9  # of its limit, by which the force of what sticks at the edge of it is moved inward
 
 
@@ -51,13 +53,18 @@ class Certificate(Piece):
     """A proof of a periodic response, or why there is none."""
 
     JSON: ClassVar = (
-        "certified=reached status reason max_abs half_peak_to_peak events held bits seconds certificate"
+        "certified=reached status reason max_abs frequency_hz load_factor half_peak_to_peak events held bits"
+        " seconds certificate"
     )
 
     status: Annotated[CertificateStatus, "Whether it was proved."]
     reason: Annotated[str, "Which inequality fails, by how much; empty if none does."]
     max_abs: Annotated[
         tuple[float, float], "Bounds of the largest |x| of the observed DOF [m]; NaN if there are none."
+    ]
+    frequency_hz: Annotated[tuple[float, float], "The frequency; of a peak, bounds of it [Hz]."]
+    load_factor: Annotated[
+        tuple[float, float], "Of a least peak, bounds of the load where it is, over the load of the scene."
     ]
     half_peak_to_peak: Annotated[tuple[float, float], "Bounds of (max x - min x) / 2 [m]."]
     events: Annotated[int, "Changes of a contact's state in a period."]
@@ -91,7 +98,7 @@ class Certificate(Piece):
             temporary.write_text(json.dumps(self.certificate), encoding="utf-8")
 
 
-def certify(solution: Solution) -> Certificate:
+def certify(solution: Solution, *, peak: bool = False, least_over: str = "") -> Certificate:
     """Prove a periodic response of piecewise linear contacts, and enclose its amplitude.
 
     Between two events all is linear, so the orbit is a zero of finitely many equations: Krawczyk's operator
@@ -101,11 +108,15 @@ def certify(solution: Solution) -> Certificate:
     Parameters
     ----------
     solution : one that converged, of contacts of the laws coulomb, elastic-normal and gap.
+    peak : prove the peak of max|x| over the frequency beside it instead.
+    least_over : the path of a load, such as ``damper.N0``, over which that peak is least near this solution;
+        prove the least peak. With N0 all of the load varies, its harmonics likewise.
 
     Raises
     ------
     SettingError
-        It did not converge, or the scene has a part that has no place in an exact solution.
+        It did not converge, the scene has a part that has no place in an exact solution, or the path is none
+        of a load.
     MissingExtraError
         Without python-flint.
     """
@@ -117,133 +128,91 @@ def certify(solution: Solution) -> Certificate:
         raise MissingExtraError("python-flint", "proof") from error
     if not solution.converged:
         raise SettingError("solution", solution.status.value, "must have converged")
-    piecewise, orbit = orbit_beside(solution)
+    if solution.scene.structure.has_sectors:  # a disk written out is a system like any other
+        solution = solve(
+            annulus(solution.scene), frequency_hz=solution.frequency_hz, harmonics=solution.n_harmonics
+        )
+    piecewise, orbit = orbit_beside(solution, polish=1)  # exact numbers go on from there
     raw: dict[str, Any] = {"certifies": "periodic orbit", "scene": solution.scene.name}
     status, reason, bounds = CertificateStatus.NO_ORBIT, "", {}
     if orbit is not None:
         raw["system"] = system_of(piecewise, solution.frequency_hz)
         try:
-            bounds = _proved(raw, piecewise, orbit)
+            if least_over:
+                raw["varies"] = _loads_of(solution.scene, least_over)
+            proved = least_proved if least_over else peak_proved if peak else _proved
+            bounds = proved(raw, piecewise, orbit)
             status = CertificateStatus.CERTIFIED
         except RejectedError as error:
             status, reason = CertificateStatus.NOT_CERTIFIED, str(error)
     unknown = (math.nan, math.nan)
     contacts, course = raw.get("system", {}).get("contacts", ()), raw.get("orbit", {})
+    heights = (bounds[key] for key in ("least_peak", "peak", "max_abs") if key in bounds)
     return Certificate(
-        status=status, reason=reason, max_abs=bounds.get("max_abs", unknown),
+        status=status, reason=reason, max_abs=next(heights, unknown),
+        frequency_hz=bounds.get("frequency_hz", (solution.frequency_hz, solution.frequency_hz)),
+        load_factor=bounds.get("load_factor", (1.0, 1.0)),
         half_peak_to_peak=bounds.get("half_peak_to_peak", unknown), events=len(course.get("events", ())),
         held=tuple(contacts[int(j)]["name"] for j in course.get("fixed_sliders", ())),
-        bits=raw.get("bits", 0),
-        seconds=time.perf_counter() - begun, certificate=raw if bounds else None,
+        bits=raw.get("bits", 0), seconds=time.perf_counter() - begun, certificate=raw if bounds else None,
     )  # fmt: skip
+
+
+def _loads_of(scene: Scene, path: str) -> list[int]:
+    """Return the numbers of the contacts whose load a path is."""
+    name, _, key = path.rpartition(".")
+    found = [i for i, each in enumerate(scene.contacts) if name in (each.name, each.group)]
+    if key != "N0" or not found or any(scene.contacts[i].load is None for i in found):
+        raise SettingError("least_over", path, "must be the path of a load, such as damper.N0")
+    return found
 
 
 def _proved(raw: dict[str, Any], piecewise: Piecewise, found: ExactOrbit) -> dict[str, tuple[float, float]]:
     """Complete a certificate by the box of its unknowns and by what it claims; return that as floats."""
     from flint import ctx
 
-    from solver.certificate.checker import Orbit, RejectedError, System
-    from solver.certificate.statement import orbit_of
+    from solver.certificate.checker import RejectedError
 
     kept = ctx.prec
     try:
         for bits in _BITS:
             ctx.prec = raw["bits"] = bits
-            system = System(raw["system"])
-            if "orbit" not in raw:
-                raw["orbit"], start = orbit_of(piecewise, found, system)
-            for step in range(_MOVES):
-                orbit = Orbit(system, raw["orbit"])
-                try:
-                    image = _included(raw, orbit, start)
-                except RejectedError:
-                    if bits == _BITS[-1]:
-                        raise
-                    break
-                try:
-                    low, high = orbit.extremes(image)
-                except RejectedError as error:
-                    if not _moved_inward(raw, error, step):
-                        raise
-                    continue
-                if bits == _BITS[-1] or (low.rad() + high.rad()) <= _NARROW * (high - low):
-                    return _claimed(raw, low, high)
-                break
+            try:
+                low, high = _kept_inward(raw, set_out(raw, piecewise, found))
+            except RejectedError as error:
+                if bits == _BITS[-1] or error.contact >= 0:
+                    raise
+                continue
+            if bits == _BITS[-1] or (low.rad() + high.rad()) <= _NARROW * (high - low):
+                return claimed(raw, {"max_abs": high.max(-low), "half_peak_to_peak": (high - low) / 2})
         raise AssertionError
     finally:
         ctx.prec = kept
 
 
-def _included(raw: dict[str, Any], orbit: Orbit, start: list[float]) -> list[Any]:
-    """Put a box of the unknowns that holds exactly one orbit into the certificate; return its image."""
-    from flint import arb, ctx
+def _kept_inward(raw: dict[str, Any], start: list[Any]) -> tuple[Any, Any]:
+    """Prove an orbit, contacts that stick at the edge of their limit moved inward; return its extremes."""
+    from solver.certificate.checker import RejectedError
 
-    from solver.certificate.checker import RejectedError, isolated
-
-    y, n = [arb(each) for each in start], orbit.system.n
-    sizes = [max(map(abs, start[:n]))] * n + [max(map(abs, start[n : 2 * n]))] * n
-    sizes += [sizes[0]] * (len(orbit.lasting) - 2 * n)
-    sizes += [1.0] * (len(y) - len(sizes))
-    fine, inverse, before = arb(2) ** (-ctx.prec * 3 // 5), None, math.inf
-    for _ in range(_NEWTON):
-        value, slope, _ = orbit.shoot(y, derivative=inverse is None)
-        if inverse is None:
-            inverse = isolated(slope)
-        steps = [each[0] for each in (inverse * value).tolist()]
-        y = [(each - step).mid() for each, step in zip(y, steps, strict=True)]
-        now = max(float(step.abs_upper()) / (size or 1.0) for step, size in zip(steps, sizes, strict=True))
-        if now <= 2.0 ** (-ctx.prec // 2):
-            break
-        if now > _SLOW * before:
-            inverse = None
-        before = now
-    radii = [(fine + now) * (size or 1.0) for size in sizes]
-    for wider in range(_WIDER):
-        box = [_written(each, radius * 4 ** (2 * wider + 1)) for each, radius in zip(y, radii, strict=True)]
+    for step in range(_MOVES):
+        orbit = orbit_at(raw)
         try:
-            image: list[Any] = orbit.included([arb(each) for each in box])
-        except RejectedError:
-            if wider == _WIDER - 1:
+            raw["orbit"]["unknowns"], extremes = boxed(orbit, *settled(orbit, start))
+        except RejectedError as error:
+            if not _moved_inward(raw, error, step):
                 raise
-            continue
-        raw["orbit"]["unknowns"] = box
-        return image
-    raise AssertionError
-
-
-def _written(middle: Any, radius: Any) -> str:
-    """Return a ball as text with the digits of the precision it has."""
-    from flint import ctx
-
-    return f"{middle.str(ctx.prec * 3 // 10, radius=False)} +/- {radius.upper().str(5, radius=False)}"
-
-
-def _claimed(raw: dict[str, Any], low: Any, high: Any) -> dict[str, tuple[float, float]]:
-    """Put what is proved of the extremes into the certificate; return it as floats; all rounded outward."""
-    found = {"max_abs": high.max(-low), "half_peak_to_peak": (high - low) / 2}
-    raw["claims"] = {
-        name: [_decimal(each.lower(), ROUND_FLOOR), _decimal(each.upper(), ROUND_CEILING)]
-        for name, each in found.items()
-    }
-    return {
-        name: (math.nextafter(float(each.lower()), -math.inf), math.nextafter(float(each.upper()), math.inf))
-        for name, each in found.items()
-    }
-
-
-def _decimal(exact: Any, rounding: str) -> str:
-    """Return a number rounded to decimals."""
-    mantissa, exponent = map(int, exact.man_exp())
-    with localcontext(prec=_DIGITS, rounding=rounding):
-        return str(+Decimal(mantissa << exponent) if exponent >= 0 else Decimal(mantissa) / (1 << -exponent))
+            last = error
+        else:
+            return extremes
+    raise last
 
 
 def _moved_inward(raw: dict[str, Any], error: RejectedError, step: int) -> bool:
     """Take a little of its force from a contact that sticks all the time at the edge of its limit."""
     fixed, key = raw["orbit"]["fixed_sliders"], str(error.contact)
-    if key not in fixed or abs(error.follows) != 1:
+    if key not in fixed or error.follows not in (1, -1):
         return False
     contact = raw["system"]["contacts"][error.contact]
-    force = 10.0 * abs(error.margin) + 10.0**step * _MOVED * contact["mu"] * abs(contact["load"][0][1])
+    force = 10.0**step * _MOVED * contact["mu"] * abs(contact["load"][0][1])
     fixed[key] += error.follows * force / contact["kt"]
     return True

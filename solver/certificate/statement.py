@@ -19,6 +19,7 @@ from solver.response.exact.piecewise import FREE, STICK, MemberState, Piecewise
 from solver.scene.parts import LumpedStructure
 
 _AT_ONCE = 1e-7  # rad: events this near each other may be one
+_HARDLY = 1e-5  # rad: a slip that is shorter may be none
 _APART = 1e-9  # rad between events that floats do not tell apart
 
 
@@ -95,6 +96,8 @@ def orbit_of(piecewise: Piecewise, orbit: Orbit, system: System) -> tuple[dict[s
                 times.append(
                     max(piece.tau, times[-1] + _APART) if times and times[-1] >= piece.tau else piece.tau
                 )
+    for i in _hardly(states[0], events, times):
+        del events[i], times[i]
     moved = {each["contact"] for each in events}
     sliders = {
         member.contact: float(w[piecewise.elastic_at[member.slider]])
@@ -111,6 +114,19 @@ def orbit_of(piecewise: Piecewise, orbit: Orbit, system: System) -> tuple[dict[s
                 events[i]["at_once"] = True
     lasting = [*w[: 2 * piecewise.n].tolist(), *(value for j, value in sorted(sliders.items()) if j in moved)]
     return found, [*lasting, *(at for at, each in zip(times, events, strict=True) if "at_once" not in each)]
+
+
+def _hardly(states: list[str], events: list[dict[str, Any]], times: list[float]) -> list[int]:
+    """Return the events, the last first, of slips that hardly last: shaken down, a contact stands there."""
+    found: list[int] = []
+    before: dict[int, tuple[str, int]] = {}  # of a contact: what it did, and its last event
+    for i, each in enumerate(events):
+        word, last = before.get(each["contact"], (states[each["contact"]], -1))
+        slipped = last >= 0 and each["to"] == "stick" and events[last]["to"].startswith("slip")
+        if slipped and word == "stick" and times[i] - times[last] < _HARDLY:
+            found += [last, i]
+        before[each["contact"]] = events[last]["to"] if last >= 0 else states[each["contact"]], i
+    return sorted(found, reverse=True)
 
 
 def _way(piecewise: Piecewise, before: FlowPiece, w: Real, j: int, old: str, new: str) -> list[str]:

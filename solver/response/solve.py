@@ -57,8 +57,9 @@ def solve(
     accuracy : estimated error of the amplitude, relative to it, that the fewest harmonics are chosen for.
     effects : what is paid for though the scene does not call for it; see
     `solver.balance.simplifications.Effects`.
-    exact : follow the events of the contacts instead, to rounding (`solver.response.exact`), as scenes with
-    rigid contacts always are. Where no orbit is found the balance answers, with ACCURACY_NOT_REACHED.
+    exact : from there follow the events of the contacts, to rounding (`solver.response.exact`), as is always
+    done of scenes with rigid contacts, from rest. Where no orbit is found the balance answers, with
+    ACCURACY_NOT_REACHED.
 
     Raises
     ------
@@ -101,6 +102,11 @@ def solve(
     found, flags = seen(workspace, found, omega)
     solution = describe(workspace, found, frequency_hz, begun)
     solution = replace(solution, flags=(*solution.flags, *assumed_flags(workspace.balance), *flags))
+    if exact:
+        polished = solve_exactly(scene, frequency_hz, harmonics, near=solution)
+        if polished.converged:
+            return polished
+        good_enough = False
     return solution if good_enough else replace(solution, status=SolutionStatus.ACCURACY_NOT_REACHED)
 
 

@@ -1,4 +1,7 @@
-"""What accuracy costs: error against time, for numbers of harmonics, in closed form and by samples."""
+"""What accuracy costs: error against time, for numbers of harmonics, in closed form and by samples.
+
+The last row is the exact solution where there is one, and what errors are measured against.
+"""
 
 from __future__ import annotations
 
@@ -20,13 +23,16 @@ from solver.continuation.branches.sweep import sweep
 from solver.continuation.extrema.error_estimate import truncation_error
 from solver.errors import SettingError
 from solver.jit.fourier import Real
+from solver.response.exact.answer import solve_exactly
+from solver.response.exact.beside import orbit_beside
+from solver.response.solve import solve
 from solver.results.watch import ShouldStop, shows_progress
 from solver.scene.harmonics import kept_harmonics
 from solver.scene.parameter_paths import check_frequency
 from solver.scene.scene import Scene
 from solver.studies.study_results import AccuracyRow, AccuracyStatus, AccuracyStudy
 
-CLOSED_FORM, SAMPLED = "closed form", "sampled"
+CLOSED_FORM, SAMPLED, EXACT = "closed form", "sampled", "exact"
 HARMONICS = (1, 3, 5, 7, 11, 15, 21, 31, 41)
 SAMPLES = (64, 256, 1024, 8192)
 LEAST_REFERENCE = 101  # harmonics
@@ -89,7 +95,11 @@ def accuracy_study(
     reference = _reference(scene, p, max(LEAST_REFERENCE, _BEYOND * max(harmonics)))
     if reference is None:
         raise SettingError("frequency_hz", frequency_hz, "has no solution to compare with")
-    workspace, u, exact = reference
+    workspace, u, most = reference
+    counted, doubt = workspace.balance.n_harmonics, truncation_error(workspace, u, p).max_abs
+    polished = _polished(scene, frequency_hz)
+    if polished is not None:
+        most, counted, doubt = polished[0].max_abs, 0, polished[0].error
     ways = _ways(scene, harmonics, samples)
     prepared: list[tuple[AccuracyRow, Callable[[], object]]] = []
     asked = should_stop or (lambda: False)
@@ -98,16 +108,16 @@ def accuracy_study(
     for done, (highest, count) in enumerate(ways):
         if asked():
             break
-        way = _prepared(scene, p, highest, count, exact)
+        way = _prepared(scene, p, highest, count, most)
         if way is not None:
             prepared.append(way)
         tell((done + 1) / steps, len(prepared))
+    prepared += [] if polished is None else [polished]
     rows = _timed(prepared, repeats, asked, lambda turns: tell((len(ways) + turns) / steps, len(prepared)))
     stopped = asked()
     return AccuracyStudy(
-        scene=scene.name, frequency_hz=frequency_hz, reference=exact,
-        reference_harmonics=workspace.balance.n_harmonics,
-        reference_error=truncation_error(workspace, u, p).max_abs,
+        scene=scene.name, frequency_hz=frequency_hz, reference=most, reference_harmonics=counted,
+        reference_error=doubt,
         rows=() if stopped else tuple(replace(row, pareto=_leads(row, rows)) for row in rows),
         branch=branch, status=AccuracyStatus.STOPPED if stopped else AccuracyStatus.COMPLETED,
     )  # fmt: skip
@@ -164,6 +174,22 @@ def _reference(scene: Scene, p: float, top: int) -> tuple[Workspace, Real, float
         found = workspace.solve(p, pad(found.u, balance, workspace.balance))
     measures = workspace.measure(found.u, p) if found.converged else None
     return None if measures is None else (workspace, found.u, float(measures.values[MAX_ABS]))
+
+
+def _polished(scene: Scene, frequency_hz: float) -> tuple[AccuracyRow, Callable[[], object]] | None:
+    """Return the row of the exact solution beside that of the balance; None where there is none."""
+    beside = solve(scene, frequency_hz=frequency_hz)
+    if not scene.contacts or not beside.converged:  # without contacts harmonics are exact themselves
+        return None
+    try:
+        found = solve_exactly(scene, frequency_hz, beside.n_harmonics, near=beside)
+    except SettingError:  # a part of the scene has no place in it: harmonics are all there is
+        return None
+    row = AccuracyRow(
+        harmonics=0, evaluator=EXACT, samples=0, max_abs=found.max_abs, error=found.error_estimate,
+        milliseconds=math.nan, iterations=found.newton_iterations, residual=found.residual,
+    )  # fmt: skip
+    return (row, lambda: orbit_beside(beside)) if found.converged else None
 
 
 def _prepared(

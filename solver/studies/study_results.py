@@ -30,12 +30,14 @@ class AccuracyStatus(Enum):
 class AccuracyRow(Piece):
     """One way to compute one point."""
 
-    harmonics: Annotated[int, "Highest harmonic kept."]
-    evaluator: Annotated[str, "Of the contact forces: ``closed form`` or ``sampled``."]
-    samples: Annotated[int, "In a period; 0 in closed form."]
+    harmonics: Annotated[int, "Highest harmonic kept; 0 of the exact solution."]
+    evaluator: Annotated[str, "Of the contact forces: ``closed form``, ``sampled`` or ``exact``."]
+    samples: Annotated[int, "In a period; 0 if there are none."]
     max_abs: Annotated[float, "The amplitude [m]."]
-    error: Annotated[float, "|max_abs − reference| [m]."]
-    milliseconds: Annotated[float, "Median processor time of Newton's method from a neighbour [ms]."]
+    error: Annotated[float, "|max_abs − reference|; of the exact solution its estimated error [m]."]
+    milliseconds: Annotated[
+        float, "Median processor time of Newton's method from a neighbour; exact: from the balance [ms]."
+    ]
     iterations: Annotated[int, "Newton iterations of it."]
     residual: Annotated[float, "Relative residual left."]
     pareto: Annotated[bool, "No other row is both at least as accurate and at least as fast."] = False
@@ -56,11 +58,11 @@ class AccuracyStudy(Drawn):
 
     scene: Annotated[str, "Name of the scene."]
     frequency_hz: Annotated[float, "Excitation frequency [Hz]."]
-    reference: Annotated[FloatOrNaN, "max|x| with `reference_harmonics` harmonics in closed form [m]."]
-    reference_harmonics: Annotated[int, "Highest harmonic of the reference."]
+    reference: Annotated[FloatOrNaN, "max|x|, exact or with `reference_harmonics` harmonics [m]."]
+    reference_harmonics: Annotated[int, "Highest harmonic of the reference; 0: it is exact."]
     reference_error: Annotated[FloatOrNaN, "Its estimated error [m]; errors below it are not known."]
     rows: Annotated[
-        tuple[AccuracyRow, ...], "Closed form first, then by samples, without ways that did not converge."
+        tuple[AccuracyRow, ...], "Closed form, then by samples, last exact, without ways that gave nothing."
     ]
     branch: Annotated[Branch | None, "The sweep that found the highest peak; None if given the frequency."]
     status: Annotated[AccuracyStatus, "How it ended."]

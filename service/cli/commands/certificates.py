@@ -44,7 +44,8 @@ def check_proof(
     if as_json:
         print_json({"accepted": not reason, "reason": reason, "claims": claims})
     else:
-        rows = [(name, f"{low!r} to {high!r} m") for name, (low, high) in claims.items()]
+        units = {"frequency_hz": " Hz", "load_factor": ""}
+        rows = [(name, f"{low!r} to {high!r}{units.get(name, ' m')}") for name, (low, high) in claims.items()]
         print_table(
             f"Certificate of {raw.get('scene', 'a system')}", ("claim", "proved"), rows if not reason else []
         )

@@ -16,6 +16,7 @@ import numpy as np
 from solver.errors import SettingError
 from solver.jit.fourier import Real
 from solver.response.contact_response import OPENS, ContactResponse, ContactState
+from solver.response.exact.beside import orbit_beside
 from solver.response.exact.flow import LiftsError, NoMotionError, exponential, first_root, steps_of, taylor
 from solver.response.exact.orbit import PERIOD, ROUNDING, Ended, Orbit, find, follow, grazed
 from solver.response.exact.piecewise import STICK, MemberState, Mode, Piecewise
@@ -94,19 +95,21 @@ def panels_of(orbit: Orbit, highest: int) -> Panels:
                   modes, states, every, begun, wide)  # fmt: skip
 
 
-def solve_exactly(scene: Scene, frequency_hz: float, harmonics: int) -> Solution:
-    """Return the response of a scene with rigid contacts, to rounding.
+def solve_exactly(
+    scene: Scene, frequency_hz: float, harmonics: int, *, near: Solution | None = None
+) -> Solution:
+    """Return the response of a scene, to rounding; it is looked for beside a solution of the balance.
 
     Raises
     ------
     SettingError
-        A part of the scene that cannot stand beside rigid contacts, see `Piecewise`.
+        A part of the scene that has no place in an exact solution, see `Piecewise`.
     """
-    return solve_beside(scene, frequency_hz, harmonics)[0]
+    return solve_beside(scene, frequency_hz, harmonics, near)[0]
 
 
 def solve_beside(
-    scene: Scene, frequency_hz: float, harmonics: int, near: Orbit | None = None
+    scene: Scene, frequency_hz: float, harmonics: int, near: Orbit | Solution | None = None
 ) -> tuple[Solution, Orbit | None]:
     """Return the response, to rounding, and its orbit; it is looked for beside `near`, else from rest.
 
@@ -143,9 +146,14 @@ def stability_exactly(scene: Scene, frequency_hz: float) -> Stability:
 
 
 def _orbit_of(
-    scene: Scene, frequency_hz: float, near: Orbit | None = None
+    scene: Scene, frequency_hz: float, near: Orbit | Solution | None = None
 ) -> tuple[Piecewise, Orbit | SolutionStatus]:
     """Return the response of a scene as an orbit, or why there is none."""
+    if isinstance(near, Solution):
+        system, polished = orbit_beside(near)
+        if polished is not None:
+            return system, polished
+        near = None
     system = Piecewise(scene, 2.0 * math.pi * frequency_hz)
     try:
         found = find(system, *system.at_rest()) if near is None else follow(system, near)

@@ -8,7 +8,7 @@ import numpy as np
 
 from solver.jit.fourier import Real
 from solver.response.exact.flow import LiftsError, NoMotionError
-from solver.response.exact.orbit import Orbit, beside, find
+from solver.response.exact.orbit import POLISH, Orbit, beside, find
 from solver.response.exact.piecewise import FREE, STICK, MemberState, Piecewise
 from solver.response.solution import Solution
 from solver.response.time_history import all_coordinates
@@ -16,10 +16,11 @@ from solver.response.time_history import all_coordinates
 _START = np.zeros(1)  # the angle
 
 
-def orbit_beside(solution: Solution) -> tuple[Piecewise, Orbit | None]:
+def orbit_beside(solution: Solution, polish: int = POLISH) -> tuple[Piecewise, Orbit | None]:
     """Return the system of a solution that converged and the periodic motion near it; None if none is found.
 
     Sliders begin where the forces of the balance hold them, so that what sticks throughout keeps its force.
+    `polish`: Newton's steps beyond convergence.
 
     Raises
     ------
@@ -31,7 +32,7 @@ def orbit_beside(solution: Solution) -> tuple[Piecewise, Orbit | None]:
         if system.rigid.any() or any(member.rigid_normal for member in system.members):
             found = find(system, *system.at_rest())  # it is exact itself
         else:
-            found = beside(system, *_begun(system, solution), 0.0)
+            found = beside(system, *_begun(system, solution), 0.0, polish=polish)
     except (LiftsError, NoMotionError):
         return system, None
     return system, found if isinstance(found, Orbit) else None

@@ -157,9 +157,10 @@ class Flow:
         """Return the first condition that ends within a step, and where, as a share of it; None: none."""
         values = mode.conditions @ taylor(mode, w, h).T
         earliest: tuple[int, float] | None = None
+        sure = values[:, 0] > np.abs(values[:, 1:]) @ end ** np.arange(1, values.shape[1])
         for c, coefficients in enumerate(values):
             k = 0 if order is None else order[c]
-            if k < 0:
+            if k < 0 or (k == 0 and sure[c]):
                 continue
             t = first_root(coefficients[k:], end if earliest is None else earliest[1])
             if t is not None:

@@ -21,7 +21,7 @@ from solver.response.exact.piecewise import FREE, STICK, MemberState, Piecewise
 PERIOD = 2.0 * np.pi
 CLOSED = 1e-11  # distance after a period, of the largest number of the state, from which on it is polished
 ROUNDING = 5e-13  # of the largest number of the state: of 88 orbits with proofs the worst was 4e-13 off
-_NEWTON, _POLISH = 12, 4
+_NEWTON, POLISH = 12, 4
 MOST_PERIODS = 4000
 _FOLLOWED = 200  # periods from a neighbour's motion
 _OPEN = 1e-9  # singular values of 1 − Φ below: nothing decides that direction
@@ -102,8 +102,10 @@ def follow(system: Piecewise, near: Orbit) -> Orbit | Ended:
     return found
 
 
-def beside(system: Piecewise, w: Real, state: MemberState, tau: float) -> Orbit | Ended:
-    """Find the periodic motion near a start at an angle; give up soon.
+def beside(
+    system: Piecewise, w: Real, state: MemberState, tau: float, *, polish: int = POLISH
+) -> Orbit | Ended:
+    """Find the periodic motion near a start at an angle; give up soon. `polish`: Newton's steps beyond.
 
     Raises
     ------
@@ -111,7 +113,7 @@ def beside(system: Piecewise, w: Real, state: MemberState, tau: float) -> Orbit 
     """
     march = Flow(system, w, state, tau)
     march.run(PERIOD)
-    found = _newton(system, march, 1)
+    found = _newton(system, march, 1, polish)
     if found is not None:
         return found
     start = march.w.copy()
@@ -145,7 +147,7 @@ def _ratchets(system: Piecewise, flow: Flow, drifts: list[Real]) -> bool:
     return bool(moved > 1e-7 * speed and same and np.abs(second[n : 2 * n]).max(initial=0.0) <= 1e-7 * speed)
 
 
-def _newton(system: Piecewise, march: Flow, periods: int) -> Orbit | None:
+def _newton(system: Piecewise, march: Flow, periods: int, polish: int = POLISH) -> Orbit | None:
     """Try Newton's method from where a march has come; None if it leads nowhere."""
     longest = max(march.pieces, key=lambda each: each.length)
     flow = Flow(system, march.w, march.state, march.tau)
@@ -174,7 +176,7 @@ def _newton(system: Piecewise, march: Flow, periods: int) -> Orbit | None:
                         multipliers=multipliers, open_directions=open_directions, periods=periods,
                         steps=step + 1,
                     )  # fmt: skip
-                if polished > _POLISH or now == 0.0:
+                if polished > polish or now == 0.0:
                     break
             w = system.mode(state).to_rates @ (begun + change)
     except NoMotionError:

@@ -29,10 +29,18 @@ def accuracy_figure(study: Mapping[str, Any], *, ax: Into = None) -> Figure:
     least = max(study["reference_error"] or 0.0, 1e-15 * study["reference"])
     with style.styled():
         page, (axes,) = style.figure(6.6, 4.0, into=ax)
+        exact = [row for row in rows if row["evaluator"] == "exact"]
+        rows = [row for row in rows if row["evaluator"] != "exact"]
         counts = sorted({row["samples"] for row in rows})
         looks = [_CLOSED if count == 0 else _SAMPLED[i % len(_SAMPLED)] for i, count in enumerate(counts, -1)]
         for count, look in zip(counts, looks, strict=True):
             _draw(axes, [row for row in rows if row["samples"] == count], look, study["reference"], least)
+        for row in exact:
+            share = max(row["error"], least) / study["reference"]
+            axes.plot(
+                [row["milliseconds"]], [share], color=style.INK, marker="*", markersize=11,
+                linestyle="none", label="exact",
+            )  # fmt: skip
         axes.axhspan(
             0.0, least / study["reference"], color=style.GREY, alpha=0.15, linewidth=0.0, label="not known"
         )  # fmt: skip

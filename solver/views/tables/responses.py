@@ -182,7 +182,7 @@ def accuracy(found: Json) -> Iterator[Block]:
     rows = [
         (
             "*" if row["pareto"] else "",
-            str(row["harmonics"]),
+            str(row["harmonics"] or ""),
             row["evaluator"] if row["samples"] == 0 else f"{row['samples']} samples",
             units.length(row["max_abs"]),
             f"{row['error'] / size:.1e}" if size > 0.0 else "",
@@ -193,9 +193,9 @@ def accuracy(found: Json) -> Iterator[Block]:
     ]
     title = f"{found['scene']} at {found['frequency_hz']:.6g} Hz: {units.length(size)}"
     if found["reference_error"] is not None:
-        title += (
-            f" with {found['reference_harmonics']} harmonics, to {units.length(found['reference_error'])}"
-        )
+        by = found["reference_harmonics"]
+        way = f"with {by} harmonics" if by else "exact"
+        title += f" {way}, to {units.length(found['reference_error'])}"
     yield ResultTable(title, _ACCURACY_COLUMNS, rows)
     yield Summary("", [("*", "nothing else here is both as accurate and as fast")])
 

@@ -152,10 +152,100 @@ def test_what_sticks_all_the_time_is_named() -> None:
     assert found.events == 0
 
 
-def test_a_response_that_did_not_converge_is_refused() -> None:
-    scene = stickslip.load_scene("bladed-disk")
-    with pytest.raises(stickslip.SettingError, match="sectors"):
-        stickslip.certify(stickslip.solve(scene, frequency_hz=700.0))
+def test_what_has_no_place_in_a_proof_is_refused() -> None:
+    scene = stickslip.load_scene("two-dof")
+    found = stickslip.solve(scene, frequency_hz=1.2)
+    with pytest.raises(stickslip.SettingError, match="path of a load"):
+        stickslip.certify(found, least_over="damper.kt")
+
+
+@pytest.mark.long
+def test_a_disk_is_proved_of_the_disk_written_out() -> None:
+    """Its enclosure holds what the balance of one sector says, within the error it estimates."""
+    found = stickslip.solve(stickslip.load_scene("bladed-disk"), frequency_hz=700.0, harmonics=21)
+    proof = stickslip.certify(found)
+    assert proof.reached, proof.reason
+    assert proof.max_abs[1] - proof.max_abs[0] <= 1e-15 * proof.max_abs[1]
+    assert abs(found.max_abs - proof.max_abs[0]) <= found.error_estimate
+
+
+# Peaks
+
+
+@pytest.fixture(scope="module")
+def peak() -> stickslip.Certificate:
+    """The peak of two masses with a damper, from a balance that is a little beside it."""
+    branch = stickslip.sweep(stickslip.load_scene("two-dof"))
+    assert branch.peak is not None
+    found = stickslip.solve(stickslip.load_scene("two-dof"), frequency_hz=branch.peak.at)
+    return stickslip.certify(found, peak=True)
+
+
+def test_a_peak_is_proved_and_marches_lie_below_it(peak: stickslip.Certificate) -> None:
+    assert peak.reached, peak.reason
+    (low, high), (before, after) = peak.max_abs, peak.frequency_hz
+    assert high - low <= 1e-15 * high
+    assert after - before <= 1e-15 * after
+    scene = stickslip.load_scene("two-dof")
+    for share in (1.0 - 1e-3, 1.0, 1.0 + 1e-3):
+        marched = stickslip.march(scene, frequency_hz=share * before)
+        assert marched.max_abs <= high + marched.error_estimate + 1e-8
+    assert stickslip.march(scene, frequency_hz=before).max_abs == pytest.approx(low, rel=1e-7)
+
+
+def test_spoilt_certificates_of_peaks_are_rejected(peak: stickslip.Certificate) -> None:
+    assert peak.certificate is not None
+    raw, rng = json.loads(json.dumps(peak.certificate)), np.random.default_rng(3)
+    checker.check(raw)
+    for i in range(100):
+        with pytest.raises(checker.RejectedError):
+            checker.check(_spoilt_peak(raw, i, rng))
+
+
+def _spoilt_peak(raw: dict[str, Any], i: int, rng: np.random.Generator) -> dict[str, Any]:
+    """Return a certificate of a peak with one thing wrong."""
+    raw = copy.deepcopy(raw)
+    if i % 4 == 0:  # a number of the system
+        places = [each for each in _numbers(raw) if each[0] == "system" and each[1] != "frequency_hz"]
+        *path, last = places[int(rng.integers(len(places)))]
+        holder: Any = raw
+        for key in path:
+            holder = holder[key]
+        holder[last] *= 1.0 + float(10.0 ** rng.uniform(-12.0, -1.0))
+    elif i % 4 == 1:  # two of the orbits that are compared
+        one, other = rng.choice([1, 2, 3], size=2, replace=False).tolist()
+        raw["at"][one], raw["at"][other] = raw["at"][other], raw["at"][one]
+    elif i % 4 == 2:  # an unknown beside its box
+        unknowns = raw["at"][int(rng.integers(4))]["unknowns"]
+        k = int(rng.integers(len(unknowns)))
+        middle, radius = unknowns[k].split(" +/- ")
+        unknowns[k] = f"{float(middle) * (1.0 + 1e-9)!r} +/- {radius}"
+    else:  # a claim that is elsewhere
+        key = ("peak", "frequency_hz")[int(rng.integers(2))]
+        low, high = map(float, raw["claims"][key])
+        moved = 1e-12 * high * float(rng.choice([-1.0, 1.0]))
+        raw["claims"][key] = [repr(low + moved), repr(high + moved)]
+    return raw
+
+
+def test_what_is_no_peak_says_so() -> None:
+    scene = stickslip.load_scene("two-dof")
+    found = stickslip.certify(stickslip.solve(scene, frequency_hz=1.6), peak=True)
+    assert not found.reached
+    assert found.certificate is None
+    assert "slips forward" in found.reason  # uphill, where other events happen
+
+
+@pytest.mark.long
+def test_the_least_peak_is_proved() -> None:
+    track = stickslip.peaks.track_peak(stickslip.load_scene("two-dof"), "damper.N0", 40.0, 400.0)
+    best = track.optimum
+    scene = stickslip.load_scene("two-dof").with_values({"damper.N0": best.at})
+    near = stickslip.solve(scene, frequency_hz=best.active[0].frequency)
+    found = stickslip.certify(near, least_over="damper.N0")
+    assert found.reached, found.reason
+    assert found.max_abs[1] - found.max_abs[0] <= 1e-14 * found.max_abs[1]
+    assert found.max_abs[0] == pytest.approx(best.peak, rel=1e-3)
 
 
 # The command

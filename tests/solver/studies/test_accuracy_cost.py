@@ -11,7 +11,7 @@ from matplotlib.colors import to_rgb
 from scene_cases import bladed_disk, loose_mass, oscillator, two_dof
 
 from service.cli import main
-from solver import AccuracyRow, AccuracyStudy, SettingError, accuracy_study, solve, sweep
+from solver import AccuracyRow, AccuracyStudy, Scene, SettingError, accuracy_study, solve, sweep
 from solver.views.plots.accuracy import accuracy_figure
 
 
@@ -64,6 +64,22 @@ def test_at_the_peak_if_nothing_is_said():
     assert peak is not None
     assert study.frequency_hz == peak.at
     assert study.rows[0].max_abs == pytest.approx(solve(two_dof(), frequency_hz=peak.at, harmonics=3).max_abs)
+
+
+def test_the_last_row_is_exact():
+    """Against an orbit enclosed by interval arithmetic, with no code of this package."""
+    case = json.loads((Path(__file__).parents[2] / "data" / "certified_orbits.json").read_text())[0]
+    scene = Scene.from_dict(case["scene"])
+    study = accuracy_study(scene, case["frequency_hz"], harmonics=(3, 21), samples=(64,), repeats=2)
+    exact = study.rows[-1]
+    assert exact.evaluator == "exact"
+    assert exact.max_abs == study.reference == pytest.approx(case["value"], rel=1e-13)
+    assert abs(exact.max_abs - case["value"]) <= exact.error == study.reference_error
+    assert exact.pareto
+    for row in study.rows[:-1]:
+        assert row.error == pytest.approx(abs(row.max_abs - case["value"]), abs=1e-12)
+    (axes,) = accuracy_figure(study.to_json()).axes
+    assert [line.get_label() for line in axes.lines] == ["closed form", "64 samples", "exact"]
 
 
 def test_a_scene_without_contacts():

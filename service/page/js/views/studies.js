@@ -27,20 +27,22 @@ export const accuracyView = {
   progress: ({ took }) => say("accuracy-status", `Measuring:${took}.`),
   result(result) {
     const rows = result.rows.filter((row) => row.error !== null && row.milliseconds !== null);
-    const share = (row) => Math.max(row.error / result.reference, 1e-12);
-    const exact = rows.filter((row) => row.samples === 0).sort((a, b) => a.harmonics - b.harmonics);
+    const share = (row) => Math.max(row.error / result.reference, 1e-14);
+    const exact = rows.filter((row) => row.evaluator === "closed form").sort((a, b) => a.harmonics - b.harmonics);
     const sampled = rows.filter((row) => row.samples > 0);
+    const followed = rows.filter((row) => row.evaluator === "exact");
     costs.draw({
       x: { name: "time of a point [ms]", log: true, pad: 0.06 },
       y: { name: "relative error", log: true, pad: 0.08 },
       series: [
         { name: "closed form", x: exact.map((r) => r.milliseconds), y: exact.map(share), colour: 1, shape: "circle", size: 4 },
         { name: "by samples", x: sampled.map((r) => r.milliseconds), y: sampled.map(share), colour: 2, shape: "triangle", size: 3.5, width: 0 },
+        { name: "exact", x: followed.map((r) => r.milliseconds), y: followed.map(share), colour: 3, shape: "square", size: 5, width: 0 },
       ],
       marks: exact.filter((_, i) => i === 0 || i === exact.length - 1).map((r) => ({ x: r.milliseconds, y: share(r), text: `H = ${r.harmonics}`, colour: 1 })),
       describe: (x, y, i) => `H = ${exact[i].harmonics}: ${number(100 * y, 3)} % in ${number(x, 3)} ms`,
     });
-    say("accuracy-status", `At ${number(result.frequency_hz, 6)} Hz, against ${result.reference_harmonics} harmonics. ${result.status ?? ""}`);
+    say("accuracy-status", `At ${number(result.frequency_hz, 6)} Hz, against ${result.reference_harmonics ? `${result.reference_harmonics} harmonics` : "the exact solution"}. ${result.status ?? ""}`);
   },
   failed: (text) => say("accuracy-status", text, true),
 };
