@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 from pydantic import BaseModel, ConfigDict, Field
 from pydantic.fields import FieldInfo
@@ -51,7 +52,9 @@ class SceneParameterAnswer(BaseModel):
 class SceneParameterList(BaseModel):
     """What is known of a scene beside its tables."""
 
-    items: list[SceneParameterAnswer] = Field(description="Those of a part one after the other.")
+    items: list[SceneParameterAnswer] = Field(
+        description="Those of a part one after the other: first what presses its contacts, last its geometry."
+    )
     joints: list[JointAnswer] = Field(description="What a drawing shows between its parts.")
     studies: list[StudyProposal] = Field(description="What its studies begin with.")
 
@@ -60,13 +63,29 @@ def scene_parameters(scene: Scene) -> SceneParameterList:
     """Return what can be said of every parameter of the parts of a scene, of its force and of its speed."""
     parts = {part.name: part for part in (*scene.contacts, *scene.bodies, *scene.loads, *scene.dampers)}
     items = []
-    for path in scene.parameter_paths():
+    for path in sorted(scene.parameter_paths(), key=_order(scene)):
         owner, _, name = path.rpartition(".")
         if owner in parts or path == SPEED:
             items.append(_described(scene, path, parts.get(owner), name))
     if _FORCE in scene.parameter_paths():
         items.append(_force(scene))
     return SceneParameterList(items=items, joints=joints(scene), studies=proposals(scene))
+
+
+def _order(scene: Scene) -> Callable[[str], tuple[int, bool, bool]]:
+    """How paths are told: by their owners, as the scene has them, and what is designed most often first.
+
+    That is what presses the contacts: a normal load, of a damper that rotation presses its mass.
+    """
+    owners = {path.rpartition(".")[0]: i for i, path in reversed([*enumerate(scene.parameter_paths())])}
+
+    def place(path: str) -> tuple[int, bool, bool]:
+        owner, _, name = path.rpartition(".")
+        found = parameter_of(scene, path)
+        presses = name in ("N0", "mass") and found.get() > 0.0
+        return owners[owner], found.moves_contacts, not presses
+
+    return place
 
 
 def _force(scene: Scene) -> SceneParameterAnswer:
