@@ -140,7 +140,7 @@ def _config(app: FastAPI, settings: Settings) -> uvicorn.Config:
 
 
 def _begin_the_rest(service: Service) -> None:
-    """Start the processes of answers and previews when a worker is ready, and make what the page asks for first.
+    """Start the processes of answers and previews when a worker is ready; make what the page asks for first.
 
     Nothing is to delay readiness; who asks for either before gets it at once.
     """
