@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pydantic import BaseModel, ConfigDict, Field
 from pydantic.fields import FieldInfo
 
+from optim.problem.default_variable import default_variable
 from service.jobs.common.proposals import StudyProposal, around, design_bounds, proposals
 from service.jobs.common.scene_parts import JointAnswer, joints
 from solver.contacts.laws.parts import Span
@@ -53,7 +54,7 @@ class SceneParameterList(BaseModel):
     """What is known of a scene beside its tables."""
 
     items: list[SceneParameterAnswer] = Field(
-        description="Those of a part one after the other: first what presses its contacts, last its geometry."
+        description="Those of a part one after the other: what is designed by itself first, geometry last."
     )
     joints: list[JointAnswer] = Field(description="What a drawing shows between its parts.")
     studies: list[StudyProposal] = Field(description="What its studies begin with.")
@@ -73,17 +74,13 @@ def scene_parameters(scene: Scene) -> SceneParameterList:
 
 
 def _order(scene: Scene) -> Callable[[str], tuple[int, bool, bool]]:
-    """How paths are told: by their owners, as the scene has them, and what is designed most often first.
-
-    That is what presses the contacts: a normal load, of a damper that rotation presses its mass.
-    """
+    """How paths are told: by their owners, as the scene has them, first what is designed by itself."""
     owners = {path.rpartition(".")[0]: i for i, path in reversed([*enumerate(scene.parameter_paths())])}
+    first = (default_variable(scene) or "").rpartition(".")[2]
 
     def place(path: str) -> tuple[int, bool, bool]:
         owner, _, name = path.rpartition(".")
-        found = parameter_of(scene, path)
-        presses = name in ("N0", "mass") and found.get() > 0.0
-        return owners[owner], found.moves_contacts, not presses
+        return owners[owner], parameter_of(scene, path).moves_contacts, name != first
 
     return place
 
