@@ -23,6 +23,9 @@ import numpy as np
 
 from optim.identification.fit import HUBER, LocalFit, Runs
 from optim.problem.variables import Real
+from solver.balance.balance import build
+from solver.balance.parameter_derivatives import reason_without
+from solver.balance.simplifications import Effects, even_harmonics_reason
 from solver.scene.matrices_structure import MatricesStructure
 from solver.scene.parts import Damper, Mass, Spring
 from solver.scene.scene import Scene
@@ -166,10 +169,12 @@ def _beyond(runs: Runs, best: LocalFit, i: int) -> _Direction:
 
 
 def _others(runs: Runs, best: LocalFit) -> list[_Direction]:
-    """Return every parameter of the scene that was not looked for, with relative changes of each."""
-    sought = runs.unknowns.paths
+    """Return every parameter with a derivative that was not looked for, with relative changes of each."""
     here = _all_named(runs.scene.with_values(runs.unknowns.by_path(best.fitted.z)))
-    paths = tuple(path for path in here.parameter_paths() if path not in sought)
+    effects = Effects(even_harmonics=even_harmonics_reason(here, here.parameter_paths()) is not None)
+    balance = build(here, harmonics=runs.harmonics, effects=effects)
+    others = (path for path in here.parameter_paths() if path not in runs.unknowns.paths)
+    paths = tuple(path for path in others if not reason_without(here, balance, path))
     blocks = []
     for run, part in zip(runs.runs, runs.slices, strict=True):
         under = here.with_values(dict(run.conditions))

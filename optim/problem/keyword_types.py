@@ -18,8 +18,8 @@ class ProblemKeywords(TypedDict, total=False):
     harmonics: int | None
     """Highest harmonic of the balance."""
     variables: Mapping[str, Sequence[float]] | None
-    """Variable to [low, high]: a parameter path, or several that share a value, separated by commas. The
-    normal load of the contact whose load varies if left out."""
+    """Variable to [low, high]: a parameter path, or several that share a value, separated by commas. The mass
+    of the first damper, or the normal load of the contact whose load varies, if left out."""
     scaling: Mapping[str, ScalingWord] | None
     """Whether equal steps or equal ratios of a variable count equally; by its bounds."""
     cases: Sequence[Mapping[str, object]] | None

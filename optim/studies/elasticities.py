@@ -23,15 +23,13 @@ from optim.studies.sensitivity_result import (
     WithoutDerivative,
 )
 from solver.balance.parameter import resolve
-from solver.balance.parameter_derivatives import resolved
+from solver.balance.parameter_derivatives import reason_without
 from solver.balance.simplifications import Effects, even_harmonics_reason
 from solver.contacts.laws.harmonics import is_phase
 from solver.continuation.branch import Branch, BranchStatus
 from solver.continuation.branches.sweep import sweep
 from solver.continuation.extrema.extrema import HALF_POWER
 from solver.continuation.peaks import Peak
-from solver.errors import SettingError
-from solver.scene.cyclic.annulus import check_in_annulus
 from solver.scene.parameter_paths import PHASE
 from solver.scene.scene import Scene
 
@@ -81,18 +79,9 @@ def _differentiable(
     scene: Scene, branch: Branch, known: tuple[str, ...]
 ) -> tuple[list[str], tuple[WithoutDerivative, ...]]:
     """Return the paths with a value and a derivative, and the others with the reason."""
-    paths, left_out = [], []
-    for path in known:
-        try:
-            scene.value(path)
-            if branch.balance.scene is not scene:
-                check_in_annulus(scene, path)
-            resolved(branch.balance, [path])
-        except SettingError as error:
-            left_out.append(WithoutDerivative(path, str(error)))
-        else:
-            paths.append(path)
-    return paths, tuple(left_out)
+    reasons = {path: reason_without(scene, branch.balance, path) for path in known}
+    left_out = tuple(WithoutDerivative(path, reason) for path, reason in reasons.items() if reason)
+    return [path for path, reason in reasons.items() if not reason], left_out
 
 
 def _rows(

@@ -111,7 +111,8 @@ class Tools:
             dict[str, list[float]] | None,
             Field(
                 description='Parameters to choose, with bounds: {"damper.N0": [20, 3000]}; if left out, the '
-                "normal load of the contact whose load varies. `bounds` of `scene` proposes some."
+                "mass of the first damper or the normal load of the contact whose load varies. "
+                "`bounds` of `scene` proposes some."
             ),
         ] = None,
         set: Values = None,

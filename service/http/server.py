@@ -77,7 +77,7 @@ def serve(settings: Settings, registry: Registry | None = None) -> None:
             server.should_exit = True
             _end_by_force_after(settings.exit_seconds)
 
-        later = threading.Thread(target=_begin_answers, args=(service,), daemon=True)
+        later = threading.Thread(target=_begin_the_rest, args=(service,), daemon=True)
         with _signals(stop), scratch_folder():
             later.start()
             server.run(sockets=[listener])
@@ -139,8 +139,8 @@ def _config(app: FastAPI, settings: Settings) -> uvicorn.Config:
     )
 
 
-def _begin_answers(service: Service) -> None:
-    """Start the processes that compute answers when a worker is ready, and make what the page asks for first.
+def _begin_the_rest(service: Service) -> None:
+    """Start the processes of answers and previews when a worker is ready; make what the page asks for first.
 
     Nothing is to delay readiness; who asks for either before gets it at once.
     """
@@ -149,6 +149,7 @@ def _begin_answers(service: Service) -> None:
             return
     service.answers.begin()
     prepare(service.registry)
+    service.previews.begin()
 
 
 def _end_by_force_after(seconds: float) -> None:

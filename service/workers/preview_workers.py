@@ -1,7 +1,7 @@
 """Previews: computed at once by worker processes of their own, never stored.
 
-The processes start with the first preview, or when the page is opened. Of the previews of one client only the
-newest is computed; those of several clients wait for each other, a few at most.
+The processes start with the service, or with the first preview or page before. Of the previews of one client
+only the newest is computed; those of several clients wait for each other, a few at most.
 """
 
 from __future__ import annotations

@@ -23,6 +23,7 @@ from solver.linear.condensation import reduce_model, term_amplitudes
 from solver.linear.contact_table import port_stiffnesses
 from solver.linear.model import LinearModelDerivative
 from solver.scene.bodies.paths import FORCE
+from solver.scene.cyclic.annulus import check_in_annulus
 from solver.scene.parameter_paths import AMPLITUDE, parameter_of
 from solver.scene.scene import MatricesStructure, Scene
 
@@ -48,6 +49,18 @@ def resolved(balance: Balance, paths: Sequence[str]) -> tuple[Parameter, ...]:
             raise SettingError("paths", path, f"needs a balance with even harmonics: {reason}")
         found.append(parameter)
     return tuple(found)
+
+
+def reason_without(scene: Scene, balance: Balance, path: str) -> str:
+    """Return why a path has no value or no derivative in the balance of a scene; empty if it has both."""
+    try:
+        scene.value(path)
+        if balance.scene is not scene:
+            check_in_annulus(scene, path)
+        resolved(balance, [path])
+    except SettingError as error:
+        return str(error)
+    return ""
 
 
 def contact_slopes(balance: Balance, parameters: Sequence[Parameter]) -> tuple[Real, Real]:

@@ -47,7 +47,7 @@ def asked(kind: str, name: str) -> dict[str, Any]:
         },
     }  # fmt: skip
     body: Any = scene.to_dict()
-    if kind == "mistuning" and scene.structure.sector_count > 1:
+    if kind == "mistuning" and scene.structure.kind == "cyclic":
         body["structure"]["sectors"] = 3
     return {"scene": body, **own.get(kind, {}), **rough}
 
@@ -88,7 +88,10 @@ def test_a_result_read_back_is_the_result(kind: str, name: str) -> None:
         resolved = SHIPPED[kind].resolve(validated(study, asked(kind, name)), Shipped())
     except InvalidRequestError:
         assert kind in OF_DISKS
-        assert solver.load_scene(name).structure.sector_count == 1
+        structure = solver.load_scene(name).structure
+        # A sector of matrices has parts to be mistuned if it was reduced with them.
+        untold = structure.kind == "matrices" and structure.parts is None
+        assert structure.sector_count == 1 or (kind == "mistuning" and untold)
         return
     found = study.compute(*study.asked(resolved.spec), Watch())
     written = json.loads(json.dumps(found.json))

@@ -36,6 +36,16 @@ def test_values_that_are_set_are_those_told(shipped: httpx.Client) -> None:
     assert items["wedge.mass"]["slider"]["logarithmic"]
 
 
+@pytest.mark.parametrize(("name", "path"), [("platform-wedge", "wedge.mass"), ("shroud-3d", "shroud.N0")])
+def test_what_presses_a_damper_is_offered_first_and_its_geometry_last(
+    shipped: httpx.Client, name: str, path: str
+) -> None:
+    items = shipped.post("/v1/scenes/parameters", json={"scene": name}).json()["items"]
+    offered = [item["path"] for item in items if item["bounds"] and item["part"] == path.split(".")[0]]
+    assert offered[0] == path
+    assert {one.split(".")[1] for one in offered[-2:]} <= {"angle", "width", "length"}
+
+
 def test_a_scene_that_is_not_there_is_refused(shipped: httpx.Client) -> None:
     refused = shipped.post("/v1/scenes/parameters", json={"scene": "nowhere"})
     assert refused.status_code == 422

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 from pydantic import BaseModel, ConfigDict, Field
 from pydantic.fields import FieldInfo
 
+from optim.problem.default_variable import default_variable
 from service.jobs.common.proposals import StudyProposal, around, design_bounds, proposals
 from service.jobs.common.scene_parts import JointAnswer, joints
 from solver.contacts.laws.parts import Span
@@ -51,7 +53,9 @@ class SceneParameterAnswer(BaseModel):
 class SceneParameterList(BaseModel):
     """What is known of a scene beside its tables."""
 
-    items: list[SceneParameterAnswer] = Field(description="Those of a part one after the other.")
+    items: list[SceneParameterAnswer] = Field(
+        description="Those of a part one after the other: what is designed by itself first, geometry last."
+    )
     joints: list[JointAnswer] = Field(description="What a drawing shows between its parts.")
     studies: list[StudyProposal] = Field(description="What its studies begin with.")
 
@@ -60,13 +64,25 @@ def scene_parameters(scene: Scene) -> SceneParameterList:
     """Return what can be said of every parameter of the parts of a scene, of its force and of its speed."""
     parts = {part.name: part for part in (*scene.contacts, *scene.bodies, *scene.loads, *scene.dampers)}
     items = []
-    for path in scene.parameter_paths():
+    for path in sorted(scene.parameter_paths(), key=_order(scene)):
         owner, _, name = path.rpartition(".")
         if owner in parts or path == SPEED:
             items.append(_described(scene, path, parts.get(owner), name))
     if _FORCE in scene.parameter_paths():
         items.append(_force(scene))
     return SceneParameterList(items=items, joints=joints(scene), studies=proposals(scene))
+
+
+def _order(scene: Scene) -> Callable[[str], tuple[int, bool, bool]]:
+    """How paths are told: by their owners, as the scene has them, first what is designed by itself."""
+    owners = {path.rpartition(".")[0]: i for i, path in reversed([*enumerate(scene.parameter_paths())])}
+    first = (default_variable(scene) or "").rpartition(".")[2]
+
+    def place(path: str) -> tuple[int, bool, bool]:
+        owner, _, name = path.rpartition(".")
+        return owners[owner], parameter_of(scene, path).moves_contacts, name != first
+
+    return place
 
 
 def _force(scene: Scene) -> SceneParameterAnswer:

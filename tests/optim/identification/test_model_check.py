@@ -116,3 +116,15 @@ def test_the_cause_is_named() -> None:
     found, _ = identified(1, "rms", phase=True)
     assert "29 % smaller" in found.misfit
     assert found.uncertain == {one.name: [one.low, one.high] for one in found.estimates}
+
+
+def test_a_parameter_without_a_derivative_is_no_cause() -> None:
+    """The number of a shroud's points goes in steps."""
+    truth = solver.load_scene("shroud-3d")
+    assert "shroud.points" in truth.parameter_paths()
+    hertz = [380.0, 440.0, 470.0]
+    heights = [solver.solve(truth, frequency_hz=f, harmonics=3).max_abs for f in hertz]
+    data = {"frequency": hertz, "amplitude": heights}
+    found = optim.identify(truth, [data], {"excitation.amplitude": (10.0, 40.0)}, harmonics=1, starts=1)
+    assert [one.name for one in found.estimates] == ["excitation.amplitude"]
+    assert found.noise > 1e-3  # so that what explains it is looked for

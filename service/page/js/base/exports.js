@@ -30,7 +30,7 @@ export async function saveFrom(path, accept, name, options) {
 
 // The drawing with its computed paint as attributes: it looks the same outside the page. The copy stands in a document
 // of its own, which loads nothing: what the page may load says nothing about a picture inside a file.
-export function standalone(drawing, canvas) {
+function standalone(drawing, canvas) {
   const copy = document.implementation.createHTMLDocument("").importNode(drawing, true);
   const [from, to] = [drawing.querySelectorAll("*"), copy.querySelectorAll("*")];
   from.forEach((node, i) => {

@@ -64,7 +64,7 @@ function indices(shape, { shown, places, boxes }) {
 }
 
 // The motion of every point at the angle τ about its mean, and what its contacts do there.
-export function motionAt(shape, j, tau) {
+function motionAt(shape, j, tau) {
   const s = shape.real.length > 1 ? j : 0;
   const moved = shape.points.map(() => [0, 0, 0]);
   shape.harmonics.forEach((k, h) => {
@@ -76,7 +76,7 @@ export function motionAt(shape, j, tau) {
   return moved;
 }
 
-export function contactAt({ motions, states }, { real, turn }, j, tau) {
+function contactAt({ motions, states }, { real, turn }, j, tau) {
   const s = real.length > 1 ? j : 0;
   const over = motions[s];
   if (!over) return states[s] ? { stuck: 0, closed: 0, separated: 2 }[states[s]] ?? 1 : null;
