@@ -191,7 +191,7 @@ def with_values(scene: _SceneT, values: Mapping[str, float]) -> _SceneT:
 
 
 def _check_together(scene: Scene, values: Mapping[str, float]) -> None:
-    """Raise SettingError where two paths say one number: N1 and N1_ratio, or a group and one of its members."""
+    """Raise SettingError where two paths say one number: N1 and N1_ratio, or a group and a member of it."""
     owners = dict[str | None, dict[str, str]]()
     for path in values:
         owner, _, key = path.rpartition(".")

@@ -44,7 +44,8 @@ def structure_parameter(scene: Scene, path: str) -> SceneParameter | None:
     if not path.startswith(STRUCTURE):
         return None
     structure, name = scene.structure, path.removeprefix(STRUCTURE)
-    members = [(i, part, share) for i, part in enumerate(named_parts(structure)) if (share := _share(part, name))]
+    parts = enumerate(named_parts(structure))
+    members = [(i, part, share) for i, part in parts if (share := _share(part, name))]
     if members:
         return _of_parts(structure, path, members)
     lossy = name == _LOSS and structure.loss_factor > 0.0

@@ -274,7 +274,7 @@ def test_groups_of_bodies_are_set_together() -> None:
     scene = Scene.from_dict(raw)
     changed = scene.with_values({"dampers.mass": 0.004})
     assert [body.mass for body in changed.bodies] == [0.004, 0.004]
-    with pytest.raises(SettingError, match="`dampers.mass` cannot be set together with `d2.mass`"):
+    with pytest.raises(SettingError, match=r"`dampers.mass` cannot be set together with `d2.mass`"):
         scene.with_values({"d2.mass": 0.003, "dampers.mass": 0.004})
 
 
