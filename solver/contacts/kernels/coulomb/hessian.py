@@ -11,8 +11,10 @@ where a contact opens or closes.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from solver.contacts.kernels.coulomb.force import add_moments, bases_at, moment_rows
 from solver.contacts.kernels.stick_slip_events import (
@@ -62,7 +64,8 @@ def second_along(
         return dot(w, dU), 0.0
     n, m = U.size, N.size
     times, waves = np.empty((3, count), np.complex128), np.empty((2, ks[-1] + 1))
-    rows, over = np.empty((3, n), np.complex128), np.empty((3, m), np.complex128)
+    rows: NDArray[Any] = np.empty((3, n), np.complex128)
+    over: NDArray[Any] = np.empty((3, m), np.complex128)
     at, beside, u, load = np.empty((4, n)), np.empty((4, m)), rows[2], over[2]
     for i in range(n):
         u[i] = complex(U[i], TINY * dU[i])
@@ -138,7 +141,7 @@ def _add(target: Real, factor: float, vector: Real) -> None:
 
 @apart
 def _carry(
-    u: Complex, ks: Integer, load: Complex, load_ks: Integer, kt: float, mu: float, state: int,
+    u: NDArray[Any], ks: Integer, load: NDArray[Any], load_ks: Integer, kt: float, mu: float, state: int,
     segments: Records, count: int, at: Real, over: Real, times: Complex,
 ) -> None:  # fmt: skip
     """Fill `times` (3, count) with begin, end and onset of segments under a carried motion and load.
