@@ -204,8 +204,9 @@ def _check_together(scene: Scene, values: Mapping[str, float]) -> None:
         group, own = f"{STRUCTURE}{part.group}", f"{STRUCTURE}{part.name}"
         if group != own and group in values and own in values:
             raise refused(group, own)
-    for each in (*scene.contacts, *scene.bodies):
-        of_group, alone = owners.get(each.group, {}), owners.get(each.name, {})
+    named = [*((c.group, c.name) for c in scene.contacts), *((b.group, b.name) for b in scene.bodies)]
+    for of, name in named:
+        of_group, alone = owners.get(of, {}), owners.get(name, {})
         for key in of_group:
             if key in alone and of_group is not alone:
                 raise refused(of_group[key], alone[key])
