@@ -38,13 +38,6 @@ from solver.jit.records import Records
 from solver.jit.separate import apart
 
 
-@compiled
-def cos_sin(tau: Any) -> tuple[Any, Any]:
-    """Return cos and sin of an angle, real or with an imaginary part whose square is nothing beside 1."""
-    c, s, away = math.cos(tau.real), math.sin(tau.real), tau.real - tau
-    return c + s * away, s - c * away
-
-
 @apart
 def add_moments(begin: Any, end: Any, weight: float, cosines: NDArray[Any], sines: NDArray[Any]) -> None:
     """Add weight·∫cos qτ and weight·∫sin qτ over [begin, end] for q = 0 … len − 1, real or complex.
@@ -53,8 +46,8 @@ def add_moments(begin: Any, end: Any, weight: float, cosines: NDArray[Any], sine
     precision on the very short segments of stiff contacts.
     """
     half, middle = 0.5 * (end - begin), 0.5 * (end + begin)
-    cm1, sm1 = cos_sin(middle)
-    ch1, sh1 = cos_sin(half)
+    cm1, sm1 = np.cos(middle), np.sin(middle)
+    ch1, sh1 = np.cos(half), np.sin(half)
     cm, sm, ch, sh = cm1, sm1, ch1, sh1
     cosines[0] += weight * (end - begin)
     for q in range(1, cosines.size):
@@ -212,8 +205,7 @@ def _fill_moments(
 @compiled
 def bases_at(tau: Any, ks: Integer, e: NDArray[Any], de: NDArray[Any]) -> None:
     """Fill `e` with the basis for the harmonics `ks` at `tau`, real or complex, and `de` with its slope."""
-    cosine, sine = cos_sin(tau)
-    bases_by(cosine, sine, ks, e, de)
+    bases_by(np.cos(tau), np.sin(tau), ks, e, de)
 
 
 @compiled

@@ -1,40 +1,76 @@
-"""Second derivatives of the force of one elastic Coulomb contact, contracted with weights, along a direction.
+"""Second derivatives of the force of one elastic Coulomb contact, contracted with weights, in closed form.
 
-With W(τ) the weights times the basis, S = w·F is a sum of ∫ f W over the segments, and its gradient a formula
-of their times (`solver.contacts.kernels.coulomb.force`). Motion, load and times are carried into the complex
-plane, the direction as a tiny imaginary part: that of the gradient is its derivative (W. Squire, G. Trapp,
-SIAM Rev. 40 (1998) 110). An integral follows by what its ends take in. Times move so that what they are zeros
-of stays 0: the limit less the force at the end of a stick, the rate of that at an onset after slip, the load
-where a contact opens or closes.
+With W(τ) the weights times the basis, S = w·F is a sum of ∫ f W over the segments, and its gradient needs no
+event times (`solver.contacts.kernels.coulomb.force`). Differentiated once more, an event at τ_e where the
+gradient's integrand jumps by J contributes J W(τ_e) dτ_e, and an onset τ_s that fixes a later stick moves
+that stick:
+
+- stick → slip ξ: the excess force kt u + c − ξμN is 0 there, so dτ_e = −J/D with D its slope: −J J' W/D;
+- slip ξ → stick: q = ξ kt u' − μN' is 0 there, so dτ_s = −dq/q': ξ dq dq' M/q' with M = ∫W of the stick;
+- N = 0 at separation and contact: dτ = −dN/N', alike for the force that ends or begins there.
+
+Each is an outer product of the event's two functionals, so one direction costs a few vectors an event.
+Design derivation by ourselves from the law of `solver.contacts.kernels.stick_slip_events`.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from solver.contacts.kernels.coulomb.force import add_moments, bases_at, moment_rows
+from solver.contacts.kernels.coulomb.force import bases_at
 from solver.contacts.kernels.stick_slip_events import (
     AFTER_SLIP,
     LIFTING,
     NO_LENGTH,
     SEPARATED,
     SLIP,
-    STICK,
     STUCK,
     UNLOADED,
 )
 from solver.jit.decorators import compiled
-from solver.jit.fourier import Complex, Integer, Real
-from solver.jit.lapack import dot, fill, fill_block
-from solver.jit.records import Records
+from solver.jit.fourier import Integer, Real
+from solver.jit.lapack import dot, fill
+from solver.jit.records import Records, Row
 from solver.jit.separate import apart
 
-TINY = 1e-30  # of the direction
-_BEGIN, _END, _ONSET = 0, 1, 2  # times of a segment
+# Derivatives by the two numbers of the law, and wᵀ ∂F/∂N dN without the sticks after separation, which is the
+# share of ∂F/∂μ that a change of the load brings, times μ.
+_KT, _MU, _LOAD = 0, 1, 2
+
+
+@compiled
+def curvature_at(e: Real, ks: Integer, q: Real) -> float:
+    """Return d²q/dτ² of coefficients `q` where the basis is `e`."""
+    total, here = 0.0, 0
+    for i in range(ks.size):
+        k = ks[i]
+        if k > 0:
+            total -= k * k * (q[here] * e[here] + q[here + 1] * e[here + 1])
+            here += 1
+        here += 1
+    return total
+
+
+@compiled
+def _weight_of(begin: float, end: float, weights: Real, ks: Integer) -> float:
+    """Return ∫W over [begin, end], from half-length and middle; see
+    `solver.contacts.kernels.coulomb.force.add_moments`."""
+    half, middle = 0.5 * (end - begin), 0.5 * (end + begin)
+    total, here = 0.0, 0
+    for i in range(ks.size):
+        k = ks[i]
+        if k == 0:
+            total += weights[here] * (end - begin)
+        else:
+            factor = 2.0 * math.sin(k * half) / k
+            total += factor * (
+                weights[here] * math.cos(k * middle) + weights[here + 1] * math.sin(k * middle)
+            )
+            here += 1
+        here += 1
+    return total
 
 
 @apart
@@ -60,60 +96,46 @@ def second_along(
     fill(out_N, 0.0)
     if state == SEPARATED:
         return 0.0, 0.0
+    n, m = U.size, N.size
     if state == STUCK and segments[0].began == UNLOADED:
         return dot(w, dU), 0.0
-    n, m = U.size, N.size
-    times, waves = np.empty((3, count), np.complex128), np.empty((2, ks[-1] + 1))
-    rows: NDArray[Any] = np.empty((3, n), np.complex128)
-    over: NDArray[Any] = np.empty((3, m), np.complex128)
-    at, beside, u, load = np.empty((4, n)), np.empty((4, m)), rows[2], over[2]
+    weights = np.empty(n)
     for i in range(n):
-        u[i] = complex(U[i], TINY * dU[i])
-    for j in range(m):
-        load[j] = complex(N[j], TINY * dN[j])
-    _carry(u, ks, load, load_ks, kt, mu, state, segments, count, at, beside, times)
-    by_kt, by_mu, by_load = 0.0, 0.0, _weighed(w, dF_dN, dN)
+        weights[i] = w[i] / math.pi
+    if ks[0] == 0:
+        weights[0] *= 0.5
+    rates = np.zeros(3)
+    rates[_KT], rates[_LOAD] = _weighed(w, dF_dU, dU) / kt, _weighed(w, dF_dN, dN)
+    at, over = np.empty((4, n)), np.empty((4, m))
     for index in range(count):
-        row, sticks = segments[index], segments[index].motion == STICK
-        if row.end - row.begin <= NO_LENGTH or (sticks and row.began == UNLOADED):
+        row = segments[index]
+        if row.end - row.begin <= NO_LENGTH or row.began == UNLOADED:
             continue
-        gained = 0.0  # by ∫W at its ends
-        for side in range(2):
-            moved = times[side, index].imag / TINY
-            if moved == 0.0:
-                continue
-            bases_at(times[side, index].real, ks, at[0], at[1])
-            passed = (moved if side == _END else -moved) * _weight(w, at[0], ks)
-            gained += passed
-            if sticks:
-                _add(out_U, kt * passed, at[0])
-                by_kt += passed * dot(at[0], U)
-            else:
-                bases_at(times[side, index].real, load_ks, beside[0], beside[1])
-                _add(out_N, row.direction * mu * passed, beside[0])
-                by_mu += row.direction * passed * dot(beside[0], N)
-        if not sticks:
+        follows = index > 0 and segments[index - 1].end == row.begin
+        followed = index + 1 < count and segments[index + 1].begin == row.end
+        bases_at(row.onset, ks, at[0], at[1])
+        bases_at(row.onset, load_ks, over[0], over[1])
+        bases_at(row.end, ks, at[2], at[3])
+        bases_at(row.end, load_ks, over[2], over[3])
+        if row.motion == SLIP:
+            if state == LIFTING:
+                _ends_of_slip(N, mu * row.direction, follows, followed, weights, at, over, dN, out_N)
             continue
-        fill_block(waves, 0.0)
-        add_moments(row.begin, row.end, 1.0, waves[0], waves[1])
-        moment_rows(waves[0], waves[1], ks, at[2])
-        held = complex(dot(at[2], w), TINY * gained)
-        bases_at(times[_ONSET, index], ks, rows[0], rows[1])
-        bases_at(times[_ONSET, index], load_ks, over[0], over[1])
-        by_kt -= (held * dot(rows[0], U)).imag / TINY
+        held = _weight_of(row.begin, row.end, weights, ks)
         if row.began == AFTER_SLIP:
-            rate = row.direction * mu * held
-            by_mu += row.direction * (held * dot(over[0], N)).imag / TINY
+            _onset_after_slip(
+                U, ks, N, load_ks, kt, mu, row.direction, held, at, over, dU, dN, out_U, out_N, rates
+            )
         else:
-            rate = held * kt * dot(rows[1], u) / dot(over[1], load)
-            by_load -= rate.real * dot(over[0], dN).real
-        for i in range(n):
-            out_U[i] -= kt / TINY * (held * rows[0, i]).imag
-        for j in range(m):
-            out_N[j] += (rate * over[0, j]).imag / TINY
-    if by_load != 0.0:
-        by_mu += by_load / mu
-    return by_kt + _weighed(w, dF_dU, dU) / kt, by_mu
+            _onset_after_separation(
+                U, ks, N, load_ks, kt, held, dot(weights, at[0]), at, over, dU, dN, out_U, out_N, rates
+            )
+        if followed and segments[index + 1].motion == SLIP:
+            way = segments[index + 1].direction
+            _end_of_stick(U, N, kt, mu, row, way, dot(weights, at[2]), at, over, dU, dN, out_U, out_N, rates)
+    if rates[_LOAD] != 0.0:
+        rates[_MU] += rates[_LOAD] / mu
+    return rates[_KT], rates[_MU]
 
 
 @compiled
@@ -121,15 +143,8 @@ def _weighed(w: Real, matrix: Real, v: Real) -> float:
     """Return w · matrix v."""
     total = 0.0
     for i in range(w.size):
-        total += w[i] * dot(v, matrix[i])
+        total += w[i] * dot(matrix[i], v)
     return total
-
-
-@compiled
-def _weight(w: Real, e: Real, ks: Integer) -> float:
-    """Return W where the basis is `e`."""
-    mean = 0.5 * w[0] * e[0] if ks[0] == 0 else 0.0
-    return (dot(w, e) - mean) / math.pi
 
 
 @compiled
@@ -139,73 +154,77 @@ def _add(target: Real, factor: float, vector: Real) -> None:
         target[i] += factor * vector[i]
 
 
-@apart
-def _carry(
-    u: NDArray[Any], ks: Integer, load: NDArray[Any], load_ks: Integer, kt: float, mu: float, state: int,
-    segments: Records, count: int, at: Real, over: Real, times: Complex,
+@compiled
+def _ends_of_slip(
+    N: Real, limit: float, follows: bool, followed: bool, weights: Real, at: Real, over: Real, dN: Real,
+    out_N: Real,
 ) -> None:  # fmt: skip
-    """Fill `times` (3, count) with begin, end and onset of segments under a carried motion and load.
+    """Add what moves with N = 0 where a slip, force `limit` · N, begins at contact or ends at separation."""
+    if not follows:
+        factor = limit * dot(weights, at[0]) / dot(over[1], N)
+        _add(out_N, factor * dot(over[0], dN), over[0])
+    if not followed:
+        factor = -limit * dot(weights, at[2]) / dot(over[3], N)
+        _add(out_N, factor * dot(over[2], dN), over[2])
 
-    Of `at` (4, n) and `over` (4, m) nothing is known before or after.
-    """
+
+@compiled
+def _onset_after_slip(
+    U: Real, ks: Integer, N: Real, load_ks: Integer, kt: float, mu: float, xi: float, held: float,
+    at: Real, over: Real, dU: Real, dN: Real, out_U: Real, out_N: Real, rates: Real,
+) -> None:  # fmt: skip
+    """Add ξ dq dq' M/q': the onset moves, where the rate of the limit, q = ξ kt u' − μN', is 0."""
+    e, de, en, den = at[0], at[1], over[0], over[1]
+    bend = xi * kt * curvature_at(e, ks, U) - mu * curvature_at(en, load_ks, N)
+    along = xi * kt * dot(de, dU) - mu * dot(den, dN)
+    factor = xi * along * held / bend
+    _add(out_U, factor * xi * kt, de)
+    _add(out_N, -factor * mu, den)
+    rates[_KT] += factor * xi * dot(de, U)
+    rates[_MU] -= factor * dot(den, N)
+
+
+@compiled
+def _onset_after_separation(
+    U: Real, ks: Integer, N: Real, load_ks: Integer, kt: float, held: float, weight: float,
+    at: Real, over: Real, dU: Real, dN: Real, out_U: Real, out_N: Real, rates: Real,
+) -> None:  # fmt: skip
+    """Add what moves with the onset where N = 0: the offset c = −kt u(τs) and the beginning of the force."""
+    e, de, en, den = at[0], at[1], over[0], over[1]
+    speed, rise = dot(de, U), dot(den, N)
+    moved = -dot(en, dN) / rise  # dτs
+    turn = dot(den, dN)
+    _add(out_U, -held * kt * moved, de)
+    rates[_KT] -= held * speed * moved
+    factor = held * kt * (dot(de, dU) + curvature_at(e, ks, U) * moved) / rise
+    factor -= held * kt * speed * (turn + curvature_at(en, load_ks, N) * moved) / (rise * rise)
+    factor -= kt * speed * weight * moved / rise
+    _add(out_N, factor, en)
+    _add(out_N, held * kt * speed * moved / rise, den)
+    rates[_LOAD] -= held * kt * speed * dot(en, dN) / rise
+
+
+@compiled
+def _end_of_stick(
+    U: Real, N: Real, kt: float, mu: float, row: Row, way: float, weight: float,
+    at: Real, over: Real, dU: Real, dN: Real, out_U: Real, out_N: Real, rates: Real,
+) -> None:  # fmt: skip
+    """Add −J J' W/D where the force of a stick reaches the limit ξ = `way`."""
     e, de, eb, deb = at[0], at[1], at[2], at[3]
     en, den, enb, denb = over[0], over[1], over[2], over[3]
-    for index in range(count):
-        row = segments[index]
-        times[_BEGIN, index], times[_END, index], times[_ONSET, index] = row.begin, row.end, row.onset
-    for index in range(count):
-        row = segments[index]
-        if row.end - row.begin <= NO_LENGTH or (row.motion == STICK and row.began == UNLOADED):
-            continue
-        follows = index > 0 and segments[index - 1].end == row.begin
-        followed = index + 1 < count and segments[index + 1].begin == row.end
-        if row.motion == SLIP:
-            for side in range(2):
-                if state == LIFTING and not (followed if side == _END else follows):
-                    bases_at(times[side, index].real, load_ks, en, den)
-                    times[side, index] += _moved(dot(en, load), dot(den, load))
-            continue
-        bases_at(row.onset, ks, e, de)
-        bases_at(row.onset, load_ks, en, den)
-        if row.began == AFTER_SLIP:
-            way = row.direction * kt
-            bend = way * _curvature_at(e, ks, u) - mu * _curvature_at(en, load_ks, load)
-            moved = _moved(way * dot(de, u) - mu * dot(den, load), bend)
-        else:
-            moved = _moved(dot(en, load), dot(den, load))
-        times[_ONSET, index] += moved
-        if state != STUCK:
-            times[_BEGIN, index] += moved
-            if follows:
-                times[_END, index - 1] += moved
-            elif state != LIFTING:  # the period ends as it begins
-                times[_END, count - 1] += moved
-        if followed and segments[index + 1].motion == SLIP:
-            xi = mu * segments[index + 1].direction
-            bases_at(row.end, ks, eb, deb)
-            bases_at(row.end, load_ks, enb, denb)
-            excess = kt * (dot(eb, u) - dot(e, u) - moved * dot(de, u)) - xi * dot(enb, load)
-            if row.began == AFTER_SLIP:
-                excess += row.direction * mu * (dot(en, load) + moved * dot(den, load))
-            moved = _moved(excess, kt * dot(deb, u) - xi * dot(denb, load))
-            times[_END, index] += moved
-            times[_BEGIN, index + 1] += moved
-
-
-@compiled
-def _moved(excess: complex, rise: complex) -> complex:
-    """Return how a time moves that is a zero of a function with the slope `rise`; infinite by 0."""
-    return complex(0.0, -excess.imag / rise.real)
-
-
-@compiled
-def _curvature_at(e: Real, ks: Integer, q: Complex) -> complex:
-    """Return d²q/dτ² of coefficients `q` where the basis is `e`."""
-    total, here = 0.0j, 0
-    for i in range(ks.size):
-        k = ks[i]
-        if k > 0:
-            total -= k * k * (q[here] * e[here] + q[here + 1] * e[here + 1])
-            here += 1
-        here += 1
-    return total
+    slope = kt * dot(deb, U) - way * mu * dot(denb, N)
+    along = kt * (dot(eb, dU) - dot(e, dU)) - way * mu * dot(enb, dN)
+    at_onset, by_friction = 0.0, -way * dot(enb, N)
+    if row.began == AFTER_SLIP:
+        at_onset = row.direction * mu
+        by_friction += row.direction * dot(en, N)
+    else:
+        at_onset = kt * dot(de, U) / dot(den, N)
+    along += at_onset * dot(en, dN)
+    factor = -along * weight / slope
+    for i in range(e.size):
+        out_U[i] += factor * kt * (eb[i] - e[i])
+    for j in range(en.size):
+        out_N[j] += factor * (at_onset * en[j] - way * mu * enb[j])
+    rates[_KT] += factor * (dot(eb, U) - dot(e, U))
+    rates[_MU] += factor * by_friction

@@ -1,6 +1,6 @@
 """Second derivatives of friction along lines under one load, which may move with the contact.
 
-Each direction is that of `solver.contacts.kernels.coulomb.hessian`. Its force depends on X = kt U
+Each direction is the closed form of `solver.contacts.kernels.coulomb.hessian`. Its force depends on X = kt U
 and Y = μN alone: a change of kt is one of U by U dkt/kt, a change of μ one of N by N dμ/μ. A load that moves
 is N = load + kn v, with dN = dload + dkn v + kn dv, so that of ℓ = w·F
 
