@@ -227,6 +227,7 @@ class Database:
         self._lock = FileLock(database_path(url)) if is_sqlite(url) else None
         self._write = write_engine(url, connections, seconds)
         self._read = read_engine(url, seconds) if is_sqlite(url) else postgresql.reading(self._write)
+        self._look = self._read if is_sqlite(url) else postgresql.looking(self._write)
         leaders = 1 if is_sqlite(url) else max(1, min(_LEADERS, connections // 2))
         self._grouped = GroupedWrites(self.writing, leaders, seconds)
 
@@ -278,6 +279,20 @@ class Database:
                 yield connection
             finally:
                 self._here.connection = None
+
+    @contextmanager
+    def looking(self) -> Iterator[Connection]:
+        """For one statement that reads; inside a reading transaction of the same thread, that one.
+
+        PostgreSQL answers it without being told of a transaction before and after, each an answer to wait
+        for.
+        """
+        if self.exclusive or getattr(self._here, "connection", None) is not None:
+            with self.reading() as connection:
+                yield connection
+            return
+        with self._look.connect() as connection:
+            yield connection
 
     def settle(self) -> None:
         """Move what was committed from the log of SQLite into its file; nobody waits for it."""

@@ -18,6 +18,7 @@ from sqlalchemy.sql import operators
 from sqlalchemy.sql.elements import BinaryExpression, UnaryExpression
 from sqlalchemy.sql.operators import custom_op
 
+from service.db.postgresql import WITH_VALUES
 from service.errors import InvalidRequestError
 
 Range = tuple[float | None, float | None]
@@ -26,10 +27,6 @@ Position = tuple[float | None, str]
 FEW = 2000
 _FEW_OF_AN_OWNER = 5000
 _FAR_FEWER = 4.0
-_PLANNING = (
-    "SELECT set_config('plan_cache_mode', 'force_custom_plan', true), "
-    "set_config('max_parallel_workers_per_gather', '0', true)"
-)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -89,11 +86,11 @@ def met(
     SQLite does not know how many rows a condition leaves and would read the whole table in the order of
     the ids for four rows of a rare kind. So each condition with an index is counted first, up to
     `few` rows, which its index answers in well under a millisecond. PostgreSQL keeps statistics and knows,
-    if it plans with the values (see `plan_with_values`). Only what another table leaves of the rows it
+    if it plans with the values (`WITH_VALUES`). Only what another table leaves of the rows it
     guesses badly, and reads ten thousand in order for a page of two thousand.
     """
     sqlite = connection.dialect.name == "sqlite"
-    plan_with_values(connection)
+    query = query.execution_options(**{WITH_VALUES: True})
     asked = (one for one in conditions if sqlite or one.apart)
     lead = fewest(connection, asked)
     for condition in conditions:
@@ -105,16 +102,6 @@ def met(
             holds = aside(holds)
         query = query.where(holds)
     return query
-
-
-def plan_with_values(connection: Connection) -> None:
-    """Have PostgreSQL plan the queries of this transaction with their values.
-
-    A plan kept for any owner is wrong for who has few rows, or most of them. Starting its parallel workers
-    takes longer than a page should.
-    """
-    if connection.dialect.name == "postgresql":
-        connection.exec_driver_sql(_PLANNING)
 
 
 def first(ids: Select[Any]) -> Select[Any]:
@@ -150,7 +137,8 @@ def fewest(connection: Connection, conditions: Iterable[Condition]) -> Condition
     for one in conditions:
         most = int(min(one.few, least / _FAR_FEWER))
         bounded = one.ids.limit(most + 1).subquery()
-        count = connection.execute(select(func.count()).select_from(bounded)).scalar_one()
+        counted = select(func.count()).select_from(bounded).execution_options(**{WITH_VALUES: True})
+        count = connection.execute(counted).scalar_one()
         if count <= most:
             found, least = one, count
     return found

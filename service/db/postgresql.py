@@ -10,12 +10,14 @@ connection pooler between service and server has to pool sessions, not transacti
 from __future__ import annotations
 
 import math
+import selectors
 from collections.abc import Callable
 from typing import Any
 
 from sqlalchemy import Connection, Engine, create_engine, event, text
 from sqlalchemy.engine import URL, make_url
 from sqlalchemy.engine.interfaces import DBAPIConnection
+from sqlalchemy.exc import DisconnectionError
 from sqlalchemy.pool import ConnectionPoolEntry, NullPool
 
 from service.errors import DatabaseError, DatabaseInUseError
@@ -23,6 +25,12 @@ from service.jobs import strict_json
 
 DRIVER = "postgresql+psycopg"
 OLDEST = 15
+
+WITH_VALUES = "stickslip_with_values"
+"""The execution option of a statement that the server is to plan with its values, each time.
+
+A plan kept for any owner is wrong for who has few rows, or most of them.
+"""
 
 _WAIT_SECONDS = 30.0
 _CONNECT_SECONDS = 10
@@ -81,10 +89,31 @@ def _limit(seconds: float) -> Callable[[DBAPIConnection, ConnectionPoolEntry], N
         cursor = connection.cursor()
         cursor.execute(f"SET lock_timeout = {int(seconds * 1000)}")
         cursor.execute(f"SET statement_timeout = {int(seconds * 1000)}")
+        # Starting parallel workers takes longer than a page should.
+        cursor.execute("SET max_parallel_workers_per_gather = 0")
         cursor.close()
         connection.commit()
 
     return limit
+
+
+def _require_silence(connection: Any, _record: ConnectionPoolEntry, _proxy: object) -> None:
+    """Have a connection replaced on which the server said something while it lay idle: that it ended it.
+
+    To ask the server at each transaction would be one more answer to wait for.
+    """
+    with selectors.DefaultSelector() as heard:
+        heard.register(connection.fileno(), selectors.EVENT_READ)
+        if heard.select(0):
+            raise DisconnectionError("the server ended the connection while it lay idle")
+
+
+def _execute(cursor: Any, statement: str, parameters: Any, context: Any) -> bool:
+    """For SQLAlchemy's event `do_execute`: what is not prepared is planned with its values."""
+    if not context.execution_options.get(WITH_VALUES):
+        return False
+    cursor.execute(statement, parameters, prepare=False)
+    return True
 
 
 def _connect_bounded(seconds: float) -> Callable[[Any, Any, list[Any], dict[str, Any]], Any]:
@@ -145,12 +174,13 @@ def service_engine(url: str, connections: int, seconds: float) -> Engine:
     """
     patience = max(_LEAST_CONNECT_SECONDS, math.ceil(seconds))
     engine = _create(
-        url, connect_seconds=patience, pool_size=connections, max_overflow=0, pool_timeout=seconds,
-        pool_pre_ping=True,
-    )  # fmt: skip
+        url, connect_seconds=patience, pool_size=connections, max_overflow=0, pool_timeout=seconds
+    )
     event.listen(engine, "do_connect", _connect_bounded(seconds))
     event.listen(engine, "connect", _limit(seconds))
     event.listen(engine, "connect", _join_services)
+    event.listen(engine, "checkout", _require_silence)
+    event.listen(engine, "do_execute", _execute)
     return engine
 
 
@@ -187,6 +217,11 @@ def trouble(engine: Engine, seconds: float) -> str | None:
 def reading(engine: Engine) -> Engine:
     """The same pool for transactions that read one snapshot and cannot write."""
     return engine.execution_options(isolation_level="REPEATABLE READ", postgresql_readonly=True)
+
+
+def looking(engine: Engine) -> Engine:
+    """The same pool for single statements, each of which sees what is committed."""
+    return engine.execution_options(isolation_level="AUTOCOMMIT")
 
 
 def migration_engine(url: str) -> Engine:

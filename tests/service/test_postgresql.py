@@ -7,8 +7,9 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from datetime import timedelta
+from functools import partial
 from pathlib import Path
 
 import psycopg
@@ -17,7 +18,7 @@ from launch import free_port
 from postgresql_cluster import Cluster, binaries
 from private_kinds import PRIVATE
 from service_helpers import PATIENCE, pids, settings_of, until
-from sqlalchemy import make_url, select, text, update
+from sqlalchemy import column, func, make_url, select, text, update
 
 from service.auth.callers import KEYLESS
 from service.cli import main
@@ -176,6 +177,35 @@ def test_a_server_that_restarts_is_found_again(cluster: Cluster, url: str) -> No
     with pytest.raises(DatabaseInUseError):
         revisions.upgrade(url)
     database.close()
+
+
+def test_a_connection_that_the_server_ended_while_it_lay_idle_is_replaced(url: str) -> None:
+    """Its next use finds that the server said something, and asks for another one."""
+    with closing(Database(url, connections=1)) as database, closing(Database(url)) as other:
+        jobs = JobRepository(database)
+        for read in (partial(jobs.get, "none"), jobs.page):
+            assert not read()
+            with other.writing() as connection:
+                pid = func.pg_terminate_backend(column("pid"))
+                mine = select(pid).select_from(text("pg_stat_activity"))
+                mine = mine.where(text("datname = current_database() AND pid <> pg_backend_pid()"))
+                assert True in connection.execute(mine).scalars().all()
+            assert not read()
+
+
+def test_lists_are_planned_with_their_values_and_look_ups_once(url: str) -> None:
+    """What the server has prepared may be planned for anybody: look-ups, and never a page of a list."""
+    with closing(Database(url, connections=1)) as database:
+        jobs = JobRepository(database)
+        for _ in range(10):
+            assert not jobs.page(owner="somebody")
+            assert jobs.get("none") is None
+        with database.reading() as connection:
+            prepared = (
+                connection.execute(text("SELECT statement FROM pg_prepared_statements")).scalars().all()
+            )
+    assert any("FROM job" in one for one in prepared)
+    assert not any("ORDER BY job.id DESC" in one for one in prepared)
 
 
 def test_two_services_in_one_process_share_the_jobs(url: str) -> None:

@@ -132,13 +132,13 @@ class JobRepository:
 
     def get(self, job_id: str) -> JobRow | None:
         """The job, or None."""
-        with self._db.reading() as connection:
+        with self._db.looking() as connection:
             row = connection.execute(job_statements.BY_ID, {"job": job_id}).mappings().one_or_none()
         return None if row is None else JobRow(**row)
 
     def several(self, job_ids: Sequence[str]) -> dict[str, JobRow]:
         """Those of the jobs that there are, by id."""
-        with self._db.reading() as connection:
+        with self._db.looking() as connection:
             rows = connection.execute(job_statements.SEVERAL, {"jobs": job_ids}).mappings()
             return {row["id"]: JobRow(**row) for row in rows}
 
@@ -168,17 +168,17 @@ class JobRepository:
 
     def result(self, job_id: str) -> dict[str, Any] | None:
         """The result of a job, or None if it has none."""
-        with self._db.reading() as connection:
+        with self._db.looking() as connection:
             return connection.execute(job_statements.RESULT, {"job": job_id}).scalar_one_or_none()
 
     def result_text(self, job_id: str) -> str | None:
         """The result of a job as its JSON, None if it has none."""
-        with self._db.reading() as connection:
+        with self._db.looking() as connection:
             return connection.execute(job_statements.RESULT_TEXT, {"job": job_id}).scalar_one_or_none()
 
     def figures(self, job_id: str) -> dict[str, Any]:
         """What of the result of a job is compared with another's; empty if it has none."""
-        with self._db.reading() as connection:
+        with self._db.looking() as connection:
             row = connection.execute(job_statements.FIGURES, {"job": job_id}).one_or_none()
         if row is None:
             return {}
@@ -202,7 +202,7 @@ class JobRepository:
 
     def oldest_waiting(self) -> datetime | None:
         """When the job was handed in that waits for longest, None if none waits; ids ascend with time."""
-        with self._db.reading() as connection:
+        with self._db.looking() as connection:
             return connection.execute(job_statements.OLDEST_WAITING).scalar_one_or_none()
 
     def claim(self, owner: str, lease_until: datetime) -> Attempt | None:

@@ -99,13 +99,17 @@ class Rows(Generic[RowT]):
     def _identity(self) -> Any:
         return _key_of(self.table)[0]
 
+    @cached_property
+    def _by_key(self) -> Select[Any]:
+        """The row of a key, whose parts are given by the names of their columns."""
+        return self._select.where(*(column == bindparam(column.key) for column in _key_of(self.table)))
+
+    def _given(self, key: tuple[str, ...]) -> dict[str, str]:
+        return {column.key: one for column, one in zip(_key_of(self.table), key, strict=True)}
+
     def get(self, *key: str) -> RowT | None:
         """The row of a key, in general its id, whoever owns it, or None."""
-        return next(iter(self._all(self._of(key))), None)
-
-    def _of(self, key: tuple[str, ...]) -> Select[Any]:
-        columns = _key_of(self.table)
-        return self._select.where(*(column == one for column, one in zip(columns, key, strict=True)))
+        return next(iter(self._all(self._by_key, self._given(key))), None)
 
     def _newest(
         self, limit: int, before: str | None, owner: str | None, *holds: ColumnElement[bool]
@@ -125,7 +129,7 @@ class Rows(Generic[RowT]):
         return self._all(query)
 
     def _all(self, query: Select[Any], given: Mapping[str, Any] | None = None) -> list[RowT]:
-        with self._db.reading() as connection:
+        with self._db.looking() as connection:
             return self._read(connection, query, given)
 
     @staticmethod
@@ -306,7 +310,7 @@ class SceneRepository(Rows[StoredScene]):
         text = encoded(body)
 
         def find_or_add(connection: Connection) -> tuple[StoredScene, bool]:
-            for known in self._read(connection, self._of((owner, name))):
+            for known in self._read(connection, self._by_key, self._given((owner, name))):
                 return known, False
             row = StoredScene(
                 owner=owner, name=name, scene_hash=scene_hash, created=self._now(), size=len(text), body=body

@@ -42,12 +42,11 @@ from service.db.pagination import (
     ordered,
     owner_condition,
     plain_conditions,
-    plan_with_values,
     refused,
     unindexed,
     within,
 )
-from service.db.postgresql import lock_quantities
+from service.db.postgresql import WITH_VALUES, lock_quantities
 from service.db.repositories.runs import in_the_bin
 from service.errors import DatabaseError
 from service.jobs.figures import RECORDS, SWEEP, KindRecord, StoredArray, StoredRecord
@@ -196,7 +195,6 @@ def _query(connection: Connection, wanted: Filter, limit: int, after: Position |
     all; so up to `_FEW` are counted, which the key of the figures answers in a few milliseconds, and the
     way is then prescribed.
     """
-    plan_with_values(connection)
     on_sqlite = connection.dialect.name == "sqlite"
     if not on_sqlite:
         connection.exec_driver_sql(_ONE_BY_ONE)
@@ -226,7 +224,8 @@ def _query(connection: Connection, wanted: Filter, limit: int, after: Position |
     if "job_id" not in wanted.equal and wanted.run is None:
         held.append(~in_the_bin(Result.job_id))
     place = _place(after, len(keys))
-    return ordered(query.where(*held), keys, descending=wanted.descending, after=place).limit(limit)
+    query = query.where(*held).limit(limit).execution_options(**{WITH_VALUES: True})
+    return ordered(query, keys, descending=wanted.descending, after=place)
 
 
 def _figures(

@@ -10,6 +10,7 @@ from datetime import UTC, datetime, timedelta
 from typing import Any
 
 from sqlalchemy import (
+    BindParameter,
     ColumnElement,
     Connection,
     Select,
@@ -35,7 +36,6 @@ from service.db.models import (
     Job,
     JobState,
     Project,
-    Result,
     Run,
     RunTag,
     Share,
@@ -109,6 +109,16 @@ _OF_RUNS = [
 _LISTED = select(*_OF_JOBS, *_OF_RUNS).outerjoin(Run, Run.job_id == Job.id)
 _WHOLE = select(*_OF_JOBS, Job.request, *_OF_RUNS).outerjoin(Run, Run.job_id == Job.id)
 _OF_ROW = [field.name for field in fields(JobRow)]
+# Built once: building a statement costs more than running it.
+_BY_ID = _WHOLE.where(Job.id == bindparam("job"))
+_JOBS: BindParameter[Any] = bindparam("jobs", expanding=True)
+_TAGS = select(_TAG.c.job_id, _TAG.c.tag).where(_TAG.c.job_id.in_(_JOBS)).order_by(_TAG.c.tag)
+_RESULT = _TABLES["result"]
+_SWEEPS = (
+    select(_RESULT.c.job_id, func.count())
+    .where(_RESULT.c.job_id.in_(_JOBS), _RESULT.c.of == SWEEP)
+    .group_by(_RESULT.c.job_id)
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -184,7 +194,7 @@ class Runs(Binned[RunRow]):
     def get(self, job_id: str) -> RunRow | None:
         """The run, in the bin or not, whoever owns it, or None."""
         with self._db.reading() as connection:
-            return next(iter(_rows(connection, _WHOLE.where(Job.id == job_id))), None)
+            return next(iter(_rows(connection, _BY_ID, {"job": job_id})), None)
 
     def page(self, wanted: RunFilter, limit: int, before: str | None = None) -> list[RunRow]:
         """Runs that meet every condition, newest first, older than the run `before`."""
@@ -282,8 +292,12 @@ def _said(held: ColumnElement[bool], holds: ColumnElement[bool] | None = None, f
     return Condition(ids=ids, holds=held if holds is None else holds, apart=few >= 0, few=few)
 
 
-def _rows(connection: Connection, query: Select[Any]) -> list[RunRow]:
-    rows = connection.execute(query).mappings().all()
+def _rows(
+    connection: Connection, query: Select[Any], given: Mapping[str, object] | None = None
+) -> list[RunRow]:
+    rows = connection.execute(query, given).mappings().all()
+    if not rows:
+        return []
     jobs = [row["id"] for row in rows]
     tags = _tags(connection, jobs)
     sweeps = _sweeps(connection, [row["result_of"] or row["id"] for row in rows])
@@ -305,16 +319,14 @@ def _rows(connection: Connection, query: Select[Any]) -> list[RunRow]:
 
 def _tags(connection: Connection, jobs: Sequence[str]) -> dict[str, list[str]]:
     found: dict[str, list[str]] = defaultdict(list)
-    query = select(RunTag.job_id, RunTag.tag).where(RunTag.job_id.in_(jobs)).order_by(RunTag.tag)
-    for row in connection.execute(query):
-        found[row.job_id].append(row.tag)
+    for job_id, tag in connection.execute(_TAGS, {"jobs": jobs}):
+        found[job_id].append(tag)
     return found
 
 
 def _sweeps(connection: Connection, jobs: Sequence[str]) -> dict[str, int]:
     """How many sweeps are stored with each of the jobs."""
-    query = select(Result.job_id, func.count()).where(Result.job_id.in_(jobs), Result.of == SWEEP)
-    return {row[0]: row[1] for row in connection.execute(query.group_by(Result.job_id))}
+    return {row[0]: row[1] for row in connection.execute(_SWEEPS, {"jobs": jobs})}
 
 
 MOST_SHARES = 20
