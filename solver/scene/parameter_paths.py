@@ -23,6 +23,8 @@ from solver.scene.excitation import excitation_parameter
 from solver.scene.linear_terms import at_speed
 from solver.scene.scene_parameter import ActsOn, SceneParameter, changed
 from solver.scene.structure_parameters import (
+    STRUCTURE,
+    named_parts,
     structure_parameter,
     structure_paths,
     term_parameter,
@@ -189,18 +191,31 @@ def with_values(scene: _SceneT, values: Mapping[str, float]) -> _SceneT:
 
 
 def _check_together(scene: Scene, values: Mapping[str, float]) -> None:
-    """Raise SettingError where two paths say one number of a contact in two ways, as N1 and N1_ratio do."""
+    """Raise SettingError where two paths say one number: N1 and N1_ratio, or a group and a member of it."""
     owners = dict[str | None, dict[str, str]]()
     for path in values:
         owner, _, key = path.rpartition(".")
         owners.setdefault(owner, {})[key] = path
+
+    def refused(path: str, other: str) -> SettingError:
+        return SettingError(path, values[path], f"cannot be set together with `{other}`: give one of both")
+
+    for part in named_parts(scene.structure):
+        group, own = f"{STRUCTURE}{part.group}", f"{STRUCTURE}{part.name}"
+        if group != own and group in values and own in values:
+            raise refused(group, own)
+    named = [*((c.group, c.name) for c in scene.contacts), *((b.group, b.name) for b in scene.bodies)]
+    for of, name in named:
+        of_group, alone = owners.get(of, {}), owners.get(name, {})
+        for key in of_group:
+            if key in alone and of_group is not alone:
+                raise refused(of_group[key], alone[key])
     for contact in scene.contacts:
         said = {**owners.get(contact.group, {}), **owners.get(contact.name, {})}
         for key in filter(contact.parameters.__contains__, said if len(said) > 1 else ()):
             for other in contact.changed_by(key, 0.0):
                 if other != key and other in said:
-                    wanted = f"cannot be set together with `{said[other]}`: give one of both"
-                    raise SettingError(said[key], values[said[key]], wanted)
+                    raise refused(said[key], said[other])
 
 
 def _with_value(scene: _SceneT, path: str, new: float) -> _SceneT:

@@ -33,7 +33,7 @@ def structure_paths(scene: Scene) -> tuple[str, ...]:
     if isinstance(structure, MatricesStructure):
         names: tuple[str, ...] = (*_PROPORTIONAL, *own)
     else:
-        parts = _parts(structure)
+        parts = named_parts(structure)
         groups = (part.group for part in parts if part.group is not None)
         names = (*groups, *(part.name for part in parts if part.name is not None), *own)
     return tuple(STRUCTURE + name for name in dict.fromkeys(names))
@@ -44,7 +44,8 @@ def structure_parameter(scene: Scene, path: str) -> SceneParameter | None:
     if not path.startswith(STRUCTURE):
         return None
     structure, name = scene.structure, path.removeprefix(STRUCTURE)
-    members = [(i, part, share) for i, part in enumerate(_parts(structure)) if (share := _share(part, name))]
+    parts = enumerate(named_parts(structure))
+    members = [(i, part, share) for i, part in parts if (share := _share(part, name))]
     if members:
         return _of_parts(structure, path, members)
     lossy = name == _LOSS and structure.loss_factor > 0.0
@@ -85,7 +86,8 @@ def _of_parts(structure: Structure, path: str, members: list[tuple[int, _Named, 
     )  # fmt: skip
 
 
-def _parts(structure: Structure) -> tuple[_Named, ...]:
+def named_parts(structure: Structure) -> tuple[_Named, ...]:
+    """Return masses, springs and dashpots, in this order; none of a structure given by its matrices."""
     if isinstance(structure, MatricesStructure):
         return ()
     return (*structure.masses, *structure.springs, *structure.dampers)

@@ -271,8 +271,11 @@ def test_groups_of_bodies_are_set_together() -> None:
         {**raw["bodies"][0], "group": "dampers"},
         {**raw["bodies"][0], "name": "d2", "group": "dampers"},
     ]
-    changed = Scene.from_dict(raw).with_values({"dampers.mass": 0.004})
+    scene = Scene.from_dict(raw)
+    changed = scene.with_values({"dampers.mass": 0.004})
     assert [body.mass for body in changed.bodies] == [0.004, 0.004]
+    with pytest.raises(SettingError, match=r"`dampers.mass` cannot be set together with `d2.mass`"):
+        scene.with_values({"d2.mass": 0.003, "dampers.mass": 0.004})
 
 
 def test_moments_of_a_tensor_are_set_on_its_diagonal() -> None:

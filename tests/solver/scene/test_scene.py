@@ -306,6 +306,14 @@ def test_nor_by_its_group():
     assert scene.with_values({"left.N1_ratio": 0.5, "right.N1": 0.7}).value("right.N1") == 0.7
 
 
+@pytest.mark.parametrize("order", [1, -1])
+def test_a_group_is_not_set_beside_one_of_its_members(order: int):
+    """The last one counted."""
+    values = dict.fromkeys(("both.N0", "right.N0")[::order], 2.0)
+    with pytest.raises(SettingError, match=r"`both.N0` cannot be set together with `right.N0`.*got 2.0"):
+        Scene.from_dict(lumped()).with_values(values)
+
+
 def test_a_contact_without_n1_has_a_constant_load():
     contact = Contact(name="c", between=("a", "b"), kt=1.0, mu=0.3, N0=1.0)
     assert contact.N1_value == 0.0

@@ -31,6 +31,8 @@ def test_a_group_sets_its_members_by_their_factors():
     alone = moved.with_values({"structure.k2": 44.0})
     assert [spring.k for spring in alone.structure.springs] == [200.0, 44.0]
     assert Scene.from_dict(moved.to_dict()) == moved
+    with pytest.raises(SettingError, match=r"`structure.both` cannot be set together with `structure.k2`"):
+        scene.with_values({"structure.k2": 44.0, "structure.both": 200.0})
 
 
 @pytest.mark.parametrize(
