@@ -56,7 +56,8 @@ def _answers(asked: list[str] | tuple[str, ...]) -> int:
         poor += found["agreed_digits"] < answers.WANTED
         seconds = {way: one["seconds"] for way, one in found["by"].items()}
         print(
-            f"{name:24s} {found['value']:24s} {found['ways']} ways, {found['agreed_digits']:4.1f} digits {seconds} {found.get('not_by', '')}",
+            f"{name:24s} {found['value']:24s} {found['ways']} ways, {found['agreed_digits']:4.1f} digits "
+            f"{seconds} {found.get('not_by', '')}",
             flush=True,
         )
     return 1 if poor else 0

@@ -6,6 +6,7 @@ import json
 import math
 import random
 from collections.abc import Iterator
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -205,7 +206,7 @@ def the_paper() -> Iterator[Case]:
     two = lumped(
         {"m1": 1.0, "m2": 1.0}, ("m1", "ground", 16 * math.pi**2, 0.5), ("m1", "m2", 4 * math.pi**2, 0.5)
     )
-    damper = lambda N0, N1: {"name": "damper", "law": "coulomb", "between": ["m2", "ground"], "kt": 30.0, "mu": 0.3, "N0": N0, "N1": N1}  # noqa: E731, E501 # fmt: skip
+    damper = lambda N0, N1: {"name": "damper", "law": "coulomb", "between": ["m2", "ground"], "kt": 30.0, "mu": 0.3, "N0": N0, "N1": N1}  # noqa: E731 # fmt: skip
     force = push("m1", 100.0)
     yield named(
         "case-a",
@@ -253,9 +254,7 @@ def the_paper() -> Iterator[Case]:
 def chain(n: int, sliders: list[int]) -> tuple[_Dict, list[_Dict]]:
     """Return masses in a row, each to the ground, with sliders on some."""
     names = [f"x{i}" for i in range(n)]
-    springs = [(a, "ground", 1.0, 0.03) for a in names] + [
-        (a, b, 0.5, 0.03) for a, b in zip(names, names[1:], strict=False)
-    ]
+    springs = [(a, "ground", 1.0, 0.03) for a in names] + [(a, b, 0.5, 0.03) for a, b in pairwise(names)]
     contacts = [slider(0.8, 0.25 + 0.05 * i, names[i], name=f"f{i}") for i in sliders]
     return lumped(dict.fromkeys(names, 1.0), *springs), contacts
 
@@ -371,12 +370,10 @@ def patches() -> Iterator[Case]:
 
 def flutter() -> Iterator[Case]:
     """Limit cycles of what gas feeds, all harmonics."""
-    cycle = lambda dof, hz, which="attracting": {
-        "what": "limit-cycle",
-        "dof": dof,
-        "which": which,
-        "guess_hz": hz,
-    }
+
+    def cycle(dof: str, hz: float, which: str = "attracting") -> _Dict:
+        return {"what": "limit-cycle", "dof": dof, "which": which, "guess_hz": hz}
+
     for kt, c in ((0.2, -0.02), (1.0, -0.1), (0.5, -0.06)):
         yield named(
             f"flutter-{kt:g}",
@@ -471,7 +468,7 @@ def optima() -> Iterator[Case]:
     case_a = lumped(
         {"m1": 1.0, "m2": 1.0}, ("m1", "ground", k1, 0.5), ("m1", "m2", k2, 0.5), ("m2", "ground", k1, 0.5)
     )
-    least = lambda dof, band, low, high: {"what": "least-peak", "dof": dof, "band_hz": band, "variable": "damper.N0", "range": [low, high]}  # noqa: E731, E501 # fmt: skip
+    least = lambda dof, band, low, high: {"what": "least-peak", "dof": dof, "band_hz": band, "variable": "damper.N0", "range": [low, high]}  # noqa: E731 # fmt: skip
     yield named(
         "optimum-case-a",
         "The paper's two masses.",

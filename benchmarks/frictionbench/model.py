@@ -1,4 +1,4 @@
-"""A case as matrices and rows of contacts: all that a way to its answer needs. Nothing of stickslip is used."""
+"""A case as matrices and rows of contacts: what a way to its answer needs. Nothing of stickslip is used."""
 
 from __future__ import annotations
 

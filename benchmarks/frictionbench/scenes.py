@@ -26,7 +26,8 @@ def scene(case: Case) -> stickslip.Scene:
     order = {"engine_order": case["engine_order"]} if "engine_order" in case else {}
     loads = case["loads"] or [{"dof": dofs[0], "amplitude": 1.0}]
     raw: dict[str, Any] = {
-        "name": case["name"].replace(".", "_"), "contacts": case["contacts"], "excitation": [{**one, **order} for one in loads],
+        "name": case["name"].replace(".", "_"), "contacts": case["contacts"],
+        "excitation": [{**one, **order} for one in loads],
         "observe": {"dof": asked["dof"], "band": [low, high]},
     }  # fmt: skip
     if sectors == 1:

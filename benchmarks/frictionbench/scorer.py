@@ -47,7 +47,7 @@ def told(adapter: Path) -> dict[str, Any]:
 
 
 def environment(code: str, needs: tuple[str, ...], source: str | None) -> tuple[str, list[str]]:
-    """Return the interpreter of a code, made if need be, and arguments; `source` is a git address or a folder.
+    """Return the interpreter of a code, made if need be, and arguments; `source`: a git address or a folder.
 
     A source that pip can install is installed, any other is put on the adapter's path.
 
@@ -94,7 +94,8 @@ class Code:
         """Return value and seconds, or `not_offered`, or `failed` with words."""
         if self._process is None or self._process.poll() is not None:
             self._process = subprocess.Popen(
-                self._command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
+                self._command, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                stderr=subprocess.DEVNULL, text=True,
                 cwd=self._folder.name, env={**os.environ, **ONE_THREAD},
             )  # fmt: skip
         process = self._process
@@ -138,9 +139,10 @@ def run(
     except MissingError as error:
         print(f"{code} cannot run here: {error}")
         return 1
+    known = answered()
     process, scores = Code([python, str(adapter), *more], seconds), kept(adapter.stem)
     try:
-        for name in cases:
+        for name in (name for name in cases if name in known):
             scores[name] = one(process, name, wants["RUNGS"], seconds)
             print(f"{name:24s} {words(scores[name])}", flush=True)
     finally:
@@ -149,6 +151,11 @@ def run(
         RESULTS.mkdir(exist_ok=True)
         (RESULTS / f"{code}.json").write_text(json.dumps(scores, indent=0) + "\n")
     return 0
+
+
+def answered() -> list[str]:
+    """Return the cases that have an answer."""
+    return [name for name in names() if (HERE / "answers" / f"{name}.json").exists()]
 
 
 def codes() -> list[str]:
@@ -246,12 +253,14 @@ def summary() -> dict[str, Any]:
                     slower.append((name, code, top["digits"], top["seconds"], mine))
     tops = {name: best(scores) for name, scores in ours.items()}
     return {
-        "answered": sum(top is not None for top in tops.values()), "cases": len(names()),
+        "answered": sum(top is not None for top in tops.values()), "cases": len(answered()),
         "covered": sum(one["covered"] for _, one in judged), "judged": len(judged),
         "missed": sorted({name for name, one in judged if not one["covered"]}),
         "eight": sum(top is not None and top["digits"] >= 8.0 for top in tops.values()), "slower": slower,
         "offered": {code: sum(best(s) is not None for s in kept(code).values()) for code in rivals},
-        "failed": {code: sum(all("failed" in one for one in s) for s in kept(code).values()) for code in rivals},
+        "failed": {
+            code: sum(all("failed" in one for one in s) for s in kept(code).values()) for code in rivals
+        },
     }  # fmt: skip
 
 

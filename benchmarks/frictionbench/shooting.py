@@ -1,11 +1,11 @@
 """Exact events in extended precision: a periodic orbit of a piecewise linear system, enclosed.
 
-State w = (x, dx/dτ, slider positions s, 1, cos kτ, sin kτ, …), so that in every mode of the contacts dw/dτ = A w:
+State w = (x, dx/dτ, slider positions s, 1, cos kτ, sin kτ, …): in every mode of the contacts dw/dτ = A w,
 stick f = kt (u - s), slip f = ξ μN, open 0, gap k (u - gap). A march in floats finds the order of the events;
 the first state and the instants of the events are then the zero of as many equations (each condition 0 at its
 event, the state back after a period), by Newton's method and Krawczyk's operator (R. Krawczyk, Computing 4
-(1969) 187; A. Neumaier, Interval Methods, 1990, ch. 5) on matrix exponentials of python-flint's balls. The march
-from the zero must have the same events at the same instants, else it is no motion.
+(1969) 187; A. Neumaier, Interval Methods, 1990, ch. 5) on matrix exponentials in python-flint's balls. The
+march from the zero must have the same events at the same instants, else it is no motion.
 """
 
 from __future__ import annotations
@@ -201,7 +201,7 @@ class System:
     def march(
         self, w: np.ndarray, mode: tuple[int, ...], tau: float, span: float, steps: int
     ) -> tuple[np.ndarray, tuple[int, ...], list[tuple[Any, ...]]]:
-        """March in floats; events (instant, row, old, new, state and mode after it); halves of a step go up to an event."""
+        """March in floats, by halves of a step up to an event: (instant, row, old, new, state after it)."""
         h, events = span / steps, []
         for step in range(steps):
             left, k, last = 1.0, 0, None
@@ -375,7 +375,7 @@ def find(system: System, guess: tuple[np.ndarray, tuple[int, ...]] | None = None
 
 
 def find_cycle(system: System, start: float, settle: int) -> Orbit:
-    """March without forces from a displacement of the observed DOF and return the cycle between two like events.
+    """March without forces from a displacement of the observed DOF; return the cycle between like events.
 
     Raises
     ------

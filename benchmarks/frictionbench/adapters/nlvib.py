@@ -39,7 +39,8 @@ def solve(case: dict[str, Any], rung: dict[str, Any]) -> dict[str, Any]:
     for dof, amplitude, phase, _ in m.loads:
         force[dof] += amplitude * np.exp(1j * phase)
     rows = {
-        "kinds": [float(row.law == "gap") for row in m.rows], "directions": np.array([row.b for row in m.rows]).T,
+        "kinds": [float(row.law == "gap") for row in m.rows],
+        "directions": np.array([row.b for row in m.rows]).T,
         "stiffness": [row.kt for row in m.rows],
         "limits": [row.gap if row.law == "gap" else row.mu * row.N0 for row in m.rows],
     }  # fmt: skip
@@ -55,8 +56,9 @@ def solve(case: dict[str, Any], rung: dict[str, Any]) -> dict[str, Any]:
         savemat(Path(folder) / "in.mat", told | {"H": float(rung["harmonics"]), "N": float(rung["samples"])})
         program = str(Path(__file__).with_name("nlvib_case.m"))
         done = subprocess.run(
-            [shutil.which(PROGRAM) or PROGRAM, "--quiet", "--eval", f"source('{program}')"], cwd=folder, capture_output=True,
-            text=True, check=False, env={"NLVIB": str(SOURCE), "PATH": "/usr/bin:/bin:/usr/local/bin", "HOME": folder},
+            [shutil.which(PROGRAM) or PROGRAM, "--quiet", "--eval", f"source('{program}')"], cwd=folder,
+            capture_output=True, text=True, check=False,
+            env={"NLVIB": str(SOURCE), "PATH": "/usr/bin:/bin:/usr/local/bin", "HOME": folder},
         )  # fmt: skip
         if done.returncode != 0:
             raise ArithmeticError((done.stderr.strip().splitlines() or ["Octave ended"])[-1])

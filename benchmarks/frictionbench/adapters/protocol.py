@@ -1,9 +1,9 @@
 """What an adapter and the scorer say to each other: a line of JSON for each question, one for each answer.
 
-An adapter is a file with `NEEDS` (what pip is to install into its environment), `RUNGS` (settings from cheap to
-dear) and `solve(case, rung) -> {"value": …}`; `estimate` of the error and `points` may stand beside. What it
-does not offer raises NotImplementedError, whose words are shown. It runs in an environment of its own, with
-`case_model` (NumPy alone) for who wants matrices of a whole annulus.
+An adapter is a file with `NEEDS` (what pip is to install into its environment), `RUNGS` (settings from cheap
+to dear) and `solve(case, rung) -> {"value": …}`; `estimate` of the error and `points` may stand beside. What
+it does not offer raises NotImplementedError, whose words are shown. It runs in an environment of its own,
+with `case_model` (NumPy alone) for who wants matrices of a whole annulus.
 """
 
 from __future__ import annotations

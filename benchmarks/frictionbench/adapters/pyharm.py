@@ -53,7 +53,8 @@ def solve(case: dict[str, Any], rung: dict[str, Any]) -> dict[str, Any]:
                 }
     problem = {
         "analysis": {"one": {
-            "study": "frf", "puls_inf": omega, "puls_sup": omega * (1 + NEAR), "puls_start": omega, "verbose": False,
+            "study": "frf", "puls_inf": omega, "puls_sup": omega * (1 + NEAR), "puls_start": omega,
+            "verbose": False,
             "ds_min": 1e-12, "ds_max": NEAR * omega, "ds0": NEAR * omega, "solver": "NewtonRaphson",
             "solver_options": {"tol_residual": 1e-10, "tol_delta_x": 1e-10, "max_iter": 60},
         }},

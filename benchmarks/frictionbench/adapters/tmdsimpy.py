@@ -1,4 +1,4 @@
-"""tmdsimpy (TMD lab, Rice University): amplitudes under sliders of constant load, by alternating frequency and time."""
+"""tmdsimpy (TMD lab, Rice University): amplitudes under sliders of constant load and gaps."""
 
 from __future__ import annotations
 
