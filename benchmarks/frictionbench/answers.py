@@ -19,7 +19,7 @@ from benchmarks.frictionbench.shooting import BITS, NoOrbitError, Orbit, System
 Answer = dict[str, Any]
 WANTED = 10  # digits in which both ways are to agree
 STARTS = 12  # from which several solutions are looked for
-FAR = 640  # the most harmonics of the balance
+FAR = 320  # the most harmonics of the balance
 COSTLY = 12  # contacts in space from which neither the balance is taken far nor the march begun
 MANY = 12  # rows beyond which events are left to the march
 

@@ -22,7 +22,7 @@ ROOT = HERE.parents[1]
 ADAPTERS, RESULTS, MADE = HERE / "adapters", HERE / "results", ROOT / ".frictionbench"
 ONE_THREAD = {f"{name}_NUM_THREADS": "1" for name in ("OMP", "OPENBLAS", "MKL", "NUMBA")}
 MOST = 15.6  # digits of a double
-PATIENCE = 4.0  # times the processor time a case may take, on the wall
+PATIENCE = 30.0  # times the processor time a case may take, on the wall: machines are shared
 Score = dict[str, Any]
 
 
@@ -60,9 +60,11 @@ def environment(code: str, needs: tuple[str, ...], source: str | None) -> tuple[
         return sys.executable, []
     folder = MADE / code
     python = folder / "bin" / "python"
-    if not python.exists():
-        venv.create(folder, with_pip=True)
+    complete = folder / "complete"  # an installation that was broken off is begun anew
+    if not complete.exists():
+        venv.create(folder, with_pip=True, clear=True)
         _ran([str(python), "-m", "pip", "install", "--quiet", *needs])
+        complete.touch()
     if source is None:
         return str(python), []
     place = Path(source)
