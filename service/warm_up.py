@@ -16,8 +16,10 @@ from solver.jit.parallel import compile_together
 
 
 def referee() -> None:
-    """Run the time march once, on a small problem."""
-    solver.march(solver.load_scene("two-dof"), frequency_hz=1.2, max_periods=2)
+    """Run the time march and a transient once, on a small problem."""
+    scene = solver.load_scene("two-dof")
+    solver.march(scene, frequency_hz=1.2, max_periods=2)
+    solver.transient(scene, begin_hz=1.2, end_hz=1.3, ramp_seconds=1.0, from_rest=True)
 
 
 def functions_of_laws() -> None:

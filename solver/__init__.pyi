@@ -28,7 +28,6 @@ from .errors import (
 from .marching.march import march as march
 from .marching.start import MarchStart as MarchStart
 from .marching.transient import transient as transient
-from .marching.transient_result import TransientResult as TransientResult, TransientStatus as TransientStatus
 from .modes.driven.controlled import held_amplitude as held_amplitude
 from .modes.driven.phase_resonance import phase_resonance as phase_resonance
 from .modes.gradient import ModeGradient as ModeGradient, mode_gradient as mode_gradient

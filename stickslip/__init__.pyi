@@ -48,7 +48,6 @@ from solver import (
     solve_all as solve_all,
     stability as stability,
     sweep as sweep,
-    transient as transient,
 )
 
 __version__: str

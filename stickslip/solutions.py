@@ -1,4 +1,4 @@
-"""One response: its motion in time, power, stability, uniqueness, all that there are."""
+"""One response: its motion in time, a run through many, power, stability, uniqueness, all that there are."""
 
 from solver import (
     AllSolutions as AllSolutions,
@@ -19,5 +19,6 @@ from solver import (
     power_balance as power_balance,
     start_of as start_of,
     time_history as time_history,
+    transient as transient,
     uniqueness as uniqueness,
 )

@@ -156,12 +156,14 @@ class ProblemKeys(BaseModel):
         Option(
             Form.BOUNDS, "--variable", "PATH LO HI",
             help=f"A parameter and its bounds, for example {DISK_LOAD} 20 3000; paths that share a value are "
-            "separated by commas; repeatable. If left out, the normal load of the contact whose load varies.",
+            "separated by commas; repeatable. If left out, the mass of the first damper, or "
+            "the normal load of the contact whose load varies.",
         ),
     ] = Field(
         default=None,
         description="Variable to [low, high]: a parameter path, or several that share a value, separated "
-        "by commas. The normal load of the contact whose load varies if left out.",
+        "by commas. The mass of the first damper, or the normal load of the contact whose load varies, if "
+        "left out.",
         examples=[{DAMPER_LOAD: [20, 1000]}, {DISK_LOADS: [20, 3000]}],
     )  # fmt: skip
     scaling: Annotated[

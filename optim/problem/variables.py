@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optim.errors import DesignError
+from optim.problem.default_variable import ABOVE, BELOW, default_variable
 from optim.problem.numbers import number_pair, word
 from optim.problem.words import Scaling
 from solver.balance.parameter import Kind, resolve
@@ -182,12 +183,11 @@ def _bounds(key: str, path: str, bounds: object) -> tuple[float, float]:
 
 
 def _default(scene: Scene) -> dict[str, tuple[float, float]]:
-    """Return N0 of the first contact with a tied load (else of the first), a tenth to 15 times its value."""
-    rubbing = [(contact, contact.load) for contact in scene.contacts if contact.load is not None]
-    if not rubbing:
+    """Return the variable that is designed by itself with its range."""
+    path = default_variable(scene)
+    if path is None:
         raise DesignError("variables", None, "must be given: the scene has no friction contact to design")
-    tied = [(contact, load) for contact, load in rubbing if load.ratio is not None]
-    contact, load = (tied or rubbing)[0]
-    if load.mean <= 0.0:
-        raise DesignError("variables", None, f"must be given: {contact.name}.N0 is 0, it suggests no range")
-    return {f"{contact.group or contact.name}.N0": (load.mean / 10.0, load.mean * 15.0)}
+    value = scene.value(path)
+    if value <= 0.0:
+        raise DesignError("variables", None, f"must be given: {path} is {value:g}, it suggests no range")
+    return {path: (value / BELOW, value * ABOVE)}

@@ -10,9 +10,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from solver.arrays import Real
@@ -37,14 +38,14 @@ class Ramp:
     seconds: Annotated[float, "How long it takes [s]."]
     driven: Annotated[bool, "Whether forces of harmonics from 1 on act."] = True
 
-    def cycles(self, seconds: Real) -> Real:
+    def cycles(self, seconds: NDArray[Any]) -> Real:
         """Turns of the excitation since it began, at times since then [s]."""
         rate = (self.end_hz - self.begin_hz) / self.seconds
         return np.asarray((self.begin_hz + 0.5 * rate * seconds) * seconds)
 
-    def frequency(self, seconds: Real) -> Real:
+    def frequency(self, seconds: NDArray[Any]) -> Real:
         """Frequency [Hz] at times since it began [s]."""
-        return self.begin_hz + (self.end_hz - self.begin_hz) / self.seconds * seconds
+        return np.asarray(self.begin_hz + (self.end_hz - self.begin_hz) / self.seconds * seconds)
 
 
 def check(scene: Scene) -> None:

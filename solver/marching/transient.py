@@ -9,11 +9,11 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import dataclass
-from numbers import Real as Number
+from numbers import Real
 
 import numpy as np
 
-from solver.arrays import Real
+from solver import arrays
 from solver.errors import SettingError
 from solver.marching.equations import MarchEquations, equations_of_motion
 from solver.marching.kernels import state as kernel
@@ -28,6 +28,7 @@ from solver.scene.scene import Scene
 
 MOST_WINDOWS = 2000  # of the envelope, over the whole run
 MOST_STEPS = 2**28  # of a run
+MOST = 1e9  # Hz and s
 FINEST = 5  # times that steps are halved to meet the tolerance
 SETTLED = 1e-10  # relative change over a period at the first frequency
 _CHUNK = 16_384  # steps between two looks at progress and stop
@@ -84,7 +85,7 @@ def transient(
         ring_down_seconds=ring_down_seconds,
     )  # fmt: skip
     run = _Run(scene, ramps)
-    if not (isinstance(tolerance, Number) and 1e-12 <= tolerance <= 0.1):  # type: ignore[operator]
+    if not (isinstance(tolerance, Real) and 1e-12 <= tolerance <= 0.1):
         raise SettingError("tolerance", tolerance, "must be a number from 1e-12 to 0.1")
     if start is not None and from_rest:
         raise SettingError("from_rest", from_rest, "must not be given beside `start`")
@@ -170,7 +171,7 @@ class _Envelope:
         self.largest, self.at_seconds, self.at_hz = 0.0, math.nan, math.nan
         self.complete = False
 
-    def add(self, number: int, begin: float, step: float, x: Real, slopes: Real) -> None:
+    def add(self, number: int, begin: float, step: float, x: arrays.Real, slopes: arrays.Real) -> None:
         """Take samples of a ramp, (n + 1,), the first at `begin` [s], with their slopes a step [m]."""
         ramp = self._run.ramps[number]
         before = sum(each.seconds for each in self._run.ramps[:number])
@@ -253,8 +254,8 @@ def ramps_of(
     """
     check(scene)
     low, high = scene.observe.band
-    begin = _number("begin_hz", low if begin_hz is None else begin_hz, least=0.0)
-    end = _number("end_hz", high if end_hz is None else end_hz, least=0.0)
+    begin = _number("begin_hz", low if begin_hz is None else begin_hz)
+    end = _number("end_hz", high if end_hz is None else end_hz)
     if max(begin, end) == 0.0:
         raise SettingError("end_hz", end, "must be > 0, or `begin_hz`")
     rate, seconds = rate_hz_per_s, ramp_seconds
@@ -272,11 +273,12 @@ def ramps_of(
     return tuple(ramps)
 
 
-def _number(key: str, value: object, *, least: float = 0.0, above: bool = False) -> float:
-    if isinstance(value, Number) and not isinstance(value, bool) and least <= value < 1e9:  # noqa: SIM102
-        if value > least or not above:
-            return float(value)
-    raise SettingError(key, value, f"must be a number {'>' if above else '>='} {least:g} and < 1e9")
+def _number(key: str, value: object, *, above: bool = False) -> float:
+    if isinstance(value, Real) and not isinstance(value, bool):
+        number = float(value)
+        if 0.0 <= number < MOST and (number > 0.0 or not above):
+            return number
+    raise SettingError(key, value, f"must be a number {'>' if above else '>='} 0 and < {MOST:g}")
 
 
 def _start(

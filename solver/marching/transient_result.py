@@ -4,15 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from typing import Annotated, ClassVar
 
 from solver.arrays import FloatOrNaN, Real
 from solver.results.base import Drawn
 from solver.results.views import Data, Views
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 
 class TransientStatus(Enum):
@@ -67,8 +63,3 @@ class TransientResult(Drawn):
         FloatOrNaN, "Estimated error of `max_abs` relative to it, from a run with twice the step."
     ]
     seconds: Annotated[float, "Time taken [s]."]
-
-    def plot(self, ax: Axes | None = None) -> Figure:
-        """Draw the envelope over time and over the frequency."""
-        figure: Figure = self.VIEWS.call("figure", self, ax=ax)
-        return figure

@@ -148,6 +148,11 @@ class MatricesStructure(Part):
         if moved is not None and self.outline is not None and moved.points != len(self.outline.points):
             drawn = len(self.outline.points)
             raise ValueError(f"`motion` of the outline must be of its {drawn} points, got {moved.points}")
+        if self.outline is not None and len(self.outline.moved) and self.M is not None:
+            row = int(self.outline.moved[:, 1].max())
+            if row >= self.M.size:
+                wanted = f"`moved` of the outline must name rows from 0 to {self.M.size - 1}"
+                raise ValueError(f"{wanted}, got {row}")
         if self.diameters is None:
             joined = self.sectors is not None
             check_matrices(self.M, self.K, self.C, self.modes, self.dofs, spinning, joined=joined)

@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from solver.arrays import Real
 from solver.contacts.fields import parse_end
 from solver.contacts.frames import cross, unit
-from solver.matrices.sectors.diameters import DiameterMatrices
 from solver.scene.bodies.body import Body
 from solver.scene.bodies.kinematics import places, point_motion
 from solver.scene.bodies.shapes import Cylinder, Wedge
@@ -252,26 +251,27 @@ def _say(scene: Scene, picture: Picture, parts: Parts) -> None:
         return
     moving = {dof for moves in picture.moves for factors in moves for dof in factors}
     left = [dof for dof in scene.dofs if dof not in moving and not dof.startswith(COORDINATE)]
-    if left and moved_mesh(scene) is None:
+    if left and not mesh_moves(scene):
         listed = ", ".join(left[:6]) + (f" and {len(left) - 6} more" if len(left) > 6 else "")
         picture.notes.append(f"Without a place, so not drawn: {listed}.")
-    if "mesh" in picture.roles and moved_mesh(scene) is None:
+    if "mesh" in picture.roles and not mesh_moves(scene):
         picture.notes.append(
             "The mesh is drawn at rest: its file tells the motion of the nodes named alone. `stickslip "
-            "import --nodes … --reduce` writes one that tells all."
+            "import --nodes …` writes one that tells all."
         )
     undrawn = [contact.name for contact in scene.contacts if contact.name not in picture.contacts]
     if undrawn:
         picture.notes.append(f"Contacts without a place: {', '.join(undrawn)}.")
 
 
-def moved_mesh(scene: Scene) -> DiameterMatrices | None:
-    """Return the sector of a scene whose `motion` of the points of its mesh, the first ones, is known."""
+def mesh_moves(scene: Scene) -> bool:
+    """Return whether the motion of the points of a scene's mesh, the first ones of its picture, is known."""
     structure = scene.structure
-    if not isinstance(structure, MatricesStructure) or structure.diameters is None:
-        return None
-    known = structure.outline is not None and structure.diameters.motion is not None
-    return structure.diameters if known else None
+    if not isinstance(structure, MatricesStructure) or structure.outline is None:
+        return False
+    if structure.diameters is not None:
+        return structure.diameters.motion is not None
+    return len(structure.outline.moved) > 0
 
 
 COORDINATE = "coordinate "

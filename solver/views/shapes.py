@@ -8,9 +8,9 @@ solved each has motions of its own, and θ = 0.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, cast
 
 import numpy as np
 
@@ -18,15 +18,17 @@ from solver.arrays import Complex, Integer, Real
 from solver.errors import SettingError
 from solver.linear.assembly import linear_model
 from solver.linear.model import LinearModel
-from solver.matrices.sectors.diameters import DiameterMatrices
-from solver.matrices.sectors.outline_motion import OutlineMotion
+from solver.matrices.sectors.elimination import phase_factor
+from solver.matrices.sectors.outline import SectorOutline
+from solver.matrices.values import Matrix
 from solver.modes.nonlinear_mode import at_nodal_diameter, pose
 from solver.modes.records import diameter_of
 from solver.response.solution import Solution
 from solver.response.time_history import all_coordinates
 from solver.scene.cyclic.annulus import written_out
-from solver.scene.scene import Scene
-from solver.views.picture import Picture, moved_mesh, picture_of
+from solver.scene.cyclic.sector_blocks import full_elimination
+from solver.scene.scene import MatricesStructure, Scene
+from solver.views.picture import Picture, mesh_moves, picture_of
 
 FAINT = 1e-3
 """Harmonics that move every point less than this share of the largest motion are left out."""
@@ -154,11 +156,10 @@ def _shape(
     for j in range(count):
         own = amplitudes[[row[f"{dof}@{j}" if whole else dof] for dof in scene.dofs]]
         motions[j] = np.einsum("pcd,dk->kpc", factors, own)
-    sector = moved_mesh(scene)
-    if sector is not None and sector.motion is not None:
+    if mesh_moves(scene):
         turning = None if whole else model.diameters(np.arange(coordinates.shape[1])).tolist()
-        found = _of_mesh(sector, sector.motion, coordinates, scene.structure.sector_count, turning)
-        motions[:, :, : sector.motion.points] = found
+        found = _of_mesh(scene, coordinates, turning)
+        motions[:, :, : found.shape[2]] = found
     sizes = np.linalg.norm(motions, axis=-1).max(axis=(0, 2), initial=0.0)
     kept = np.flatnonzero(sizes >= FAINT * sizes.max(initial=0.0))
     kept = kept if sizes.any() else np.array([1], dtype=np.int64)
@@ -174,24 +175,39 @@ def _shape(
     )  # fmt: skip
 
 
-def _of_mesh(
-    sector: DiameterMatrices, mesh: OutlineMotion, coordinates: Complex, count: int, waves: list[int] | None
-) -> Complex:
-    """The motion of the points of a mesh, (sectors, H + 1, n_points, 3).
+def _of_mesh(scene: Scene, coordinates: Complex, waves: list[int] | None) -> Complex:
+    """The motion of the points of the mesh of a sector, (sectors, H + 1, n_points, 3).
 
     Without the waves of the harmonics the coordinates are those of all sectors, a sum of waves each.
     """
-    n, built = sector.size, sector.diameters
-
-    def moved(wave: int, q: Complex) -> Complex:
-        back = 2 * wave > count  # it runs backward: the complex conjugate of the one ahead
-        found = mesh.at(built.index(min(wave, count - wave)), q.conj() if back else q)
-        return found.conj() if back else found
-
+    structure, count = cast(MatricesStructure, scene.structure), scene.structure.sector_count
+    n, moved = structure.n_coordinates, _by_wave(structure, count)
     if waves is not None:
-        still = np.zeros((mesh.points, 3), np.complex128)
+        still = np.zeros_like(moved(0, np.zeros(n, np.complex128)))
         return np.array(
             [[moved(m, q) if q.any() else still for m, q in zip(waves, coordinates[:n].T, strict=True)]]
         )
     sectors = np.fft.fft(coordinates[: count * n].reshape(count, n, -1), axis=0)
     return np.fft.ifft(np.array([[moved(m, q) for q in own.T] for m, own in enumerate(sectors)]), axis=0)
+
+
+def _by_wave(structure: MatricesStructure, count: int) -> Callable[[int, Complex], Complex]:
+    """What gives the motion (n_points, 3) of the coordinates (n,) of a sector in a wave of all of them."""
+    sector = structure.diameters
+    if sector is not None and sector.motion is not None:
+        motion, built = sector.motion, sector.diameters
+
+        def of_patterns(wave: int, q: Complex) -> Complex:
+            back = 2 * wave > count  # it runs backward: the complex conjugate of the one ahead
+            found = motion.at(built.index(min(wave, count - wave)), q.conj() if back else q)
+            return found.conj() if back else found
+
+        return of_patterns
+    outline, M = cast(SectorOutline, structure.outline), cast(Matrix, structure.M)
+    gone, moving = full_elimination(structure), outline.moving(M.size)
+    here, beyond = moving @ gone.here, moving @ gone.beyond
+
+    def of_rows(wave: int, q: Complex) -> Complex:
+        return np.asarray(here @ q + phase_factor(wave, count) * (beyond @ q)).reshape(-1, 3)
+
+    return of_rows

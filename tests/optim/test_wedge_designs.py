@@ -120,3 +120,12 @@ def test_a_heavier_wedge_than_max_x_asks_for_is_best_by_half_peak_to_peak() -> N
     best = solver.sweep(observed.with_values(dict(found.optimum)), harmonics=2 * HARMONICS)
     assert best.peak is not None
     assert best.peak.value == pytest.approx(found.peak.value, rel=1e-9)
+
+
+def test_the_mass_of_a_damper_is_designed_by_itself() -> None:
+    result = optim.design(solver.load_scene("platform-wedge"), harmonics=3)
+    assert list(result.optimum) == ["wedge.mass"]
+    assert result.reached
+    given = solver.sweep(solver.load_scene("platform-wedge"), harmonics=3).peak
+    assert given is not None
+    assert result.peak.value < given.value

@@ -8,11 +8,11 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from optim.problem.default_variable import ABOVE, BELOW
 from solver.errors import SettingError
 from solver.scene.scene import AnyContact, Scene
 
 _DIGITS = 3
-_BELOW, _ABOVE = 10.0, 15.0  # of a value, the bounds between which it is designed
 _AROUND = 3.0  # of a value, the bounds between which it is identified
 _ORDERS = 3
 _MODAL = (1e-7, 0.1)  # √kg m, where nothing says at which motion contacts begin to slip
@@ -63,7 +63,7 @@ def design_bounds(value: float, low: float, high: float, *, logarithmic: bool) -
         return None
     if value == 0.0:
         return [_rounded(low), _rounded(high)]
-    return [_rounded(value / _BELOW), _rounded(value * _ABOVE if logarithmic else min(value * _ABOVE, high))]
+    return [_rounded(value / BELOW), _rounded(value * ABOVE if logarithmic else min(value * ABOVE, high))]
 
 
 def around(value: float) -> list[float]:

@@ -196,6 +196,8 @@ def sector_kept(
     ends, keep = boundaries(joined, found, sectors, folder, metres), joined.get("keep_modes")
     drawn = tables if ends.outline is None else {**tables, "outline": ends.outline}
     if keep is None:
+        if ends.outline is not None and ends.drawn is not None:
+            drawn["outline"] = ends.outline.moved_by(ends.drawn)
         return {**drawn, **_dense(found), "cyclic": {**kept, **ends.table()}}, None
     if isinstance(keep, bool) or not isinstance(keep, int) or not 0 <= keep <= MOST_DOFS:
         raise _refusal("keep_modes", f"must be a whole number from 0 to {MOST_DOFS}", keep)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
@@ -14,11 +14,15 @@ from solver.matrices.sectors.elements import drawn_edges
 from solver.matrices.values import ByContent
 
 if TYPE_CHECKING:
+    from scipy.sparse import csr_array
+
     from solver.matrices.decks.deck import Deck
 
 MOST_POINTS = 10_000
 MOST_EDGES = 20_000
+MOST_MOVED = 9 * MOST_POINTS
 KEYS = ("points", "edges", "low", "high")
+MOVED = "moved"
 _MOST_LOOSE = 1_500  # nodes of a mesh without elements
 _MOST_OF_A_BOUNDARY = 400
 _DIGITS = 5  # of a place, relative to the size of the sector: enough for a drawing
@@ -37,6 +41,11 @@ class SectorOutline(ByContent):
     ]
     low: Annotated[Integer, "Points of the boundary to the sector before, (k,)."]
     high: Annotated[Integer, "Of that to the next one, (k,)."]
+    moved: Annotated[
+        Real,
+        "How the rows of the matrices move the points along the global axes: 3 × point + axis, row, factor, "
+        "(e, 3); none of a reduced sector, whose coordinates are no rows.",
+    ] = field(default_factory=lambda: np.zeros((0, 3)))
     digest: Annotated[str, "Hash of the content."] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -44,6 +53,7 @@ class SectorOutline(ByContent):
         for key, kind, shape, most in (
             ("points", np.float64, (-1, 3), MOST_POINTS), ("edges", np.int64, (-1, 2), MOST_EDGES),
             ("low", np.int64, (-1,), MOST_POINTS), ("high", np.int64, (-1,), MOST_POINTS),
+            (MOVED, np.float64, (-1, 3), MOST_MOVED),
         ):  # fmt: skip
             given = np.asarray(getattr(self, key))
             if given.size == 0:
@@ -58,6 +68,13 @@ class SectorOutline(ByContent):
                 raise ValueError(f"`{key}` of the outline must hold finite numbers")
             kept[key] = array
         self._hold(kept)
+        named = kept[MOVED][:, :2]
+        if (
+            np.any(named != np.floor(named))
+            or np.any(named < 0)
+            or np.any(named[:, 0] >= 3 * len(self.points))
+        ):
+            raise ValueError(f"`{MOVED}` of the outline must name axes of its points, and rows from 0 on")
         for key in KEYS[1:]:
             rows = kept[key]
             if rows.size and not 0 <= rows.min() <= rows.max() < len(self.points):
@@ -89,24 +106,38 @@ class SectorOutline(ByContent):
 
     @classmethod
     def read(cls, data: object) -> SectorOutline:
-        """Read a table of `points`, `edges`, `low` and `high`."""
+        """Read a table of `points`, `edges`, `low`, `high`, and `moved` where it is known."""
         if isinstance(data, SectorOutline):
             return data
-        if not isinstance(data, dict) or set(data) != set(KEYS):
+        if not isinstance(data, dict) or set(data) - {MOVED} != set(KEYS):
             got = ", ".join(map(str, data))[:200] if isinstance(data, dict) else type(data).__name__
             raise ValueError(f"`outline` must be a table with the keys {', '.join(KEYS)}, got {got}")
-        return cls(*(_numbers(key, data[key]) for key in KEYS))
+        return cls(**{key: _numbers(key, given) for key, given in data.items()})
 
     def write(self) -> dict[str, object]:
         """The table that `read` reads."""
-        return {key: getattr(self, key).tolist() for key in KEYS}
+        keys = (*KEYS, MOVED) if len(self.moved) else KEYS
+        return {key: getattr(self, key).tolist() for key in keys}
+
+    def moving(self, rows: int) -> csr_array:
+        """How `rows` rows of matrices move the points, sparse (3 n_points, rows)."""
+        from scipy.sparse import csr_array
+
+        place, row, factor = self.moved.T
+        at = (place.astype(np.int64), row.astype(np.int64))
+        return csr_array((factor, at), shape=(3 * len(self.points), rows))
+
+    def moved_by(self, motion: csr_array) -> SectorOutline:
+        """The same, with how the rows move its points."""
+        entries = motion.tocoo()
+        return replace(self, moved=np.column_stack([*entries.coords, entries.data]))
 
 
 def _numbers(key: str, data: object) -> NDArray[Any]:
     """A list of numbers or of rows of them; texts and truth values are refused."""
-    rows = data if isinstance(data, list | tuple) else None
-    if rows is None or len(rows) > MOST_EDGES:
-        raise ValueError(f"`{key}` of the outline must be a list of at most {MOST_EDGES}")
+    rows, most = data if isinstance(data, list | tuple) else None, MOST_MOVED if key == MOVED else MOST_EDGES
+    if rows is None or len(rows) > most:
+        raise ValueError(f"`{key}` of the outline must be a list of at most {most}")
     flat = [value for row in rows for value in (row if isinstance(row, list | tuple) else (row,))]
     if any(isinstance(value, bool) or not isinstance(value, int | float) for value in flat):
         raise ValueError(f"`{key}` of the outline must hold numbers")
@@ -142,8 +173,8 @@ def outline_of(
     points = metres * np.array([deck.nodes[int(node)] for node in shown]).reshape(-1, 3)
     if points.size and (size := float(np.ptp(points, axis=0).max())) > 0.0:
         points = np.round(points, _DIGITS - math.floor(math.log10(size)))
-    ends = [np.searchsorted(shown, each) for each in ends]
-    return SectorOutline(points, np.searchsorted(shown, edges), *ends), shown.tolist()
+    lower, higher = (np.searchsorted(shown, each) for each in ends)
+    return SectorOutline(points, np.searchsorted(shown, edges), lower, higher), shown.tolist()
 
 
 def _some(nodes: Sequence[int], most: int) -> Integer:

@@ -13,6 +13,7 @@ from scipy.special import wofz
 
 import solver
 from solver.errors import SettingError
+from solver.marching.transient_result import TransientStatus
 from solver.scene.scene import Scene
 
 K = (2.0 * math.pi) ** 2  # of a mass of 1 kg: 1 Hz
@@ -249,5 +250,5 @@ def test_it_stops_when_asked_with_what_was_run_through() -> None:
     found = solver.transient(
         oscillator(0.01), ramp_seconds=1000.0, from_rest=True, should_stop=lambda: next(asked)
     )
-    assert found.status is solver.TransientStatus.STOPPED
+    assert found.status is TransientStatus.STOPPED
     assert 0 < found.time.size < 1000
