@@ -90,11 +90,12 @@ class Code:
     def __init__(self, command: list[str], seconds: float) -> None:
         self._command, self._seconds = command, seconds
         self._process: subprocess.Popen[str] | None = None
-        self._folder = tempfile.TemporaryDirectory()
 
     def ask(self, case: dict[str, Any], rung: dict[str, Any]) -> Score:
         """Return value and seconds, or `not_offered`, or `failed` with words."""
         if self._process is None or self._process.poll() is not None:
+            self.close()
+            self._folder = tempfile.TemporaryDirectory()
             self._process = subprocess.Popen(
                 self._command, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
                 stderr=subprocess.DEVNULL, text=True,
@@ -121,8 +122,9 @@ class Code:
         """End the process."""
         if self._process is not None:
             self._process.kill()
-            self._process.wait()
+            self._process.communicate()
             self._process = None
+            self._folder.cleanup()
 
 
 def run(

@@ -115,7 +115,8 @@ def test_a_made_up_code_is_scored(tmp_path: Path, capsys: pytest.CaptureFixture[
 
 
 def test_the_archive_holds_every_case_and_its_answer(tmp_path: Path) -> None:
-    made = zipfile.ZipFile(scorer.archive(str(tmp_path / "all.zip"))).namelist()
-    for name in names():
-        assert {f"frictionbench/{kind}/{name}.json" for kind in ("cases", "answers")} <= set(made)
+    with zipfile.ZipFile(scorer.archive(str(tmp_path / "all.zip"))) as packed:
+        made = packed.namelist()
+    assert {f"frictionbench/cases/{name}.json" for name in names()} <= set(made)
+    assert {f"frictionbench/answers/{name}.json" for name in KNOWN} <= set(made)
     assert "frictionbench/CITATION.cff" in made
