@@ -6,13 +6,13 @@ import json
 from typing import Any
 
 from benchmarks.frictionbench import scorer
-from benchmarks.frictionbench.model import HERE, load
+from benchmarks.frictionbench.model import HERE, load, names
 
 DOCS = HERE.parents[1] / "docs"
 COLOURS = {"stickslip": "#0b6e99", "tmdsimpy": "#c2571a", "pyharm": "#7a8f2a", "nlvib": "#8a4f9e"}
 HEAD = """# FrictionBench
 
-{cases} cases of friction damping in one neutral schema, with answers to ten digits, and what codes make
+{cases} answered cases of friction damping in one neutral schema, and what codes make
 of them. Cases, answers, schema and [how to add a code](../benchmarks/frictionbench/README.md#add-a-code)
 are in `benchmarks/frictionbench`; `python -m benchmarks.frictionbench archive` packs them.
 
@@ -29,6 +29,8 @@ single responses alone: a dash says what an adapter or its code does not offer, 
 
 {words}
 
+{without}
+
 ![Right digits over processor time of every rung of every case.](img/frictionbench.png)
 
 """
@@ -42,7 +44,7 @@ def write() -> str:
         name: json.loads((HERE / "answers" / f"{name}.json").read_text()) for name in scorer.answered()
     }
     ten = sum(one["ways"] > 1 and one["agreed_digits"] >= 10.0 for one in answers.values())
-    lines = [HEAD.format(cases=len(answers), ten=ten, words=_words(scorer.summary()))]
+    lines = [HEAD.format(cases=len(answers), ten=ten, without=_without(), words=_words(scorer.summary()))]
     ladder = ""
     for name, answer in answers.items():
         case = load(name)
@@ -64,9 +66,14 @@ def write() -> str:
     return str(DOCS / "frictionbench.md")
 
 
+def _without() -> str:
+    missing = [f"`{name}`" for name in names() if name not in scorer.answered()]
+    return f"Cases that have no answer yet: {', '.join(missing)}." if missing else ""
+
+
 def _words(told: dict[str, Any]) -> str:
     lines = [
-        f"stickslip answers {told['answered']} of {told['cases']} cases, {told['eight']} of them to eight "
+        f"stickslip answers {told['answered']} of {told['cases']} cases it was run on, {told['eight']} of them to eight "
         f"digits or more; {told['covered']} of {told['judged']} answers of all rungs are within its own "
         "error estimate"
         + (
@@ -76,7 +83,7 @@ def _words(told: dict[str, Any]) -> str:
         )
     ]
     for code, offered in told["offered"].items():
-        lines.append(f"{code} answers {offered} cases and fails in {told['failed'][code]}.")
+        lines.append(f"{code} answers {offered} cases and fails in all rungs of {told['failed'][code]}.")
     for name, code, right, theirs, mine in told["slower"]:
         ours = "stickslip does not reach that" if mine is None else f"stickslip takes {1e3 * mine:.3g} ms"
         lines.append(f"In `{name}` {code} has {right:.1f} digits after {1e3 * theirs:.3g} ms, {ours}.")

@@ -223,12 +223,10 @@ def words(scores: list[Score]) -> str:
     """Return a case's scores as one cell: digits and seconds of the best, or what went wrong."""
     top = best(scores)
     if top is None:
-        last = scores[-1] if scores else {}
-        return (
-            f"– {last['not_offered']}"
-            if "not_offered" in last
-            else f"failed: {last.get('failed', 'not run')}"
-        )
+        if not scores:
+            return "not run"
+        last = scores[-1]
+        return f"– {last['not_offered']}" if "not_offered" in last else f"failed: {last['failed']}"
     wrong = sum("failed" in score for score in scores)
     told_ = f"{top['digits']:.1f} in {_time(top['seconds'])}"
     return told_ + (f", {wrong} of {len(scores)} failed" if wrong else "")
@@ -257,7 +255,7 @@ def summary() -> dict[str, Any]:
                     slower.append((name, code, top["digits"], top["seconds"], mine))
     tops = {name: best(scores) for name, scores in ours.items()}
     return {
-        "answered": sum(top is not None for top in tops.values()), "cases": len(answered()),
+        "answered": sum(top is not None for top in tops.values()), "cases": len(tops),
         "covered": sum(one["covered"] for _, one in judged), "judged": len(judged),
         "missed": sorted({name for name, one in judged if not one["covered"]}),
         "eight": sum(top is not None and top["digits"] >= 8.0 for top in tops.values()), "slower": slower,
