@@ -73,7 +73,8 @@ def _without() -> str:
 
 def _words(told: dict[str, Any]) -> str:
     lines = [
-        f"stickslip answers {told['answered']} of {told['cases']} cases it was run on, {told['eight']} of them to eight "
+        f"stickslip answers {told['answered']} of {told['cases']} cases it was run on, "
+        f"{told['eight']} of them to eight "
         f"digits or more; {told['covered']} of {told['judged']} answers of all rungs are within its own "
         "error estimate"
         + (
