@@ -26,6 +26,7 @@ _SECTION = re.compile(r"^## (.+)$")
 _ENTRY = re.compile(r"^- \[(?P<title>[^]]+)\]\((?P<page>[\w-]+\.md)\)")
 OUTSIDE = (
     "README.md", "CONTRIBUTING.md", "CHANGELOG.md", "LICENSE", "CITATION.cff", "tests/README.md",
+    "benchmarks/frictionbench/README.md",
     "deploy/stickslip.service", "deploy/stickslip.env.example", "deploy/compose.yaml", "deploy/nginx.conf",
     "deploy/Caddyfile", "deploy/alerts.yaml", "deploy/grafana.json",
 )  # fmt: skip

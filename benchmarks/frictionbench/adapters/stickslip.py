@@ -1,0 +1,36 @@
+"""This project; it runs in the environment of the command."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+from protocol import serve
+
+NEEDS: tuple[str, ...] = ()
+RUNGS = [
+    {"harmonics": 7},
+    {"harmonics": 21},
+    {"harmonics": 61},
+    {"harmonics": 161},
+    {"harmonics": 41, "exact": True},
+]
+
+
+def solve(case: dict[str, Any], rung: dict[str, Any]) -> dict[str, Any]:
+    """Return the answer of `benchmarks.frictionbench.scenes`."""
+    from benchmarks.frictionbench import scenes
+
+    rigid = any(one.get("kt") == "inf" for one in case["contacts"])
+    exact = bool(rung.get("exact")) and not rigid
+    try:
+        return scenes.answer(case, rung["harmonics"], exact)
+    except scenes.NotOfferedError as error:
+        raise NotImplementedError(str(error)) from None
+
+
+if __name__ == "__main__":
+    # The script's folder holds a file of the package's name.
+    sys.path[0] = str(Path(__file__).resolve().parents[3])
+    serve(solve)
