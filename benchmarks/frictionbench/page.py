@@ -9,7 +9,7 @@ from benchmarks.frictionbench import scorer
 from benchmarks.frictionbench.model import HERE, load, names
 
 DOCS = HERE.parents[1] / "docs"
-COLOURS = {"stickslip": "#0b6e99", "tmdsimpy": "#c2571a", "pyharm": "#7a8f2a", "nlvib": "#8a4f9e"}
+COLOURS = {"stickslip": "#0b6e99", "tmdsimpy": "#c2571a", "pyharm": "#7a8f2a"}
 HEAD = """# FrictionBench
 
 {cases} answered cases of friction damping in one neutral schema, and what codes make

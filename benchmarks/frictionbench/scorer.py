@@ -31,7 +31,7 @@ class MissingError(Exception):
 
 
 def told(adapter: Path) -> dict[str, Any]:
-    """Return the constants of an adapter (NEEDS, RUNGS, PROGRAM), read without running it."""
+    """Return the constants of an adapter (NEEDS, RUNGS), read without running it."""
     found = {}
     for node in ast.parse(adapter.read_text()).body:
         target = (
@@ -41,7 +41,7 @@ def told(adapter: Path) -> dict[str, Any]:
             if isinstance(node, ast.Assign)
             else None
         )
-        if isinstance(target, ast.Name) and target.id in ("NEEDS", "RUNGS", "PROGRAM"):
+        if isinstance(target, ast.Name) and target.id in ("NEEDS", "RUNGS"):
             found[target.id] = ast.literal_eval(node.value)  # type: ignore[union-attr, arg-type]
     return found
 
@@ -137,8 +137,6 @@ def run(
         return 1
     wants = told(adapter)
     try:
-        if (program := wants.get("PROGRAM")) and shutil.which(program) is None:
-            raise MissingError(f"{program} is not installed")
         python, more = environment(adapter.stem, wants["NEEDS"], source)
     except MissingError as error:
         print(f"{code} cannot run here: {error}")
