@@ -66,6 +66,7 @@ def test_the_first_screen_holds_the_answer(profile: Profile, site: Site, found: 
     assert float(force.removesuffix(" %")) == pytest.approx(1.0, abs=2e-3)
     expect(shares.first).to_contain_text("%")
     for part in ("#answer-certificate", "#use-design", "#save-report"):
+        expect(page.locator(part)).to_be_visible()
         box = page.locator(part).bounding_box()
         assert box is not None
         assert box["y"] + box["height"] <= 900, f"{part} stands below the fold"

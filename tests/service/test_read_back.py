@@ -19,6 +19,7 @@ from solver.results.told import Told, json_keys, json_value
 
 FORCE = "excitation.amplitude"
 OF_DISKS = ("interference", "mistuning")
+IN_TIME = ("march", "transient")
 
 
 def asked(kind: str, name: str) -> dict[str, Any]:
@@ -83,6 +84,8 @@ def _parts(value: Any) -> list[Any]:
 @pytest.mark.parametrize("kind", studies())
 @pytest.mark.parametrize("name", solver.shipped_scenes())
 def test_a_result_read_back_is_the_result(kind: str, name: str) -> None:
+    if name == "fe-disk" and kind in IN_TIME:
+        pytest.skip("24 sectors of a finite-element disk are marched for minutes")
     study = studies()[kind]
     try:
         resolved = SHIPPED[kind].resolve(validated(study, asked(kind, name)), Shipped())
