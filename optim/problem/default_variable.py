@@ -11,12 +11,13 @@ BELOW, ABOVE = 10.0, 15.0
 def default_variable(scene: Scene) -> str | None:
     """Return the path that is designed by itself; None where the scene suggests none.
 
-    The mass of the first damper that has one, else the normal load of the first contact with a tied load,
-    else of the first contact.
+    Mass or normal load of the first damper that has one, else the normal load of the first contact with a
+    tied load, else of the first contact.
     """
-    heavy = [f"{damper.name}.mass" for damper in scene.dampers if "mass" in damper.parameters]
-    if heavy:
-        return heavy[0]
+    for damper in scene.dampers:
+        for key in ("mass", "N0"):
+            if key in damper.parameters and scene.value(f"{damper.name}.{key}") > 0.0:
+                return f"{damper.name}.{key}"
     rubbing = [(contact, contact.load) for contact in scene.contacts if contact.load is not None]
     tied = [(contact, load) for contact, load in rubbing if load.ratio is not None]
     for contact, _ in (tied or rubbing)[:1]:

@@ -84,7 +84,7 @@ def transient(
         scene, begin_hz=begin_hz, end_hz=end_hz, rate_hz_per_s=rate_hz_per_s, ramp_seconds=ramp_seconds,
         ring_down_seconds=ring_down_seconds,
     )  # fmt: skip
-    run = _Run(scene, ramps)
+    run = _Passage(scene, ramps)
     if not (isinstance(tolerance, Real) and 1e-12 <= tolerance <= 0.1):
         raise SettingError("tolerance", tolerance, "must be a number from 1e-12 to 0.1")
     if start is not None and from_rest:
@@ -113,7 +113,7 @@ def transient(
     return _result(run, found, status, error, began)
 
 
-class _Run:
+class _Passage:
     """A scene and its ramps, time τ = omega t of the highest frequency."""
 
     def __init__(self, scene: Scene, ramps: tuple[Ramp, ...]) -> None:
@@ -162,7 +162,7 @@ class _Run:
 class _Envelope:
     """The extremes of the observed motion in windows of at least one turn of the excitation."""
 
-    def __init__(self, run: _Run, steps: int) -> None:
+    def __init__(self, run: _Passage, steps: int) -> None:
         self._run, self.steps = run, steps
         count = max(1, min(int(run.cycles), MOST_WINDOWS))
         self._turns = run.cycles / count  # in a window
@@ -213,7 +213,9 @@ class _Watch:
         self.done += (1.0 - self.done) * _SHARE
 
 
-def _followed(run: _Run, start: kernel.State, steps: int, watch: _Watch) -> tuple[_Envelope, TransientStatus]:
+def _followed(
+    run: _Passage, start: kernel.State, steps: int, watch: _Watch
+) -> tuple[_Envelope, TransientStatus]:
     """Follow a run with so many steps in a period of the highest frequency."""
     state, envelope = copied(start), _Envelope(run, steps)
     for number, (ramp, equations) in enumerate(zip(run.ramps, run.equations, strict=True)):
@@ -282,7 +284,7 @@ def _number(key: str, value: object, *, above: bool = False) -> float:
 
 
 def _start(
-    run: _Run, start: MarchStart | None, *, from_rest: bool, should_stop: ShouldStop
+    run: _Passage, start: MarchStart | None, *, from_rest: bool, should_stop: ShouldStop
 ) -> tuple[kernel.State | None, TransientStatus]:
     """Return the state a run begins with; None where the motion at the first frequency does not repeat."""
     if start is not None or from_rest:
@@ -302,7 +304,7 @@ def _start(
 
 
 def _result(
-    run: _Run, found: _Envelope, status: TransientStatus, error: float, began: float
+    run: _Passage, found: _Envelope, status: TransientStatus, error: float, began: float
 ) -> TransientResult:
     """Read the result; of a run that did not end, as far as it went."""
     seen = np.isfinite(found.time)
