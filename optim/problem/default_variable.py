@@ -20,6 +20,5 @@ def default_variable(scene: Scene) -> str | None:
                 return f"{damper.name}.{key}"
     rubbing = [(contact, contact.load) for contact in scene.contacts if contact.load is not None]
     tied = [(contact, load) for contact, load in rubbing if load.ratio is not None]
-    for contact, _ in (tied or rubbing)[:1]:
-        return f"{contact.group or contact.name}.N0"
-    return None
+    first = next((contact for contact, _ in tied or rubbing), None)
+    return None if first is None else f"{first.group or first.name}.N0"

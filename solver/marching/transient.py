@@ -93,10 +93,20 @@ def transient(
     if state is None:
         return _result(run, _Envelope(run, 0), status, math.nan, began)
     watch = _Watch(on_progress, should_stop)
-    steps = run.steps(steps_per_period)
+    found, status, error = _refined(run, state, steps_per_period, tolerance, watch)
+    if on_progress is not None and found.complete:
+        on_progress(1.0, int(run.cycles))
+    return _result(run, found, status, error, began)
+
+
+def _refined(
+    run: _Passage, state: kernel.State, wanted: int | None, tolerance: float, watch: _Watch
+) -> tuple[_Envelope, TransientStatus, float]:
+    """Follow a run with steps and half of them until its largest amplitude is known; return its error too."""
+    steps = run.steps(wanted)
     found, status = _followed(run, state, steps // 2, watch)
     error = math.nan
-    for _ in range(FINEST if steps_per_period is None else 1):
+    for _ in range(FINEST if wanted is None else 1):
         if status is not TransientStatus.FINISHED:
             break
         coarse = found.largest
@@ -108,9 +118,7 @@ def transient(
         steps *= 2
     if status is TransientStatus.FINISHED and error > tolerance:
         status = TransientStatus.INACCURATE
-    if on_progress is not None and found.complete:
-        on_progress(1.0, int(run.cycles))
-    return _result(run, found, status, error, began)
+    return found, status, error
 
 
 class _Passage:
@@ -119,12 +127,12 @@ class _Passage:
     def __init__(self, scene: Scene, ramps: tuple[Ramp, ...]) -> None:
         self.scene, self.ramps = scene, ramps
         self.omega = 2.0 * math.pi * max(ramps[0].begin_hz, ramps[0].end_hz)
-        self.turned = [0.0]  # cycles of the excitation at the end of each
+        self.turned, self.passed = [0.0], [0.0]  # turns of the excitation, and time [s], before each and all
         self.equations: list[MarchEquations] = []
         for ramp in ramps:
             self.equations.append(equations_over(scene, ramp, self.omega, self.turned[-1]))
             self.turned.append(self.turned[-1] + float(ramp.cycles(np.array(ramp.seconds))))
-        self.names = row_names(whole(scene))
+            self.passed.append(self.passed[-1] + ramp.seconds)
 
     @property
     def cycles(self) -> float:
@@ -134,7 +142,7 @@ class _Passage:
     @property
     def periods(self) -> float:
         """Periods of the highest frequency in the whole run."""
-        return sum(ramp.seconds for ramp in self.ramps) * self.omega / (2.0 * math.pi)
+        return self.passed[-1] * self.omega / (2.0 * math.pi)
 
     @property
     def order(self) -> int:
@@ -144,12 +152,11 @@ class _Passage:
 
     def steps(self, wanted: int | None) -> int:
         """Steps in a period of the highest frequency, of the finer of the first two runs."""
-        first = self.ramps[0]
-        ends = {first.begin_hz, first.end_hz}
-        scenes = [whole(self.scene.at_frequency(hertz)) for hertz in ends]
-        steps = max(
-            steps_for(equations_of_motion(scene, self.omega).system, scene.forces, wanted) for scene in scenes
-        )
+        first, systems = self.ramps[0], [self.equations[0].system]
+        if self.scene.speed_order is not None and first.end_hz != first.begin_hz:
+            there = whole(self.scene.at_frequency(first.end_hz))
+            systems.append(equations_of_motion(there, self.omega).system)
+        steps = max(steps_for(system, self.scene.forces, wanted) for system in systems)
         if steps * self.periods > MOST_STEPS:
             most = MOST_STEPS / steps / self.periods
             wanted_seconds = (
@@ -174,7 +181,7 @@ class _Envelope:
     def add(self, number: int, begin: float, step: float, x: arrays.Real, slopes: arrays.Real) -> None:
         """Take samples of a ramp, (n + 1,), the first at `begin` [s], with their slopes a step [m]."""
         ramp = self._run.ramps[number]
-        before = sum(each.seconds for each in self._run.ramps[:number])
+        before = self._run.passed[number]
         at, place, between = turning_points(x, slopes)
         seconds = begin + step * np.arange(x.size)
         turned = self._run.turned[number] + ramp.cycles(seconds[:-1])
@@ -234,9 +241,9 @@ def _followed(
                 return envelope, _STATUS[code]
             x, v = np.append(record.x, state.x[dof]), np.append(record.v, state.v[dof])
             envelope.add(number, first * h / run.omega, h / run.omega, x, h * v)
-            share = sum(s.seconds for s in run.ramps[:number]) + (first + count) * h / run.omega
-            cycles = run.turned[number] + float(ramp.cycles(np.array((first + count) * h / run.omega)))
-            if watch.part(share / sum(s.seconds for s in run.ramps), cycles):
+            seconds = (first + count) * h / run.omega
+            cycles = run.turned[number] + float(ramp.cycles(np.array(seconds)))
+            if watch.part((run.passed[number] + seconds) / run.passed[-1], cycles):
                 return envelope, TransientStatus.STOPPED
     envelope.complete = True
     watch.end()
@@ -288,7 +295,8 @@ def _start(
 ) -> tuple[kernel.State | None, TransientStatus]:
     """Return the state a run begins with; None where the motion at the first frequency does not repeat."""
     if start is not None or from_rest:
-        begins = state_at(run.equations[0], start or MarchStart(), run.names, run.omega)
+        names = row_names(whole(run.scene))
+        begins = state_at(run.equations[0], start or MarchStart(), names, run.omega)
         return begins, TransientStatus.FINISHED
     hertz = run.ramps[0].begin_hz
     if hertz == 0.0:

@@ -45,12 +45,14 @@ class ChangeSearch:
     def run(self, nodes: list[PointRow]) -> list[PointRow]:
         """Return the nodes with those added."""
         top = max(node.measures[MAX_ABS] for node in nodes)
+        departs = self._departs(nodes, top, FORETOLD)
         for _ in range(MOST_HALVINGS):
-            hiding = self._hiding(nodes, top)
+            hiding = self._hiding(nodes, top, departs)
             if not hiding.any():
                 break
             nodes, _, _ = self._solver.halved(nodes, hiding)
-        wanted = self._wanted(nodes, top)
+            departs = self._departs(nodes, top, FORETOLD)
+        wanted = self._wanted(nodes, top, departs)
         if not wanted.any():
             return nodes
         grown: list[PointRow] = []
@@ -68,13 +70,14 @@ class ChangeSearch:
         kinds += [_APART] * (len(nodes) - 1 - begun)
         return self._checked(grown, np.array(kinds), top)
 
-    def _hiding(self, nodes: list[PointRow], top: float) -> NDArray[np.bool_]:
+    def _hiding(
+        self, nodes: list[PointRow], top: float, departs: NDArray[np.bool_]
+    ) -> NDArray[np.bool_]:  # fmt: skip
         """Return where a contact may change and change back with a maximum between, (P − 1,)."""
         seen, table, rows = self._solver.look(nodes, top), self._solver.table, numbers_of(nodes)
         stands = np.maximum(seen.measures[1:, MAX_ABS], seen.measures[:-1, MAX_ABS])
         may = (np.diff(seen.measures[:, PIECE]) == 0.0) & (stands >= self._worth * top)
-        if may.any():
-            may &= self._departs(nodes, top, FORETOLD).all(axis=0)
+        may &= departs.all(axis=0)
         at = np.flatnonzero(may)
         if at.size == 0:
             return np.asarray(may, dtype=bool)
@@ -88,16 +91,16 @@ class ChangeSearch:
         may[at] = (slopes > CHANGES_ALL * onward[..., None] * sizes).any(axis=(0, 2))
         return np.asarray(may, dtype=bool)
 
-    def _wanted(self, nodes: list[PointRow], top: float) -> NDArray[np.bool_]:
+    def _wanted(
+        self, nodes: list[PointRow], top: float, departs: NDArray[np.bool_]
+    ) -> NDArray[np.bool_]:  # fmt: skip
         """Return in which intervals a change may hide a maximum, (P − 1,)."""
         seen = self._solver.look(nodes, top)
         stands = np.maximum(seen.measures[1:, MAX_ABS], seen.measures[:-1, MAX_ABS])
         wanted = (np.diff(seen.measures[:, PIECE]) != 0.0) & (stands >= self._worth * top)
         onward = np.array([node.tangent[-1] for node in nodes])
         wanted &= onward[1:] * onward[:-1] > 0.0
-        if wanted.any():
-            wanted &= self._departs(nodes, top, FORETOLD).any(axis=0)
-        return np.asarray(wanted, dtype=bool)
+        return np.asarray(wanted & departs.any(axis=0), dtype=bool)
 
     def _departs(self, nodes: list[PointRow], top: float, allowed: float) -> NDArray[np.bool_]:
         """Return where a maximum may hide by what the points before, and behind, foretell, (2, P − 1)."""
