@@ -70,15 +70,16 @@ class User:
         self._streams: tuple[asyncio.StreamReader, asyncio.StreamWriter] | None = None
 
     async def live(self, until: float, pause: float) -> None:
-        """Ask now and then, `pause` seconds apart in the mean."""
-        await asyncio.sleep(self._chance.uniform(0.0, pause))
-        while time.monotonic() < until:
+        """Ask now and then, `pause` seconds apart in the mean; the first time too, for an even rate."""
+        while True:
+            left = max(0.0, until - time.monotonic())
+            await asyncio.sleep(min(left, self._chance.expovariate(1.0 / pause)))
+            if time.monotonic() >= until:
+                break
             if self._chance.random() < 1.0 / 12.0:
                 await self._hand_in()
             else:
                 await self._read()
-            left = max(0.0, until - time.monotonic())
-            await asyncio.sleep(min(left, self._chance.expovariate(1.0 / pause)))
         if self._streams is not None:
             self._streams[1].close()
 

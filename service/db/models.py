@@ -339,6 +339,9 @@ class Run(TableBase):
 RUN_TEXT = table("run_text", column("rowid", Integer), column("run_text", Text))
 """SQLite's index of the names and notes of runs, kept by triggers; `rowid` is the number of the run."""
 
+RUN_LETTERS = table("run_text_letters", column("term", Text), column("doc", Integer))
+"""The triples of letters in that index and where each stands; every letter begins one."""
+
 
 class Project(TableBase):
     """A name under which an owner gathers runs.

@@ -364,16 +364,23 @@ def test_every_filter_holds_on_both_databases(database: Database) -> None:
     assert found() == [hard, soft]
 
 
-def test_texts_are_found_by_the_index_of_texts(database: Database) -> None:
+@pytest.mark.parametrize(
+    ("text", "index"),
+    [
+        ("turbofan", ("run_text VIRTUAL TABLE", "ix_run_text")),
+        ("rb", ("run_text_letters VIRTUAL TABLE", "ix_run_letters")),
+    ],
+)
+def test_texts_are_found_by_the_index_of_texts(database: Database, text: str, index: tuple[str, str]) -> None:
     sqlite = database.backend == "sqlite"
     with database.reading() as connection:
-        found = _containing("turbofan", sqlite=sqlite).ids
+        found = _containing(text, sqlite=sqlite).ids
         asked = str(found.compile(connection, compile_kwargs={"literal_binds": True}))
         if not sqlite:
             # Of so few rows all are read sooner.
             connection.exec_driver_sql("SET LOCAL enable_seqscan = off")
         plan = connection.exec_driver_sql(f"{'EXPLAIN QUERY PLAN' if sqlite else 'EXPLAIN'} {asked}").all()
-    assert ("run_text VIRTUAL TABLE" if sqlite else "ix_run_text") in str(plan)
+    assert index[0 if sqlite else 1] in str(plan)
 
 
 @pytest.mark.parametrize("counted", [0, 5000], ids=["looked at one by one", "by the index"])
@@ -400,8 +407,8 @@ def test_texts_are_found_as_by_looking_at_every_one(
               for n in (1, 2, 3, 6) for i in range(0, len(text) - n + 1, 4)}  # fmt: skip
     hit = 0
     for text in sorted(pieces | {one.name for one in gone if one.name}):
-        if len(text) < 3 and not text.isascii():
-            continue  # a piece of one or two letters is compared as the database compares
+        if len(text) < 3 and not text.isascii() and database.backend == "postgresql":
+            continue  # a piece of one or two letters is folded as the database's locale folds
         wanted = {one for one, words in said.items()
                   if text.lower() in words.name.lower() or text.lower() in words.notes.lower()}  # fmt: skip
         found = {row.id for row in runs.page(RunFilter(sees="ann", text=text), 100)}
