@@ -10,7 +10,7 @@ from __future__ import annotations
 import logging
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from datetime import datetime, timedelta
 from functools import partial
@@ -28,8 +28,7 @@ log = logging.getLogger("stickslip.retention")
 
 _WANTED_SECONDS = 0.004
 _MOST = 64
-_JOBS = 64
-_JOBS_AT_ONCE = 4
+_WANTED_ALONE, _MOST_ALONE = 0.25, 1024  # where nobody else waits
 _ROUND_SECONDS = 600.0
 
 
@@ -40,11 +39,12 @@ class _Paced:
     finds the log long does that for all before it, up to 0.1 s.
     """
 
-    def __init__(self, database: Database, pause: Callable[[float], bool]) -> None:
+    def __init__(self, database: Database, pause: Callable[[float], bool] | None) -> None:
+        alone = pause is _at_once
+        self._wanted, self.most = (_WANTED_ALONE, _MOST_ALONE) if alone else (_WANTED_SECONDS, _MOST)
         self._database = database
-        self._pause = pause
+        self._pause = pause or _sleep
         self._size = 4
-        self._last = 0.0
         self.stopped = False
 
     def all(self, step: Callable[[int], int]) -> int:
@@ -54,19 +54,27 @@ class _Paced:
             size = self._size
             done = self.once(partial(step, size))
             total += done
-            if self._last > _WANTED_SECONDS:
-                self._size = max(1, size // 2)
-            elif self._last < 0.5 * _WANTED_SECONDS:
-                self._size = min(_MOST, 2 * size)
+        return total
+
+    def each(self, things: Sequence[str], step: Callable[[Sequence[str]], int]) -> int:
+        """Do `step` for all things, some at a time; the sum of what it says."""
+        total = 0
+        while things and not self.stopped:
+            some, things = things[: self._size], things[self._size :]
+            total += self.once(partial(step, some))
         return total
 
     def once(self, step: Callable[[], int]) -> int:
-        """Do one step, and pause."""
+        """Do one step, choose the size of the next, and pause."""
         if self.stopped:
             return 0
         begun = time.monotonic()
         done = step()
-        self._last = time.monotonic() - begun
+        took = time.monotonic() - begun
+        if took > self._wanted:
+            self._size = max(1, self._size // 2)
+        elif took < 0.5 * self._wanted:
+            self._size = min(self.most, 2 * self._size)
         self._database.settle()
         self.stopped = self._pause(time.monotonic() - begun)
         return done
@@ -90,15 +98,12 @@ def prune(
     pause : called between transactions with the time the last one took [s]; True ends the work.
     on_progress : called with what was deleted in every round.
     """
-    repository, paced = RetentionRepository(database), _Paced(database, pause or _sleep)
+    repository, paced = RetentionRepository(database), _Paced(database, pause)
     total = Pruned()
     while not paced.stopped:
-        jobs = repository.take(before, _JOBS, keep_designs=keep_designs, binned=binned)
+        jobs = repository.take(before, paced.most, keep_designs=keep_designs, binned=binned)
         sweeps = paced.all(partial(repository.delete_sweeps, jobs, keep_designs=keep_designs))
-        deleted = 0
-        for index in range(0, len(jobs), _JOBS_AT_ONCE):
-            some = jobs[index : index + _JOBS_AT_ONCE]
-            deleted += paced.once(partial(repository.delete_jobs, some, keep_designs=keep_designs))
+        deleted = paced.each(jobs, partial(repository.delete_jobs, keep_designs=keep_designs))
         found = Pruned(jobs=deleted, sweeps=sweeps)
         total += found
         if on_progress is not None:
@@ -129,7 +134,7 @@ def prune_uploads(
     database: Database, before: datetime, *, pause: Callable[[float], bool] | None = None
 ) -> Pruned:
     """Delete the uploads that came before a time and are not used, one by one; arguments as of `prune`."""
-    repository, paced = RetentionRepository(database), _Paced(database, pause or _sleep)
+    repository, paced = RetentionRepository(database), _Paced(database, pause)
     old = repository.old_uploads(before)
     return Pruned(uploads=sum(paced.once(partial(repository.delete_upload, one, before)) for one in old))
 
