@@ -64,6 +64,15 @@ def new_id() -> str:
         fresh = (time.time_ns() // 1_000_000) << 74 | secrets.randbits(73)
         _last = fresh if fresh >> 74 > _last >> 74 else _last + 1 + secrets.randbits(32)
         stamp = _last
+    return _as_id(stamp)
+
+
+def earliest_id(when: datetime) -> str:
+    """The least id that can be made from a time on, by a machine whose clock is right."""
+    return _as_id(max(0, int(when.timestamp() * 1e3)) << 74)
+
+
+def _as_id(stamp: int) -> str:
     high, low = stamp >> 62, stamp & ((1 << 62) - 1)
     value = (high >> 12) << 80 | 0x7 << 76 | (high & 0xFFF) << 64 | 0b10 << 62 | low
     return str(uuid.UUID(int=value))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import random
 import re
-from datetime import timedelta
+from datetime import UTC, datetime, timedelta
 from typing import Any
 
 import httpx
@@ -381,6 +381,26 @@ def test_texts_are_found_by_the_index_of_texts(database: Database, text: str, in
             connection.exec_driver_sql("SET LOCAL enable_seqscan = off")
         plan = connection.exec_driver_sql(f"{'EXPLAIN QUERY PLAN' if sqlite else 'EXPLAIN'} {asked}").all()
     assert index[0 if sqlite else 1] in str(plan)
+
+
+def test_runs_of_a_time_are_found_where_the_clocks_of_machines_differ(database: Database) -> None:
+    jobs, runs, chance = JobRepository(database), Runs(database, utc_now, bin_days=7.0), random.Random(3)
+    made = [jobs.submit(new_job(owner="ann"), queue_limit=100)[0].id for _ in range(12)]
+    created = {one: utc_now() + timedelta(hours=chance.uniform(-23.0, 23.0)) for one in made}
+    with database.writing() as connection:
+        for one, when in created.items():
+            connection.execute(update(Job).where(Job.id == one).values(created=when))
+    for _ in range(40):
+        after, before = sorted(utc_now() + timedelta(hours=chance.uniform(-60.0, 60.0)) for _ in range(2))
+        wanted = {one for one, when in created.items() if after <= when < before}
+        between = RunFilter(sees="ann", created_after=after, created_before=before)
+        assert {row.id for row in runs.page(between, 100)} == wanted
+    ever = RunFilter(
+        sees="ann",
+        created_after=datetime.min.replace(tzinfo=UTC),
+        created_before=datetime.max.replace(tzinfo=UTC),
+    )
+    assert {row.id for row in runs.page(ever, 100)} == set(made)
 
 
 @pytest.mark.parametrize("counted", [0, 5000], ids=["looked at one by one", "by the index"])

@@ -31,7 +31,7 @@ from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.dialects.postgresql import ARRAY, array
 from sqlalchemy.orm import InstrumentedAttribute
 
-from service.db.clock import Clock
+from service.db.clock import Clock, earliest_id
 from service.db.engine import Database
 from service.db.models import (
     ID_LENGTH,
@@ -104,6 +104,7 @@ def put_tags(connection: Connection, job_id: str, tags: tuple[str, ...]) -> None
 
 
 _NEVER_LEADS = -1
+_CLOCKS_DIFFER = timedelta(days=1)  # of machines that make ids and of the database, at the most
 _FEW_TEXTS = 5000
 _LETTERS = 3  # of the pieces that the indexes of texts know
 _LETTERS_OF_RUN = func.letters_of(Run.name, Run.notes, type_=ARRAY(Text))  # as its index says it
@@ -207,6 +208,11 @@ class Runs(Binned[RunRow]):
         query = _LISTED.order_by(Job.id.desc()).limit(limit)
         if before is not None:
             query = query.where(Job.id < before)
+        # Ids sort by the time at which they were made: beyond these none can have been handed in in time.
+        if wanted.created_after is not None:
+            query = query.where(Job.id >= earliest_id(_shifted(wanted.created_after, -_CLOCKS_DIFFER)))
+        if wanted.created_before is not None:
+            query = query.where(Job.id < earliest_id(_shifted(wanted.created_before, _CLOCKS_DIFFER)))
         conditions = _conditions(wanted, sqlite=self._db.backend == "sqlite")
         leads = wanted.kind is None and wanted.scene is None
         if not wanted.deleted:
@@ -270,6 +276,14 @@ def _conditions(wanted: RunFilter, *, sqlite: bool) -> list[Condition]:
         holds = ids.where(RunTag.job_id == Job.id).correlate(Job).exists()
         conditions.append(Condition(ids=ids, holds=holds, apart=True))
     return conditions
+
+
+def _shifted(when: datetime, by: timedelta) -> datetime:
+    """A time moved, no further than there are dates."""
+    try:
+        return when + by
+    except OverflowError:
+        return when
 
 
 def _containing(text: str, *, sqlite: bool) -> Condition:
