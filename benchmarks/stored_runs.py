@@ -26,7 +26,7 @@ from service.schemas.pages import newest
 from service.schemas.workbench_answers import RunQuery
 from service.settings.settings import load_settings
 
-_CHUNK = 10_000
+_CHUNK = 2_000
 _DAYS = 300.0
 _OWNER, _OTHERS = "most", 20
 _KINDS = ("sweep", "design", "solve", "map", "modes", "march", "identify")

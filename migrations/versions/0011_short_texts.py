@@ -26,12 +26,12 @@ def upgrade() -> None:
         return
     op.execute("""
         CREATE FUNCTION letters_of(name text, notes text) RETURNS text[]
-        LANGUAGE sql IMMUTABLE PARALLEL SAFE AS $$
-            SELECT array_agg(DISTINCT piece) FROM (
-                SELECT letter, letter || lead(letter, 1, '') OVER (ORDER BY place) AS pair
-                FROM unnest(string_to_array(lower(name || chr(31) || notes), NULL))
-                    WITH ORDINALITY AS letters (letter, place)
-            ) AS pairs, LATERAL (VALUES (letter), (pair)) AS pieces (piece)
+        LANGUAGE plpgsql IMMUTABLE PARALLEL SAFE AS $$
+            DECLARE letters text[] := string_to_array(lower(name || chr(31) || notes), NULL);
+            BEGIN
+                RETURN letters || ARRAY(
+                    SELECT one || coalesce(next, '') FROM unnest(letters, letters[2:]) AS pairs (one, next));
+            END
         $$
     """)
     index = "CREATE INDEX ix_run_letters ON run USING gin (letters_of(name, notes))"
