@@ -26,7 +26,7 @@ def upgrade() -> None:
         return
     op.execute("""
         CREATE FUNCTION letters_of(name text, notes text) RETURNS text[]
-        LANGUAGE plpgsql IMMUTABLE PARALLEL SAFE AS $$
+        LANGUAGE plpgsql IMMUTABLE PARALLEL SAFE COST 10000 AS $$
             DECLARE letters text[] := string_to_array(lower(name || chr(31) || notes), NULL);
             BEGIN
                 RETURN letters || ARRAY(
