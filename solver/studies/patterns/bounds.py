@@ -11,14 +11,12 @@ Of N equally damped blades that is Whitehead's bound, of a family of travelling 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
-from typing import Annotated
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve, eigh
+from scipy.linalg import cho_factor, cho_solve
 
-from solver.arrays import Complex, Real
-from solver.studies.patterns.linear_disk import TWO_PI, LinearDisk
+from solver.studies.patterns.linear_disk import LinearDisk
+from solver.studies.patterns.tuned_modes import TunedModes
 
 _ONE_WAVE = 1e-9  # share of a force in other waves that is rounding
 _NEAR = 1e-9  # relative distance of a natural frequency from a peak that is none
@@ -30,29 +28,6 @@ def whitehead(sectors: int) -> float:
     D. S. Whitehead, J. Mech. Eng. Sci. 8 (1966) 15, doi:10.1243/JMES_JOUR_1966_008_004_02.
     """
     return 0.5 * (1.0 + math.sqrt(sectors))
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TunedModes:
-    """Undamped modes of a tuned disk at every nodal diameter, mass-normalised."""
-
-    omega: Annotated[Real, "Natural frequencies [rad/s], (N, n)."]
-    shapes: Annotated[Complex, "Over all coordinates, (N, m, n)."] = field(repr=False)
-
-
-def tuned_modes(disk: LinearDisk) -> TunedModes:
-    """Return the modes x_j = φ e^{2πi n j/N} of every nodal diameter n of a disk in all its coordinates."""
-    N, m = disk.sectors, len(disk.K)
-    size = m // N
-    turns = np.exp(TWO_PI * 1j * np.outer(np.arange(N), np.arange(N)) / N)
-    blocks = [matrix[:size].reshape(size, N, size) for matrix in (disk.K, disk.M)]
-    omega, shapes = np.empty((N, size)), np.empty((N, m, size), np.complex128)
-    for n in range(N):
-        K, M = (np.einsum("ajb,j->ab", block, turns[n]) for block in blocks)
-        values, phi = eigh(0.5 * (K + K.conj().T), 0.5 * (M + M.conj().T))
-        omega[n] = np.sqrt(np.maximum(values, 0.0)) / disk.harmonic
-        shapes[n] = (turns[n][:, None, None] * phi).reshape(m, size) / math.sqrt(N)
-    return TunedModes(omega=omega, shapes=shapes)
 
 
 def martel(disk: LinearDisk, modes: TunedModes, omega: float) -> float:
@@ -119,4 +94,4 @@ def power_bound(disk: LinearDisk, omega: float, tuned: float) -> float:
         abs(row @ by_force) + math.sqrt(spent * float((row @ cho_solve(factor, row.conj())).real))
         for row in disk.observed
     )
-    return 0.5 * most / tuned
+    return float(0.5 * most / tuned)

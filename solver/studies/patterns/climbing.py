@@ -1,8 +1,8 @@
 """The mistuning within bounds that makes the highest peak of a disk in a linear limit largest.
 
 From many starts a quasi-Newton method within bounds (L-BFGS-B: Byrd, Lu, Nocedal, Zhu, SIAM J. Sci. Comput.
-16 (1995) 1190) climbs with exact derivatives of the logarithm of the peak. Starts are drawn, or are what makes
-one blade move as in Whitehead's worst case: of mode shape q the wave with 1 + √N on one blade, to which
+16 (1995) 1190) climbs with exact derivatives of the logarithm of the peak. Starts are drawn, or are what
+makes one blade move as in Whitehead's worst case: of mode shape q the wave with 1 + √N on one blade, to which
 K₀ q + Σ δ_j Δ_j q = ω² M q gives δ (D. S. Whitehead, J. Eng. Gas Turbines Power 120 (1998) 115). With little
 damping the peak as a function of δ is full of narrow ridges, where modes meet: some climbs begin with more
 damping, which is taken away step by step.
@@ -49,19 +49,26 @@ class Bounds:
         width = self.within * rng.choice([0.2, 0.5, 1.0])
         return self.inside(self.middle + width * rng.uniform(-1.0, 1.0, self.middle.size))
 
-    def largest(self, rise: Callable[[Real], tuple[float, Real]], begin: Real, steps: int, flat: float) -> Real:
+    def largest(
+        self, rise: Callable[[Real], tuple[float, Real]], begin: Real, steps: int, flat: float
+    ) -> Real:
         """Return the deviations, climbing from some, at which a function with its slopes is largest.
 
         Beyond the ball of `rms` the function counts as at the nearest point of the ball.
         """
-        kept = [begin, -math.inf]
+        kept, highest = begin, -math.inf
 
         def fall(z: Real) -> tuple[float, Real]:
+            nonlocal kept, highest
             off = self.within * z
-            share = 1.0 if self.rms is None else min(1.0, self.rms / max(math.sqrt(float(np.mean(off**2))), 1e-300))
+            share = (
+                1.0
+                if self.rms is None
+                else min(1.0, self.rms / max(math.sqrt(float(np.mean(off**2))), 1e-300))
+            )
             value, slope = rise(self.middle + share * off)
-            if value > kept[1]:
-                kept[:] = self.middle + share * off, value
+            if value > highest:
+                kept, highest = self.middle + share * off, value
             if share < 1.0:
                 slope = share * (slope - z * float(z @ slope) / float(z @ z))
             return -value, -self.within * slope
@@ -70,7 +77,7 @@ class Bounds:
             fall, np.clip((begin - self.middle) / self.within, -1.0, 1.0), jac=True, method="L-BFGS-B",
             bounds=[(-1.0, 1.0)] * begin.size, options={"maxiter": steps, "maxfun": 2 * steps, "ftol": flat},
         )  # fmt: skip
-        return np.asarray(kept[0])
+        return kept
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -14,7 +14,6 @@ from enum import Enum
 from typing import Annotated, Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import eigh
 
 from solver.arrays import Complex, Integer, Real
@@ -25,7 +24,6 @@ from solver.scene.scene import MatricesStructure, Scene
 from solver.studies.blades import mistuned
 
 TWO_PI = 2.0 * math.pi
-MOST_COORDINATES = 200  # of a disk whose every coordinate is solved for in a search
 _GRID = 48  # frequencies over a band, besides the natural ones, at which a peak is looked for
 _POLISH = 6  # maxima that are looked at closely
 _CLOSE = 1e-13  # relative rise of an amplitude at which a peak is found
@@ -62,7 +60,9 @@ class LinearDisk:
     K: Annotated[Complex, "(m, m)."] = field(repr=False)
     C: Annotated[Complex, "(m, m)."] = field(repr=False)
     M: Annotated[Complex, "(m, m)."] = field(repr=False)
-    own: Annotated[tuple[Complex, ...], "What a factor adds to K, C and M of its rows, (s, s) each."]
+    own: Annotated[
+        tuple[Complex, Complex, Complex], "What a factor adds to K, C and M of its rows, (s, s) each."
+    ]
     rows: Annotated[Complex, "Coordinates to the rows of each blade, (N, s, m)."] = field(repr=False)
     force: Annotated[Complex, "(m,)."] = field(repr=False)
     observed: Annotated[Complex, "The DOF of each sector, (N, m)."] = field(repr=False)
@@ -74,7 +74,10 @@ class LinearDisk:
         if np.any(delta):
             Z = Z + self._spread(delta, D)
             if np.any(D_omega):
-                Z_omega, Z_twice = Z_omega + self._spread(delta, D_omega), Z_twice + self._spread(delta, D_twice)
+                Z_omega, Z_twice = (
+                    Z_omega + self._spread(delta, D_omega),
+                    Z_twice + self._spread(delta, D_twice),
+                )
         return Z, Z_omega, D, Z_twice
 
     def _spread(self, delta: Real, block: Complex) -> Complex:
@@ -100,12 +103,12 @@ class LinearDisk:
     def summit(self, delta: Real, blade: int, omega: float) -> tuple[float, float, Real]:
         """Return the maximum of a blade's amplitude over ω next to `omega`.
 
-        Newton's method on log|X|; where that curves upward Gauss and Newton's on |1/X|, which near a resonance
-        is nearly linear in ω.
+        Newton's method on log|X|; where that curves upward Gauss and Newton's on |1/X|, which near a
+        resonance is nearly linear in ω.
 
         Returns
         -------
-        Its ω, log|X| there, and the derivatives of that by δ, (N,), in which ω moves along (envelope theorem).
+        Its ω, log|X| there, and derivatives of that by δ, (N,), in which ω moves along (envelope theorem).
         """
         low, high = self.band
         X, by_delta, by_omega, twice = self.slopes(delta, omega, blade)
@@ -140,9 +143,11 @@ class LinearDisk:
         return max(found, key=lambda one: one.value)
 
     def places(self, delta: Real) -> Real:
-        """Return frequencies [rad/s] at which a peak is looked for: the natural ones in the band, and a grid."""
+        """Return where a peak is looked for [rad/s]: natural frequencies in the band, and a grid."""
         low, high = self.band
-        scaled = [base + self._spread(delta, own) for base, own in zip((self.K, self.M), self.own[::2], strict=True)]
+        scaled = [
+            base + self._spread(delta, own) for base, own in zip((self.K, self.M), self.own[::2], strict=True)
+        ]
         K, M = (0.5 * (each + each.conj().T) for each in scaled)
         natural = np.sqrt(np.maximum(eigh(K, M, eigvals_only=True), 0.0)) / self.harmonic
         inside = natural[(natural >= low) & (natural <= high)]
@@ -181,22 +186,23 @@ def linear_disk(
     whole = mistuned(scene, of=of, values=ones.tolist())
     model, k = linear_model(whole), _harmonic(scene)
     if model.prescribed:
-        raise SettingError("scene", scene.name, "must be shaken by forces, not by its base, for a linear limit")
+        raise SettingError(
+            "scene", scene.name, "must be shaken by forces, not by its base, for a linear limit"
+        )
     other = ones.copy()
     other[0] = 2.0
     scaled = linear_model(mistuned(scene, of=of, values=other.tolist()))
-    tuned = _matrices(model, k, _stuck(whole, model) if contacts is Contacts.STUCK else 0.0)
-    added = [b - a for a, b in zip(_matrices(model, k, 0.0), _matrices(scaled, k, 0.0), strict=True)]
+    order = _sector_by_sector(whole, model.n_coordinates)
+    K, C, M = _matrices(model, k, _stuck(whole, model) if contacts is Contacts.STUCK else 0.0, order)
+    added = [b - a for a, b in zip(*(_matrices(one, k, 0.0, order) for one in (model, scaled)), strict=True)]
     n, m = len(ones), model.n_coordinates
-    order = _sector_by_sector(whole, m)
-    tuned, added = ([each[np.ix_(order, order)] for each in one] for one in (tuned, added))
     touched = np.flatnonzero(np.any([np.any(np.abs(each) > 0.0, axis=1) for each in added], axis=0))
-    eye = np.eye(m, dtype=np.complex128)
+    own, eye = [each[np.ix_(touched, touched)] for each in added], np.eye(m, dtype=np.complex128)
     places = (touched[None, :] + np.arange(n)[:, None] * (m // n)) % m
     names = [f"{dof}@{j}" for j in range(n)]
     return LinearDisk(
-        sectors=n, harmonic=k, band=(TWO_PI * band[0], TWO_PI * band[1]), K=tuned[0], C=tuned[1], M=tuned[2],
-        own=tuple(each[np.ix_(touched, touched)] for each in added), rows=eye[places],
+        sectors=n, harmonic=k, band=(TWO_PI * band[0], TWO_PI * band[1]), K=K, C=C, M=M,
+        own=(own[0], own[1], own[2]), rows=eye[places],
         force=_force(model, k)[order],
         observed=np.array([(row_of(whole, name) @ model.shapes)[order] for name in names], np.complex128),
     )  # fmt: skip
@@ -236,27 +242,10 @@ def _stuck(scene: Scene, model: LinearModel) -> Complex:
     return np.asarray(L.conj().T @ (np.array(own)[:, None] * L))
 
 
-def _matrices(model: LinearModel, k: int, more: Any) -> tuple[Complex, Complex, Complex]:
-    """Return K, C and M of all sectors at a harmonic."""
-    ks, diameters = np.array([k]), np.zeros(1, np.int64)
+def _matrices(model: LinearModel, k: int, more: Any, order: Integer) -> tuple[Complex, Complex, Complex]:
+    """Return K, C and M of all sectors at a harmonic, sector after sector."""
+    ks, diameters, places = np.array([k]), np.zeros(1, np.int64), np.ix_(order, order)
     (K,), (C,), _ = model.at(diameters, np.ones(1, np.bool_))
     (M,) = model.inertia(diameters, ks)
-    return np.asarray(K + more, complex), np.asarray(C, complex), np.asarray(M, complex)
-
-
-def reduced(disk: LinearDisk, modes: TunedModes) -> LinearDisk:
-    """Return a large disk in the tuned modes nearest to its band; a small one as it is.
-
-    As in M.-T. Yang, J. H. Griffin, J. Eng. Gas Turbines Power 123 (2001) 893.
-    """
-    if len(disk.K) <= MOST_COORDINATES:
-        return disk
-    kept = max(MOST_COORDINATES // disk.sectors, 1)
-    middle = math.sqrt(disk.band[0] * disk.band[1])
-    nearest: Integer = np.argsort(np.abs(modes.omega - middle), axis=1)[:, :kept]
-    T: NDArray[Any] = np.concatenate([modes.shapes[n][:, nearest[n]] for n in range(disk.sectors)], axis=1)
-    K, C, M = (T.conj().T @ each @ T for each in (disk.K, disk.C, disk.M))
-    return LinearDisk(
-        sectors=disk.sectors, harmonic=disk.harmonic, band=disk.band, K=K, C=C, M=M, own=disk.own,
-        rows=disk.rows @ T, force=T.conj().T @ disk.force, observed=disk.observed @ T,
-    )  # fmt: skip
+    whole = [np.asarray(each, np.complex128)[places] for each in (K + more, C, M)]
+    return whole[0], whole[1], whole[2]

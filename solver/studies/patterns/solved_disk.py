@@ -1,4 +1,4 @@
-"""The highest peak of a mistuned disk with its contacts solved, and its derivatives by the factor of each blade."""
+"""The highest peak of a mistuned disk with its contacts solved, with derivatives by the blades' factors."""
 
 from __future__ import annotations
 
@@ -81,7 +81,9 @@ class SolvedDisk:
         if branch is None or branch.peak is None:
             raise UnknownPeakError
         rows = self._paths()
-        gradient = peak_gradient(Sensitivities(branch.balance, [p for row in rows for p, _ in row]), branch.peak)
+        gradient = peak_gradient(
+            Sensitivities(branch.balance, [p for row in rows for p, _ in row]), branch.peak
+        )
         by_path = gradient.gradient.reshape(len(rows), -1)
         per_factor = np.array([[nominal for _, nominal in row] for row in rows])
         return math.log(found.largest), np.asarray((by_path * per_factor).sum(axis=1) / found.largest)
@@ -169,7 +171,7 @@ class _ClimbEndedError(Exception):
 
 
 def _with_names(scene: Scene, of: Sequence[str]) -> Scene:
-    """Return a scene in which the masses of DOFs that factors are of have names, so that they are parameters."""
+    """Return a scene in which masses that factors are of have names, so that they are parameters."""
     structure = scene.structure
     if not isinstance(structure, CyclicStructure):
         return scene

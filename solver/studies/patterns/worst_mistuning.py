@@ -21,10 +21,11 @@ from solver.results.watch import OnProgress, ShouldStop, shows_progress
 from solver.scene.scene import Scene
 from solver.studies.blades import blade_rows, mistuned
 from solver.studies.mistuning import without_mistuning
-from solver.studies.patterns.bounds import TunedModes, martel, power_bound, tuned_modes, whitehead
+from solver.studies.patterns.bounds import martel, power_bound, whitehead
 from solver.studies.patterns.climbing import Bounds, WorstPattern, alike, worst_patterns
-from solver.studies.patterns.linear_disk import TWO_PI, Contacts, DiskPeak, LinearDisk, linear_disk, reduced
+from solver.studies.patterns.linear_disk import TWO_PI, Contacts, DiskPeak, LinearDisk, linear_disk
 from solver.studies.patterns.solved_disk import SolvedDisk, UnknownPeakError
+from solver.studies.patterns.tuned_modes import TunedModes, reduced, tuned_modes
 from solver.studies.patterns.worst_result import (
     IntentionalPattern,
     PatternPeak,
@@ -151,7 +152,7 @@ def worst_mistuning(
 
     Returns
     -------
-    The worst pattern found with the bounds beside it; a search from many starts, so a lower bound of the worst.
+    The worst pattern found, with the bounds beside it: a search from many starts, so the worst is no less.
 
     Raises
     ------
@@ -174,7 +175,8 @@ def worst_mistuning(
     deltas = {name: pattern_deviations(name, len(blades), detuning) for name in patterns}
     told = {
         "scene": scene.name, "dof": dof, "of": names, "within": within, "rms": rms, "detuning": detuning,
-        "contacts": how.value, "whitehead": whitehead(len(blades)), "starts": starts, "n_harmonics": harmonics,
+        "contacts": how.value, "whitehead": whitehead(len(blades)), "starts": starts,
+        "n_harmonics": harmonics,
     }  # fmt: skip
     if how is Contacts.SOLVED:
         disk = SolvedDisk(search.scene, names, dof, band, harmonics, should_stop)
@@ -215,7 +217,7 @@ def _linear(
         "tuned_peak": tuned.value, "tuned_at_hz": tuned.omega / TWO_PI, "worst": worst,
         "alike": alike(climbs), "patterns": tuple(sorted(ranked, key=lambda one: one.counts)),
         "martel": martel(limit.whole, limit.modes, tuned.omega),
-        "power_bound": math.nan if worst is None else power_bound(limit.whole, TWO_PI * worst.at_hz, tuned.value),
+        "power_bound": power_bound(limit.whole, TWO_PI * worst.at_hz, tuned.value) if worst else math.nan,
         "status": WorstMistuningStatus.STOPPED if search.stopped else WorstMistuningStatus.COMPLETED,
     }  # fmt: skip
 
@@ -243,8 +245,8 @@ def _solved(
     def worst_around(middle: Real, starts: int) -> PatternPeak | None:
         nonlocal known
         begins = [middle, *(delta for limit in limits for delta in _apart(search, limit, middle, starts))]
-        delta, complete = disk.climbed(begins, Bounds(middle=middle, within=search.within, rms=search.rms), climb,
-                                       FLAT, search.go_on)  # fmt: skip
+        bounds = Bounds(middle=middle, within=search.within, rms=search.rms)
+        delta, complete = disk.climbed(begins, bounds, climb, FLAT, search.go_on)
         known = known and complete
         return None if delta is None else told(delta)
 
@@ -274,7 +276,9 @@ def _apart(search: _Search, limit: _Limit, middle: Real, starts: int) -> list[Re
     search.alike = max(search.alike, alike(climbs))
     kept: list[Real] = []
     for one in climbs:
-        if len(kept) < _CANDIDATES and all(np.abs(one.delta - other).max() > _APART * search.within for other in kept):
+        if len(kept) < _CANDIDATES and all(
+            np.abs(one.delta - other).max() > _APART * search.within for other in kept
+        ):
             kept.append(one.delta)
     return kept
 
@@ -340,7 +344,11 @@ def check_bounds(
             wanted = f"must be capital letters, {len(blades)} at most, such as AB"
             raise SettingError("patterns", name, wanted)
     for key, value, most in (("starts", starts, MOST_STARTS), ("climb", climb, MOST_CLIMB)):
-        if isinstance(value, bool) or not isinstance(value, int) or not (key == "climb") <= value + 1 <= most + 1:
+        if (
+            isinstance(value, bool)
+            or not isinstance(value, int)
+            or not (key == "climb") <= value + 1 <= most + 1
+        ):
             raise SettingError(key, value, f"must be a whole number up to {most}")
     if starts < 1:
         raise SettingError("starts", starts, "must be a whole number >= 1")

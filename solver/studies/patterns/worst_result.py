@@ -1,4 +1,4 @@
-"""What `solver.studies.patterns.worst_mistuning` returns: the worst pattern, its bounds, intentional patterns."""
+"""What `worst_mistuning` returns: the worst pattern with its bounds, and intentional patterns."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ class WorstMistuningStatus(Enum):
 
     COMPLETED = "Every climb came to its end: no pattern worse than this was found within the bounds."
     INCOMPLETE = (
-        "The response of a pattern did not reach the end of the band, so the worst is that of the others: use "
-        "more harmonics or another band."
+        "The response of a pattern did not reach the end of the band, so the worst is that of the others: "
+        "use more harmonics or another band."
     )
     NO_RESPONSE = (
         "The tuned disk has no peak to compare with, or its response did not reach the end of the band: use "
