@@ -218,7 +218,8 @@ def _sector_by_sector(whole: Scene, m: int) -> Integer:
 
 def _harmonic(scene: Scene) -> int:
     """Return the one harmonic that the forces have."""
-    found = sorted({force.harmonic for force in scene.excitation if force.harmonic > 0 and force.amplitude})
+    moving = [force for force in scene.excitation if force.harmonic > 0]
+    found = sorted({force.harmonic for force in moving if force.amplitude} or {f.harmonic for f in moving})
     if len(found) != 1:
         wanted = "must have forces of one harmonic for a linear limit"
         raise SettingError("excitation", found, wanted)

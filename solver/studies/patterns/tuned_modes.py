@@ -39,14 +39,14 @@ def tuned_modes(disk: LinearDisk) -> TunedModes:
     return TunedModes(omega=omega, shapes=shapes)
 
 
-def reduced(disk: LinearDisk, modes: TunedModes) -> LinearDisk:
+def reduced(disk: LinearDisk, modes: TunedModes, most: int = MOST_COORDINATES) -> LinearDisk:
     """Return a large disk in the tuned modes nearest to its band; a small one as it is.
 
     As in M.-T. Yang, J. H. Griffin, J. Eng. Gas Turbines Power 123 (2001) 893.
     """
-    if len(disk.K) <= MOST_COORDINATES:
+    if len(disk.K) <= most:
         return disk
-    kept = max(MOST_COORDINATES // disk.sectors, 1)
+    kept = max(most // disk.sectors, 1)
     middle = math.sqrt(disk.band[0] * disk.band[1])
     nearest: Integer = np.argsort(np.abs(modes.omega - middle), axis=1)[:, :kept]
     T: NDArray[Any] = np.concatenate([modes.shapes[n][:, nearest[n]] for n in range(disk.sectors)], axis=1)
