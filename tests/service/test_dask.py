@@ -51,7 +51,7 @@ BODIES: dict[str, dict[str, Any]] = {
     "interference": {"scene": "bladed-disk", "speed_rpm": 11000},
     "worst-mistuning": {
         "scene": "bladed-disk", "of": "tip", "starts": 2, "climb": 2, "harmonics": 1, "from": 740, "to": 780
-    },  # fmt: skip
+    },
     "mistuning": {
         "scene": DISK, "of": ["tip_middle", "tip"], "spread": 0.03, "samples": 6, "seed": 5, "from": 700,
         "to": 850, "harmonics": 1,

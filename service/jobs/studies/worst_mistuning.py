@@ -60,8 +60,9 @@ class WorstMistuningStudy(Study, HarmonicRequest):
     contacts: Literal["solved", "stuck", "open"] = Field(
         default="solved", description="How contacts count: solved, or in a linear limit."
     )
-    patterns: Annotated[list[_Pattern], Field(max_length=_MOST_PATTERNS), Flag(metavar="AB")] = Field(
-        default=[], description="Intentional patterns, a letter for each blade type, repeated round the disk."
+    patterns: Annotated[list[_Pattern] | None, Field(max_length=_MOST_PATTERNS), Flag(metavar="AB")] = Field(
+        default=None,
+        description="Intentional patterns, a letter for each blade type, repeated round the disk.",
     )
     detuning: Annotated[float, Field(strict=True, ge=0.0, le=0.9), Flag(metavar="D")] = Field(
         default=0.02, description="Deviation of the factor of the first blade type, negative of the last."
@@ -101,13 +102,14 @@ class WorstMistuningStudy(Study, HarmonicRequest):
         from solver.studies.patterns.worst_mistuning import check_bounds
 
         blades = check_bounds(
-            scene, self.within, self.rms, self.detuning, self.patterns, self.starts, self.climb
+            scene, self.within, self.rms, self.detuning, self.patterns or (), self.starts, self.climb
         )
         mistuned(scene, of=self.of, values=[1.0] * len(blades))
 
     def sizes(self, scene: Scene) -> list[Issue]:
         """Return what is too large."""
-        solved = (self.climb + 5) * (1 + self.worst_of_patterns * len(self.patterns)) + len(self.patterns)
+        count = len(self.patterns or ())
+        solved = (self.climb + 5) * (1 + self.worst_of_patterns * count) + count
         points = (
             POINTS_OF_A_SWEEP * (solved if self.contacts == "solved" else 1) * scene.structure.sector_count
         )

@@ -114,7 +114,7 @@ def worst_mistuning(
     of: str | Sequence[str],
     within: float = 0.02,
     rms: float | None = None,
-    contacts: str | Contacts = Contacts.SOLVED,
+    contacts: str | Contacts = Contacts.SOLVED.value,
     patterns: Sequence[str] = (),
     detuning: float = 0.02,
     worst_of_patterns: bool = False,
