@@ -99,12 +99,15 @@ class WorstMistuningStudy(Study, HarmonicRequest):
     def _checked(self, scene: Scene) -> None:
         # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
         from solver.studies.blades import mistuned
+        from solver.studies.patterns.linear_disk import Contacts, check_linear
         from solver.studies.patterns.worst_mistuning import check_bounds
 
         blades = check_bounds(
             scene, self.within, self.rms, self.detuning, self.patterns or (), self.starts, self.climb
         )
         mistuned(scene, of=self.of, values=[1.0] * len(blades))
+        if self.contacts != Contacts.SOLVED.value:
+            check_linear(scene, Contacts(self.contacts))
 
     def sizes(self, scene: Scene) -> list[Issue]:
         """Return what is too large."""

@@ -184,11 +184,7 @@ def linear_disk(
     """
     ones = np.ones(scene.structure.sector_count)
     whole = mistuned(scene, of=of, values=ones.tolist())
-    model, k = linear_model(whole), _harmonic(scene)
-    if model.prescribed:
-        raise SettingError(
-            "scene", scene.name, "must be shaken by forces, not by its base, for a linear limit"
-        )
+    model, k = linear_model(whole), check_linear(scene, contacts)
     other = ones.copy()
     other[0] = 2.0
     scaled = linear_model(mistuned(scene, of=of, values=other.tolist()))
@@ -216,13 +212,25 @@ def _sector_by_sector(whole: Scene, m: int) -> Integer:
     return np.argsort(sectors, kind="stable")
 
 
-def _harmonic(scene: Scene) -> int:
-    """Return the one harmonic that the forces have."""
+def check_linear(scene: Scene, contacts: Contacts) -> int:
+    """Return the one harmonic that the forces of a linear limit have.
+
+    Raises
+    ------
+    SettingError
+        There are several, a base moves, or a contact that is to stick is rigid.
+    """
+    if any(force.base is not None for force in scene.excitation):
+        raise SettingError(
+            "scene", scene.name, "must be shaken by forces, not by its base, for a linear limit"
+        )
+    stiffnesses = [k for contact in scene.contacts for k in contact.stiffnesses]
+    if contacts is Contacts.STUCK and not np.all(np.isfinite(stiffnesses)):
+        raise SettingError("contacts", contacts.value, "must not be of rigid contacts (kt or kn = inf)")
     moving = [force for force in scene.excitation if force.harmonic > 0]
     found = sorted({force.harmonic for force in moving if force.amplitude} or {f.harmonic for f in moving})
     if len(found) != 1:
-        wanted = "must have forces of one harmonic for a linear limit"
-        raise SettingError("excitation", found, wanted)
+        raise SettingError("scene", found, "must have forces of one harmonic for a linear limit")
     return found[0]
 
 
@@ -237,10 +245,8 @@ def _force(model: LinearModel, k: int) -> Complex:
 def _stuck(scene: Scene, model: LinearModel) -> Complex:
     """Return the stiffness of all contacts, stuck."""
     (L,) = model.ports_at(np.zeros(1, np.int64))
-    own = [k for contact in scene.contacts for k in contact.stiffnesses]
-    if not np.all(np.isfinite(own)):
-        raise SettingError("contacts", Contacts.STUCK.value, "must not be of rigid contacts (kt or kn = inf)")
-    return np.asarray(L.conj().T @ (np.array(own)[:, None] * L))
+    own = np.array([k for contact in scene.contacts for k in contact.stiffnesses])
+    return np.asarray(L.conj().T @ (own[:, None] * L))
 
 
 def _matrices(model: LinearModel, k: int, more: Any, order: Integer) -> tuple[Complex, Complex, Complex]:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 
 import numpy as np
 
 from solver.arrays import Real
+from solver.errors import SettingError
 from solver.results.watch import ShouldStop
 from solver.scene.parts import CyclicStructure, Mass
 from solver.scene.scene import Scene
@@ -16,7 +18,7 @@ from solver.sensitivity.gradient import Sensitivities
 from solver.sensitivity.nonsmooth import peak_gradient
 from solver.studies.blades import BladePeaks, blade_peaks, mistuned
 from solver.studies.patterns.climbing import Bounds
-from solver.studies.patterns.linear_disk import TWO_PI, Contacts, DiskPeak
+from solver.studies.patterns.linear_disk import TWO_PI, Contacts, DiskPeak, check_linear
 
 
 class UnknownPeakError(Exception):
@@ -49,11 +51,13 @@ class SolvedDisk:
 
     @property
     def linear_limits(self) -> tuple[Contacts, ...]:
-        """The linear limits it has: all open, and all stuck unless a contact is rigid or there is none."""
-        stiffnesses = [k for contact in self._scene.contacts for k in contact.stiffnesses]
-        stuck = bool(stiffnesses) and bool(np.all(np.isfinite(stiffnesses)))
-        single = len({force.harmonic for force in self._scene.excitation if force.harmonic > 0}) == 1
-        return ((Contacts.STUCK,) * stuck + (Contacts.OPEN,)) if single else ()
+        """The linear limits it has, to begin from the worst patterns of."""
+        found = []
+        for contacts in (Contacts.STUCK, Contacts.OPEN) if self._scene.contacts else (Contacts.OPEN,):
+            with suppress(SettingError):
+                check_linear(self._scene, contacts)
+                found.append(contacts)
+        return tuple(found)
 
     def peak(self, delta: Real) -> DiskPeak:
         """Return the highest peak of any blade.
