@@ -183,14 +183,17 @@ def _draw_magnifications(axes: Axes, answer: Json) -> None:
         if on_top is not None:
             axes.bar(i, on_top, color=style.VERMILION, alpha=0.35, width=0.7)
         axes.bar(i, alone, color=style.VERMILION if name == "worst" else style.SKY, width=0.7)
+    axes.set_title("magnification")
     for key, words, colour in (("whitehead", "Whitehead", style.INK), ("martel", "Martel", style.GREEN)):
         if answer[key] is not None and answer[key] < 2.0 * answer["whitehead"]:
             axes.axhline(answer[key], color=colour, linewidth=0.9, linestyle=(0, (5.0, 2.5)), label=words)
     axes.axhline(1.0, color=style.GREY, linewidth=0.9)
     axes.set_xticks(places, [name for name, _, _ in rows])
     axes.grid(visible=False, axis="x")
-    style.label(axes, "", "magnification, peak / tuned peak")
-    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=2)
+    on_top = any(one is not None for _, _, one in rows)
+    style.label(axes, "pale: with the worst mistuning on top" if on_top else "", "peak / tuned peak")
+    axes.set_ylim(0.0, 1.25 * axes.get_ylim()[1])
+    axes.legend(loc="upper right", ncols=2)
 
 
 def blades_figure(heights: Real, what: str, *, ax: Into = None) -> Figure:
