@@ -24,6 +24,7 @@ from solver.studies.patterns.linear_disk import DiskPeak, LinearDisk
 CLIMB_STEPS = 200
 EASED = ((1.0,), (100.0, 30.0, 10.0, 3.0, 1.0), (10.0, 3.0, 1.0))  # damping of climbs, times that of the disk
 FLAT = 1e-10  # of the logarithm of a peak, at which a climb ends
+ROUNDING = 1e-14
 ALIKE = 1e-4  # relative difference of two peaks that are one
 _SHIFTS = 5  # frequencies of a mode that is looked for
 _KICK = 0.25  # of the bounds, by which the best patterns are changed to climb again
@@ -43,6 +44,10 @@ class Bounds:
         off = np.clip(delta - self.middle, -self.within, self.within)
         size = math.sqrt(float(np.mean(off**2)))
         return self.middle + (off if self.rms is None or size <= self.rms else off * (self.rms / size))
+
+    def hold(self, delta: Real) -> bool:
+        """Whether deviations lie within the bounds."""
+        return bool(np.abs(delta - self.inside(delta)).max() <= ROUNDING)
 
     def drawn(self, rng: np.random.Generator) -> Real:
         """Return random deviations within the bounds, of one size or another."""
@@ -89,7 +94,12 @@ class WorstPattern:
 
 
 def worst_patterns(
-    disk: LinearDisk, bounds: Bounds, starts: int, seed: int, go_on: Callable[[int], bool] = lambda _: True
+    disk: LinearDisk,
+    bounds: Bounds,
+    starts: int,
+    seed: int,
+    go_on: Callable[[], bool] = lambda: True,
+    given: Sequence[Real] = (),
 ) -> list[WorstPattern]:
     """Return the patterns that climbs from so many starts end at, worst first; repeatable by the seed.
 
@@ -99,14 +109,15 @@ def worst_patterns(
     bounds : of the deviations.
     starts : climbs.
     seed : of the random starts.
-    go_on : asked before each climb, with how many were made.
+    go_on : asked before each climb.
+    given : patterns to climb from as well, those of them that the bounds hold.
     """
     rng = np.random.default_rng(seed)
     aimed = list(_aimed(disk, bounds))
     aimed = [aimed[i] for i in rng.permutation(len(aimed))]
-    found: list[WorstPattern] = []
+    found = [climbed(disk, bounds, delta) for delta in given if bounds.hold(delta) and go_on()]
     for i in range(starts):
-        if not go_on(i):
+        if not go_on():
             break
         if i % 3 == 0 and aimed:
             begin = aimed.pop()

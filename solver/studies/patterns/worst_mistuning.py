@@ -76,6 +76,7 @@ class _Search:
     rms: float | None
     starts: int
     seed: int
+    patterns: Annotated[dict[str, Real], "Deviations of the intentional ones."]
     steps: Annotated[float, "All that will be done, in climbs."]
     on_progress: OnProgress
     should_stop: ShouldStop
@@ -83,7 +84,7 @@ class _Search:
     stopped: bool = False
     alike: int = 0
 
-    def go_on(self, *_made: object) -> bool:
+    def go_on(self) -> bool:
         """Count a step; return whether to go on."""
         self.stopped = self.stopped or (self.should_stop is not None and self.should_stop())
         if self.on_progress is not None and not self.stopped:
@@ -103,8 +104,13 @@ class _Search:
 
     def worst(self, limit: _Limit, middle: Real, starts: int) -> list[WorstPattern]:
         """Return the patterns that climbs end at, worst first."""
-        bounds = Bounds(middle=middle, within=self.within, rms=self.rms)
-        return worst_patterns(limit.searched, bounds, starts, self.seed, self.go_on)
+        return worst_patterns(
+            limit.searched, self.around(middle), starts, self.seed, self.go_on, list(self.patterns.values())
+        )
+
+    def around(self, middle: Real) -> Bounds:
+        """Return the bounds of the deviations around a pattern."""
+        return Bounds(middle=middle, within=self.within, rms=self.rms)
 
 
 @shows_progress("worst mistuning")
@@ -170,9 +176,9 @@ def worst_mistuning(
     blade_rows(scene, dof)
     search = _Search(
         scene=without_mistuning(scene), of=names, band=band, dof=dof, within=within, rms=rms, starts=starts,
-        seed=seed, steps=1.0, on_progress=on_progress, should_stop=should_stop,
+        seed=seed, patterns={name: pattern_deviations(name, len(blades), detuning) for name in patterns},
+        steps=1.0, on_progress=on_progress, should_stop=should_stop,
     )  # fmt: skip
-    deltas = {name: pattern_deviations(name, len(blades), detuning) for name in patterns}
     told = {
         "scene": scene.name, "dof": dof, "of": names, "within": within, "rms": rms, "detuning": detuning,
         "contacts": how.value, "whitehead": whitehead(len(blades)), "starts": starts,
@@ -180,19 +186,17 @@ def worst_mistuning(
     }  # fmt: skip
     if how is Contacts.SOLVED:
         disk = SolvedDisk(search.scene, names, dof, band, harmonics, should_stop)
-        found = _solved(search, disk, deltas, climb, worst_of_patterns)
+        found = _solved(search, disk, climb, worst_of_patterns)
     else:
-        found = _linear(search, how, deltas, worst_of_patterns)
+        found = _linear(search, how, worst_of_patterns)
     if on_progress is not None and not search.stopped:
         on_progress(1.0, search.done)
     return WorstMistuning(**told, **found, seconds=time.perf_counter() - begun)  # type: ignore[arg-type]
 
 
-def _linear(
-    search: _Search, how: Contacts, deltas: dict[str, Real], worst_of_patterns: bool
-) -> dict[str, object]:
+def _linear(search: _Search, how: Contacts, worst_of_patterns: bool) -> dict[str, object]:
     """Return what is found in a linear limit."""
-    search.steps = search.starts + len(deltas) * (1 + worst_of_patterns * (search.starts // _FEWER))
+    search.steps = search.starts + len(search.patterns) * (1 + worst_of_patterns * (search.starts // _FEWER))
     limit = search.limit(how)
     if limit is None:
         return _nothing()
@@ -208,7 +212,7 @@ def _linear(
 
     worst = told(climbs[0]) if climbs else None
     ranked = []
-    for name, delta in deltas.items():
+    for name, delta in search.patterns.items():
         if search.go_on():
             alone = told(WorstPattern(delta=delta, peak=limit.searched.peak(delta)))
             on_top = beneath(delta) if worst_of_patterns else None
@@ -222,15 +226,15 @@ def _linear(
     }  # fmt: skip
 
 
-def _solved(
-    search: _Search, disk: SolvedDisk, deltas: dict[str, Real], climb: int, worst_of_patterns: bool
-) -> dict[str, object]:
+def _solved(search: _Search, disk: SolvedDisk, climb: int, worst_of_patterns: bool) -> dict[str, object]:
     """Return what is found with the contacts solved."""
     N = search.scene.structure.sector_count
     limits = [one for how in disk.linear_limits if (one := search.limit(how)) is not None]
     each = climb + 1 + _CANDIDATES * len(limits)
-    on_top = len(deltas) * (each + len(limits) * (search.starts // _FEWER)) if worst_of_patterns else 0
-    search.steps = len(limits) * search.starts + each + 1 + len(deltas) + on_top
+    on_top = (
+        len(search.patterns) * (each + len(limits) * (search.starts // _FEWER)) if worst_of_patterns else 0
+    )
+    search.steps = len(limits) * search.starts + each + 1 + len(search.patterns) + on_top
     try:
         tuned = disk.peak(np.zeros(N))
     except UnknownPeakError:
@@ -244,15 +248,16 @@ def _solved(
 
     def worst_around(middle: Real, starts: int) -> PatternPeak | None:
         nonlocal known
-        begins = [middle, *(delta for limit in limits for delta in _apart(search, limit, middle, starts))]
-        bounds = Bounds(middle=middle, within=search.within, rms=search.rms)
+        bounds = search.around(middle)
+        begins = [middle, *filter(bounds.hold, search.patterns.values())]
+        begins += [delta for limit in limits for delta in _apart(search, limit, middle, starts)]
         delta, complete = disk.climbed(begins, bounds, climb, FLAT, search.go_on)
         known = known and complete
         return None if delta is None else told(delta)
 
     worst = worst_around(np.zeros(N), search.starts)
     ranked = []
-    for name, delta in deltas.items():
+    for name, delta in search.patterns.items():
         if not search.go_on():
             break
         try:

@@ -16,7 +16,7 @@ from solver.results.views import Data, Views
 class WorstMistuningStatus(Enum):
     """How a search ended; the value is a sentence a user can act on."""
 
-    COMPLETED = "Every climb came to its end: no pattern worse than this was found within the bounds."
+    COMPLETED = "All climbs asked for are made: no pattern worse than this was found within the bounds."
     INCOMPLETE = (
         "The response of a pattern did not reach the end of the band, so the worst is that of the others: "
         "use more harmonics or another band."

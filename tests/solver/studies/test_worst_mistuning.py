@@ -276,6 +276,11 @@ def test_intentional_patterns_are_those_of_full_matrices_and_ranked() -> None:
         assert one.worst is not None
         assert one.worst.magnification >= one.disk.magnification
         assert np.abs(np.array(one.worst.factors) - factors).max() <= 0.01 + 1e-12
+        inside = worst_mistuning(
+            scene, of="root", within=0.03, patterns=[one.pattern], detuning=0.03, starts=1
+        )
+        assert inside.worst is not None
+        assert inside.worst.magnification >= inside.patterns[0].disk.magnification
     counts = [one.counts for one in found.patterns]
     assert counts == sorted(counts)
     assert found.best == found.patterns[0].pattern
