@@ -58,6 +58,7 @@ CASES = {
     "cluster": "cluster:mistuning_study",
     "spreading": "spreading:spreading",
     "mistuned": "mistuned:mistuned_disks",
+    "worst-mistuning": "mistuned:worst_patterns",
     "certificates": "certificates:certificates",
 }
 """The function of each case, in a module of this package."""

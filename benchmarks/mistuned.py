@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import time
+from typing import Any
+
+import numpy as np
 
 import solver
 from benchmarks.harness import check, expect, table
@@ -45,3 +48,60 @@ def mistuned_disks() -> None:
         "swept alone",
     )  # fmt: skip
     table("Mistuned disks, the peak of every blade", header, rows)
+
+
+COUPLING, ZETA, WITHIN, DRAWN, BLADES = 0.001, 2e-6, 0.01, 60, (4, 6, 9, 12, 16, 20, 24)
+
+
+def ring(blades: int, order: int) -> solver.Scene:
+    """Return lightly damped blades on a ring of springs."""
+    springs: list[dict[str, Any]] = [
+        {"name": "root", "between": ["b", "ground"], "k": 1.0},
+        {"name": "ring", "between": ["b", "b@next"], "k": COUPLING},
+    ]
+    structure = {
+        "kind": "cyclic", "sectors": blades, "masses": {"b": 1.0}, "springs": springs,
+        "dampers": [{"name": "loss", "between": ["b", "ground"], "c": 2.0 * ZETA}],
+    }  # fmt: skip
+    force = {"dof": "b", "amplitude": 1.0, "engine_order": order}
+    observe = {"dof": "b", "band": [0.155, 0.165]}
+    return solver.Scene.from_dict(
+        {"name": "ring", "structure": structure, "contacts": [], "excitation": force, "observe": observe}
+    )
+
+
+def worst_patterns() -> None:
+    """The worst mistuning within 1 % of lightly damped rings beside Whitehead's bound and random disks."""
+    rows = []
+    rng = np.random.default_rng(1)
+    for blades in BLADES:
+        for order in (0, 1, blades // 2):
+            scene = ring(blades, order)
+            begun = time.process_time()
+            found = solver.worst_mistuning(scene, of="root", within=WITHIN)
+            seconds = time.process_time() - begun
+            expect("a worst pattern", found.worst is not None)
+            drawn = 0.0
+            for _ in range(DRAWN):
+                factors = (1.0 + WITHIN * rng.uniform(-1.0, 1.0, blades)).tolist()
+                peaks = solver.blade_peaks(
+                    solver.mistuned(scene, of="root", values=factors), harmonics=1, every_branch=False
+                )
+                drawn = max(drawn, peaks.largest / found.tuned_peak)
+            worst = found.worst.magnification if found.worst else 0.0
+            expect("no random disk above the worst", drawn <= worst)
+            rows.append(
+                (str(blades), str(order), f"{drawn:.3f}", f"{worst:.4f}", f"{found.whitehead:.4f}",
+                 f"{100.0 * (worst / found.whitehead - 1.0):+.2f} %", str(found.alike), f"{seconds:.1f}")
+            )  # fmt: skip
+    header = (
+        "blades",
+        "engine order",
+        f"{DRAWN} random",
+        "worst",
+        "Whitehead",
+        "apart",
+        "alike",
+        "s (process)",
+    )
+    table(f"Worst mistuning within {100.0 * WITHIN:g} %", header, rows)

@@ -128,6 +128,13 @@ from .studies.mistuning_result import (
     MistuningStatus as MistuningStatus,
     MistuningStudy as MistuningStudy,
 )
+from .studies.patterns.worst_mistuning import worst_mistuning as worst_mistuning
+from .studies.patterns.worst_result import (
+    IntentionalPattern as IntentionalPattern,
+    PatternPeak as PatternPeak,
+    WorstMistuning as WorstMistuning,
+    WorstMistuningStatus as WorstMistuningStatus,
+)
 from .studies.study_results import MapStatus as MapStatus, ResponseMap as ResponseMap
 from .studies.peaks.minimise_peak import least_peak as least_peak
 from .studies.peaks.results import (

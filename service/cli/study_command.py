@@ -85,7 +85,7 @@ class Outputs:
 
 def command_named(name: str) -> Callable[..., None]:
     """Return the command of a study that comes with the service."""
-    study: type[Study] = import_module(f"service.jobs.studies.{name}").STUDY
+    study: type[Study] = import_module(f"service.jobs.studies.{name.replace('-', '_')}").STUDY
     return command_of(study)
 
 

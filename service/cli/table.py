@@ -222,6 +222,7 @@ COMMANDS = {
             "Draw natural frequencies over the nodal diameter, with the engine orders that meet them.",
         ),
         CommandEntry("mistuning", STUDY, "Study disks whose blades are not quite equal."),
+        CommandEntry("worst-mistuning", STUDY, "Find the worst mistuning of a disk within bounds."),
         CommandEntry("modes", STUDY, "Follow a mode's frequency and damping over its amplitude."),
         CommandEntry(
             "controlled", STUDY,

@@ -154,7 +154,7 @@ def blade_peaks(
     """
     name = scene.observe.dof.partition("@")[0] if dof is None else dof
     structure = scene.structure
-    names, repeats = [scene.dofs[i] for i in _rows(scene, name)], 1
+    names, repeats = [scene.dofs[i] for i in blade_rows(scene, name)], 1
     if structure.has_sectors:
         names, repeats = [name], structure.sector_count
         if sectors_needed(_observing(scene, name)).sectors > 1:
@@ -286,7 +286,7 @@ def blade_amplitudes(solution: Solution, dof: str | None = None) -> BladeAmplitu
         The solution did not converge, or no sector has such a DOF.
     """
     name = solution.scene.observe.dof.partition("@")[0] if dof is None else dof
-    rows = _rows(solution.scene, name)
+    rows = blade_rows(solution.scene, name)
     moves = motion(solution)
     ranges = np.array([_extremes(moves[row]) for row in rows])
     return BladeAmplitudes(
@@ -296,8 +296,14 @@ def blade_amplitudes(solution: Solution, dof: str | None = None) -> BladeAmplitu
     )
 
 
-def _rows(scene: Scene, name: str) -> list[int]:
-    """Index of a DOF in each sector; in a cyclic scene the same one again and again."""
+def blade_rows(scene: Scene, name: str) -> list[int]:
+    """Return the index of a DOF in each sector; in a cyclic scene the same one again and again.
+
+    Raises
+    ------
+    SettingError
+        No sector has such a DOF.
+    """
     dofs, structure = scene.dofs, scene.structure
     if structure.has_sectors:
         rows = [dofs.index(name)] * structure.sector_count if name in dofs else []

@@ -22,6 +22,7 @@ _HEIGHT = {"bladed-disk": 2e-5}
 _OWN_HARMONICS = ("accuracy", "interference", "march", "solve-accuracy")
 _LONG = {
     "accuracy": SCENES, "mistuning": CYCLIC, "pareto": SCENES, "controlled": SCENES[1:],
+    "worst_mistuning": CYCLIC, "worst_mistuning-open": CYCLIC,
     "sweep-load": ("rub", "gap", "cubic"), "march": CYCLIC, "campbell": ("ring",), "solve-all": ("ring",),
     "modes-resonance": ("ring", "two-dof"), "sweep": ("ring",), "peaks": ("bladed-disk",), "identify": SCENES,
 }  # fmt: skip
@@ -66,7 +67,9 @@ def cases() -> Iterator[Case]:
     for scene_name in SCENES:
         for study, options in _options(scene_name):
             fewer = "" if study in _OWN_HARMONICS else " --harmonics 3"
-            yield Case(study, scene_name, f"{study.partition('-')[0]} SCENE {options}{fewer}")
+            yield Case(
+                study, scene_name, f"{study.partition('-')[0].replace('_', '-')} SCENE {options}{fewer}"
+            )
 
 
 def _options(name: str) -> Iterator[tuple[str, str]]:
@@ -101,3 +104,6 @@ def _options(name: str) -> Iterator[tuple[str, str]]:
     if name in CYCLIC:
         yield "interference", "--speed 11000" if name == "bladed-disk" else "--speed 8"
         yield "mistuning", f"--of {'tip' if name == 'bladed-disk' else 'u'} --samples 2 {ends}"
+        of = f"--of {'tip' if name == 'bladed-disk' else 'u'} --starts 2 --patterns AB"
+        yield "worst_mistuning", f"{of} --climb 2 {ends}"
+        yield "worst_mistuning-open", f"{of} --contacts open --rms 0.01 --worst-of-patterns {ends}"

@@ -99,6 +99,12 @@ _MEANT: dict[str, tuple[dict[str, Any], ...]] = {
         {"of": "m1"}, {**_DISK, "of": ["nothing"]}, {**_DISK, "of": "tip", "from": 3, "to": 2},
         {**_DISK, "of": "tip", "dof": "nothing"}, {**_DISK, "of": "tip", "samples": 10001},
     ),
+    "worst-mistuning": (
+        {"of": "m1"}, {**_DISK, "of": ["nothing"]}, {**_DISK, "of": "tip", "from": 3, "to": 2},
+        {**_DISK, "of": "tip", "within": 0}, {**_DISK, "of": "tip", "patterns": ["ab"]},
+        {**_DISK, "of": "tip", "patterns": ["AB"], "detuning": 0.9}, {**_DISK, "of": "tip", "rms": -1},
+        {**_DISK, "of": "tip", "patterns": ["ABABABABABAB"]}, {**_DISK, "of": "tip", "contacts": "x"},
+    ),
     "design": (
         {"variables": {"damper.N0": [2, 1]}}, {"variables": {"nothing.N0": [1, 2]}}, {"max_band_hz": -1},
         {"weights": {"peak": 1, "x": 2}}, {"uncertain": {"damper.mu": [0.4, 0.2]}}, {"aim": "x"},

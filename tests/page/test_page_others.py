@@ -25,6 +25,7 @@ def test_a_kind_without_a_view_has_a_form_and_a_result(browser: Browser, site: S
             "plan",
             "solve",
             "mistuning",
+            "worst-mistuning",
             "controlled",
             "sensitivities",
             "transient",

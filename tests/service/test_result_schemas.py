@@ -27,6 +27,10 @@ BODIES: dict[str, tuple[str, Mapping[str, Any]]] = {
     "peaks": ("peaks", {**OVER, "checks": 1}),
     "campbell": ("campbell", {**TWO, "speeds_rpm": [[60, 100]]}),
     "interference": ("interference", {"scene": "bladed-disk", "speed_rpm": 11000}),
+    "worst-mistuning": (
+        "worst-mistuning",
+        {"scene": "bladed-disk", "of": ["tip"], "contacts": "stuck", "patterns": ["AB"], "starts": 2},
+    ),
     "mistuning": (
         "mistuning",
         {"scene": SMALL_DISK, "of": "tip", "samples": 2, "harmonics": 1, "from": 740, "to": 780},

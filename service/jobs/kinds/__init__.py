@@ -24,6 +24,7 @@ from service.jobs.studies.sensitivities import Sensitivities
 from service.jobs.studies.solve import Solve
 from service.jobs.studies.sweep import Sweep
 from service.jobs.studies.transient import Transient
+from service.jobs.studies.worst_mistuning import WorstMistuningStudy
 from service.jobs.study import Study
 
 
@@ -49,6 +50,7 @@ SHIPPED = Registry(
         Campbell.as_kind(),
         Interference.as_kind(),
         Mistuning.as_kind(),
+        WorstMistuningStudy.as_kind(),
         Identify.as_kind(),
         Modes.as_kind(),
         Controlled.as_kind(),

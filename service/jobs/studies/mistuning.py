@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -63,6 +63,29 @@ PartNames = Annotated[
 ]
 
 
+def disk_issues(scene: Scene, dof: str | None) -> list[Issue]:
+    """Return why a scene is no disk, or that no sector has a DOF."""
+    if not scene.structure.has_sectors:
+        return [Issue(("scene",), f"{scene.name!r} must have a cyclic structure to be mistuned")]
+    if dof is not None and dof not in scene.dofs:
+        words = f"must be a DOF of every sector, one of {', '.join(scene.dofs)}, got {dof!r}"
+        return [Issue(("dof",), words)]
+    return []
+
+
+def part_issues(attempt: Callable[[], object]) -> list[Issue]:
+    """Return what is wrong if `attempt`, which mistunes a disk, does not go through."""
+    try:
+        attempt()
+    except SceneError as error:
+        of = ("structure", "mistuning", "of")
+        within = [issue.at(*issue.subject[2:]) for issue in error.issues if issue.subject[:3] == of]
+        return within or [issue.at("of") for issue in error.issues]
+    except SettingError as error:
+        return [error.issue]
+    return []
+
+
 mistuning_result = answered(
     "solver.studies.mistuning_result:MistuningStudy", "MistuningResult", dof=str, samples=list[Table],
     quantiles=list[Table],
@@ -108,13 +131,8 @@ class Mistuning(Study, HarmonicRequest):
 
     def issues(self, scene: Scene) -> list[Issue]:
         """Return why it is no disk, and what is wrong with DOF and range."""
-        if not scene.structure.has_sectors:
-            return [Issue(("scene",), f"{scene.name!r} must have a cyclic structure to be mistuned")]
-        found = band_issues(scene, self.start, self.stop)
-        if self.dof is not None and self.dof not in scene.dofs:
-            words = f"must be a DOF of every sector, one of {', '.join(scene.dofs)}, got {self.dof!r}"
-            found.append(Issue(("dof",), words))
-        return found
+        found = disk_issues(scene, self.dof)
+        return found + band_issues(scene, self.start, self.stop) if scene.structure.has_sectors else found
 
     def sizes(self, scene: Scene) -> list[Issue]:
         """Return what is too large; the factors are drawn if they are not too many, to see that they can."""
@@ -130,15 +148,7 @@ class Mistuning(Study, HarmonicRequest):
         # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
         from solver.studies.mistuning import disk_factors
 
-        try:
-            disk_factors(scene, self.of, self.spread, self.samples, self.seed)
-        except SceneError as error:
-            of = ("structure", "mistuning", "of")
-            within = [issue.at(*issue.subject[2:]) for issue in error.issues if issue.subject[:3] == of]
-            return within or [issue.at("of") for issue in error.issues]
-        except SettingError as error:
-            return [error.issue]
-        return []
+        return part_issues(lambda: disk_factors(scene, self.of, self.spread, self.samples, self.seed))
 
     @classmethod
     def as_kind(cls) -> JobKind:

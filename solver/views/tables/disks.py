@@ -89,3 +89,40 @@ def mistuning(found: Mapping[str, Any]) -> Iterator[Block]:
     pairs += known_pairs(found)
     pairs.append(("time", units.duration(found["seconds"])))
     yield Summary(f"{title}, {found['n_harmonics']} harmonics", pairs)
+
+
+def worst_mistuning(found: Mapping[str, Any]) -> Iterator[Block]:
+    """The worst pattern with the bounds beside it, and intentional patterns, the best first."""
+    worst, limit = found["worst"], found["rms"]
+    size = f"factors of {', '.join(found['of'])} within ± {100.0 * found['within']:g} %"
+    size += "" if limit is None else f", {100.0 * limit:g} % rms"
+    pairs = []
+    if found["tuned_peak"] is not None:
+        height = units.length(found["tuned_peak"])
+        pairs.append((f"tuned, max |{found['dof']}|", f"{height} at {found['tuned_at_hz']:.6g} Hz"))
+    if worst is not None:
+        place = f"blade {worst['blade']} at {worst['at_hz']:.6g} Hz"
+        pairs.append(("worst", f"{worst['magnification']:.4g}: {units.length(worst['peak'])}, {place}"))
+        pairs.append(("  its factors", ", ".join(f"{factor:.4f}" for factor in worst["factors"])))
+    pairs.append(("Whitehead's bound", f"{found['whitehead']:.4g}"))
+    bounds = (("Martel's bound", "martel"), ("bound by the power at this frequency", "power_bound"))
+    pairs += [(name, f"{found[key]:.4g}") for name, key in bounds if found[key] is not None]
+    pairs.append(("climbs", f"{found['starts']}, of which {found['alike']} ended at the same height"))
+    if found["climbed"]:
+        pairs.append(("responses solved", str(found["climbed"])))
+    pairs.append(("time", units.duration(found["seconds"])))
+    yield Summary(f"{found['scene']}, contacts {found['contacts']}, {size}", pairs)
+    if found["patterns"]:
+        yield _patterns(found)
+
+
+def _patterns(found: Mapping[str, Any]) -> ResultTable:
+    rows = [
+        (
+            one["pattern"], f"{one['disk']['magnification']:.4g}", f"{one['disk']['at_hz']:.6g}",
+            "" if one["worst"] is None else f"{one['worst']['magnification']:.4g}",
+        )
+        for one in found["patterns"]
+    ]  # fmt: skip
+    title = f"intentional patterns, ± {100.0 * found['detuning']:g} %, the best first"
+    return ResultTable(title, ("pattern", "magnification", "at [Hz]", "with the worst mistuning"), rows)

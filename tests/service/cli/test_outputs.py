@@ -23,6 +23,7 @@ COMMANDS = {
     "peaks": "two-dof --parameter damper.N0 --from 50 --to 200 --harmonics 3",
     "map": "two-dof --parameter damper.N0 --from 50 --to 200 --steps 3 --frequencies 5 --harmonics 3",
     "mistuning": "bladed-disk --of tip --samples 2 --harmonics 1 --from 740 --to 780",
+    "worst-mistuning": "bladed-disk --of tip --starts 2 --contacts stuck --patterns AB",
     "modes": "two-dof --from 0.1 --to 3 --harmonics 3",
     "interference": "bladed-disk --speed 11000 --up-to 1400",
     "controlled": "two-dof --amplitude 1 --harmonics 3",
@@ -77,6 +78,9 @@ def results() -> dict[str, Any]:
         "peaks": solver.track_peak(scene, "damper.N0", 50, 200, harmonics=3),
         "mistuning": solver.mistuning_study(
             solver.load_scene("bladed-disk"), of=["tip"], samples=2, harmonics=1, start=740, stop=780
+        ),
+        "worst-mistuning": solver.worst_mistuning(
+            solver.load_scene("bladed-disk"), of=["tip"], starts=2, contacts="stuck", patterns=["AB"]
         ),
         "interference": solver.interference_diagram(solver.load_scene("bladed-disk"), speed_rpm=11e3),
         "modes": solver.nonlinear_mode(scene, amplitudes=(0.1, 3.0), harmonics=3),

@@ -1,0 +1,124 @@
+"""The study `worst-mistuning`: the worst pattern of blades within bounds, and intentional patterns."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from pydantic import ConfigDict, Field
+
+from optim.criteria.key import Name
+from service.jobs.common.results import Table, answered
+from service.jobs.common.scenes import FrequencyHz, HarmonicRequest
+from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
+from service.jobs.common.study_keys import band_issues
+from service.jobs.registry import Flag
+from service.jobs.studies.mistuning import PartNames, disk_issues, part_issues
+from service.jobs.study import Study
+from solver.errors import Issue
+
+if TYPE_CHECKING:
+    from solver.scene.scene import Scene
+
+_MOST_STARTS, _MOST_CLIMB, _MOST_PATTERNS = 1000, 200, 50
+_EXAMPLE: dict[str, Any] = {
+    "scene": "bladed-disk", "of": ["tip_middle"], "within": 0.03, "patterns": ["AB", "ABB"], "starts": 30,
+    "harmonics": 3,
+}  # fmt: skip
+_Share = Annotated[float, Field(strict=True, gt=0.0, le=0.9)]
+_Pattern = Annotated[str, Field(pattern=r"^[A-Z]{1,100}$")]
+
+
+class WorstMistuningStudy(Study, HarmonicRequest):
+    """Find the worst mistuning of a disk within bounds.
+
+    It makes the highest peak of any blade largest; Whitehead's and Martel's bounds stand beside it.
+    Intentional patterns of blade types are ranked.
+    """
+
+    model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE]})
+    NAME, FUNCTION = "worst-mistuning", "solver:worst_mistuning"
+    RESULT = answered(
+        "solver.studies.patterns.worst_result:WorstMistuning", "WorstMistuningResult", worst=Table | None,
+        patterns=list[Table],
+    )  # fmt: skip
+    TOLD = "solver.views.tables.disks:worst_mistuning"
+    SHOWS = "the worst pattern with its bounds, and intentional ones ([patterns](patterns.md))"
+    COUNTED = "climbs and responses"
+    EMPTY = ("worst", "the peak of no pattern is known")
+    FIGURE = "solver.views.plots.disks:worst_mistuning_figure"
+
+    of: Annotated[PartNames, Flag(metavar="NAME")] = Field(
+        description="Springs (k), dashpots (c) and masses by name, or DOFs (their mass)."
+    )
+    within: Annotated[_Share, Flag(metavar="D")] = Field(
+        default=0.02, description="Largest deviation of a blade's factor from 1."
+    )
+    rms: Annotated[_Share | None, Flag(metavar="D")] = Field(
+        default=None, description="Largest root mean square of the deviations."
+    )
+    contacts: Literal["solved", "stuck", "open"] = Field(
+        default="solved", description="How contacts count: solved, or in a linear limit."
+    )
+    patterns: Annotated[list[_Pattern] | None, Field(max_length=_MOST_PATTERNS), Flag(metavar="AB")] = Field(
+        default=None,
+        description="Intentional patterns, a letter for each blade type, repeated round the disk.",
+    )
+    detuning: Annotated[float, Field(strict=True, ge=0.0, le=0.9), Flag(metavar="D")] = Field(
+        default=0.02, description="Deviation of the factor of the first blade type, negative of the last."
+    )
+    worst_of_patterns: Annotated[bool, Field(strict=True)] = Field(
+        default=False, description="Find the worst mistuning on top of each pattern, and rank by that."
+    )
+    starts: Annotated[int, Field(strict=True, ge=1, le=_MOST_STARTS), Flag(metavar="N")] = Field(
+        default=60, description="Climbs in each linear limit."
+    )
+    climb: Annotated[int, Field(strict=True, ge=0, le=_MOST_CLIMB), Flag(metavar="N")] = Field(
+        default=30, description="Responses with the contacts solved to climb on with, of each worst pattern."
+    )
+    seed: Annotated[int, Field(strict=True, ge=0, lt=2**53), Flag(metavar="N")] = Field(
+        default=1, description="Of the starts that are drawn."
+    )
+    dof: Annotated[Name | None, Flag(metavar="DOF")] = Field(
+        default=None, description="DOF of one sector whose amplitude counts; the observed one."
+    )
+    start: Annotated[FrequencyHz | None, Flag(metavar="F")] = Field(
+        default=None, alias="from", description="Lowest frequency [Hz]; the scene's band."
+    )
+    stop: Annotated[FrequencyHz | None, Flag(metavar="F")] = Field(
+        default=None, alias="to", description="Highest frequency [Hz]; the scene's band."
+    )
+
+    def issues(self, scene: Scene) -> list[Issue]:
+        """Return why it is no disk, and what is wrong with DOF, range and bounds."""
+        found = disk_issues(scene, self.dof)
+        return (
+            found or band_issues(scene, self.start, self.stop) or part_issues(partial(self._checked, scene))
+        )
+
+    def _checked(self, scene: Scene) -> None:
+        # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
+        from solver.studies.blades import mistuned
+        from solver.studies.patterns.linear_disk import Contacts, check_linear
+        from solver.studies.patterns.worst_mistuning import check_bounds
+
+        blades = check_bounds(
+            scene, self.within, self.rms, self.detuning, self.patterns or (), self.starts, self.climb
+        )
+        mistuned(scene, of=self.of, values=[1.0] * len(blades))
+        if self.contacts != Contacts.SOLVED.value:
+            check_linear(scene, Contacts(self.contacts))
+
+    def sizes(self, scene: Scene) -> list[Issue]:
+        """Return what is too large."""
+        count = len(self.patterns or ())
+        solved = (self.climb + 5) * (1 + self.worst_of_patterns * count) + count
+        points = (
+            POINTS_OF_A_SWEEP * (solved if self.contacts == "solved" else 1) * scene.structure.sector_count
+        )
+        return balance_issues(
+            "climb", scene, self.harmonics, points, "points of all sweeps", every_sector=True
+        )
+
+
+STUDY = WorstMistuningStudy

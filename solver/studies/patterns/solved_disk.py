@@ -1,0 +1,189 @@
+"""The highest peak of a mistuned disk with its contacts solved, with derivatives by the blades' factors."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+
+import numpy as np
+
+from solver.arrays import Real
+from solver.errors import SettingError
+from solver.results.watch import ShouldStop
+from solver.scene.parts import CyclicStructure, Mass
+from solver.scene.scene import Scene
+from solver.scene.structure_parameters import NUMBERS, STRUCTURE, named_parts
+from solver.sensitivity.gradient import Sensitivities
+from solver.sensitivity.nonsmooth import peak_gradient
+from solver.studies.blades import BladePeaks, blade_peaks, mistuned
+from solver.studies.patterns.climbing import Bounds
+from solver.studies.patterns.linear_disk import TWO_PI, Contacts, DiskPeak, check_linear
+
+
+class UnknownPeakError(Exception):
+    """The response of a disk did not reach the end of its band."""
+
+
+class SolvedDisk:
+    """A disk with its contacts solved, at one pattern after the other.
+
+    Parameters
+    ----------
+    scene : cyclic, not mistuned.
+    of : what the factors multiply.
+    dof : the observed DOF of a sector.
+    band : of the frequency [Hz].
+    harmonics : highest one kept.
+    should_stop : asked on the way.
+    """
+
+    def __init__(
+        self, scene: Scene, of: Sequence[str], dof: str, band: tuple[float, float], harmonics: int,
+        should_stop: ShouldStop,
+    ) -> None:  # fmt: skip
+        self._scene, self._of = _with_names(scene, of), tuple(of)
+        self._dof, self._band, self._harmonics = dof, band, harmonics
+        self._should_stop = should_stop
+        self._known: dict[bytes, DiskPeak] = {}
+        self._last: tuple[bytes, BladePeaks] | None = None
+        self.responses = 0
+
+    @property
+    def linear_limits(self) -> tuple[Contacts, ...]:
+        """The linear limits it has, to begin from the worst patterns of."""
+        found = []
+        for contacts in (Contacts.STUCK, Contacts.OPEN) if self._scene.contacts else (Contacts.OPEN,):
+            with suppress(SettingError):
+                check_linear(self._scene, contacts)
+                found.append(contacts)
+        return tuple(found)
+
+    def peak(self, delta: Real) -> DiskPeak:
+        """Return the highest peak of any blade.
+
+        Raises
+        ------
+        UnknownPeakError
+            The response did not reach the end of the band.
+        """
+        key = delta.tobytes()
+        if key not in self._known:
+            self._peaks(delta)
+        return self._known[key]
+
+    def slopes(self, delta: Real) -> tuple[float, Real]:
+        """Return the logarithm of the highest peak and its derivatives by δ, (N,).
+
+        Raises
+        ------
+        UnknownPeakError
+            The response did not reach the end of the band.
+        """
+        found = self._peaks(delta)
+        branch = found.branches[0] if len(found.branches) == 1 else found.worst_branch
+        if branch is None or branch.peak is None:
+            raise UnknownPeakError
+        rows = self._paths()
+        gradient = peak_gradient(
+            Sensitivities(branch.balance, [p for row in rows for p, _ in row]), branch.peak
+        )
+        by_path = gradient.gradient.reshape(len(rows), -1)
+        per_factor = np.array([[nominal for _, nominal in row] for row in rows])
+        return math.log(found.largest), np.asarray((by_path * per_factor).sum(axis=1) / found.largest)
+
+    def climbed(
+        self, begins: Sequence[Real], bounds: Bounds, responses: int, flat: float, go_on: Callable[[], bool]
+    ) -> tuple[Real | None, bool]:
+        """Return the worst pattern on a climb from the worst of several, and whether all were known.
+
+        Parameters
+        ----------
+        begins : patterns to begin with.
+        bounds : of δ.
+        responses : computed on the climb, at most.
+        flat : rise of the logarithm at which the climb ends.
+        go_on : asked before each response.
+        """
+        tried: list[tuple[float, Real]] = []
+        known = True
+        for delta in begins:
+            if not go_on():
+                break
+            try:
+                tried.append((self.peak(delta).value, delta))
+            except UnknownPeakError:
+                known = False
+        if not tried:
+            return None, known
+        _, begin = max(tried, key=lambda pair: pair[0])
+        if responses == 0 or not self.differentiable:
+            return begin, known
+        left = responses
+
+        def rise(delta: Real) -> tuple[float, Real]:
+            nonlocal left
+            left -= 1
+            if left < 0 or not go_on():
+                raise _ClimbEndedError
+            value, slope = self.slopes(delta)
+            tried.append((math.exp(value), delta))
+            return value, slope
+
+        try:
+            bounds.largest(rise, begin, responses, flat)
+        except _ClimbEndedError:
+            pass
+        except UnknownPeakError:
+            known = False
+        return max(tried, key=lambda pair: pair[0])[1], known
+
+    @property
+    def differentiable(self) -> bool:
+        """Whether the factors are of parts with parameters: those of matrices have none."""
+        return isinstance(self._scene.structure, CyclicStructure)
+
+    def _paths(self) -> list[list[tuple[str, float]]]:
+        """Return the parameters that the factor of each blade multiplies, with their tuned values."""
+        named = named_parts(self._scene.structure)
+        dofs = set(self._of) - {part.name for part in named}
+        parts = [part for part in named if part.name in self._of or getattr(part, "dof", None) in dofs]
+        return [
+            [(f"{STRUCTURE}{part.name}@{j}", float(getattr(part, NUMBERS[type(part)]))) for part in parts]
+            for j in range(self._scene.structure.sector_count)
+        ]
+
+    def _peaks(self, delta: Real) -> BladePeaks:
+        key = delta.tobytes()
+        if self._last is None or self._last[0] != key:
+            scene = mistuned(self._scene, of=self._of, values=(1.0 + delta).tolist())
+            self.responses += 1
+            found = blade_peaks(
+                scene, *self._band, dof=self._dof, harmonics=self._harmonics, every_branch=False,
+                should_stop=self._should_stop,
+            )  # fmt: skip
+            if not math.isfinite(found.largest):
+                raise UnknownPeakError
+            at = TWO_PI * float(found.at_hz[found.worst])
+            self._last = key, found
+            self._known[key] = DiskPeak(value=found.largest, blade=found.worst, omega=at)
+        return self._last[1]
+
+
+class _ClimbEndedError(Exception):
+    """All responses of a climb are used, or it is to be stopped."""
+
+
+def _with_names(scene: Scene, of: Sequence[str]) -> Scene:
+    """Return a scene in which masses that factors are of have names, so that they are parameters."""
+    structure = scene.structure
+    if not isinstance(structure, CyclicStructure):
+        return scene
+
+    def named(mass: Mass) -> Mass:
+        if mass.name is not None or mass.dof not in of:
+            return mass
+        return mass.model_copy(update={"name": f"mass-of-{mass.dof}"})
+
+    masses = tuple(named(mass) for mass in structure.masses)
+    return scene.model_copy(update={"structure": structure.model_copy(update={"masses": masses})})
