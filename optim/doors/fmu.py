@@ -155,7 +155,7 @@ def description_of(found: Equations, source: str) -> str:
     ElementTree.SubElement(ElementTree.SubElement(unit, "SourceFiles"), "File", name=f"{NAME}.c")
     units = ElementTree.SubElement(root, "UnitDefinitions")
     for name, powers in _UNITS.items():
-        ElementTree.SubElement(ElementTree.SubElement(units, "Unit", name=name), "BaseUnit", **powers)
+        ElementTree.SubElement(ElementTree.SubElement(units, "Unit", name=name), "BaseUnit", powers)
     listed, outputs = ElementTree.SubElement(root, "ModelVariables"), []
     for reference, each in enumerate(variables_of(found)):
         if not each.causality:
@@ -168,7 +168,7 @@ def description_of(found: Equations, source: str) -> str:
         given = {"unit": each.unit} if each.unit else {}
         if each.start is not None:
             given["start"] = repr(each.start)
-        ElementTree.SubElement(scalar, "Real", **given)
+        ElementTree.SubElement(scalar, "Real", given)
         if each.causality == "output":
             outputs.append(len(listed))
     structure = ElementTree.SubElement(root, "ModelStructure")
@@ -183,7 +183,7 @@ def description_of(found: Equations, source: str) -> str:
 def source_of(found: Equations) -> str:
     """Return the source of a unit: dimensions and numbers, then the text that is the same of all."""
     rows, n = found.contacts, len(found.M)
-    inverse = np.linalg.inv(found.M)
+    inverse = np.asarray(np.linalg.inv(found.M), np.float64)
     A, B = inverse @ found.K, inverse @ found.C
     m, f, d, k = len(rows.names), len(found.amplitude), len(found.dofs), rows.wave.shape[1]
     tied = np.where(rows.ratio != 0.0, rows.ratio, rows.wave[:, 0]) if m else np.zeros(0)

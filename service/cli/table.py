@@ -234,6 +234,10 @@ COMMANDS = {
             "import", "commands.import_matrices.import_scene", "Make a scene of matrices or modes in files.",
         ),
         CommandEntry(
+            "export", "commands.export.export",
+            "Write a scene for other programs: equations for MATLAB, a unit for co-simulation (FMI 2.0).",
+        ),
+        CommandEntry(
             "schema", "commands.scenes.schema",
             "Print the JSON Schema of scene files, design problems or jobs, for editors.",
         ),
