@@ -247,7 +247,7 @@ COMMANDS = {
         ),
         CommandEntry(
             "check-proof", "commands.certificates.check_proof",
-            "Check the proof of a response, in a file that `solve --certify --json` wrote.",
+            "Check the proofs in a file that `solve`, `peaks` or `design --certify --json` wrote.",
         ),
         CommandEntry("demo", "commands.service.demo", "Run the main job end to end, with pictures."),
     ),

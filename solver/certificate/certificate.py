@@ -58,8 +58,8 @@ class Certificate(Piece):
     """A proof of a periodic response, or why there is none."""
 
     JSON: ClassVar = (
-        "proves certified=reached status reason max_abs frequency_hz load_factor half_peak_to_peak events held"
-        " bits work seconds certificate"
+        "proves certified=reached status reason max_abs frequency_hz load_factor half_peak_to_peak events"
+        " held bits work seconds certificate"
     )
 
     proves: Annotated[str, "What was to be proved: a response, a peak, a least peak."]

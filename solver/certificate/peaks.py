@@ -10,19 +10,17 @@ from solver.scene.scene import Scene
 
 
 def certified_peaks(
-    scene: Scene, frequencies_hz: Sequence[float], *, least_over: str = "", harmonics: int = 11
+    peaks: Sequence[tuple[Scene, float]], *, least_over: str = "", harmonics: int = 11
 ) -> tuple[Certificate, ...]:
-    """Prove the peaks of a scene beside frequencies.
+    """Prove peaks that were found.
 
     One alone that is least over a load is proved to be that: if all of the load varies with N0, and where the
-    proof succeeds. Of equally high ones each is proved by itself, which does not say that the highest is
-    least.
+    proof succeeds. Of several each is proved by itself, which does not say that the highest is least.
 
     Parameters
     ----------
-    scene : with the values of the optimum.
-    frequencies_hz : of its highest peaks [Hz].
-    least_over : the path over which the highest is least, if it is within the range.
+    peaks : of each the scene, with the values that make it, and its frequency [Hz].
+    least_over : the path over which the highest is least, within the range.
     harmonics : highest harmonic of the balance that the search begins with.
 
     Raises
@@ -32,12 +30,16 @@ def certified_peaks(
     MissingExtraError
         Without python-flint.
     """
-    check_certifiable(scene)
-    near = [solve(scene, frequency_hz=hertz, harmonics=harmonics) for hertz in frequencies_hz]
-    varied = [scene.contacts[i].load for i in loads_of(scene, least_over)]
-    if len(near) == 1 and varied and all(load is not None and load.in_proportion for load in varied):
+    for scene, _ in peaks:
+        check_certifiable(scene)
+    near = [solve(scene, frequency_hz=hertz, harmonics=harmonics) for scene, hertz in peaks]
+    if len(near) == 1 and _all_in_proportion(peaks[0][0], least_over):
         least = certify(near[0], least_over=least_over)
-        if least.reached:
-            return (least,)
-        return least, certify(near[0], peak=True)
+        return (least,) if least.reached else (least, certify(near[0], peak=True))
     return tuple(certify(each, peak=True) for each in near)
+
+
+def _all_in_proportion(scene: Scene, path: str) -> bool:
+    """Whether a path is that of a load which varies in proportion to it."""
+    loads = [scene.contacts[i].load for i in loads_of(scene, path)]
+    return bool(loads) and all(load is not None and load.in_proportion for load in loads)

@@ -29,11 +29,14 @@ def prepare(scene: Scene) -> None:
     check_certifiable(scene)
 
 
-def with_proofs(answer: Answer, scene: Scene, frequencies_hz: Sequence[float], least_over: str) -> Answer:
-    """Return an answer with the proofs of its peaks; it falls short if one is not proved."""
+def with_proofs(answer: Answer, peaks: Sequence[tuple[Scene, float]], least_over: str) -> Answer:
+    """Return an answer with proofs of peaks; it falls short if one is not proved.
+
+    Arguments as of `solver.certificate.peaks.certified_peaks`.
+    """
     from solver.certificate.peaks import certified_peaks
 
-    found = certified_peaks(scene, frequencies_hz, least_over=least_over)
+    found = certified_peaks(peaks, least_over=least_over)
     missing = [each.status.value for each in found if not each.reached]
     return answer._replace(
         json=answer.json | {"certificates": [each.to_json() for each in found]},

@@ -69,9 +69,8 @@ class Peaks(Study, RangeRequest):
         best, path = track.optimum, given["parameter"]
         if not best.active:
             return answer
-        inside = path if best.status is best.status.TRACKED else ""
-        peaks = [each.frequency for each in best.active]
-        return with_proofs(answer, scene.with_values({path: best.at}), peaks, inside)
+        inside, there = path if best.status is best.status.TRACKED else "", scene.with_values({path: best.at})
+        return with_proofs(answer, [(there, each.frequency) for each in best.active], inside)
 
     @classmethod
     def sweeps(cls, found: PeakTrack) -> tuple[SweepRecord, ...]:

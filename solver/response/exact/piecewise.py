@@ -29,7 +29,7 @@ STICK, FREE = 0, 2  # of a slider; one that slips has its direction, +1 or -1
 TO_SLIP, TO_REST, TO_OPEN, TO_CLOSE, AT_GAP, LIFTS = range(6)  # what ends a piece
 _PARALLEL = 1e-12
 _ELASTIC = "give one a large finite kt (the error falls with its square root)"
-_EVENTS = "where contacts are followed by their events (kt = inf, kn = inf, exact)"
+_EVENTS = "where contacts are followed by their events (kt = inf, kn = inf, exact, certify)"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
