@@ -28,6 +28,7 @@ class Form(Enum):
     NUMBERS_BY_WORD = "WORD=NUMBER, repeatable"
     WORDS_BY_PATH = "PATH=WORD, repeatable"
     NAMES = "NAME, repeatable"
+    FLAG = "no word"
 
 
 @dataclass(frozen=True, slots=True)

@@ -235,6 +235,10 @@ COMMANDS = {
             "import", "commands.import_matrices.import_scene", "Make a scene of matrices or modes in files.",
         ),
         CommandEntry(
+            "export", "commands.export.export",
+            "Write a scene for other programs: equations for MATLAB, a unit for co-simulation (FMI 2.0).",
+        ),
+        CommandEntry(
             "schema", "commands.scenes.schema",
             "Print the JSON Schema of scene files, design problems or jobs, for editors.",
         ),
@@ -244,7 +248,7 @@ COMMANDS = {
         ),
         CommandEntry(
             "check-proof", "commands.certificates.check_proof",
-            "Check the proof of a response, in a file that `solve --certify --json` wrote.",
+            "Check the proofs in a file that `solve`, `peaks` or `design --certify --json` wrote.",
         ),
         CommandEntry("demo", "commands.service.demo", "Run the main job end to end, with pictures."),
     ),

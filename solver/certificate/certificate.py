@@ -19,6 +19,7 @@ from solver.certificate.boxes import boxed, claimed, orbit_at, set_out, settled
 from solver.certificate.summits import least_proved, peak_proved
 from solver.errors import MissingExtraError, SettingError
 from solver.response.exact.beside import orbit_beside
+from solver.response.exact.piecewise import Piecewise
 from solver.response.solution import Solution
 from solver.response.solve import solve
 from solver.results.files import whole
@@ -29,9 +30,9 @@ from solver.scene.scene import Scene
 if TYPE_CHECKING:
     from solver.certificate.checker import RejectedError
     from solver.response.exact.orbit import Orbit as ExactOrbit
-    from solver.response.exact.piecewise import Piecewise
 
 _BITS = (128, 256)
+MOST_WORK = 5000.0
 _MOVES = 8  # contacts moved
 _NARROW = 1e-16  # relative width of what is claimed; else more bits
 _MOVED = 1e-9  # of its limit, by which the force of what sticks at the edge of it is moved inward
@@ -45,6 +46,10 @@ class CertificateStatus(Enum):
         "Not proved, `reason` says which inequality fails: change a parameter a little, away from where a "
         "contact only just slips, opens or touches."
     )
+    WORK_USED_UP = (
+        "Not proved: the work allowed is used up. Allow more (`most_work`), or a system with fewer "
+        "coordinates or events."
+    )
     NO_ORBIT = "Not proved: no periodic motion was found from event to event beside this solution."
 
 
@@ -53,12 +58,13 @@ class Certificate(Piece):
     """A proof of a periodic response, or why there is none."""
 
     JSON: ClassVar = (
-        "certified=reached status reason max_abs frequency_hz load_factor half_peak_to_peak events held bits"
-        " seconds certificate"
+        "proves certified=reached status reason max_abs frequency_hz load_factor half_peak_to_peak events"
+        " held bits work seconds certificate"
     )
 
+    proves: Annotated[str, "What was to be proved: a response, a peak, a least peak."]
     status: Annotated[CertificateStatus, "Whether it was proved."]
-    reason: Annotated[str, "Which inequality fails, by how much; empty if none does."]
+    reason: Annotated[str, "Which inequality fails, by how much, or why there is nothing to prove; or empty."]
     max_abs: Annotated[
         tuple[float, float], "Bounds of the largest |x| of the observed DOF [m]; NaN if there are none."
     ]
@@ -74,6 +80,7 @@ class Certificate(Piece):
         "`max_abs` depends on it.",
     ]
     bits: Annotated[int, "Precision it was proved with."]
+    work: Annotated[float, "Work done, in millions of products of balls of 128 bits."]
     seconds: Annotated[float, "Time taken [s]."]
     certificate: Annotated[dict[str, Any] | None, "What `stickslip check-proof` checks; None if not proved."]
 
@@ -98,7 +105,9 @@ class Certificate(Piece):
             temporary.write_text(json.dumps(self.certificate), encoding="utf-8")
 
 
-def certify(solution: Solution, *, peak: bool = False, least_over: str = "") -> Certificate:
+def certify(
+    solution: Solution, *, peak: bool = False, least_over: str = "", most_work: float = MOST_WORK
+) -> Certificate:
     """Prove a periodic response of piecewise linear contacts, and enclose its amplitude.
 
     Between two events all is linear, so the orbit is a zero of finitely many equations: Krawczyk's operator
@@ -107,49 +116,58 @@ def certify(solution: Solution, *, peak: bool = False, least_over: str = "") -> 
 
     Parameters
     ----------
-    solution : one that converged, of contacts of the laws coulomb, elastic-normal and gap.
+    solution : of contacts of the laws coulomb, elastic-normal and gap.
     peak : prove the peak of max|x| over the frequency beside it instead.
     least_over : the path of a load, such as ``damper.N0``, over which that peak is least near this solution;
         prove the least peak. With N0 all of the load varies, its harmonics likewise.
+    most_work : work allowed, in millions of products of balls of 128 bits; it ends then with WORK_USED_UP.
 
     Raises
     ------
     SettingError
-        It did not converge, the scene has a part that has no place in an exact solution, or the path is none
-        of a load.
+        The scene has a part that has no place in an exact solution, or the path is none of a load.
     MissingExtraError
         Without python-flint.
     """
     begun = time.perf_counter()
-    try:
-        from solver.certificate.checker import RejectedError
-        from solver.certificate.statement import system_of
-    except ImportError as error:
-        raise MissingExtraError("python-flint", "proof") from error
-    if not solution.converged:
-        raise SettingError("solution", solution.status.value, "must have converged")
-    if solution.scene.structure.has_sectors:  # a disk written out is a system like any other
+    _check_extra()
+    from solver.certificate.checker import RejectedError
+    from solver.certificate.statement import system_of
+    from solver.certificate.work import WorkUsedUpError, allowed
+
+    if (
+        solution.converged and solution.scene.structure.has_sectors
+    ):  # a disk written out is a system like any other
         solution = solve(
             annulus(solution.scene), frequency_hz=solution.frequency_hz, harmonics=solution.n_harmonics
         )
-    piecewise, orbit = orbit_beside(solution, polish=1)  # exact numbers go on from there
+    orbit, reason = None, solution.status.value
+    if solution.converged:
+        (piecewise, orbit), reason = orbit_beside(solution, polish=1), ""  # exact numbers go on from there
     raw: dict[str, Any] = {"certifies": "periodic orbit", "scene": solution.scene.name}
-    status, reason, bounds = CertificateStatus.NO_ORBIT, "", {}
+    status, bounds, work = CertificateStatus.NO_ORBIT, {}, 0.0
     if orbit is not None:
         raw["system"] = system_of(piecewise, solution.frequency_hz)
-        try:
-            if least_over:
-                raw["varies"] = _loads_of(solution.scene, least_over)
-            proved = least_proved if least_over else peak_proved if peak else _proved
-            bounds = proved(raw, piecewise, orbit)
-            status = CertificateStatus.CERTIFIED
-        except RejectedError as error:
-            status, reason = CertificateStatus.NOT_CERTIFIED, str(error)
+        if least_over:
+            raw["varies"] = loads_of(solution.scene, least_over)
+        if least_over and not raw["varies"]:
+            raise SettingError("least_over", least_over, "must be the path of a load, such as damper.N0")
+        proved = least_proved if least_over else peak_proved if peak else _proved
+        with allowed(most_work) as allowance:
+            try:
+                bounds = proved(raw, piecewise, orbit)
+                status = CertificateStatus.CERTIFIED
+            except RejectedError as error:
+                status, reason = CertificateStatus.NOT_CERTIFIED, str(error)
+            except WorkUsedUpError:
+                status = CertificateStatus.WORK_USED_UP
+        work = allowance.done
     unknown = (math.nan, math.nan)
     contacts, course = raw.get("system", {}).get("contacts", ()), raw.get("orbit", {})
     heights = (bounds[key] for key in ("least_peak", "peak", "max_abs") if key in bounds)
     return Certificate(
-        status=status, reason=reason, max_abs=next(heights, unknown),
+        proves="least peak" if least_over else "peak" if peak else "response", status=status,
+        reason=reason, max_abs=next(heights, unknown), work=work,
         frequency_hz=bounds.get("frequency_hz", (solution.frequency_hz, solution.frequency_hz)),
         load_factor=bounds.get("load_factor", (1.0, 1.0)),
         half_peak_to_peak=bounds.get("half_peak_to_peak", unknown), events=len(course.get("events", ())),
@@ -158,13 +176,24 @@ def certify(solution: Solution, *, peak: bool = False, least_over: str = "") -> 
     )  # fmt: skip
 
 
-def _loads_of(scene: Scene, path: str) -> list[int]:
-    """Return the numbers of the contacts whose load a path is."""
+def _check_extra() -> None:
+    try:
+        import flint  # noqa: F401 - whether it is there
+    except ImportError as error:
+        raise MissingExtraError("python-flint", "proof") from error
+
+
+def check_certifiable(scene: Scene) -> None:
+    """Raise what `certify` would, before what it is to prove is computed."""
+    _check_extra()
+    Piecewise(annulus(scene) if scene.structure.has_sectors else scene, 1.0)
+
+
+def loads_of(scene: Scene, path: str) -> list[int]:
+    """Return the numbers of the contacts whose load a path is; none of a path of something else."""
     name, _, key = path.rpartition(".")
     found = [i for i, each in enumerate(scene.contacts) if name in (each.name, each.group)]
-    if key != "N0" or not found or any(scene.contacts[i].load is None for i in found):
-        raise SettingError("least_over", path, "must be the path of a load, such as damper.N0")
-    return found
+    return found if key == "N0" and all(scene.contacts[i].load is not None for i in found) else []
 
 
 def _proved(raw: dict[str, Any], piecewise: Piecewise, found: ExactOrbit) -> dict[str, tuple[float, float]]:

@@ -405,14 +405,14 @@ def least(parts: list[Any], enough: Any = None) -> Any:
     return best.min(bottom).union(best) if enough is None else bottom
 
 
-def stated(raw: dict[str, Any], at: dict[str, Any]) -> System:
+def stated(raw: dict[str, Any], at: dict[str, Any], kind: type[System] = System) -> System:
     """Return the system at a frequency, the loads of the contacts that vary times a factor."""
     contacts, factor = list(raw["system"]["contacts"]), arb(at.get("load_factor", 1))
     for j in raw.get("varies", ()):
         load = [[order, arb(amplitude) * factor, phase] for order, amplitude, phase in contacts[j]["load"]]
         contacts[j] = contacts[j] | {"load": load}
     frequency = at.get("frequency_hz", raw["system"]["frequency_hz"])
-    return System(raw["system"] | {"frequency_hz": frequency, "contacts": contacts})
+    return kind(raw["system"] | {"frequency_hz": frequency, "contacts": contacts})
 
 
 def summit(found: list[Any]) -> tuple[Any, Any]:

@@ -66,6 +66,7 @@ ON_THE_WAY = {"accuracy", "design", "map", "pareto", "peaks"}
 """Kinds whose sweeps are steps on the way to another result."""
 SOMETIMES = {
     "certificate",
+    "certificates",
     "drift_per_period",
     "mean_range",
     "history",

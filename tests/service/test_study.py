@@ -28,6 +28,7 @@ BESIDES = {
 # Keys that Python takes otherwise: as one of three words, as a pair, or by a function of its own.
 OTHERWISE: Mapping[str, set[str]] = {
     "controlled": {"no_stability"}, "march": {"history"}, "solve": {"every", "certify"},
+    "peaks": {"certify"}, "design": {"certify"},
     "sweep": {"multipliers", "switched"},
     "modes": {
         "start", "stop", "performance", "aero_damping", "motions", "exact_peaks", "disturbance",

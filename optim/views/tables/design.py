@@ -11,6 +11,7 @@ from solver.results import units
 from solver.results.known import known_pairs
 from solver.results.told import Block, ResultTable, Summary
 from solver.scene.parameter_paths import parameter
+from solver.views.tables.responses import proved
 
 Json = Mapping[str, Any]
 Pairs = list[tuple[str, str]]
@@ -112,6 +113,7 @@ def _pairs(found: Json) -> Pairs:
         pairs.append(("looked at", f"{looked} designs over the whole range; {ends} local optima"))
     if "certainty" in found:
         pairs.append(("certain", found["certainty"]))
+    pairs += proved(found.get("certificates") or ())
     residual = found.get("optimality")
     if residual is not None:
         pairs.append(("KKT residual", f"{residual:.1e}"))

@@ -1,10 +1,10 @@
-"""`stickslip check-proof`: check the proof of a periodic response."""
+"""`stickslip check-proof`: check proofs of periodic responses and their peaks."""
 
 from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -14,6 +14,8 @@ from service.errors import InputError
 from service.rendering.text import print_json, print_table
 from solver.errors import MissingExtraError
 
+_UNITS = {"frequency_hz": " Hz", "load_factor": ""}
+
 
 def check_proof(
     file: Annotated[
@@ -21,7 +23,7 @@ def check_proof(
     ],
     as_json: options.Json = False,
 ) -> None:
-    """Check the proof of a response, in a file that `solve --certify --json` wrote.
+    """Check the proofs in a file that `solve`, `peaks` or `design --certify --json` wrote.
 
     By solver/certificate/checker.py, which needs python-flint and nothing of this package.
     """
@@ -30,23 +32,34 @@ def check_proof(
     except ImportError as error:
         raise MissingExtraError("python-flint", "proof") from error
     try:
-        raw = json.loads(file.read_text(encoding="utf-8"))
-        while isinstance(raw.get("certificate"), dict):
-            raw = raw["certificate"]
-        claims = {name: [float(end) for end in span] for name, span in raw["claims"].items()}
+        proofs = _proofs(json.loads(file.read_text(encoding="utf-8")))
+        claims = [
+            {name: [float(end) for end in span] for name, span in raw["claims"].items()} for raw in proofs
+        ]
+        if not proofs:
+            raise ValueError("nothing is proved in it")
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise InputError(f"`FILE`: {str(file)!r} must be a certificate in JSON, got {error!r}") from error
-    reason = ""
-    try:
-        checker.check(raw)
-    except checker.RejectedError as error:
-        reason = str(error)
+    reasons = []
+    for raw in proofs:
+        try:
+            checker.check(raw)
+        except checker.RejectedError as error:
+            reasons.append(str(error))
+    reason = "; ".join(reasons)
     if as_json:
-        print_json({"accepted": not reason, "reason": reason, "claims": claims})
-    else:
-        units = {"frequency_hz": " Hz", "load_factor": ""}
-        rows = [(name, f"{low!r} to {high!r}{units.get(name, ' m')}") for name, (low, high) in claims.items()]
-        print_table(
-            f"Certificate of {raw.get('scene', 'a system')}", ("claim", "proved"), rows if not reason else []
+        print_json(
+            {"accepted": not reason, "reason": reason, "claims": claims[0] if len(claims) == 1 else claims}
         )
+    for raw, each in zip(proofs, claims, strict=True) if not (as_json or reason) else ():
+        rows = [(name, f"{low!r} to {high!r}{_UNITS.get(name, ' m')}") for name, (low, high) in each.items()]
+        print_table(f"Certificate of {raw.get('scene', 'a system')}", ("claim", "proved"), rows)
     end(not reason, f"The certificate is rejected: {reason}.")
+
+
+def _proofs(raw: dict[str, Any]) -> list[dict[str, Any]]:
+    """Return the certificates of an answer, those of peaks behind each other, or the one that it is."""
+    found = raw.get("certificates", [raw.get("certificate")])
+    if found == [None]:
+        return [raw]
+    return [proof for each in found if each for proof in _proofs(each)]

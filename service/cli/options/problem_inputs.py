@@ -67,6 +67,7 @@ _OFFERED: dict[Form, Callable[..., list[str]]] = {
 }  # fmt: skip
 _READ: dict[Form, tuple[Any, Callable[[str], Any] | None]] = {
     Form.NUMBER: (float, number), Form.WHOLE_NUMBER: (int, whole_number), Form.WORD: (str, None),
+    Form.FLAG: (bool, None),
 }  # fmt: skip
 
 
@@ -75,7 +76,9 @@ def _option(one: Option) -> Any:
     """The option of a key, the same for every command."""
     type_, parser = _READ.get(one.form, (list[str], None))
     offered = completion.words(*one.words) if one.words else _OFFERED.get(one.form)
-    told = typer.Option(one.flag, metavar=one.metavar, parser=parser, help=one.help, autocompletion=offered)
+    told = typer.Option(
+        one.flag, metavar=one.metavar or None, parser=parser, help=one.help, autocompletion=offered
+    )
     return Annotated[type_ | None, told]
 
 
@@ -146,7 +149,8 @@ def description(scene: str | None, flags: ProblemFlags, kind: str, **further: tu
     body = {} if file is None else _read(file, kind)
     given = _of_flags(flags) | ({} if scene is None else {"scene": scene})
     given |= {key: value for key, (_, value) in further.items() if value is not None}
-    options = OPTIONS | {key: option for key, (option, _) in further.items()}
+    options = OPTIONS | {key: one.flag for key, (one, _) in flags.keys.items()}
+    options |= {key: option for key, (option, _) in further.items()}
     body |= given
     if "scene" not in body:
         raise InputError("`SCENE` is missing: name a scene, or a --problem file with the key `scene`")

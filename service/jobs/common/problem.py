@@ -18,7 +18,8 @@ from solver.errors import Issue
 if TYPE_CHECKING:
     from solver.scene.scene import Scene
 
-_OF_OTHERS = ("points", *ROBUST)
+CERTIFY = "certify"
+_OF_OTHERS = ("points", CERTIFY, *ROBUST)
 
 
 class ProblemRequest(ProblemKeys, Study, HarmonicRequest):

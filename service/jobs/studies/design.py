@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, RootModel
 
 import optim
+from optim.criteria.key import Form, Option
 from optim.problem.keys import ROBUST, NominalAndRobustKeys, of_design
-from service.jobs.common.problem import ProblemRequest, arguments
+from service.jobs.common.problem import CERTIFY, ProblemRequest, arguments
+from service.jobs.common.proofs import CERTIFICATES, prepare, with_proofs
 from service.jobs.common.results import PeakAt, Table, answered
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
 from service.jobs.figures import SweepRecord
@@ -30,7 +32,7 @@ if TYPE_CHECKING:
     from solver.scene.scene import Scene
 
 UNCERTAIN = "uncertain"
-_NOT_ROBUST = ("basins",)
+_NOT_ROBUST = ("basins", CERTIFY)
 
 _EXAMPLE: dict[str, Any] = {
     "scene": "bladed-disk",
@@ -55,7 +57,8 @@ def design_result() -> type[BaseModel]:
         "optim:DesignResult", "OptimumResult", peak=PeakAt | None, peaks=_Rows, bands=_Rows, rows=_Rows,
         errors=_Rows, looked_at=_Rows, tried=_Rows, broken=_Rows, plateau=Table, conditions=Table | None,
         objective=float | None, limit=float | None, stable=str, stable_ground=str, newton_iterations=int,
-        multipliers=list[float | None], n_harmonics=(int, Field(description=_HARMONICS)),
+        multipliers=list[float | None], certificates=CERTIFICATES,
+        n_harmonics=(int, Field(description=_HARMONICS)),
     )()  # fmt: skip
     robust: Any = answered(
         "optim:RobustResult", "RobustResult", scene=str, quantile=float | None, nominal=Table | None,
@@ -71,6 +74,20 @@ def design_result() -> type[BaseModel]:
     return DesignResult
 
 
+def _peaks_of(found: Optimum) -> tuple[list[tuple[Scene, float]], str]:
+    """Return the peaks that hold a design, each with the scene it is of, and the load they are least over."""
+    from optim.criteria.peak import PEAK
+    from optim.results.design import SAME_HEIGHT, DesignStatus
+
+    responses = () if found.evaluation is None else found.evaluation.responses
+    scenes = {each.case: each.branch.posed.scene for each in responses}
+    rows = [] if found.evaluation is None else found.evaluation.highest(SAME_HEIGHT)
+    peaks = [(scenes[row.case], row.at_hz) for row in rows if row.quantity is PEAK]
+    alone = found.problem.plain and found.status is DesignStatus.OPTIMAL and not found.plateau
+    variables = found.problem.variables
+    return peaks, variables[0].name if alone and len(variables) == 1 else ""
+
+
 class _Design(NominalAndRobustKeys, ProblemRequest):
     """Find the best damper.
 
@@ -84,6 +101,15 @@ class _Design(NominalAndRobustKeys, ProblemRequest):
     TOLD = "optim.views.tables.design:design"
     SHOWS, SWEEPS = "the optimum and what holds it", "every response computed"
 
+    certify: Annotated[
+        Annotated[bool, Field(strict=True)] | None,
+        Option(Form.FLAG, "--certify", "", help="Prove the peaks that hold the design, see `peaks`."),
+    ] = Field(
+        default=None,
+        description="Prove the peaks that hold the design, where contacts are piecewise linear; over one "
+        "load the least peak.",
+    )
+
     def issues(self, scene: Scene) -> list[Issue]:
         """Return everything wrong with a design, robust or not."""
         # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
@@ -93,7 +119,7 @@ class _Design(NominalAndRobustKeys, ProblemRequest):
         apart, which = (_NOT_ROBUST, "without") if robust else (ROBUST, "with")
         words = f"is for a design {which} `uncertain` parameters"
         found = super().issues(scene) + [Issue((key,), words, given[key]) for key in apart if key in given]
-        known = {key: value for key, value in given.items() if key not in ROBUST}
+        known = {key: value for key, value in given.items() if key not in (CERTIFY, *ROBUST)}
         return found + (uncertainty_issues(scene, known, given[UNCERTAIN]) if robust else [])
 
     def sizes(self, scene: Scene) -> list[Issue]:
@@ -110,9 +136,13 @@ class _Design(NominalAndRobustKeys, ProblemRequest):
 
         best = getattr(watch.on_progress, "best", None)
         on_best = None if best is None else lambda found: best(found.to_json())
-        search = optim.robust_design if UNCERTAIN in asked else optim.design
-        found = search(scene, **asked, **watch._asdict(), on_best=on_best)
-        return Answer.of(found)
+        given = dict(asked)
+        if proof := given.pop(CERTIFY, False):
+            prepare(scene)
+        search = optim.robust_design if UNCERTAIN in given else optim.design
+        found: Any = search(scene, **given, **watch._asdict(), on_best=on_best)
+        answer = Answer.of(found)
+        return with_proofs(answer, *_peaks_of(found)) if proof and found.peak is not None else answer
 
     @classmethod
     def sweeps(cls, found: Optimum | Robust) -> tuple[SweepRecord, ...]:

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import ConfigDict, Field
 
+from service.jobs.common.proofs import CERTIFICATES, Certify, prepare, with_proofs
 from service.jobs.common.results import answered
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
 from service.jobs.common.study_keys import RangeRequest, law_issues, range_issues
 from service.jobs.figures import SweepRecord
 from service.jobs.registry import Flag
-from service.jobs.study import Study
+from service.jobs.study import Answer, Study, Watch
 from solver.errors import Issue
 from solver.scene.descriptions import DISK_LOAD
 
@@ -20,7 +22,7 @@ if TYPE_CHECKING:
     from solver.studies.peaks.results import PeakTrack
 
 
-peaks_result = answered("solver.studies.peaks.results:PeakTrack", "PeaksResult")
+peaks_result = answered("solver.studies.peaks.results:PeakTrack", "PeaksResult", certificates=CERTIFICATES)
 
 
 class Peaks(Study, RangeRequest):
@@ -44,6 +46,8 @@ class Peaks(Study, RangeRequest):
         default=3, description="Sweeps between the ends that look for peaks nothing has followed."
     )
 
+    certify: Certify = False
+
     def issues(self, scene: Scene) -> list[Issue]:
         """Return what is wrong with the range and the laws of the contacts."""
         return range_issues(self, scene) + law_issues("scene", scene)
@@ -52,6 +56,21 @@ class Peaks(Study, RangeRequest):
         """Return what is too large."""
         points = POINTS_OF_A_SWEEP * (self.checks + 2)
         return balance_issues("checks", scene, self.harmonics, points)
+
+    @classmethod
+    def compute(cls, scene: Scene, asked: Mapping[str, Any], watch: Watch) -> Answer:
+        """Follow the peaks; then prove the least, if that is asked for."""
+        given = dict(asked)
+        if not given.pop("certify", False):
+            return super().compute(scene, given, watch)
+        prepare(scene)
+        answer = super().compute(scene, given, watch)
+        track: Any = answer.result
+        best, path = track.optimum, given["parameter"]
+        if not best.active:
+            return answer
+        inside, there = path if best.status is best.status.TRACKED else "", scene.with_values({path: best.at})
+        return with_proofs(answer, [(there, each.frequency) for each in best.active], inside)
 
     @classmethod
     def sweeps(cls, found: PeakTrack) -> tuple[SweepRecord, ...]:

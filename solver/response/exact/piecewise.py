@@ -29,7 +29,7 @@ STICK, FREE = 0, 2  # of a slider; one that slips has its direction, +1 or -1
 TO_SLIP, TO_REST, TO_OPEN, TO_CLOSE, AT_GAP, LIFTS = range(6)  # what ends a piece
 _PARALLEL = 1e-12
 _ELASTIC = "give one a large finite kt (the error falls with its square root)"
-_EVENTS = "where contacts are followed by their events (kt = inf, kn = inf, exact)"
+_EVENTS = "where contacts are followed by their events (kt = inf, kn = inf, exact, certify)"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -101,7 +101,7 @@ class Piecewise:
 
     def __init__(self, scene: Scene, omega: float) -> None:
         model = linear_model(scene)
-        _check_structure(scene, model)
+        check_structure(scene, model)
         self.scene, self.omega, self.n = scene, omega, model.n_coordinates
         zero = np.zeros(1, np.int64)
         K, C, M = (np.real(each[0]) for each in model.at(zero, np.ones(1, np.bool_)))
@@ -347,15 +347,15 @@ def _slider_of(row: Real, kt: float, rows: list[Real], stiffnesses: list[float])
     return len(rows) - 1, 1.0
 
 
-def _check_structure(scene: Scene, model: LinearModel) -> None:
-    """Refuse what is no system of ordinary differential equations under forces."""
+def check_structure(scene: Scene, model: LinearModel, where: str = _EVENTS) -> None:
+    """Refuse what is no system of ordinary differential equations under forces; `where` that is asked for."""
     structure = scene.structure
     if model.sectors > 1 or structure.has_sectors:
-        raise SettingError("structure", structure.kind, f"must be without sectors {_EVENTS}")
+        raise SettingError("structure", structure.kind, f"must be without sectors {where}")
     if model.extra is not None and not model.extra.is_real:
         raise SettingError(
-            "loss_factor", structure.loss_factor, f"must be 0 {_EVENTS}: it has no meaning in time"
+            "loss_factor", structure.loss_factor, f"must be 0 {where}: it has no meaning in time"
         )
     if model.prescribed or model.line is not None:
         what = "excitation" if model.prescribed else "speed_order"
-        raise SettingError(what, scene.name, f"must be forces at a fixed speed {_EVENTS}")
+        raise SettingError(what, scene.name, f"must be forces at a fixed speed {where}")

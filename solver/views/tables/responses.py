@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from solver.results import units
@@ -55,7 +55,7 @@ def solution(found: Json) -> Iterator[Block]:
     if found["error_estimate"] is not None:
         of = "half peak to peak" if "mean_undetermined" in found["flags"] else "max|x|"
         pairs.append(("estimated error", f"{units.length(found['error_estimate'])} of {of}"))
-    pairs += _proof(found.get("certificate"))
+    pairs += proved([found["certificate"]] if found.get("certificate") else [])
     pairs.append(("harmonics 1 to 5", _harmonics(found["harmonics"])))
     pairs += [(f"contact {name}", state) for name, state in found["contacts"].items()]
     if "stable" in found:
@@ -76,15 +76,22 @@ def _harmonics(amplitudes: Sequence[float]) -> str:
     return ", ".join(units.length(a if a > least else 0.0) for a in amplitudes[1:6])
 
 
-def _proof(proof: Json | None) -> Pairs:
-    """Return what is proved of a response, or why nothing is."""
-    if proof is None:
-        return []
-    if not proof["certified"]:
-        return [("proved", f"no: {proof['reason'] or proof['status']}")]
-    low, high = proof["half_peak_to_peak" if proof["held"] else "max_abs"]
-    what = "half peak to peak" if proof["held"] else "max|x|"
-    return [("proved", f"{what} from {low!r} to {high!r} m")]
+def proved(proofs: Iterable[Json]) -> Pairs:
+    """Return what is proved of a response and of peaks, or why nothing is."""
+    pairs = []
+    for proof in proofs:
+        of = proof.get("proves", "response")
+        if not proof["certified"]:
+            pairs.append(("proved", f"no {of}: {proof['reason'] or proof['status']}"))
+            continue
+        held = of == "response" and proof["held"]
+        what = "half peak to peak" if held else "max|x|" if of == "response" else of
+        low, high = proof["half_peak_to_peak" if held else "max_abs"]
+        at = "" if of == "response" else f" at {proof['frequency_hz'][0]:.12g} Hz"
+        factor = proof["load_factor"]
+        least = f", the load {factor[0]!r} to {factor[1]!r} of that" if of == "least peak" else ""
+        pairs.append(("proved", f"{what} from {low!r} to {high!r} m{at}{least}"))
+    return pairs
 
 
 def _drift(found: Json) -> list[tuple[str, str]]:

@@ -9,6 +9,7 @@ from solver.results import units
 from solver.results.known import known_pairs
 from solver.results.told import Block, Summary
 from solver.scene.parameter_paths import parameter
+from solver.views.tables.responses import proved
 
 Json = Mapping[str, Any]
 Pairs = list[tuple[str, str]]
@@ -17,7 +18,7 @@ ON_THE_GRID = "resonances narrower than the grid are not on it: the tracked peak
 
 def track(found: Json) -> Iterator[Block]:
     """The highest peak over a parameter: both ends, the exchanges, the least."""
-    pairs = [*_ridge(found), *_plateau(found), *_sure(found)]
+    pairs = [*_ridge(found), *_plateau(found), *_sure(found), *proved(found.get("certificates") or ())]
     pairs.append(("points", f"{len(found['parameter'])}, {found['sweeps']} sweeps"))
     pairs.append(("time", units.duration(found["seconds"])))
     yield Summary(_title(found), pairs)

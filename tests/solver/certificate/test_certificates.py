@@ -7,6 +7,7 @@ import json
 import subprocess
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,9 @@ from certified_scenes import random_scene
 
 import stickslip
 from service.cli import main
+from service.jobs.studies.design import Design
+from service.jobs.studies.peaks import Peaks
+from service.jobs.study import Watch
 from solver.certificate import checker
 
 CERTIFIED = json.loads((Path(__file__).parents[2] / "data" / "certified_orbits.json").read_text())
@@ -246,6 +250,83 @@ def test_the_least_peak_is_proved() -> None:
     assert found.reached, found.reason
     assert found.max_abs[1] - found.max_abs[0] <= 1e-14 * found.max_abs[1]
     assert found.max_abs[0] == pytest.approx(best.peak, rel=1e-3)
+
+
+def test_the_work_of_a_proof_is_limited() -> None:
+    """Seed 82 has 68 events: it ends where the work allowed is used up, at the same place each time."""
+    scene, hz = random_scene(82)
+    found = stickslip.solve(scene, frequency_hz=hz, harmonics=21)
+    ended = [stickslip.certify(found, most_work=5.0) for _ in range(2)]
+    assert ended[0].status is stickslip.solutions.CertificateStatus.WORK_USED_UP
+    assert 5.0 < ended[0].work < 10.0
+    assert ended[0].work == ended[1].work
+    assert ended[0].certificate is None
+
+
+def test_a_solution_that_did_not_converge_is_not_proved() -> None:
+    scene = stickslip.load_scene("two-dof")
+    found = replace(
+        stickslip.solve(scene, frequency_hz=1.2), status=stickslip.solutions.SolutionStatus.NOT_CONVERGED
+    )
+    proof = stickslip.certify(found)
+    assert not proof.reached
+    assert proof.reason == found.status.value
+
+
+# Peaks that studies found
+
+
+@pytest.mark.long
+def test_the_least_peak_of_a_study_is_proved(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    file = tmp_path / "answer.json"
+    for words in (
+        ["peaks", "two-dof", "--parameter", "damper.N0", "--from", "40", "--to", "400"],
+        ["design", "two-dof", "--variable", "damper.N0", "40", "400"],
+    ):
+        assert main([*words, "--certify", "--json"]) == 0
+        file.write_text(capsys.readouterr().out, encoding="utf-8")
+        (found,) = json.loads(file.read_text(encoding="utf-8"))["certificates"]
+        assert (found["proves"], found["certified"]) == ("least peak", True)
+        assert found["load_factor"][0] == pytest.approx(1.0, abs=1e-3)
+        assert main(["check-proof", str(file)]) == 0
+        assert "load_factor" in capsys.readouterr().out
+
+
+def test_peaks_that_are_not_least_over_a_load_are_proved_at_their_place() -> None:
+    """At an end of the range, over a stiffness: the peak there."""
+    asked = {"parameter": "damper.kt", "start": 25.0, "stop": 30.0, "certify": True, "checks": 0}
+    answer = Peaks.compute(stickslip.load_scene("two-dof"), asked, Watch())
+    best, (proof,) = answer.json["optimum"], answer.json["certificates"]
+    assert proof["proves"] == "peak"
+    assert proof["certified"], proof["reason"]
+    assert proof["max_abs"][0] == pytest.approx(best["peak"], rel=1e-3)
+    assert proof["frequency_hz"][0] == pytest.approx(best["active"][0]["frequency"], rel=1e-3)
+
+
+def test_what_cannot_be_proved_is_refused_before_anything_is_computed(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """A law without pieces, and a design in spite of what is not known."""
+    assert (
+        main(
+            [
+                "peaks",
+                "platform-wedge",
+                "--parameter",
+                "wedge.mu",
+                "--from",
+                "0.1",
+                "--to",
+                "0.5",
+                "--certify",
+            ]
+        )
+        == 2
+    )
+    assert "must be coulomb, elastic-normal or gap" in capsys.readouterr().err
+    body = {"scene": "two-dof", "uncertain": {"damper.mu": [0.28, 0.32]}, "certify": True}
+    issues = Design.model_validate(body).issues(stickslip.load_scene("two-dof"))
+    assert [each.subject for each in issues] == [("certify",)]
 
 
 # The command

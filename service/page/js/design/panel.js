@@ -18,7 +18,7 @@ const GROUPS = [
   { legend: "Load cases: engine orders, levels, bands", id: "cases", keys: ["cases"] },
   { legend: "Limits", id: "limits" },
   { legend: "What is not known", id: "uncertainty", keys: ["uncertain", "aim", "quantile", "samples", "seed"] },
-  { legend: "Method and what is minimised", id: "method", keys: ["method", "basins", "tolerance", "weights"] },
+  { legend: "Method and what is minimised", id: "method", keys: ["method", "basins", "tolerance", "weights", "certify"] },
 ];
 let form = null;
 let uncertain = null;

@@ -1,0 +1,9 @@
+"""Scenes for other programs: their equations for MATLAB, and a functional mock-up unit (FMI 2.0)."""
+
+from optim.doors.equations import (
+    ContactRows as ContactRows,
+    Equations as Equations,
+    equations_of as equations_of,
+)
+from optim.doors.fmu import save_fmu as save_fmu
+from optim.doors.matlab import save_mat as save_mat
