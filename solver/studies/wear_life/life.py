@@ -12,6 +12,7 @@ import numpy as np
 
 from solver.arrays import Real
 from solver.balance.balance import check_harmonics
+from solver.balance.simplifications import Effects, even_harmonics_reason
 from solver.continuation.branches.sweep import sweep
 from solver.errors import SettingError
 from solver.response.known import known_of_solution
@@ -122,13 +123,14 @@ def course_of(
     own = tuple(path for path in paths if path not in wearing.entries)
     for path in own:
         _check_path(whole, wearing, path)
+    every = (*own, *(loss.path for loss in wearing.losses))
     conditions = Conditions(
         blocks=_blocks(frequency_hz, blocks), harmonics=check_harmonics(harmonics), paths=own,
+        effects=Effects(even_harmonics=even_harmonics_reason(whole, every) is not None),
         should_stop=should_stop,
     )  # fmt: skip
     if conditions.blocks is None:
-        losses = tuple(loss.path for loss in wearing.losses)
-        Sensitivities(conditions.balance(whole), (*own, *losses)).check_second()
+        Sensitivities(conditions.balance(whole), every).check_second()
     return Course(
         wearing=wearing, conditions=conditions, paths=tuple(paths), hours=float(hours), tolerance=tolerance
     )
@@ -239,4 +241,4 @@ def _known(course: Course, here: Here) -> Known:
     if conditions.blocks is None:
         return sweep(scene, harmonics=conditions.harmonics, settings=replace(SETTINGS, errors=True)).known
     there = scene.at_frequency(here.motion.hertz)
-    return known_of_solution(solve(there, here.motion.hertz, harmonics=conditions.harmonics))
+    return known_of_solution(solve(there, frequency_hz=here.motion.hertz, harmonics=conditions.harmonics))

@@ -8,7 +8,6 @@ amplitude itself does not gain by that (envelope theorem).
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Annotated
 
@@ -16,7 +15,7 @@ import numpy as np
 
 from solver.arrays import Real
 from solver.balance.balance import Balance, build, for_parameter
-from solver.balance.simplifications import Effects, even_harmonics_reason
+from solver.balance.simplifications import Effects
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.system import by_reference
 from solver.continuation.branch import Branch
@@ -78,19 +77,20 @@ class Conditions:
     blocks : (frequency [Hz], share of the time) of each; None for the peak, which is then the only one.
     harmonics : highest harmonic kept.
     paths : what is differentiated by.
+    effects : what is paid for: the harmonics stay the same over the life.
     """
 
     blocks: tuple[tuple[float, float], ...] | None
     harmonics: int
     paths: tuple[str, ...]
+    effects: Effects
     should_stop: ShouldStop = None
     solved: Annotated[int, "Responses so far."] = 0
     _known: dict[float, Motion] = field(default_factory=dict)
 
-    def balance(self, scene: Scene, paths: Sequence[str] = ()) -> Balance:
-        """Return the balance of a worn scene, with the harmonics that derivatives by the paths need."""
-        effects = Effects(even_harmonics=even_harmonics_reason(scene, (*self.paths, *paths)) is not None)
-        return build(scene, harmonics=self.harmonics, effects=effects)
+    def balance(self, scene: Scene) -> Balance:
+        """Return the balance of a worn scene."""
+        return build(scene, harmonics=self.harmonics, effects=self.effects)
 
     def swept(self, scene: Scene) -> Branch:
         """Return the response over the band.
@@ -102,7 +102,7 @@ class Conditions:
         """
         branch = sweep(
             scene, harmonics=self.harmonics, settings=SETTINGS, should_stop=self.should_stop,
-            effects=self.balance(scene).effects,
+            effects=self.effects,
         )  # fmt: skip
         self.solved += len(branch.values)
         if not branch.reached or not branch.peaks:
