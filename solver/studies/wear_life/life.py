@@ -47,7 +47,7 @@ def wear_life(
     limit: float | None = None,
     paths: Sequence[str] = (),
     points: int = 40,
-    tolerance: float = 1e-7,
+    tolerance: float = 1e-6,
     harmonics: int = 11,
     on_progress: OnProgress = None,
     should_stop: ShouldStop = None,
@@ -70,7 +70,8 @@ def wear_life(
     frequency_hz : at which it runs [Hz]; always at the highest peak of the band, the worst case, if left out.
     blocks : several frequencies [Hz], each with the hours of a mission it runs there, repeated often.
     limit : amplitude of the observed DOF [m]: when it is reached.
-    paths : parameter paths, or `coefficient` (by name ``coefficient.NAME``), to differentiate by.
+    paths : parameter paths, or `coefficient` (by name ``coefficient.NAME``), to differentiate by; of a shape's
+        faces those of its contacts and their group.
     points : instants shown, evenly over the hours.
     tolerance : relative error of a step over the hours.
     harmonics : highest harmonic kept.
@@ -102,7 +103,7 @@ def course_of(
     scene: Scene, hours: float, coefficient: PerContact, area: PerContact, *,
     load_loss_per_depth: PerContact | None = None, stiffness_loss_per_depth: PerContact | None = None,
     frequency_hz: float | None = None, blocks: Sequence[Sequence[float]] | None = None,
-    paths: Sequence[str] = (), tolerance: float = 1e-7, harmonics: int = 11, should_stop: ShouldStop = None,
+    paths: Sequence[str] = (), tolerance: float = 1e-6, harmonics: int = 11, should_stop: ShouldStop = None,
 ) -> Course:  # fmt: skip
     """Return a life that was not followed yet, by the arguments of `wear_life`.
 
@@ -111,7 +112,8 @@ def course_of(
     SettingError
         As `wear_life`.
     """
-    whole = written_out(scene)
+    # The points of a shape's faces wear each by itself: they become contacts of their own.
+    whole = written_out(scene).model_copy(update={"dampers": ()})
     wearing = wearing_of(
         whole, coefficient, area, load_loss_per_depth=load_loss_per_depth,
         stiffness_loss_per_depth=stiffness_loss_per_depth,

@@ -171,11 +171,12 @@ def _load_loss(scene: Scene, i: int, contact: AnyContact, given: tuple[float, st
 
 
 def _loss(scene: Scene, i: int, contact: AnyContact, key: str, per_depth: float, *, of_kn: bool) -> Loss:
-    path = f"{contact.name}.{key}"
+    path, asked = f"{contact.name}.{key}", "load_loss_per_depth" if key == LOAD else "stiffness_loss_per_depth"
     if key not in contact.parameters:
-        raise SettingError(path, contact.LAW, "must be a number of the contact: its law has none")
+        wanted = f"must not be given for the contact {contact.name}: its law {contact.LAW} has no {key}"
+        raise SettingError(asked, per_depth, wanted)
     if scene.with_speed and follows_speed(scene, path) is not None:
-        raise SettingError(path, None, "must not follow the speed (`with_speed`) where the contact wears")
+        raise SettingError(asked, per_depth, f"must not lower {path}, which follows the speed (`with_speed`)")
     least = -math.inf if key == LOAD and getattr(contact, "moving", None) is not None else 0.0
     return Loss(contact=i, key=key, path=path, per_depth=per_depth, of_kn=of_kn, least=least)
 
@@ -194,14 +195,15 @@ def _of_contacts(
         return dict.fromkeys(rubbing, (number, key))
     found: dict[int, tuple[float, str]] = {}
     for name, value in given.items():
-        number = _number(f"{key}.{name}", value, above=above)
+        number = _number((key, name), value, above=above)
         members = [i for i in rubbing if name in _called(scene.contacts[i])]
         if not members:
             known = dict.fromkeys(word for i in rubbing for word in _called(scene.contacts[i]))
-            raise SettingError(key, name, f"must name contacts with friction, or groups: {', '.join(known)}")
+            wanted = f"must name contacts with friction, or groups of them: {', '.join(known)}"
+            raise SettingError((key, name), name, wanted)
         for i in members:
             if i in found:
-                raise SettingError(key, name, f"gives {scene.contacts[i].name} a second number")
+                raise SettingError((key, name), value, f"gives {scene.contacts[i].name} a second number")
             found[i] = number, f"{key}.{name}"
     return dict(sorted(found.items()))
 
@@ -212,7 +214,7 @@ def _called(contact: AnyContact) -> list[str]:
     return list(dict.fromkeys(name for name in names if name))
 
 
-def _number(key: str, value: object, *, above: bool) -> float:
+def _number(key: str | tuple[str, str], value: object, *, above: bool) -> float:
     if isinstance(value, int | float) and not isinstance(value, bool):
         number = float(value)
         if 0.0 <= number <= LARGEST and (number > 0.0 or not above):
