@@ -312,17 +312,26 @@ class Course:
 
     def maxima(self, begin: float = 0.0, end: float = math.inf) -> list[Here]:
         """Return the local maxima of the amplitude between two times [h], highest first; ends are among them."""
-        found, left = [], self.at(begin)
-        if left.rise <= 0.0:
-            found.append(left)
-        for stretch in self.stretches:
-            if stretch.end.hours <= begin or stretch.begin.hours >= end:
-                continue
-            left = stretch.begin if stretch.begin.hours >= begin else left
-            right = stretch.end if stretch.end.hours <= end else self.at(end)
+        last = self.stretches[-1].end.hours
+        begin, end = min(begin, last), min(end, last)
+        parts = [
+            (
+                one.begin if one.begin.hours >= begin else self.at(begin),
+                one.end if one.end.hours <= end else self.at(end),
+            )
+            for one in self.stretches
+            if one.begin.hours < end and one.end.hours > begin
+        ]
+        if not parts:
+            return [self.at(end)]
+        found, before = [], math.inf if parts[0][0].rise <= 0.0 else 0.0
+        for left, right in parts:
+            if before > 0.0 >= left.rise:
+                found.append(left)
             if left.rise > 0.0 > right.rise:
                 found.append(self.at(self._root(lambda hours: self.at(hours).rise, left, right)))
-        if right.rise >= 0.0 or not found:
+            before = right.rise
+        if before >= 0.0 or not found:
             found.append(right)
         return sorted(found, key=lambda one: -one.amplitude)
 

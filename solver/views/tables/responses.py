@@ -265,6 +265,18 @@ def wear_life(found: Json) -> Iterator[Block]:
         yield ResultTable("Derivatives", heads, slopes)
 
 
+def least_worn_peak(found: Json) -> Iterator[Block]:
+    """The best value of a parameter for contacts that wear."""
+    pairs: Pairs = []
+    if found["at"] is not None:
+        pairs.append(("best", f"{found['parameter']} = {parameter(found['parameter'], found['at'])}"))
+        when = f"after {units.number(found['worst_hours'])} h"
+        pairs.append(("worst amplitude", f"{units.length(found['worst'])} {when}"))
+        pairs.append(("before anything is worn", units.length(found["first"])))
+    pairs += [("lives looked at", str(len(found["looked_at"]))), ("time", units.duration(found["seconds"]))]
+    yield Summary(f"{found['scene']}, least amplitude of worn contacts", pairs)
+
+
 def _force(value: float | None) -> str:
     return "" if value is None else f"{units.number(value)} N"
 
