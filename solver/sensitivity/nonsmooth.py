@@ -63,7 +63,11 @@ def peak_gradient(sensitivities: Sensitivities, peak: Peak) -> PeakGradient:
     peak : one of the branch, as `solver.sweep` returns them.
     """
     here = sensitivities.gradient(peak.solution, peak.at)
-    kind, gradient, drift = PeakKind.UNRESOLVED, here.by_parameters, np.full(len(sensitivities.paths), math.nan)
+    kind, gradient, drift = (
+        PeakKind.UNRESOLVED,
+        here.by_parameters,
+        np.full(len(sensitivities.paths), math.nan),
+    )
     if not peak.interior:
         kind, drift = PeakKind.END, np.zeros(len(sensitivities.paths))
     elif abs(here.by_frequency) * peak.at <= SMOOTH * here.value:

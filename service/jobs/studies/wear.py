@@ -76,7 +76,7 @@ class Wear(Study, HarmonicRequest):
     )
     paths: Annotated[list[ParameterPath] | None, Field(max_length=100), Flag("--by", "PATH")] = Field(
         default=None,
-        description="Parameters, or coefficient.NAME of a wear coefficient, that results are differentiated by.",
+        description="Parameters, or coefficient.NAME of a wear coefficient, to differentiate by.",
     )
     points: Annotated[int, Field(strict=True, ge=2, le=10_000), Flag(metavar="N")] = Field(
         default=40, description="Instants shown, evenly over the hours."

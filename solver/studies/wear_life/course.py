@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Annotated
 
 import numpy as np
@@ -24,7 +25,7 @@ from solver.arrays import Real
 from solver.results.watch import OnProgress, ShouldStop
 from solver.studies.wear_life.result import WearLifeStatus
 from solver.studies.wear_life.running import Conditions, LostError, Motion
-from solver.studies.wear_life.wearing import SECONDS_AN_HOUR, Wearing
+from solver.studies.wear_life.wearing import SECONDS_AN_HOUR, Loss, Wearing
 
 FEWEST_STEPS = 8
 MOST_STEPS = 2000
@@ -91,17 +92,20 @@ class Course:
     paths: tuple[str, ...]
     hours: float
     tolerance: float
-    stretches: list[Stretch] = field(default_factory=list)
-    switches: list[float] = field(default_factory=list)
+    stretches: Annotated[list[Stretch], "What was followed."] = field(default_factory=list)
+    switches: Annotated[list[float], "When another peak became the highest [h]."] = field(
+        default_factory=list
+    )
     status: WearLifeStatus = WearLifeStatus.COMPLETED
-    why: str = ""
-    smooth: bool = True
+    why: Annotated[str, "What ended it."] = ""
+    smooth: Annotated[bool, "Sensitivities are known all the way."] = True
     _known: list[tuple[Real, Motion]] = field(default_factory=list)
+    _rival: Motion | None = None
 
     # What the equations are made of
 
     @property
-    def stretches_end(self) -> float:
+    def followed(self) -> float:
         """How far the life was followed [h]."""
         return self.stretches[-1].end.hours if self.stretches else 0.0
 
@@ -120,9 +124,7 @@ class Course:
         """
         return self._all(hours, state, near, rates=rates)[0]
 
-    def _all(
-        self, hours: float, state: Real, near: Motion | None, *, rates: bool
-    ) -> tuple[Here, Real, Real]:
+    def _all(self, hours: float, state: Real, near: Motion | None, *, rates: bool) -> tuple[Here, Real, Real]:
         """Return everything at a time and its state, with ∂r/∂w (n, n) and ∂r/∂θ (n, m)."""
         wearing, depths = self.wearing, state[: self.n].copy()
         found = self.conditions.at(wearing, depths, near, rates=rates)
@@ -162,7 +164,7 @@ class Course:
         slopes = by_depths @ here.slopes + by_own
         if not np.isfinite(slopes).all():
             # A peak that is about to vanish, behind where another overtakes it: a shorter step is taken.
-            if hours - self.stretches_end > _CLOSE * self.hours:
+            if hours - self.followed > _CLOSE * self.hours:
                 return np.full(state.size, math.nan)
             self.smooth, slopes = False, np.zeros_like(slopes)
         return np.concatenate([here.rates, slopes.ravel()])
@@ -234,9 +236,7 @@ class Course:
                 rival = self._overtaker(here)
                 if rival is not None:
                     meets = self._meeting(begin, here, rival, dense)
-                    self._rival = rival
-                    if meets < end:
-                        self.status = WearLifeStatus.COMPLETED
+                    self._rival, self.status, self.why = rival, WearLifeStatus.COMPLETED, ""
                     here = self.here(meets, dense(meets), begin.motion)
                     yield Stretch(begin=begin, end=here, dense=dense)
                     return
@@ -246,19 +246,18 @@ class Course:
             begin = here
             self._know(here)
 
-    _rival: Motion | None = None
-
     def _worn_out(self, begin: float, end: float, dense: Callable[[float], Real]) -> float:
         """Return the end of a step: where the first number of a contact reaches its least, if one does."""
         for loss in self.wearing.losses:
-
-            def above(hours: float, loss: object = loss) -> float:
-                return self.wearing.number(loss, dense(hours)) - loss.least  # type: ignore[arg-type,attr-defined]
-
+            above = partial(self._above, loss, dense)
             if above(end) < 0.0 < above(begin):
-                end = float(brentq(above, begin, end, xtol=_SAME * self.hours, rtol=1e-15))
+                end = float(brentq(above, begin, end, xtol=_SAME * self.hours, rtol=1e-14))
                 self.status, self.why = WearLifeStatus.WORN_OUT, loss.path
         return end
+
+    def _above(self, loss: Loss, dense: Callable[[float], Real], hours: float) -> float:
+        """Return how far a number of a contact is above its least at a time of a step."""
+        return self.wearing.number(loss, dense(hours)) - loss.least
 
     def _overtaker(self, here: Here) -> Motion | None:
         """Return the highest peak of the band if it is another one."""
@@ -311,7 +310,7 @@ class Course:
         return self.here(hours, stretch.dense(hours), stretch.begin.motion)
 
     def maxima(self, begin: float = 0.0, end: float = math.inf) -> list[Here]:
-        """Return the local maxima of the amplitude between two times [h], highest first; ends are among them."""
+        """Return the local maxima of the amplitude between two times [h], ends too, highest first."""
         last = self.stretches[-1].end.hours
         begin, end = min(begin, last), min(end, last)
         parts = [

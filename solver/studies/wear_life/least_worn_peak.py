@@ -59,7 +59,10 @@ class LeastWornPeak(Shown):
 
     VIEWS: ClassVar = Views("solver.views", "responses:least_worn_peak")
     DATA: ClassVar = Data(
-        "least-worn-peak", {"look": "looked_at heights"}, "parameter at worst worst_hours first", scene="scene"
+        "least-worn-peak",
+        {"look": "looked_at heights"},
+        "parameter at worst worst_hours first",
+        scene="scene",
     )
     JSON: ClassVar = (
         "scene parameter unit at worst worst_hours first looked_at heights completed=reached status seconds"

@@ -1,4 +1,4 @@
-"""`wear_life`: what dissipated energy wears off the contacts over hours, and what that does to the response."""
+"""`wear_life`: what dissipated energy wears off the contacts over hours, and the response meanwhile."""
 
 from __future__ import annotations
 
@@ -61,8 +61,8 @@ def wear_life(
     ----------
     scene : not worn yet.
     hours : how long it runs [h].
-    coefficient : wear coefficient [1/Pa, which is m³/J] of every contact with friction, or by contact or group:
-        then the others do not wear.
+    coefficient : wear coefficient [1/Pa, which is m³/J] of every contact with friction, or by contact or
+        group: then the others do not wear.
     area : nominal area of each contact [m²], likewise.
     load_loss_per_depth : what a depth of 1 m takes from the normal load [N/m], likewise; the normal stiffness
         of a contact that has one if left out.
@@ -70,8 +70,8 @@ def wear_life(
     frequency_hz : at which it runs [Hz]; always at the highest peak of the band, the worst case, if left out.
     blocks : several frequencies [Hz], each with the hours of a mission it runs there, repeated often.
     limit : amplitude of the observed DOF [m]: when it is reached.
-    paths : parameter paths, or `coefficient` (by name ``coefficient.NAME``), to differentiate by; of a shape's
-        faces those of its contacts and their group.
+    paths : parameter paths, or `coefficient` (by name ``coefficient.NAME``), to differentiate by; of the
+        faces of a shape those of its contacts and their group.
     points : instants shown, evenly over the hours.
     tolerance : relative error of a step over the hours.
     harmonics : highest harmonic kept.

@@ -23,11 +23,13 @@ class WearLifeStatus(Enum):
         "one grows: give the frequencies that it runs at."
     )
     NO_RESPONSE = (
-        "Beyond the last hour no response was found: use more harmonics, or look at a sweep with the loads of "
-        "that hour."
+        "Beyond the last hour no response was found: use more harmonics, or look at a sweep with the loads "
+        "of that hour."
     )
     STALLED = "The steps became too small to go on: allow a larger tolerance."
-    TOO_MANY_STEPS = "The largest number of steps was used up: look at fewer hours, or allow a larger tolerance."
+    TOO_MANY_STEPS = (
+        "The largest number of steps was used up: look at fewer hours, or allow a larger tolerance."
+    )
     STOPPED = "Stopped on request: what was followed until then."
 
 

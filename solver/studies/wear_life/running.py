@@ -109,9 +109,7 @@ class Conditions:
             raise LostError(str(branch.status.value))
         return branch
 
-    def at(
-        self, wearing: Wearing, depths: Real, near: Motion | None, *, rates: bool = True
-    ) -> Running:
+    def at(self, wearing: Wearing, depths: Real, near: Motion | None, *, rates: bool = True) -> Running:
         """Return what contacts do at depths (n,) [m].
 
         Parameters

@@ -72,7 +72,7 @@ class Wearing:
         return contact.value_of(loss.key) - loss.per_depth * float(depths[loss.contact])
 
     def at(self, depths: Real) -> Scene:
-        """Return the scene with its contacts worn by `depths` (n,) [m]; what would fall below its least stays.
+        """Return the scene with its contacts worn by `depths` (n,) [m]; nothing falls below its least.
 
         Raises
         ------
@@ -119,8 +119,8 @@ def wearing_of(
     Parameters
     ----------
     scene : its contacts by name or group; of a disk that is written out by their names in one sector.
-    coefficient : wear coefficient [1/Pa, which is m³/J] of every contact with friction, or by contact or group:
-        then the others do not wear.
+    coefficient : wear coefficient [1/Pa, which is m³/J] of every contact with friction, or by contact or
+        group: then the others do not wear.
     area : nominal area of each [m²]; of a face with several points that of each point.
     load_loss_per_depth : what a depth of 1 m takes from the normal load [N/m]; the normal stiffness of a
         contact that has one.
@@ -149,8 +149,8 @@ def wearing_of(
         found = [loss for loss in own if loss is not None]
         if not found:
             wanted = (
-                f"must be given for the contact {contact.name}: without a normal stiffness kn nothing says what "
-                "a depth takes from its load"
+                f"must be given for the contact {contact.name}: without a normal stiffness kn nothing says "
+                "what a depth takes from its load"
             )
             raise SettingError("load_loss_per_depth", None, wanted)
         losses += found
@@ -171,7 +171,10 @@ def _load_loss(scene: Scene, i: int, contact: AnyContact, given: tuple[float, st
 
 
 def _loss(scene: Scene, i: int, contact: AnyContact, key: str, per_depth: float, *, of_kn: bool) -> Loss:
-    path, asked = f"{contact.name}.{key}", "load_loss_per_depth" if key == LOAD else "stiffness_loss_per_depth"
+    path, asked = (
+        f"{contact.name}.{key}",
+        "load_loss_per_depth" if key == LOAD else "stiffness_loss_per_depth",
+    )
     if key not in contact.parameters:
         wanted = f"must not be given for the contact {contact.name}: its law {contact.LAW} has no {key}"
         raise SettingError(asked, per_depth, wanted)

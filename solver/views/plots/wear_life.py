@@ -35,7 +35,9 @@ def wear_life_figure(found: Mapping[str, Any], *, ax: Into = None) -> Figure:
             response.axhline(found["limit"] * length.per_metre, color=style.VERMILION, linewidth=0.8)
         if found["hours_to_limit"] is not None:
             at = found["hours_to_limit"]
-            response.plot([at], [found["limit"] * length.per_metre], "o", color=style.VERMILION, markersize=4.0)
+            response.plot(
+                [at], [found["limit"] * length.per_metre], "o", color=style.VERMILION, markersize=4.0
+            )
             response.set_title(f"limit after {units.number(at, 4)} h")
         else:
             response.set_title(found["scene"])

@@ -233,8 +233,12 @@ def wear_life(found: Json) -> Iterator[Block]:
     where = "at the highest peak" if found["at_peak"] else "at given frequencies"
     if hours:
         for name, at in (("max|x| at the beginning", 0), (f"after {units.number(hours[-1])} h", -1)):
-            pairs.append((name, f"{units.length(amplitude[at])} at {units.number(found['frequency_hz'][at])} Hz"))
-        pairs.append(("largest", f"{units.length(found['highest'])} after {units.number(found['highest_hours'])} h"))
+            pairs.append(
+                (name, f"{units.length(amplitude[at])} at {units.number(found['frequency_hz'][at])} Hz")
+            )
+        pairs.append(
+            ("largest", f"{units.length(found['highest'])} after {units.number(found['highest_hours'])} h")
+        )
     if found["limit"] is not None:
         met = found["hours_to_limit"]
         said = "not reached" if met is None else f"reached after {units.number(met)} h"
@@ -247,11 +251,13 @@ def wear_life(found: Json) -> Iterator[Block]:
     pairs.append(("time", units.duration(found["seconds"])))
     yield Summary(f"{found['scene']}, wear {where}", pairs)
     if hours:
+        of_each = (found[key] for key in ("contacts", "depths", "loads", "power"))
         rows = [
-            (name, units.length(depth[-1]), *(_force(load[at]) for at in (0, -1)), f"{power[0]:.4g} W", f"{power[-1]:.4g} W")
-            for name, depth, load, power in zip(
-                found["contacts"], found["depths"], found["loads"], found["power"], strict=True
+            (
+                name, units.length(depth[-1]), _force(load[0]), _force(load[-1]), f"{power[0]:.4g} W",
+                f"{power[-1]:.4g} W",
             )
+            for name, depth, load, power in zip(*of_each, strict=True)
         ]  # fmt: skip
         heads = ("contact", "depth", "load at first", "at last", "power at first", "at last")
         yield ResultTable("Contacts", heads, rows)
@@ -261,8 +267,8 @@ def wear_life(found: Json) -> Iterator[Block]:
             (path, *("" if one is None else f"{one:.6g}" for one in each))
             for path, *each in zip(found["paths"], *columns, strict=True)
         ]
-        heads = ("by", "of the last amplitude", "of the largest", "of the time to the limit")
-        yield ResultTable("Derivatives", heads, slopes)
+        by = ("by", "of the last amplitude", "of the largest", "of the time to the limit")
+        yield ResultTable("Derivatives", by, slopes)
 
 
 def least_worn_peak(found: Json) -> Iterator[Block]:

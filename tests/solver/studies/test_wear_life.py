@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, minimize_scalar
-from tests.cases.moving_scenes import moving_scene
-from tests.cases.random_scenes import random_scene
 
 from solver import Scene, load_scene, march
 from solver.errors import SettingError
 from solver.studies.wear_life.life import wear_life
 from solver.studies.wear_life.result import WearLife, WearLifeStatus
+from tests.cases.moving_scenes import moving_scene
+from tests.cases.random_scenes import random_scene
 
 M, K, C, KT, MU, F = 1.0, 40.0, 0.3, 25.0, 0.4, 12.0
 COEFFICIENT, AREA, LOSS = 1e-12, 2e-4, 4e6
@@ -76,9 +76,7 @@ def test_loads_follow_the_closed_form_at_a_fixed_frequency(hertz: float) -> None
     )  # fmt: skip
     assert found.reached
     np.testing.assert_allclose(found.loads[0], exact.y[0], rtol=1e-8)
-    np.testing.assert_allclose(
-        found.amplitude, [_amplitude(omega, N) for N in exact.y[0]], rtol=1e-8
-    )
+    np.testing.assert_allclose(found.amplitude, [_amplitude(omega, N) for N in exact.y[0]], rtol=1e-8)
 
 
 def test_loads_follow_the_closed_form_at_the_peak() -> None:
@@ -87,7 +85,8 @@ def test_loads_follow_the_closed_form_at_the_peak() -> None:
         lambda _, N: [-FADE * _power(_peak(N[0])[0], N[0])], (0.0, found.hours[-1]), [12.0], rtol=1e-10,
         atol=1e-11, t_eval=found.hours,
     )  # fmt: skip
-    assert found.reached and found.loads[0, -1] < 9.0
+    assert found.reached
+    assert found.loads[0, -1] < 9.0
     np.testing.assert_allclose(found.loads[0], exact.y[0], rtol=1e-6)
     np.testing.assert_allclose(found.amplitude, [_peak(N)[1] for N in exact.y[0]], rtol=1e-6)
 
@@ -193,7 +192,8 @@ def test_what_a_normal_stiffness_takes_is_differentiated_by_it(kind: str, *, at_
         )  # fmt: skip
 
     found = life({}, paths)
-    assert found.reached and found.depths[0, -1] > 1e-3
+    assert found.reached
+    assert found.depths[0, -1] > 1e-3
     assert found.loads[0, -1] == pytest.approx(1.0 - scene.value("c0.kn") * found.depths[0, -1])
     slopes = _slopes(found)
     for i, path in enumerate(paths):
@@ -272,5 +272,6 @@ def test_faces_of_a_shape_wear_by_their_normal_stiffness(name: str) -> None:
     found = wear_life(scene, 1e-7 / rate, {group: 1e-14}, {group: 1e-5}, **given)
     kn = np.array([contact.value_of("kn") for contact in scene.contacts])
     loads = np.array([contact.value_of("N0") for contact in scene.contacts])
-    assert found.reached and 1e-8 < found.depths[:, -1].max() < 1e-6
+    assert found.reached
+    assert 1e-8 < found.depths[:, -1].max() < 1e-6
     np.testing.assert_allclose(found.loads[:, -1], loads - kn * found.depths[:, -1], rtol=1e-12)
