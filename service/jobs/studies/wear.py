@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 from pydantic import ConfigDict, Field
 
 from optim.criteria.key import FrequencyHz, Name, ParameterPath
-from service.jobs.common.results import answered
+from service.jobs.common.results import Curve, answered
 from service.jobs.common.scenes import HarmonicRequest, PositiveNumber, check
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
 from service.jobs.registry import Flag
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 _STEPS = 20  # over the hours, each with a look at the whole band
 _NotNegative = Annotated[float, Field(strict=True, ge=0.0, le=1e15)]
+_OfContacts = list[Curve]
 _Block = Annotated[list[PositiveNumber], Field(min_length=2, max_length=2)]
 
 
@@ -40,7 +41,10 @@ class Wear(Study, HarmonicRequest):
         }
     )  # fmt: skip
     NAME, FUNCTION = "wear", "solver:wear_life"
-    RESULT = answered("solver.studies.wear_life.result:WearLife", "WearResult")
+    RESULT = answered(
+        "solver.studies.wear_life.result:WearLife", "WearResult", depths=_OfContacts, loads=_OfContacts,
+        power=_OfContacts, depth_slopes=_OfContacts,
+    )  # fmt: skip
     TOLD = "solver.views.tables.responses:wear_life"
     SHOWS, COUNTED = "depths, loads and amplitude over hours ([wear](wear.md#wear-over-life))", "responses"
     FIGURE = "solver.views.plots.wear_life:wear_life_figure"
