@@ -31,7 +31,7 @@ FEWEST_STEPS = 8
 MOST_STEPS = 2000
 _HIGHER = 1e-9  # relative height by which another peak has overtaken
 _SAME = 1e-13  # of the whole time, to which instants are located
-_SAME_PEAK = 1e-9  # relative distance of frequencies
+_SAME_PEAK = 1e-7  # relative distance of frequencies
 _CLOSE = 1e-7  # of the whole time: a step that is shorter goes on without derivatives
 _MOST_KNOWN = 40
 
@@ -234,8 +234,8 @@ class Course:
             here = self.here(end, dense(end), begin.motion)
             if self.conditions.blocks is None:
                 rival = self._overtaker(here)
-                if rival is not None:
-                    meets = self._meeting(begin, here, rival, dense)
+                meets = None if rival is None else self._meeting(begin, here, rival, dense)
+                if meets is not None:
                     self._rival, self.status, self.why = rival, WearLifeStatus.COMPLETED, ""
                     here = self.here(meets, dense(meets), begin.motion)
                     yield Stretch(begin=begin, end=here, dense=dense)
@@ -262,12 +262,13 @@ class Course:
     def _overtaker(self, here: Here) -> Motion | None:
         """Return the highest peak of the band if it is another one."""
         top = self.conditions.swept(self.wearing.at(here.depths)).peaks[0]
-        if top.value <= here.amplitude * (1.0 + _HIGHER):
+        same = abs(top.at - here.motion.hertz) <= _SAME_PEAK * top.at
+        if same or top.value <= here.amplitude * (1.0 + _HIGHER):
             return None
         return Motion(hertz=top.at, u=top.solution, moves=top.interior)
 
-    def _meeting(self, begin: Here, end: Here, rival: Motion, dense: Callable[[float], Real]) -> float:
-        """Return when another peak becomes the highest within a step [h]."""
+    def _meeting(self, begin: Here, end: Here, rival: Motion, dense: Callable[[float], Real]) -> float | None:
+        """Return when another peak becomes the highest within a step [h]; None if it is the same one."""
 
         known = [(end.hours, rival)]
 
@@ -280,6 +281,8 @@ class Course:
             known.append((hours, other))
             return self.here(hours, dense(hours), other).amplitude - here.amplitude
 
+        if above(end.hours) <= 0.0:
+            return None
         if above(begin.hours) > 0.0:
             return begin.hours
         return float(brentq(above, begin.hours, end.hours, xtol=_SAME * self.hours, rtol=1e-14))

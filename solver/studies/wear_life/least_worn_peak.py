@@ -98,7 +98,7 @@ def least_worn_peak(
     frequency_hz: float | None = None,
     blocks: Sequence[Sequence[float]] | None = None,
     looks: int = 9,
-    tolerance: float = 1e-6,
+    tolerance: float = 1e-5,
     harmonics: int = 11,
     on_progress: OnProgress = None,
     should_stop: ShouldStop = None,
