@@ -147,4 +147,11 @@ from .studies.peaks.track_peak import track_peak as track_peak
 from .studies.plan import plan as plan
 from .studies.study_results import Plan as Plan
 from .studies.response_map import response_map as response_map
+from .studies.wear_life.least_worn_peak import (
+    LeastWornPeak as LeastWornPeak,
+    WornStatus as WornStatus,
+    least_worn_peak as least_worn_peak,
+)
+from .studies.wear_life.life import wear_life as wear_life
+from .studies.wear_life.result import WearLife as WearLife, WearLifeStatus as WearLifeStatus
 from .views.io import load as load, save as save

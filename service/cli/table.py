@@ -198,6 +198,10 @@ COMMANDS = {
         ),
         CommandEntry("march", STUDY, "March in time until the motion repeats."),
         CommandEntry("transient", STUDY, "Run through a range of frequencies in time."),
+        CommandEntry(
+            "wear", STUDY,
+            "Follow what friction wears off the contacts over hours, and the response meanwhile.",
+        ),
         CommandEntry("accuracy", STUDY, "Measure what accuracy costs."),
         CommandEntry(
             "sensitivities", STUDY,

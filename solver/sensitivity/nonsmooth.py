@@ -48,6 +48,9 @@ class PeakGradient(Piece):
 
     value: Annotated[float, "max|x| at the peak [m]."]
     gradient: Annotated[Real, "d peak / dp [m per unit]; NaN where the balance is singular, (n_paths,)."]
+    drift: Annotated[
+        Real, "d frequency / dp [Hz per unit] of an end or a corner; NaN of the others, (n_paths,)."
+    ]
     kind: Annotated[PeakKind, "What the derivative is."]
 
 
@@ -60,20 +63,24 @@ def peak_gradient(sensitivities: Sensitivities, peak: Peak) -> PeakGradient:
     peak : one of the branch, as `solver.sweep` returns them.
     """
     here = sensitivities.gradient(peak.solution, peak.at)
-    kind, gradient = PeakKind.UNRESOLVED, here.by_parameters
+    kind, gradient, drift = (
+        PeakKind.UNRESOLVED,
+        here.by_parameters,
+        np.full(len(sensitivities.paths), math.nan),
+    )
     if not peak.interior:
-        kind = PeakKind.END
+        kind, drift = PeakKind.END, np.zeros(len(sensitivities.paths))
     elif abs(here.by_frequency) * peak.at <= SMOOTH * here.value:
         kind = PeakKind.SMOOTH
     elif math.isfinite(here.by_frequency):
         near, far = (_across(sensitivities, peak, share * BESIDE) for share in (1.0, 2.0))
         if near is not None and far is not None:
-            kind, gradient = PeakKind.CORNER, 2.0 * near - far
-    return PeakGradient(value=here.value, gradient=gradient, kind=kind)
+            kind, (gradient, drift) = PeakKind.CORNER, 2.0 * near - far
+    return PeakGradient(value=here.value, gradient=gradient, drift=drift, kind=kind)
 
 
 def _across(sensitivities: Sensitivities, peak: Peak, distance: float) -> Real | None:
-    """Return the derivatives of a corner from solutions at a relative distance on both sides."""
+    """Return the derivatives of height and frequency of a corner, (2, n_paths), from both sides of it."""
     sides = []
     for way in (-1.0, 1.0):
         at_hz = peak.at * (1.0 + way * distance)
@@ -83,13 +90,19 @@ def _across(sensitivities: Sensitivities, peak: Peak, distance: float) -> Real |
             return None
         found = sensitivities.gradient(u, at_hz)
         sides.append((found.by_frequency, found.by_parameters))
-    return of_corner(*sides) if sides[0][0] > 0.0 > sides[1][0] else None
+    if not sides[0][0] > 0.0 > sides[1][0]:
+        return None
+    return np.array([of_corner(*sides), corner_drift(*sides)])
+
+
+def corner_drift(left: tuple[float, Real], right: tuple[float, Real]) -> Real:
+    """Return how a corner moves with parameters, from the slopes by frequency and those on both sides."""
+    return np.asarray(-(right[1] - left[1]) / (right[0] - left[0]))
 
 
 def of_corner(left: tuple[float, Real], right: tuple[float, Real]) -> Real:
     """Return the derivatives of a corner from the slopes by frequency and parameters on both sides."""
-    drift = -(right[1] - left[1]) / (right[0] - left[0])
-    return np.asarray(left[1] + left[0] * drift)
+    return np.asarray(left[1] + left[0] * corner_drift(left, right))
 
 
 def beside(found: PointSolution, solution: Real) -> Real | None:

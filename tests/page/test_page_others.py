@@ -29,6 +29,7 @@ def test_a_kind_without_a_view_has_a_form_and_a_result(browser: Browser, site: S
             "controlled",
             "sensitivities",
             "transient",
+            "wear",
             "distortion",
         }
         page.select_option("#others-kind", "distortion")

@@ -45,6 +45,10 @@ BODIES: dict[str, dict[str, Any]] = {
     "pareto": {"scene": "two-dof", "variables": {"damper.N0": [20, 500]}, "harmonics": 3, "points": 3},
     "solve": {"scene": "two-dof", "frequency_hz": 1.2, "harmonics": 3},
     "march": {"scene": "two-dof", "frequency_hz": 1.2},
+    "wear": {
+        "scene": "two-dof", "hours": 1e-4, "coefficient": {"damper": 1e-11}, "area": {"damper": 2e-4},
+        "load_loss_per_depth": {"damper": 4e6}, "harmonics": 3,
+    },
     "transient": {"scene": "two-dof", "begin_hz": 0.9, "end_hz": 1.2, "ramp_seconds": 20.0},
     "accuracy": {"scene": "two-dof", "harmonics": [1, 3], "samples": [64], "repeats": 1},
     "campbell": {"scene": "two-dof", "speeds_rpm": [[60, 100]], "harmonics": 3},

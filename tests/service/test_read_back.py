@@ -37,6 +37,11 @@ def asked(kind: str, name: str) -> dict[str, Any]:
         "map": {**over, "steps": 2, "frequencies": 2, "ridge": name == "two-dof"},
         "design": {"variables": {FORCE: ends}}, "pareto": {"variables": {FORCE: ends}, "points": 3},
         "march": {"frequency_hz": middle, "max_periods": 3},
+        "wear": {
+            "hours": 1e-6, "coefficient": {scene.contacts[0].name: 1e-14}, "frequency_hz": middle,
+            "area": {scene.contacts[0].name: 1e-4}, "points": 3,
+            "load_loss_per_depth": {scene.contacts[0].name: 1e6},
+        },
         "transient": {"begin_hz": low, "end_hz": middle, "ramp_seconds": 10.0 / middle, "from_rest": True},
         "controlled": {"amplitude": 1e-5, **near},
         "accuracy": {"frequency_hz": middle, "harmonics": [1, 2], "samples": [16], "repeats": 1},

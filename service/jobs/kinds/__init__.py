@@ -24,6 +24,7 @@ from service.jobs.studies.sensitivities import Sensitivities
 from service.jobs.studies.solve import Solve
 from service.jobs.studies.sweep import Sweep
 from service.jobs.studies.transient import Transient
+from service.jobs.studies.wear import Wear
 from service.jobs.studies.worst_mistuning import WorstMistuningStudy
 from service.jobs.study import Study
 
@@ -46,6 +47,7 @@ SHIPPED = Registry(
         Solve.as_kind(),
         March.as_kind(),
         Transient.as_kind(),
+        Wear.as_kind(),
         Accuracy.as_kind(),
         Campbell.as_kind(),
         Interference.as_kind(),

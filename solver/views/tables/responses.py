@@ -234,6 +234,66 @@ def transient(found: Json) -> Iterator[Block]:
     yield Summary(f"{found['scene']} from {begin} to {end} Hz", pairs)
 
 
+def wear_life(found: Json) -> Iterator[Block]:
+    """What contacts lose over hours, and what the response comes to."""
+    hours, amplitude, pairs = found["hours"], found["amplitude"], []
+    where = "at the highest peak" if found["at_peak"] else "at given frequencies"
+    if hours:
+        for name, at in (("max|x| at the beginning", 0), (f"after {units.number(hours[-1])} h", -1)):
+            pairs.append(
+                (name, f"{units.length(amplitude[at])} at {units.number(found['frequency_hz'][at])} Hz")
+            )
+        pairs.append(
+            ("largest", f"{units.length(found['highest'])} after {units.number(found['highest_hours'])} h")
+        )
+    if found["limit"] is not None:
+        met = found["hours_to_limit"]
+        said = "not reached" if met is None else f"reached after {units.number(met)} h"
+        pairs.append((f"limit {units.length(found['limit'])}", said))
+    for one in found["switches"]:
+        pairs.append(("another peak is highest", f"from {units.number(one)} h on"))
+    if found["ended_by"]:
+        pairs.append(("ended by", found["ended_by"]))
+    pairs.append(("steps", f"{found['steps']}, {found['responses']} responses"))
+    pairs.append(("time", units.duration(found["seconds"])))
+    yield Summary(f"{found['scene']}, wear {where}", pairs)
+    if hours:
+        of_each = (found[key] for key in ("contacts", "depths", "loads", "power"))
+        rows = [
+            (
+                name, units.length(depth[-1]), _force(load[0]), _force(load[-1]), f"{power[0]:.4g} W",
+                f"{power[-1]:.4g} W",
+            )
+            for name, depth, load, power in zip(*of_each, strict=True)
+        ]  # fmt: skip
+        heads = ("contact", "depth", "load at first", "at last", "power at first", "at last")
+        yield ResultTable("Contacts", heads, rows)
+    if found["paths"]:
+        columns = [found[f"{name}_slopes"] for name in ("end", "highest", "limit")]
+        slopes = [
+            (path, *("" if one is None else f"{one:.6g}" for one in each))
+            for path, *each in zip(found["paths"], *columns, strict=True)
+        ]
+        by = ("by", "of the last amplitude", "of the largest", "of the time to the limit")
+        yield ResultTable("Derivatives", by, slopes)
+
+
+def least_worn_peak(found: Json) -> Iterator[Block]:
+    """The best value of a parameter for contacts that wear."""
+    pairs: Pairs = []
+    if found["at"] is not None:
+        pairs.append(("best", f"{found['parameter']} = {parameter(found['parameter'], found['at'])}"))
+        when = f"after {units.number(found['worst_hours'])} h"
+        pairs.append(("worst amplitude", f"{units.length(found['worst'])} {when}"))
+        pairs.append(("before anything is worn", units.length(found["first"])))
+    pairs += [("lives looked at", str(len(found["looked_at"]))), ("time", units.duration(found["seconds"]))]
+    yield Summary(f"{found['scene']}, least amplitude of worn contacts", pairs)
+
+
+def _force(value: float | None) -> str:
+    return "" if value is None else f"{units.number(value)} N"
+
+
 def _amplitudes(found: Json) -> Pairs:
     names = {"max_abs": "max|x|", "half_peak_to_peak": "half peak to peak", "mean": "mean"}
     known = {key: found[key] for key in names if found[key] is not None}

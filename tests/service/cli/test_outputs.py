@@ -19,6 +19,10 @@ COMMANDS = {
     "solve": "two-dof --frequency 1.2 --harmonics 3",
     "sweep": "two-dof --from 0.8 --to 1.4 --harmonics 3",
     "march": "two-dof --frequency 1.2",
+    "wear": (
+        "two-dof --hours 0.0001 --coefficient damper=1e-11 --area damper=0.0002 --load-loss damper=4e6"
+        " --harmonics 3"
+    ),
     "transient": "two-dof --from 0.9 --to 1.2 --rate 0.02",
     "peaks": "two-dof --parameter damper.N0 --from 50 --to 200 --harmonics 3",
     "map": "two-dof --parameter damper.N0 --from 50 --to 200 --steps 3 --frequencies 5 --harmonics 3",
@@ -73,6 +77,9 @@ def results() -> dict[str, Any]:
     return {
         "solve": solver.solve(scene, frequency_hz=1.2, harmonics=3),
         "march": solver.march(scene, frequency_hz=1.2),
+        "wear": solver.wear_life(
+            scene, 1e-4, 1e-11, 2e-4, load_loss_per_depth=4e6, limit=2.4, harmonics=3, points=5
+        ),
         "transient": solver.transient(scene, begin_hz=0.9, end_hz=1.2, rate_hz_per_s=0.02),
         "map": solver.response_map(scene, "damper.N0", 50, 200, steps=3, frequencies=5, harmonics=3),
         "peaks": solver.track_peak(scene, "damper.N0", 50, 200, harmonics=3),

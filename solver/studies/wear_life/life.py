@@ -1,0 +1,246 @@
+"""`wear_life`: what dissipated energy wears off the contacts over hours, and the response meanwhile."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from numbers import Real as RealNumber
+
+import numpy as np
+
+from solver.arrays import Real
+from solver.balance.balance import check_harmonics
+from solver.balance.simplifications import Effects, even_harmonics_reason
+from solver.continuation.branches.sweep import sweep
+from solver.errors import SettingError
+from solver.response.known import known_of_solution
+from solver.response.solve import solve
+from solver.results.known import NOTHING_KNOWN, Known
+from solver.results.watch import OnProgress, ShouldStop, part_of, shows_progress
+from solver.scene.cyclic.annulus import written_out
+from solver.scene.parameter_paths import check_frequency
+from solver.scene.scene import Scene
+from solver.sensitivity.gradient import Sensitivities
+from solver.studies.wear_life.course import Course, Here
+from solver.studies.wear_life.result import WearLife
+from solver.studies.wear_life.running import SETTINGS, Conditions
+from solver.studies.wear_life.wearing import LOAD, PerContact, Wearing, wearing_of
+
+MOST_HOURS = 1e9
+MOST_POINTS = 10_000
+_FOLLOWING = 0.8  # share of the work
+
+
+@shows_progress("wear life")
+def wear_life(
+    scene: Scene,
+    hours: float,
+    coefficient: PerContact,
+    area: PerContact,
+    *,
+    load_loss_per_depth: PerContact | None = None,
+    stiffness_loss_per_depth: PerContact | None = None,
+    frequency_hz: float | None = None,
+    blocks: Sequence[Sequence[float]] | None = None,
+    limit: float | None = None,
+    paths: Sequence[str] = (),
+    points: int = 40,
+    tolerance: float = 1e-6,
+    harmonics: int = 11,
+    on_progress: OnProgress = None,
+    should_stop: ShouldStop = None,
+) -> WearLife:
+    """Follow what friction wears off the contacts of a scene, with loads and response over the hours.
+
+    The depth of a contact grows by coefficient × power that friction takes out / area, and lowers its normal
+    load, which changes the response and with it the power.
+
+    Parameters
+    ----------
+    scene : not worn yet.
+    hours : how long it runs [h].
+    coefficient : wear coefficient [1/Pa, which is m³/J] of every contact with friction, or by contact or
+        group: then the others do not wear.
+    area : nominal area of each contact [m²], likewise.
+    load_loss_per_depth : what a depth of 1 m takes from the normal load [N/m], likewise; the normal stiffness
+        of a contact that has one if left out.
+    stiffness_loss_per_depth : what it takes from the tangential stiffness kt [N/m²]; nothing if left out.
+    frequency_hz : at which it runs [Hz]; always at the highest peak of the band, the worst case, if left out.
+    blocks : several frequencies [Hz], each with the hours of a mission it runs there, repeated often.
+    limit : amplitude of the observed DOF [m]: when it is reached.
+    paths : parameter paths, or `coefficient` (by name ``coefficient.NAME``), to differentiate by; of the
+        faces of a shape those of its contacts and their group.
+    points : instants shown, evenly over the hours.
+    tolerance : relative error of a step over the hours.
+    harmonics : highest harmonic kept.
+    on_progress : called with (share done, responses so far).
+    should_stop : asked between steps; True ends the life with the status STOPPED.
+
+    Raises
+    ------
+    SettingError
+        An argument out of its range, an unknown contact or path, a contact without area or of which nothing
+        says what a depth takes away, rigid contacts; at a peak a law without second derivatives or an
+        engine-order line.
+    """
+    begun = time.perf_counter()
+    course = course_of(
+        scene, hours, coefficient, area, load_loss_per_depth=load_loss_per_depth,
+        stiffness_loss_per_depth=stiffness_loss_per_depth, frequency_hz=frequency_hz, blocks=blocks,
+        paths=paths, tolerance=tolerance, harmonics=harmonics, should_stop=should_stop,
+    )  # fmt: skip
+    check_looks(limit, points)
+    course.follow(part_of(on_progress, 0.0, _FOLLOWING), should_stop)
+    found = _result(course, scene, limit, points, begun)
+    if on_progress is not None and found.reached:
+        on_progress(1.0, found.responses)
+    return found
+
+
+def course_of(
+    scene: Scene, hours: float, coefficient: PerContact, area: PerContact, *,
+    load_loss_per_depth: PerContact | None = None, stiffness_loss_per_depth: PerContact | None = None,
+    frequency_hz: float | None = None, blocks: Sequence[Sequence[float]] | None = None,
+    paths: Sequence[str] = (), tolerance: float = 1e-6, harmonics: int = 11, should_stop: ShouldStop = None,
+) -> Course:  # fmt: skip
+    """Return a life that was not followed yet, by the arguments of `wear_life`.
+
+    Raises
+    ------
+    SettingError
+        As `wear_life`.
+    """
+    # The points of a shape's faces wear each by itself: they become contacts of their own.
+    whole = written_out(scene).model_copy(update={"dampers": ()})
+    wearing = wearing_of(
+        whole, coefficient, area, load_loss_per_depth=load_loss_per_depth,
+        stiffness_loss_per_depth=stiffness_loss_per_depth,
+    )  # fmt: skip
+    if not _is_number(hours) or not 0.0 < hours <= MOST_HOURS:
+        raise SettingError("hours", hours, f"must be a number > 0 and <= {MOST_HOURS:g}")
+    if not _is_number(tolerance) or not 1e-12 <= tolerance <= 0.1:
+        raise SettingError("tolerance", tolerance, "must be a number from 1e-12 to 0.1")
+    own = tuple(path for path in paths if path not in wearing.entries)
+    for path in own:
+        _check_path(whole, wearing, path)
+    every = (*own, *(loss.path for loss in wearing.losses))
+    conditions = Conditions(
+        blocks=_blocks(frequency_hz, blocks), harmonics=check_harmonics(harmonics), paths=own,
+        effects=Effects(even_harmonics=even_harmonics_reason(whole, every) is not None),
+        should_stop=should_stop,
+    )  # fmt: skip
+    if conditions.blocks is None:
+        Sensitivities(conditions.balance(whole), every).check_second()
+    return Course(
+        wearing=wearing, conditions=conditions, paths=tuple(paths), hours=float(hours), tolerance=tolerance
+    )
+
+
+def check_looks(limit: float | None, points: int) -> None:
+    """Raise SettingError where a limit of the amplitude or a number of instants is out of its range."""
+    if limit is not None and (not _is_number(limit) or not 0.0 < limit < math.inf):
+        raise SettingError("limit", limit, "must be an amplitude > 0 [m]")
+    if isinstance(points, bool) or not isinstance(points, int) or not 2 <= points <= MOST_POINTS:
+        raise SettingError("points", points, f"must be a whole number from 2 to {MOST_POINTS}")
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, RealNumber) and not isinstance(value, bool)
+
+
+def _check_path(scene: Scene, wearing: Wearing, path: object) -> None:
+    """Raise SettingError unless it is a path of the scene; wear coefficients are among what is listed."""
+    known = scene.parameter_paths()
+    if path not in known:
+        wanted = f"must be a value of the scene or one of {', '.join(wearing.entries)}"
+        raise SettingError("paths", path, wanted)
+
+
+def _blocks(
+    frequency_hz: float | None, blocks: Sequence[Sequence[float]] | None
+) -> tuple[tuple[float, float], ...] | None:
+    """Return frequencies with their shares of the time; None for the peak."""
+    if frequency_hz is not None:
+        if blocks is not None:
+            raise SettingError("frequency_hz", frequency_hz, "must not be given beside `blocks`")
+        return ((check_frequency("frequency_hz", frequency_hz), 1.0),)
+    if blocks is None:
+        return None
+    if not blocks:
+        raise SettingError("blocks", list(blocks), "must have a frequency [Hz] with hours at least")
+    found = dict[float, float]()
+    for i, block in enumerate(blocks):
+        if len(block) != 2 or not _is_number(block[1]) or not 0.0 < block[1] <= MOST_HOURS:
+            raise SettingError(("blocks", i), list(block), "must be a frequency [Hz] and hours > 0")
+        hertz = check_frequency(f"blocks[{i}]", block[0])
+        found[hertz] = found.get(hertz, 0.0) + block[1]
+    total = sum(found.values())
+    return tuple((hertz, hours / total) for hertz, hours in found.items())
+
+
+def _result(course: Course, scene: Scene, limit: float | None, points: int, begun: float) -> WearLife:
+    """Return what a life came to that was followed."""
+    wearing, stretches = course.wearing, course.stretches
+    rows = _rows(course, points) if stretches else []
+    last, highest = (rows[-1], course.maxima()[0]) if rows else (None, None)
+    met = None if limit is None else course.reaches(limit)
+    nothing = np.full(len(course.paths), math.nan)
+    known = course.paths and course.smooth
+    ends = [_known(course, one) for one in (rows[0], rows[-1])] if rows else [NOTHING_KNOWN] * 2
+    return WearLife(
+        scene=scene.name, dof=scene.observe.dof, status=course.status, ended_by=course.why,
+        contacts=wearing.names, hours=np.array([row.hours for row in rows]),
+        amplitude=np.array([row.amplitude for row in rows]),
+        frequency_hz=np.array([row.motion.hertz for row in rows]),
+        depths=_across([row.depths for row in rows], course.n),
+        loads=_across([_loads(wearing, row.depths) for row in rows], course.n),
+        power=_across([row.power for row in rows], course.n), switches=tuple(course.switches),
+        highest=math.nan if highest is None else highest.amplitude,
+        highest_hours=math.nan if highest is None else highest.hours,
+        limit=math.nan if limit is None else limit, hours_to_limit=math.nan if met is None else met.hours,
+        paths=course.paths, end_slopes=last.gradient if last is not None and known else nothing,
+        highest_slopes=highest.gradient if highest is not None and known else nothing,
+        limit_slopes=met.instant_moves if met is not None and known else nothing,
+        depth_slopes=last.slopes if last is not None and known else np.outer(np.ones(course.n), nothing),
+        at_peak=course.conditions.blocks is None, n_harmonics=course.conditions.harmonics,
+        steps=len(stretches), responses=course.conditions.solved, seconds=time.perf_counter() - begun,
+        begin_known=ends[0], end_known=ends[1],
+    )  # fmt: skip
+
+
+def _rows(course: Course, points: int) -> list[Here]:
+    """Return the instants that are shown: evenly spaced, where another peak takes over, and the end."""
+    last = course.stretches[-1].end.hours
+    rows = [course.stretches[0].begin]
+    wanted = [float(hours) for hours in np.linspace(0.0, course.hours, points)[1:] if hours < last]
+    before = rows[0]
+    for stretch in course.stretches:
+        begin, end = stretch.begin.hours, stretch.end.hours
+        if before.motion is not stretch.begin.motion and begin in course.switches:
+            rows += [before, stretch.begin]
+        rows += [course.at(hours) for hours in wanted if begin < hours <= end]
+        before = stretch.end
+    return [*rows, before]
+
+
+def _across(rows: Sequence[Real], n: int) -> Real:
+    """Return values (T, n) contact by contact, (n, T)."""
+    return np.array(rows).reshape(-1, n).T.copy()
+
+
+def _loads(wearing: Wearing, depths: Real) -> Real:
+    """Return the mean normal load of each contact at depths (n,) [N]; NaN of a law without."""
+    scene = wearing.at(depths)
+    contacts = [scene.contacts[place] for place in wearing.places]
+    return np.array([one.value_of(LOAD) if LOAD in one.parameters else math.nan for one in contacts])
+
+
+def _known(course: Course, here: Here) -> Known:
+    """Return how well the response at an instant is known."""
+    conditions, scene = course.conditions, course.wearing.at(here.depths)
+    if conditions.blocks is None:
+        return sweep(scene, harmonics=conditions.harmonics, settings=replace(SETTINGS, errors=True)).known
+    there = scene.at_frequency(here.motion.hertz)
+    return known_of_solution(solve(there, frequency_hz=here.motion.hertz, harmonics=conditions.harmonics))

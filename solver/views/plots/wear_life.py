@@ -1,0 +1,52 @@
+"""Amplitude, loads and depths of contacts that wear, over hours."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from solver.results import units
+from solver.views.plots import style
+from solver.views.plots.style import Into
+from solver.views.plots.tracks import numbers
+
+_MOST = 12  # contacts with a line each and a name
+
+
+def wear_life_figure(found: Mapping[str, Any], *, ax: Into = None) -> Figure:
+    """Draw the amplitude over the hours with its limit, and the load and the depth of each contact.
+
+    Parameters
+    ----------
+    found : as its `to_json` gives it, with at least one instant.
+    """
+    hours, amplitude = numbers(found["hours"]), numbers(found["amplitude"])
+    length, depths = units.length_unit(float(amplitude.max())), np.array(found["depths"])
+    depth = units.length_unit(float(depths.max()))
+    with style.styled():
+        page, (response, loads, worn) = style.figure(10.5, 3.4, columns=3, into=ax)
+        response.plot(hours, amplitude * length.per_metre, color=style.BLUE)
+        for at in found["switches"]:
+            response.axvline(at, color=style.GREY, linewidth=0.6)
+        if found["limit"] is not None:
+            response.axhline(found["limit"] * length.per_metre, color=style.VERMILION, linewidth=0.8)
+        if found["hours_to_limit"] is not None:
+            at = found["hours_to_limit"]
+            response.plot(
+                [at], [found["limit"] * length.per_metre], "o", color=style.VERMILION, markersize=4.0
+            )
+            response.set_title(f"limit after {units.number(at, 4)} h")
+        else:
+            response.set_title(found["scene"])
+        rows = zip(found["contacts"], found["loads"], depths, strict=True)
+        for name, load, deep in list(rows)[:_MOST]:
+            loads.plot(hours, numbers(load), label=name)
+            worn.plot(hours, deep * depth.per_metre)
+        loads.legend()
+        style.label(response, "running time [h]", f"max |{found['dof']}| [{length.name}]")
+        style.label(loads, "running time [h]", "normal load [N]")
+        style.label(worn, "running time [h]", f"depth [{depth.name}]")
+    return page
