@@ -7,11 +7,9 @@ The worst over a response is a maximum over the frequency, so its gradient is th
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any
-
-from pydantic import BeforeValidator, WithJsonSchema
 
 from optim.criteria.criterion import Criterion, CriterionContext, CriterionRow, Form, Judged, Key, of_sector
+from optim.criteria.key import number_or_table
 
 _KEY = "max_friction_work"
 
@@ -48,27 +46,6 @@ def _read(asked: CriterionContext) -> Mapping[str, float]:
     return {name: positive((_KEY, name), value) for name, value in limits.items()}
 
 
-def _work(value: object) -> object:
-    """A number, or a table of them; `_read` looks at the numbers."""
-    number = isinstance(value, int | float) and not isinstance(value, bool)
-    if number or (isinstance(value, dict) and 1 <= len(value) <= 1000):
-        return value
-    raise ValueError("must be a number > 0 [J], or a table of contacts with one each")
-
-
-FrictionWork = Annotated[
-    Any,
-    BeforeValidator(_work),
-    WithJsonSchema(
-        {
-            "anyOf": [
-                {"type": "number", "exclusiveMinimum": 0},
-                {"type": "object", "additionalProperties": {"type": "number", "exclusiveMinimum": 0}},
-            ]
-        }
-    ),
-]
-
 FRICTION_WORK = CRITERION = Criterion(
     name="friction work",
     unit="J",
@@ -76,8 +53,8 @@ FRICTION_WORK = CRITERION = Criterion(
     rows=_rows,
     keys=(
         Key(
-            name=_KEY, annotation=FrictionWork, form=Form.NUMBER_OR_TABLE, flag="--max-work",
-            metavar="J|CONTACT=J", example="0.02 or shroud=0.02", examples=(0.02, {"shroud": 0.02}),
+            name=_KEY, annotation=number_or_table("J", "contacts"), form=Form.NUMBER_OR_TABLE,
+            flag="--max-work", metavar="J|CONTACT=J", example="0.02 or shroud=0.02", examples=(0.02, {"shroud": 0.02}),
             help="Largest friction work in a cycle [J], of every friction contact or by contact (wear).",
             option_help="Largest friction work in a cycle [J]; repeatable by contact.",
         ),

@@ -13,6 +13,8 @@ from solver.extensions import Kinds
 SHIPPED = (
     "optim.criteria.peak",
     "optim.criteria.band",
+    "optim.criteria.stress",
+    "optim.criteria.utilisation",
     "optim.criteria.forbidden",
     "optim.criteria.friction_work",
     "optim.criteria.separation",

@@ -32,6 +32,11 @@ class ProblemKeywords(TypedDict, total=False):
     """How the optimum is searched."""
     max_peak: float | None
     """Largest amplitude allowed [m]."""
+    max_stress: float | Mapping[str, float] | None
+    """Largest alternating stress [Pa], of every recovered stress or by row."""
+    min_margin: float | Mapping[str, float] | None
+    """Least margin, of every recovered stress with a material or by row: how many times the alternating
+    stress may be as large."""
     forbidden_hz: Sequence[Sequence[float]] | None
     """Ranges [Hz] in which the amplitude stays below `limit`."""
     speeds_rpm: Sequence[Sequence[float]] | None
@@ -52,7 +57,8 @@ class DesignKeywords(ProblemKeywords, total=False):
     max_band_hz: float | None
     """Largest width of the resonance band allowed [Hz]."""
     weights: Mapping[str, float] | None
-    """What is minimised: peak [1/m], band [1/Hz], each times its weight; the peak alone."""
+    """What is minimised: peak [1/m], band [1/Hz], stress [1/Pa], utilisation, each times its weight; the peak
+    alone."""
 
 
 class FrontKeywords(ProblemKeywords, total=False):
