@@ -66,6 +66,7 @@ class Key:
     example: Annotated[str, "Likewise."] = ""
     examples: Annotated[tuple[Any, ...], "Values of the key."] = ()
     needs_limit: Annotated[bool, "Whether it is refused without the key ``limit``."] = False
+    beside: Annotated[str, "Another key of its criterion that it is read with."] = ""
 
     def __post_init__(self) -> None:
         if not WORD.fullmatch(self.name):

@@ -16,7 +16,11 @@ SHIPPED = (
     "optim.criteria.stress",
     "optim.criteria.utilisation",
     "optim.criteria.forbidden",
+    "optim.criteria.running",
     "optim.criteria.friction_work",
+    "optim.criteria.wear_rate",
+    "optim.criteria.damping",
+    "optim.criteria.mass",
     "optim.criteria.separation",
 )
 

@@ -1,7 +1,7 @@
 """Strengths of a material, and the alternating stress that its Haigh diagram allows at a mean stress.
 
 With the fatigue strength S under alternating stress alone and the strength R under mean stress alone (the
-ultimate one; of Soderberg that of yield), a mean stress m > 0 leaves S (1 − m/R) of it by Goodman and Soderberg
+ultimate one; of Soderberg that of yield), a mean stress m > 0 leaves S (1 − m/R) by Goodman and Soderberg
 and S (1 − (m/R)²) by Gerber; pressure is not credited. Shigley, Mechanical Engineering Design, section 6-11;
 Bannantine, Comer, Handrock, Fundamentals of Metal Fatigue Analysis (Prentice Hall 1990), section 2.4.
 """

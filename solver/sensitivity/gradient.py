@@ -215,7 +215,7 @@ class Sensitivities:
         return [self._one(u, omega, top) for top in range(count)]
 
     def _extremes(self) -> tuple[Complex, Real, Real]:
-        """Return the turns of max x and −min x, or of one, and the derivatives of what is measured by them."""
+        """Return the turns of max x and −min x, or of one, and derivatives of what is measured by them."""
         system = self.balance.system
         if system.centred == FROM_REST:
             return self._turns[:1].copy(), np.ones(1), np.zeros((1, 1))
