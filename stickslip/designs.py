@@ -10,7 +10,11 @@ from optim import (
     SensitivityStatus as SensitivityStatus,
 )
 from solver import (
+    AllowedExcitation as AllowedExcitation,
     AmplitudeHessian as AmplitudeHessian,
     Gradient as Gradient,
+    MarginDiagram as MarginDiagram,
+    MarginStatus as MarginStatus,
     Sensitivities as Sensitivities,
+    margin_diagram as margin_diagram,
 )

@@ -26,6 +26,7 @@ COMMANDS = {
     "modes": "two-dof --from 0.1 --to 3 --harmonics 3",
     "interference": "bladed-disk --speed 11000 --up-to 1400",
     "controlled": "two-dof --amplitude 1 --harmonics 3",
+    "margin": "two-dof --from 20 --to 120 --points 3 --limit 2 --harmonics 3",
     "campbell": "two-dof --speeds 50 80 --harmonics 3",
     "sensitivities": "two-dof --harmonics 3",
     "design": "two-dof --variable damper.N0 20 500 --harmonics 3",
@@ -79,6 +80,7 @@ def results() -> dict[str, Any]:
             solver.load_scene("bladed-disk"), of=["tip"], samples=2, harmonics=1, start=740, stop=780
         ),
         "interference": solver.interference_diagram(solver.load_scene("bladed-disk"), speed_rpm=11e3),
+        "margin": solver.margin_diagram(scene, start=20, stop=120, points=3, limit=2.0, harmonics=3),
         "modes": solver.nonlinear_mode(scene, amplitudes=(0.1, 3.0), harmonics=3),
         "pareto": optim.pareto_front(
             scene, variables={"damper.N0": (20, 500)}, limit=2.0, points=3, harmonics=3
