@@ -149,7 +149,7 @@ def margin_diagram(
     if stopped or (should_stop is not None and should_stop()):
         status = MarginStatus.STOPPED
     return MarginDiagram(
-        scene=scene.name, measure="utilisation" if strengths else "amplitude",
+        scene=scene.name, judged_by="utilisation" if strengths else "amplitude",
         unit="Pa" if strengths else scene.observed_unit, level=levels,
         level_unit=parameter_of(scene, AMPLITUDE).unit, stress=stress, used=used, allowed=tuple(found),
         n_harmonics=harmonics, highest=tuple(one.known for one in parts), status=status,

@@ -48,14 +48,14 @@ class MarginDiagram(MadeOfResponses, Drawn):
             "damper=allowed": "damper=name allowed end row at_hz value", "level": "level",
             "damper level": "stress used",
         },
-        "measure unit level_unit harmonics=n_harmonics", scene="scene", rows=("damper", "level"),
+        "judged_by unit level_unit harmonics=n_harmonics", scene="scene", rows=("damper", "level"),
     )  # fmt: skip
     JSON: ClassVar = (
-        "scene measure unit level level_unit stress used allowed n_harmonics seconds reached status"
+        "scene judged_by unit level level_unit stress used allowed n_harmonics seconds reached status"
     )
 
     scene: Annotated[str, "Name of the scene."]
-    measure: Annotated[str, "``utilisation`` of strengths, or ``amplitude`` of the observed DOF."]
+    judged_by: Annotated[str, "``utilisation`` of strengths, or ``amplitude`` of the observed DOF."]
     unit: Annotated[str, "Of `stress`: Pa, or that of the amplitude."]
     level: Annotated[Real, "Excitation amplitudes, (n,)."]
     level_unit: Annotated[str, "Their unit."]

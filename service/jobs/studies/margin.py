@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 from pydantic import ConfigDict, Field
 
 from optim.criteria.key import Name, ParameterPath
-from service.jobs.common.results import answered
+from service.jobs.common.results import Curve, answered
 from service.jobs.common.scenes import HarmonicRequest, Number, PositiveNumber, check
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
 from service.jobs.registry import Flag
@@ -33,7 +33,9 @@ class Margin(Study, HarmonicRequest):
         json_schema_extra={"examples": [{"scene": "two-dof", "from": 10, "to": 200, "limit": 2.0}]}
     )
     NAME, FUNCTION = "margin", "solver:margin_diagram"
-    RESULT = answered("solver.studies.margin_result:MarginDiagram", "MarginResult")
+    RESULT = answered(
+        "solver.studies.margin_result:MarginDiagram", "MarginResult", stress=list[Curve], used=list[Curve]
+    )
     TOLD = "solver.views.tables.tracks:margin"
     SHOWS = "stress over the excitation, what each damper allows ([criteria](criteria.md))"
     FIGURE, EMPTY = "solver.views.plots.margins:margin_figure", ("level", "it has no level to draw")

@@ -35,6 +35,8 @@ def margin_figure(found: Mapping[str, Any], *, ax: Into = None) -> Figure:
                 words = f"{units.number(one['allowed'], digits=4)} {found['level_unit']}"
                 of_share.plot([one["allowed"]], [1.0], "o", color=colour, markersize=4.0, label=words)
         of_share.axhline(1.0, color=style.GREY, linewidth=0.8)
+        for axis in (of_stress.xaxis, of_stress.yaxis, of_share.xaxis, of_share.yaxis):
+            style.plain_log(axis)
         of_stress.set_title(found["scene"])
         what = "alternating stress" if stresses else "amplitude"
         style.label(of_stress, f"excitation [{found['level_unit']}]", f"{what} [{unit}]")

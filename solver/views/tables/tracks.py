@@ -50,9 +50,10 @@ def response_map(found: Json) -> Iterator[Block]:
 def margin(found: Json) -> Iterator[Block]:
     """What each damper allows, and the stress of each over the excitation."""
     level, unit = found["level"], found["level_unit"]
+    what = "stress" if found["judged_by"] == "utilisation" else "amplitude"
     title = f"{found['scene']}, excitation from {level[0]:.6g} to {level[-1]:.6g} {unit}"
     pairs = [("time", units.duration(found["seconds"]))]
-    if found["measure"] == "amplitude" and all(one is None for row in found["used"] for one in row):
+    if found["judged_by"] == "amplitude" and all(one is None for row in found["used"] for one in row):
         pairs.insert(0, ("note", "nothing says what is allowed: give stresses a material, or a limit"))
     yield Summary(f"{title}, {found['n_harmonics']} harmonics", pairs)
     allowed = [
@@ -63,16 +64,14 @@ def margin(found: Json) -> Iterator[Block]:
         )
         for one in found["allowed"]
     ]  # fmt: skip
-    yield ResultTable("Excitation allowed", ("damper", "allowed", "by", "at", found["measure"]), allowed)
-    for key, what in (
-        ("stress", f"{found['measure']} [{found['unit']}]"),
-        ("used", "share of what is allowed"),
-    ):
+    yield ResultTable("Excitation allowed", ("damper", "allowed", "by", "at", what), allowed)
+    names = [one["name"] for one in found["allowed"]]
+    for key, title in (("stress", f"{what} [{found['unit']}]"), ("used", "share of what is allowed")):
         rows = [
-            (one["name"], *("–" if value is None else f"{value:.4g}" for value in row))
-            for one, row in zip(found["allowed"], found[key], strict=True)
+            (f"{each:.4g}", *("–" if one is None else f"{one:.4g}" for one in row))
+            for each, *row in zip(level, *found[key], strict=True)
         ]
-        yield ResultTable(what, ("damper", *(f"{each:.4g} {unit}" for each in level)), rows)
+        yield ResultTable(title, (f"excitation [{unit}]", *names), rows)
 
 
 def _ends(one: Json, unit: str) -> str:
