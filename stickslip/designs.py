@@ -1,13 +1,17 @@
 """Designs: what they return, and the gradients that searches of one's own need."""
 
 from optim import (
+    CatalogueOption as CatalogueOption,
+    CatalogueResult as CatalogueResult,
     DesignStatus as DesignStatus,
+    OptionStatus as OptionStatus,
     ParetoResult as ParetoResult,
     ParetoStatus as ParetoStatus,
     RobustResult as RobustResult,
     RobustStatus as RobustStatus,
     SensitivityResult as SensitivityResult,
     SensitivityStatus as SensitivityStatus,
+    catalogue as catalogue,
 )
 from solver import (
     AllowedExcitation as AllowedExcitation,
