@@ -116,7 +116,7 @@ def test_a_design_has_the_least_stress_within_a_margin() -> None:
         ({"max_stress": {"rim": 1e6}}, r"max_stress.*must name rows of `recovery`: fillet, root"),
         ({"max_stress": -1.0}, r"max_stress.*> 0"),
         ({"min_margin": {"fillet": 0.0}}, r"min_margin.*> 0"),
-        ({"weights": {"strain": 1.0}}, r"`stress` and `utilisation` can be minimised"),
+        ({"weights": {"strain": 1.0}}, r"`stress`, `utilisation`.* can be minimised"),
     ],
 )
 def test_what_is_wrong_is_told(keys: dict[str, Any], message: str) -> None:
