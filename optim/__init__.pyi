@@ -7,6 +7,12 @@ from .robust.result import RobustResult as RobustResult, RobustStatus as RobustS
 from .robust.robust import robust_design as robust_design
 from .search import design as design
 from .studies.campbell import campbell_diagram as campbell_diagram, forbidden_hz as forbidden_hz
+from .studies.catalogue import (
+    CatalogueOption as CatalogueOption,
+    CatalogueResult as CatalogueResult,
+    OptionStatus as OptionStatus,
+    catalogue as catalogue,
+)
 from .studies.crossings import CampbellDiagram as CampbellDiagram, CampbellStatus as CampbellStatus
 from .studies.elasticities import sensitivities as sensitivities
 from .studies.pareto import pareto_front as pareto_front

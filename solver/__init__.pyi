@@ -114,6 +114,12 @@ from .studies.blades import (
 from .studies.convergence import accuracy_study as accuracy_study
 from .studies.instant import start_of as start_of
 from .studies.interference import interference_diagram as interference_diagram
+from .studies.margin import margin_diagram as margin_diagram
+from .studies.margin_result import (
+    AllowedExcitation as AllowedExcitation,
+    MarginDiagram as MarginDiagram,
+    MarginStatus as MarginStatus,
+)
 from .studies.study_results import (
     DiameterFrequencies as DiameterFrequencies,
     FoldedOrder as FoldedOrder,

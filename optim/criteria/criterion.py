@@ -41,6 +41,10 @@ class CriterionContext:
     values: Annotated[Mapping[str, object], "The criterion's keys that were given."]
 
 
+def _always_there(_scene: Scene) -> str:
+    return ""
+
+
 def _unscaled(_scene: Scene) -> float:
     return 1.0
 
@@ -99,6 +103,9 @@ class Criterion:
     scale: Annotated[
         Callable[[Scene], float], "What an excess over a limit of 0 is relative to, in a scene."
     ] = _unscaled
+    lacking: Annotated[
+        Callable[[Scene], str], "Why a scene has nothing of it to be minimised; empty if it has."
+    ] = _always_there
     always: Annotated[bool, "Whether its rows are wanted if nobody asks: results show them."] = False
     each_blade: Annotated[bool, "Whether it is that of every blade of a mistuned disk."] = False
     limit_name: Annotated[str, "How results call its limit."] = ""
@@ -119,6 +126,11 @@ class Criterion:
 
     def __repr__(self) -> str:
         return f"Criterion({self.name})"
+
+    @property
+    def per_unit(self) -> str:
+        """The unit of its weight, behind a word."""
+        return "" if self.unit == "1" else f" [1/{self.unit}]"
 
     def limit_words(self, row: CriterionRow) -> str:
         """Return the limit of a row in words."""

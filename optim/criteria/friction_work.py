@@ -7,11 +7,13 @@ The worst over a response is a maximum over the frequency, so its gradient is th
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any
-
-from pydantic import BeforeValidator, WithJsonSchema
+from typing import TYPE_CHECKING
 
 from optim.criteria.criterion import Criterion, CriterionContext, CriterionRow, Form, Judged, Key, of_sector
+from optim.criteria.key import number_or_table
+
+if TYPE_CHECKING:
+    from solver.scene.scene import Scene
 
 _KEY = "max_friction_work"
 
@@ -33,41 +35,29 @@ def _rows(judged: Judged) -> list[CriterionRow]:
 
 
 def _read(asked: CriterionContext) -> Mapping[str, float]:
-    """The limit of every contact named; a single number is that of every friction contact."""
+    return by_contact(_KEY, asked.values[_KEY], asked.scene)
+
+
+def by_contact(key: str, limits: object, scene: Scene) -> Mapping[str, float]:
+    """Return a positive number of every contact named; a single one is that of every friction contact.
+
+    Raises
+    ------
+    DesignError
+        What is wrong with the value `limits` of the key.
+    """
     from optim.errors import DesignError
     from optim.problem.numbers import positive
 
-    limits = asked.values[_KEY]
-    names = [contact.name for contact in asked.scene.contacts]
+    names = [contact.name for contact in scene.contacts]
     if not isinstance(limits, Mapping):
-        rubbing = [contact.name for contact in asked.scene.contacts if contact.RUBBING]
-        return dict.fromkeys(rubbing, positive(_KEY, limits))
+        rubbing = [contact.name for contact in scene.contacts if contact.RUBBING]
+        return dict.fromkeys(rubbing, positive(key, limits))
     for name in limits:
         if name not in names:
-            raise DesignError(_KEY, name, f"must name contacts: {', '.join(names)}", place=(_KEY, name))
-    return {name: positive((_KEY, name), value) for name, value in limits.items()}
+            raise DesignError(key, name, f"must name contacts: {', '.join(names)}", place=(key, name))
+    return {name: positive((key, name), value) for name, value in limits.items()}
 
-
-def _work(value: object) -> object:
-    """A number, or a table of them; `_read` looks at the numbers."""
-    number = isinstance(value, int | float) and not isinstance(value, bool)
-    if number or (isinstance(value, dict) and 1 <= len(value) <= 1000):
-        return value
-    raise ValueError("must be a number > 0 [J], or a table of contacts with one each")
-
-
-FrictionWork = Annotated[
-    Any,
-    BeforeValidator(_work),
-    WithJsonSchema(
-        {
-            "anyOf": [
-                {"type": "number", "exclusiveMinimum": 0},
-                {"type": "object", "additionalProperties": {"type": "number", "exclusiveMinimum": 0}},
-            ]
-        }
-    ),
-]
 
 FRICTION_WORK = CRITERION = Criterion(
     name="friction work",
@@ -76,8 +66,9 @@ FRICTION_WORK = CRITERION = Criterion(
     rows=_rows,
     keys=(
         Key(
-            name=_KEY, annotation=FrictionWork, form=Form.NUMBER_OR_TABLE, flag="--max-work",
-            metavar="J|CONTACT=J", example="0.02 or shroud=0.02", examples=(0.02, {"shroud": 0.02}),
+            name=_KEY, annotation=number_or_table("J", "contacts"), form=Form.NUMBER_OR_TABLE,
+            flag="--max-work", metavar="J|CONTACT=J", example="0.02 or shroud=0.02",
+            examples=(0.02, {"shroud": 0.02}),
             help="Largest friction work in a cycle [J], of every friction contact or by contact (wear).",
             option_help="Largest friction work in a cycle [J]; repeatable by contact.",
         ),

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Annotated, Any
 
-from pydantic import Field
+from pydantic import BeforeValidator, Field, WithJsonSchema
 
 from solver.wording import documented
 
@@ -67,6 +67,7 @@ class Key:
     example: Annotated[str, "Likewise."] = ""
     examples: Annotated[tuple[Any, ...], "Values of the key."] = ()
     needs_limit: Annotated[bool, "Whether it is refused without the key ``limit``."] = False
+    beside: Annotated[str, "Another key of its criterion that it is read with."] = ""
 
     def __post_init__(self) -> None:
         if not WORD.fullmatch(self.name):
@@ -93,3 +94,23 @@ FrequencyHz = Annotated[float, Field(strict=True, gt=0.0, le=1e9)]
 Name = Annotated[str, Field(strict=True, min_length=1, max_length=200)]
 Pair = Annotated[list[Number], Field(min_length=2, max_length=2)]
 Ranges = Annotated[list[Pair], Field(min_length=1, max_length=MAX_RANGES)]
+
+
+def number_or_table(unit: str, of: str) -> Any:
+    """Return the type of a positive number, or a table of them; what is read looks at the numbers.
+
+    Parameters
+    ----------
+    unit : of the numbers.
+    of : what the keys of the table name.
+    """
+
+    def checked(value: object) -> object:
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        if number or (isinstance(value, dict) and 1 <= len(value) <= 1000):
+            return value
+        raise ValueError(f"must be a number > 0 [{unit}], or a table of {of} with one each")
+
+    one = {"type": "number", "exclusiveMinimum": 0}
+    schema = {"anyOf": [one, {"type": "object", "additionalProperties": one}]}
+    return Annotated[Any, BeforeValidator(checked), WithJsonSchema(schema)]

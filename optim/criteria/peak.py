@@ -19,28 +19,33 @@ COMPETES = 0.6
 
 
 def maxima(
-    judged: Judged, criterion: Criterion, what: str, *, bound: float | None, weight: float = 0.0
-) -> list[CriterionRow]:
-    """Return a row for every local maximum that competes, as `what` at its frequency.
+    judged: Judged, criterion: Criterion, what: str, *, bound: float | None, weight: float = 0.0,
+    factor: float = 1.0,
+) -> list[CriterionRow]:  # fmt: skip
+    """Return a row for every local maximum that competes, as `what` at its frequency, times `factor`.
 
     At a maximum over the frequency ∂a/∂ω = 0: its derivative by a parameter is the partial one there.
     """
     peaks, sensitivity = judged.branch.peaks, judged.sensitivity
     return [
         judged.row(
-            criterion, f"{what} at {peak.at:.6g} Hz", peak.value,
-            None if sensitivity is None else sensitivity.peak(peak),
-            at_hz=peak.at, bound=bound, weight=weight, second=_second(sensitivity, peak),
+            criterion, f"{what} at {peak.at:.6g} Hz", factor * peak.value,
+            None if sensitivity is None else factor * sensitivity.peak(peak),
+            at_hz=peak.at, bound=bound, weight=weight, second=_second(sensitivity, peak, factor),
         )
         for peak in peaks
         if peak.value >= COMPETES * peaks[0].value
     ]  # fmt: skip
 
 
-def _second(sensitivity: Sensitivity | None, peak: Peak) -> Callable[[], Real] | None:
+def _second(sensitivity: Sensitivity | None, peak: Peak, factor: float) -> Callable[[], Real] | None:
     if sensitivity is None or not sensitivity.has_second:
         return None
-    return partial(sensitivity.peak_second, peak)
+    return partial(_times, factor, sensitivity, peak)
+
+
+def _times(factor: float, sensitivity: Sensitivity, peak: Peak) -> Real:
+    return factor * sensitivity.peak_second(peak)
 
 
 def _rows(judged: Judged) -> list[CriterionRow]:

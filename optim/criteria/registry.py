@@ -13,8 +13,14 @@ from solver.extensions import Kinds
 SHIPPED = (
     "optim.criteria.peak",
     "optim.criteria.band",
+    "optim.criteria.stress",
+    "optim.criteria.utilisation",
     "optim.criteria.forbidden",
+    "optim.criteria.running",
     "optim.criteria.friction_work",
+    "optim.criteria.wear_rate",
+    "optim.criteria.damping",
+    "optim.criteria.mass",
     "optim.criteria.separation",
 )
 

@@ -104,9 +104,12 @@ class DesignEvaluation:
 
 
 def nearest(row: CriterionRow, rows: Sequence[CriterionRow]) -> int | None:
-    """Return which of some rows of another design measures the same: quantity, case, nearest frequency."""
+    """Return which of some rows of another design measures the same: quantity, case, part, frequency."""
     same = [i for i, r in enumerate(rows) if (r.quantity, r.case) == (row.quantity, row.case)]
     same = [i for i in same if math.isnan(row.at_hz) == math.isnan(rows[i].at_hz)]
     if math.isnan(row.at_hz):
         return next((i for i in same if rows[i].what == row.what), same[0] if same else None)
-    return min(same, key=lambda i: abs(rows[i].at_hz - row.at_hz), default=None)
+    # Of several contacts or recovered rows at one frequency it is the one of that name.
+    of = row.what.partition(" at ")[0]
+    named = [i for i in same if rows[i].what.partition(" at ")[0] == of]
+    return min(named or same, key=lambda i: abs(rows[i].at_hz - row.at_hz), default=None)

@@ -80,9 +80,8 @@ def _others(scene: Scene, given: Mapping[str, Any], *, sound: bool) -> Iterator[
         if name in owners:
             one, key = owners[name]
             limit = ANY_LIMIT if key.needs_limit else None
-            asked = CriterionContext(
-                scene=scene, cases=read_cases(scene, None), limit=limit, values={name: value}
-            )
+            values = {word: given[word] for word in (name, key.beside) if word in given}
+            asked = CriterionContext(scene=scene, cases=read_cases(scene, None), limit=limit, values=values)
             yield (name,), partial(one.read, asked)
         elif name in READERS:
             yield (name,), partial(READERS[name], value)

@@ -286,7 +286,7 @@ def with_limits(model: type[Model], keys: Iterable[Key], **further: Any) -> type
 def of_design(model: type[Model]) -> type[Model]:
     """Return a model with the limits and the weights of a design."""
     words = weight_words()
-    minimised = ", ".join(f"{one.weight} [1/{one.unit}]" for one in criteria() if one.weight)
+    minimised = ", ".join(f"{one.weight}{one.per_unit}" for one in criteria() if one.weight)
     option = Option(
         Form.NUMBERS_BY_WORD, "--weight", "|".join(f"{word}=W" for word in words), example="peak=1",
         help="What is minimised; the peak alone if left out.",

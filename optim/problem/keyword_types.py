@@ -32,12 +32,29 @@ class ProblemKeywords(TypedDict, total=False):
     """How the optimum is searched."""
     max_peak: float | None
     """Largest amplitude allowed [m]."""
+    max_stress: float | Mapping[str, float] | None
+    """Largest alternating stress [Pa], of every recovered stress or by row."""
+    min_margin: float | Mapping[str, float] | None
+    """Least margin, of every recovered stress with a material or by row: how many times the alternating
+    stress may be as large."""
     forbidden_hz: Sequence[Sequence[float]] | None
     """Ranges [Hz] in which the amplitude stays below `limit`."""
     speeds_rpm: Sequence[Sequence[float]] | None
     """Ranges of running speed [1/min]; times the order of each case they are forbidden too."""
+    running_rpm: Sequence[float | Sequence[float]] | None
+    """Speeds and ranges of speed [1/min] at which the machine runs."""
+    max_running_amplitude: float | None
+    """Largest amplitude allowed at the running speeds [m]."""
     max_friction_work: float | Mapping[str, float] | None
     """Largest friction work in a cycle [J], of every friction contact or by contact (wear)."""
+    max_wear_rate: float | Mapping[str, float] | None
+    """Largest wear rate [m³/s], of every friction contact or by contact."""
+    wear_coefficient: float | Mapping[str, float] | None
+    """Volume worn off by a unit of friction work [m³/J], of every contact limited or by contact."""
+    min_damping: float | Mapping[str, float] | None
+    """Least damping `ratio` of a `mode` (the first) at a modal `amplitude` [√kg m]."""
+    max_mass: float | None
+    """Largest mass of all bodies [kg]."""
     contact_states: Mapping[str, Literal["never-separates"]] | None
     """What a contact must never do: contact to `never-separates`."""
 
@@ -52,7 +69,8 @@ class DesignKeywords(ProblemKeywords, total=False):
     max_band_hz: float | None
     """Largest width of the resonance band allowed [Hz]."""
     weights: Mapping[str, float] | None
-    """What is minimised: peak [1/m], band [1/Hz], each times its weight; the peak alone."""
+    """What is minimised: peak [1/m], band [1/Hz], stress [1/Pa], utilisation, running [1/m], mass [1/kg],
+    each times its weight; the peak alone."""
 
 
 class FrontKeywords(ProblemKeywords, total=False):

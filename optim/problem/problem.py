@@ -108,9 +108,14 @@ def pose(scene: Scene, **given: Any) -> Problem:
     if limit is not None:
         positive("limit", limit)
     limits = _limits(scene, cases, limit, keys)
-    basins = _basins(keys["basins"])
+    basins, weights = _basins(keys["basins"]), _weights(keys["weights"])
+    for one in (one for one, weight in weights.items() if weight > 0.0 and one.lacking(scene)):
+        raise DesignError(("weights", one.weight), weights[one], one.lacking(scene))
+    for one in (one for one, weight in weights.items() if weight > 0.0 and one.ranges is not None):
+        if limits.of(one) is None:
+            raise DesignError(("weights", one.weight), weights[one], f"needs `{one.keys[0].name}`")
     problem = Problem(
-        scene=scene, variables=chosen, cases=cases, limit=limit, weights=_weights(keys["weights"]),
+        scene=scene, variables=chosen, cases=cases, limit=limit, weights=weights,
         limits=limits, harmonics=_harmonics(keys["harmonics"]), start=read_start(chosen, keys["start"]),
         method=_method(keys["method"]), basins=basins, tolerance=_tolerance(keys["tolerance"]),
     )  # fmt: skip

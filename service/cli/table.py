@@ -213,6 +213,10 @@ COMMANDS = {
         CommandEntry("design", "commands.design.design", "Find the best damper."),
         CommandEntry("pareto", "commands.design.pareto", "Find the front of peak against resonance band."),
         CommandEntry(
+            "margin", STUDY,
+            "Draw the stress over the excitation for several dampers, and the excitation each allows.",
+        ),
+        CommandEntry(
             "identify", "commands.identify.identify",
             "Find parameters from measured responses and hysteresis loops.",
         ),

@@ -139,7 +139,7 @@ def criteria_table() -> str:
     for one in criteria():
         better = "" if one.smaller_is_better else ", larger is better"
         limits = "<br>".join(f"`{key.name}`: {key.help} {_option(key)}" for key in one.keys)
-        weight = f"`{one.weight}` [1/{one.unit}]" if one.weight else ""
+        weight = f"`{one.weight}`{one.per_unit}" if one.weight else ""
         rows.append((f"**{one.name}** [{one.unit}]{better}: {one.help}", weight, limits))
     return _table("criterion | minimised by `weights` | limited by", rows)
 

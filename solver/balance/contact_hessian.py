@@ -122,9 +122,9 @@ def check_laws(scene: Scene) -> None:
 
 
 def check_measure(scene: Scene) -> None:
-    """Raise SettingError where what is observed has no second derivatives, being at two places at once."""
+    """Raise SettingError where what is observed is at two places at once: no tracked peak follows it."""
     if scene.observe.centred:
-        wanted = "has a gradient alone and is followed by sweeps, not by its peak: use `max_abs`"
+        wanted = "is followed by sweeps, not by its peak: use `max_abs`"
         raise SettingError("observe.measure", scene.observe.measure, wanted)
 
 

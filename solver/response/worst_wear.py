@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 from enum import Enum
 from functools import partial
 from operator import attrgetter
-from typing import Annotated
+from typing import Annotated, TypeVar
 
 import numpy as np
 
@@ -37,7 +37,7 @@ from solver.continuation.extrema.nodes import share_scales
 from solver.errors import SettingError
 from solver.jit.fourier import Real
 from solver.linear.kernels.receptance import receptance
-from solver.response.wear import Measured, WearPoint, WearSensitivity, contact_index
+from solver.response.wear import Measured, WearSensitivity, contact_index
 from solver.response.wear_measures import (
     Change,
     ContactCycle,
@@ -50,6 +50,7 @@ from solver.response.wear_measures import (
 from solver.results.told import Piece
 from solver.sensitivity.nonsmooth import BESIDE, SMOOTH, beside, of_corner
 
+Number = TypeVar("Number", float, Real)
 # Maxima below this share of the highest cannot lead within one step of an optimiser.
 COMPETES = 0.6
 _HALVINGS_BELOW = 2  # of an interval whose maximum could compete, but not lead
@@ -62,12 +63,14 @@ class Measure(Enum):
     """What a contact goes through in a period; the value is what a user reads."""
 
     FRICTION_WORK = "friction work"
+    FRICTION_POWER = "friction power"
     LEAST_LOAD = "least normal load"
     SLIP_TRAVEL = "slip travel"
 
 
 _MEASURES: dict[Measure, Callable[[ContactCycle, int, Sequence[Change]], tuple[float, Real] | None]] = {
     Measure.FRICTION_WORK: friction_work,
+    Measure.FRICTION_POWER: friction_work,
     Measure.LEAST_LOAD: least_load,
     Measure.SLIP_TRAVEL: slip_travel,
 }
@@ -77,7 +80,7 @@ _MEASURES: dict[Measure, Callable[[ContactCycle, int, Sequence[Change]], tuple[f
 class WorstWear(Piece):
     """A local worst value of a measure over a branch."""
 
-    value: Annotated[float, "Friction work [J], least normal load [N] or slip travel [m]."]
+    value: Annotated[float, "Friction work [J] or power [W], least normal load [N] or slip travel [m]."]
     at: Annotated[float, "Value of the branch's parameter there, in user units (Hz for a frequency)."]
     solution: Annotated[Real, "Slip motions of all contacts there [m], (n_unknowns,)."]
     interior: Annotated[bool, "Not at an end of the branch."]
@@ -202,7 +205,7 @@ class _MaximaSearch:
         workspace, point, system = self._workspace, self._point, self._workspace.balance.system
         e, first = self._e, int(system.first_port[self._e])
         rubbing = workspace.balance.scene.contacts[e].RUBBING
-        together = self._measure is Measure.FRICTION_WORK and rubbing
+        together = self._measure in (Measure.FRICTION_WORK, Measure.FRICTION_POWER) and rubbing
         nodes: list[_Node] = []
         forces = np.zeros((2, len(rubbing), len(solutions), point.F.shape[1]))
         for i, (solution, tangent) in enumerate(zip(solutions, tangents, strict=True)):
@@ -227,6 +230,7 @@ class _MaximaSearch:
             ]
             done, rises = work_of(motions[0], forces[0, j], motions[1], forces[1, j], system.ks)
             values, slopes = values + done, slopes + rises
+        values, slopes = self._rated(values, slopes, solutions[:, -1], tangents[:, -1])
         known = np.isfinite(values)
         values, slopes = np.where(known, values, -math.inf), np.where(known, slopes, 0.0)
         return [
@@ -256,6 +260,15 @@ class _MaximaSearch:
             return self._fixed
         return contact_values(self._workspace.balance.system, p, 0.0)
 
+    def _rated(self, value: Number, slope: Number, p: Number, dp: Number) -> tuple[Number, Number]:
+        """Return a number of a period as it is or, of a power, in a second, with its slope along dλ = dp."""
+        if self._measure is not Measure.FRICTION_POWER:
+            return value, slope
+        if self._workspace.balance.parameter.kind is not Kind.FREQUENCY:
+            rate = self._workspace.balance.system.omega / (2.0 * math.pi)
+            return value * rate, slope * rate
+        return value * p / (2.0 * math.pi), (slope * p + value * dp) / (2.0 * math.pi)
+
     def _node(self, solution: Real, tangent: Real) -> _Node:
         """Measure the contact where the workspace was evaluated last."""
         balance, point, dp = self._workspace.balance, self._point, float(tangent[-1])
@@ -272,6 +285,7 @@ class _MaximaSearch:
             name = balance.scene.contacts[self._e].name
             raise SettingError("contact", name, f"must be one whose law has a {self._measure.value}")
         value, slope = self._sign * found[0], self._sign * float(found[1][0])
+        value, slope = self._rated(value, slope, float(solution[-1]), dp)
         if not math.isfinite(value):
             value, slope = -math.inf, 0.0
         return _Node(solution, tangent, value, slope)
@@ -292,7 +306,7 @@ def worst_slopes(
     SettingError
         An unknown contact, or a law the measure has no meaning for.
     """
-    here = _measured(sensitivity.at(worst.at, worst.solution), contact, measure)
+    here = _measured(sensitivity, worst.at, worst.solution, contact, measure)
     if not worst.interior or not abs(here.by_frequency) * worst.at > SMOOTH * abs(here.value):
         return here
     near, far = (_across(sensitivity, worst, contact, measure, share * BESIDE) for share in (1.0, 2.0))
@@ -300,15 +314,22 @@ def worst_slopes(
     return here if near is None or far is None else replace(here, gradient=2.0 * near - far)
 
 
-def _measured(point: WearPoint, contact: str, measure: Measure) -> Measured:
+def _measured(
+    sensitivity: WearSensitivity, at_hz: float, solution: Real, contact: str, measure: Measure
+) -> Measured:  # fmt: skip
+    point = sensitivity.at(at_hz, solution)
     found = {
         Measure.FRICTION_WORK: point.work,
+        Measure.FRICTION_POWER: point.work,
         Measure.LEAST_LOAD: point.least_load,
         Measure.SLIP_TRAVEL: point.travel,
     }[measure](contact)
     if found is None:
         raise SettingError("contact", contact, f"must be one whose law has a {measure.value}")
-    return found
+    if measure is not Measure.FRICTION_POWER:
+        return found
+    rise = at_hz * found.by_frequency + found.value
+    return Measured(value=at_hz * found.value, by_frequency=rise, gradient=at_hz * found.gradient)
 
 
 def _across(
@@ -322,6 +343,6 @@ def _across(
         u = beside(solved, worst.solution)
         if u is None:
             return None
-        found = _measured(sensitivity.at(at_hz, u), contact, measure)
+        found = _measured(sensitivity, at_hz, u, contact, measure)
         sides.append((found.by_frequency, found.gradient))
     return of_corner(*sides) if sides[0][0] * sides[1][0] < 0.0 else None

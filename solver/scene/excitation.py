@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, Self
 from pydantic import BeforeValidator, Field, PlainSerializer, WithJsonSchema, model_validator
 
 from solver.contacts.fields import Angle, DofName, Part, Signed
-from solver.errors import SceneError, SettingError
+from solver.errors import Place, SceneError, SettingError
 from solver.scene.scene_parameter import ActsOn, SceneParameter, changed
 
 if TYPE_CHECKING:
@@ -215,32 +215,35 @@ def listed(names: object) -> str:
     return ", ".join(known) if len(known) <= _FEW else f"{len(known)} DOFs"
 
 
-def with_force_files(raw: Mapping[str, object], folder: Path) -> dict[str, object]:
-    """Return the tables of a scene with the files of its forces read.
+def with_factor_files(raw: Mapping[str, object], folder: Path) -> dict[str, object]:
+    """Return the tables of a scene with the files of its forces and of what is recovered read.
 
     Raises
     ------
     SceneError
-        A file that cannot be read, or a row that is no DOF with one or two numbers.
+        A file that cannot be read, or a row that is no DOF with one number, or two of a force.
     """
-    given = raw.get("excitation")
-    rows = given if isinstance(given, list) else [given]
-    if not any(isinstance(row, dict) and isinstance(row.get("forces"), str) for row in rows):
-        return dict(raw)
-    found = [
-        {**row, "forces": _read(folder / row["forces"], i if isinstance(given, list) else None)}
-        if isinstance(row, dict) and isinstance(row.get("forces"), str)
-        else row
-        for i, row in enumerate(rows)
-    ]
-    return {**raw, "excitation": found if isinstance(given, list) else found[0]}
+    found = dict(raw)
+    for table, key, most in (("excitation", "forces", 2), ("recovery", "terms", 1)):
+        given = raw.get(table)
+        rows = given if isinstance(given, list) else [given]
+        if not any(isinstance(row, dict) and isinstance(row.get(key), str) for row in rows):
+            continue
+        read = [
+            {**row, key: _read(folder / row[key], (table, *([i] if rows is given else []), key), most)}
+            if isinstance(row, dict) and isinstance(row.get(key), str)
+            else row
+            for i, row in enumerate(rows)
+        ]
+        found[table] = read if rows is given else read[0]
+    return found
 
 
-def _read(path: Path, number: int | None) -> dict[str, list[float]]:
-    place = ("excitation", *(() if number is None else (number,)), "forces")
+def _read(path: Path, place: Place, most: int) -> dict[str, list[float]] | dict[str, float]:
+    """Return DOF to its numbers, up to `most` of them, of a CSV file."""
 
     def refused(why: str) -> SceneError:
-        return SceneError.of(place, f"`forces`: {str(path)!r} {why}", named=False)
+        return SceneError.of(place, f"`{place[-1]}`: {str(path)!r} {why}", named=False)
 
     try:
         text = path.read_text(encoding="utf-8")
@@ -255,9 +258,10 @@ def _read(path: Path, number: int | None) -> dict[str, list[float]]:
             numbers = [float(cell) for cell in cells[1:]]
         except ValueError:
             numbers = []
-        if not 1 <= len(numbers) <= 2 or cells[0] in table:
-            raise refused(f"line {line} must be a DOF, its factor and maybe a phase, none twice, got {row!r}")
-        table[cells[0]] = [*numbers, 0.0][:2]
+        if not 1 <= len(numbers) <= most or cells[0] in table:
+            phase = " and maybe a phase" if most > 1 else ""
+            raise refused(f"line {line} must be a DOF, its factor{phase}, none twice, got {row!r}")
+        table[cells[0]] = [*numbers, 0.0][:most]
     if not table:
         raise refused("names no DOF")
-    return table
+    return table if most > 1 else {dof: numbers[0] for dof, numbers in table.items()}

@@ -19,7 +19,7 @@ from solver.contacts.laws import harmonics as load_harmonics
 from solver.contacts.laws.base import AnyContact
 from solver.contacts.laws.registry import laws
 from solver.matrices.values import UNITS
-from solver.scene import linear_terms
+from solver.scene import linear_terms, materials
 from solver.scene import matrices_structure as matrices_part
 from solver.scene import parts as scene_parts
 from solver.scene.bodies import body as scene_bodies
@@ -31,7 +31,7 @@ from solver.wording import every_field_said
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 _ENTRY = re.compile(r"^(\w+) : .*\n((?:    .*\n?)+)", re.MULTILINE)
-_HOMES = (scene_parts, scene_bodies, scene_shapes, linear_terms, matrices_part, load_harmonics)
+_HOMES = (scene_parts, scene_bodies, scene_shapes, linear_terms, matrices_part, load_harmonics, materials)
 
 
 class _Generator(GenerateJsonSchema):

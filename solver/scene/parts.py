@@ -26,6 +26,7 @@ from solver.contacts.fields import (
     NonNegative,
     Part,
     Positive,
+    Signed,
     Vector,
 )
 from solver.contacts.laws.base import AnyContact
@@ -218,7 +219,12 @@ class Recovered(Part):
     unit: Annotated[
         str, Field(min_length=1, max_length=20), "Its unit, for example MPa; amplitudes are in it."
     ]
-    terms: Annotated[Shares, "DOF to its factor [unit/m]."]
+    terms: Annotated[Shares, "DOF to its factor [unit/m]; in a scene file also the name of a CSV file."]
+    static: Annotated[
+        Signed | None,
+        "What it is without the motion, by speed and preload: the mean stress of margins [unit].",
+    ] = None
+    material: Annotated[Name | None, "One of `materials`, for the margin of a stress."] = None
 
 
 LAW_TAG = "law "  # begins the tags of the union: no key of a contact has a space

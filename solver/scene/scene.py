@@ -35,7 +35,7 @@ from solver.scene.bodies.shape_parts import own_parts, with_shapes
 from solver.scene.bodies.shapes import AnyShape
 from solver.scene.bodies.validation import body_issues
 from solver.scene.cyclic.validation import cyclic_issues
-from solver.scene.excitation import with_force_files
+from solver.scene.excitation import with_factor_files
 from solver.scene.linear_terms import (
     Aerodynamics,
     CouplingOfAnyKind,
@@ -43,6 +43,7 @@ from solver.scene.linear_terms import (
     SpeedDependence,
     at_speed,
 )
+from solver.scene.materials import Material
 from solver.scene.parts import (
     KINDS,
     ContactOfAnyLaw,
@@ -101,6 +102,7 @@ _OPTIONAL = (
     "aerodynamics",
     "with_speed",
     "recovery",
+    "materials",
 )  # left out if empty
 _FEW = 6  # contacts that are named where a scene says what it is
 
@@ -168,6 +170,7 @@ class Scene(Part):
         tuple[Recovered, ...],
         "Stresses, strains and other sums of DOFs that may be observed.",
     ] = ()
+    materials: Annotated[tuple[Material, ...], "Strengths, for the margins of recovered stresses."] = ()
 
     def __repr__(self) -> str:
         """Say in a line what it is; `to_dict` has all of it."""
@@ -360,7 +363,7 @@ def load_scene(name_or_path: object) -> Scene:
     SceneError
         No such scene, a file that cannot be read, or everything that is wrong with its content.
     """
-    raw = with_force_files(load_raw(name_or_path), scene_folder(name_or_path))
+    raw = with_factor_files(load_raw(name_or_path), scene_folder(name_or_path))
     structure = raw.get("structure")
     if isinstance(structure, Mapping) and structure.get("kind") == "matrices":
         from solver.matrices.scene_files import with_files

@@ -30,6 +30,7 @@ from solver.scene.linear_terms import (
     coupling_kinds,
     kind_of,
 )
+from solver.scene.materials import Material, strength_issue
 from solver.scene.parts import (
     KINDS,
     LAW_TAG,
@@ -50,6 +51,7 @@ from solver.wording import listing, nearest, quoted
 TERM_KEYS: dict[tuple[str, ...], tuple[str, tuple[str, ...]]] = {
     ("with_speed",): ("a dependence on the speed", tuple(SpeedDependence.model_fields)),
     ("recovery",): ("a recovered quantity", tuple(Recovered.model_fields)),
+    ("materials",): ("a material", tuple(Material.model_fields)),
     ("couplings",): ("a coupling", tuple(Coupling.model_fields)),
     ("aerodynamics",): ("aerodynamics", tuple(Aerodynamics.model_fields)),
     ("aerodynamics", "influence"): ("an influence", tuple(Influence.model_fields)),
@@ -60,7 +62,7 @@ MOST_ISSUES = 200  # of each kind: a scene with more is not read by a person
 RESERVED_PREFIXES = ("excitation", "structure", "frequency", "observe", "speed")
 _SCENE_KEYS = (
     "name", "structure", "contacts", "excitation", "observe", "bodies", "nodes", "loads", "dampers", "speed",
-    "couplings", "aerodynamics", "speed_order", "with_speed", "recovery",
+    "couplings", "aerodynamics", "speed_order", "with_speed", "recovery", "materials",
 )  # fmt: skip
 _KEYS: dict[tuple[str, ...], tuple[str, tuple[str, ...]]] = {
     (): ("a scene", _SCENE_KEYS),
@@ -512,6 +514,12 @@ def _recovery_issues(raw: dict[str, Any], dofs: dict[str, None] | None) -> Itera
     rows = list(rows_of(raw, "recovery"))
     named = [((*steps, "name"), row["name"]) for steps, row in rows if isinstance(row.get("name"), str)]
     yield from duplicates(named, "recovery")
+    made = list(rows_of(raw, "materials"))
+    yield from duplicates([((*at, "name"), one["name"]) for at, one in made if "name" in one], "materials")
+    for steps, row in rows:
+        if isinstance(row.get("material"), str):
+            issue = strength_issue(steps, row, {str(one.get("name")): one for _, one in made})
+            yield from () if issue is None else (issue,)
     for steps, row in rows if dofs is not None else ():
         terms = row.get("terms")
         for dof in terms if isinstance(terms, dict) else ():

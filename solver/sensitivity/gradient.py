@@ -20,9 +20,9 @@ from solver.balance.contact_hessian import (
     ContactForces,
     check_laws,
     check_loads,
-    check_measure,
     contact_forces,
 )
+from solver.balance.kernels.haigh import utilisation
 from solver.balance.kernels.jacobian import factorise, step_back
 from solver.balance.parameter import Kind
 from solver.balance.parameter_derivatives import (
@@ -38,7 +38,7 @@ from solver.balance.speed_line import check_no_line
 from solver.balance.whole_motion import Amplitudes, WholeMotion, times, whole_motion
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.columns import KT, MU
-from solver.contacts.kernels.system import evaluation_by_value
+from solver.contacts.kernels.system import FROM_REST, UTILISED, evaluation_by_value
 from solver.errors import SettingError
 from solver.jit.fourier import Complex, Integer, Real
 from solver.linear.contact_table import second_numbers
@@ -62,6 +62,8 @@ from solver.sensitivity.kernels.adjoint import (
     BY_OMEGA,
     BY_PHASE,
     EXTREME_COLUMNS,
+    SIGN,
+    TAU,
     amplitude_slopes,
 )
 
@@ -79,7 +81,7 @@ class Gradient(Piece):
 
 
 class Sensitivities:
-    """Derivatives of the amplitude at points of one frequency response, by parameter paths.
+    """Derivatives of what is measured at points of one frequency response, by parameter paths.
 
     Parameters
     ----------
@@ -172,8 +174,8 @@ class Sensitivities:
                 whole_motion(system, self._matrices, self._dampings, omega),
                 contact_forces(system, self._seconds, u),
             )
-            turn = self._turns[0].copy()
-            adjoint = Adjoint(w=self._weights[0].copy(), y=self._adjoint_motion(motion, 0), turn=turn)
+            y, (turns, by, by_twice) = self._adjoint_motion(motion, 0), self._extremes()
+            adjoint = Adjoint(w=self._weights[0].copy(), y=y, turns=turns, by=by, by_twice=by_twice)
             along = self._directions()
             responses = self._responses(u, omega, motion, contacts, along)
             if responses is None:
@@ -194,7 +196,6 @@ class Sensitivities:
     def check_second(self) -> None:
         """Raise SettingError where laws or paths have no exact second derivatives here."""
         check_laws(self.balance.scene)
-        check_measure(self.balance.scene)
         check_no_line(self.balance.scene)
         check_smooth_structure(self.balance.scene, self._parameters)
 
@@ -212,6 +213,20 @@ class Sensitivities:
             self._x, self._tops, self._turns, self._weights, self._pulls, self._by,
         )  # fmt: skip
         return [self._one(u, omega, top) for top in range(count)]
+
+    def _extremes(self) -> tuple[Complex, Real, Real]:
+        """Return the turns of max x and −min x, or of one, and derivatives of what is measured by them."""
+        system = self.balance.system
+        if system.centred == FROM_REST:
+            return self._turns[:1].copy(), np.ones(1), np.zeros((1, 1))
+        turns = self._tops[:, SIGN, None] * np.exp(1j * np.outer(self._tops[:, TAU], system.ks))
+        by_half, by_mean, mixed, twice = 1.0, 0.0, 0.0, 0.0
+        if system.centred == UTILISED:
+            high, low = (turns @ self._amplitudes.of(self._x)).real
+            _, by_half, by_mean, mixed, twice = utilisation(system.haigh, high, -low)
+        both = 0.5 * np.array([[1.0, 1.0], [1.0, -1.0]])  # half the range, and the mean, of max x and −min x
+        by = np.array([by_half, by_mean]) @ both
+        return turns, by, both.T @ np.array([[0.0, mixed], [mixed, twice]]) @ both
 
     def _directions(self) -> Directions:
         """Return what ω and every path change."""

@@ -6,7 +6,8 @@ amplitude has the second derivatives of L along the directions v_i = (du/dP_i, e
     H_ij = −Re yᵀ (Z_i x_j + Z_j x_i + Z_ij x − f_ij) + w·F_ij − q_i q_j / (ξ x''(τ)),
 
 with the whole motion x = Z⁻¹ φ of every harmonic, its derivatives x_i along v_i, the adjoint motion y, the
-weights w of the forces, w·F_ij their second derivative along v_i and v_j, and q_i = ξ dx'(τ)/dP_i. Where the
+weights w of the forces, w·F_ij their second derivative along v_i and v_j, and q_i = ξ dx'(τ)/dP_i. A function
+g of several extremes e has such a last term of each, times its ∂g/∂e, and Σ ∂²g/∂e∂e' e_i e'_j. Where the
 amplitude is stationary in ω the peak A(p) has the Hessian H_pp − H_pω H_ωp/H_ωω, and ω* drifts by −H_pω/H_ωω.
 """
 
@@ -124,7 +125,9 @@ class Adjoint:
 
     w: Annotated[Real, "(nc, n)."]
     y: Annotated[Complex, "(nk, N)."]
-    turn: Annotated[Complex, "ξ e^{ikτ} at the extremum, (nk,)."]
+    turns: Annotated[Complex, "ξ e^{ikτ} at each extremum that counts, (ne, nk)."]
+    by: Annotated[Real, "Derivatives of the measure by these extremes, (ne,)."]
+    by_twice: Annotated[Real, "Its second ones, (ne, ne)."]
 
 
 def lagrangian_hessian(
@@ -151,10 +154,12 @@ def lagrangian_hessian(
     twice = second_forces(ks, motion.forces, along.level, along.phase)
     hessian += np.einsum("kn,ijkn->ij", y, twice).real
     hessian += _of_contacts(contacts, along, found.dU, adjoint.w)
-    moved = np.einsum("k,kn,ikn->ik", adjoint.turn, motion.observe, found.dx)
-    bend = -(ks**2 * adjoint.turn * np.einsum("kn,kn->k", motion.observe, x)).sum().real
-    q = (1j * ks * moved).sum(axis=1).real
-    hessian -= np.outer(q, q) / bend if bend != 0.0 else 0.0
+    moved = np.einsum("ek,kn,ikn->eik", adjoint.turns, motion.observe, found.dx)
+    bends = -(ks**2 * adjoint.turns * np.einsum("kn,kn->k", motion.observe, x)).sum(axis=1).real
+    for by, q, bend in zip(adjoint.by, (1j * ks * moved).sum(axis=2).real, bends, strict=True):
+        hessian -= by * np.outer(q, q) / bend if bend != 0.0 else 0.0
+    firsts = moved.sum(axis=2).real
+    hessian += firsts.T @ adjoint.by_twice @ firsts
     return np.asarray(0.5 * (hessian + hessian.T))
 
 

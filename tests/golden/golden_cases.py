@@ -98,6 +98,7 @@ def _options(name: str) -> Iterator[tuple[str, str]]:
         yield "sensitivities", ""
         yield "design", f"--variable {path} {least} {most}"
         limit = 1e-4 if name == "bladed-disk" else 1.0
+        yield "margin", f"--from 0.5 --to 2 --points 3 --limit {1e-6 if name == 'bladed-disk' else 0.1}"
         yield "pareto", f"--variable {path} {least} {most} --limit {limit} --points 3"
     if name == "two-dof":
         yield "identify", "DATA --unknown damper.mu 0.1 0.6 --starts 2"

@@ -90,6 +90,10 @@ _MEANT: dict[str, tuple[dict[str, Any], ...]] = {
         {"from": 1, "to": 2, "phase_resonance": True, "performance": True}, {"to": 2},
         {**_DISK, "from": 1e-5, "to": 1e-4, "nodal_diameter": 5},
     ),
+    "margin": (
+        {}, {"from": 2, "to": 1}, {"from": 0, "to": 1}, {"from": 1, "to": 2, "points": 1},
+        {"from": 1, "to": 2, "dampers": {}}, {"from": 1, "to": 2, "dampers": {"x": {"damper.N9": 1}}},
+    ),
     "controlled": ({"amplitude": 0}, {"amplitude": 1, "from": 3}, {"amplitude": 1, "dof": "x"}, {}),
     "interference": ({}, {**_DISK, "orders": [0]}, {**_DISK, "within": 2}, {**_DISK, "orders": [1]}),
     "solve": ({"frequency_hz": 0}, {}, {"frequency_hz": 1, "starts": -1}, {"frequency_hz": 1, "seed": -1}),

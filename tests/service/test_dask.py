@@ -62,6 +62,7 @@ BODIES: dict[str, dict[str, Any]] = {
     },
     "modes": {"scene": "two-dof", "from": 0.01, "to": 10.0, "harmonics": 3},
     "controlled": {"scene": "two-dof", "amplitude": 1.0, "harmonics": 3},
+    "margin": {"scene": "two-dof", "from": 20, "to": 120, "points": 3, "limit": 2.0, "harmonics": 3},
     "sensitivities": {"scene": "two-dof", "harmonics": 3},
     "plan": {"scene": "two-dof"},
     "identify": {

@@ -43,6 +43,7 @@ def asked(kind: str, name: str) -> dict[str, Any]:
             "load_loss_per_depth": {scene.contacts[0].name: 1e6},
         },
         "transient": {"begin_hz": low, "end_hz": middle, "ramp_seconds": 10.0 / middle, "from_rest": True},
+        "margin": {"from": ends[0], "to": ends[1], "points": 2, "limit": 1e-4},
         "controlled": {"amplitude": 1e-5, **near},
         "accuracy": {"frequency_hz": middle, "harmonics": [1, 2], "samples": [16], "repeats": 1},
         "campbell": {"speeds_rpm": [[60 * middle, 61 * middle]]}, "interference": {"speed_rpm": 3000},

@@ -35,6 +35,7 @@ BODIES: dict[str, tuple[str, Mapping[str, Any]]] = {
         "mistuning",
         {"scene": SMALL_DISK, "of": "tip", "samples": 2, "harmonics": 1, "from": 740, "to": 780},
     ),
+    "margin": ("margin", {**TWO, "from": 20, "to": 120, "points": 3, "limit": 2.0}),
     "controlled": ("controlled", {**TWO, "amplitude": 1.0}),
     "sensitivities": ("sensitivities", TWO),
     "plan": ("plan", TWO),

@@ -15,6 +15,7 @@ from service.jobs.studies.identify import Identify
 from service.jobs.studies.interference import Interference
 from service.jobs.studies.map import Map
 from service.jobs.studies.march import March
+from service.jobs.studies.margin import Margin
 from service.jobs.studies.mistuning import Mistuning
 from service.jobs.studies.modes import Modes
 from service.jobs.studies.pareto import Pareto
@@ -44,6 +45,7 @@ SHIPPED = Registry(
         Peaks.as_kind(),
         Design.as_kind(),
         Pareto.as_kind(),
+        Margin.as_kind(),
         Solve.as_kind(),
         March.as_kind(),
         Transient.as_kind(),

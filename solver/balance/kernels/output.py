@@ -6,9 +6,10 @@ import math
 
 import numpy as np
 
+from solver.balance.kernels.haigh import utilisation
 from solver.balance.kernels.mechanics import unaccounted
 from solver.contacts.kernels.stick_slip_events import largest
-from solver.contacts.kernels.system import Evaluation, Receptance, System
+from solver.contacts.kernels.system import FROM_REST, UTILISED, Evaluation, Receptance, System
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Real, coefficient_count, cosine_position
 from solver.jit.separate import apart
@@ -137,14 +138,17 @@ def measure_motion(system: System, point: Evaluation, x: Real, dx: Real, out: Re
     """Fill `out` with the measures of the observed coefficients `x` and their slopes where x changes by dx.
 
     The place of an extremum is stationary, so a slope is the change of the motion at that place. Counted from
-    the middle of its range the motion is as far up as down.
+    the middle of its range the motion is as far up as down; so is a utilisation.
     """
     high, at_high, low, at_low = extremes(system, x)
     rise, sink = _along(system, dx, at_high), _along(system, dx, at_low)
-    if system.centred == 1:
-        high, rise = 0.5 * (high - low), 0.5 * (rise - sink)
-        low, sink = -high, -rise
     out[HALF_RANGE], out[RANGE_SLOPE] = 0.5 * (high - low), 0.5 * (rise - sink)
+    if system.centred != FROM_REST:
+        value, by_half, by_mean = out[HALF_RANGE], 1.0, 0.0
+        if system.centred == UTILISED:
+            value, by_half, by_mean, _, _ = utilisation(system.haigh, high, low)
+        rise = by_half * out[RANGE_SLOPE] + by_mean * 0.5 * (rise + sink)
+        high, low, sink = value, -value, -rise
     out[HIGH], out[LOW], out[HIGH_SLOPE], out[LOW_SLOPE] = high, -low, rise, -sink
     out[MEAN] = x[0] if system.ks[0] == 0 else 0.0
     out[MAX_ABS] = max(high, -low)

@@ -36,6 +36,8 @@ from solver.jit.reference import referenced
 FREQUENCY, LEVEL, FORCE_PHASE, STRUCTURE = 0, 1, 2, 3
 # How Z⁻¹ is kept.
 MODES, POLES, DENSE = 0, 1, 2
+# What is measured: max|x|; counted from the middle of its range; a stress over what is allowed at its mean.
+FROM_REST, CENTRED, UTILISED = 0, 1, 2
 # Numbers in `Evaluation.counts`.
 FREE, HELD, SIZE, AT_BRANCH_POINT, UNHELD, PINNED, MIXED, BANDED = range(8)
 COUNTS = 8
@@ -82,7 +84,8 @@ class System(NamedTuple):
     level_reference: float  # N, the excitation amplitude at level 1
     constant_mean: int  # 1: constant forces are loads, which the level of the excitation leaves alone
     phase_reference: float  # rad
-    centred: int  # 1: the observed motion counts from the middle of its range, 0: from where it is at rest
+    centred: int  # what is measured of the observed motion: FROM_REST, CENTRED or UTILISED
+    haigh: Real  # (4,) of a utilisation, see `solver.balance.kernels.haigh`
     parameter_reference: float  # the value of a structural parameter at which K, M, C stand
     least_size: float  # m, motions of the contacts far below it are rounding of what cancels in ū
     form: int

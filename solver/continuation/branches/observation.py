@@ -14,7 +14,7 @@ from solver.balance.kernels.observers import measure_through_modes
 from solver.balance.kernels.output import measure
 from solver.balance.kernels.residual import evaluate
 from solver.balance.workspace import Workspace
-from solver.contacts.kernels.system import DENSE
+from solver.contacts.kernels.system import DENSE, UTILISED
 from solver.continuation.branch import Branch
 from solver.continuation.branches.sweep import surveyed, with_error, with_points
 from solver.continuation.extrema.extrema import Survey
@@ -23,9 +23,13 @@ from solver.continuation.extrema.nodes import NodeSolver, numbers_of
 from solver.continuation.peaks import Peak
 from solver.jit.fourier import Real
 from solver.linear.kernels.receptance import observer_receptance, receptance
+from solver.scene.materials import Haigh
 
 
-def observing(branch: Branch, dof: str, *, measure: str | None = None, limit: float | None = None) -> Branch:
+def observing(
+    branch: Branch, dof: str, *, measure: str | Haigh | None = None, limit: float | None = None,
+    peaks_alone: bool = False,
+) -> Branch:  # fmt: skip
     """Return a frequency response observed otherwise: the same solutions, its own peaks and band.
 
     It costs one evaluation a point, no continuation. Between points it is as good as the branch is dense;
@@ -35,8 +39,10 @@ def observing(branch: Branch, dof: str, *, measure: str | None = None, limit: fl
     ----------
     branch : a completed response over the frequency.
     dof : name of the DOF.
-    measure : of its motion, as in a scene; that of the branch if left out.
+    measure : of its motion, as in a scene; that of the branch if left out. The utilisation of a recovered
+        stress by what it is judged by, `solver.scene.materials.haigh_of`.
     limit : amplitude [m] above which the band is measured; peak/√2 if left out.
+    peaks_alone : leave out the band and the error of the highest peak.
 
     Raises
     ------
@@ -48,6 +54,11 @@ def observing(branch: Branch, dof: str, *, measure: str | None = None, limit: fl
     x, measures = _measured([workspace], branch.solutions, branch.tangents, branch.measures)
     seen = replace(branch, balance=workspace.balance, error_estimate=math.nan, newton_iterations=0)
     survey = Survey.of(workspace, _points(branch, x[0], measures[0]))
+    if peaks_alone:
+        return replace(
+            with_points(seen, survey.points), peaks=survey.peaks, band=None,
+            peak_certificate=survey.certificate(completed=branch.reached),
+        )  # fmt: skip
     found = with_error(surveyed(seen, survey, limit), workspace)
     return replace(found, seconds=time.perf_counter() - begun)
 
@@ -104,14 +115,20 @@ def _points(branch: Branch, x: Real, measures: Real) -> Points:
     )  # fmt: skip
 
 
-def _workspaces(branch: Branch, dofs: Sequence[str], measure: str | None = None) -> list[Workspace]:
+def _workspaces(
+    branch: Branch, dofs: Sequence[str], measure: str | Haigh | None = None
+) -> list[Workspace]:  # fmt: skip
     """Return a workspace with each DOF observed; all share what is known of the resonances."""
     posed, workspaces = branch.balance, list[Workspace]()
-    how = {"measure": measure or posed.scene.observe.measure}
+    haigh = measure if isinstance(measure, Haigh) else None
+    how = {"measure": "half_peak_to_peak" if haigh else measure or posed.scene.observe.measure}
     for dof in dofs:
         seen = posed.scene.observe.model_copy(update={"dof": dof, **how})
         other = posed.scene.model_copy(update={"observe": seen})
         balance = build(other, harmonics=posed.n_harmonics, effects=posed.effects)
+        if haigh is not None:
+            system = balance.system._replace(centred=UTILISED, haigh=np.array(haigh, dtype=np.float64))
+            balance = replace(balance, system=system)
         workspaces.append(Workspace.of(balance, observing_another=workspaces[0] if workspaces else None))
     return workspaces
 

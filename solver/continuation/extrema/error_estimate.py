@@ -8,12 +8,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from solver.balance.kernels.haigh import utilisation
 from solver.balance.kernels.jacobian import factorise, step_back
 from solver.balance.kernels.output import extremes, observed_motion
 from solver.balance.kernels.residual import evaluate
 from solver.balance.more_harmonics import less_harmonics, linear_part, more_harmonics, pad
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.system import (
+    FROM_REST,
+    UTILISED,
     by_reference,
     evaluation_by_value,
     new_receptance,
@@ -133,8 +136,8 @@ class ErrorEstimator:
         largest = np.max(changes, axis=0)
         if not across and steps[1] > _FIRST_ORDER * steps[0] and largest[0] > _FIRST_ORDER * self._size(x):
             largest = self._solved(x, start, p, largest)
-        max_abs, half_range = more * SAFETY * largest + tail + self._rounding()
-        if kept.system.centred:
+        max_abs, half_range = more * SAFETY * largest + self._per_motion(x) * (tail + self._rounding())
+        if kept.system.centred != FROM_REST:
             max_abs = half_range
         return ErrorEstimate(max_abs=float(max_abs), half_peak_to_peak=float(half_range))
 
@@ -161,9 +164,21 @@ class ErrorEstimator:
         return None if x is None else pad(x, less, self._larger.balance)
 
     def _size(self, x: Real) -> float:
-        """Return the amplitude of an observed motion [m]."""
+        """Return the amplitude of an observed motion [m], or its utilisation."""
         high, _, low, _ = extremes(self._larger.system, x)
-        return max(high, -low)
+        used = self._utilisation(high, low)
+        return max(high, -low) if used is None else used[0]
+
+    def _utilisation(self, high: float, low: float) -> tuple[float, float, float] | None:
+        """Return the utilisation of an observed stress with its derivatives; None if it is not measured."""
+        system = self._workspace.balance.system
+        return utilisation(system.haigh, high, low)[:3] if system.centred == UTILISED else None
+
+    def _per_motion(self, x: Real) -> float:
+        """Return by how much what is measured may change for a unit of the observed motion."""
+        high, _, low, _ = extremes(self._larger.system, x)
+        used = self._utilisation(high, low)
+        return 1.0 if used is None else used[1] + abs(used[2])
 
     def _rounding(self) -> float:
         """Return what rounding may do to the observed motion where last evaluated [m].
@@ -188,12 +203,19 @@ class ErrorEstimator:
         return x
 
     def _change(self, before: Real, after: Real) -> tuple[float, float]:
-        """Return the changes of max|x| and of (max x − min x)/2, at least a tenth of those of the motion."""
+        """Return the changes of max|x| and of (max x − min x)/2, or twice that of the utilisation.
+
+        They are at least a tenth of those of the motion.
+        """
         (high, low), (high_after, low_after), (rise, sink) = (
             extremes(self._larger.system, x)[::2] for x in (before, after, after - before)
         )
         max_abs = abs(max(high_after, -low_after) - max(high, -low))
         half_range = 0.5 * abs(high_after - low_after - high + low)
+        used, now = self._utilisation(high, low), self._utilisation(high_after, low_after)
+        if used is not None and now is not None:
+            least = 0.5 * used[1] * (rise - sink) + abs(used[2]) * max(rise, -sink)
+            return (max(abs(now[0] - used[0]), _ANYWHERE * least),) * 2
         return max(max_abs, _ANYWHERE * max(rise, -sink)), max(half_range, 0.5 * _ANYWHERE * (rise - sink))
 
     def _tangent(self) -> Real | None:

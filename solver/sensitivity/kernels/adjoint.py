@@ -17,6 +17,7 @@ import math
 import numpy as np
 
 from solver.balance.kernels.coordinates import is_reduced, responses
+from solver.balance.kernels.haigh import utilisation
 from solver.balance.kernels.jacobian import factorise, step_back
 from solver.balance.kernels.output import SAME_HEIGHT, extremes, observed_motion
 from solver.balance.kernels.residual import contact_values, evaluate
@@ -24,7 +25,7 @@ from solver.balance.kernels.slopes import springs_of
 from solver.contacts.kernels.columns import KT, MU
 from solver.contacts.kernels.coulomb.force import contact_force
 from solver.contacts.kernels.stick_slip_events import FAILED
-from solver.contacts.kernels.system import Evaluation, Receptance, System
+from solver.contacts.kernels.system import FROM_REST, UTILISED, Evaluation, Receptance, System
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Complex, Integer, Real, coefficient_count, cosine_position
 from solver.jit.separate import apart
@@ -50,7 +51,8 @@ def amplitude_slopes(
 ) -> int:  # fmt: skip
     """Differentiate max|x| of the observed DOF at the solution (u, ω); λ of `system` is the frequency.
 
-    Counted from the middle of its range it is (max x − min x)/2, whose turn is half of both.
+    Counted from the middle of its range it is (max x − min x)/2, whose turn is half of both; a utilisation
+    is a function of that and of the mean of max x and min x.
 
     Parameters
     ----------
@@ -68,9 +70,10 @@ def amplitude_slopes(
     if not observe(system, linear, u, omega, point, x, tops):
         return 0
     high, low = tops[0, AMPLITUDE], -tops[1, AMPLITUDE]
+    of_both = system.centred != FROM_REST
     # Without a mean and even harmonics both extremes are the same by symmetry.
     both = system.ks[0] == 0 and abs(high + low) <= SAME_HEIGHT * max(high, -low)
-    if not both and -low > high:
+    if not both and not of_both and -low > high:
         for column in range(EXTREME_COLUMNS):
             tops[0, column], tops[1, column] = tops[1, column], tops[0, column]
     count = 2 if both else 1
@@ -78,10 +81,13 @@ def amplitude_slopes(
         for i in range(system.ks.size):
             angle = system.ks[i] * tops[top, TAU]
             turns[top, i] = tops[top, SIGN] * complex(math.cos(angle), math.sin(angle))
-    if system.centred == 1:
-        count, tops[0, AMPLITUDE] = 1, 0.5 * (high - low)
+    if of_both:
+        count, tops[0, AMPLITUDE], by_half, by_mean = 1, 0.5 * (high - low), 1.0, 0.0
+        if system.centred == UTILISED:
+            tops[0, AMPLITUDE], by_half, by_mean, _, _ = utilisation(system.haigh, high, low)
         for i in range(system.ks.size):
-            turns[0, i] = 0.5 * (turns[0, i] + turns[1, i])
+            up, down = turns[0, i], turns[1, i]
+            turns[0, i] = 0.5 * (by_half * (up + down) + by_mean * (up - down))
     good = slopes_along(system, linear, u, omega, point, wanted, count, turns, weights, pulls, by)
     return count if good else 0
 

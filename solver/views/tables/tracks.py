@@ -7,7 +7,7 @@ from typing import Any
 
 from solver.results import units
 from solver.results.known import known_pairs
-from solver.results.told import Block, Summary
+from solver.results.told import Block, ResultTable, Summary
 from solver.scene.parameter_paths import parameter
 from solver.views.tables.responses import proved
 
@@ -46,6 +46,39 @@ def response_map(found: Json) -> Iterator[Block]:
     pairs += _sure(found if "measure" in found else found["ridge"] or {})
     pairs.append(("time", units.duration(found["seconds"])))
     yield Summary(_title(found), pairs)
+
+
+def margin(found: Json) -> Iterator[Block]:
+    """What each damper allows, and the stress of each over the excitation."""
+    level, unit = found["level"], found["level_unit"]
+    what = "stress" if found["judged_by"] == "utilisation" else "amplitude"
+    title = f"{found['scene']}, excitation from {level[0]:.6g} to {level[-1]:.6g} {unit}"
+    pairs = [("time", units.duration(found["seconds"]))]
+    if found["judged_by"] == "amplitude" and all(one is None for row in found["used"] for one in row):
+        pairs.insert(0, ("note", "nothing says what is allowed: give stresses a material, or a limit"))
+    yield Summary(f"{title}, {found['n_harmonics']} harmonics", pairs)
+    allowed = [
+        (
+            one["name"], _ends(one, unit), one["row"] or "–",
+            "–" if one["at_hz"] is None else f"{one['at_hz']:.6g} Hz",
+            "–" if one["value"] is None else f"{one['value']:.6g} {found['unit']}",
+        )
+        for one in found["allowed"]
+    ]  # fmt: skip
+    yield ResultTable("Excitation allowed", ("damper", "allowed", "by", "at", what), allowed)
+    names = [one["name"] for one in found["allowed"]]
+    for key, title in (("stress", f"{what} [{found['unit']}]"), ("used", "share of what is allowed")):
+        rows = [
+            (f"{each:.4g}", *("–" if one is None else f"{one:.4g}" for one in row))
+            for each, *row in zip(level, *found[key], strict=True)
+        ]
+        yield ResultTable(title, (f"excitation [{unit}]", *names), rows)
+
+
+def _ends(one: Json, unit: str) -> str:
+    if one["allowed"] is not None:
+        return f"{one['allowed']:.6g} {unit}"
+    return {"below": "less than the range", "above": "more than the range"}.get(one["end"], "not known")
 
 
 def _title(found: Json) -> str:

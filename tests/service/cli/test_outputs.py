@@ -31,6 +31,7 @@ COMMANDS = {
     "modes": "two-dof --from 0.1 --to 3 --harmonics 3",
     "interference": "bladed-disk --speed 11000 --up-to 1400",
     "controlled": "two-dof --amplitude 1 --harmonics 3",
+    "margin": "two-dof --from 20 --to 120 --points 3 --limit 2 --harmonics 3",
     "campbell": "two-dof --speeds 50 80 --harmonics 3",
     "sensitivities": "two-dof --harmonics 3",
     "design": "two-dof --variable damper.N0 20 500 --harmonics 3",
@@ -90,6 +91,7 @@ def results() -> dict[str, Any]:
             solver.load_scene("bladed-disk"), of=["tip"], starts=2, contacts="stuck", patterns=["AB"]
         ),
         "interference": solver.interference_diagram(solver.load_scene("bladed-disk"), speed_rpm=11e3),
+        "margin": solver.margin_diagram(scene, start=20, stop=120, points=3, limit=2.0, harmonics=3),
         "modes": solver.nonlinear_mode(scene, amplitudes=(0.1, 3.0), harmonics=3),
         "pareto": optim.pareto_front(
             scene, variables={"damper.N0": (20, 500)}, limit=2.0, points=3, harmonics=3

@@ -8,11 +8,11 @@ const LAST = ["at", "normal", "tangents", "motions", "direction", "out", "axial"
 const TITLES = {
   "": "Scene", "structure": "Structure", "structure/masses": "Masses", "structure/springs": "Springs", "structure/dampers": "Dashpots", "structure/dofs": "DOFs of the matrices",
   contacts: "Contacts", excitation: "Forces", observe: "What is observed", bodies: "Bodies", nodes: "Nodes", loads: "Constant loads",
-  dampers: "Dampers by shape", with_speed: "What follows the speed", couplings: "Couplings", aerodynamics: "Aerodynamics", recovery: "Recovered quantities",
+  dampers: "Dampers by shape", with_speed: "What follows the speed", couplings: "Couplings", aerodynamics: "Aerodynamics", recovery: "Recovered quantities", materials: "Materials",
 };
 const ONE = {
   "structure/masses": "mass", "structure/springs": "spring", "structure/dampers": "dashpot", "structure/dofs": "DOF", contacts: "contact", excitation: "force", bodies: "body",
-  nodes: "node", loads: "load", dampers: "damper", couplings: "coupling",
+  nodes: "node", loads: "load", dampers: "damper", couplings: "coupling", materials: "material",
 };
 let schema = null;
 

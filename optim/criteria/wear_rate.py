@@ -1,0 +1,77 @@
+"""The wear rate of a contact: a coefficient times the friction power, its local maxima over the band.
+
+Archard's law in the form of energy: the worn volume is k times the friction work, k = K / (μ H) of Archard's
+K and the hardness H. Fouvry, Liskiewicz, Kapsa, Hannel, Sauger, Wear 255 (2003) 287-298.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from optim.criteria.criterion import Criterion, CriterionContext, CriterionRow, Form, Judged, Key, of_sector
+from optim.criteria.friction_work import by_contact
+from optim.criteria.key import number_or_table
+
+_RATE, _COEFFICIENT = "max_wear_rate", "wear_coefficient"
+
+
+def _rows(judged: Judged) -> list[CriterionRow]:
+    """A row for every local maximum that competes, of every contact that is limited."""
+    from solver.response.worst_wear import Measure, worst_slopes, worst_wear
+
+    limits: Mapping[str, tuple[float, float]] = judged.limit(WEAR_RATE) or {}
+    rows = []
+    for contact in judged.contacts(limits):
+        bound, coefficient = limits[of_sector(contact)]
+        for worst in worst_wear(judged.branch, contact.name, Measure.FRICTION_POWER):
+            slope = None
+            if judged.wear is not None:
+                found = worst_slopes(judged.wear, worst, contact.name, Measure.FRICTION_POWER)
+                slope = coefficient * found.gradient
+            what = f"wear rate of {contact.name} at {worst.at:.6g} Hz"
+            rows.append(
+                judged.row(WEAR_RATE, what, coefficient * worst.value, slope, at_hz=worst.at, bound=bound)
+            )
+    return rows
+
+
+def _read(asked: CriterionContext) -> Mapping[str, tuple[float, float]]:
+    """The limit and the coefficient of every contact named."""
+    from optim.errors import DesignError
+
+    limits = asked.values.get(_RATE)
+    if limits is None:
+        raise DesignError(_RATE, None, f"must be given with `{_COEFFICIENT}` [m³/s]")
+    if _COEFFICIENT not in asked.values:
+        raise DesignError(_COEFFICIENT, None, f"must be given with `{_RATE}` [m³/J]")
+    bounds, each = (by_contact(key, asked.values[key], asked.scene) for key in (_RATE, _COEFFICIENT))
+    for name in bounds:
+        if name not in each:
+            raise DesignError(_COEFFICIENT, asked.values[_COEFFICIENT], f"must have one of {name!r} too")
+    return {name: (bound, each[name]) for name, bound in bounds.items()}
+
+
+WEAR_RATE = CRITERION = Criterion(
+    name="wear rate",
+    unit="m³/s",
+    help="The volume that wears off a contact in a second, a coefficient times its friction power, at any "
+    "frequency of the band.",
+    rows=_rows,
+    keys=(
+        Key(
+            name=_RATE, annotation=number_or_table("m³/s", "contacts"), form=Form.NUMBER_OR_TABLE,
+            flag="--max-wear-rate", metavar="R|CONTACT=R", example="1e-15 or shroud=1e-15",
+            examples=(1e-15, {"shroud": 1e-15}), beside=_COEFFICIENT,
+            help="Largest wear rate [m³/s], of every friction contact or by contact.",
+            option_help="Largest wear rate [m³/s]; repeatable by contact.",
+        ),
+        Key(
+            name=_COEFFICIENT, annotation=number_or_table("m³/J", "contacts"), form=Form.NUMBER_OR_TABLE,
+            flag="--wear-coefficient", metavar="K|CONTACT=K", example="1e-13 or shroud=1e-13",
+            examples=(1e-13, {"shroud": 1e-13}), beside=_RATE,
+            help="Volume worn off by a unit of friction work [m³/J], of every contact limited or by contact.",
+            option_help="Volume worn off by friction work [m³/J]; repeatable by contact.",
+        ),
+    ),
+    read=_read,
+)  # fmt: skip

@@ -1,0 +1,213 @@
+"""The designer's diagram: stress over the excitation for several dampers, and what excitation they allow.
+
+At each level one response gives the peak of the utilisation of every recovered stress with a material.
+The allowed excitation is the first at which one of them is used up, U(level) = 1: between the two levels that
+enclose it by Newton's method with the exact ∂U/∂level of the peak (envelope theorem), kept between them.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from solver.balance.balance import check_harmonics
+from solver.continuation.branch import Branch
+from solver.continuation.branches.observation import observing
+from solver.continuation.branches.sweep import sweep
+from solver.continuation.peaks import Peak
+from solver.errors import SettingError, at
+from solver.results.watch import OnProgress, ShouldStop, shows_progress
+from solver.scene.materials import STRESS_UNITS, haigh_of
+from solver.scene.parameter_paths import AMPLITUDE, parameter_of
+from solver.scene.scene import Scene
+from solver.sensitivity.gradient import Sensitivities
+from solver.sensitivity.nonsmooth import peak_gradient
+from solver.studies.margin_result import AllowedExcitation, MarginDiagram, MarginStatus
+
+AS_IT_IS = "as it is"
+POINTS = 9
+_SOLVED = 1e-9  # of |U − 1|
+_MOST = 40  # responses to find an allowed excitation
+
+
+class _Used(NamedTuple):
+    """What is used most of what is allowed in one response."""
+
+    used: float
+    row: str
+    peak: Peak
+    branch: Branch
+    stress: float
+
+
+class _Level:
+    """Responses of one damper at levels of the excitation."""
+
+    def __init__(
+        self, scene: Scene, limit: float | None, harmonics: int, should_stop: ShouldStop
+    ) -> None:  # fmt: skip
+        self.scene, self._limit, self._harmonics, self._should_stop = scene, limit, harmonics, should_stop
+        self._rows = tuple(one.name for one in scene.recovery if one.material is not None)
+        self.parts: list[Branch] = []
+
+    def used(self, level: float) -> _Used | None:
+        """Return what is used most at a level; None where the response does not cover the band."""
+        branch = sweep(
+            self.scene.with_values({AMPLITUDE: level}),
+            harmonics=self._harmonics,
+            should_stop=self._should_stop,
+        )
+        if not branch.reached or branch.peak is None:
+            return None
+        self.parts.append(branch)
+        if not self._rows:
+            used = branch.peak.value / (self._limit or math.nan)
+            return _Used(used, self.scene.observe.dof, branch.peak, branch, branch.peak.value)
+        return max((self._of(branch, row) for row in self._rows), key=lambda one: one.used)
+
+    def _of(self, branch: Branch, row: str) -> _Used:
+        """Return how much a recovered stress is used."""
+        scene = branch.balance.scene
+        seen = observing(branch, row, measure=haigh_of(scene, row), peaks_alone=True)
+        peak = seen.peaks[0]
+        stress = observing(branch, row, measure="half_peak_to_peak", peaks_alone=True).peaks[0].value
+        unit = next(one.unit for one in scene.recovery if one.name == row)
+        return _Used(peak.value, row, peak, seen, stress * STRESS_UNITS[unit])
+
+    def allowed(self, low: float, high: float) -> tuple[float, _Used] | None:
+        """Return the level between two at which U = 1 and what is used there; U is below 1 at the lower."""
+        level = 0.5 * (low + high)
+        for _ in range(_MOST):
+            found = self.used(level)
+            if found is None:
+                return None
+            if abs(found.used - 1.0) <= _SOLVED or high - low <= 1e-14 * high:
+                return level, found
+            low, high = (level, high) if found.used < 1.0 else (low, level)
+            slope = peak_gradient(Sensitivities(found.branch.balance, (AMPLITUDE,)), found.peak).gradient[0]
+            if not self._rows:
+                slope /= self._limit or math.nan
+            step = level + (1.0 - found.used) / slope if slope > 0.0 else math.nan
+            level = step if low < step < high else 0.5 * (low + high)
+        return None
+
+
+@shows_progress("margin")
+def margin_diagram(
+    scene: Scene, *, start: float, stop: float, points: int = POINTS,
+    dampers: Mapping[str, Mapping[str, float]] | None = None, limit: float | None = None,
+    harmonics: int = 11, on_progress: OnProgress = None, should_stop: ShouldStop = None,
+) -> MarginDiagram:  # fmt: skip
+    """Compute the stress over the excitation for several dampers, and the excitation that each allows.
+
+    Parameters
+    ----------
+    scene : with a `material` for at least one stress of its `recovery`; of another the amplitude of the
+        observed DOF is looked at, against `limit`.
+    start, stop : excitation amplitudes of both ends, in the unit of ``excitation.amplitude``.
+    points : levels, in equal ratios.
+    dampers : name to values of parameter paths that make it; the scene as it is if left out.
+    limit : amplitude allowed [m] of a scene without strengths.
+    harmonics : highest harmonic kept.
+    on_progress : called with (share done, responses so far).
+    should_stop : asked between responses and within them.
+
+    Raises
+    ------
+    SettingError
+        Bad ends, points or values, or a `limit` beside strengths.
+    """
+    begun = time.perf_counter()
+    every = checked_dampers(scene, dampers)
+    levels = checked_levels(scene, start, stop, points, limit)
+    check_harmonics(harmonics)
+    stress, used = (np.full((len(every), points), math.nan) for _ in range(2))
+    found: list[AllowedExcitation] = []
+    parts: list[Branch] = []
+    done = holes = stopped = 0
+    for d, (name, changed) in enumerate(every.items()):
+        level = _Level(changed, limit, harmonics, should_stop)
+        seen: list[_Used | None] = []
+        for i, amplitude in enumerate(levels):
+            stopped = stopped or int(should_stop is not None and should_stop())
+            here = None if stopped else level.used(float(amplitude))
+            seen.append(here)
+            if here is not None:
+                stress[d, i], used[d, i] = here.stress, here.used
+            done += 1
+            if on_progress is not None:
+                on_progress(done / (points * len(every)), done)
+        holes += sum(one is None for one in seen)
+        parts += level.parts
+        found.append(_allowed(name, level, levels, seen))
+    strengths = any(one.material is not None for one in scene.recovery)
+    status = MarginStatus.HOLES if holes else MarginStatus.COMPLETED
+    if stopped or (should_stop is not None and should_stop()):
+        status = MarginStatus.STOPPED
+    return MarginDiagram(
+        scene=scene.name, judged_by="utilisation" if strengths else "amplitude",
+        unit="Pa" if strengths else scene.observed_unit, level=levels,
+        level_unit=parameter_of(scene, AMPLITUDE).unit, stress=stress, used=used, allowed=tuple(found),
+        n_harmonics=harmonics, highest=tuple(one.known for one in parts), status=status,
+        seconds=time.perf_counter() - begun,
+    )  # fmt: skip
+
+
+def _allowed(
+    name: str, level: _Level, levels: np.ndarray, seen: list[_Used | None]
+) -> AllowedExcitation:  # fmt: skip
+    """Return what a damper allows, by the first of its levels at which what is allowed is used up."""
+    used = [math.nan if one is None else one.used for one in seen]
+    first = next((i for i, one in enumerate(used) if one >= 1.0), None)
+    if first is None or first == 0:
+        best = max((one for one in seen if one is not None), key=lambda one: one.used, default=None)
+        best = seen[0] if first == 0 else best
+        row, hertz = ("", math.nan) if best is None else (best.row, best.peak.at)
+        value = math.nan if best is None else best.stress
+        end = "above" if first is None else "below"
+        return AllowedExcitation(name=name, allowed=math.nan, end=end, row=row, at_hz=hertz, value=value)
+    solved = level.allowed(float(levels[first - 1]), float(levels[first]))
+    if solved is None:
+        return AllowedExcitation(
+            name=name, allowed=math.nan, end="within", row="", at_hz=math.nan, value=math.nan
+        )
+    amplitude, there = solved
+    return AllowedExcitation(
+        name=name, allowed=amplitude, end="within", row=there.row, at_hz=there.peak.at, value=there.stress
+    )
+
+
+def checked_dampers(
+    scene: Scene, dampers: Mapping[str, Mapping[str, float]] | None
+) -> dict[str, Scene]:  # fmt: skip
+    """Return the scene with each damper; raises SettingError as `margin_diagram`."""
+    if dampers is None:
+        return {AS_IT_IS: scene}
+    if not dampers:
+        raise SettingError("dampers", dict(dampers), "must have at least one name with values")
+    found = {}
+    for name, values in dampers.items():
+        with at("dampers", name):
+            found[name] = scene.with_values(values)
+    return found
+
+
+def checked_levels(
+    scene: Scene, start: float, stop: float, points: int, limit: float | None
+) -> np.ndarray:  # fmt: skip
+    """Return the levels of the excitation, (points,); raises SettingError as `margin_diagram`."""
+    if not 0.0 < start < math.inf:
+        raise SettingError("start", start, "must be an amplitude > 0")
+    if not start < stop < math.inf:
+        raise SettingError("stop", stop, f"must be above `start` = {start:g}")
+    if points < 2:
+        raise SettingError("points", points, "must be at least 2")
+    strengths = any(one.material is not None for one in scene.recovery)
+    if limit is not None and (strengths or not limit > 0.0):
+        wanted = "is for a scene without strengths" if strengths else "must be an amplitude > 0"
+        raise SettingError("limit", limit, wanted)
+    return np.geomspace(start, stop, points)

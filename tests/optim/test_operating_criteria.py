@@ -1,0 +1,146 @@
+"""Running amplitude, wear rate, damping and mass as what designs are judged by."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import optim
+import solver
+from optim.criteria.criterion import Criterion
+from optim.criteria.damping import DAMPING
+from optim.criteria.evaluation import evaluate
+from optim.criteria.mass import MASS
+from optim.criteria.running import RUNNING
+from optim.criteria.wear_rate import WEAR_RATE
+from optim.errors import DesignError
+from optim.problem.issues import problem_issues
+from optim.problem.problem import pose
+from solver.scene.scene import Scene
+
+HARMONICS = 5
+VARIABLES = {"damper.N0": (20.0, 400.0), "damper.kt": (10.0, 60.0)}
+DESIGN = {"damper.N0": 105.0, "damper.kt": 30.0}
+RUNNING_KEYS = {"running_rpm": [[66.0, 78.0]], "weights": {"running": 1.0}}
+WEAR_KEYS = {"max_wear_rate": 1e-9, "wear_coefficient": 1e-12}
+DAMPING_KEYS = {"min_damping": {"ratio": 0.02, "amplitude": 3.0}}
+
+
+def two_dof(**values: float) -> Scene:
+    return solver.load_scene("two-dof").with_values({f"damper.{key}": value for key, value in values.items()})
+
+
+def row_of(quantity: Criterion, keys: dict[str, Any], design: dict[str, float] = DESIGN) -> Any:
+    problem = pose(two_dof(), variables=VARIABLES, harmonics=HARMONICS, **keys)
+    return evaluate(problem, design).of(quantity)[0]
+
+
+@pytest.mark.parametrize(
+    ("quantity", "keys"),
+    [
+        (RUNNING, RUNNING_KEYS),
+        (RUNNING, {"running_rpm": [50.0], "max_running_amplitude": 1.0}),
+        (WEAR_RATE, WEAR_KEYS),
+        (DAMPING, DAMPING_KEYS),
+    ],
+    ids=["range", "speed", "wear", "damping"],
+)
+def test_gradients_are_differences(quantity: Criterion, keys: dict[str, Any]) -> None:
+    row = row_of(quantity, keys)
+    for i, (path, value) in enumerate(DESIGN.items()):
+        step = 1e-4 * value
+        below, above = (row_of(quantity, keys, DESIGN | {path: value + s}) for s in (-step, step))
+        assert row.gradient[i] == pytest.approx((above.value - below.value) / (2.0 * step), rel=1e-5)
+
+
+def test_the_running_amplitude_is_that_of_its_speeds() -> None:
+    low, high = 66.0 / 60.0, 78.0 / 60.0
+    dense = max(
+        solver.solve(two_dof(N0=105.0), frequency_hz=float(hertz), harmonics=HARMONICS).max_abs
+        for hertz in np.linspace(low, high, 200)
+    )
+    assert row_of(RUNNING, RUNNING_KEYS).value == pytest.approx(dense, rel=1e-4)
+    assert row_of(RUNNING, RUNNING_KEYS).value >= dense
+    alone = row_of(RUNNING, {"running_rpm": [50.0], "max_running_amplitude": 1.0})
+    there = solver.solve(two_dof(N0=105.0), frequency_hz=50.0 / 60.0, harmonics=HARMONICS)
+    assert alone.value == pytest.approx(there.max_abs, rel=1e-4)
+    assert alone.bound == 1.0
+
+
+def test_the_least_running_amplitude_is_not_the_least_peak() -> None:
+    bounds = {"damper.N0": (20.0, 400.0)}
+    found = optim.design(two_dof(), variables=bounds, harmonics=3, **RUNNING_KEYS)
+    assert found.reached, found.status
+    problem = pose(two_dof(), variables=bounds, harmonics=3, **RUNNING_KEYS)
+    grid = [
+        evaluate(problem, {"damper.N0": load}, gradients=False).of(RUNNING)[0].value
+        for load in np.geomspace(20.0, 400.0, 25)
+    ]
+    assert found.evaluation is not None
+    assert 0.95 * min(grid) <= found.evaluation.objective <= min(grid)
+    least = optim.design(two_dof(), variables=bounds, harmonics=3)
+    assert abs(found.optimum["damper.N0"] / least.optimum["damper.N0"] - 1.0) > 0.01
+
+
+def test_the_wear_rate_is_the_coefficient_times_the_power() -> None:
+    row = row_of(WEAR_RATE, WEAR_KEYS)
+    grid = row.at_hz * (1.0 + np.linspace(-0.01, 0.01, 41))
+    power = []
+    for hertz in grid:
+        there = solver.solve(two_dof(N0=105.0), frequency_hz=float(hertz), harmonics=HARMONICS)
+        power.append(hertz * solver.contact_wear(there)["damper"].work.value)
+    assert row.value == pytest.approx(1e-12 * max(power), rel=1e-6)
+    assert row.value >= 1e-12 * max(power) * (1.0 - 1e-9)
+    assert 0 < int(np.argmax(power)) < 40
+
+
+def test_the_damping_is_that_of_the_mode() -> None:
+    row = row_of(DAMPING, DAMPING_KEYS)
+    mode = solver.nonlinear_mode(two_dof(N0=105.0), mode=1, amplitudes=(0.3, 30.0), harmonics=HARMONICS)
+    found = np.interp(np.log(3.0), np.log(mode.amplitude), mode.damping_ratio)
+    assert -row.value == pytest.approx(found, rel=1e-3)
+    assert row.bound == -0.02
+
+
+def test_the_mass_is_that_of_the_bodies() -> None:
+    scene = solver.load_scene("platform-wedge")
+    names = [body.name for body in scene.bodies]
+    variables = {
+        f"{name}.mass": (0.5 * body.mass, 2.0 * body.mass)
+        for name, body in zip(names, scene.bodies, strict=True)
+    }
+    problem = pose(scene, variables=variables, harmonics=3, max_mass=1.0, weights={"mass": 1.0, "peak": 1.0})
+    here = {path: scene.value(path) for path in variables}
+    evaluation = evaluate(problem, here)
+    (row,) = evaluation.of(MASS)
+    assert row.value == pytest.approx(sum(here.values()), rel=1e-14)
+    assert row.gradient == pytest.approx(np.ones(len(names)), rel=1e-14)
+    assert not row.second().any()
+
+
+@pytest.mark.parametrize(
+    ("keys", "pointer", "message"),
+    [
+        ({"max_running_amplitude": 1.0}, "/running_rpm", "must be given with `max_running_amplitude`"),
+        ({"running_rpm": [[2.0, 1.0]]}, "/running_rpm/0", "0 < low <= high"),
+        ({"running_rpm": 50.0}, "/running_rpm", "must be a list"),
+        ({"weights": {"running": 1.0}}, "/weights/running", "needs `running_rpm`"),
+        ({"max_wear_rate": 1.0}, "/wear_coefficient", "must be given with `max_wear_rate`"),
+        ({"wear_coefficient": 1.0}, "/max_wear_rate", "must be given with `wear_coefficient`"),
+        (
+            {"max_wear_rate": {"rim": 1.0}, "wear_coefficient": 1.0},
+            "/max_wear_rate/rim",
+            "must name contacts",
+        ),
+        ({"min_damping": {"ratio": 0.1}}, "/min_damping", "must be a table with `ratio`, `amplitude`"),
+        ({"min_damping": {"ratio": 0.1, "amplitude": 1.0, "mode": 9}}, "/min_damping/mode", "mode"),
+        ({"min_damping": {"ratio": 0.1, "amplitude": -1.0}}, "/min_damping/amplitude", "> 0"),
+        ({"max_mass": 1.0}, "/max_mass", "needs `bodies`"),
+        ({"weights": {"mass": 1.0}}, "/weights/mass", "needs `bodies`"),
+    ],
+)
+def test_what_is_wrong_is_told_at_its_place(keys: dict[str, Any], pointer: str, message: str) -> None:
+    with pytest.raises((DesignError, solver.SettingError), match=message):
+        pose(two_dof(), **keys)
+    (issue,) = problem_issues(two_dof(), keys)
+    assert issue.pointer == pointer
