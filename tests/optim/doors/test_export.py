@@ -53,7 +53,7 @@ def motion_of_a_file(file: Path, at: Any) -> Any:
         given -= along.T @ pushed + normal.T @ (of["presses"] * (np.maximum(load, 0.0) - rest))
         return np.concatenate([v, inverse @ given, np.where(closed & ~gaps, held, 0.0)])
 
-    fine = {"rtol": 1e-8, "atol": 1e-9, "max_step": 0.2 / omega}
+    fine = {"rtol": 1e-9, "atol": 1e-10, "max_step": 0.1 / omega}
     found = solve_ivp(rates, (0.0, at[-1]), np.zeros(2 * n + m), "DOP853", t_eval=at, **fine)
     return np.reshape(model["observe"], n) @ found.y[:n]
 
