@@ -165,7 +165,7 @@ def _meaning(name: str, field: FieldInfo) -> str:
 
 
 def _option(option: Key | Option | None) -> str:
-    return "" if option is None else f"`{option.flag} {option.metavar}`".replace("|", "\\|")
+    return "" if option is None else f"`{f'{option.flag} {option.metavar}'.strip()}`".replace("|", "\\|")
 
 
 def data_columns_table() -> str:

@@ -24,6 +24,7 @@ from solver.response.solution import Solution
 from solver.response.solve import solve
 from solver.results.files import whole
 from solver.results.told import Piece
+from solver.results.watch import ShouldStop
 from solver.scene.cyclic.annulus import annulus
 from solver.scene.scene import Scene
 
@@ -50,6 +51,7 @@ class CertificateStatus(Enum):
         "Not proved: the work allowed is used up. Allow more (`most_work`), or a system with fewer "
         "coordinates or events."
     )
+    STOPPED = "Not proved: stopped on request."
     NO_ORBIT = "Not proved: no periodic motion was found from event to event beside this solution."
 
 
@@ -106,7 +108,12 @@ class Certificate(Piece):
 
 
 def certify(
-    solution: Solution, *, peak: bool = False, least_over: str = "", most_work: float = MOST_WORK
+    solution: Solution,
+    *,
+    peak: bool = False,
+    least_over: str = "",
+    most_work: float = MOST_WORK,
+    should_stop: ShouldStop = None,
 ) -> Certificate:
     """Prove a periodic response of piecewise linear contacts, and enclose its amplitude.
 
@@ -121,6 +128,7 @@ def certify(
     least_over : the path of a load, such as ``damper.N0``, over which that peak is least near this solution;
         prove the least peak. With N0 all of the load varies, its harmonics likewise.
     most_work : work allowed, in millions of products of balls of 128 bits; it ends then with WORK_USED_UP.
+    should_stop : asked now and then; True ends it with STOPPED.
 
     Raises
     ------
@@ -133,7 +141,7 @@ def certify(
     _check_extra()
     from solver.certificate.checker import RejectedError
     from solver.certificate.statement import system_of
-    from solver.certificate.work import WorkUsedUpError, allowed
+    from solver.certificate.work import HaltedError, allowed
 
     if (
         solution.converged and solution.scene.structure.has_sectors
@@ -153,14 +161,14 @@ def certify(
         if least_over and not raw["varies"]:
             raise SettingError("least_over", least_over, "must be the path of a load, such as damper.N0")
         proved = least_proved if least_over else peak_proved if peak else _proved
-        with allowed(most_work) as allowance:
+        with allowed(most_work, should_stop) as allowance:
             try:
                 bounds = proved(raw, piecewise, orbit)
                 status = CertificateStatus.CERTIFIED
             except RejectedError as error:
                 status, reason = CertificateStatus.NOT_CERTIFIED, str(error)
-            except WorkUsedUpError:
-                status = CertificateStatus.WORK_USED_UP
+            except HaltedError as error:
+                status = CertificateStatus.STOPPED if error.stopped else CertificateStatus.WORK_USED_UP
         work = allowance.done
     unknown = (math.nan, math.nan)
     contacts, course = raw.get("system", {}).get("contacts", ()), raw.get("orbit", {})

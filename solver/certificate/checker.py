@@ -425,7 +425,7 @@ def summit(found: list[Any]) -> tuple[Any, Any]:
     return top.lower().union(most.upper()), before[1].union(after[1])
 
 
-def prove(raw: dict[str, Any]) -> dict[str, Any]:
+def prove(raw: dict[str, Any], kind: type[System] = System) -> dict[str, Any]:
     """Return enclosures of max |x| and half the range [m], or of a peak or a least peak and where it is.
 
     Of three peaks that in the middle is the least, and for every load between max |x| is not below the last
@@ -433,7 +433,7 @@ def prove(raw: dict[str, Any]) -> dict[str, Any]:
     """
     ctx.prec, found = raw["bits"], []
     for at in raw.get("at", [raw["orbit"]]):
-        system, box = stated(raw, at), [arb(each) for each in at["unknowns"]]
+        system, box = stated(raw, at, kind), [arb(each) for each in at["unknowns"]]
         orbit = Orbit(system, raw["orbit"])
         require(len(box) == orbit.size, f"there must be {orbit.size} unknowns, got {len(box)}")
         low, high = orbit.extremes(box)

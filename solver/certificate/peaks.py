@@ -4,13 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from solver.certificate.certificate import Certificate, certify, check_certifiable, loads_of
+from solver.certificate.certificate import (
+    Certificate,
+    CertificateStatus,
+    certify,
+    check_certifiable,
+    loads_of,
+)
 from solver.response.solve import solve
+from solver.results.watch import ShouldStop
 from solver.scene.scene import Scene
 
 
 def certified_peaks(
-    peaks: Sequence[tuple[Scene, float]], *, least_over: str = "", harmonics: int = 11
+    peaks: Sequence[tuple[Scene, float]],
+    *,
+    least_over: str = "",
+    harmonics: int = 11,
+    should_stop: ShouldStop = None,
 ) -> tuple[Certificate, ...]:
     """Prove peaks that were found.
 
@@ -22,6 +33,7 @@ def certified_peaks(
     peaks : of each the scene, with the values that make it, and its frequency [Hz].
     least_over : the path over which the highest is least, within the range.
     harmonics : highest harmonic of the balance that the search begins with.
+    should_stop : asked now and then, as by `certify`.
 
     Raises
     ------
@@ -34,9 +46,11 @@ def certified_peaks(
         check_certifiable(scene)
     near = [solve(scene, frequency_hz=hertz, harmonics=harmonics) for scene, hertz in peaks]
     if len(near) == 1 and _all_in_proportion(peaks[0][0], least_over):
-        least = certify(near[0], least_over=least_over)
-        return (least,) if least.reached else (least, certify(near[0], peak=True))
-    return tuple(certify(each, peak=True) for each in near)
+        least = certify(near[0], least_over=least_over, should_stop=should_stop)
+        if least.reached or least.status is CertificateStatus.STOPPED:
+            return (least,)
+        return least, certify(near[0], peak=True, should_stop=should_stop)
+    return tuple(certify(each, peak=True, should_stop=should_stop) for each in near)
 
 
 def _all_in_proportion(scene: Scene, path: str) -> bool:

@@ -44,6 +44,7 @@ def _in_long_numbers(
     from flint import arb, ctx
 
     from solver.certificate.checker import prove
+    from solver.certificate.work import Counted
 
     kept = ctx.prec
     try:
@@ -56,7 +57,7 @@ def _in_long_numbers(
             loads = [at + at * k * arb(_BESIDE) for k in (-1, 0, 1)]
             raw["at"] = [each for load in loads for each in summits.beside(load)]
             raw["at"].append(summits.over_loads(at))
-        return claimed(raw, prove(raw))
+        return claimed(raw, prove(raw, Counted))
     finally:
         ctx.prec = kept
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import Any
@@ -13,33 +14,43 @@ from solver.certificate.checker import System
 
 UNIT = 1e6  # products of balls
 _BITS = 128.0  # of which a product counts as one
+_EVERY = 0.1  # s between two questions to the caller
 _EXPONENTIAL = 30  # products of matrices, about, in that of one
 
 
-class WorkUsedUpError(Exception):
-    """The work allowed is used up."""
+class HaltedError(Exception):
+    """The work allowed is used up, or the caller wants it to end (`stopped`)."""
+
+    def __init__(self, *, stopped: bool) -> None:
+        self.stopped = stopped
+        super().__init__("stopped" if stopped else "the work allowed is used up")
 
 
 class Allowance:
     """The work allowed, and what of it is done, in millions of products of balls of 128 bits."""
 
-    def __init__(self, most: float) -> None:
-        self.most, self.done = most, 0.0
+    def __init__(self, most: float, should_stop: Callable[[], bool] | None) -> None:
+        self.most, self.done, self._should_stop = most, 0.0, should_stop
+        self._asked = time.perf_counter()
 
     def spend(self, products: float) -> None:
-        """Count products; raise `WorkUsedUpError` where they are too many."""
+        """Count products; raise `HaltedError` where they are too many, or the caller wants it."""
         self.done += products * (ctx.prec / _BITS) / UNIT
         if self.done > self.most:
-            raise WorkUsedUpError
+            raise HaltedError(stopped=False)
+        if self._should_stop is not None and time.perf_counter() - self._asked > _EVERY:
+            self._asked = time.perf_counter()
+            if self._should_stop():
+                raise HaltedError(stopped=True)
 
 
 _ALLOWED: ContextVar[Allowance] = ContextVar("work allowed to a proof")
 
 
 @contextmanager
-def allowed(most: float) -> Iterator[Allowance]:
+def allowed(most: float, should_stop: Callable[[], bool] | None) -> Iterator[Allowance]:
     """Count what systems of the class `Counted` do inside."""
-    allowance = Allowance(most)
+    allowance = Allowance(most, should_stop)
     token = _ALLOWED.set(allowance)
     try:
         yield allowance

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from pydantic import Field
 
 from service.jobs.common.results import Table
-from service.jobs.study import Answer
+from service.jobs.study import Answer, Watch
 
 if TYPE_CHECKING:
     from solver.scene.scene import Scene
@@ -29,14 +29,16 @@ def prepare(scene: Scene) -> None:
     check_certifiable(scene)
 
 
-def with_proofs(answer: Answer, peaks: Sequence[tuple[Scene, float]], least_over: str) -> Answer:
+def with_proofs(
+    answer: Answer, peaks: Sequence[tuple[Scene, float]], least_over: str, watch: Watch
+) -> Answer:
     """Return an answer with proofs of peaks; it falls short if one is not proved.
 
     Arguments as of `solver.certificate.peaks.certified_peaks`.
     """
     from solver.certificate.peaks import certified_peaks
 
-    found = certified_peaks(peaks, least_over=least_over)
+    found = certified_peaks(peaks, least_over=least_over, should_stop=watch.should_stop)
     missing = [each.status.value for each in found if not each.reached]
     return answer._replace(
         json=answer.json | {"certificates": [each.to_json() for each in found]},

@@ -142,7 +142,7 @@ class _Design(NominalAndRobustKeys, ProblemRequest):
         search = optim.robust_design if UNCERTAIN in given else optim.design
         found: Any = search(scene, **given, **watch._asdict(), on_best=on_best)
         answer = Answer.of(found)
-        return with_proofs(answer, *_peaks_of(found)) if proof and found.peak is not None else answer
+        return with_proofs(answer, *_peaks_of(found), watch) if proof and found.peak is not None else answer
 
     @classmethod
     def sweeps(cls, found: Optimum | Robust) -> tuple[SweepRecord, ...]:

@@ -70,7 +70,7 @@ class Peaks(Study, RangeRequest):
         if not best.active:
             return answer
         inside, there = path if best.status is best.status.TRACKED else "", scene.with_values({path: best.at})
-        return with_proofs(answer, [(there, each.frequency) for each in best.active], inside)
+        return with_proofs(answer, [(there, each.frequency) for each in best.active], inside, watch)
 
     @classmethod
     def sweeps(cls, found: PeakTrack) -> tuple[SweepRecord, ...]:

@@ -122,7 +122,7 @@ class Solve(Study, HarmonicRequest):
             answer = Answer(plain, one.to_json(), one.reached, one.status.value, one.plot)
             if not proof or not one.converged:
                 return answer
-            proved = solver.certify(one)
+            proved = solver.certify(one, should_stop=watch.should_stop)
             return answer._replace(
                 json=answer.json | {"certificate": proved.to_json()}, reached=one.reached and proved.reached,
                 status=answer.status if proved.reached else proved.status.value,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -52,7 +53,7 @@ def motion_of_a_file(file: Path, at: Any) -> Any:
         given -= along.T @ pushed + normal.T @ (of["presses"] * (np.maximum(load, 0.0) - rest))
         return np.concatenate([v, inverse @ given, np.where(closed & ~gaps, held, 0.0)])
 
-    fine = {"rtol": 1e-8, "atol": 1e-9, "max_step": 0.2 / omega}
+    fine = {"rtol": 1e-9, "atol": 1e-10, "max_step": 0.1 / omega}
     found = solve_ivp(rates, (0.0, at[-1]), np.zeros(2 * n + m), "DOP853", t_eval=at, **fine)
     return np.reshape(model["observe"], n) @ found.y[:n]
 
@@ -80,12 +81,15 @@ def test_a_matlab_file_is_solved_by_scipy_alone(name: str, tmp_path: Path) -> No
 class Running:
     """A unit that fmpy runs."""
 
-    def __init__(self, file: Path, folder: Path, **values: float) -> None:
+    def __init__(self, file: Path, folder: Path, build: Unit | None = None, **values: float) -> None:
         import fmpy.fmi2
 
         about = fmpy.read_model_description(str(file))
         self.at = {each.name: each.valueReference for each in about.modelVariables}
         fmpy.extract(str(file), str(folder))
+        if build is not None:
+            folder.with_name("build").mkdir()
+            build(folder, folder.with_name("build"), generator="Unix Makefiles")
         self.unit = fmpy.fmi2.FMU2Slave(
             guid=about.guid, unzipDirectory=str(folder), modelIdentifier="model", instanceName="one"
         )
@@ -200,6 +204,22 @@ def test_a_unit_follows_the_standard_and_refuses_what_is_none_of_it(running: Uni
     ):
         with pytest.raises(FMICallException):
             set_or_get()
+
+
+def test_whoever_imports_the_sources_compiles_them(
+    running: Unit, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By CMake and the settings of fmpy."""
+    from fmpy.build import build_platform_binary
+
+    monkeypatch.setenv("PATH", str(Path(sys.executable).parent), prepend=":")
+    if not (shutil.which("cmake") and shutil.which("make")):
+        pytest.skip("there is no cmake or make")
+    save_fmu(TWO, tmp_path / "sources.fmu", frequency_hz=1.2, sources_only=True)
+    built = Running(tmp_path / "sources.fmu", tmp_path / "built", build_platform_binary)
+    assert np.allclose(built.period(0, 1.2, 32), running(TWO, 1.2).period(0, 1.2, 32), rtol=1e-9, atol=0.0)
+    built.unit.terminate()
+    built.unit.freeInstance()
 
 
 # What is refused

@@ -263,6 +263,14 @@ def test_the_work_of_a_proof_is_limited() -> None:
     assert ended[0].certificate is None
 
 
+def test_a_proof_is_stopped_on_request() -> None:
+    scene = stickslip.load_scene("two-dof")
+    near = stickslip.solve(scene, frequency_hz=1.03724)
+    ended = stickslip.certify(near, peak=True, should_stop=lambda: True)
+    assert ended.status is stickslip.solutions.CertificateStatus.STOPPED
+    assert ended.certificate is None
+
+
 def test_a_solution_that_did_not_converge_is_not_proved() -> None:
     scene = stickslip.load_scene("two-dof")
     found = replace(
