@@ -58,8 +58,14 @@ BODIES: dict[str, tuple[str, Mapping[str, Any]]] = {
     "wear": (
         "wear",
         {
-            "scene": "two-dof", "hours": 1e-4, "coefficient": {"damper": 1e-11}, "area": {"damper": 2e-4},
-            "load_loss_per_depth": {"damper": 4e6}, "limit": 2.4, "paths": ["damper.N0"], "harmonics": 3,
+            "scene": "two-dof",
+            "hours": 1e-4,
+            "coefficient": {"damper": 1e-11},
+            "area": {"damper": 2e-4},
+            "load_loss_per_depth": {"damper": 4e6},
+            "limit": 2.4,
+            "paths": ["damper.N0"],
+            "harmonics": 3,
         },
     ),  # fmt: skip
     "transient": ("transient", {"scene": "two-dof", "begin_hz": 0.9, "end_hz": 1.2, "ramp_seconds": 20.0}),
