@@ -67,7 +67,7 @@ BODIES: dict[str, tuple[str, Mapping[str, Any]]] = {
             "paths": ["damper.N0"],
             "harmonics": 3,
         },
-    ),  # fmt: skip
+    ),
     "transient": ("transient", {"scene": "two-dof", "begin_hz": 0.9, "end_hz": 1.2, "ramp_seconds": 20.0}),
     "a march that does not settle": ("march", {**MARCH, "max_periods": 1}),
 }
