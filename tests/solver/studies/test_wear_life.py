@@ -275,3 +275,14 @@ def test_faces_of_a_shape_wear_by_their_normal_stiffness(name: str) -> None:
     assert found.reached
     assert 1e-8 < found.depths[:, -1].max() < 1e-6
     np.testing.assert_allclose(found.loads[:, -1], loads - kn * found.depths[:, -1], rtol=1e-12)
+
+
+def test_a_life_that_is_stopped_has_what_was_followed() -> None:
+    scene, asked = _oscillator(12.0), iter([False] * 3 + [True] * 100)
+    at_once = _run(scene, 0.1 / FADE, should_stop=lambda: True)
+    assert at_once.status is WearLifeStatus.STOPPED
+    assert at_once.hours.size == 0
+    later = _run(scene, 0.1 / FADE, frequency_hz=1.0, should_stop=lambda: next(asked))
+    assert later.status is WearLifeStatus.STOPPED
+    assert 0.0 < later.hours[-1] < 0.1 / FADE
+    assert math.isnan(at_once.highest)
