@@ -9,8 +9,9 @@ from __future__ import annotations
 import math
 import re
 import time
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Annotated
 
 import numpy as np
@@ -23,7 +24,14 @@ from solver.studies.blades import blade_rows, mistuned
 from solver.studies.mistuning import without_mistuning
 from solver.studies.patterns.bounds import martel, power_bound, whitehead
 from solver.studies.patterns.climbing import Bounds, WorstPattern, alike, worst_patterns
-from solver.studies.patterns.linear_disk import TWO_PI, Contacts, DiskPeak, LinearDisk, linear_disk
+from solver.studies.patterns.linear_disk import (
+    TWO_PI,
+    Contacts,
+    DiskPeak,
+    LinearDisk,
+    linear_disk,
+    with_factors,
+)
 from solver.studies.patterns.solved_disk import Climb, SolvedDisk, UnknownPeakError
 from solver.studies.patterns.tuned_modes import TunedModes, reduced, tuned_modes
 from solver.studies.patterns.worst_result import (
@@ -50,17 +58,14 @@ class _Limit:
     modes: TunedModes
     tuned: DiskPeak
 
+    of_pattern: Callable[[Real], LinearDisk]
+
     def exact(self, delta: Real, found: DiskPeak) -> DiskPeak:
         """Return the peak of a pattern in all coordinates, found in those that are searched."""
-        return _exact(self.whole, self.searched, found, delta)
-
-
-def _exact(whole: LinearDisk, searched: LinearDisk, found: DiskPeak, delta: Real | None = None) -> DiskPeak:
-    if searched is whole:
-        return found
-    delta = np.zeros(whole.sectors) if delta is None else delta
-    omega, value, _ = whole.summit(delta, found.blade, found.omega)
-    return DiskPeak(value=math.exp(value), blade=found.blade, omega=omega)
+        if self.searched is self.whole and not self.whole.modal_damping:
+            return found
+        omega, value, _ = self.of_pattern(delta).summit(np.zeros(delta.size), found.blade, found.omega)
+        return DiskPeak(value=math.exp(value), blade=found.blade, omega=omega)
 
 
 @dataclass(slots=True, kw_only=True)
@@ -98,8 +103,12 @@ class _Search:
         if not np.any(whole.amplitudes(nothing, whole.band[0])):
             return None
         searched = reduced(whole, modes)
-        tuned = _exact(whole, searched, searched.peak(nothing))
-        return _Limit(whole=whole, searched=searched, modes=modes, tuned=tuned)
+        near = searched.peak(nothing)
+        found = _Limit(
+            whole=whole, searched=searched, modes=modes, tuned=near,
+            of_pattern=partial(with_factors, whole, self.scene, self.of, contacts),
+        )  # fmt: skip
+        return replace(found, tuned=found.exact(nothing, near))
 
     def worst(self, limit: _Limit, middle: Real, starts: int) -> list[WorstPattern]:
         """Return the patterns that climbs end at, worst first."""
