@@ -106,5 +106,5 @@ def _options(name: str) -> Iterator[tuple[str, str]]:
         yield "interference", "--speed 11000" if name == "bladed-disk" else "--speed 8"
         yield "mistuning", f"--of {'tip' if name == 'bladed-disk' else 'u'} --samples 2 {ends}"
         of = f"--of {'tip' if name == 'bladed-disk' else 'u'} --starts 2 --patterns AB"
-        yield "worst_mistuning", f"{of} --climb 2 {ends}"
+        yield "worst_mistuning", f"{of} --climbs 2 --climb 2 {ends}"
         yield "worst_mistuning-open", f"{of} --contacts open --rms 0.01 --worst-of-patterns {ends}"

@@ -54,7 +54,8 @@ BODIES: dict[str, dict[str, Any]] = {
     "campbell": {"scene": "two-dof", "speeds_rpm": [[60, 100]], "harmonics": 3},
     "interference": {"scene": "bladed-disk", "speed_rpm": 11000},
     "worst-mistuning": {
-        "scene": "bladed-disk", "of": "tip", "starts": 2, "climb": 2, "harmonics": 1, "from": 740, "to": 780
+        "scene": "bladed-disk", "of": "tip", "starts": 2, "climbs": 2, "climb": 2, "harmonics": 1,
+        "from": 740, "to": 780,
     },
     "mistuning": {
         "scene": DISK, "of": ["tip_middle", "tip"], "spread": 0.03, "samples": 6, "seed": 5, "from": 700,

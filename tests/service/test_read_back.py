@@ -47,7 +47,7 @@ def asked(kind: str, name: str) -> dict[str, Any]:
         "controlled": {"amplitude": 1e-5, **near},
         "accuracy": {"frequency_hz": middle, "harmonics": [1, 2], "samples": [16], "repeats": 1},
         "campbell": {"speeds_rpm": [[60 * middle, 61 * middle]]}, "interference": {"speed_rpm": 3000},
-        "worst-mistuning": {"of": [scene.observe.dof], "starts": 1, "climb": 1, **near},
+        "worst-mistuning": {"of": [scene.observe.dof], "starts": 1, "climbs": 1, "climb": 1, **near},
         "mistuning": {"of": [scene.observe.dof], "samples": 1, **near}, "modes": {"from": 1e-5, "to": 2e-5},
         "identify": {
             "data": [{"frequency": at, "amplitude": [_height(scene, one) for one in at]}],

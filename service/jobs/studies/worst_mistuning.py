@@ -73,8 +73,11 @@ class WorstMistuningStudy(Study, HarmonicRequest):
     starts: Annotated[int, Field(strict=True, ge=1, le=_MOST_STARTS), Flag(metavar="N")] = Field(
         default=60, description="Climbs in each linear limit."
     )
+    climbs: Annotated[int, Field(strict=True, ge=0, le=_MOST_CLIMB), Flag(metavar="N")] = Field(
+        default=4, description="Climbs with the contacts solved, half of them from drawn patterns."
+    )
     climb: Annotated[int, Field(strict=True, ge=0, le=_MOST_CLIMB), Flag(metavar="N")] = Field(
-        default=30, description="Responses with the contacts solved to climb on with, of each worst pattern."
+        default=30, description="Responses computed on each of these, at most."
     )
     seed: Annotated[int, Field(strict=True, ge=0, lt=2**53), Flag(metavar="N")] = Field(
         default=1, description="Of the starts that are drawn."
@@ -103,7 +106,14 @@ class WorstMistuningStudy(Study, HarmonicRequest):
         from solver.studies.patterns.worst_mistuning import check_bounds
 
         blades = check_bounds(
-            scene, self.within, self.rms, self.detuning, self.patterns or (), self.starts, self.climb
+            scene,
+            self.within,
+            self.rms,
+            self.detuning,
+            self.patterns or (),
+            self.starts,
+            self.climbs,
+            self.climb,
         )
         mistuned(scene, of=self.of, values=[1.0] * len(blades))
         if self.contacts != Contacts.SOLVED.value:
@@ -112,7 +122,7 @@ class WorstMistuningStudy(Study, HarmonicRequest):
     def sizes(self, scene: Scene) -> list[Issue]:
         """Return what is too large."""
         count = len(self.patterns or ())
-        solved = (self.climb + 5) * (1 + self.worst_of_patterns * count) + count
+        solved = (self.climbs * self.climb + 5) * (1 + self.worst_of_patterns * count) + count
         points = (
             POINTS_OF_A_SWEEP * (solved if self.contacts == "solved" else 1) * scene.structure.sector_count
         )

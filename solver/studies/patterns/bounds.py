@@ -82,7 +82,7 @@ def power_bound(disk: LinearDisk, omega: float, tuned: float) -> float:
     NaN where mistuning changes the damping too, or damping does not take power from every motion.
     """
     changes = [own - own.conj().T for own in (disk.own[0], disk.own[2])]
-    if np.any(changes) or np.any(disk.own[1]):
+    if disk.modal_damping or np.any(changes) or np.any(disk.own[1]):
         return math.nan
     try:
         factor = cho_factor(disk.loss(omega))

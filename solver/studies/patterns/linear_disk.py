@@ -24,9 +24,11 @@ from solver.scene.scene import MatricesStructure, Scene
 from solver.studies.blades import mistuned
 
 TWO_PI = 2.0 * math.pi
+MOST_NUMBERS = 20_000_000  # of rows of blades by coordinates, 320 MB
 _GRID = 48  # frequencies over a band, besides the natural ones, at which a peak is looked for
 _POLISH = 6  # maxima that are looked at closely
 _CLOSE = 1e-13  # relative rise of an amplitude at which a peak is found
+_INTERPOLATED = 0.01  # deviation over which a damping ratio's C is interpolated: all else is linear
 _MOST_STEPS, _MOST_HALVINGS = 30, 12
 
 
@@ -63,6 +65,9 @@ class LinearDisk:
     own: Annotated[
         tuple[Complex, Complex, Complex], "What a factor adds to K, C and M of its rows, (s, s) each."
     ]
+    modal_damping: Annotated[
+        bool, "Damping is a ratio of modes, so that C is linear in the factors nearly, see `with_factors`."
+    ] = False
     rows: Annotated[Complex, "Coordinates to the rows of each blade, (N, s, m)."] = field(repr=False)
     force: Annotated[Complex, "(m,)."] = field(repr=False)
     observed: Annotated[Complex, "The DOF of each sector, (N, m)."] = field(repr=False)
@@ -185,23 +190,40 @@ def linear_disk(
     ones = np.ones(scene.structure.sector_count)
     whole = mistuned(scene, of=of, values=ones.tolist())
     model, k = linear_model(whole), check_linear(scene, contacts)
-    other = ones.copy()
-    other[0] = 2.0
+    ratio = isinstance(whole.structure, MatricesStructure) and bool(whole.structure.damping_ratio)
+    step, other = (_INTERPOLATED if ratio else 1.0), ones.copy()
+    other[0] += step
     scaled = linear_model(mistuned(scene, of=of, values=other.tolist()))
     order = _sector_by_sector(whole, model.n_coordinates)
     K, C, M = _matrices(model, k, _stuck(whole, model) if contacts is Contacts.STUCK else 0.0, order)
-    added = [b - a for a, b in zip(*(_matrices(one, k, 0.0, order) for one in (model, scaled)), strict=True)]
+    both = (_matrices(one, k, 0.0, order) for one in (model, scaled))
+    added = [(b - a) / step for a, b in zip(*both, strict=True)]
     n, m = len(ones), model.n_coordinates
     touched = np.flatnonzero(np.any([np.any(np.abs(each) > 0.0, axis=1) for each in added], axis=0))
+    if n * len(touched) * m > MOST_NUMBERS:
+        wanted = f"must have a smaller annulus than {m} coordinates for a linear limit: keep fewer modes"
+        raise SettingError("scene", scene.name, wanted)
     own, eye = [each[np.ix_(touched, touched)] for each in added], np.eye(m, dtype=np.complex128)
     places = (touched[None, :] + np.arange(n)[:, None] * (m // n)) % m
     names = [f"{dof}@{j}" for j in range(n)]
     return LinearDisk(
         sectors=n, harmonic=k, band=(TWO_PI * band[0], TWO_PI * band[1]), K=K, C=C, M=M,
-        own=(own[0], own[1], own[2]), rows=eye[places],
+        own=(own[0], own[1], own[2]), modal_damping=ratio, rows=eye[places],
         force=_force(model, k)[order],
         observed=np.array([(row_of(whole, name) @ model.shapes)[order] for name in names], np.complex128),
     )  # fmt: skip
+
+
+def with_factors(
+    disk: LinearDisk, scene: Scene, of: Sequence[str], contacts: Contacts, delta: Real
+) -> LinearDisk:
+    """Return a disk in all coordinates whose blades have factors 1 + δ, its damping that of its own modes."""
+    whole = mistuned(scene, of=of, values=(1.0 + delta).tolist())
+    model = linear_model(whole)
+    more = _stuck(whole, model) if contacts is Contacts.STUCK else 0.0
+    order = _sector_by_sector(whole, model.n_coordinates)
+    K, C, M = _matrices(model, disk.harmonic, more, order)
+    return replace(disk, K=K, C=C, M=M)
 
 
 def _sector_by_sector(whole: Scene, m: int) -> Integer:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
@@ -17,12 +19,31 @@ from solver.scene.structure_parameters import NUMBERS, STRUCTURE, named_parts
 from solver.sensitivity.gradient import Sensitivities
 from solver.sensitivity.nonsmooth import peak_gradient
 from solver.studies.blades import BladePeaks, blade_peaks, mistuned
-from solver.studies.patterns.climbing import Bounds
+from solver.studies.patterns.climbing import ALIKE, Bounds
 from solver.studies.patterns.linear_disk import TWO_PI, Contacts, DiskPeak, check_linear
+
+FLAT = 1e-7  # rise of the logarithm of a peak at which a climb ends
 
 
 class UnknownPeakError(Exception):
     """The response of a disk did not reach the end of its band."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Climb:
+    """What climbs with the contacts solved may cost."""
+
+    climbs: Annotated[int, "How many."]
+    responses: Annotated[int, "Computed on each, at most."]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Climbed:
+    """What climbs with the contacts solved led to."""
+
+    worst: Annotated[Real | None, "The worst pattern, (N,)."]
+    known: Annotated[bool, "Whether every response covered the band."]
+    alike: Annotated[int, "Climbs that ended at the height of the highest."]
 
 
 class SolvedDisk:
@@ -93,50 +114,63 @@ class SolvedDisk:
         return math.log(found.largest), np.asarray((by_path * per_factor).sum(axis=1) / found.largest)
 
     def climbed(
-        self, begins: Sequence[Real], bounds: Bounds, responses: int, flat: float, go_on: Callable[[], bool]
-    ) -> tuple[Real | None, bool]:
-        """Return the worst pattern on a climb from the worst of several, and whether all were known.
+        self,
+        begins: Sequence[Real],
+        drawn: Sequence[Real],
+        bounds: Bounds,
+        climb: Climb,
+        go_on: Callable[[], bool],
+    ) -> Climbed:
+        """Return the worst pattern on climbs from the worst of some patterns, and from others.
 
         Parameters
         ----------
-        begins : patterns to begin with.
+        begins : patterns, of the worst of which the climbs are that are not from drawn ones.
+        drawn : patterns that are all climbed from.
         bounds : of δ.
-        responses : computed on the climb, at most.
-        flat : rise of the logarithm at which the climb ends.
+        climb : how many, and how long.
         go_on : asked before each response.
         """
         tried: list[tuple[float, Real]] = []
+        ends: list[float] = []
         known = True
         for delta in begins:
-            if not go_on():
-                break
-            try:
-                tried.append((self.peak(delta).value, delta))
-            except UnknownPeakError:
-                known = False
-        if not tried:
-            return None, known
-        _, begin = max(tried, key=lambda pair: pair[0])
-        if responses == 0 or not self.differentiable:
-            return begin, known
-        left = responses
+            if go_on():
+                try:
+                    tried.append((self.peak(delta).value, delta))
+                except UnknownPeakError:
+                    known = False
+        ranked = [delta for _, delta in sorted(tried, key=lambda pair: -pair[0])]
+        chosen = [*ranked[: climb.climbs - len(drawn)], *drawn] if self.differentiable else []
+        for begin in chosen if climb.responses > 0 else []:
+            found, complete = self._climb(begin, bounds, climb, go_on)
+            tried += found
+            ends += [max(value for value, _ in found)] if found else []
+            known = known and complete
+        worst = max(tried, key=lambda pair: pair[0])[1] if tried else None
+        alike = sum(value >= (1.0 - ALIKE) * max(ends) for value in ends)
+        return Climbed(worst=worst, known=known, alike=alike)
+
+    def _climb(
+        self, begin: Real, bounds: Bounds, climb: Climb, go_on: Callable[[], bool]
+    ) -> tuple[list[tuple[float, Real]], bool]:
+        """Return the peaks on the way of one climb with their patterns, and whether all were known."""
+        found: list[tuple[float, Real]] = []
 
         def rise(delta: Real) -> tuple[float, Real]:
-            nonlocal left
-            left -= 1
-            if left < 0 or not go_on():
+            if len(found) >= climb.responses or not go_on():
                 raise _ClimbEndedError
             value, slope = self.slopes(delta)
-            tried.append((math.exp(value), delta))
+            found.append((math.exp(value), delta))
             return value, slope
 
         try:
-            bounds.largest(rise, begin, responses, flat)
+            bounds.largest(rise, begin, climb.responses, FLAT)
         except _ClimbEndedError:
             pass
         except UnknownPeakError:
-            known = False
-        return max(tried, key=lambda pair: pair[0])[1], known
+            return found, False
+        return found, True
 
     @property
     def differentiable(self) -> bool:

@@ -9,8 +9,9 @@ from __future__ import annotations
 import math
 import re
 import time
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Annotated
 
 import numpy as np
@@ -23,8 +24,15 @@ from solver.studies.blades import blade_rows, mistuned
 from solver.studies.mistuning import without_mistuning
 from solver.studies.patterns.bounds import martel, power_bound, whitehead
 from solver.studies.patterns.climbing import Bounds, WorstPattern, alike, worst_patterns
-from solver.studies.patterns.linear_disk import TWO_PI, Contacts, DiskPeak, LinearDisk, linear_disk
-from solver.studies.patterns.solved_disk import SolvedDisk, UnknownPeakError
+from solver.studies.patterns.linear_disk import (
+    TWO_PI,
+    Contacts,
+    DiskPeak,
+    LinearDisk,
+    linear_disk,
+    with_factors,
+)
+from solver.studies.patterns.solved_disk import Climb, SolvedDisk, UnknownPeakError
 from solver.studies.patterns.tuned_modes import TunedModes, reduced, tuned_modes
 from solver.studies.patterns.worst_result import (
     IntentionalPattern,
@@ -34,8 +42,7 @@ from solver.studies.patterns.worst_result import (
 )
 
 LARGEST = 0.9  # deviation of a factor
-MOST_STARTS, MOST_CLIMB = 100_000, 10_000
-FLAT = 1e-7  # of the logarithm of a solved peak, at which its climb ends
+MOST_STARTS = 100_000
 LETTERS = re.compile(r"[A-Z]+")
 _APART = 0.05  # of the bounds, by which two patterns to begin with differ
 _CANDIDATES = 2  # worst patterns of each linear limit that are solved
@@ -51,17 +58,14 @@ class _Limit:
     modes: TunedModes
     tuned: DiskPeak
 
+    of_pattern: Callable[[Real], LinearDisk]
+
     def exact(self, delta: Real, found: DiskPeak) -> DiskPeak:
         """Return the peak of a pattern in all coordinates, found in those that are searched."""
-        return _exact(self.whole, self.searched, found, delta)
-
-
-def _exact(whole: LinearDisk, searched: LinearDisk, found: DiskPeak, delta: Real | None = None) -> DiskPeak:
-    if searched is whole:
-        return found
-    delta = np.zeros(whole.sectors) if delta is None else delta
-    omega, value, _ = whole.summit(delta, found.blade, found.omega)
-    return DiskPeak(value=math.exp(value), blade=found.blade, omega=omega)
+        if self.searched is self.whole and not self.whole.modal_damping:
+            return found
+        omega, value, _ = self.of_pattern(delta).summit(np.zeros(delta.size), found.blade, found.omega)
+        return DiskPeak(value=math.exp(value), blade=found.blade, omega=omega)
 
 
 @dataclass(slots=True, kw_only=True)
@@ -99,8 +103,12 @@ class _Search:
         if not np.any(whole.amplitudes(nothing, whole.band[0])):
             return None
         searched = reduced(whole, modes)
-        tuned = _exact(whole, searched, searched.peak(nothing))
-        return _Limit(whole=whole, searched=searched, modes=modes, tuned=tuned)
+        near = searched.peak(nothing)
+        found = _Limit(
+            whole=whole, searched=searched, modes=modes, tuned=near,
+            of_pattern=partial(with_factors, whole, self.scene, self.of, contacts),
+        )  # fmt: skip
+        return replace(found, tuned=found.exact(nothing, near))
 
     def worst(self, limit: _Limit, middle: Real, starts: int) -> list[WorstPattern]:
         """Return the patterns that climbs end at, worst first."""
@@ -125,6 +133,7 @@ def worst_mistuning(
     detuning: float = 0.02,
     worst_of_patterns: bool = False,
     starts: int = 60,
+    climbs: int = 4,
     climb: int = 30,
     seed: int = 1,
     start: float | None = None,
@@ -148,7 +157,9 @@ def worst_mistuning(
     detuning : deviation of the factor of type A, and negative of the last type; others lie evenly between.
     worst_of_patterns : find the worst mistuning on top of each pattern too, and rank by that.
     starts : climbs in each linear limit.
-    climb : responses with the contacts solved to climb on with, of each worst pattern.
+    climbs : with the contacts solved: half of them from the worst patterns of the linear limits and those of
+        `patterns` that the bounds hold, the others from drawn ones.
+    climb : responses computed on each of these, at most.
     seed : of the starts that are drawn.
     start, stop : frequencies [Hz], the scene's band if left out.
     dof : name of the DOF in one sector; the observed one if left out.
@@ -169,7 +180,7 @@ def worst_mistuning(
     begun = time.perf_counter()
     names = (of,) if isinstance(of, str) else tuple(of)
     how = _contacts(scene, contacts)
-    blades = check_bounds(scene, within, rms, detuning, patterns, starts, climb)
+    blades = check_bounds(scene, within, rms, detuning, patterns, starts, climbs, climb)
     band = _band(scene, start, stop)
     dof = scene.observe.dof.partition("@")[0] if dof is None else dof
     mistuned(scene, of=names, values=[1.0] * len(blades))  # refuses what is not there
@@ -182,11 +193,12 @@ def worst_mistuning(
     told = {
         "scene": scene.name, "dof": dof, "of": names, "within": within, "rms": rms, "detuning": detuning,
         "contacts": how.value, "whitehead": whitehead(len(blades)), "starts": starts,
+        "climbs": climbs if how is Contacts.SOLVED else 0,
         "n_harmonics": harmonics,
     }  # fmt: skip
     if how is Contacts.SOLVED:
         disk = SolvedDisk(search.scene, names, dof, band, harmonics, should_stop)
-        found = _solved(search, disk, climb, worst_of_patterns)
+        found = _solved(search, disk, Climb(climbs=climbs, responses=climb), worst_of_patterns)
     else:
         found = _linear(search, how, worst_of_patterns)
     if on_progress is not None and not search.stopped:
@@ -226,17 +238,17 @@ def _linear(search: _Search, how: Contacts, worst_of_patterns: bool) -> dict[str
     }  # fmt: skip
 
 
-def _solved(search: _Search, disk: SolvedDisk, climb: int, worst_of_patterns: bool) -> dict[str, object]:
+def _solved(search: _Search, disk: SolvedDisk, climb: Climb, worst_of_patterns: bool) -> dict[str, object]:
     """Return what is found with the contacts solved."""
-    N = search.scene.structure.sector_count
+    nothing = np.zeros(search.scene.structure.sector_count)
     limits = [one for how in disk.linear_limits if (one := search.limit(how)) is not None]
-    each = climb + 1 + _CANDIDATES * len(limits)
+    each = climb.climbs * climb.responses + 1 + _CANDIDATES * len(limits) + len(search.patterns)
     on_top = (
         len(search.patterns) * (each + len(limits) * (search.starts // _FEWER)) if worst_of_patterns else 0
     )
     search.steps = len(limits) * search.starts + each + 1 + len(search.patterns) + on_top
     try:
-        tuned = disk.peak(np.zeros(N))
+        tuned = disk.peak(nothing)
     except UnknownPeakError:
         return _nothing() | ({"status": WorstMistuningStatus.STOPPED} if not search.go_on() else {})
     if not tuned.value > 0.0:
@@ -251,11 +263,15 @@ def _solved(search: _Search, disk: SolvedDisk, climb: int, worst_of_patterns: bo
         bounds = search.around(middle)
         begins = [middle, *filter(bounds.hold, search.patterns.values())]
         begins += [delta for limit in limits for delta in _apart(search, limit, middle, starts)]
-        delta, complete = disk.climbed(begins, bounds, climb, FLAT, search.go_on)
-        known = known and complete
-        return None if delta is None else told(delta)
+        rng = np.random.default_rng(search.seed)
+        drawn = [bounds.drawn(rng) for _ in range(climb.climbs // 2)]
+        found = disk.climbed(begins, drawn, bounds, climb, search.go_on)
+        known = known and found.known
+        if middle is nothing:
+            search.alike = found.alike
+        return None if found.worst is None else told(found.worst)
 
-    worst = worst_around(np.zeros(N), search.starts)
+    worst = worst_around(nothing, search.starts)
     ranked = []
     for name, delta in search.patterns.items():
         if not search.go_on():
@@ -278,7 +294,6 @@ def _solved(search: _Search, disk: SolvedDisk, climb: int, worst_of_patterns: bo
 def _apart(search: _Search, limit: _Limit, middle: Real, starts: int) -> list[Real]:
     """Return the worst patterns of a linear limit that differ from each other."""
     climbs = search.worst(limit, middle, starts)
-    search.alike = max(search.alike, alike(climbs))
     kept: list[Real] = []
     for one in climbs:
         if len(kept) < _CANDIDATES and all(
@@ -325,7 +340,7 @@ def _band(scene: Scene, start: float | None, stop: float | None) -> tuple[float,
 
 def check_bounds(
     scene: Scene, within: float, rms: float | None, detuning: float, patterns: Sequence[str], starts: int,
-    climb: int,
+    climbs: int, climb: int,
 ) -> range:  # fmt: skip
     """Return the sectors of a disk whose factors may be anywhere within bounds.
 
@@ -348,15 +363,9 @@ def check_bounds(
         if not LETTERS.fullmatch(name) or len(name) > len(blades):
             wanted = f"must be capital letters, {len(blades)} at most, such as AB"
             raise SettingError("patterns", name, wanted)
-    for key, value, most in (("starts", starts, MOST_STARTS), ("climb", climb, MOST_CLIMB)):
-        if (
-            isinstance(value, bool)
-            or not isinstance(value, int)
-            or not (key == "climb") <= value + 1 <= most + 1
-        ):
-            raise SettingError(key, value, f"must be a whole number up to {most}")
-    if starts < 1:
-        raise SettingError("starts", starts, "must be a whole number >= 1")
+    for key, value, least in (("starts", starts, 1), ("climbs", climbs, 0), ("climb", climb, 0)):
+        if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= MOST_STARTS:
+            raise SettingError(key, value, f"must be a whole number from {least} to {MOST_STARTS}")
     return blades
 
 

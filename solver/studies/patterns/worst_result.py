@@ -68,7 +68,7 @@ class WorstMistuning(Drawn):
     )  # fmt: skip
     JSON: ClassVar = (
         "scene dof of within rms detuning contacts tuned_peak tuned_at_hz worst whitehead martel power_bound"
-        " starts alike climbed patterns best n_harmonics seconds completed=reached status"
+        " starts climbs alike climbed patterns best n_harmonics seconds completed=reached status"
     )
 
     scene: Annotated[str, "Its name."]
@@ -90,8 +90,11 @@ class WorstMistuning(Drawn):
         "No pattern of the linear disk exceeds this magnification at the frequency of the worst; unknown "
         "where damping does not take power from every motion, or mistuning changes it.",
     ] = math.nan
-    starts: Annotated[int, "Climbs in linear limits."]
-    alike: Annotated[int, "Of these, in the limit with the worst pattern, that ended at the same height."]
+    starts: Annotated[int, "Climbs in each linear limit."]
+    climbs: Annotated[int, "Climbs with the contacts solved; 0 in a linear limit."]
+    alike: Annotated[
+        int, "Climbs that ended at the height of the worst pattern; with the contacts solved, of those."
+    ]
     climbed: Annotated[int, "Responses with the contacts solved that were computed to climb on."] = 0
     patterns: Annotated[tuple[IntentionalPattern, ...], "Intentional patterns, the best first."] = ()
     n_harmonics: int

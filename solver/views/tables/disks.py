@@ -107,7 +107,8 @@ def worst_mistuning(found: Mapping[str, Any]) -> Iterator[Block]:
     pairs.append(("Whitehead's bound", f"{found['whitehead']:.4g}"))
     bounds = (("Martel's bound", "martel"), ("bound by the power at this frequency", "power_bound"))
     pairs += [(name, f"{found[key]:.4g}") for name, key in bounds if found[key] is not None]
-    pairs.append(("climbs", f"{found['starts']}, of which {found['alike']} ended at the same height"))
+    climbs = found["climbs"] or found["starts"]
+    pairs.append(("climbs", f"{climbs}, of which {found['alike']} ended at the same height"))
     if found["climbed"]:
         pairs.append(("responses solved", str(found["climbed"])))
     pairs.append(("time", units.duration(found["seconds"])))

@@ -28,6 +28,7 @@ from solver.matrices.sectors.elimination import elimination, rotation
 from solver.matrices.sectors.loading import boundaries
 from solver.matrices.sectors.pairing import groups, paired
 from solver.matrices.sectors.reduction import diameters_met, reduce_sector
+from solver.studies.patterns.linear_disk import Contacts, linear_disk, with_factors
 
 ROOT = Path(__file__).resolve().parents[3]
 SECTORS = 6
@@ -169,6 +170,19 @@ def test_a_response_with_friction_is_that_of_the_annulus_and_of_the_reduced_sect
         assert reduced.max_abs == pytest.approx(one.max_abs, rel=1e-3)
 
 
+def check_linear_limit(scene: Scene, mistuning: dict[str, Any]) -> None:
+    """The disk of the worst mistuning, its contacts open, is that of the solver without contacts."""
+    free = scene.model_copy(update={"contacts": ()})
+    wanted = solver.blade_amplitudes(solver.solve(free, frequency_hz=3200.0, harmonics=1))
+    disk = linear_disk(free, mistuning["of"], Contacts.OPEN, (3000.0, 3400.0), wanted.dof)
+    delta, omega = np.array(mistuning["values"]) - 1.0, 2.0 * math.pi * 3200.0
+    own = with_factors(disk, free, mistuning["of"], Contacts.OPEN, delta)
+    exact = np.abs(own.amplitudes(np.zeros(SECTORS), omega))
+    np.testing.assert_allclose(exact, wanted.max_abs, rtol=1e-7)
+    # A damping ratio is one of the modes, so that C is not quite linear in the factors.
+    np.testing.assert_allclose(np.abs(disk.amplitudes(delta, omega)), exact, rtol=0.02)
+
+
 def test_a_mistuned_reduced_disk_is_the_annulus_of_full_sectors() -> None:
     """With all modes kept exactly; with some to the error of the reduction; by the file too."""
     deck, found, low, high = a_sector()
@@ -203,6 +217,8 @@ def test_a_mistuned_reduced_disk_is_the_annulus_of_full_sectors() -> None:
         given = scene_of(small | {"mistuning": mistuning}, 2)
         other = solver.solve(given, frequency_hz=3200.0, harmonics=2)
         np.testing.assert_allclose(solver.blade_amplitudes(other).max_abs, blades, rtol=tolerance)
+        check_linear_limit(given, mistuning)
+    check_linear_limit(scene, mistuning)
     assert Scene.from_dict(given.to_dict()) == given
     with pytest.raises(solver.SceneError, match="there is no part of the matrices 'K'; known: blade, M"):
         scene_of(small | {"mistuning": {**mistuning, "of": ["K"]}}, 2)

@@ -344,7 +344,9 @@ def test_slopes_with_friction_are_those_of_differences(of: tuple[str, ...]) -> N
 
 def test_with_friction_no_random_disk_is_worse() -> None:
     scene, of, within = small(), ["tip_middle"], 0.03
-    found = worst_mistuning(scene, of=of, within=within, starts=9, climb=15, harmonics=1, patterns=["AB"])
+    found = worst_mistuning(
+        scene, of=of, within=within, starts=9, climbs=3, climb=15, harmonics=1, patterns=["AB"]
+    )
     assert found.status is WorstMistuningStatus.COMPLETED
     assert found.worst is not None
     assert found.climbed > 5
@@ -413,7 +415,8 @@ def test_a_disk_at_rest_is_nothing_to_compare_with() -> None:
         ({"patterns": ["ab"]}, "patterns"), ({"patterns": [""]}, "patterns"),
         ({"patterns": ["ABABAB"]}, "patterns"), ({"patterns": ["AB"], "detuning": 0.9}, "detuning"),
         ({"patterns": ["AB"], "detuning": -0.1}, "detuning"), ({"starts": 0}, "starts"),
-        ({"starts": True}, "starts"), ({"climb": -1}, "climb"), ({"dof": "hub"}, "dof"),
+        ({"starts": True}, "starts"), ({"climb": -1}, "climb"), ({"climbs": 1.5}, "climbs"),
+        ({"dof": "hub"}, "dof"),
         ({"start": 0.0}, "start"), ({"stop": 0.01}, "stop"),
     ],
 )  # fmt: skip
