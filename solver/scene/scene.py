@@ -261,8 +261,13 @@ class Scene(Part):
 
     @property
     def dofs(self) -> tuple[str, ...]:
-        """Names of all degrees of freedom: of the structure, then of the bodies."""
-        return kinematics.dof_names(self.structure, self.bodies)
+        """Names of all degrees of freedom: of the structure, then of the bodies, then points of terms."""
+        return (*kinematics.dof_names(self.structure, self.bodies), *self.points)
+
+    @property
+    def points(self) -> tuple[str, ...]:
+        """The DOFs without inertia that couplings make."""
+        return tuple(point for each in self.couplings for point in each.points)
 
     @property
     def forms(self) -> tuple[tuple[Form, ...], ...]:
