@@ -366,6 +366,10 @@ def load_scene(name_or_path: object) -> Scene:
         No such scene, a file that cannot be read, or everything that is wrong with its content.
     """
     raw = with_force_files(load_raw(name_or_path), scene_folder(name_or_path))
+    if "tensors" in raw:
+        from solver.scene.tensor_springs import with_tensors
+
+        raw = with_tensors(raw, scene_folder(name_or_path))
     structure = raw.get("structure")
     if isinstance(structure, Mapping) and structure.get("kind") == "matrices":
         from solver.matrices.scene_files import with_files
