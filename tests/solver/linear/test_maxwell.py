@@ -107,6 +107,27 @@ def test_the_same_as_matrices() -> None:
     assert referee.max_abs == pytest.approx(solver.march(scene(), frequency_hz=HZ).max_abs, rel=1e-8)
 
 
+@pytest.mark.parametrize("base", [{"ground": {"a": 1.0, "b": 1.0}}, {"driven": {"a": 1.0}}])
+def test_a_base_moves_them(base: dict[str, Any]) -> None:
+    """Counted from the ground masses are pushed by −m y''; a driven DOF has the motion prescribed."""
+    moved = {**base, "motion": "displacement", "amplitude": 0.3}
+    given = scene({"d.N0": 1e6}, excitation=moved, observe={**SCENE["observe"], "relative": True})
+    w = 2.0j * math.pi * HZ
+    M, K = np.diag([1.0, 0.7]), np.array([[1.5, -0.5], [-0.5, 1.2]]) + 0j
+    K[0, 0] += 0.02 * w
+    for along, k, tau in (((1, 0), 0.8, 1.3), ((1, -1), 0.3, 0.4), ((1, -1), 0.2, 5.0)):
+        K += k * w * tau / (1.0 + w * tau) * np.outer(along, along)
+    Z = K + w**2 * M
+    if "ground" in base:
+        seen = np.linalg.solve(Z, -(w**2) * 0.3 * np.array([1.0, 0.7]))[1]
+    else:
+        seen = -Z[1, 0] * 0.3 / Z[1, 1] - 0.3
+    found = solver.solve(given, frequency_hz=HZ, harmonics=1)
+    assert found.max_abs == pytest.approx(abs(seen), rel=1e-9)
+    assert solver.march(given, frequency_hz=HZ).max_abs == pytest.approx(abs(seen), rel=1e-5)
+    assert solver.stability(found).stable is True
+
+
 def test_slopes_of_the_matrices_are_differences() -> None:
     at = np.zeros(1, np.int64), np.ones(1, np.bool_)
     for path in ("pad.k", "pad.tau", "mid.tau", "structure.loss_factor"):
