@@ -92,6 +92,7 @@ from .scene.builder import SceneBuilder as SceneBuilder
 from .scene.cyclic.annulus import Extent as Extent, annulus as annulus, sectors_needed as sectors_needed
 from .scene.scene import Scene as Scene, load_scene as load_scene, shipped_scenes as shipped_scenes
 from .scene.templates import new_scene as new_scene
+from .scene.tensor_springs import tensor_springs as tensor_springs
 from .sensitivity.gradient import Gradient as Gradient, Sensitivities as Sensitivities
 from .sensitivity.hessian import (
     AmplitudeHessian as AmplitudeHessian,

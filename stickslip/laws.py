@@ -1,6 +1,7 @@
-"""Friction laws of one's own."""
+"""Friction laws of one's own, and polynomial tensors as contacts."""
 
 from solver import (
     LawParameter as LawParameter,
     register_law as register_law,
+    tensor_springs as tensor_springs,
 )

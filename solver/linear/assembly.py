@@ -76,20 +76,22 @@ def _without_base(scene: Scene) -> LinearModel:
     structure, here = scene.structure, _coordinates(scene)
     terms: dict[str, Any] = {}
     if isinstance(structure, MatricesStructure):
-        sector = sector_matrices(structure, scene.bodies)
+        sector = sector_matrices(structure, scene.bodies, len(scene.points))
         terms["every_diameter"] = sector.every_diameter
         if structure.has_sectors:
             terms |= _in_matrices(*(_nothing(0),) * 3) | {"sector": sector}
         else:
             terms |= _in_matrices(*sector.at(0))
     else:
-        terms |= matrices_of_elements(elements_of(structure, scene.bodies), scene.bodies)._asdict()
+        terms |= matrices_of_elements(
+            elements_of(structure, scene.bodies, scene.points), scene.bodies
+        )._asdict()
     motions, beyond = _motions(here, scene.forms)
     return LinearModel(
         **terms, dofs=here.dofs, shapes=here.shapes, contact_here=motions, contact_next=beyond,
         forces=_force_terms(here, scene.forces),
         observe=here.rows(row_of(scene, scene.observe.dof)), engine_order=scene.engine_order,
-        sectors=structure.sector_count, extra=extra_terms(scene, here),
+        points=len(scene.points), sectors=structure.sector_count, extra=extra_terms(scene, here),
         line=None if scene.speed_order is None else terms_of_line(scene, here),
         line_order=scene.speed_order or 1.0,
     )  # fmt: skip
@@ -174,14 +176,14 @@ def _derivative_by(scene: Scene, path: str) -> LinearModelDerivative:
     n = here.shapes.shape[1]
     terms: dict[str, Any] = _in_matrices(*(_nothing(n),) * 3)
     if slope.damping is not None and isinstance(structure, MatricesStructure):
-        sector = sector_matrices(structure, scene.bodies)
+        sector = sector_matrices(structure, scene.bodies, len(scene.points))
         terms["sector"] = ProportionalDamping(sector=sector, which=slope.damping)
     if slope.parts and not isinstance(structure, MatricesStructure):
-        elements = elements_of(structure, scene.bodies)
+        elements = elements_of(structure, scene.bodies, scene.points)
         found, terms["affine"] = slopes_of_elements(elements, slope.parts)
         terms |= found._asdict()
     if slope.masses:
-        terms["M"] = mass_of_bodies(n, scene.bodies, slope.masses)
+        terms["M"] = mass_of_bodies(n, scene.bodies, slope.masses, len(scene.points))
     if slope.motions is not None:
         moved = [slope.motions.get(c.name, ((),) * len(c.directions)) for c in scene.contacts]
         terms["contact_here"], terms["contact_next"] = _motions(here, moved)
@@ -201,7 +203,7 @@ def _coordinates(scene: Scene) -> Coordinates:
     structure, dofs = scene.structure, scene.dofs
     if not isinstance(structure, MatricesStructure):
         return Coordinates(dofs=dofs, shapes=_identity(len(dofs)), direct=True)
-    shapes = sector_matrices(structure, scene.bodies).shapes
+    shapes = sector_matrices(structure, scene.bodies, len(scene.points)).shapes
     return Coordinates(dofs=dofs, shapes=shapes, own=own_terms(structure))
 
 

@@ -115,7 +115,12 @@ def held_by(held: HeldMatrices, L: Complex, kt: Real) -> HeldMatrices:
 
 @lru_cache(maxsize=32)
 def decompose(held: HeldMatrices, *, poles: bool = True) -> Decomposition | None:
-    """Return modes if the damping is classical, else `poles`; None if neither gives Z⁻¹ to rounding."""
+    """Return modes if the damping is classical, else `poles`; None if neither gives Z⁻¹ to rounding.
+
+    None also of points without inertia: their matrices are kept.
+    """
+    if not np.all(np.any(held.M, axis=2)):  # points without inertia
+        return None
     stiffness = list(held.K)
     even = [hermitian(K) for K in stiffness]
     undamped = [undamped_modes(K, M) for K, M in zip(even, held.M, strict=True)]

@@ -44,6 +44,28 @@ def dynamic_stiffness(K: Any, C: Any, M: Any, k: Any, omega: float) -> tuple[Com
     )
 
 
+def with_inertia(
+    K: NDArray[Any], C: NDArray[Any], M: NDArray[Any]
+) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any] | None]:
+    """Give points without inertia, for which C x' + K x = 0, equations of second order.
+
+    They are (d/dt + D) (C x' + K x) = 0, with D the diagonal of K over that of C.
+
+    Returns
+    -------
+    K, C, M, and the rows (K, C) over displacements and velocities, (m, 2 n), that are 0 in every motion; None
+    where there are no such points.
+    """
+    heavy = np.any(M, axis=1)
+    if heavy.all():
+        return K, C, M, None
+    own, at = C[~heavy], K[~heavy]
+    decay = (np.diag(K)[~heavy] / np.diag(C)[~heavy])[:, None]
+    K, C, M = K.copy(), C.copy(), M.astype(np.result_type(M, C))
+    K[~heavy], C[~heavy], M[~heavy] = decay * at, at + decay * own, own
+    return K, C, M, np.hstack([at, own])
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ForceTerm:
     """One force amplitude * cos(harmonic * omega t + phase) along `vector`."""
@@ -216,6 +238,7 @@ class LinearModel(Terms):
     prescribed: Annotated[
         int, "So many coordinates, the last, are motions of a base; see `solver.linear.moving_base`."
     ] = 0
+    points: Annotated[int, "So many coordinates, the last before those, are points without inertia."] = 0
     line: Annotated[
         ExtraTerms | None,
         "What K gains per squared speed and C per speed where the speed follows the frequency, Ω = ω / "
@@ -239,6 +262,7 @@ class LinearModel(Terms):
         if not self.prescribed:
             return np.ones(self.n_coordinates, np.bool_)
         moves: Flags = np.any(self.M, axis=1)
+        moves[-self.prescribed - self.points :] = True
         moves[-self.prescribed :] = False
         return moves
 

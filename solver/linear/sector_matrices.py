@@ -27,10 +27,11 @@ _NO_PROPORTIONAL = {"stiffness_proportional_damping": 0.0, "mass_proportional_da
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SectorMatrices:
-    """The matrices of a structure with its bodies behind its coordinates."""
+    """The matrices of a structure with its bodies, and points without inertia, behind its coordinates."""
 
     structure: Annotated[MatricesStructure, "One sector, or the whole."]
     bodies: Annotated[tuple[Body, ...], "Of it."]
+    points: Annotated[int, "How many points."]
     shapes: Annotated[
         NDArray[np.float64], "The DOFs of structure and bodies in the coordinates, (n_dofs, n)."
     ]
@@ -52,7 +53,7 @@ class SectorMatrices:
             The model was not reduced for this nodal diameter.
         """
         n, count = diameter % self.structure.sector_count, self.structure.sector_count
-        found = _with_damping(self.structure, self.bodies, min(n, count - n))
+        found = _with_damping(self.structure, self.bodies, self.points, min(n, count - n))
         return found if 2 * n <= count else (found[0].conj(), found[1].conj(), found[2].conj())
 
 
@@ -66,13 +67,20 @@ class ProportionalDamping:
     def at(self, diameter: int) -> Matrices:
         """Derivatives of K, C and M at a nodal diameter."""
         found = self.sector.at(diameter)[0 if self.which == "K" else 2].copy()
-        found[len(found) - sum(len(body.dofs) for body in self.sector.bodies) :] = 0.0
+        found[len(found) - _behind(self.sector.bodies, self.sector.points) :] = 0.0
         nothing = np.zeros_like(found)
         return nothing, found, nothing
 
 
+def _behind(bodies: tuple[Body, ...], points: int) -> int:
+    """How many coordinates stand behind those of the structure."""
+    return sum(len(body.dofs) for body in bodies) + points
+
+
 @lru_cache(maxsize=16)
-def sector_matrices(structure: MatricesStructure, bodies: tuple[Body, ...]) -> SectorMatrices:
+def sector_matrices(
+    structure: MatricesStructure, bodies: tuple[Body, ...], points: int = 0
+) -> SectorMatrices:
     """The matrices of a structure; the same object each time, so that what follows from them can be kept."""
     rows = list(structure.dofs.rows)
     if structure.modes is not None:
@@ -83,16 +91,15 @@ def sector_matrices(structure: MatricesStructure, bodies: tuple[Body, ...]) -> S
             rows = [eliminated.row(row) for row in rows]
         own = np.zeros((len(rows), structure.n_coordinates))
         own[np.arange(len(rows)), rows] = 1.0
-    shapes = frozen(block_diag(own, np.eye(sum(len(body.dofs) for body in bodies))))
-    return SectorMatrices(structure=structure, bodies=bodies, shapes=shapes)
+    shapes = frozen(block_diag(own, np.eye(_behind(bodies, points))))
+    return SectorMatrices(structure=structure, bodies=bodies, points=points, shapes=shapes)
 
 
 @lru_cache(maxsize=128)
-def _with_damping(structure: MatricesStructure, bodies: tuple[Body, ...], n: int) -> Matrices:
+def _with_damping(structure: MatricesStructure, bodies: tuple[Body, ...], points: int, n: int) -> Matrices:
     own = structure.model_copy(update=_NO_PROPORTIONAL)
-    K, C, M = _at(own, bodies, n)
-    behind = sum(len(body.dofs) for body in bodies)
-    inner = slice(0, K.shape[0] - behind)
+    K, C, M = _at(own, bodies, points, n)
+    inner = slice(0, K.shape[0] - _behind(bodies, points))
     if structure.stiffness_proportional_damping or structure.mass_proportional_damping:
         C = C.copy()
         C[inner, inner] += structure.stiffness_proportional_damping * K[inner, inner]
@@ -101,12 +108,14 @@ def _with_damping(structure: MatricesStructure, bodies: tuple[Body, ...], n: int
 
 
 @lru_cache(maxsize=128)
-def _at(structure: MatricesStructure, bodies: tuple[Body, ...], n: int) -> Matrices:
+def _at(structure: MatricesStructure, bodies: tuple[Body, ...], points: int, n: int) -> Matrices:
     """K, C and M without proportional damping."""
     K, C, M = _own(structure, n)
-    if bodies:
-        behind = np.zeros((sum(len(body.dofs) for body in bodies),) * 2)
-        K, C, M = block_diag(K, behind), block_diag(C, behind), block_diag(M, bodies_mass(0, bodies))
+    if bodies or points:
+        still, behind = np.zeros((points, points)), np.zeros((_behind(bodies, points),) * 2)
+        K, C, M = (
+            block_diag(K, behind), block_diag(C, behind), block_diag(M, bodies_mass(0, bodies), still)
+        )  # fmt: skip
     return frozen(K), frozen(C), frozen(M)
 
 

@@ -44,10 +44,12 @@ class Matrices(NamedTuple):
     Kp: FloatArray
 
 
-def elements_of(structure: LumpedStructure | CyclicStructure, bodies: tuple[Body, ...]) -> Elements:
-    """Return what a structure with bodies consists of."""
+def elements_of(
+    structure: LumpedStructure | CyclicStructure, bodies: tuple[Body, ...], points: tuple[str, ...] = ()
+) -> Elements:
+    """Return what a structure with bodies, and points without inertia behind them, consists of."""
     return Elements(
-        dofs=dof_names(structure, bodies), masses=tuple(mass.m for mass in structure.masses),
+        dofs=(*dof_names(structure, bodies), *points), masses=tuple(mass.m for mass in structure.masses),
         springs=tuple((spring.ends, spring.k, spring.c) for spring in structure.springs),
         dampers=tuple((damper.ends, damper.c) for damper in structure.dampers),
         beta=structure.stiffness_proportional_damping,
@@ -95,7 +97,8 @@ def matrices_of_elements(elements: Elements, bodies: tuple[Body, ...]) -> Matric
         inner = np.s_[:own, :own]
         found.C0[inner] += modal_damping(found.M[inner], found.K0[inner], elements.ratios)
     if bodies:
-        found.M[:] += bodies_mass(own, bodies)
+        last = own + sum(len(body.dofs) for body in bodies)
+        found.M[:last, :last] += bodies_mass(own, bodies)
     return Matrices(*map(frozen, found))
 
 
@@ -181,11 +184,13 @@ def bodies_mass(n: int, bodies: tuple[Body, ...]) -> FloatArray:
     return frozen(block_diag(np.zeros((n, n)), *(body.mass_matrix() for body in bodies)))
 
 
-def mass_of_bodies(n: int, bodies: tuple[Body, ...], masses: Mapping[str, FloatArray]) -> FloatArray:
-    """Mass matrices of bodies by their names as one of `n` coordinates, theirs the last; read-only."""
+def mass_of_bodies(
+    n: int, bodies: tuple[Body, ...], masses: Mapping[str, FloatArray], behind: int = 0
+) -> FloatArray:
+    """Mass matrices of bodies by their names as one of `n` coordinates, `behind` after theirs; read-only."""
     blocks = [masses.get(body.name, np.zeros((len(body.dofs),) * 2)) for body in bodies]
-    own = n - sum(map(len, blocks))
-    return frozen(block_diag(np.zeros((own, own)), *blocks))
+    own = n - behind - sum(map(len, blocks))
+    return frozen(block_diag(np.zeros((own, own)), *blocks, np.zeros((behind, behind))))
 
 
 def block_diag(*blocks: NDArray[Any]) -> NDArray[Any]:

@@ -12,7 +12,7 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
-from scipy.sparse import block_diag, csr_array, diags_array
+from scipy.sparse import block_diag, csr_array, diags_array, vstack
 
 from solver.errors import SettingError
 from solver.marching.base import with_base, with_sum
@@ -151,7 +151,7 @@ def _equations(scene: Scene) -> tuple[csr_array, csr_array, csr_array, dict[str,
     inverse = diags_array(1.0 / M)
     if bodies:
         inverse = block_diag([inverse, *inertias], format="csr")
-    index = {dof: i for i, dof in enumerate(scene.dofs)}
+    index = {dof: i for i, dof in enumerate(dof_names(structure, bodies))}
     return csr_array(inverse @ K), csr_array(inverse @ C), csr_array(inverse), index
 
 
@@ -166,7 +166,8 @@ def _of_matrices(
     used = [*ends, *pushed, *moved, *(dof for dof, _ in scene.seen(scene.observe.dof) or ())]
     used += [dof for entry in scene.entries for dof in (entry.on, entry.of)]
     spin = (scene.speed or 0.0) * REVOLUTIONS
-    *_, index = found = _of_structure(structure, [dof for dof in used if dof not in own], spin)
+    beside = {*own, *scene.points}
+    *_, index = found = _of_structure(structure, [dof for dof in used if dof not in beside], spin)
     A, B, W = (csr_array(each) for each in found[:3])
     if not own:
         return A, B, W, index
@@ -188,15 +189,56 @@ def _with_couplings(
     """
     if scene.structure.loss_factor:
         raise SettingError("loss_factor", scene.structure.loss_factor, _IN_TIME)
-    spin = (scene.speed or 0.0) * REVOLUTIONS
+    spin, n, points = (scene.speed or 0.0) * REVOLUTIONS, W.shape[0], scene.points
+    index = index | {point: n + i for i, point in enumerate(points)}
+    nothing = csr_array((len(points),) * 2)
+    A, B, W = (csr_array(block_diag([each, nothing])) if points else each for each in (A, B, W))
+    K, C = np.zeros((2, len(points), n + len(points)))
     for entry in scene.entries:
         if entry.k.imag != 0.0:
             raise SettingError("k_imaginary", entry.k.imag, _IN_TIME)
+        k, c = entry.k.real + spin**2 * entry.k_omega2, entry.c.real + spin * entry.g
+        if entry.on in points:
+            K[index[entry.on] - n, index[entry.of]] += k
+            C[index[entry.on] - n, index[entry.of]] += c
+            continue
         push = csr_array(W[:, [index[entry.on]]])
         at = csr_array(([1.0], ([0], [index[entry.of]])), shape=(1, W.shape[0]))
-        A = A + (entry.k.real + spin**2 * entry.k_omega2) * (push @ at)
-        B = B + (entry.c.real + spin * entry.g) * (push @ at)
-    return csr_array(A), csr_array(B), W, index
+        A, B = A + k * (push @ at), B + c * (push @ at)
+    A, B, W = (csr_array(each) for each in (A, B, W))
+    return (*(_with_points(scene, A, B, W, K, C) if points else (A, B, W)), index)
+
+
+def _with_points(
+    scene: Scene, A: csr_array, B: csr_array, W: csr_array, K: FloatArray, C: FloatArray
+) -> tuple[csr_array, csr_array, csr_array]:
+    """The same with rows of the points without inertia, for which C x' + K x = 0.
+
+    With x' + R x = 0, R = C_z⁻¹ K, S = C_z⁻¹ C, the second-order rows are (d/dt + r) (S x' + R x) = 0: what
+    does not fulfil the equation at the start dies out by its own rate r, the diagonal of R.
+
+    Raises
+    ------
+    SettingError
+        A contact or a force on a point.
+    """
+    n, points = A.shape[0] - len(K), scene.points
+    ends = [
+        (one.name, t.dof)
+        for one, own in zip(scene.contacts, scene.forms, strict=True)
+        for f in own
+        for t in f
+    ]
+    for name, dof in (*ends, *(("excitation", dof) for e in scene.forces for dof, *_ in e.parts)):
+        if dof in points:
+            raise SettingError(name, dof, "must not be a point without inertia where it is marched in time")
+    R, S = (np.linalg.solve(C[:, n:], each) for each in (K, C))
+    S[:, n:] = 0.0
+    r, own = np.diag(R[:, n:])[:, None], np.eye(len(K), A.shape[0], n)
+    more = (r * R - S @ A, R + r * (S + own) - S @ B, -(S @ W))
+    return tuple(
+        csr_array(vstack([each[:n], csr_array(rows)])) for each, rows in zip((A, B, W), more, strict=True)
+    )
 
 
 def equations_of_motion(scene: Scene, omega: float) -> MarchEquations:

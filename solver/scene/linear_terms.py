@@ -16,13 +16,13 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from functools import reduce
 from operator import or_
-from typing import Annotated, Any, ClassVar, NamedTuple, Self
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
 from pydantic import Discriminator, Field, GetCoreSchemaHandler, Tag, model_validator
 from pydantic_core import CoreSchema
 
-from solver.contacts.fields import DofName, Name, NonNegative, Part, Signed
+from solver.contacts.fields import DofName, MemberName, Name, NonNegative, Part, Positive, Signed
 from solver.extensions import Kinds
 
 Offset = Annotated[int, Field(strict=True, ge=-10_000, le=10_000)]
@@ -67,10 +67,17 @@ class LinearTerm(Part, ABC):
     """Its fields that need a speed of rotation."""
     PARAMETERS: ClassVar[Mapping[str, str]] = {}
     """Its fields that are parameters, with their units; what it adds is affine in each."""
+    POSITIVE: ClassVar[bool] = False
+    """Whether they must be above 0."""
 
     name: Annotated[
         Name | None, "Makes its numbers parameters ``<name>.<key>``; terms of one name are set together."
     ] = None
+
+    @property
+    def points(self) -> tuple[str, ...]:
+        """Names of the DOFs without inertia that it makes."""
+        return ()
 
     @abstractmethod
     def entries(self, sectors: int) -> tuple[Entry, ...]:
@@ -84,7 +91,8 @@ class LinearTerm(Part, ABC):
 
     def in_sector(self, named: Callable[[str, int], str]) -> Self:
         """The same in one sector of a disk that is written out; `named` names a DOF so many sectors ahead."""
-        return self.model_copy(update={key: named(getattr(self, key), 0) for key in self.DOFS})
+        given = {key: dof for key in self.DOFS if (dof := getattr(self, key)) is not None}
+        return self.model_copy(update={key: named(dof, 0) for key, dof in given.items()})
 
 
 class Coupling(LinearTerm):
@@ -97,6 +105,7 @@ class Coupling(LinearTerm):
         "k": "N/m", "k_imaginary": "N/m", "c": "N s/m", "gyroscopic": "N s^2/m", "k_omega2": "N s^2/m",
     }  # fmt: skip
 
+    kind: Annotated[Literal["coupling"] | None, "The other kinds say what they are; may be left out."] = None
     on: Annotated[
         DofName,
         "DOF in whose equation of motion it stands (with the sign of the left-hand side, as a spring's k).",
@@ -142,8 +151,79 @@ class Coupling(LinearTerm):
         return self.model_copy(update={**ends, "offset": 0})
 
 
+class MaxwellBranch(LinearTerm):
+    """A spring in series with a dashpot, joined in a point without inertia: a branch of a viscoelastic part.
+
+    Its dynamic stiffness is k iωτ / (1 + iωτ). Branches beside a spring k_inf are the generalised Maxwell
+    model, k_inf + Σ k_j iωτ_j / (1 + iωτ_j), the Prony series of a relaxation k_inf + Σ k_j e^{−t/τ_j}
+    (R. M. Christensen, Theory of Viscoelasticity, 1982, chapter 1).
+
+    Attributes
+    ----------
+    on : str
+        DOF at the end of the spring.
+    of : str
+        DOF at the end of the dashpot; the ground if left out.
+    point : str
+        Names the point between both: a DOF that may be observed.
+    k : float
+        Stiffness of the spring [N/m].
+    tau : float
+        Relaxation time [s]: the dashpot has k tau [N s/m].
+    """
+
+    KIND = "maxwell"
+    DOFS = ("on", "of", "point")
+    PARAMETERS: ClassVar = {"k": "N/m", "tau": "s"}
+    POSITIVE = True
+
+    kind: Literal["maxwell"]
+    on: DofName
+    of: DofName | None = None
+    offset: Annotated[
+        Offset, "Cyclic structures only: `of` is that of the sector so many ahead (negative: behind)."
+    ] = 0
+    point: MemberName
+    k: Positive
+    tau: Positive
+
+    @model_validator(mode="after")
+    def _apart(self) -> Self:
+        if self.on == self.of and self.offset == 0:
+            raise ValueError(f"a branch joins two different ends, got {self.on!r} twice")
+        return self
+
+    @property
+    def points(self) -> tuple[str, ...]:
+        """The point between spring and dashpot."""
+        return (self.point,)
+
+    def entries(self, _sectors: int) -> tuple[Entry, ...]:
+        """A spring from `on` to the point, and a dashpot from there to `of`."""
+        c = self.k * self.tau
+        ends = [(self.on, self.point, 0, self.k, 0.0)]
+        if self.of is not None:
+            ends.append((self.of, self.point, -self.offset, 0.0, c))
+        joined = (
+            Entry(on, of, offset, sign * k, sign * c, 0.0, 0.0)
+            for a, b, ahead, k, c in ends
+            for on, of, offset, sign in ((a, a, 0, 1), (b, b, 0, 1), (a, b, ahead, -1), (b, a, -ahead, -1))
+        )
+        if self.of is not None:
+            return tuple(joined)
+        return (*joined, Entry(self.point, self.point, 0, 0.0, c, 0.0, 0.0))
+
+    def in_sector(self, named: Callable[[str, int], str]) -> Self:
+        """The same between the DOFs of two sectors."""
+        of = None if self.of is None else named(self.of, self.offset)
+        return self.model_copy(
+            update={"on": named(self.on, 0), "point": named(self.point, 0), "of": of, "offset": 0}
+        )
+
+
+SHIPPED = (Coupling, MaxwellBranch)
 COUPLINGS: Kinds[type[LinearTerm]] = Kinds(
-    LinearTerm, "kind", lambda term: (term.KIND,), (__name__,), Coupling.__name__
+    LinearTerm, "kind", lambda term: (term.KIND,), (__name__,), "SHIPPED"
 )
 coupling_kinds, register, unregister = COUPLINGS.known, COUPLINGS.register, COUPLINGS.unregister
 
@@ -159,10 +239,7 @@ class _OfAnyKind:
 
     @classmethod
     def __get_pydantic_core_schema__(cls, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
-        kinds = coupling_kinds()
-        if len(kinds) == 1:
-            return handler.generate_schema(Coupling)
-        members: list[Any] = [Annotated[each, Tag(word)] for word, each in kinds.items()]
+        members: list[Any] = [Annotated[each, Tag(word)] for word, each in coupling_kinds().items()]
         union = Annotated[reduce(or_, members), Discriminator(kind_of)]  # type: ignore[valid-type]
         return handler.generate_schema(union)
 

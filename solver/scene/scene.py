@@ -264,8 +264,13 @@ class Scene(Part):
 
     @property
     def dofs(self) -> tuple[str, ...]:
-        """Names of all degrees of freedom: of the structure, then of the bodies."""
-        return kinematics.dof_names(self.structure, self.bodies)
+        """Names of all degrees of freedom: of the structure, then of the bodies, then points of terms."""
+        return (*kinematics.dof_names(self.structure, self.bodies), *self.points)
+
+    @property
+    def points(self) -> tuple[str, ...]:
+        """The DOFs without inertia that couplings make."""
+        return tuple(point for each in self.couplings for point in each.points)
 
     @property
     def forms(self) -> tuple[tuple[Form, ...], ...]:
@@ -364,6 +369,10 @@ def load_scene(name_or_path: object) -> Scene:
         No such scene, a file that cannot be read, or everything that is wrong with its content.
     """
     raw = with_factor_files(load_raw(name_or_path), scene_folder(name_or_path))
+    if "tensors" in raw:
+        from solver.scene.tensor_springs import with_tensors
+
+        raw = with_tensors(raw, scene_folder(name_or_path))
     structure = raw.get("structure")
     if isinstance(structure, Mapping) and structure.get("kind") == "matrices":
         from solver.matrices.scene_files import with_files

@@ -118,8 +118,10 @@ def term_parameter(scene: Scene, path: str) -> SceneParameter | None:
     if not members:
         return None
 
+    positive = any(each.POSITIVE for each in members)
+
     def with_value(new: float) -> dict[str, Any]:
-        wanted = "must be a number from -1e15 to 1e15"
+        wanted = "must be a number > 0 and <= 1e15" if positive else "must be a number from -1e15 to 1e15"
         found = {id(each): changed(each, {key: new}, path, new, wanted) for each in members}
         return {table: tuple(found.get(id(old), old) for old in rows) for table, rows in tables.items()}
 
@@ -133,5 +135,5 @@ def term_parameter(scene: Scene, path: str) -> SceneParameter | None:
 
     return SceneParameter(
         get=lambda: cast(float, getattr(members[0], key)), with_value=with_value,
-        unit=members[0].PARAMETERS[key], least=-math.inf, slope=slope,
+        unit=members[0].PARAMETERS[key], least=0.0 if positive else -math.inf, slope=slope,
     )  # fmt: skip

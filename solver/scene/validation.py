@@ -238,7 +238,8 @@ def dofs_of(raw: dict[str, Any]) -> _Known | None:
     shapes = [row for _, row in rows_of(raw, "dampers") if row.get("shape") in WITH_BODY]
     bodies = [*(row for _, row in rows_of(raw, "bodies")), *shapes]
     bodies = [row for row in bodies if isinstance(row.get("name"), str)]
-    return own | dict.fromkeys(dof for row in bodies for dof in body_dofs(row["name"], row.get("plane")))
+    own |= dict.fromkeys(dof for row in bodies for dof in body_dofs(row["name"], row.get("plane")))
+    return own | dict.fromkeys(name for _, name in named_rows(raw, "couplings", by="point"))
 
 
 def _dof_names(given: object, table: str) -> _Known | None:
@@ -410,7 +411,12 @@ def term_issues(raw: dict[str, Any]) -> list[Issue]:
 def _issues(raw: dict[str, Any]) -> Iterator[Issue]:
     structure, dofs = structure_of(raw), dofs_of(raw)
     cyclic = is_cyclic(structure)
-    kinds = coupling_kinds()
+    points, kinds = named_rows(raw, "couplings", by="point"), coupling_kinds()
+    taken = dofs_of({key: each for key, each in raw.items() if key != "couplings"} if points else {})
+    yield from duplicates(points, "points")
+    for steps, point in points:
+        if point == GROUND or point in (taken or ()):
+            yield Issue(steps, f"= {point!r} is that of another DOF: give the point a name of its own")
     for steps, row in rows_of(raw, "couplings"):
         kind = kinds.get(kind_of(row), Coupling)
         yield from _places(steps, row, kind.DOFS, dofs)

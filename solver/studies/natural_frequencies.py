@@ -61,6 +61,11 @@ def _of_poles(K: Complex, C: Complex, M: Complex) -> Real:
     Forward and backward whirl are two of them. Of conjugate poles one counts.
     """
     G, K = 0.5 * (C - C.conj().T), 0.5 * (K + K.conj().T)
+    heavy = np.any(M, axis=1)
+    if not heavy.all():  # points without inertia follow: no dashpot counts
+        kept, light = np.ix_(heavy, heavy), np.ix_(heavy, ~heavy)
+        K = K[kept] - K[light] @ np.linalg.solve(K[np.ix_(~heavy, ~heavy)], K[light].conj().T)
+        G, M = G[kept], M[kept]
     n, inverse = len(M), np.linalg.inv(M)
     state = np.block([[np.zeros((n, n)), np.eye(n)], [-inverse @ K, -inverse @ G]])
     turning = np.sort(np.linalg.eigvals(state).imag)

@@ -142,7 +142,7 @@ def test_what_is_wrong_is_told() -> None:
 
 def test_a_scene_knows_it_while_it_is_registered() -> None:
     with pytest.raises(
-        solver.SceneError, match=r"`law` must be one of coulomb, .*coulomb-tanh, got 'sliders'"
+        solver.SceneError, match=r"`law` must be one of coulomb, .*hunt-crossley, got 'sliders'"
     ):
         scene()
     register(SlidersContact)
@@ -161,7 +161,7 @@ def test_a_scene_knows_it_while_it_is_registered() -> None:
 def test_the_schema_of_scenes_describes_it() -> None:
     found = scene_schema()["$defs"]["SlidersContact"]["properties"]
     assert found["limit"]["description"] == "Force at which all of it slips [N]."
-    assert found["law"]["description"].endswith("dahl, coulomb-tanh or sliders.")
+    assert found["law"]["description"].endswith("dahl, coulomb-tanh, hunt-crossley or sliders.")
 
 
 @pytest.mark.usefixtures("registered")

@@ -20,6 +20,7 @@ SHIPPED = (
     "solver.contacts.laws.history.bouc_wen",
     "solver.contacts.laws.history.dahl",
     "solver.contacts.laws.history.coulomb_tanh",
+    "solver.contacts.laws.history.hunt_crossley",
 )
 
 

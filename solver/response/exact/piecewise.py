@@ -356,6 +356,9 @@ def check_structure(scene: Scene, model: LinearModel, where: str = _EVENTS) -> N
         raise SettingError(
             "loss_factor", structure.loss_factor, f"must be 0 {where}: it has no meaning in time"
         )
+    if model.points:
+        wanted = f"must make no point without inertia {_EVENTS}"
+        raise SettingError("couplings", scene.points[0], wanted)
     if model.prescribed or model.line is not None:
         what = "excitation" if model.prescribed else "speed_order"
         raise SettingError(what, scene.name, f"must be forces at a fixed speed {where}")

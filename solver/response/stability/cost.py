@@ -11,7 +11,7 @@ import numpy as np
 
 from solver.jit.fourier import Complex
 from solver.linear.assembly import linear_model
-from solver.linear.model import LinearModel
+from solver.linear.model import LinearModel, with_inertia
 from solver.scene.scene import Scene
 
 STAGES = 8  # of a step of collocation
@@ -76,6 +76,7 @@ def _structure(scene: Scene, model: LinearModel, omega: float) -> tuple[float, b
     stiff = np.array([k if math.isfinite(k) else 0.0 for c in scene.contacts for k in c.stiffnesses])
     for diameter in every[every <= model.sectors // 2] if model.every_diameter else every:
         K, C, M = (each[0][free][:, free] for each in model.at(np.array([diameter]), np.ones(1, np.bool_)))
+        K, C, M, _ = with_inertia(K, C, M)
         L = (model.contact_here + model.contact_next * model.turns(np.array([diameter]))[0])[:, free]
         found = [np.linalg.solve(M, right) for right in (K, C, L.conj().T)]
         if not all(np.isfinite(each).all() for each in found):

@@ -14,8 +14,15 @@ from solver.jit import fourier
 from solver.jit.fourier import Complex, Real
 from solver.linear.assembly import linear_model
 from solver.linear.contact_table import port_counts
+from solver.linear.model import with_inertia
 from solver.response.solution import Solution
-from solver.response.stability.monodromy import PERIOD, LinearPart, Monodromy, PeriodElement, monodromy
+from solver.response.stability.monodromy import (
+    PERIOD,
+    LinearPart,
+    Monodromy,
+    PeriodElement,
+    monodromy,
+)
 from solver.response.stability.multipliers import Stability, growth_of
 from solver.results.watch import OnProgress, ShouldStop, shows_progress
 from solver.scene.cyclic.annulus import annulus
@@ -133,6 +140,11 @@ def scene_monodromy(
         for ports, contact in zip(np.split(model.contact_here, ends), whole.contacts, strict=True)
         for part in parts[contact.name]
     )
+    heavy = np.any(model.M, axis=1)
+    for contact, element in zip(whole.contacts, np.split(model.contact_here, ends), strict=True):
+        if np.any(element[:, free & ~heavy]):
+            wanted = "must not join a point without inertia where stability is asked for"
+            raise SettingError("contact", contact.name, wanted)
     K, C, M = (each[0][free][:, free] for each in model.at(np.zeros(1, np.int64), np.ones(1, np.bool_)))
     if np.any(K.imag) or np.any(C.imag):
         wanted = (
@@ -143,7 +155,8 @@ def scene_monodromy(
     fed = M.real
     if alone is not None:
         fed = np.outer(M @ alone, (M @ alone).conj()).real
-    structure = LinearPart(M=M, C=C.real + mass_damping * fed, K=K.real)
+    K, C, M, rates = with_inertia(K.real, C.real + mass_damping * fed, M)
+    structure = LinearPart(M=M, C=C, K=K, rates=rates)
     sectors = scene.structure.sector_count if scene.structure.has_sectors else 1
     return monodromy(
         structure, elements, PERIOD * frequency_hz, sectors=sectors, order=scene.engine_order,

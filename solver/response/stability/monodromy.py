@@ -25,7 +25,7 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import block_diag, expm
+from scipy.linalg import block_diag, expm, null_space
 
 from solver.contacts.pieces.piece import SHORTEST, StatePiece
 from solver.errors import StoppedError
@@ -70,6 +70,7 @@ class LinearPart:
     M: Real
     C: Real
     K: Real
+    rates: Annotated[Real | None, "Rows (m, 2 n) over displacements and velocities [m/s] that are 0."] = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -200,7 +201,7 @@ class _Flow:
         self.first = 2 * self.n + np.concatenate([[0], np.cumsum([e.memory for e in elements], dtype=int)])
         self.size = int(self.first[-1])
         self.active = [element.piece_at(0.5 * (instants[-2] + instants[-1])) for element in elements]
-        self._largest = 0.0
+        self._largest, self.omega = 0.0, omega
 
     def further(self, active: list[int], wave: _Wave) -> list[int]:
         """Return the pieces in which elements are a share of the wave later."""
@@ -352,6 +353,11 @@ def _without_neutral(
     free = [i for i in range(len(elements)) if i in owners and not elements[i].held]
     carried = [elements[i].pieces[flow.active[i]].carried @ (elements[i].ports @ loose) for i in free]
     vectors = np.vstack([loose, np.zeros_like(loose), *carried])
+    if structure.rates is not None:
+        rates = np.pad(structure.rates, ((0, 0), (0, len(kept) - 2 * n)))
+        rates[:, n : 2 * n] *= flow.omega
+        fulfilled = null_space(rates)
+        reduced, vectors = fulfilled.T @ reduced @ fulfilled, fulfilled.T @ vectors
     if loose.shape[1]:
         basis, _ = np.linalg.qr(vectors, mode="complete")
         rest = basis[:, loose.shape[1] :]

@@ -96,7 +96,7 @@ def uniqueness(scene: Scene, frequency_hz: float) -> Uniqueness:
     others = ", ".join(contact.name for contact in scene.contacts if not contact.keeps_together)
     unknown = Uniqueness(unique=NOT_KNOWN, ground=_MAY_BE.format(others))
     in_time = model.extra is None or model.extra.is_real
-    known = in_time and model.every_diameter and not model.prescribed
+    known = in_time and model.every_diameter and not (model.prescribed or model.points)
     if not known or model.n_coordinates * model.sectors > LARGEST:
         return unknown
     if scene.structure.has_sectors:
