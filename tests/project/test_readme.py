@@ -181,7 +181,7 @@ def test_python_runs(
         code = code.replace(ADDRESS, request.getfixturevalue("server"))
     exec(compile(code, "README.md", "exec"), {"__name__": "readme"})
     assert len(capsys.readouterr().out.splitlines()) >= len(re.findall(r"^ *print\(", code, re.MULTILINE))
-    named = set(re.findall(r'"([\w-]+\.(?:png|svg|nc|npz|csv|parquet|mat|toml))"', code))
+    named = set(re.findall(r'"([\w-]+\.(?:png|svg|nc|npz|csv|parquet|mat|fmu|toml))"', code))
     assert {file.name for file in tmp_path.iterdir()} == named
 
 
