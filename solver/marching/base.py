@@ -47,8 +47,8 @@ def with_base(
     ground = any(e.ground for e, _ in phases)
     moved = {index[dof] for e, _ in phases if e.base and not ground for dof, *_ in e.base.shares}
     driven = np.array(sorted(moved), np.int64)
-    pulled, points = shares.copy(), [index[point] for point in scene.points]
-    if points:  # no inertia pulls a point, but what its dashpot joins it to has an acceleration of its own
+    pulled, points = shares.copy(), np.array([index[point] for point in scene.points], np.int64)
+    if points.size:  # no inertia pulls a point, but what its dashpot joins it to is accelerated
         heavy = np.setdiff1d(np.arange(n), points)
         pulled[points] = W[np.ix_(points, heavy)] @ np.linalg.solve(W[np.ix_(heavy, heavy)], shares[heavy])
     pushed = W[:n, driven] @ np.linalg.inv(W[np.ix_(driven, driven)])

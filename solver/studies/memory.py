@@ -106,7 +106,8 @@ def _sectors(scene: Scene, every_sector: bool) -> int:
 
 def _dofs(scene: Scene) -> int:
     structure = scene.structure
-    return structure.n_coordinates if isinstance(structure, MatricesStructure) else len(structure.dofs)
+    own = structure.n_coordinates if isinstance(structure, MatricesStructure) else len(structure.dofs)
+    return own + len(scene.points)
 
 
 def _is_diagonal(scene: Scene) -> bool:

@@ -224,6 +224,11 @@ def test_a_disk_written_out_is_the_tuned_one() -> None:
     assert solver.Scene.from_dict(whole.to_dict()) == whole
     tuned, written = (solver.solve(each, frequency_hz=750.0, harmonics=3) for each in (disk, whole))
     assert written.max_abs == pytest.approx(tuned.max_abs, rel=1e-8)
+    finer, referee = (
+        solver.solve(disk, frequency_hz=735.0, harmonics=31),
+        solver.march(disk, frequency_hz=735.0),
+    )
+    assert finer.half_peak_to_peak == pytest.approx(referee.half_peak_to_peak, rel=1e-5)
     without = solver.solve(shipped, frequency_hz=750.0, harmonics=3).max_abs
     assert abs(tuned.max_abs / without - 1.0) > 0.02
 
