@@ -134,14 +134,15 @@ def scene_monodromy(
     whole = annulus(scene) if scene.structure.has_sectors else scene
     model = linear_model(whole)
     free = model.free
-    parts, ends = _parts(scene, motions), np.cumsum(port_counts(whole))[:-1]
+    parts = _parts(scene, motions)
+    every = np.split(model.contact_here, np.cumsum(port_counts(whole)))[:-1]
     elements = tuple(
         PeriodElement(ports=ports[list(part.ports)][:, free], pieces=part.pieces)
-        for ports, contact in zip(np.split(model.contact_here, ends), whole.contacts, strict=True)
+        for ports, contact in zip(every, whole.contacts, strict=True)
         for part in parts[contact.name]
     )
     heavy = np.any(model.M, axis=1)
-    for contact, element in zip(whole.contacts, np.split(model.contact_here, ends), strict=True):
+    for contact, element in zip(whole.contacts, every, strict=True):
         if np.any(element[:, free & ~heavy]):
             wanted = "must not join a point without inertia where stability is asked for"
             raise SettingError("contact", contact.name, wanted)

@@ -206,10 +206,11 @@ def test_a_run_from_rest_is_what_scipy_integrates() -> None:
     assert found.max_abs == pytest.approx(np.abs(referee.y[1]).max(), rel=1e-4)
 
 
-def test_multipliers_are_those_of_the_first_order_equations() -> None:
-    found = solver.solve(scene({"d.N0": 1e6}), frequency_hz=HZ, harmonics=1)
-    judged = solver.stability(found)
-    expected = np.exp(np.linalg.eigvals(generator(0.7)) / HZ)
+@pytest.mark.parametrize("stuck", [0.7, 0.0])
+def test_multipliers_are_those_of_the_first_order_equations(stuck: float) -> None:
+    given = scene({"d.N0": 1e6}) if stuck else scene(contacts=[])
+    judged = solver.stability(solver.solve(given, frequency_hz=HZ, harmonics=1))
+    expected = np.exp(np.linalg.eigvals(generator(stuck)) / HZ)
     assert np.sort(np.abs(judged.multipliers)) == pytest.approx(np.sort(np.abs(expected)), abs=1e-9)
 
 
