@@ -135,7 +135,9 @@ from .studies.mistuning_result import (
     MistuningStatus as MistuningStatus,
     MistuningStudy as MistuningStudy,
 )
-from .studies.patterns.worst_mistuning import worst_mistuning as worst_mistuning
+from .studies.patterns.climbing import WorstSearch as WorstSearch
+from .studies.patterns.intentional import IntentionalMistuning as IntentionalMistuning
+from .studies.patterns.worst import worst_mistuning as worst_mistuning
 from .studies.patterns.worst_result import (
     IntentionalPattern as IntentionalPattern,
     PatternPeak as PatternPeak,

@@ -88,7 +88,11 @@ def results() -> dict[str, Any]:
             solver.load_scene("bladed-disk"), of=["tip"], samples=2, harmonics=1, start=740, stop=780
         ),
         "worst-mistuning": solver.worst_mistuning(
-            solver.load_scene("bladed-disk"), of=["tip"], starts=2, contacts="stuck", patterns=["AB"]
+            solver.load_scene("bladed-disk"),
+            of=["tip"],
+            contacts="stuck",
+            search=solver.WorstSearch(starts=2),
+            intentional=solver.IntentionalMistuning(["AB"]),
         ),
         "interference": solver.interference_diagram(solver.load_scene("bladed-disk"), speed_rpm=11e3),
         "margin": solver.margin_diagram(scene, start=20, stop=120, points=3, limit=2.0, harmonics=3),
