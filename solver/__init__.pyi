@@ -162,5 +162,7 @@ from .studies.wear_life.least_worn_peak import (
     least_worn_peak as least_worn_peak,
 )
 from .studies.wear_life.life import wear_life as wear_life
+from .studies.wear_life.mission import Mission as Mission
 from .studies.wear_life.result import WearLife as WearLife, WearLifeStatus as WearLifeStatus
+from .studies.wear_life.wearing import WearLaw as WearLaw
 from .views.io import load as load, save as save
