@@ -115,7 +115,7 @@ from .studies.blades import (
 from .studies.convergence import accuracy_study as accuracy_study
 from .studies.instant import start_of as start_of
 from .studies.interference import interference_diagram as interference_diagram
-from .studies.margin import margin_diagram as margin_diagram
+from .studies.margin_diagram import margin_diagram as margin_diagram
 from .studies.margin_result import (
     AllowedExcitation as AllowedExcitation,
     MarginDiagram as MarginDiagram,
@@ -163,6 +163,6 @@ from .studies.wear_life.least_worn_peak import (
 )
 from .studies.wear_life.life import wear_life as wear_life
 from .studies.wear_life.mission import Mission as Mission
-from .studies.wear_life.result import WearLife as WearLife, WearLifeStatus as WearLifeStatus
+from .studies.wear_life.life_result import WearLife as WearLife, WearLifeStatus as WearLifeStatus
 from .studies.wear_life.wearing import WearLaw as WearLaw
 from .views.io import load as load, save as save

@@ -140,8 +140,8 @@ def certify(
     begun = time.perf_counter()
     _check_extra()
     from solver.certificate.checker import RejectedError
+    from solver.certificate.proof_work import ProofHaltedError, allowed
     from solver.certificate.statement import system_of
-    from solver.certificate.work import HaltedError, allowed
 
     if (
         solution.converged and solution.scene.structure.has_sectors
@@ -167,7 +167,7 @@ def certify(
                 status = CertificateStatus.CERTIFIED
             except RejectedError as error:
                 status, reason = CertificateStatus.NOT_CERTIFIED, str(error)
-            except HaltedError as error:
+            except ProofHaltedError as error:
                 status = CertificateStatus.STOPPED if error.stopped else CertificateStatus.WORK_USED_UP
         work = allowance.done
     unknown = (math.nan, math.nan)

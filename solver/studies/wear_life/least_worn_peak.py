@@ -25,8 +25,8 @@ from solver.results.views import Data, Views
 from solver.results.watch import OnProgress, ShouldStop, shows_progress
 from solver.scene.scene import Scene
 from solver.studies.wear_life.life import course_of
+from solver.studies.wear_life.life_result import WearLifeStatus
 from solver.studies.wear_life.mission import Mission
-from solver.studies.wear_life.result import WearLifeStatus
 from solver.studies.wear_life.wearing import WearLaw
 
 FEWEST_LOOKS = 3

@@ -21,10 +21,10 @@ from solver.results.watch import OnProgress, ShouldStop, part_of, shows_progress
 from solver.scene.cyclic.annulus import written_out
 from solver.scene.scene import Scene
 from solver.sensitivity.gradient import Sensitivities
-from solver.studies.wear_life.course import Course, Here
+from solver.studies.wear_life.course import Here, WearCourse
+from solver.studies.wear_life.life_result import WearLife
 from solver.studies.wear_life.mission import Mission, is_number
-from solver.studies.wear_life.result import WearLife
-from solver.studies.wear_life.running import SETTINGS, Conditions
+from solver.studies.wear_life.operating_conditions import SETTINGS, OperatingConditions
 from solver.studies.wear_life.wearing import LOAD, Wearing, WearLaw, wearing_of
 
 MOST_POINTS = 10_000
@@ -86,7 +86,7 @@ def wear_life(
 def course_of(
     scene: Scene, mission: Mission, wear: WearLaw, *, paths: Sequence[str] = (), tolerance: float = 1e-6,
     harmonics: int = 11, should_stop: ShouldStop = None,
-) -> Course:  # fmt: skip
+) -> WearCourse:  # fmt: skip
     """Return a life that was not followed yet, by the arguments of `wear_life`.
 
     Raises
@@ -103,14 +103,14 @@ def course_of(
     for path in own:
         _check_path(whole, wearing, path)
     every = (*own, *(loss.path for loss in wearing.losses))
-    conditions = Conditions(
+    conditions = OperatingConditions(
         blocks=mission.shares(), harmonics=check_harmonics(harmonics), paths=own,
         effects=Effects(even_harmonics=even_harmonics_reason(whole, every) is not None),
         should_stop=should_stop,
     )  # fmt: skip
     if conditions.blocks is None:
         Sensitivities(conditions.balance(whole), every).check_second()
-    return Course(
+    return WearCourse(
         wearing=wearing, conditions=conditions, paths=tuple(paths), hours=float(mission.hours),
         tolerance=tolerance,
     )  # fmt: skip
@@ -132,7 +132,7 @@ def _check_path(scene: Scene, wearing: Wearing, path: object) -> None:
         raise SettingError("paths", path, wanted)
 
 
-def _result(course: Course, scene: Scene, limit: float | None, points: int, begun: float) -> WearLife:
+def _result(course: WearCourse, scene: Scene, limit: float | None, points: int, begun: float) -> WearLife:
     """Return what a life came to that was followed."""
     wearing, stretches = course.wearing, course.stretches
     rows = _rows(course, points) if stretches else []
@@ -162,7 +162,7 @@ def _result(course: Course, scene: Scene, limit: float | None, points: int, begu
     )  # fmt: skip
 
 
-def _rows(course: Course, points: int) -> list[Here]:
+def _rows(course: WearCourse, points: int) -> list[Here]:
     """Return the instants that are shown: evenly spaced, where another peak takes over, and the end."""
     last = course.stretches[-1].end.hours
     rows = [course.stretches[0].begin]
@@ -189,7 +189,7 @@ def _loads(wearing: Wearing, depths: Real) -> Real:
     return np.array([one.value_of(LOAD) if LOAD in one.parameters else math.nan for one in contacts])
 
 
-def _known(course: Course, here: Here) -> Known:
+def _known(course: WearCourse, here: Here) -> Known:
     """Return how well the response at an instant is known."""
     conditions, scene = course.conditions, course.wearing.at(here.depths)
     if conditions.blocks is None:

@@ -12,8 +12,8 @@ from scipy.optimize import brentq, minimize_scalar
 from solver import Scene, load_scene, march
 from solver.errors import SettingError
 from solver.studies.wear_life.life import wear_life
+from solver.studies.wear_life.life_result import WearLife, WearLifeStatus
 from solver.studies.wear_life.mission import Mission
-from solver.studies.wear_life.result import WearLife, WearLifeStatus
 from solver.studies.wear_life.wearing import WearLaw
 from tests.cases.moving_scenes import moving_scene
 from tests.cases.random_scenes import random_scene

@@ -42,13 +42,13 @@ class Wear(Study, HarmonicRequest):
     )  # fmt: skip
     NAME, FUNCTION = "wear", "solver:wear_life"
     RESULT = answered(
-        "solver.studies.wear_life.result:WearLife", "WearResult", depths=_OfContacts, loads=_OfContacts,
+        "solver.studies.wear_life.life_result:WearLife", "WearResult", depths=_OfContacts, loads=_OfContacts,
         power=_OfContacts, depth_slopes=_OfContacts,
     )  # fmt: skip
     TOLD = "solver.views.tables.responses:wear_life"
     SHOWS, COUNTED = "depths, loads and amplitude over hours ([wear](wear.md#wear-over-life))", "responses"
     GROUPED: ClassVar = {"mission": "solver:Mission", "wear": "solver:WearLaw"}
-    FIGURE = "solver.views.plots.wear_life:wear_life_figure"
+    FIGURE = "solver.views.plots.worn_contacts:wear_life_figure"
     EMPTY = ("hours", "no response was found at the beginning")
 
     hours: Annotated[PositiveNumber, Field(le=1e9), Flag(metavar="H")] = Field(
