@@ -42,7 +42,8 @@ def save_mat(scene: Scene, file: str | Path, *, frequency_hz: float) -> Equation
         raise SettingError("file", str(file), f"must end in {SUFFIX}")
     found = equations_of(scene, frequency_hz)
     struct = _struct(found, "scene", "contacts") | {
-        "scene": found.scene.name, "contacts": _struct(found.contacts), "equations": equations_of_motion.__doc__,
+        "scene": found.scene.name, "contacts": _struct(found.contacts),
+        "equations": equations_of_motion.__doc__,
         "words": _words(EquationsOfMotion, "scene", "contacts") | {"contacts": _words(ContactRows)},
         "parameters": _parameters(scene),
     }  # fmt: skip
