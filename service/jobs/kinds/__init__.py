@@ -25,7 +25,7 @@ from service.jobs.studies.sensitivities import Sensitivities
 from service.jobs.studies.solve import Solve
 from service.jobs.studies.sweep import Sweep
 from service.jobs.studies.transient import Transient
-from service.jobs.studies.wear_life import Wear
+from service.jobs.studies.wear import Wear
 from service.jobs.studies.worst_mistuning import WorstMistuningStudy
 from service.jobs.study import Study
 
