@@ -115,7 +115,7 @@ from .studies.blades import (
 from .studies.convergence import accuracy_study as accuracy_study
 from .studies.instant import start_of as start_of
 from .studies.interference import interference_diagram as interference_diagram
-from .studies.margin import margin_diagram as margin_diagram
+from .studies.margin_diagram import margin_diagram as margin_diagram
 from .studies.margin_result import (
     AllowedExcitation as AllowedExcitation,
     MarginDiagram as MarginDiagram,
@@ -135,7 +135,9 @@ from .studies.mistuning_result import (
     MistuningStatus as MistuningStatus,
     MistuningStudy as MistuningStudy,
 )
-from .studies.patterns.worst_mistuning import worst_mistuning as worst_mistuning
+from .studies.patterns.climbing import WorstSearch as WorstSearch
+from .studies.patterns.intentional import IntentionalMistuning as IntentionalMistuning
+from .studies.patterns.worst import worst_mistuning as worst_mistuning
 from .studies.patterns.worst_result import (
     IntentionalPattern as IntentionalPattern,
     PatternPeak as PatternPeak,
@@ -160,5 +162,7 @@ from .studies.wear_life.least_worn_peak import (
     least_worn_peak as least_worn_peak,
 )
 from .studies.wear_life.life import wear_life as wear_life
-from .studies.wear_life.result import WearLife as WearLife, WearLifeStatus as WearLifeStatus
+from .studies.wear_life.mission import Mission as Mission
+from .studies.wear_life.life_result import WearLife as WearLife, WearLifeStatus as WearLifeStatus
+from .studies.wear_life.wearing import WearLaw as WearLaw
 from .views.io import load as load, save as save

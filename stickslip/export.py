@@ -1,8 +1,8 @@
 """Scenes for other programs: their equations for MATLAB, and a functional mock-up unit (FMI 2.0)."""
 
-from optim.doors.equations import (
+from optim.doors.equations_of_motion import (
     ContactRows as ContactRows,
-    Equations as Equations,
+    EquationsOfMotion as EquationsOfMotion,
     equations_of as equations_of,
 )
 from optim.doors.fmu import save_fmu as save_fmu

@@ -5,6 +5,8 @@ from solver import (
     LeastWornPeak as LeastWornPeak,
     Measure as Measure,
     Measured as Measured,
+    Mission as Mission,
+    WearLaw as WearLaw,
     WearLife as WearLife,
     WearLifeStatus as WearLifeStatus,
     WearSensitivity as WearSensitivity,

@@ -16,7 +16,7 @@ SHIPPED = (
     "optim.criteria.stress",
     "optim.criteria.utilisation",
     "optim.criteria.forbidden",
-    "optim.criteria.running",
+    "optim.criteria.running_speeds",
     "optim.criteria.friction_work",
     "optim.criteria.wear_rate",
     "optim.criteria.damping",

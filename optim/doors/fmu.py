@@ -21,7 +21,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from optim.doors.equations import Equations, equations_of
+from optim.doors.equations_of_motion import EquationsOfMotion, equations_of
 from solver.contacts.laws.parts import Follows
 from solver.errors import SettingError
 from solver.jit.fourier import Real
@@ -43,7 +43,7 @@ _UNITS = {
 }  # fmt: skip
 
 
-class Variable(NamedTuple):
+class ModelVariable(NamedTuple):
     """A variable of the unit; its value reference is its place."""
 
     name: str
@@ -53,7 +53,9 @@ class Variable(NamedTuple):
     start: float | None = None
 
 
-def save_fmu(scene: Scene, file: str | Path, *, frequency_hz: float, sources_only: bool = False) -> Equations:
+def save_fmu(
+    scene: Scene, file: str | Path, *, frequency_hz: float, sources_only: bool = False
+) -> EquationsOfMotion:
     """Write a scene as a functional mock-up unit for co-simulation, whole or not at all; return its numbers.
 
     Inputs are further forces on the degrees of freedom ``NAME.force`` [N], outputs their displacements and
@@ -118,31 +120,31 @@ def compiled(source: str, folder: Path) -> Path:
     return library
 
 
-def variables_of(found: Equations) -> Iterator[Variable]:
+def variables_of(found: EquationsOfMotion) -> Iterator[ModelVariable]:
     """Yield the variables of a unit in the order of their value references."""
     rows = found.contacts
-    yield Variable("frequency_hz", "parameter", "Frequency of the excitation.", "Hz", found.frequency_hz)
-    yield Variable("excitation.factor", "parameter", "Times the forces of the scene that vary.", "", 1.0)
+    yield ModelVariable("frequency_hz", "parameter", "Frequency of the excitation.", "Hz", found.frequency_hz)
+    yield ModelVariable("excitation.factor", "parameter", "Times the forces of the scene that vary.", "", 1.0)
     for c, name in enumerate(rows.names):
         friction = rows.follows[c] != Follows.GAP.value
         kind, tied = "parameter" if friction else "", rows.ratio[c] != 0.0
         first, unit = float(rows.ratio[c] if tied else rows.wave[c, 0]), "" if tied else "N"
-        yield Variable(f"{name}.mu", kind, "Friction coefficient.", "", float(rows.mu[c]))
-        yield Variable(f"{name}.N0", kind, "Mean normal load.", "N", float(rows.N0[c]))
+        yield ModelVariable(f"{name}.mu", kind, "Friction coefficient.", "", float(rows.mu[c]))
+        yield ModelVariable(f"{name}.N0", kind, "Mean normal load.", "N", float(rows.N0[c]))
         words = "First amplitude of the load over N0." if tied else "First amplitude of the load."
-        yield Variable(f"{name}.{'N1_ratio' if tied else 'N1'}", kind, words, unit, first)
+        yield ModelVariable(f"{name}.{'N1_ratio' if tied else 'N1'}", kind, words, unit, first)
     for name in found.dofs:
-        yield Variable(f"{name}.force", "input", "Force beside the excitation.", "N", 0.0)
+        yield ModelVariable(f"{name}.force", "input", "Force beside the excitation.", "N", 0.0)
     for key, words, unit in (("displacement", "Displacement.", "m"), ("velocity", "Velocity.", "m/s")):
         for name in found.dofs:
-            yield Variable(f"{name}.{key}", "output", words, unit)
+            yield ModelVariable(f"{name}.{key}", "output", words, unit)
     for key, words in (("contact_force", "Friction force, or that of a gap."), ("normal_load", "Load.")):
         for name in rows.names:
-            yield Variable(f"{name}.{key}", "output", words, "N")
-    yield Variable("observed", "output", f"What the scene observes: {found.scene.observe.dof}.", "m")
+            yield ModelVariable(f"{name}.{key}", "output", words, "N")
+    yield ModelVariable("observed", "output", f"What the scene observes: {found.scene.observe.dof}.", "m")
 
 
-def description_of(found: Equations, source: str) -> str:
+def description_of(found: EquationsOfMotion, source: str) -> str:
     """Return `modelDescription.xml`."""
     root = ElementTree.Element(
         "fmiModelDescription", fmiVersion="2.0", modelName=found.scene.name, guid=_guid(source),
@@ -180,7 +182,7 @@ def description_of(found: Equations, source: str) -> str:
     return ElementTree.tostring(root, encoding="unicode", xml_declaration=True)
 
 
-def source_of(found: Equations) -> str:
+def source_of(found: EquationsOfMotion) -> str:
     """Return the source of a unit: dimensions and numbers, then the text that is the same of all."""
     rows, n = found.contacts, len(found.M)
     inverse = np.asarray(np.linalg.inv(found.M), np.float64)
@@ -217,7 +219,7 @@ def source_of(found: Equations) -> str:
     return f'#define GUID "{_guid(text)}"\n{text}'
 
 
-def _fastest(found: Equations, A: Real, B: Real, inverse: Real) -> float:
+def _fastest(found: EquationsOfMotion, A: Real, B: Real, inverse: Real) -> float:
     """Return the largest rate of the motion, contacts stuck and pressed [rad/s]."""
     rows, n = found.contacts, len(A)
     stuck = rows.along.T @ (rows.kt[:, None] * rows.along)

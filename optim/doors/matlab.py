@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from optim.doors import equations
-from optim.doors.equations import ContactRows, Equations, equations_of
+from optim.doors import equations_of_motion
+from optim.doors.equations_of_motion import ContactRows, EquationsOfMotion, equations_of
 from solver.errors import SettingError
 from solver.results.files import whole
 from solver.scene.parameter_paths import parameter_of
@@ -20,7 +20,7 @@ from solver.wording import fields_said
 SUFFIX = ".mat"
 
 
-def save_mat(scene: Scene, file: str | Path, *, frequency_hz: float) -> Equations:
+def save_mat(scene: Scene, file: str | Path, *, frequency_hz: float) -> EquationsOfMotion:
     """Write the equations of motion with their contacts to a MATLAB file, whole or not at all; return them.
 
     A struct `model`: M, C, K, forces, `contacts`, the observed row, `parameters` of the scene with their
@@ -42,8 +42,9 @@ def save_mat(scene: Scene, file: str | Path, *, frequency_hz: float) -> Equation
         raise SettingError("file", str(file), f"must end in {SUFFIX}")
     found = equations_of(scene, frequency_hz)
     struct = _struct(found, "scene", "contacts") | {
-        "scene": found.scene.name, "contacts": _struct(found.contacts), "equations": equations.__doc__,
-        "words": _words(Equations, "scene", "contacts") | {"contacts": _words(ContactRows)},
+        "scene": found.scene.name, "contacts": _struct(found.contacts),
+        "equations": equations_of_motion.__doc__,
+        "words": _words(EquationsOfMotion, "scene", "contacts") | {"contacts": _words(ContactRows)},
         "parameters": _parameters(scene),
     }  # fmt: skip
     with whole(path) as temporary:
@@ -51,7 +52,7 @@ def save_mat(scene: Scene, file: str | Path, *, frequency_hz: float) -> Equation
     return found
 
 
-def _struct(of: Equations | ContactRows, *but: str) -> dict[str, Any]:
+def _struct(of: EquationsOfMotion | ContactRows, *but: str) -> dict[str, Any]:
     """Return the fields of a class, texts as cells."""
     values = {each.name: getattr(of, each.name) for each in fields(of) if each.name not in but}
     return {
@@ -59,7 +60,7 @@ def _struct(of: Equations | ContactRows, *but: str) -> dict[str, Any]:
     }
 
 
-def _words(kind: type[Equations | ContactRows], *but: str) -> dict[str, str]:
+def _words(kind: type[EquationsOfMotion | ContactRows], *but: str) -> dict[str, str]:
     return {name: words for name, (_, words) in fields_said(kind).items() if name not in but}
 
 

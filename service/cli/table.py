@@ -243,7 +243,7 @@ COMMANDS = {
             "import", "commands.import_matrices.import_scene", "Make a scene of matrices or modes in files.",
         ),
         CommandEntry(
-            "export", "commands.export.export",
+            "export", "commands.exports.export",
             "Write a scene for other programs: equations for MATLAB, a unit for co-simulation (FMI 2.0).",
         ),
         CommandEntry(

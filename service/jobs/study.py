@@ -118,9 +118,11 @@ class Study(SceneRequest):
     """Root of the studies: the keys are fields, an alias is how bodies and options call one.
 
     A subclass says its NAME, the FUNCTION that computes (``"solver:track_peak"``), the model of its RESULT;
-    for people what it SHOWS, by which function a result is TOLD, which SWEEPS it stores, what its progress
-    has COUNTED; of its picture what makes the FIGURE, and the key that is EMPTY where there is none, with
-    what is said then. Its docstring is the help of the command, the first line of which is its summary.
+    which arguments of the function are GROUPED, objects of a class whose fields are keys (``{"search":
+    "solver:WorstSearch"}``); for people what it SHOWS, by which function a result is TOLD, which SWEEPS it
+    stores, what its progress has COUNTED; of its picture what makes the FIGURE, and the key that is EMPTY
+    where there is none, with what is said then. Its docstring is the help of the command, the first line of
+    which is its summary.
     """
 
     model_config = ConfigDict(validate_by_alias=True, defer_build=True)
@@ -132,6 +134,7 @@ class Study(SceneRequest):
     SHOWS: ClassVar[str]
     SWEEPS: ClassVar[str] = ""
     COUNTED: ClassVar[str] = "points"
+    GROUPED: ClassVar[Mapping[str, str]] = {}
     EMPTY: ClassVar[tuple[str, str]]
     FIGURE: ClassVar[str]
 
@@ -146,8 +149,18 @@ class Study(SceneRequest):
     @classmethod
     def compute(cls, scene: Scene, asked: Mapping[str, Any], watch: Watch) -> Answer:
         """Compute what was asked, by keys that are the function's; left out, its own defaults count."""
-        found = on_demand(cls.FUNCTION)(scene, **asked, **watch._asdict())
+        found = on_demand(cls.FUNCTION)(scene, **cls.grouped(asked), **watch._asdict())
         return Answer.of(found)
+
+    @classmethod
+    def grouped(cls, asked: Mapping[str, Any]) -> dict[str, Any]:
+        """Return what was asked as the function takes it: keys that are fields of a class in one object."""
+        given = dict(asked)
+        for argument, place in cls.GROUPED.items():
+            made = on_demand(place)
+            own = inspect.signature(made).parameters.keys() & given.keys()
+            given[argument] = made(**{name: given.pop(name) for name in own})
+        return given
 
     @classmethod
     def result_class(cls, _result: Json) -> type[Told]:

@@ -20,8 +20,8 @@ _DIGITS = 25
 def set_out(raw: dict[str, Any], piecewise: Piecewise, found: ExactOrbit) -> list[Any]:
     """Put the order of events into a certificate, and where states are unknown anew; return the unknowns."""
     from solver.certificate.checker import Orbit, stated
+    from solver.certificate.proof_work import Counted
     from solver.certificate.statement import orbit_of
-    from solver.certificate.work import Counted
 
     system = stated(raw, {}, Counted)
     raw["orbit"], start = orbit_of(piecewise, found, system)
@@ -31,7 +31,7 @@ def set_out(raw: dict[str, Any], piecewise: Piecewise, found: ExactOrbit) -> lis
 def orbit_at(raw: dict[str, Any], **at: str) -> Orbit:
     """Return the orbit at a frequency [Hz] and a factor of the loads that vary."""
     from solver.certificate.checker import Orbit, stated
-    from solver.certificate.work import Counted
+    from solver.certificate.proof_work import Counted
 
     return Orbit(stated(raw, at, Counted), raw["orbit"])
 

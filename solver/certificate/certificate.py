@@ -10,8 +10,10 @@ from __future__ import annotations
 import json
 import math
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
@@ -32,6 +34,7 @@ if TYPE_CHECKING:
     from solver.certificate.checker import RejectedError
     from solver.response.exact.orbit import Orbit as ExactOrbit
 
+_Bounds = dict[str, tuple[float, float]]
 _BITS = (128, 256)
 MOST_WORK = 5000.0
 _MOVES = 8  # contacts moved
@@ -108,13 +111,9 @@ class Certificate(Piece):
 
 
 def certify(
-    solution: Solution,
-    *,
-    peak: bool = False,
-    least_over: str = "",
-    most_work: float = MOST_WORK,
+    solution: Solution, *, peak: bool = False, least_over: str = "", most_work: float = MOST_WORK,
     should_stop: ShouldStop = None,
-) -> Certificate:
+) -> Certificate:  # fmt: skip
     """Prove a periodic response of piecewise linear contacts, and enclose its amplitude.
 
     Between two events all is linear, so the orbit is a zero of finitely many equations: Krawczyk's operator
@@ -139,21 +138,15 @@ def certify(
     """
     begun = time.perf_counter()
     _check_extra()
-    from solver.certificate.checker import RejectedError
+    from solver.certificate.proof_work import allowed
     from solver.certificate.statement import system_of
-    from solver.certificate.work import HaltedError, allowed
 
-    if (
-        solution.converged and solution.scene.structure.has_sectors
-    ):  # a disk written out is a system like any other
-        solution = solve(
-            annulus(solution.scene), frequency_hz=solution.frequency_hz, harmonics=solution.n_harmonics
-        )
+    solution = _written_out(solution)
     orbit, reason = None, solution.status.value
     if solution.converged:
         (piecewise, orbit), reason = orbit_beside(solution, polish=1), ""  # exact numbers go on from there
     raw: dict[str, Any] = {"certifies": "periodic orbit", "scene": solution.scene.name}
-    status, bounds, work = CertificateStatus.NO_ORBIT, {}, 0.0
+    status, bounds, work = CertificateStatus.NO_ORBIT, _Bounds(), 0.0
     if orbit is not None:
         raw["system"] = system_of(piecewise, solution.frequency_hz)
         if least_over:
@@ -162,13 +155,7 @@ def certify(
             raise SettingError("least_over", least_over, "must be the path of a load, such as damper.N0")
         proved = least_proved if least_over else peak_proved if peak else _proved
         with allowed(most_work, should_stop) as allowance:
-            try:
-                bounds = proved(raw, piecewise, orbit)
-                status = CertificateStatus.CERTIFIED
-            except RejectedError as error:
-                status, reason = CertificateStatus.NOT_CERTIFIED, str(error)
-            except HaltedError as error:
-                status = CertificateStatus.STOPPED if error.stopped else CertificateStatus.WORK_USED_UP
+            status, reason, bounds = _tried(partial(proved, raw, piecewise, orbit))
         work = allowance.done
     unknown = (math.nan, math.nan)
     contacts, course = raw.get("system", {}).get("contacts", ()), raw.get("orbit", {})
@@ -182,6 +169,28 @@ def certify(
         held=tuple(contacts[int(j)]["name"] for j in course.get("fixed_sliders", ())),
         bits=raw.get("bits", 0), seconds=time.perf_counter() - begun, certificate=raw if bounds else None,
     )  # fmt: skip
+
+
+def _written_out(solution: Solution) -> Solution:
+    """Return the solution of the whole disk where there is one: written out it is a system like any other."""
+    if not solution.converged or not solution.scene.structure.has_sectors:
+        return solution
+    disk = annulus(solution.scene)
+    return solve(disk, frequency_hz=solution.frequency_hz, harmonics=solution.n_harmonics)
+
+
+def _tried(prove: Callable[[], _Bounds]) -> tuple[CertificateStatus, str, _Bounds]:
+    """Return how a proof ended, why, and the bounds that it proved."""
+    from solver.certificate.checker import RejectedError
+    from solver.certificate.proof_work import ProofHaltedError
+
+    try:
+        return CertificateStatus.CERTIFIED, "", prove()
+    except RejectedError as error:
+        return CertificateStatus.NOT_CERTIFIED, str(error), {}
+    except ProofHaltedError as error:
+        ended = CertificateStatus.STOPPED if error.stopped else CertificateStatus.WORK_USED_UP
+        return ended, "", {}
 
 
 def _check_extra() -> None:
@@ -204,7 +213,7 @@ def loads_of(scene: Scene, path: str) -> list[int]:
     return found if key == "N0" and all(scene.contacts[i].load is not None for i in found) else []
 
 
-def _proved(raw: dict[str, Any], piecewise: Piecewise, found: ExactOrbit) -> dict[str, tuple[float, float]]:
+def _proved(raw: dict[str, Any], piecewise: Piecewise, found: ExactOrbit) -> _Bounds:
     """Complete a certificate by the box of its unknowns and by what it claims; return that as floats."""
     from flint import ctx
 

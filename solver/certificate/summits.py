@@ -44,7 +44,7 @@ def _in_long_numbers(
     from flint import arb, ctx
 
     from solver.certificate.checker import prove
-    from solver.certificate.work import Counted
+    from solver.certificate.proof_work import Counted
 
     kept = ctx.prec
     try:

@@ -11,7 +11,7 @@ from optim.criteria.criterion import Criterion
 from optim.criteria.damping import DAMPING
 from optim.criteria.evaluation import evaluate
 from optim.criteria.mass import MASS
-from optim.criteria.running import RUNNING
+from optim.criteria.running_speeds import RUNNING
 from optim.criteria.wear_rate import WEAR_RATE
 from optim.errors import DesignError
 from optim.problem.issues import problem_issues

@@ -51,10 +51,14 @@ OF_PYTHON: Mapping[str, set[str]] = {
 
 
 def parameters(study: type[Study]) -> Mapping[str, inspect.Parameter]:
-    """Those of the functions behind a study."""
+    """Those of the functions behind a study; of what is grouped the fields."""
     places = (study.FUNCTION, *BESIDES.get(study.NAME, ()))
     functions = [inspect.signature(inspect.unwrap(on_demand(place))) for place in places]
-    return {name: one for each in reversed(functions) for name, one in each.parameters.items()}
+    taken = {name: one for each in reversed(functions) for name, one in each.parameters.items()}
+    for argument, place in study.GROUPED.items():
+        del taken[argument]
+        taken |= inspect.signature(on_demand(place)).parameters
+    return taken
 
 
 def defaults(study: type[Study]) -> Iterator[tuple[str, object, object]]:

@@ -34,9 +34,9 @@ def with_proofs(
 ) -> Answer:
     """Return an answer with proofs of peaks; it falls short if one is not proved.
 
-    Arguments as of `solver.certificate.peaks.certified_peaks`.
+    Arguments as of `solver.certificate.certified_peaks.certified_peaks`.
     """
-    from solver.certificate.peaks import certified_peaks
+    from solver.certificate.certified_peaks import certified_peaks
 
     found = certified_peaks(peaks, least_over=least_over, should_stop=watch.should_stop)
     missing = [each.status.value for each in found if not each.reached]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from pydantic import ConfigDict, Field
 
@@ -42,11 +42,12 @@ class Wear(Study, HarmonicRequest):
     )  # fmt: skip
     NAME, FUNCTION = "wear", "solver:wear_life"
     RESULT = answered(
-        "solver.studies.wear_life.result:WearLife", "WearResult", depths=_OfContacts, loads=_OfContacts,
+        "solver.studies.wear_life.life_result:WearLife", "WearResult", depths=_OfContacts, loads=_OfContacts,
         power=_OfContacts, depth_slopes=_OfContacts,
     )  # fmt: skip
     TOLD = "solver.views.tables.responses:wear_life"
     SHOWS, COUNTED = "depths, loads and amplitude over hours ([wear](wear.md#wear-over-life))", "responses"
+    GROUPED: ClassVar = {"mission": "solver:Mission", "wear": "solver:WearLaw"}
     FIGURE = "solver.views.plots.wear_life:wear_life_figure"
     EMPTY = ("hours", "no response was found at the beginning")
 
@@ -91,17 +92,17 @@ class Wear(Study, HarmonicRequest):
 
     def issues(self, scene: Scene) -> list[Issue]:
         """Return what is wrong with contacts, frequencies and paths."""
+        return check(partial(self._checked, scene))
+
+    def _checked(self, scene: Scene) -> None:
         # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
         from solver.studies.wear_life.life import course_of
+        from solver.studies.wear_life.mission import Mission
+        from solver.studies.wear_life.wearing import WearLaw
 
-        return check(
-            partial(
-                course_of, scene, self.hours, self.coefficient, self.area,
-                load_loss_per_depth=self.load_loss_per_depth,
-                stiffness_loss_per_depth=self.stiffness_loss_per_depth, frequency_hz=self.frequency_hz,
-                blocks=self.blocks, paths=self.paths or (), harmonics=self.harmonics,
-            )
-        )  # fmt: skip
+        wear = WearLaw(self.coefficient, self.area, self.load_loss_per_depth, self.stiffness_loss_per_depth)
+        mission = Mission(self.hours, self.frequency_hz, self.blocks)
+        course_of(scene, mission, wear, paths=self.paths or (), harmonics=self.harmonics)
 
     def sizes(self, scene: Scene) -> list[Issue]:
         """Return what is too large."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from pydantic import ConfigDict, Field
 
@@ -45,6 +45,7 @@ class WorstMistuningStudy(Study, HarmonicRequest):
     TOLD = "solver.views.tables.disks:worst_mistuning"
     SHOWS = "the worst pattern with its bounds, and intentional ones ([patterns](patterns.md))"
     COUNTED = "climbs and responses"
+    GROUPED: ClassVar = {"intentional": "solver:IntentionalMistuning", "search": "solver:WorstSearch"}
     EMPTY = ("worst", "the peak of no pattern is known")
     FIGURE = "solver.views.plots.disks:worst_mistuning_figure"
 
@@ -102,19 +103,12 @@ class WorstMistuningStudy(Study, HarmonicRequest):
     def _checked(self, scene: Scene) -> None:
         # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
         from solver.studies.blades import mistuned
+        from solver.studies.patterns.intentional import IntentionalMistuning
         from solver.studies.patterns.linear_disk import Contacts, check_linear
-        from solver.studies.patterns.worst_mistuning import check_bounds
+        from solver.studies.patterns.worst import check_bounds
 
-        blades = check_bounds(
-            scene,
-            self.within,
-            self.rms,
-            self.detuning,
-            self.patterns or (),
-            self.starts,
-            self.climbs,
-            self.climb,
-        )
+        intentional = IntentionalMistuning(self.patterns or (), self.detuning)
+        blades = check_bounds(scene, self.within, self.rms, intentional)
         mistuned(scene, of=self.of, values=[1.0] * len(blades))
         if self.contacts != Contacts.SOLVED.value:
             check_linear(scene, Contacts(self.contacts))

@@ -19,8 +19,11 @@ import numpy as np
 from scipy.optimize import minimize
 
 from solver.arrays import Complex, Real
+from solver.errors import SettingError
 from solver.studies.patterns.linear_disk import DiskPeak, LinearDisk
 
+LARGEST = 0.9  # deviation of a factor
+MOST_STARTS = 100_000
 CLIMB_STEPS = 200
 EASED = ((1.0,), (100.0, 30.0, 10.0, 3.0, 1.0), (10.0, 3.0, 1.0))  # damping of climbs, times that of the disk
 FLAT = 1e-10  # of the logarithm of a peak, at which a climb ends
@@ -83,6 +86,40 @@ class Bounds:
             bounds=[(-1.0, 1.0)] * begin.size, options={"maxiter": steps, "maxfun": 2 * steps, "ftol": flat},
         )  # fmt: skip
         return kept
+
+
+@dataclass(frozen=True, slots=True)
+class WorstSearch:
+    """How the worst mistuning is searched for.
+
+    Attributes
+    ----------
+    starts : int
+        Climbs in each linear limit.
+    climbs : int
+        With the contacts solved: half of them from the worst patterns of the linear limits and those
+        intentional ones that the bounds hold, the others from drawn ones.
+    climb : int
+        Responses computed on each of these, at most.
+    seed : int
+        Of the starts that are drawn.
+
+    Raises
+    ------
+    SettingError
+        A count that cannot be.
+    """
+
+    starts: int = 60
+    climbs: int = 4
+    climb: int = 30
+    seed: int = 1
+
+    def __post_init__(self) -> None:
+        counts = (("starts", self.starts, 1), ("climbs", self.climbs, 0), ("climb", self.climb, 0))
+        for key, value, least in counts:
+            if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= MOST_STARTS:
+                raise SettingError(key, value, f"must be a whole number from {least} to {MOST_STARTS}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -19,7 +19,7 @@ from solver.scene.structure_parameters import NUMBERS, STRUCTURE, named_parts
 from solver.sensitivity.gradient import Sensitivities
 from solver.sensitivity.nonsmooth import peak_gradient
 from solver.studies.blades import BladePeaks, blade_peaks, mistuned
-from solver.studies.patterns.climbing import ALIKE, Bounds
+from solver.studies.patterns.climbing import ALIKE, Bounds, WorstSearch
 from solver.studies.patterns.linear_disk import TWO_PI, Contacts, DiskPeak, check_linear
 
 FLAT = 1e-7  # rise of the logarithm of a peak at which a climb ends
@@ -27,14 +27,6 @@ FLAT = 1e-7  # rise of the logarithm of a peak at which a climb ends
 
 class UnknownPeakError(Exception):
     """The response of a disk did not reach the end of its band."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Climb:
-    """What climbs with the contacts solved may cost."""
-
-    climbs: Annotated[int, "How many."]
-    responses: Annotated[int, "Computed on each, at most."]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -118,7 +110,7 @@ class SolvedDisk:
         begins: Sequence[Real],
         drawn: Sequence[Real],
         bounds: Bounds,
-        climb: Climb,
+        search: WorstSearch,
         go_on: Callable[[], bool],
     ) -> Climbed:
         """Return the worst pattern on climbs from the worst of some patterns, and from others.
@@ -128,7 +120,7 @@ class SolvedDisk:
         begins : patterns, of the worst of which the climbs are that are not from drawn ones.
         drawn : patterns that are all climbed from.
         bounds : of δ.
-        climb : how many, and how long.
+        search : how many climbs, and how long.
         go_on : asked before each response.
         """
         tried: list[tuple[float, Real]] = []
@@ -141,9 +133,9 @@ class SolvedDisk:
                 except UnknownPeakError:
                     known = False
         ranked = [delta for _, delta in sorted(tried, key=lambda pair: -pair[0])]
-        chosen = [*ranked[: climb.climbs - len(drawn)], *drawn] if self.differentiable else []
-        for begin in chosen if climb.responses > 0 else []:
-            found, complete = self._climb(begin, bounds, climb, go_on)
+        chosen = [*ranked[: search.climbs - len(drawn)], *drawn] if self.differentiable else []
+        for begin in chosen if search.climb > 0 else []:
+            found, complete = self._climb(begin, bounds, search.climb, go_on)
             tried += found
             ends += [max(value for value, _ in found)] if found else []
             known = known and complete
@@ -152,20 +144,20 @@ class SolvedDisk:
         return Climbed(worst=worst, known=known, alike=alike)
 
     def _climb(
-        self, begin: Real, bounds: Bounds, climb: Climb, go_on: Callable[[], bool]
+        self, begin: Real, bounds: Bounds, most: int, go_on: Callable[[], bool]
     ) -> tuple[list[tuple[float, Real]], bool]:
-        """Return the peaks on the way of one climb with their patterns, and whether all were known."""
+        """Return the peaks on the way of a climb of so many responses, and whether all were known."""
         found: list[tuple[float, Real]] = []
 
         def rise(delta: Real) -> tuple[float, Real]:
-            if len(found) >= climb.responses or not go_on():
+            if len(found) >= most or not go_on():
                 raise _ClimbEndedError
             value, slope = self.slopes(delta)
             found.append((math.exp(value), delta))
             return value, slope
 
         try:
-            bounds.largest(rise, begin, climb.responses, FLAT)
+            bounds.largest(rise, begin, most, FLAT)
         except _ClimbEndedError:
             pass
         except UnknownPeakError:

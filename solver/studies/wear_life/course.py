@@ -1,9 +1,9 @@
 """Depths of the contacts over hours, by an embedded Runge-Kutta pair, with exact sensitivities.
 
-dw/dt = r(w, θ) with r the rates of `running`, and the variational equations dS/dt = (∂r/∂w) S + ∂r/∂θ for S =
-∂w/∂θ, are integrated together by the pair of order 8 with 5 and 3 of Hairer, Nørsett and Wanner (Solving
-Ordinary Differential Equations I, 1993, section II.10), which controls the error of both. At a peak the
-highest one of the band counts: every step ends with a look at the whole band, and where another peak has
+dw/dt = r(w, θ) with r the rates at operating conditions, and the variational equations dS/dt = (∂r/∂w) S +
+∂r/∂θ for S = ∂w/∂θ, are integrated together by the pair of order 8 with 5 and 3 of Hairer, Nørsett and Wanner
+(Solving Ordinary Differential Equations I, 1993, section II.10), which controls the error of both. At a peak
+the highest one of the band counts: every step ends with a look at the whole band, and where another peak has
 overtaken, at t* with h = a_other − a = 0, the rates jump from r⁻ to r⁺ and
 
     S⁺ = S⁻ + (r⁻ − r⁺) ∂t*/∂θ,   ∂t*/∂θ = −(h_w S⁻ + h_θ)/(h_w · r⁻).
@@ -23,8 +23,8 @@ from scipy.optimize import brentq
 
 from solver.arrays import Real
 from solver.results.watch import OnProgress, ShouldStop
-from solver.studies.wear_life.result import WearLifeStatus
-from solver.studies.wear_life.running import Conditions, LostError, Motion
+from solver.studies.wear_life.life_result import WearLifeStatus
+from solver.studies.wear_life.operating_conditions import LostError, OperatingConditions, PeriodicMotion
 from solver.studies.wear_life.wearing import SECONDS_AN_HOUR, Loss, Wearing
 
 FEWEST_STEPS = 8
@@ -43,7 +43,7 @@ class Here:
     hours: Annotated[float, "Running time [h]."]
     depths: Annotated[Real, "[m], (n,)."]
     slopes: Annotated[Real, "Derivatives S of the depths by θ, (n, m)."]
-    motion: Annotated[Motion, "The response."]
+    motion: Annotated[PeriodicMotion, "The response."]
     power: Annotated[Real, "What friction takes out [W], (n,)."]
     rates: Annotated[Real, "Depth an hour [m/h], (n,)."]
     amplitude: Annotated[float, "max|x| of the observed DOF [m]."]
@@ -67,7 +67,7 @@ class Here:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Stretch:
+class WearStretch:
     """A part of the life over which the same peak is highest."""
 
     begin: Here
@@ -76,7 +76,7 @@ class Stretch:
 
 
 @dataclass(slots=True)
-class Course:
+class WearCourse:
     """The life of worn contacts, followed as far as it goes.
 
     Parameters
@@ -88,19 +88,19 @@ class Course:
     """
 
     wearing: Wearing
-    conditions: Conditions
+    conditions: OperatingConditions
     paths: tuple[str, ...]
     hours: float
     tolerance: float
-    stretches: Annotated[list[Stretch], "What was followed."] = field(default_factory=list)
+    stretches: Annotated[list[WearStretch], "What was followed."] = field(default_factory=list)
     switches: Annotated[list[float], "When another peak became the highest [h]."] = field(
         default_factory=list
     )
     status: WearLifeStatus = WearLifeStatus.COMPLETED
     why: Annotated[str, "What ended it."] = ""
     smooth: Annotated[bool, "Sensitivities are known all the way."] = True
-    _known: list[tuple[Real, Motion]] = field(default_factory=list)
-    _rival: Motion | None = None
+    _known: list[tuple[Real, PeriodicMotion]] = field(default_factory=list)
+    _rival: PeriodicMotion | None = None
 
     # What the equations are made of
 
@@ -114,7 +114,7 @@ class Course:
         """Contacts that wear."""
         return len(self.wearing.places)
 
-    def here(self, hours: float, state: Real, near: Motion | None, *, rates: bool = False) -> Here:
+    def here(self, hours: float, state: Real, near: PeriodicMotion | None, *, rates: bool = False) -> Here:
         """Return everything at a time and its state.
 
         Raises
@@ -124,7 +124,9 @@ class Course:
         """
         return self._all(hours, state, near, rates=rates)[0]
 
-    def _all(self, hours: float, state: Real, near: Motion | None, *, rates: bool) -> tuple[Here, Real, Real]:
+    def _all(
+        self, hours: float, state: Real, near: PeriodicMotion | None, *, rates: bool
+    ) -> tuple[Here, Real, Real]:
         """Return everything at a time and its state, with ∂r/∂w (n, n) and ∂r/∂θ (n, m)."""
         wearing, depths = self.wearing, state[: self.n].copy()
         found = self.conditions.at(wearing, depths, near, rates=rates)
@@ -217,7 +219,7 @@ class Course:
             self.status = WearLifeStatus.STOPPED if stopped else WearLifeStatus.NO_RESPONSE
             self.why = str(lost)
 
-    def _steps(self, begin: Here, allowed: Real) -> Iterator[Stretch]:
+    def _steps(self, begin: Here, allowed: Real) -> Iterator[WearStretch]:
         """Yield the steps from a state on, up to the end, or to where another peak is highest."""
         at = np.concatenate([begin.depths, begin.slopes.ravel()])
         steps = DOP853(
@@ -238,9 +240,9 @@ class Course:
                 if meets is not None:
                     self._rival, self.status, self.why = rival, WearLifeStatus.COMPLETED, ""
                     here = self.here(meets, dense(meets), begin.motion)
-                    yield Stretch(begin=begin, end=here, dense=dense)
+                    yield WearStretch(begin=begin, end=here, dense=dense)
                     return
-            yield Stretch(begin=begin, end=here, dense=dense)
+            yield WearStretch(begin=begin, end=here, dense=dense)
             if self.status is not WearLifeStatus.COMPLETED:
                 return
             begin = here
@@ -259,15 +261,17 @@ class Course:
         """Return how far a number of a contact is above its least at a time of a step."""
         return self.wearing.number(loss, dense(hours)) - loss.least
 
-    def _overtaker(self, here: Here) -> Motion | None:
+    def _overtaker(self, here: Here) -> PeriodicMotion | None:
         """Return the highest peak of the band if it is another one."""
         top = self.conditions.swept(self.wearing.at(here.depths)).peaks[0]
         same = abs(top.at - here.motion.hertz) <= _SAME_PEAK * top.at
         if same or top.value <= here.amplitude * (1.0 + _HIGHER):
             return None
-        return Motion(hertz=top.at, u=top.solution, moves=top.interior)
+        return PeriodicMotion(hertz=top.at, u=top.solution, moves=top.interior)
 
-    def _meeting(self, begin: Here, end: Here, rival: Motion, dense: Callable[[float], Real]) -> float | None:
+    def _meeting(
+        self, begin: Here, end: Here, rival: PeriodicMotion, dense: Callable[[float], Real]
+    ) -> float | None:
         """Return when another peak becomes the highest within a step [h]; None if it is the same one."""
 
         known = [(end.hours, rival)]

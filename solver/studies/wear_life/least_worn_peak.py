@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import Annotated, ClassVar
 
@@ -25,8 +25,9 @@ from solver.results.views import Data, Views
 from solver.results.watch import OnProgress, ShouldStop, shows_progress
 from solver.scene.scene import Scene
 from solver.studies.wear_life.life import course_of
-from solver.studies.wear_life.result import WearLifeStatus
-from solver.studies.wear_life.wearing import PerContact
+from solver.studies.wear_life.life_result import WearLifeStatus
+from solver.studies.wear_life.mission import Mission
+from solver.studies.wear_life.wearing import WearLaw
 
 FEWEST_LOOKS = 3
 MOST_CLOSING = 40
@@ -36,14 +37,14 @@ SHARP, LEVEL = 1e-8, 1e-10  # of the range, and relative to the height: where it
 class WornStatus(Enum):
     """How the search ended; the value is a sentence a user can act on."""
 
-    FOUND = "The worst amplitude is least there, of all basins that the first looks show."
+    COMPLETED = "The worst amplitude is least there, of all basins that the first looks show."
     AT_BOUND = "The worst amplitude still falls at an end of the range: a wider range may do better."
     NO_RESPONSE = "No life could be followed to its end: look at one of them with `wear_life`."
     STOPPED = "Stopped on request: the best so far."
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Look:
+class _LifeLook:
     """A value of the parameter with the worst amplitude of the life; infinite where it does not last."""
 
     z: float
@@ -83,31 +84,16 @@ class LeastWornPeak(Shown):
 
 @shows_progress("least worn peak")
 def least_worn_peak(
-    scene: Scene,
-    parameter: str,
-    start: float,
-    stop: float,
-    hours: float,
-    coefficient: PerContact,
-    area: PerContact,
-    *,
-    from_hours: float | None = None,
-    factors: Sequence[float] = (1.0, 1.0),
-    load_loss_per_depth: PerContact | None = None,
-    stiffness_loss_per_depth: PerContact | None = None,
-    frequency_hz: float | None = None,
-    blocks: Sequence[Sequence[float]] | None = None,
-    looks: int = 9,
-    tolerance: float = 1e-5,
-    harmonics: int = 11,
-    on_progress: OnProgress = None,
+    scene: Scene, parameter: str, start: float, stop: float, mission: Mission, wear: WearLaw, *,
+    from_hours: float | None = None, factors: Sequence[float] = (1.0, 1.0), looks: int = 9,
+    tolerance: float = 1e-5, harmonics: int = 11, on_progress: OnProgress = None,
     should_stop: ShouldStop = None,
-) -> LeastWornPeak:
+) -> LeastWornPeak:  # fmt: skip
     """Find the value of a parameter with which the amplitude is least at the end of life, or over it.
 
     Parameters
     ----------
-    scene, hours, coefficient, area : as of `wear_life`, likewise what is not said here.
+    scene, mission, wear : as of `wear_life`, likewise what is not said here.
     parameter : path of what is chosen, for example ``shroud.N0``, its value before anything is worn.
     start, stop : its range in user units.
     from_hours : the amplitude counts from then on [h]: 0 over the whole life; at its end alone if left out.
@@ -121,30 +107,26 @@ def least_worn_peak(
     """
     begun = time.perf_counter()
     low, high = _checked_factors(factors)
-    since = hours if from_hours is None else from_hours
-    if not isinstance(since, int | float) or isinstance(since, bool) or not 0.0 <= since <= hours:
-        raise SettingError("from_hours", from_hours, f"must be from 0 to {hours}")
+    since, longest = _checked_since(from_hours, mission.hours), replace(mission, hours=mission.hours * high)
     if isinstance(looks, bool) or not isinstance(looks, int) or not FEWEST_LOOKS <= looks <= 1000:
         raise SettingError("looks", looks, f"must be a whole number from {FEWEST_LOOKS} to 1000")
     scale = scale_of(scene, parameter, start, stop)
 
-    def look(z: float) -> _Look:
+    def look(z: float) -> _LifeLook:
         value = scale.outside(z)
         course = course_of(
-            scene.with_values({parameter: value}), hours * high, coefficient, area,
-            load_loss_per_depth=load_loss_per_depth, stiffness_loss_per_depth=stiffness_loss_per_depth,
-            frequency_hz=frequency_hz, blocks=blocks, paths=(parameter,), tolerance=tolerance,
+            scene.with_values({parameter: value}), longest, wear, paths=(parameter,), tolerance=tolerance,
             harmonics=harmonics, should_stop=should_stop,
         )  # fmt: skip
         course.follow(None, should_stop)
         if course.status is not WearLifeStatus.COMPLETED:
-            return _Look(z=z, value=math.inf, slope=math.nan, hours=math.nan, first=math.nan)
-        worst = course.maxima(since * low, hours * high)[0]
+            return _LifeLook(z=z, value=math.inf, slope=math.nan, hours=math.nan, first=math.nan)
+        worst = course.maxima(since * low, longest.hours)[0]
         slope = float(worst.gradient[0]) * float(scale.by_z(np.array([value]))[0])
         first = course.stretches[0].begin.amplitude
-        return _Look(z=z, value=worst.amplitude, slope=slope, hours=worst.hours, first=first)
+        return _LifeLook(z=z, value=worst.amplitude, slope=slope, hours=worst.hours, first=first)
 
-    search = _Search(look, scale.low, scale.high, looks, on_progress, should_stop)
+    search = _ClosingSearch(look, scale.low, scale.high, looks, on_progress, should_stop)
     status = search.run()
     best, known = search.best, bool(search.looked) and math.isfinite(search.best.value)
     return LeastWornPeak(
@@ -154,6 +136,14 @@ def least_worn_peak(
         looked_at=np.array([scale.outside(one.z) for one in search.looked]),
         heights=np.array([one.value for one in search.looked]), seconds=time.perf_counter() - begun,
     )  # fmt: skip
+
+
+def _checked_since(from_hours: float | None, hours: float) -> float:
+    """Return from when on the amplitude counts [h]."""
+    since = hours if from_hours is None else from_hours
+    if not isinstance(since, int | float) or isinstance(since, bool) or not 0.0 <= since <= hours:
+        raise SettingError("from_hours", from_hours, f"must be from 0 to {hours}")
+    return since
 
 
 def _checked_factors(factors: Sequence[float]) -> tuple[float, float]:
@@ -166,19 +156,19 @@ def _checked_factors(factors: Sequence[float]) -> tuple[float, float]:
 
 
 @dataclass(slots=True)
-class _Search:
+class _ClosingSearch:
     """Looks over a range, then closes in on the best of them from both sides."""
 
-    look: Callable[[float], _Look]
+    look: Callable[[float], _LifeLook]
     low: float
     high: float
     looks: int
     on_progress: OnProgress
     should_stop: ShouldStop
-    looked: list[_Look] = field(default_factory=list)
+    looked: list[_LifeLook] = field(default_factory=list)
 
     @property
-    def best(self) -> _Look:
+    def best(self) -> _LifeLook:
         """The least so far."""
         return min(self.looked, key=lambda one: one.value)
 
@@ -203,7 +193,7 @@ class _Search:
             left, right = _closer(left, right, self.looked[-1])
         if self.on_progress is not None:
             self.on_progress(1.0, len(self.looked))
-        return WornStatus.FOUND
+        return WornStatus.COMPLETED
 
     def _stopped(self, z: float) -> bool:
         """Look at a value; return whether the caller wants it to end."""
@@ -212,7 +202,7 @@ class _Search:
             self.on_progress(len(self.looked) / (len(self.looked) + self.looks), len(self.looked))
         return self.should_stop is not None and self.should_stop()
 
-    def _level(self, left: _Look, right: _Look) -> bool:
+    def _level(self, left: _LifeLook, right: _LifeLook) -> bool:
         """Return whether the tangents say that nothing between two looks is lower."""
         if not left.slope < 0.0 < right.slope:
             return False
@@ -221,13 +211,13 @@ class _Search:
         return bool(self.best.value - bound <= LEVEL * self.best.value)
 
 
-def _meeting(left: _Look, right: _Look) -> float:
+def _meeting(left: _LifeLook, right: _LifeLook) -> float:
     """Return where the tangents of two looks meet."""
     rise = right.value - left.value + left.slope * left.z - right.slope * right.z
     return rise / (left.slope - right.slope)
 
 
-def _between(left: _Look, right: _Look, turn: int) -> float:
+def _between(left: _LifeLook, right: _LifeLook, turn: int) -> float:
     """Return where to look next: where tangents meet, or where the cubic is least, in turns."""
     width = right.z - left.z
     z = 0.5 * (left.z + right.z)
@@ -241,7 +231,7 @@ def _between(left: _Look, right: _Look, turn: int) -> float:
     return min(max(z, left.z + 1e-3 * width), right.z - 1e-3 * width)
 
 
-def _closer(left: _Look, right: _Look, middle: _Look) -> tuple[_Look, _Look]:
+def _closer(left: _LifeLook, right: _LifeLook, middle: _LifeLook) -> tuple[_LifeLook, _LifeLook]:
     """Return the part between two looks that holds the least."""
     if not math.isfinite(middle.value) or middle.value > min(left.value, right.value):
         return (middle, right) if left.value > right.value else (left, middle)

@@ -6,7 +6,6 @@ import math
 import time
 from collections.abc import Sequence
 from dataclasses import replace
-from numbers import Real as RealNumber
 
 import numpy as np
 
@@ -20,15 +19,14 @@ from solver.response.solve import solve
 from solver.results.known import NOTHING_KNOWN, Known
 from solver.results.watch import OnProgress, ShouldStop, part_of, shows_progress
 from solver.scene.cyclic.annulus import written_out
-from solver.scene.parameter_paths import check_frequency
 from solver.scene.scene import Scene
 from solver.sensitivity.gradient import Sensitivities
-from solver.studies.wear_life.course import Course, Here
-from solver.studies.wear_life.result import WearLife
-from solver.studies.wear_life.running import SETTINGS, Conditions
-from solver.studies.wear_life.wearing import LOAD, PerContact, Wearing, wearing_of
+from solver.studies.wear_life.course import Here, WearCourse
+from solver.studies.wear_life.life_result import WearLife
+from solver.studies.wear_life.mission import Mission, is_number
+from solver.studies.wear_life.operating_conditions import SETTINGS, OperatingConditions
+from solver.studies.wear_life.wearing import LOAD, Wearing, WearLaw, wearing_of
 
-MOST_HOURS = 1e9
 MOST_POINTS = 10_000
 _FOLLOWING = 0.8  # share of the work
 
@@ -36,14 +34,9 @@ _FOLLOWING = 0.8  # share of the work
 @shows_progress("wear life")
 def wear_life(
     scene: Scene,
-    hours: float,
-    coefficient: PerContact,
-    area: PerContact,
+    mission: Mission,
+    wear: WearLaw,
     *,
-    load_loss_per_depth: PerContact | None = None,
-    stiffness_loss_per_depth: PerContact | None = None,
-    frequency_hz: float | None = None,
-    blocks: Sequence[Sequence[float]] | None = None,
     limit: float | None = None,
     paths: Sequence[str] = (),
     points: int = 40,
@@ -60,15 +53,8 @@ def wear_life(
     Parameters
     ----------
     scene : not worn yet.
-    hours : how long it runs [h].
-    coefficient : wear coefficient [1/Pa, which is m³/J] of every contact with friction, or by contact or
-        group: then the others do not wear.
-    area : nominal area of each contact [m²], likewise.
-    load_loss_per_depth : what a depth of 1 m takes from the normal load [N/m], likewise; the normal stiffness
-        of a contact that has one if left out.
-    stiffness_loss_per_depth : what it takes from the tangential stiffness kt [N/m²]; nothing if left out.
-    frequency_hz : at which it runs [Hz]; always at the highest peak of the band, the worst case, if left out.
-    blocks : several frequencies [Hz], each with the hours of a mission it runs there, repeated often.
+    mission : how long it runs, and at which frequencies.
+    wear : which contacts wear, and what a depth takes from them.
     limit : amplitude of the observed DOF [m]: when it is reached.
     paths : parameter paths, or `coefficient` (by name ``coefficient.NAME``), to differentiate by; of the
         faces of a shape those of its contacts and their group.
@@ -87,10 +73,8 @@ def wear_life(
     """
     begun = time.perf_counter()
     course = course_of(
-        scene, hours, coefficient, area, load_loss_per_depth=load_loss_per_depth,
-        stiffness_loss_per_depth=stiffness_loss_per_depth, frequency_hz=frequency_hz, blocks=blocks,
-        paths=paths, tolerance=tolerance, harmonics=harmonics, should_stop=should_stop,
-    )  # fmt: skip
+        scene, mission, wear, paths=paths, tolerance=tolerance, harmonics=harmonics, should_stop=should_stop
+    )
     check_looks(limit, points)
     course.follow(part_of(on_progress, 0.0, _FOLLOWING), should_stop)
     found = _result(course, scene, limit, points, begun)
@@ -100,11 +84,9 @@ def wear_life(
 
 
 def course_of(
-    scene: Scene, hours: float, coefficient: PerContact, area: PerContact, *,
-    load_loss_per_depth: PerContact | None = None, stiffness_loss_per_depth: PerContact | None = None,
-    frequency_hz: float | None = None, blocks: Sequence[Sequence[float]] | None = None,
-    paths: Sequence[str] = (), tolerance: float = 1e-6, harmonics: int = 11, should_stop: ShouldStop = None,
-) -> Course:  # fmt: skip
+    scene: Scene, mission: Mission, wear: WearLaw, *, paths: Sequence[str] = (), tolerance: float = 1e-6,
+    harmonics: int = 11, should_stop: ShouldStop = None,
+) -> WearCourse:  # fmt: skip
     """Return a life that was not followed yet, by the arguments of `wear_life`.
 
     Raises
@@ -114,40 +96,32 @@ def course_of(
     """
     # The points of a shape's faces wear each by itself: they become contacts of their own.
     whole = written_out(scene).model_copy(update={"dampers": ()})
-    wearing = wearing_of(
-        whole, coefficient, area, load_loss_per_depth=load_loss_per_depth,
-        stiffness_loss_per_depth=stiffness_loss_per_depth,
-    )  # fmt: skip
-    if not _is_number(hours) or not 0.0 < hours <= MOST_HOURS:
-        raise SettingError("hours", hours, f"must be a number > 0 and <= {MOST_HOURS:g}")
-    if not _is_number(tolerance) or not 1e-12 <= tolerance <= 0.1:
+    wearing = wearing_of(whole, wear)
+    if not is_number(tolerance) or not 1e-12 <= tolerance <= 0.1:
         raise SettingError("tolerance", tolerance, "must be a number from 1e-12 to 0.1")
     own = tuple(path for path in paths if path not in wearing.entries)
     for path in own:
         _check_path(whole, wearing, path)
     every = (*own, *(loss.path for loss in wearing.losses))
-    conditions = Conditions(
-        blocks=_blocks(frequency_hz, blocks), harmonics=check_harmonics(harmonics), paths=own,
+    conditions = OperatingConditions(
+        blocks=mission.shares(), harmonics=check_harmonics(harmonics), paths=own,
         effects=Effects(even_harmonics=even_harmonics_reason(whole, every) is not None),
         should_stop=should_stop,
     )  # fmt: skip
     if conditions.blocks is None:
         Sensitivities(conditions.balance(whole), every).check_second()
-    return Course(
-        wearing=wearing, conditions=conditions, paths=tuple(paths), hours=float(hours), tolerance=tolerance
-    )
+    return WearCourse(
+        wearing=wearing, conditions=conditions, paths=tuple(paths), hours=float(mission.hours),
+        tolerance=tolerance,
+    )  # fmt: skip
 
 
 def check_looks(limit: float | None, points: int) -> None:
     """Raise SettingError where a limit of the amplitude or a number of instants is out of its range."""
-    if limit is not None and (not _is_number(limit) or not 0.0 < limit < math.inf):
+    if limit is not None and (not is_number(limit) or not 0.0 < limit < math.inf):
         raise SettingError("limit", limit, "must be an amplitude > 0 [m]")
     if isinstance(points, bool) or not isinstance(points, int) or not 2 <= points <= MOST_POINTS:
         raise SettingError("points", points, f"must be a whole number from 2 to {MOST_POINTS}")
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, RealNumber) and not isinstance(value, bool)
 
 
 def _check_path(scene: Scene, wearing: Wearing, path: object) -> None:
@@ -158,29 +132,7 @@ def _check_path(scene: Scene, wearing: Wearing, path: object) -> None:
         raise SettingError("paths", path, wanted)
 
 
-def _blocks(
-    frequency_hz: float | None, blocks: Sequence[Sequence[float]] | None
-) -> tuple[tuple[float, float], ...] | None:
-    """Return frequencies with their shares of the time; None for the peak."""
-    if frequency_hz is not None:
-        if blocks is not None:
-            raise SettingError("frequency_hz", frequency_hz, "must not be given beside `blocks`")
-        return ((check_frequency("frequency_hz", frequency_hz), 1.0),)
-    if blocks is None:
-        return None
-    if not blocks:
-        raise SettingError("blocks", list(blocks), "must have a frequency [Hz] with hours at least")
-    found = dict[float, float]()
-    for i, block in enumerate(blocks):
-        if len(block) != 2 or not _is_number(block[1]) or not 0.0 < block[1] <= MOST_HOURS:
-            raise SettingError(("blocks", i), list(block), "must be a frequency [Hz] and hours > 0")
-        hertz = check_frequency(f"blocks[{i}]", block[0])
-        found[hertz] = found.get(hertz, 0.0) + block[1]
-    total = sum(found.values())
-    return tuple((hertz, hours / total) for hertz, hours in found.items())
-
-
-def _result(course: Course, scene: Scene, limit: float | None, points: int, begun: float) -> WearLife:
+def _result(course: WearCourse, scene: Scene, limit: float | None, points: int, begun: float) -> WearLife:
     """Return what a life came to that was followed."""
     wearing, stretches = course.wearing, course.stretches
     rows = _rows(course, points) if stretches else []
@@ -210,7 +162,7 @@ def _result(course: Course, scene: Scene, limit: float | None, points: int, begu
     )  # fmt: skip
 
 
-def _rows(course: Course, points: int) -> list[Here]:
+def _rows(course: WearCourse, points: int) -> list[Here]:
     """Return the instants that are shown: evenly spaced, where another peak takes over, and the end."""
     last = course.stretches[-1].end.hours
     rows = [course.stretches[0].begin]
@@ -237,7 +189,7 @@ def _loads(wearing: Wearing, depths: Real) -> Real:
     return np.array([one.value_of(LOAD) if LOAD in one.parameters else math.nan for one in contacts])
 
 
-def _known(course: Course, here: Here) -> Known:
+def _known(course: WearCourse, here: Here) -> Known:
     """Return how well the response at an instant is known."""
     conditions, scene = course.conditions, course.wearing.at(here.depths)
     if conditions.blocks is None:

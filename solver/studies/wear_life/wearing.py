@@ -32,6 +32,32 @@ PerContact = float | Mapping[str, float]
 """A number of every contact with friction, or by contact or group."""
 
 
+@dataclass(frozen=True, slots=True)
+class WearLaw:
+    """Which contacts wear how fast, and what a depth takes from them.
+
+    Each is a number of every contact with friction, or by contact or group; of a disk that is written out by
+    their names in one sector.
+
+    Attributes
+    ----------
+    coefficient : float or mapping
+        Wear coefficient [1/Pa, which is m³/J]. Where it is given by contact or group the others do not wear.
+    area : float or mapping
+        Nominal area of each [m²]; of a face with several points that of each point.
+    load_loss_per_depth : float, mapping or None
+        What a depth of 1 m takes from the normal load [N/m]; the normal stiffness of a contact that has one
+        if left out.
+    stiffness_loss_per_depth : float, mapping or None
+        What it takes from the tangential stiffness kt [N/m²]; nothing if left out.
+    """
+
+    coefficient: PerContact
+    area: PerContact
+    load_loss_per_depth: PerContact | None = None
+    stiffness_loss_per_depth: PerContact | None = None
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Loss:
     """A number of a contact that a depth lowers."""
@@ -110,21 +136,8 @@ class Wearing:
         return min((size for size in sizes if size > 0.0), default=math.inf)
 
 
-def wearing_of(
-    scene: Scene, coefficient: PerContact, area: PerContact, *, load_loss_per_depth: PerContact | None = None,
-    stiffness_loss_per_depth: PerContact | None = None,
-) -> Wearing:  # fmt: skip
+def wearing_of(scene: Scene, wear: WearLaw) -> Wearing:
     """Return which contacts of a scene wear, and how.
-
-    Parameters
-    ----------
-    scene : its contacts by name or group; of a disk that is written out by their names in one sector.
-    coefficient : wear coefficient [1/Pa, which is m³/J] of every contact with friction, or by contact or
-        group: then the others do not wear.
-    area : nominal area of each [m²]; of a face with several points that of each point.
-    load_loss_per_depth : what a depth of 1 m takes from the normal load [N/m]; the normal stiffness of a
-        contact that has one.
-    stiffness_loss_per_depth : what it takes from the tangential stiffness kt [N/m²]; nothing if left out.
 
     Raises
     ------
@@ -134,10 +147,10 @@ def wearing_of(
     """
     if scene.rigid_contact is not None:
         raise SettingError("scene", scene.rigid_contact, "must not have rigid contacts: they do not wear")
-    coefficients = _of_contacts(scene, "coefficient", coefficient, above=False)
-    areas = _of_contacts(scene, "area", area, above=True)
-    loads = _of_contacts(scene, "load_loss_per_depth", load_loss_per_depth, above=False)
-    stiffnesses = _of_contacts(scene, "stiffness_loss_per_depth", stiffness_loss_per_depth, above=False)
+    coefficients = _of_contacts(scene, "coefficient", wear.coefficient, above=False)
+    areas = _of_contacts(scene, "area", wear.area, above=True)
+    loads = _of_contacts(scene, "load_loss_per_depth", wear.load_loss_per_depth, above=False)
+    stiffnesses = _of_contacts(scene, "stiffness_loss_per_depth", wear.stiffness_loss_per_depth, above=False)
     places, losses = tuple(coefficients), list[Loss]()
     for i, place in enumerate(places):
         contact = scene.contacts[place]

@@ -79,7 +79,7 @@ def results() -> dict[str, Any]:
         "solve": solver.solve(scene, frequency_hz=1.2, harmonics=3),
         "march": solver.march(scene, frequency_hz=1.2),
         "wear": solver.wear_life(
-            scene, 1e-4, 1e-11, 2e-4, load_loss_per_depth=4e6, limit=2.4, harmonics=3, points=5
+            scene, solver.Mission(1e-4), solver.WearLaw(1e-11, 2e-4, 4e6), limit=2.4, harmonics=3, points=5
         ),
         "transient": solver.transient(scene, begin_hz=0.9, end_hz=1.2, rate_hz_per_s=0.02),
         "map": solver.response_map(scene, "damper.N0", 50, 200, steps=3, frequencies=5, harmonics=3),
@@ -88,7 +88,11 @@ def results() -> dict[str, Any]:
             solver.load_scene("bladed-disk"), of=["tip"], samples=2, harmonics=1, start=740, stop=780
         ),
         "worst-mistuning": solver.worst_mistuning(
-            solver.load_scene("bladed-disk"), of=["tip"], starts=2, contacts="stuck", patterns=["AB"]
+            solver.load_scene("bladed-disk"),
+            of=["tip"],
+            contacts="stuck",
+            search=solver.WorstSearch(starts=2),
+            intentional=solver.IntentionalMistuning(["AB"]),
         ),
         "interference": solver.interference_diagram(solver.load_scene("bladed-disk"), speed_rpm=11e3),
         "margin": solver.margin_diagram(scene, start=20, stop=120, points=3, limit=2.0, harmonics=3),

@@ -1,5 +1,6 @@
 """The best load for contacts that wear, against the best load that does not, and a fine grid of lives."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,40 +10,47 @@ from solver import least_peak, load_scene
 from solver.errors import SettingError
 from solver.studies.wear_life.least_worn_peak import LeastWornPeak, WornStatus, least_worn_peak
 from solver.studies.wear_life.life import wear_life
+from solver.studies.wear_life.mission import Mission
+from solver.studies.wear_life.wearing import WearLaw
 
 SCENE, LOAD = load_scene("two-dof"), "damper.N0"
 COEFFICIENT, AREA, HOURS = 1e-11, 2e-4, 3e-4
-GIVEN: dict[str, Any] = {"load_loss_per_depth": 4e6, "harmonics": 3}
+WEAR = WearLaw(COEFFICIENT, AREA, load_loss_per_depth=4e6)
+GIVEN: dict[str, Any] = {"harmonics": 3}
 
 
 def _best(low: float = 90.0, high: float = 300.0, **more: Any) -> LeastWornPeak:
     given = {**GIVEN, "looks": 4, **more}
-    return least_worn_peak(SCENE, LOAD, low, high, given.pop("hours", HOURS), COEFFICIENT, AREA, **given)
+    return least_worn_peak(SCENE, LOAD, low, high, Mission(given.pop("hours", HOURS)), WEAR, **given)
 
 
 def test_at_the_end_of_life_the_load_is_what_is_best_without_wear() -> None:
     found, unworn = _best(), least_peak(SCENE, LOAD, 50.0, 300.0, harmonics=3)
     there = SCENE.with_values({LOAD: found.at})
-    worn = wear_life(there, HOURS, COEFFICIENT, AREA, points=2, **GIVEN)
+    worn = wear_life(there, Mission(HOURS), WEAR, points=2, **GIVEN)
     assert found.reached
     assert found.worst == pytest.approx(unworn.peak, rel=1e-9)
     assert worn.loads[0, -1] == pytest.approx(unworn.at, rel=1e-5)
 
 
+@pytest.mark.long
 def test_over_the_whole_life_it_is_as_good_at_first_as_at_last() -> None:
     found = _best(from_hours=0.0)
-    worn = wear_life(SCENE.with_values({LOAD: found.at}), HOURS, COEFFICIENT, AREA, points=2, **GIVEN)
+    worn = wear_life(SCENE.with_values({LOAD: found.at}), Mission(HOURS), WEAR, points=2, **GIVEN)
     assert found.worst == pytest.approx(worn.amplitude.max(), rel=1e-9)
     assert worn.amplitude[0] == pytest.approx(worn.amplitude[-1], rel=1e-6)
 
 
+@pytest.mark.long
 def test_no_load_of_a_grid_is_better_whatever_the_coefficient_is() -> None:
     found = _best(factors=(0.6, 1.5))
 
     def worst(load: float) -> float:
         scene = SCENE.with_values({LOAD: load})
         return max(
-            wear_life(scene, HOURS, factor * COEFFICIENT, AREA, points=2, **GIVEN).amplitude[-1]
+            wear_life(
+                scene, Mission(HOURS), replace(WEAR, coefficient=factor * COEFFICIENT), points=2, **GIVEN
+            ).amplitude[-1]
             for factor in np.linspace(0.6, 1.5, 4)
         )
 
@@ -54,6 +62,7 @@ def test_a_range_that_ends_too_early_says_so() -> None:
     assert _best(200.0, 300.0).status is WornStatus.AT_BOUND
 
 
+@pytest.mark.long
 def test_lives_that_do_not_last_are_no_answer() -> None:
     found = _best(hours=1.0)
     assert found.status is WornStatus.NO_RESPONSE

@@ -29,6 +29,7 @@ def used(load: float, level: float, line: str = "goodman") -> float:
     return max(at(hertz) for hertz in best + np.linspace(-0.025, 0.025, 200))
 
 
+@pytest.mark.long
 def test_levels_and_the_allowed_one_are_those_of_dense_responses() -> None:
     raw = stressed().to_dict()
     raw["recovery"] = raw["recovery"][:1]  # type: ignore[index]

@@ -1,6 +1,7 @@
 """Wear over life against closed forms, small steps with the time march, and differences."""
 
 import math
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,9 @@ from scipy.optimize import brentq, minimize_scalar
 from solver import Scene, load_scene, march
 from solver.errors import SettingError
 from solver.studies.wear_life.life import wear_life
-from solver.studies.wear_life.result import WearLife, WearLifeStatus
+from solver.studies.wear_life.life_result import WearLife, WearLifeStatus
+from solver.studies.wear_life.mission import Mission
+from solver.studies.wear_life.wearing import WearLaw
 from tests.cases.moving_scenes import moving_scene
 from tests.cases.random_scenes import random_scene
 
@@ -62,8 +65,19 @@ def _peak(N: float) -> tuple[float, float]:
 
 
 def _run(scene: Scene, hours: float, **more: Any) -> WearLife:
-    given: dict[str, Any] = {"load_loss_per_depth": LOSS, "harmonics": 1, **more}
-    return wear_life(scene, hours, given.pop("coefficient", COEFFICIENT), AREA, **given)
+    return _life(
+        scene, **{"hours": hours, "coefficient": COEFFICIENT, "area": AREA, "load_loss_per_depth": LOSS,
+                  "harmonics": 1, **more}
+    )  # fmt: skip
+
+
+def _life(scene: Scene, **given: Any) -> WearLife:
+    """A life with the keys of a request."""
+    mission, wear = (
+        {field.name: given.pop(field.name) for field in fields(made) if field.name in given}
+        for made in (Mission, WearLaw)
+    )
+    return wear_life(scene, Mission(**mission), WearLaw(**wear), **given)
 
 
 @pytest.mark.parametrize("hertz", [0.9, 1.05, 1.3])
@@ -93,10 +107,7 @@ def test_loads_follow_the_closed_form_at_the_peak() -> None:
 
 def test_small_steps_with_the_time_march_come_to_the_same() -> None:
     hertz, N = 1.1, 20.0
-    found = wear_life(
-        _oscillator(N), 0.15 / FADE, COEFFICIENT, AREA, load_loss_per_depth=LOSS, frequency_hz=hertz,
-        harmonics=51, points=2,
-    )  # fmt: skip
+    found = _run(_oscillator(N), 0.15 / FADE, frequency_hz=hertz, harmonics=51, points=2)
 
     def power(load: float) -> float:
         period = march(_oscillator(load), frequency_hz=hertz, tolerance=1e-9)
@@ -155,7 +166,8 @@ def test_derivatives_are_those_of_the_whole_life(seed: int, at_peak: bool) -> No
     paths = (f"{names[0]}.N0", f"{names[-1]}.kt", "coefficient")
 
     def life(coefficient: float, changes: dict[str, float], hours: float, of: tuple[str, ...]) -> WearLife:
-        return wear_life(scene.with_values(changes), hours, coefficient, 1e-4, paths=of, **given)
+        of_contacts = {"coefficient": coefficient, "area": 1e-4, "paths": of}
+        return _life(scene.with_values(changes), hours=hours, **of_contacts, **given)
 
     first = life(1e-15, {}, 1e-3, ())
     wears = np.abs(first.power).max()
@@ -186,9 +198,10 @@ def test_what_a_normal_stiffness_takes_is_differentiated_by_it(kind: str, *, at_
     paths = ("c0.N0", "c0.kn")
 
     def life(changes: dict[str, float], of: tuple[str, ...] = ()) -> WearLife:
+        mission = Mission(1.0, frequency_hz=None if at_peak else hertz)
         return wear_life(
-            scene.with_values(changes), 1.0, {"c0": 2e-4}, {"c0": 1.0}, harmonics=3, points=2, tolerance=1e-9,
-            frequency_hz=None if at_peak else hertz, paths=of,
+            scene.with_values(changes), mission, WearLaw({"c0": 2e-4}, {"c0": 1.0}), harmonics=3, points=2,
+            tolerance=1e-9, paths=of,
         )  # fmt: skip
 
     found = life({}, paths)
@@ -252,7 +265,7 @@ def test_what_is_wrong_is_named(changes: dict[str, Any], field: str) -> None:
         "hours": 1.0, "coefficient": COEFFICIENT, "area": AREA, "load_loss_per_depth": LOSS, **changes
     }  # fmt: skip
     with pytest.raises(SettingError) as error:
-        wear_life(_oscillator(5.0), **given)
+        _life(_oscillator(5.0), **given)
     assert error.value.name == field
 
 
@@ -267,9 +280,12 @@ def test_rigid_contacts_and_structures_without_friction_are_refused() -> None:
 def test_faces_of_a_shape_wear_by_their_normal_stiffness(name: str) -> None:
     scene = load_scene(name)
     group = scene.contacts[0].group
-    given: dict[str, Any] = {"harmonics": 3, "frequency_hz": 0.5 * sum(scene.observe.band), "points": 3}
-    rate = wear_life(scene, 1e-9, {group: 1e-14}, {group: 1e-5}, **given).depths[:, -1].max() / 1e-9
-    found = wear_life(scene, 1e-7 / rate, {group: 1e-14}, {group: 1e-5}, **given)
+    given: dict[str, Any] = {
+        "harmonics": 3, "frequency_hz": 0.5 * sum(scene.observe.band), "points": 3,
+        "coefficient": {group: 1e-14}, "area": {group: 1e-5},
+    }  # fmt: skip
+    rate = _life(scene, hours=1e-9, **given).depths[:, -1].max() / 1e-9
+    found = _life(scene, hours=1e-7 / rate, **given)
     kn = np.array([contact.value_of("kn") for contact in scene.contacts])
     loads = np.array([contact.value_of("N0") for contact in scene.contacts])
     assert found.reached

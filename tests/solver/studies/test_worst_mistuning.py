@@ -10,20 +10,22 @@ from mistuned_cases import disk as friction_disk
 from scene_cases import bladed_disk, two_dof
 
 from solver import (
+    IntentionalMistuning,
     Scene,
     SceneError,
     SettingError,
     WorstMistuningStatus,
+    WorstSearch,
     blade_peaks,
     mistuned,
     worst_mistuning,
 )
 from solver.studies.patterns.bounds import martel, power_bound, whitehead
 from solver.studies.patterns.climbing import Bounds, worst_patterns
+from solver.studies.patterns.intentional import pattern_deviations
 from solver.studies.patterns.linear_disk import Contacts, linear_disk
 from solver.studies.patterns.solved_disk import SolvedDisk
 from solver.studies.patterns.tuned_modes import reduced, tuned_modes
-from solver.studies.patterns.worst_mistuning import pattern_deviations
 
 TWO_PI = 2.0 * math.pi
 
@@ -150,7 +152,7 @@ def test_the_peak_of_a_pattern_is_that_of_a_grid_and_its_slope_that_of_the_peak(
 
 def whitehead_case(sectors: int, order: int, starts: int) -> float:
     scene = ring(sectors, order, 0.001, 2e-6)
-    found = worst_mistuning(scene, of="root", within=0.01, starts=starts)
+    found = worst_mistuning(scene, of="root", within=0.01, search=WorstSearch(starts=starts))
     assert found.worst is not None
     assert max(abs(factor - 1.0) for factor in found.worst.factors) <= 0.01 + 1e-12
     direct = own_peak(scene, np.array(found.worst.factors)) / own_peak(scene, np.ones(sectors))
@@ -159,7 +161,7 @@ def whitehead_case(sectors: int, order: int, starts: int) -> float:
     return found.worst.magnification
 
 
-@pytest.mark.parametrize(("sectors", "order"), [(4, 0), (4, 2), (6, 3), (9, 0), (24, 12)])
+@pytest.mark.parametrize(("sectors", "order"), [(4, 0), (4, 2), (6, 3), (9, 0)])
 def test_the_worst_disk_reaches_whiteheads_bound_to_a_percent(sectors: int, order: int) -> None:
     """Whitehead (1998): little damping, coupling that is symmetrical about the excited diameter."""
     assert whitehead_case(sectors, order, 60) == pytest.approx(whitehead(sectors), rel=0.01)
@@ -172,6 +174,7 @@ def test_every_number_of_blades_reaches_whiteheads_bound_to_a_percent(sectors: i
         assert whitehead_case(sectors, order, 60) == pytest.approx(whitehead(sectors), rel=0.01)
 
 
+@pytest.mark.long
 def test_any_engine_order_reaches_it_where_the_coupling_is_symmetrical_about_it() -> None:
     """A travelling coupling κ e^{iφ} of neighbours, as gas may have: symmetrical about one nodal diameter."""
     sectors, order, k = 12, 5, 0.001
@@ -187,7 +190,7 @@ def test_any_engine_order_reaches_it_where_the_coupling_is_symmetrical_about_it(
         for way in (1, -1)
     ]
     scene = ring(sectors, order, 0.0, 2e-6, couplings=couplings)
-    found = worst_mistuning(scene, of="root", within=0.01, starts=60)
+    found = worst_mistuning(scene, of="root", within=0.01, search=WorstSearch(starts=60))
     assert found.worst is not None
     assert found.worst.magnification == pytest.approx(whitehead(sectors), rel=0.01)
 
@@ -197,7 +200,7 @@ def test_any_engine_order_reaches_it_where_the_coupling_is_symmetrical_about_it(
 )
 def test_no_pattern_of_brute_force_is_worse(sectors: int, order: int, levels: int) -> None:
     within, scene = 0.1, ring(sectors, order, 0.03, 0.01)
-    found = worst_mistuning(scene, of="root", within=within, starts=12)
+    found = worst_mistuning(scene, of="root", within=within, search=WorstSearch(starts=12))
     assert found.worst is not None
     steps = np.linspace(-within, within, levels)
     patterns = 1.0 + np.array(list(itertools.product(steps, repeat=sectors)))
@@ -223,7 +226,7 @@ def test_no_random_disk_is_worse_than_the_worst_nor_than_the_bound(seed: int) ->
 def test_random_disks_of_the_six_blades_stay_far_below() -> None:
     """60 random disks of six blades reach some 1.5, the search the worst there is, Whitehead's bound 1.72."""
     scene = ring(6, 0, 0.001, 2e-6)
-    worst = worst_mistuning(scene, of="root", within=0.01, starts=60).worst
+    worst = worst_mistuning(scene, of="root", within=0.01, search=WorstSearch(starts=60)).worst
     assert worst is not None
     rng = np.random.default_rng(3)
     drawn = max(own_peak(scene, 1.0 + 0.01 * rng.uniform(-1.0, 1.0, 6)) for _ in range(60))
@@ -247,7 +250,10 @@ def test_martels_bound_is_its_closed_form() -> None:
 
 def test_an_rms_bound_is_kept_and_costs_something() -> None:
     scene = ring(8, 2, 0.02, 0.002)
-    free, held = (worst_mistuning(scene, of="root", within=0.03, rms=rms, starts=20) for rms in (None, 0.01))
+    free, held = (
+        worst_mistuning(scene, of="root", within=0.03, rms=rms, search=WorstSearch(starts=20))
+        for rms in (None, 0.01)
+    )
     assert free.worst is not None
     assert held.worst is not None
     off = np.array(held.worst.factors) - 1.0
@@ -263,8 +269,8 @@ def test_an_rms_bound_is_kept_and_costs_something() -> None:
 def test_intentional_patterns_are_those_of_full_matrices_and_ranked() -> None:
     scene = ring(12, 3, 0.01, 0.002)
     found = worst_mistuning(
-        scene, of="root", within=0.01, patterns=["AB", "ABB", "AABB", "ABC", "A"], detuning=0.03, starts=9,
-        worst_of_patterns=True,
+        scene, of="root", within=0.01, search=WorstSearch(starts=9),
+        intentional=IntentionalMistuning(["AB", "ABB", "AABB", "ABC", "A"], 0.03, worst_of_patterns=True),
     )  # fmt: skip
     tuned = own_peak(scene, np.ones(12))
     types = {"AB": [1.03, 0.97], "ABB": [1.03, 0.97, 0.97], "AABB": [1.03, 1.03, 0.97, 0.97],
@@ -277,8 +283,9 @@ def test_intentional_patterns_are_those_of_full_matrices_and_ranked() -> None:
         assert one.worst.magnification >= one.disk.magnification
         assert np.abs(np.array(one.worst.factors) - factors).max() <= 0.01 + 1e-12
         inside = worst_mistuning(
-            scene, of="root", within=0.03, patterns=[one.pattern], detuning=0.03, starts=1
-        )
+            scene, of="root", within=0.03, intentional=IntentionalMistuning([one.pattern], 0.03),
+            search=WorstSearch(starts=1),
+        )  # fmt: skip
         assert inside.worst is not None
         assert inside.worst.magnification >= inside.patterns[0].disk.magnification
     counts = [one.counts for one in found.patterns]
@@ -311,7 +318,7 @@ def test_a_standing_wave_has_its_worst_blade_found() -> None:
     [force] = forces(raw)
     raw["excitation"] = {**force, "pattern": "standing"}
     standing = Scene.from_dict(raw)
-    found = worst_mistuning(standing, of="root", within=0.02, starts=20)
+    found = worst_mistuning(standing, of="root", within=0.02, search=WorstSearch(starts=20))
     assert found.worst is not None
     assert math.isnan(found.martel)
     rng = np.random.default_rng(0)
@@ -342,11 +349,13 @@ def test_slopes_with_friction_are_those_of_differences(of: tuple[str, ...]) -> N
         assert slope[j] == pytest.approx((math.log(ahead) - math.log(behind)) / (2.0 * h), rel=1e-5, abs=1e-6)
 
 
+@pytest.mark.long
 def test_with_friction_no_random_disk_is_worse() -> None:
     scene, of, within = small(), ["tip_middle"], 0.03
     found = worst_mistuning(
-        scene, of=of, within=within, starts=9, climbs=3, climb=15, harmonics=1, patterns=["AB"]
-    )
+        scene, of=of, within=within, harmonics=1, search=WorstSearch(starts=9, climbs=3, climb=15),
+        intentional=IntentionalMistuning(["AB"]),
+    )  # fmt: skip
     assert found.status is WorstMistuningStatus.COMPLETED
     assert found.worst is not None
     assert found.climbed > 5
@@ -381,13 +390,13 @@ def test_a_disk_in_some_of_its_modes_is_nearly_the_disk() -> None:
 
 def test_it_can_be_repeated_stopped_and_watched() -> None:
     scene = ring(6, 1, 0.02, 0.005)
-    one, two = (worst_mistuning(scene, of="root", starts=6, seed=3) for _ in range(2))
+    one, two = (worst_mistuning(scene, of="root", search=WorstSearch(starts=6, seed=3)) for _ in range(2))
     assert one.worst is not None
     assert two.worst is not None
     assert one.worst.factors == two.worst.factors
     shares: list[float] = []
     stopped = worst_mistuning(
-        scene, of="root", starts=50, on_progress=lambda share, _: shares.append(share),
+        scene, of="root", search=WorstSearch(starts=50), on_progress=lambda share, _: shares.append(share),
         should_stop=lambda: len(shares) >= 4,
     )  # fmt: skip
     assert stopped.status is WorstMistuningStatus.STOPPED
@@ -402,7 +411,7 @@ def test_a_disk_at_rest_is_nothing_to_compare_with() -> None:
     for scene in (ring(3, 1, 0.1, 0.01), small()):
         raw: Any = scene.to_dict()
         raw["excitation"] = [{**force, "amplitude": 0.0} for force in forces(raw)]
-        found = worst_mistuning(Scene.from_dict(raw), of=scene.observe.dof, starts=2)
+        found = worst_mistuning(Scene.from_dict(raw), of=scene.observe.dof, search=WorstSearch(starts=2))
         assert found.status is WorstMistuningStatus.NO_RESPONSE
         assert found.worst is None
 
@@ -412,17 +421,34 @@ def test_a_disk_at_rest_is_nothing_to_compare_with() -> None:
     [
         ({"within": 0.0}, "within"), ({"within": math.nan}, "within"), ({"within": 1.0}, "within"),
         ({"rms": 0.0}, "rms"), ({"rms": -1.0}, "rms"), ({"contacts": "loose"}, "contacts"),
-        ({"patterns": ["ab"]}, "patterns"), ({"patterns": [""]}, "patterns"),
-        ({"patterns": ["ABABAB"]}, "patterns"), ({"patterns": ["AB"], "detuning": 0.9}, "detuning"),
-        ({"patterns": ["AB"], "detuning": -0.1}, "detuning"), ({"starts": 0}, "starts"),
-        ({"starts": True}, "starts"), ({"climb": -1}, "climb"), ({"climbs": 1.5}, "climbs"),
-        ({"dof": "hub"}, "dof"),
-        ({"start": 0.0}, "start"), ({"stop": 0.01}, "stop"),
+        ({"dof": "hub"}, "dof"), ({"start": 0.0}, "start"), ({"stop": 0.01}, "stop"),
     ],
 )  # fmt: skip
 def test_bad_settings(change: dict[str, Any], name: str) -> None:
     with pytest.raises(SettingError, match=f"`{name}`"):
         worst_mistuning(ring(5, 1, 0.1, 0.01), **{"of": "root", **change})
+
+
+@pytest.mark.parametrize(
+    ("patterns", "detuning", "name"),
+    [
+        (["ab"], 0.02, "patterns"), ([""], 0.02, "patterns"), (["ABABAB"], 0.02, "patterns"),
+        (["AB"], 0.9, "detuning"), (["AB"], -0.1, "detuning"),
+    ],
+)  # fmt: skip
+def test_bad_patterns(patterns: list[str], detuning: float, name: str) -> None:
+    with pytest.raises(SettingError, match=f"`{name}`"):
+        worst_mistuning(
+            ring(5, 1, 0.1, 0.01), of="root", intentional=IntentionalMistuning(patterns, detuning)
+        )
+
+
+@pytest.mark.parametrize(
+    "counts", [{"starts": 0}, {"starts": True}, {"climb": -1}, {"climbs": 1.5}, {"starts": 10**6}]
+)
+def test_bad_counts(counts: dict[str, Any]) -> None:
+    with pytest.raises(SettingError, match=f"`{next(iter(counts))}`"):
+        WorstSearch(**counts)
 
 
 def test_bad_scenes() -> None:

@@ -19,7 +19,7 @@ from solver.contacts.laws.history.register import law_class
 K, GAP, CHI = range(3)
 
 
-class _Stop(HistoryContact):
+class _DampedStop(HistoryContact):
     """It opens and closes."""
 
     OPENS: ClassVar[bool] = True
@@ -53,4 +53,4 @@ HUNT_CROSSLEY = HistoryLaw(
     formula="`k δ (1 + χ δ̇)` where `δ = u - gap > 0`, never below 0",
     words="A stop with damping while it is closed, of Hunt and Crossley.",
 )  # fmt: skip
-LAW = law_class(HUNT_CROSSLEY, _Stop)
+LAW = law_class(HUNT_CROSSLEY, _DampedStop)

@@ -18,7 +18,7 @@ _EVERY = 0.1  # s between two questions to the caller
 _EXPONENTIAL = 30  # products of matrices, about, in that of one
 
 
-class HaltedError(Exception):
+class ProofHaltedError(Exception):
     """The work allowed is used up, or the caller wants it to end (`stopped`)."""
 
     def __init__(self, *, stopped: bool) -> None:
@@ -26,7 +26,7 @@ class HaltedError(Exception):
         super().__init__("stopped" if stopped else "the work allowed is used up")
 
 
-class Allowance:
+class ProofAllowance:
     """The work allowed, and what of it is done, in millions of products of balls of 128 bits."""
 
     def __init__(self, most: float, should_stop: Callable[[], bool] | None) -> None:
@@ -34,23 +34,23 @@ class Allowance:
         self._asked = time.perf_counter()
 
     def spend(self, products: float) -> None:
-        """Count products; raise `HaltedError` where they are too many, or the caller wants it."""
+        """Count products; raise `ProofHaltedError` where they are too many, or the caller wants it."""
         self.done += products * (ctx.prec / _BITS) / UNIT
         if self.done > self.most:
-            raise HaltedError(stopped=False)
+            raise ProofHaltedError(stopped=False)
         if self._should_stop is not None and time.perf_counter() - self._asked > _EVERY:
             self._asked = time.perf_counter()
             if self._should_stop():
-                raise HaltedError(stopped=True)
+                raise ProofHaltedError(stopped=True)
 
 
-_ALLOWED: ContextVar[Allowance] = ContextVar("work allowed to a proof")
+_ALLOWED: ContextVar[ProofAllowance] = ContextVar("work allowed to a proof")
 
 
 @contextmanager
-def allowed(most: float, should_stop: Callable[[], bool] | None) -> Iterator[Allowance]:
+def allowed(most: float, should_stop: Callable[[], bool] | None) -> Iterator[ProofAllowance]:
     """Count what systems of the class `Counted` do inside."""
-    allowance = Allowance(most, should_stop)
+    allowance = ProofAllowance(most, should_stop)
     token = _ALLOWED.set(allowance)
     try:
         yield allowance

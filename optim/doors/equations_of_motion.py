@@ -53,7 +53,7 @@ class ContactRows:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Equations:
+class EquationsOfMotion:
     """The equations of motion of a scene, n coordinates; a disk written out."""
 
     scene: Annotated[Scene, "What they are of."]
@@ -71,7 +71,7 @@ class Equations:
     contacts: ContactRows
 
 
-def equations_of(scene: Scene, frequency_hz: float) -> Equations:
+def equations_of(scene: Scene, frequency_hz: float) -> EquationsOfMotion:
     """Return the equations of a scene under its excitation at a frequency [Hz].
 
     Raises
@@ -93,7 +93,7 @@ def equations_of(scene: Scene, frequency_hz: float) -> Equations:
     zero = np.zeros(1, np.int64)
     K, C, M = (np.array(each[0].real) for each in model.at(zero, np.ones(1, np.bool_)))
     force, amplitude, phase, harmonic = _forces(model)
-    return Equations(
+    return EquationsOfMotion(
         scene=scene, frequency_hz=hertz, M=M, C=C, K=K, dofs=tuple(model.dofs), shapes=model.shapes,
         observe=model.observe, force=force, amplitude=amplitude, phase=phase, harmonic=harmonic,
         contacts=_contacts(scene, np.real(model.ports_at(zero)[0])),

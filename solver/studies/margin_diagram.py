@@ -44,7 +44,7 @@ class _Used(NamedTuple):
     stress: float
 
 
-class _Level:
+class _DamperResponses:
     """Responses of one damper at levels of the excitation."""
 
     def __init__(
@@ -130,7 +130,7 @@ def margin_diagram(
     parts: list[Branch] = []
     done = holes = stopped = 0
     for d, (name, changed) in enumerate(every.items()):
-        level = _Level(changed, limit, harmonics, should_stop)
+        level = _DamperResponses(changed, limit, harmonics, should_stop)
         seen: list[_Used | None] = []
         for i, amplitude in enumerate(levels):
             stopped = stopped or int(should_stop is not None and should_stop())
@@ -158,7 +158,7 @@ def margin_diagram(
 
 
 def _allowed(
-    name: str, level: _Level, levels: np.ndarray, seen: list[_Used | None]
+    name: str, level: _DamperResponses, levels: np.ndarray, seen: list[_Used | None]
 ) -> AllowedExcitation:  # fmt: skip
     """Return what a damper allows, by the first of its levels at which what is allowed is used up."""
     used = [math.nan if one is None else one.used for one in seen]

@@ -45,7 +45,7 @@ _NEAR = 0.05  # relative distance of a peak that is the one followed
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Motion:
+class PeriodicMotion:
     """A periodic response from which neighbours begin."""
 
     hertz: Annotated[float, "Its frequency [Hz]."]
@@ -54,10 +54,10 @@ class Motion:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Running:
+class WornResponse:
     """What contacts worn by some depths do, n of them, with derivatives by q numbers."""
 
-    motion: Annotated[Motion, "The response, of several the one with the largest amplitude."]
+    motion: Annotated[PeriodicMotion, "The response, of several the one with the largest amplitude."]
     amplitude: Annotated[float, "Its max|x| of the observed DOF [m]."]
     by_amplitude: Annotated[Real, "Derivatives of that, (q,)."]
     power: Annotated[Real, "What friction takes out, the mean of all blocks [W], (n,)."]
@@ -69,7 +69,7 @@ class LostError(Exception):
 
 
 @dataclass(slots=True)
-class Conditions:
+class OperatingConditions:
     """The frequencies that worn contacts run at.
 
     Parameters
@@ -86,7 +86,7 @@ class Conditions:
     effects: Effects
     should_stop: ShouldStop = None
     solved: Annotated[int, "Responses so far."] = 0
-    _known: dict[float, Motion] = field(default_factory=dict)
+    _known: dict[float, PeriodicMotion] = field(default_factory=dict)
 
     def balance(self, scene: Scene) -> Balance:
         """Return the balance of a worn scene."""
@@ -109,7 +109,9 @@ class Conditions:
             raise LostError(str(branch.status.value))
         return branch
 
-    def at(self, wearing: Wearing, depths: Real, near: Motion | None, *, rates: bool = True) -> Running:
+    def at(
+        self, wearing: Wearing, depths: Real, near: PeriodicMotion | None, *, rates: bool = True
+    ) -> WornResponse:
         """Return what contacts do at depths (n,) [m].
 
         Parameters
@@ -131,11 +133,11 @@ class Conditions:
             found = self._searched(scene, near)
         return self._running(wearing, balance, found, rates=rates)
 
-    def peak_near(self, wearing: Wearing, depths: Real, near: Motion) -> Motion | None:
+    def peak_near(self, wearing: Wearing, depths: Real, near: PeriodicMotion) -> PeriodicMotion | None:
         """Return the peak at depths (n,) [m] that continues one of a neighbour; None if none is found."""
         return self._peak(self.balance(wearing.at(depths)), wearing, near)
 
-    def _at_blocks(self, wearing: Wearing, scene: Scene, *, rates: bool) -> Running:
+    def _at_blocks(self, wearing: Wearing, scene: Scene, *, rates: bool) -> WornResponse:
         """Return what contacts do at fixed frequencies: powers by the shares of time."""
         every = []
         for hertz, share in self.blocks or ():
@@ -148,7 +150,7 @@ class Conditions:
             self.solved += 1
             if not found.converged:
                 raise LostError(f"At {hertz:g} Hz no response was found.")
-            motion = Motion(hertz=hertz, u=found.u, moves=False)
+            motion = PeriodicMotion(hertz=hertz, u=found.u, moves=False)
             self._known[hertz] = motion
             every.append((share, self._running(wearing, balance, motion, rates=rates)))
         highest = max((one for _, one in every), key=lambda one: one.amplitude)
@@ -157,7 +159,7 @@ class Conditions:
             by_power=sum((share * one.by_power for share, one in every), np.zeros((1, 1))),
         )  # fmt: skip
 
-    def _peak(self, balance: Balance, wearing: Wearing, near: Motion) -> Motion | None:
+    def _peak(self, balance: Balance, wearing: Wearing, near: PeriodicMotion) -> PeriodicMotion | None:
         """Return the peak near another by Newton's method, or uphill; None where neither finds it."""
         path, omega, u = wearing.losses[0].path, TWO_PI * near.hertz, near.u.copy()
         low, high = (TWO_PI * end for end in balance.scene.observe.band)
@@ -169,17 +171,19 @@ class Conditions:
             u, summit_numbers(summit)[SIGN] = near.u.copy(), 0.0
             good, there = climb(system, u, omega, p, 0.0, _FIRST_CLIMB * omega, low, high, summit)
         self.solved += int(summit_numbers(summit)[SPENT])
-        return Motion(hertz=there / TWO_PI, u=u, moves=near.moves) if good else None
+        return PeriodicMotion(hertz=there / TWO_PI, u=u, moves=near.moves) if good else None
 
-    def _searched(self, scene: Scene, near: Motion | None) -> Motion:
+    def _searched(self, scene: Scene, near: PeriodicMotion | None) -> PeriodicMotion:
         """Return the highest peak of a response, of those near another if there is one."""
         peaks = self.swept(scene).peaks
         if near is not None:
             beside = [peak for peak in peaks if abs(peak.at - near.hertz) <= _NEAR * near.hertz]
             peaks = tuple(beside) or peaks
-        return Motion(hertz=peaks[0].at, u=peaks[0].solution, moves=peaks[0].interior)
+        return PeriodicMotion(hertz=peaks[0].at, u=peaks[0].solution, moves=peaks[0].interior)
 
-    def _running(self, wearing: Wearing, balance: Balance, motion: Motion, *, rates: bool) -> Running:
+    def _running(
+        self, wearing: Wearing, balance: Balance, motion: PeriodicMotion, *, rates: bool
+    ) -> WornResponse:
         """Return powers and amplitude at a response, with derivatives."""
         hertz, u = motion.hertz, motion.u
         paths = (*self.paths, *(loss.path for loss in wearing.losses))
@@ -197,7 +201,7 @@ class Conditions:
             if rates:
                 by_power[i] = hertz * work.gradient
                 by_power[i] += (work.value + hertz * work.by_frequency) * drift
-        return Running(
+        return WornResponse(
             motion=motion, amplitude=height.value, by_amplitude=height.gradient, power=power,
             by_power=by_power,
         )  # fmt: skip
