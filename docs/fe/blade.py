@@ -52,6 +52,7 @@ def main() -> None:
 
     print(f"{free.size} rows, {len(places)} nodes, {csr_array(M).sum() / 3.0:.4f} kg")
     print(f"tip       node {nearest(TIP, 0.0, CHORD / 2)}")
+    print(f"foot      node {nearest(SHANK / 3, HALF_SHANK, CHORD / 2)}")
     print(f"platform  node {nearest(PLATFORM, HALF_PLATFORM, CHORD / 2)}")
 
 

@@ -27,9 +27,9 @@ COMMANDS = [
 ]
 
 
-def with_the_contact(text: str) -> str:
-    """The scene with what the third step puts into it."""
-    (contact,) = re.findall(r"^```toml\n(.*?)^```$", PAGE, flags=re.MULTILINE | re.DOTALL)
+def with_the_contact(text: str, page: str = PAGE) -> str:
+    """The scene with what the page puts into it."""
+    (contact,) = re.findall(r"^```toml\n(.*?)^```$", page, flags=re.MULTILINE | re.DOTALL)
     text, templates = re.subn(r"# A contact joins.*\n(#.*\n)+", contact, text)
     assert templates == 1
     assert text.count("\ndamping_ratio = 0.001\n") == 1

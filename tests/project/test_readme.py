@@ -41,6 +41,7 @@ ELSEWHERE = {
     "identification.md": "project/test_identification.py",
     "fe-disk.md": "project/test_fe_disk.py",
     "fe-example.md": "project/test_fe_example.py",
+    "life.md": "project/test_life_example.py",
     "paper.md": "solver/published/test_paper_figures.py",
 }
 BLOCKS = [

@@ -191,7 +191,14 @@ def test_derivatives_are_those_of_the_whole_life(seed: int, at_peak: bool) -> No
         np.testing.assert_allclose(slopes[:, i], expected, atol=2e-5 * size.max() + 1e-300, rtol=2e-4)
 
 
-@pytest.mark.parametrize(("kind", "at_peak"), [("elastic-normal", True), ("circle", False), ("box", False)])
+@pytest.mark.parametrize(
+    ("kind", "at_peak"),
+    [
+        pytest.param("elastic-normal", True, marks=pytest.mark.long),
+        pytest.param("circle", False, marks=pytest.mark.long),
+        ("box", False),
+    ],
+)
 def test_what_a_normal_stiffness_takes_is_differentiated_by_it(kind: str, *, at_peak: bool) -> None:
     scene, hertz = moving_scene(4, kind)
     scene = scene.with_values({"c0.N0": 1.0})

@@ -161,7 +161,7 @@ def whitehead_case(sectors: int, order: int, starts: int) -> float:
     return found.worst.magnification
 
 
-@pytest.mark.parametrize(("sectors", "order"), [(4, 0), (4, 2), (6, 3), (9, 0)])
+@pytest.mark.parametrize(("sectors", "order"), [(4, 0), (6, 3)])
 def test_the_worst_disk_reaches_whiteheads_bound_to_a_percent(sectors: int, order: int) -> None:
     """Whitehead (1998): little damping, coupling that is symmetrical about the excited diameter."""
     assert whitehead_case(sectors, order, 60) == pytest.approx(whitehead(sectors), rel=0.01)
@@ -223,6 +223,7 @@ def test_no_random_disk_is_worse_than_the_worst_nor_than_the_bound(seed: int) ->
         assert one.value / tuned.value <= power_bound(disk, one.omega, tuned.value) * (1.0 + 1e-9)
 
 
+@pytest.mark.long
 def test_random_disks_of_the_six_blades_stay_far_below() -> None:
     """60 random disks of six blades reach some 1.5, the search the worst there is, Whitehead's bound 1.72."""
     scene = ring(6, 0, 0.001, 2e-6)
