@@ -27,9 +27,9 @@ STUDIES: dict[str, tuple[str, dict[str, Any]]] = {
         "mistuning",
         {**DISK, "of": ["tip_middle", "tip"], "samples": 60, "from": 700, "to": 850, "harmonics": 1},
     ),
-    "map 2000 × 2000": (
+    "map 700 × 700": (
         "map",
-        {**DISK, "parameter": "shroud.N0", "from": 20, "to": 3000, "steps": 2000, "frequencies": 2000,
+        {**DISK, "parameter": "shroud.N0", "from": 20, "to": 3000, "steps": 700, "frequencies": 700,
          "ridge": False},
     ),
     "map 60 × 40 with ridge": (

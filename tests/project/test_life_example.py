@@ -31,7 +31,6 @@ def test_the_page_runs_line_by_line(capsys: pytest.CaptureFixture[str]) -> None:
         ("design", r"damper\.N0 (\d+)\.\d+ N objective (0\.\d\d)"),
         ("wear", r"damper [\d.]+ mm \d+ N (\d+) N"),
         ("best", r"best damper\.N0 = (\d+)"),
-        ("transient", r"([\d.]+) mm at"),
     ):
         found = re.search(quoted, said[key])
         assert found is not None, said[key]
