@@ -46,17 +46,10 @@ def by_contact(key: str, limits: object, scene: Scene) -> Mapping[str, float]:
     DesignError
         What is wrong with the value `limits` of the key.
     """
-    from optim.errors import DesignError
-    from optim.problem.numbers import positive
+    from optim.problem.numbers import positive_of_each
 
-    names = [contact.name for contact in scene.contacts]
-    if not isinstance(limits, Mapping):
-        rubbing = [contact.name for contact in scene.contacts if contact.RUBBING]
-        return dict.fromkeys(rubbing, positive(key, limits))
-    for name in limits:
-        if name not in names:
-            raise DesignError(key, name, f"must name contacts: {', '.join(names)}", place=(key, name))
-    return {name: positive((key, name), value) for name, value in limits.items()}
+    rubbing = [contact.name for contact in scene.contacts if contact.RUBBING]
+    return positive_of_each(key, limits, [contact.name for contact in scene.contacts], rubbing, "contacts")
 
 
 FRICTION_WORK = CRITERION = Criterion(

@@ -54,18 +54,11 @@ def by_row(key: str, given: object, names: list[str], lacking: str) -> Mapping[s
         What is wrong.
     """
     from optim.errors import DesignError
-    from optim.problem.numbers import positive
+    from optim.problem.numbers import positive_of_each
 
     if not names:
         raise DesignError(key, given, lacking)
-    if not isinstance(given, Mapping):
-        return dict.fromkeys(names, positive(key, given))
-    for name in given:
-        if name not in names:
-            raise DesignError(
-                key, name, f"must name rows of `recovery`: {', '.join(names)}", place=(key, name)
-            )
-    return {name: positive((key, name), value) for name, value in given.items()}
+    return positive_of_each(key, given, names, names, "rows of `recovery`")
 
 
 def seen_by(

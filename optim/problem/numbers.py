@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from enum import Enum
 from typing import TypeGuard, TypeVar
 
@@ -72,3 +72,21 @@ def positive(name: str | Place, value: object) -> float:
     if not is_number(value) or value <= 0.0:
         raise DesignError(name, value, "must be a number > 0")
     return float(value)
+
+
+def positive_of_each(
+    key: str, given: object, known: Sequence[str], all_of_them: Sequence[str], what: str
+) -> Mapping[str, float]:
+    """Return a positive number for every name in a table; a single number is that of `all_of_them`.
+
+    Raises
+    ------
+    DesignError
+        A name that is not known, of what `what` says, or no positive number.
+    """
+    if not isinstance(given, Mapping):
+        return dict.fromkeys(all_of_them, positive(key, given))
+    for name in given:
+        if name not in known:
+            raise DesignError(key, name, f"must name {what}: {', '.join(known)}", place=(key, name))
+    return {name: positive((key, name), value) for name, value in given.items()}

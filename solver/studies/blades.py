@@ -153,12 +153,7 @@ def blade_peaks(
         No sector has such a DOF, or a bad range or number of harmonics.
     """
     name = scene.observe.dof.partition("@")[0] if dof is None else dof
-    structure = scene.structure
-    names, repeats = [scene.dofs[i] for i in blade_rows(scene, name)], 1
-    if structure.has_sectors:
-        names, repeats = [name], structure.sector_count
-        if sectors_needed(_observing(scene, name)).sectors > 1:
-            names, repeats = [f"{name}@{j}" for j in range(structure.sector_count)], 1
+    names, repeats = _of_blades(scene, name)
 
     def progress(share: float, _points: int) -> None:
         if on_progress is not None:
@@ -183,6 +178,16 @@ def blade_peaks(
             branches=(highest,), highest=highest.known,
         )  # fmt: skip
     return _of_every_blade(name, names, branch, repeats, on_progress, should_stop)
+
+
+def _of_blades(scene: Scene, dof: str) -> tuple[list[str], int]:
+    """Return the DOFs of blades whose responses differ, and how many blades each of them stands for."""
+    names, count = [scene.dofs[i] for i in blade_rows(scene, dof)], scene.structure.sector_count
+    if not scene.structure.has_sectors:
+        return names, 1
+    if sectors_needed(_observing(scene, dof)).sectors > 1:
+        return [f"{dof}@{j}" for j in range(count)], 1
+    return [dof], count
 
 
 def _of_every_blade(
