@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from decimal import ROUND_CEILING, ROUND_FLOOR, Decimal, localcontext
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from solver.certificate.checker import Orbit
+    from solver.certificate.checker import Orbit, System
     from solver.response.exact.orbit import Orbit as ExactOrbit
     from solver.response.exact.piecewise import Piecewise
 
@@ -15,6 +16,8 @@ _NEWTON, _WIDER = 12, 4  # steps; boxes tried
 _GROWN = 1e11  # by which balls grow before a state is unknown anew
 _SLOW = 1e-4  # by which a step falls with a derivative that still serves
 _DIGITS = 25
+_KNOWN = 1e-31  # rad: a last step of Newton's method after which the order of events is known
+_AT_ONCE = 1e-7  # rad: floats may have events this near each other in the wrong order
 
 
 def set_out(raw: dict[str, Any], piecewise: Piecewise, found: ExactOrbit) -> list[Any]:
@@ -25,7 +28,38 @@ def set_out(raw: dict[str, Any], piecewise: Piecewise, found: ExactOrbit) -> lis
 
     system = stated(raw, {}, Counted)
     raw["orbit"], start = orbit_of(piecewise, found, system)
+    _set_in_order(raw["orbit"], system, start)
     return _anew(raw["orbit"], Orbit(system, raw["orbit"]), start)
+
+
+def _set_in_order(raw: dict[str, Any], system: System, start: list[float]) -> None:
+    """Set events in their order where floats do not tell it: opposite blades of a disk slip at one instant.
+
+    They are that only up to the rounding of the phases of their forces, so that Newton's method tells it.
+    """
+    from flint import arb
+
+    from solver.certificate.checker import Orbit
+
+    orbit = Orbit(system, raw)
+    first = len(start) - len(orbit.groups)
+    where = [0] * len(orbit.groups)  # groups of events in clusters
+    for k in range(1, len(where)):
+        where[k] = where[k - 1] + (start[first + k] - start[first + k - 1] >= _AT_ONCE)
+    contacts = Counter((where[k], orbit.events[i][0]) for k, group in enumerate(orbit.groups) for i in group)
+    if len(set(where)) == len(where) or max(contacts.values()) > 1:
+        return
+    y = [arb(each) for each in start]
+    for _ in range(_NEWTON):
+        value, slope, _ = orbit.shoot(y, [arb(0)] * len(y))
+        steps = slope.mid().solve(value.mid()).entries()
+        y = [(each - step).mid() for each, step in zip(y, steps, strict=True)]
+        order = sorted(range(len(where)), key=lambda k: (where[k], y[first + k]))
+        if order != list(range(len(where))):
+            raw["events"] = [raw["events"][i] for k in order for i in orbit.groups[k]]
+            y[first:], orbit = [y[first + k] for k in order], Orbit(system, raw)
+        elif max(float(abs(step)) for step in steps[first:]) < _KNOWN:
+            return
 
 
 def orbit_at(raw: dict[str, Any], **at: str) -> Orbit:

@@ -225,8 +225,8 @@ def _proved(raw: dict[str, Any], piecewise: Piecewise, found: ExactOrbit) -> _Bo
             ctx.prec = raw["bits"] = bits
             try:
                 low, high = _kept_inward(raw, set_out(raw, piecewise, found))
-            except RejectedError as error:
-                if bits == _BITS[-1] or error.contact >= 0:
+            except RejectedError:
+                if bits == _BITS[-1]:
                     raise
                 continue
             if bits == _BITS[-1] or (low.rad() + high.rad()) <= _NARROW * (high - low):

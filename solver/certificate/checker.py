@@ -222,20 +222,24 @@ class Orbit:
         if new_a == new_b == OPEN or old_a == old_b == OPEN:  # one load opens or closes both
             return all(one[key] == other[key] for key in ("load", "normal", "kn"))
         turned = [[at, -factor] for at, factor in one["row"]]
-        if other["row"] not in (one["row"], turned) or not (system.constant[a] and system.constant[b]):
+        same = 1 if other["row"] == one["row"] else -1 if other["row"] == turned else 0
+        if not same or not (system.constant[a] and system.constant[b]):
             return False
-        return new_a == new_b == STICK or self.resumed(i)  # they come to rest with one motion, or
+        alike = new_b == same * new_a and all(one[key] == other[key] for key in ("kt", "mu", "load"))
+        return new_a == new_b == STICK or self.resumed(i, alike)  # they come to rest with one motion, or
 
-    def resumed(self, i: int) -> bool:
-        """Whether the contacts of event i and the one before came to rest together, and go on as before."""
-        last = []
+    def resumed(self, i: int, alike: bool) -> bool:
+        """Whether the contacts of event i and the one before came to rest together, and go on as before,
+        or turn: those that are alike do so together."""
+        last, ways = [], set()
         for at in (i - 1, i):
             j, _, new = self.events[at]
             order = [*range(at - 1, -1, -1), *range(len(self.events) - 1, at - 1, -1)]
             last.append(next(k for k in order if self.events[k][0] == j))
-            if self.events[last[-1]] != (j, new, STICK):
-                return False
-        return any(set(last) <= set(group) for group in self.groups)
+            ways.add(self.events[last[-1]][1] * new if self.events[last[-1]][2] == STICK else 0)
+        return ways <= ({1} if not alike or len(ways) > 1 else {1, -1}) and any(
+            set(last) <= set(group) for group in self.groups
+        )
 
     def ended(self, i: int) -> tuple[int, int]:
         """Return the contact of event i, and what follows the condition that is 0 there."""

@@ -93,6 +93,13 @@ class ContactResponse(Piece):
         every = (self.force, self.second_force, self.third_force)
         return tuple(force for force in every if force is not None)
 
+    @property
+    def work(self) -> float:
+        """Work that its forces take out in a period [J], by their harmonics and those of its motions."""
+        every = zip(self.motions, self.forces, strict=True)
+        orders = np.arange(1, (self.slip.size - 1) // 2 + 1)
+        return float(sum(np.pi * orders @ (f[1::2] * u[2::2] - f[2::2] * u[1::2]) for u, f in every))
+
     def force_over(self, given: AnyContact, tau: Real) -> Real:
         """Return the force of the contact `given` along its first motion [N] at angles, evenly spaced from 0.
 

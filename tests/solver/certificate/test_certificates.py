@@ -232,6 +232,57 @@ def _spoilt_peak(raw: dict[str, Any], i: int, rng: np.random.Generator) -> dict[
     return raw
 
 
+def _ring(contacts: list[dict[str, Any]], phases: tuple[float, ...]) -> stickslip.Scene:
+    """Masses in a ring, each on a spring of its own, with forces of these phases."""
+    names = [f"x{i}" for i in range(len(phases))]
+    springs = [{"between": [one, "ground"], "k": 1.0, "c": 0.05} for one in names]
+    springs += [
+        {"between": [one, other], "k": 0.3, "c": 0.01}
+        for one, other in zip(names, [*names[1:], names[0]], strict=True)
+    ]
+    return stickslip.Scene.from_dict({
+        "name": "ring", "structure": {"kind": "lumped", "masses": dict.fromkeys(names, 1.0), "springs": springs},
+        "contacts": contacts, "observe": {"dof": "x0", "band": [0.1, 0.3]},
+        "excitation": [
+            {"dof": one, "amplitude": 1.0, "phase": phase} for one, phase in zip(names, phases, strict=True)
+        ],
+    })  # fmt: skip
+
+
+def test_opposite_blades_that_slip_at_one_instant_are_proved() -> None:
+    """By symmetry they are apart by the rounding of their phases alone: floats have the order by chance."""
+    dampers = [
+        {"name": f"f{i}", "law": "coulomb", "between": [f"x{i}", "ground"], "kt": 0.8, "mu": 0.5, "N0": 0.5}
+        for i in range(4)
+    ]
+    scene = _ring(dampers, tuple(0.5 * np.pi * i for i in range(4)))
+    near = stickslip.solve(scene, frequency_hz=0.19, harmonics=61)
+    found = stickslip.certify(near)
+    assert found.reached, found.reason
+    assert found.events == 16
+    assert abs(near.max_abs - found.max_abs[0]) <= near.error_estimate
+
+
+@pytest.mark.parametrize("between", [["x0", "x1"], ["x1", "x0"]])
+def test_contacts_that_are_alike_turn_together(between: list[str]) -> None:
+    """Two in parallel, one told the other way round, are as one of twice the stiffness and the load."""
+    one = {"name": "f", "law": "coulomb", "between": ["x0", "x1"], "kt": 0.8, "mu": 0.5, "N0": 0.5}
+    phases = (0.0, 2.0)
+    pair = _ring([one, one | {"name": "g", "between": between}], phases)
+    single = _ring([one | {"kt": 1.6, "N0": 1.0}], phases)
+    found, other = (stickslip.certify(stickslip.solve(each, frequency_hz=0.25)) for each in (pair, single))
+    assert found.reached, found.reason
+    assert found.events == 2 * other.events
+    low, high = other.max_abs
+    assert low <= found.max_abs[1]
+    assert found.max_abs[0] <= high
+    raw = json.loads(json.dumps(found.certificate))
+    checker.check(raw)
+    raw["system"]["contacts"][1]["mu"] *= 1.0 + 1e-14
+    with pytest.raises(checker.RejectedError, match="need not be at one instant"):
+        checker.check(raw)
+
+
 def test_what_is_no_peak_says_so() -> None:
     scene = stickslip.load_scene("two-dof")
     found = stickslip.certify(stickslip.solve(scene, frequency_hz=1.6), peak=True)

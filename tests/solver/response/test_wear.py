@@ -342,3 +342,20 @@ def test_the_other_measures_over_a_response() -> None:
     travels = np.array([w.travel.value for w in wears if w.travel is not None])
     assert travel.value >= travels.max() * (1.0 - 1e-12)
     assert travel.value == pytest.approx(travels.max(), rel=1e-2)
+
+
+def test_the_work_of_a_contact_is_that_of_its_loop() -> None:
+    """A slider to the ground takes out 4 μN (A − μN/kt) a period; exact motions know it to many digits."""
+    scene = Scene.from_dict({
+        "name": "one", "structure": {"kind": "lumped",
+            "masses": {"x": 1.0}, "springs": [{"between": ["x", "ground"], "k": 1.0, "c": 0.1}],
+        },
+        "contacts": [{"name": "f", "law": "coulomb", "between": ["x", "ground"], "kt": 2.0, "mu": 0.5, "N0": 1.0}],
+        "excitation": [{"dof": "x", "amplitude": 1.0}], "observe": {"dof": "x", "band": [0.1, 0.3]},
+    })  # fmt: skip
+    for harmonics, exact, error in ((41, False, 1e-5), (161, True, 1e-11)):
+        found = solve(scene, frequency_hz=0.175, harmonics=harmonics, exact=exact)
+        (contact,) = found.contacts
+        assert contact.work == pytest.approx(4.0 * 0.5 * (found.max_abs - 0.25), rel=error)
+        if not exact:
+            assert contact.work == pytest.approx(contact_wear(found)["f"].work.value, rel=1e-12)
