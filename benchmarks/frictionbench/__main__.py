@@ -13,7 +13,6 @@ def main(arguments: list[str] | None = None) -> int:
     """Run one of the commands; 1 if answers do not hold."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.frictionbench", description=__doc__)
     commands = parser.add_subparsers(dest="command", required=True)
-    commands.add_parser("build", help="write the cases anew")
     recompute = commands.add_parser("answers", help="compute answers anew by every way")
     run = commands.add_parser("run", help="score a code")
     run.add_argument("--code", required=True, help="a file of adapters/, without its ending")
@@ -25,11 +24,6 @@ def main(arguments: list[str] | None = None) -> int:
     for one in (recompute, run):
         one.add_argument("--case", action="append", help="names; all if left out")
     asked = parser.parse_args(arguments)
-    if asked.command == "build":
-        from benchmarks.frictionbench import builders
-
-        print(builders.write(), "cases")
-        return 0
     if asked.command == "answers":
         return _answers(asked.case or names())
     from benchmarks.frictionbench import scorer

@@ -1,4 +1,4 @@
-"""A case as matrices and rows of contacts: what a way to its answer needs. Nothing of stickslip is used."""
+"""A case written out and as matrices with rows of contacts. Nothing of stickslip is used."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ import numpy as np
 
 HERE = Path(__file__).parent
 Case = dict[str, Any]
+ENDS = ("between", "between_second", "normal_between")
 
 
 @cache
@@ -26,8 +27,8 @@ def load(name: str) -> Case:
     """Return a case; a matrix that stands beside it as MatrixMarket is read."""
     case: Case = json.loads((HERE / "cases" / f"{name}.json").read_text())
     structure = case["structure"]
-    for key in ("M", "C", "K", "K_next", "C_next"):
-        if isinstance(structure.get(key), str):
+    for key in ("M", "C", "K"):
+        if isinstance(structure[key], str):
             from scipy.io import mmread
 
             read = mmread(HERE / "cases" / structure[key])
@@ -35,31 +36,88 @@ def load(name: str) -> Case:
     return case
 
 
+def written_out(case: Case) -> Case:
+    """Return a case without sectors: as much of the annulus as a wave of its order repeats after."""
+    structure, order = case["structure"], case.get("engine_order", 0)
+    if "sectors" not in structure:
+        return case
+    part = gcd(structure["sectors"], order)
+    count, order = structure["sectors"] // part, order // part
+    beside = np.roll(np.eye(count), 1, axis=1)
+    matrices = {key: np.kron(np.eye(count), structure[key]) for key in "MCK"}
+    for key in "CK":
+        to_next = np.kron(beside, structure[f"{key}_next"])
+        matrices[key] += to_next + to_next.T
+    contacts, loads = [], []
+
+    def at(dof: str, sector: int) -> str:
+        if dof == "ground":
+            return dof
+        return f"{dof.removesuffix('@next')}_{(sector + dof.endswith('@next')) % count}"
+
+    for j in range(count):
+        angle = 2.0 * pi * j / count * order
+        for one in case["contacts"]:
+            ends = {key: [at(dof, j) for dof in one[key]] for key in ENDS if key in one}
+            moves = {"N1_phase": one.get("N1_phase", 0.0) + angle} if "N1" in one else {}
+            contacts.append({**one, **ends, **moves, "name": f"{one['name']}_{j}"})
+        for one in case["loads"]:
+            phase = one.get("phase", 0.0) + one.get("harmonic", 1) * angle
+            loads.append({**one, "dof": at(one["dof"], j), "phase": phase})
+    dofs = [f"{dof}_{j}" for j in range(count) for dof in structure["dofs"]]
+    return {
+        **{key: value for key, value in case.items() if key != "engine_order"},
+        "structure": {"dofs": dofs, **{key: matrix.tolist() for key, matrix in matrices.items()}},
+        "contacts": contacts, "loads": loads, "asked": {**case["asked"], "dof": f"{case['asked']['dof']}_0"},
+    }  # fmt: skip
+
+
+def piecewise_linear(case: Case) -> Case:
+    """Return a case written out, a box as two faces of half the load and stiffness and twice the μ.
+
+    Raises
+    ------
+    NotImplementedError
+        A limit is a circle.
+    """
+    case, contacts = written_out(case), []
+    for one in case["contacts"]:
+        if one.get("limit") == "circle":
+            raise NotImplementedError("a circular limit is not piecewise linear")
+        if one.get("limit") != "box":
+            contacts.append(one)
+            continue
+        half = {
+            "law": "elastic-normal",
+            "normal_between": one["normal_between"],
+            "kt": one["kt"],
+            "mu": 2 * one["mu"],
+        }
+        half |= {"kn": one["kn"] / 2, "N0": one["N0"] / 2}
+        contacts += [
+            {**half, "name": f"{one['name']}-{key}", "between": one[key]}
+            for key in ("between", "between_second")
+        ]
+    return {**case, "contacts": contacts}
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Row:
-    """One direction of a contact: motion u = b x, load N = N0 + N1 cos(τ + phase) + kn v, v = n x."""
+    """One direction of a contact: its motion is u = b x; what its load varies with is in the case."""
 
-    name: str
     law: str
     b: np.ndarray
     kt: float
     mu: float = 0.0
     N0: float = 0.0
     N1: float = 0.0
-    phase: float = 0.0
     kn: float = 0.0
-    n: np.ndarray | None = None
-    reacts: bool = True
     gap: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Model:
-    """Matrices, rows and loads (dof, amplitude, phase, harmonic); of a disk the whole annulus.
-
-    `turn` is the permutation of the coordinates and `row_turn` of the rows under which a travelling wave
-    repeats after `share` of the period; identity and 1 without sectors.
-    """
+    """Matrices, rows, loads (dof, amplitude, phase, harmonic), and the coordinate that is seen."""
 
     M: np.ndarray
     C: np.ndarray
@@ -67,71 +125,36 @@ class Model:
     rows: tuple[Row, ...]
     loads: tuple[tuple[int, float, float, int], ...]
     seen: int
-    turn: np.ndarray
-    row_turn: np.ndarray
-    share: float
-    copies: tuple[int, ...]
 
 
 def model(case: Case) -> Model:
-    """Write a case out; of sectors in a travelling wave the whole annulus."""
-    structure = case["structure"]
-    dofs, sectors = structure["dofs"], structure.get("sectors", 1)
-    n, order = len(dofs), case.get("engine_order", 0)
-    one = {key: np.array(structure[key], float) for key in "MCK"}
-    whole = {key: np.kron(np.eye(sectors), one[key]) for key in "MCK"}
-    for key in ("K_next", "C_next"):
-        if key in structure:
-            beside = np.kron(np.roll(np.eye(sectors), 1, axis=1), np.array(structure[key], float))
-            whole[key[0]] += beside + beside.T
+    """Return the matrices of a case written out.
 
-    def motion(pair: list[str], sector: int) -> np.ndarray:
-        b = np.zeros(n * sectors)
-        for name, sign in zip(pair, (1.0, -1.0), strict=True):
-            if name != "ground":
-                at = (sector + 1) % sectors if name.endswith("@next") else sector
-                b[at * n + dofs.index(name.removesuffix("@next"))] += sign
-        return b
-
-    rows, loads = [], []
-    for j in range(sectors):
-        angle = 2.0 * pi * j / sectors * order
-        for contact in case["contacts"]:
-            rows += _rows(contact, angle, lambda pair, at=j: motion(pair, at))
-        for load_ in case["loads"]:
-            k = load_.get("harmonic", 1)
-            phase = load_.get("phase", 0.0) + k * angle
-            loads.append((j * n + dofs.index(load_["dof"]), load_["amplitude"], phase, k))
-    common = gcd(sectors, order) if order else sectors
-    # x of sector j + r at τ is that of sector j at τ + 2π common / sectors.
-    r = next((r for r in range(sectors) if (r * order - common) % sectors == 0), 0) if sectors > 1 else 0
-    each = len(rows) // sectors
-    shift = (np.arange(sectors) + r) % sectors
-    seen = dofs.index(case["asked"]["dof"])
-    return Model(
-        M=whole["M"], C=whole["C"], K=whole["K"], rows=tuple(rows), loads=tuple(loads), seen=seen,
-        turn=(shift[:, None] * n + np.arange(n)).ravel(),
-        row_turn=(shift[:, None] * each + np.arange(each)).ravel(),
-        share=common / sectors if order else 1.0,
-        copies=tuple(sorted({(seen + n * r * i) % (n * sectors) for i in range(sectors)})),
-    )  # fmt: skip
-
-
-def _rows(contact: dict[str, Any], angle: float, motion: Any) -> list[Row]:
-    """Return the rows of a contact in one sector; the second direction of a box shares its load."""
-    law = contact.get("law", "coulomb")
-    if law == "gap":
-        b = motion(contact["between"])
-        return [Row(name=contact["name"], law=law, b=b, kt=contact["k"], gap=contact["gap"])]
-    if contact.get("limit") == "circle":
-        raise NotImplementedError(f"{contact['name']}: a circular limit is not piecewise linear")
-    pairs = [contact[key] for key in ("between", "between_second") if key in contact]
-    normal = motion(contact["normal_between"]) if "normal_between" in contact else None
-    return [
-        Row(
-            name=contact["name"], law="friction", b=motion(pair), mu=contact["mu"], N0=contact["N0"],
-            kt=np.inf if contact["kt"] == "inf" else contact["kt"], N1=contact.get("N1", 0.0),
-            phase=contact.get("N1_phase", 0.0) + angle, kn=contact.get("kn", 0.0), n=normal, reacts=not i,
-        )
-        for i, pair in enumerate(pairs)
-    ]  # fmt: skip
+    Raises
+    ------
+    NotImplementedError
+        A limit in the form of a circle, which is no row by itself.
+    """
+    case = written_out(case)
+    dofs, rows = case["structure"]["dofs"], []
+    for contact in case["contacts"]:
+        if contact.get("limit") == "circle":
+            raise NotImplementedError(f"{contact['name']}: the adapter knows no circular limit")
+        for key in ("between", "between_second"):
+            b = np.zeros(len(dofs))
+            for dof, sign in zip(contact.get(key, ()), (1.0, -1.0), strict=False):
+                if dof != "ground":
+                    b[dofs.index(dof)] += sign
+            if contact["law"] == "gap":
+                made = Row(law="gap", b=b, kt=contact["k"], gap=contact["gap"])
+            else:
+                more = {name: contact.get(name, 0.0) for name in ("N1", "kn")}
+                more |= {name: float(contact[name]) for name in ("kt", "mu", "N0")}
+                made = Row(law="friction", b=b, **more)
+            rows += [made] if key in contact else []
+    M, C, K = (np.array(case["structure"][key], float) for key in "MCK")
+    loads = tuple(
+        (dofs.index(one["dof"]), one["amplitude"], one.get("phase", 0.0), one.get("harmonic", 1))
+        for one in case["loads"]
+    )
+    return Model(M=M, C=C, K=K, rows=tuple(rows), loads=loads, seen=dofs.index(case["asked"]["dof"]))

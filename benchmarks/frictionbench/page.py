@@ -9,19 +9,22 @@ from benchmarks.frictionbench import scorer
 from benchmarks.frictionbench.model import HERE, load, names
 
 DOCS = HERE.parents[1] / "docs"
-COLOURS = {"stickslip": "#0b6e99", "tmdsimpy": "#c2571a", "pyharm": "#7a8f2a"}
+COLOURS = {"stickslip": "#0b6e99", "tmdsimpy": "#c2571a", "pyharm": "#7a8f2a", "nlvib": "#7b4fa3"}
 HEAD = """# FrictionBench
 
 {cases} answered cases of friction damping in one neutral schema, and what codes make
 of them. Cases, answers, schema and [how to add a code](../benchmarks/frictionbench/README.md#add-a-code)
 are in `benchmarks/frictionbench`; `python -m benchmarks.frictionbench archive` packs them.
 
-Answers come by two ways that share no code: a closed form, or the exact events in 256 bits with an
-enclosure (`shooting.py`: Krawczyk's operator on matrix exponentials in balls), and harmonic balance at
-H, 2H and 4H harmonics, extrapolated. Of {cases} answers {ten} agree to ten digits or more; the column
-*known* says to how many, *1 way* where there is but one. A limit in the form of a circle is not
-piecewise linear: there time marching stands for the events. The balance is this project's; that the
-enclosed orbit obeys the contact laws is confirmed by a march in floats from it, not proved.
+Answers come by two ways: a closed form, or exact events in balls of 128 and more bits
+with an enclosure (`proofs.py`), and harmonic balance at H, 2H, 4H … harmonics, extrapolated; where these
+agree in fewer than ten digits, time marching too. {proved} answers have a proof in `proofs/`:
+`python solver/certificate/checker.py FILE` shows anew that the orbit exists, that it obeys every law of its
+contacts and how high it is, and needs nothing but python-flint. Losses, limit cycles and optima are read
+off orbits that are enclosed alike. Of {cases} answers {ten} agree to ten digits or more; the column *known*
+says to how many, *1 way* where there is but one. A limit in the form of a circle is not piecewise linear:
+there time marching stands for the events. The balance is this project's. A disk is solved and proved as
+the part of its annulus that the wave repeats after.
 
 Each code climbs its own rungs (harmonics, samples) from cheap to dear, in a process with one thread,
 warm; a cell is the most right digits and the processor time of that rung. Other codes' adapters ask for
@@ -44,7 +47,12 @@ def write() -> str:
         name: json.loads((HERE / "answers" / f"{name}.json").read_text()) for name in scorer.answered()
     }
     ten = sum(one["ways"] > 1 and one["agreed_digits"] >= 10.0 for one in answers.values())
-    lines = [HEAD.format(cases=len(answers), ten=ten, without=_without(), words=_words(scorer.summary()))]
+    proved = len(list((HERE / "proofs").glob("*.json")))
+    lines = [
+        HEAD.format(
+            cases=len(answers), ten=ten, proved=proved, without=_without(), words=_words(scorer.summary())
+        )
+    ]
     ladder = ""
     for name, answer in answers.items():
         case = load(name)

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.frictionbench.model import HERE, load, names
+from solver.certificate import checker
 
 ROOT = HERE.parents[1]
 ADAPTERS, RESULTS, MADE = HERE / "adapters", HERE / "results", ROOT / ".frictionbench"
@@ -146,11 +147,11 @@ def run(
         for name in (name for name in cases if name in known):
             scores[name] = one(process, name, wants["RUNGS"], seconds)
             print(f"{name:24s} {words(scores[name])}", flush=True)
+            if adapter.parent == ADAPTERS:
+                RESULTS.mkdir(exist_ok=True)
+                (RESULTS / f"{code}.json").write_text(json.dumps(scores, indent=0) + "\n")
     finally:
         process.close()
-    if adapter.parent == ADAPTERS:
-        RESULTS.mkdir(exist_ok=True)
-        (RESULTS / f"{code}.json").write_text(json.dumps(scores, indent=0) + "\n")
     return 0
 
 
@@ -273,8 +274,10 @@ def page() -> str:
 def archive(out: str) -> str:
     """Write cases, answers, schema and a citation file into an archive; return its name."""
     with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as made:
-        for place in sorted([*(HERE / "cases").iterdir(), *(HERE / "answers").iterdir()]):
-            made.write(place, f"frictionbench/{place.parent.name}/{place.name}")
+        for place in sorted(HERE.glob("*/*.*")):
+            if place.parent.name in ("cases", "answers", "proofs"):
+                made.write(place, f"frictionbench/{place.parent.name}/{place.name}")
+        made.write(Path(checker.__file__), "frictionbench/checker.py")
         for name in ("case.schema.json", "CITATION.cff", "README.md", "adapters/protocol.py", "model.py"):
             made.write(HERE / name, f"frictionbench/{name}")
     return out

@@ -7,7 +7,7 @@ import sys
 from typing import Any
 
 import numpy as np
-from protocol import case_model, serve
+from protocol import measured, serve, single_response
 
 NEEDS = ("pyharm-os",)
 RUNGS = [
@@ -22,27 +22,16 @@ def solve(case: dict[str, Any], rung: dict[str, Any]) -> dict[str, Any]:
     """Follow a very short response from the frequency; its first point is the answer."""
     from pyHarm.Maestro import Maestro
 
-    what = case["asked"]["what"]
-    if what not in ("amplitude", "half-peak-to-peak") or "which" in case["asked"]:
-        raise NotImplementedError("the adapter asks it for one response alone")
-    m = case_model(case)
+    m = single_response(case, gaps=False)
     omega, n, H = 2.0 * math.pi * case["asked"]["frequency_hz"], len(m.M), rung["harmonics"]
     connectors: dict[str, Any] = {}
     for i, row in enumerate(m.rows):
         ends = [int(j) for j in np.flatnonzero(row.b)]
         connect = {"whole": [ends[0]]} if len(ends) == 1 else {"whole": [ends[0]], "INTERNAL": [ends[1]]}
-        if row.law == "gap":
-            raise NotImplementedError("the adapter knows no gap of it")
-        if row.N1 or row.kn:
-            raise NotImplementedError("its Jenkins element has no load that varies")
-        if math.isinf(row.kt):
-            raise NotImplementedError("it has no rigid friction")
         connectors[f"slider{i}"] = {
             "type": "Jenkins", "connect": connect, "dirs": [0], "mu": row.mu, "N0": row.N0, "k": row.kt,
         }  # fmt: skip
-    for i, (dof, amplitude, phase, k) in enumerate(m.loads):
-        if k != 1:
-            raise NotImplementedError("the adapter knows forces of order 1 alone")
+    for i, (dof, amplitude, phase, _) in enumerate(m.loads):
         for kind, part in (("CosinusForcing", math.cos(phase)), ("SinusForcing", -math.sin(phase))):
             if abs(part) > 1e-15:
                 connectors[f"{kind}{i}"] = {
@@ -67,12 +56,7 @@ def solve(case: dict[str, Any], rung: dict[str, Any]) -> dict[str, Any]:
     points = [one for one in maestro.nls["one"].SolList if one.flag_accepted]
     if not points:
         raise ArithmeticError("no point converged")
-    blocks = points[0].x[:-1].reshape(2 * H + 1, n)[:, m.seen]
-    spectrum = np.zeros(8193, complex)
-    spectrum[0], spectrum[1 : H + 1] = blocks[0], 0.5 * (blocks[1::2] - 1j * blocks[2::2])
-    moved = np.fft.irfft(spectrum, 16384) * 16384
-    high, low = float(moved.max()), float(moved.min())
-    return {"value": max(abs(high), abs(low)) if what == "amplitude" else 0.5 * (high - low)}
+    return {"value": measured(case, points[0].x[:-1].reshape(2 * H + 1, n)[:, m.seen])}
 
 
 if __name__ == "__main__":

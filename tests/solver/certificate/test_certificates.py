@@ -241,7 +241,8 @@ def _ring(contacts: list[dict[str, Any]], phases: tuple[float, ...]) -> sticksli
         for one, other in zip(names, [*names[1:], names[0]], strict=True)
     ]
     return stickslip.Scene.from_dict({
-        "name": "ring", "structure": {"kind": "lumped", "masses": dict.fromkeys(names, 1.0), "springs": springs},
+        "name": "ring",
+        "structure": {"kind": "lumped", "masses": dict.fromkeys(names, 1.0), "springs": springs},
         "contacts": contacts, "observe": {"dof": "x0", "band": [0.1, 0.3]},
         "excitation": [
             {"dof": one, "amplitude": 1.0, "phase": phase} for one, phase in zip(names, phases, strict=True)

@@ -350,7 +350,9 @@ def test_the_work_of_a_contact_is_that_of_its_loop() -> None:
         "name": "one", "structure": {"kind": "lumped",
             "masses": {"x": 1.0}, "springs": [{"between": ["x", "ground"], "k": 1.0, "c": 0.1}],
         },
-        "contacts": [{"name": "f", "law": "coulomb", "between": ["x", "ground"], "kt": 2.0, "mu": 0.5, "N0": 1.0}],
+        "contacts": [
+            {"name": "f", "law": "coulomb", "between": ["x", "ground"], "kt": 2.0, "mu": 0.5, "N0": 1.0}
+        ],
         "excitation": [{"dof": "x", "amplitude": 1.0}], "observe": {"dof": "x", "band": [0.1, 0.3]},
     })  # fmt: skip
     for harmonics, exact, error in ((41, False, 1e-5), (161, True, 1e-11)):
