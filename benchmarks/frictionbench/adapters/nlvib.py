@@ -60,6 +60,8 @@ fclose(file);
 def solve(case: dict[str, Any], rung: dict[str, Any]) -> dict[str, Any]:
     """Solve at the frequency, by Octave's fsolve, from the linear response with all contacts stuck."""
     m = single_response(case)
+    if len(m.M) == 1 and any(row.law == "gap" and row.b[0] < 0.0 for row in m.rows):
+        raise NotImplementedError("in a system of one coordinate its forces have no direction")
     H, n, omega = rung["harmonics"], len(m.M), 2.0 * math.pi * case["asked"]["frequency_hz"]
     force = np.zeros(n, complex)
     for dof, amplitude, phase, _ in m.loads:
