@@ -29,6 +29,8 @@ the part of its annulus that the wave repeats after.
 Each code climbs its own rungs (harmonics, samples) from cheap to dear, in a process with one thread,
 warm; a cell is the most right digits and the processor time of that rung. Other codes' adapters ask for
 single responses alone: a dash says what an adapter or its code does not offer, which is not a failure.
+Runs that a busy machine did not let end are left out: of NLvib under Octave the dear rungs, of pyHarm, which
+compiles for long, all.
 
 {words}
 
