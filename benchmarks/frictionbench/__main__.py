@@ -6,7 +6,7 @@ import argparse
 import json
 import sys
 
-from benchmarks.frictionbench.model import names
+from benchmarks.frictionbench.model import HERE, names
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -45,7 +45,8 @@ def _answers(asked: list[str] | tuple[str, ...]) -> int:
             print(f"{name:24s} {type(error).__name__}: {error}", flush=True)
             poor += 1
             continue
-        answers.path(name).parent.mkdir(exist_ok=True)
+        if (proof := found.pop("proof")) is not None:
+            (HERE / "proofs" / f"{name}.json").write_text(json.dumps(proof) + "\n")
         answers.path(name).write_text(json.dumps(found, indent=1) + "\n")
         poor += found["agreed_digits"] < answers.WANTED
         seconds = {way: one["seconds"] for way, one in found["by"].items()}

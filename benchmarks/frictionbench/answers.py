@@ -79,6 +79,7 @@ def _told(case: Case, ways: dict[str, Answer], failed: dict[str, str]) -> Answer
     told: Answer = {"name": case["name"], "value": best["value"], "enclosure": best.get("enclosure")}
     if "at" in best:
         told["at"] = best["at"]
+    told["proof"] = ways.get("events", {}).pop("proof", None)
     told |= {"ways": len(order), "agreed_digits": round(agreed, 1), "by": ways}
     if failed := {way: why for way, why in failed.items() if why != NONE}:
         told["not_by"] = failed

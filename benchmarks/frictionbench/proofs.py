@@ -6,13 +6,11 @@ look comes from the balance.
 
 from __future__ import annotations
 
-import json
 import math
 from collections import defaultdict
 from collections.abc import Iterator
 from contextlib import contextmanager
 from decimal import Decimal
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -21,7 +19,7 @@ from flint import arb, arb_mat, ctx
 
 import stickslip
 from benchmarks.frictionbench import scenes
-from benchmarks.frictionbench.model import HERE, Case, piecewise_linear
+from benchmarks.frictionbench.model import Case, piecewise_linear
 from solver.certificate.boxes import boxed, settled
 from solver.certificate.checker import STICK, Orbit, System, stated
 from solver.certificate.statement import orbit_of, system_of
@@ -40,7 +38,7 @@ class NotProvedError(ArithmeticError):
 
 
 def prove(case: Case) -> Answer:
-    """Return value, enclosure and what is known of the orbit; keep the proof beside the answers.
+    """Return value, enclosure, the proof and what is known of the orbit.
 
     Raises
     ------
@@ -67,8 +65,7 @@ def prove(case: Case) -> Answer:
     proof = stickslip.certify(near, peak=asked["what"] == "peak", least_over=least, most_work=WORK)
     if not proof.reached:
         raise NotProvedError(proof.reason or proof.status.value)
-    told = {"events": proof.events, "held": list(proof.held)}
-    kept(case["name"], proof.certificate)
+    told = {"events": proof.events, "held": list(proof.held), "proof": proof.certificate}
     claims = proof.certificate["claims"]
     if asked["what"] == "loss":
         with precision(proof.bits):
@@ -79,13 +76,6 @@ def prove(case: Case) -> Answer:
     elif asked["what"] == "peak":
         told["at"] = sum(proof.frequency_hz) / 2.0
     return between(*claims[key.get(asked["what"], "max_abs")]) | told
-
-
-def kept(name: str, certificate: Any) -> None:
-    """Write a proof into the folder of proofs: `python solver/certificate/checker.py FILE` checks it."""
-    place = Path(HERE / "proofs" / f"{name}.json")
-    place.parent.mkdir(exist_ok=True)
-    place.write_text(json.dumps(certificate) + "\n")
 
 
 def between(low: str, high: str) -> Answer:

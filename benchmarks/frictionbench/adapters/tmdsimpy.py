@@ -49,7 +49,7 @@ def solve(case: dict[str, Any], rung: dict[str, Any]) -> dict[str, Any]:
     residual = lambda U: made.hbm_res(np.hstack((U, omega)), force, h, Nt=rung["samples"])[:2]  # noqa: E731
     U, _, _, converged, *_ = _padded(solver.nsolve(residual, start, verbose=False))
     rest = float(np.abs(residual(U)[0]).max())
-    if not rest < 1e-6 * max(1.0, float(np.abs(force).max())):
+    if not rest < 1e-3 * max(1.0, float(np.abs(force).max())):
         raise ArithmeticError(f"did not converge: residual {rest:.1e} ({converged})")
     return {"value": measured(case, U[m.seen :: n])}
 
