@@ -152,6 +152,8 @@ def _most(case: Case) -> int:
     rows = len(case["contacts"])
     if any(one["law"] == "coulomb-3d" for one in case["contacts"]):
         return CIRCLES if rows <= PATCH else CIRCLES // 2 if rows <= FACE else CIRCLES // 8
+    if "frequency_hz" in case["asked"] and "which" in case["asked"]:  # all solutions are looked for
+        return CIRCLES
     if case["asked"]["what"] in ("least-peak", "limit-cycle"):
         return NEAR
     return FAR if rows <= 4 and not any("kn" in one for one in case["contacts"]) else FAR // 3
