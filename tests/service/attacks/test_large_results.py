@@ -63,6 +63,24 @@ def test_many_readers_hold_a_large_result_once(tmp_path: Path) -> None:
         assert highest < ADDED_MB
 
 
+def test_summaries_of_a_large_result_leave_others_alone(tmp_path: Path) -> None:
+    with besieged(tmp_path, "ann", "bob") as service:
+        job = a_large_result(service, "ann", numbers(1.25))
+        told: list[int] = []
+
+        def read(over: threading.Event) -> None:
+            with service.client("ann") as client:
+                while not over.is_set():
+                    told.append(client.get(f"/v1/runs/{job}/summary").status_code)
+
+        service.idle = service.memory()
+        with running(*[read] * READERS):
+            others_are_served(service, VICTIM, "bob")
+        assert set(told) <= {200, 429}
+        assert 200 in told
+        assert service.added() < ADDED_MB
+
+
 def test_large_results_are_compared_by_their_figures(tmp_path: Path) -> None:
     with besieged(tmp_path, "ann", "bob") as service:
         a, b = (a_large_result(service, "ann", numbers(one)) for one in (1.5, 2.5))
