@@ -54,6 +54,7 @@ class Runs:
         self.observations = np.concatenate([run.observations for run in self.runs])
         sizes = [run.observations.size for run in self.runs]
         self.slices = [slice(end - size, end) for end, size in zip(np.cumsum(sizes), sizes, strict=True)]
+        self.fitted = len(unknowns) + sum(run.fitted_besides for run in self.runs)
         self.evaluations = 0
         self._last: Fitted | None = None
 
@@ -164,7 +165,7 @@ def _level(runs: Runs, found: LocalFit, sd: Real, known: np.ndarray, *, robust: 
     """Return the level of the noise that is not known, from what a fit left over."""
     counted = found.active & ~known
     rest = ((found.fitted.values - runs.observations) / sd)[counted]
-    share = rest.size / max(rest.size - len(runs.unknowns), 1)
+    share = rest.size / max(rest.size - runs.fitted, 1)
     if robust:
         return max(_NORMAL * float(np.median(np.abs(rest))) * math.sqrt(share), LEAST_LEVEL)
     return max(float(np.sqrt(np.mean(rest**2) * share)), LEAST_LEVEL)

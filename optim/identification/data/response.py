@@ -122,6 +122,13 @@ class ResponseModel(RunModel):
         return float(np.linalg.norm(found.values - self._near[i]))
 
 
+def observing_dof(scene: Scene, dof: str) -> Scene:
+    """Return the scene that observes a DOF."""
+    if dof == scene.observe.dof:
+        return scene
+    return scene.model_copy(update={"observe": scene.observe.model_copy(update={"dof": dof})})
+
+
 FLOOR = (
     0.01  # of the largest amplitude of a run, below which noise in proportion to amplitude falls no further
 )
@@ -182,11 +189,10 @@ class ResponseRun(MeasuredRows):
 
     def model(self, scene: Scene, paths: Sequence[str], harmonics: int) -> RunModel:
         """As the base says."""
-        observe = scene.observe.model_copy(update={"dof": self.dof})
-        here = scene.model_copy(update={"observe": observe}) if self.dof != scene.observe.dof else scene
         return ResponseModel(
-            here, self.conditions, paths, frequency_hz=self.frequency_hz, quantity=self.quantity,
-            harmonic=self.harmonic, harmonics=harmonics, near=self.observations.reshape(-1, self.parts),
+            observing_dof(scene, self.dof), self.conditions, paths, frequency_hz=self.frequency_hz,
+            quantity=self.quantity, harmonic=self.harmonic, harmonics=harmonics,
+            near=self.observations.reshape(-1, self.parts),
         )  # fmt: skip
 
     def thinned(self, most: int) -> ResponseRun:
