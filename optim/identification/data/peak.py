@@ -29,7 +29,7 @@ from solver.sensitivity.gradient import Sensitivities
 from solver.sensitivity.nonsmooth import peak_gradient
 from solver.studies.blades import blade_peaks, blade_rows
 
-_TOLD = {"blade": "blade", "level": "excitation [N]", "peak": "largest amplitude [m]"}
+_TOLD = {"blade": "blade", "number": "number", "level": "excitation [N]", "peak": "largest amplitude [m]"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -125,7 +125,8 @@ def read_peak(scene: Scene, table: Table) -> MeasuredRows:
         raise table.refusal(band, "`from` must be below `to`, both in Hz")
     return PeakRun(
         source=table.source, conditions=dict(table.conditions), data=data, sd=sd, dof=dof,
-        at=at or {"peak": np.arange(1, len(table) + 1, dtype=np.float64)}, range=band if {"from", "to"} & set(table.words) else None,
+        at=at or {"number": np.arange(1, len(table) + 1, dtype=np.float64)},
+        range=band if {"from", "to"} & set(table.words) else None,
     )  # fmt: skip
 
 

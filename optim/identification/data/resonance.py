@@ -31,11 +31,13 @@ from solver.scene.scene import Scene
 from solver.sensitivity.observed import TWO_PI, Observed, ObservedSensitivities, Quantity
 
 SHARPER = 0.1  # noise of a frequency relative to it, where that of an amplitude is 1
-_MOST_STEPS, _CLOSE = 30, 1e-7  # of the frequency: from here one more step is exact
+_MOST_STEPS, _CLOSE = 30, 1e-7  # of the frequency; then one step more is exact
 _FAR = 0.05  # relative change of the frequency beyond which a step is cut
 _TOLD = {
-    "level": "excitation [N]", "resonance_frequency": "frequency [Hz]", "resonance_amplitude": "amplitude [m]",
-}  # fmt: skip
+    "level": "excitation [N]",
+    "resonance_frequency": "frequency [Hz]",
+    "resonance_amplitude": "amplitude [m]",
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
