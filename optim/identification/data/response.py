@@ -79,7 +79,7 @@ class ResponseModel(RunModel):
         reached = np.isfinite(slopes).all(axis=(1, 2)) & np.isfinite(found_values).all(axis=1)
         names = [contact.name for contact in balance.scene.contacts]
         return Predicted(
-            values=found_values.ravel(), slopes=slopes.reshape(-1, len(self._paths)),
+            values=found_values.ravel(), slopes=slopes.reshape(found_values.size, -1),
             reached=np.repeat(reached, parts), states={name: states[:, c] for c, name in enumerate(names)},
         )  # fmt: skip
 

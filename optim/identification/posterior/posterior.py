@@ -120,15 +120,16 @@ def sampled(runs: Runs, best: LocalFit, told: Noise, *, draws: int, sampler: str
     misfit = misfit_of(runs, best, info, robust=False)
     noise = best.level if not level_known else math.nan if told.level is None else told.level
     target = Target(runs, best, told.level)
-    before = runs.evaluations
+    before = target.evaluations
     mode = target.mode()
     drawn = _none(target.dimensions) if mode is None else _drawn(target, *mode, draws, sampler, seed)
     status = PosteriorStatus.MODEL_DOUBTFUL if misfit else PosteriorStatus.SAMPLED
     if not len(drawn.x):
         status = PosteriorStatus.UNRELIABLE
-    if target.lost > _LOST * (runs.evaluations - before):
+    if target.lost > _LOST * (target.evaluations - before):
         drawn, status = replace(drawn, x=drawn.x[:0], weighted=None), PosteriorStatus.LOST
-    return _result(runs, drawn, status, misfit, noise, begun)
+    result = _result(runs, drawn, status, misfit, noise, begun)
+    return replace(result, evaluations=target.evaluations)
 
 
 def _none(n: int) -> _Sampled:

@@ -53,7 +53,8 @@ class Marginal(Piece):
         """Return that of draws, (m,); NaN of none."""
         if not draws.size:
             return cls(name=name, unit=unit, mean=math.nan, sd=math.nan, interval=(math.nan, math.nan))
-        low, high = np.quantile(draws, [0.5 - 0.5 * level, 0.5 + 0.5 * level]).tolist()
+        # By (m + 1) p: as much as wanted lies between them on average, however few draws there are.
+        low, high = np.quantile(draws, [0.5 - 0.5 * level, 0.5 + 0.5 * level], method="weibull").tolist()
         return cls(
             name=name, unit=unit, mean=float(draws.mean()), sd=float(draws.std()), interval=(low, high)
         )

@@ -37,7 +37,7 @@ class At:
 
 
 class Target:
-    """ln p(data | x) + ln N(x; 0, 1), all constants kept.
+    """The logarithm of the density, ln p(data | x) + ln N(x; 0, 1), all constants kept.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ class Target:
     """
 
     def __init__(self, runs: Runs, best: LocalFit, level: float | None) -> None:
-        self._runs, self._active, self.lost = runs, best.active, 0
+        self._runs, self._plain, self._active, self.lost = runs, runs.without_slopes(), best.active, 0
         _, known = runs.noise(best.fitted.values, level)
         kept = best.active
         self._known = known[kept]
@@ -79,10 +79,22 @@ class Target:
         """Return z of x."""
         return np.asarray(ndtr(x))
 
+    @property
+    def evaluations(self) -> int:
+        """Evaluations of all runs."""
+        return self._runs.evaluations + self._plain.evaluations
+
+    def log(self, x: Real) -> float:
+        """Return the logarithm of the density at (n,)."""
+        return self._at(x, self._plain).log
+
     def at(self, x: Real) -> At:
         """Return the density at (n,)."""
+        return self._at(x, self._runs)
+
+    def _at(self, x: Real, runs: Runs) -> At:
         z, n = self.scaled(x), x.size
-        found = self._runs.at(z)
+        found = runs.at(z)
         nothing = At(log=-math.inf, slope=np.zeros(n), curvature=np.eye(n))
         if not found.reached[self._active].all():
             self.lost += 1
@@ -98,10 +110,6 @@ class Target:
         slope = -((weights * rest) @ rows + prior @ prior_rows) * by_x - x
         J, P = rows * by_x, prior_rows * by_x
         return At(log=log, slope=slope, curvature=J.T @ (weights[:, None] * J) + P.T @ P + np.eye(n))
-
-    def log(self, x: Real) -> float:
-        """Return the logarithm of the density."""
-        return self.at(x).log
 
     def mode(self) -> tuple[Real, Real] | None:
         """Return the mode next to the fit and the covariance of its curvature; None if there is none."""
