@@ -40,7 +40,7 @@ _FEWEST = 3  # assemblies that tell a spread
 _DRAWS = 4000  # of the spreads
 _WIDEST = 1.0 / math.sqrt(12.0)  # deviation of the bounds, the largest spread
 _LEAST = 1e-6  # of a spread, scaled
-_SCENARIOS = 64
+_SCENARIOS = 32
 
 
 class ReassemblyStatus(Enum):
@@ -79,7 +79,7 @@ class Population(InBlocks):
 
     @property
     def uncertain(self) -> list[dict[str, float]]:
-        """Scenarios for a robust design: at most 64 assemblies that may come."""
+        """Scenarios for a robust design: at most 32 assemblies that may come."""
         return [dict(zip(self.names, row, strict=True)) for row in self.samples[:_SCENARIOS].tolist()]
 
     def blocks(self) -> Sequence[Block]:

@@ -15,7 +15,7 @@ from solver.arrays import FloatOrNaN, Real
 from solver.results.told import Block, Piece, ResultTable, Summary
 
 LEVEL = 0.9
-_SCENARIOS = 64
+_SCENARIOS = 32
 
 
 class PosteriorStatus(Enum):
@@ -114,7 +114,7 @@ class Posterior(InBlocks):
 
     @property
     def uncertain(self) -> list[dict[str, float]]:
-        """Scenarios for a robust design: at most 64 of the draws; none unless they can be used."""
+        """Scenarios for a robust design: at most 32 of the draws; none unless they can be used."""
         kept = self.samples[:_SCENARIOS] if self.reached else self.samples[:0]
         return [dict(zip(self.names, row, strict=True)) for row in kept.tolist()]
 

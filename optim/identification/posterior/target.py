@@ -23,7 +23,7 @@ from optim.problem.variables import Real
 
 _LOG_2_PI = math.log(2.0 * math.pi)
 _EDGE = 1e-6  # scaled distance from a bound at which a search begins
-_MOST_ROUNDS, _SETTLED = 40, 1e-6  # of Newton's method to the mode, in standard deviations
+_MOST_ROUNDS, _SETTLED = 40, 1e-2  # of Newton's method to the mode, in standard deviations
 _PLACES = 4001  # of the integral of a prior over the bounds
 
 

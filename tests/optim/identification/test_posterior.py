@@ -176,7 +176,7 @@ def test_the_level_of_a_population_is_that_of_a_grid() -> None:
 
 
 def test_the_simpler_of_two_models_that_explain_the_same_is_more_probable() -> None:
-    """One of them has an unknown more that the data do not tell: about the range of the prior is what it costs."""
+    """One of them has an unknown more: what of its range the data rule out is what it costs."""
     scene, data, _ = linear()
     models = {
         "level": (scene, {"excitation.amplitude": (1.2, 3.2)}),
