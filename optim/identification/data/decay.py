@@ -189,7 +189,7 @@ def _course(s: Real, found: ModePoints) -> _Course | None:
     ends, middles = course.paces(fine), course.paces(0.5 * (fine[1:] + fine[:-1]))
     steps = np.diff(-fine)[:, None] / 6.0 * (ends[:-1] + 4.0 * middles + ends[1:])
     np.cumsum(steps, axis=0, out=course.tau[1:])
-    return course
+    return course if (ends[:, 0] > 0.0).all() else None
 
 
 def _shift(course: _Course, run: DecayRun) -> tuple[float, Real]:
