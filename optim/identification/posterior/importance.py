@@ -23,6 +23,7 @@ from optim.problem.variables import Real
 TRUSTED = 0.7  # k above which the weights tell nothing
 _DEGREES = 7.0  # of Student's t
 _FIRST = 0.4  # share of the draws from the first proposal
+_FEWEST = 5  # weights in a tail
 _WIDER = 1.1  # factor on the deviations of the second
 
 
@@ -120,7 +121,7 @@ def smoothed(logs: Real) -> tuple[Real, float]:
     count = int(min(0.2 * logs.size, 3.0 * math.sqrt(logs.size)))
     order = np.argsort(logs)
     tail = order[-count:]
-    if count < 5 or not np.isfinite(logs[tail]).all() or logs[order[-count - 1]] == -math.inf:
+    if count < _FEWEST or not np.isfinite(logs[tail]).all() or logs[order[-count - 1]] == -math.inf:
         return logs, math.inf
     top, cut = float(logs[order[-1]]), float(logs[order[-count - 1]])
     beyond = np.exp(logs[tail] - top) - math.exp(cut - top)

@@ -119,7 +119,7 @@ def compare_models(
         progress = part_of(on_progress, i / len(models), (i + 1) / len(models), i)
         found[name] = posterior(
             scene, data, unknowns, noise=noise, harmonics=harmonics, starts=starts, seed=seed, draws=draws,
-            on_progress=progress, should_stop=should_stop,
+            sampler="importance", on_progress=progress, should_stop=should_stop,
         )  # fmt: skip
     return _chosen(found, before, seed)
 

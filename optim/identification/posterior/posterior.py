@@ -119,6 +119,8 @@ def sampled(runs: Runs, best: LocalFit, told: Noise, *, draws: int, sampler: str
     info = information(runs, best, robust=False, level_known=level_known)
     misfit = misfit_of(runs, best, info, robust=False)
     noise = best.level if not level_known else math.nan if told.level is None else told.level
+    if not best.active.all():
+        return _result(runs, _none(len(runs.unknowns)), PosteriorStatus.LOST, misfit, noise, begun)
     target = Target(runs, best, told.level)
     before = target.evaluations
     mode = target.mode()
@@ -178,7 +180,7 @@ def _result(
     z = np.asarray(ndtr(drawn.x))
     samples = np.array([unknowns.values(one) for one in z]).reshape(z.shape)
     told = samples if status is PosteriorStatus.SAMPLED else samples[:0]
-    known = weighted is not None and _trusted(weighted)
+    known = weighted is not None and weighted.pareto_k <= TRUSTED
     return Posterior(
         scene=runs.scene.name, status=status, names=unknowns.names,
         marginals=tuple(

@@ -31,8 +31,8 @@ class PosteriorStatus(Enum):
         "or more data."
     )
     LOST = (
-        "At some places next to the optimum a point measured was not reached, so the posterior is not known: "
-        "try more harmonics, or leave these points out of the data."
+        "At the optimum, or at places next to it, a point measured was not reached, so the posterior is not "
+        "known: try more harmonics, or leave these points out of the data."
     )
     NO_FIT = "There is no fit to begin with: see `identify`."
     STOPPED = "It was stopped."

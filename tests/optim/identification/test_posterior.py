@@ -238,3 +238,51 @@ def test_reassemblies_of_a_linear_mass_give_its_spread_and_scenarios_for_a_robus
     assert len(read_uncertain(scene, (), alone).listed) == 32
     assert alone.to_json()["samples"] == alone.samples.tolist()
     assert "excitation.amplitude" in repr(found)
+
+
+@pytest.mark.parametrize(
+    ("asked", "status"),
+    [
+        ({"sampler": "importance", "draws": 100}, optim.PosteriorStatus.UNRELIABLE),
+        ({"noise": 1e-4, "draws": 150}, optim.PosteriorStatus.MODEL_DOUBTFUL),
+        ({"should_stop": lambda: True}, optim.PosteriorStatus.STOPPED),
+    ],
+)
+def test_what_the_samples_are_not_worth_is_told(asked: dict[str, Any], status: optim.PosteriorStatus) -> None:
+    scene, data, _ = linear()
+    if "noise" in asked:
+        data = [{key: values for key, values in data[0].items() if key != "sd"}]
+    found = optim.posterior(scene, data, {"excitation.amplitude": (1.2, 3.2)}, harmonics=1, starts=1, **asked)
+    assert found.status is status
+    assert not found.reached
+    assert found.uncertain == []
+    assert math.isnan(found.interval("excitation.amplitude")[0])
+    assert "not told" in str(found.blocks()[0].rows)
+
+
+def test_points_that_are_not_reached_leave_the_posterior_unknown() -> None:
+    """The slider sticks at the least level, and the mass resonates above the frequencies looked at."""
+    scene = solver.Scene.from_dict(
+        {
+            "name": "rig",
+            "structure": {
+                "kind": "lumped",
+                "masses": {"m": 1.0},
+                "springs": [{"between": ["m", "ground"], "k": 40.0, "c": 0.5}],
+            },
+            "contacts": [{"name": "s", "between": ["m", "ground"], "kt": 60.0, "mu": 0.3, "N0": 2.5}],
+            "excitation": {"dof": "m", "amplitude": 4.0},
+            "observe": {"dof": "m", "band": [0.8, 1.4]},
+        }
+    )
+    data = {
+        "level": [0.1, 5.0, 5.5, 6.0, 6.5, 7.0],
+        "resonance_frequency": [1.6, 1.02, 1.02, 1.02, 1.02, 1.02],
+    }
+    unknowns = {"s.kt": (50.0, 70.0)}
+    found = optim.posterior(scene, [data], unknowns, harmonics=1, starts=1, noise=0.05)
+    assert found.status is optim.PosteriorStatus.LOST
+    lost = {"level": [0.1, 0.11], "resonance_frequency": [1.6, 1.6]}
+    assert (
+        optim.posterior(scene, [lost], unknowns, harmonics=1, starts=1).status is optim.PosteriorStatus.NO_FIT
+    )
