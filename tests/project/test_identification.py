@@ -61,7 +61,9 @@ def test_the_whole_way(rig: Path, capsys: pytest.CaptureFixture[str]) -> None:
     told = re.search(r"of μ from ([\d.]+) to ([\d.]+), and a load of ([\d.]+) N", PAGE)
     assert told is not None
     printed = [float(one) for one in re.findall(r"-?\d+\.\d+", capsys.readouterr().out)]
-    assert [printed[0], printed[1], printed[4]] == pytest.approx([float(one) for one in told.groups()], rel=1e-3)
+    assert [printed[0], printed[1], printed[4]] == pytest.approx(
+        [float(one) for one in told.groups()], rel=1e-3
+    )
 
 
 def test_the_page_is_that_of_the_registries() -> None:

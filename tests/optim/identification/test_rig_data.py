@@ -61,6 +61,9 @@ def test_derivatives_are_those_of_differences(kind: str) -> None:
     model = run.model(scene, paths, 5)
     found = model.evaluate({})
     assert found.reached.all()
+    plain = run.model(scene, (), 5).evaluate({})
+    np.testing.assert_allclose(plain.values, found.values, rtol=1e-6)
+    assert plain.slopes.shape == (found.values.size, 0)
     for j, path in enumerate(paths):
         value, h = scene.value(path), 1e-4
         high, low = (model.evaluate({path: value * (1.0 + way * h)}).values for way in (1.0, -1.0))
