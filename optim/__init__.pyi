@@ -1,5 +1,22 @@
 from .errors import DataError as DataError, DesignError as DesignError
 from .identification.identify import identify as identify
+from .identification.posterior.model_choice import (
+    ChoiceStatus as ChoiceStatus,
+    ModelChoice as ModelChoice,
+    ModelEvidence as ModelEvidence,
+    compare_models as compare_models,
+)
+from .identification.posterior.posterior import posterior as posterior
+from .identification.posterior.reassemblies import (
+    Population as Population,
+    ReassemblyStatus as ReassemblyStatus,
+    reassemblies as reassemblies,
+)
+from .identification.posterior.result import (
+    Marginal as Marginal,
+    Posterior as Posterior,
+    PosteriorStatus as PosteriorStatus,
+)
 from .identification.result import Identification as Identification, IdentifyStatus as IdentifyStatus
 from .problem.typed import Case as Case, Limit as Limit
 from .results.design import DesignResult as DesignResult, DesignStatus as DesignStatus

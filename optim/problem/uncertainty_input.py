@@ -40,7 +40,8 @@ def read_uncertain(scene: Scene, variables: Sequence[BoundedVariable], uncertain
           P, (x − c)ᵀ P⁻¹ (x − c) ≤ 1, or a ``covariance`` with the ``confidence`` its ellipsoid has. Without
           a centre the numbers are deviations from the nominal values, with ``relative`` relative ones (a
           matrix then needs ``paths``);
-        - samples, a list of ``{path: value}`` or ``{path: {"deviation": …}}``.
+        - samples, a list of ``{path: value}`` or ``{path: {"deviation": …}}``;
+        - what an identification found: the result, of which ``uncertain`` counts.
 
         Intervals and ellipsoids may have ``mistuning`` on top: ``{"of": …, "spread": 0.01, "seeds": [1, 2]}``
         or ``{"of": …, "values": [[factor of each sector], …]}``.
@@ -50,6 +51,7 @@ def read_uncertain(scene: Scene, variables: Sequence[BoundedVariable], uncertain
     DesignError, SettingError, SceneError
         What is wrong: the key, the value, and what would be right.
     """
+    uncertain = getattr(uncertain, "uncertain", uncertain)
     chosen = {path for variable in variables for path in variable.paths}
     if isinstance(uncertain, Mapping) and uncertain:
         disks = _disks(scene, uncertain.get("mistuning"), _WHERE)
