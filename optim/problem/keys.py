@@ -231,8 +231,8 @@ class NominalAndRobustKeys(ProblemKeys):
     options: Annotated[dict[Name, dict[ParameterPath, Number]], Field(min_length=1, max_length=50)] | None = (
         Field(
             default=None,
-            description="A catalogue: name to the values of each option that can be had, of which the best is "
-            "looked for; `variables` may then be empty.",
+            description="A catalogue: name to the values of each option that can be had, of which the best "
+            "is looked for; `variables` may then be empty.",
             examples=[{"soft": {"damper.kt": 15}, "stiff": {"damper.kt": 45}}],
         )
     )
