@@ -150,6 +150,11 @@ def work_of(U: Real, F: Real, dU: Real, dF: Real, ks: Integer) -> tuple[Real, Re
     return math.pi * np.where(real, done, 0.0), math.pi * np.where(real, rises, 0.0)
 
 
+def work_pairing(ks: Integer, n: int) -> Real:
+    """Return the matrix P (n, n) of the work F·(P U) in a period."""
+    return math.pi * _speed(np.eye(n), ks).T
+
+
 def _speed(coefficients: Real, ks: Integer) -> Real:
     """Return the coefficients (..., n) of dq/dτ for those of the ascending harmonics `ks` alone."""
     first = int(ks[0] == 0)

@@ -8,8 +8,9 @@ is therefore the largest max|x| over the factors of the blades, the frequency an
 
 for each blade b, by sequential quadratic programming (SLSQP: Kraft, DFVLR-FB 88-28 (1988)). Amplitude and
 rooms have exact derivatives by all of these, through the whole solve; a minimum over τ has those at its
-instant (envelope theorem). It begins where the first-order estimate on a grid of frequencies is largest:
-under given loads, where s moves the mean alone, that estimate is exact but for the mean's sign.
+instant (envelope theorem). It begins where, on a grid of frequencies, the amplitude is largest with each
+force at the end of its room that the slopes point to: under given loads, where s moves the mean alone, those
+are the worst forces. (s alone may exceed the limit: the mean that it moves takes part of it back.)
 """
 
 from __future__ import annotations
@@ -37,8 +38,9 @@ from solver.studies.patterns.climbing import Bounds
 
 TWO_PI = 2.0 * math.pi
 FREQUENCIES = 12  # of the band, at which a climb may begin
-CLIMBS = 4
+FURTHER = 2  # climbs beyond the best of each pattern
 KEPT = 1e-6  # share of a limit by which a force may exceed it
+_ASIDE = 1e-6
 _ROUNDS = 3  # of a climb, each with the contacts that stick where the one before ended
 _FLAT = 1e-10  # of the logarithm of the amplitude
 
@@ -75,6 +77,9 @@ class _Judged:
     slope: Real
     rooms: Real
     room_slopes: Real
+
+
+_Estimate = tuple[float, int, tuple[int, ...], _Place]  # amplitude, blade, contacts that stick, where
 
 
 class _NoResponseError(Exception):
@@ -115,32 +120,43 @@ class ResidualSearch:
         tuned : peak of the tuned disk [m].
         """
         low, high = self._band
-        starts = [(delta, at) for delta, own in begins for at in (own, *np.linspace(low, high, FREQUENCIES))]
-        found = [one for delta, at in starts for one in self._estimates(delta, float(at))]
-        found.sort(key=lambda one: -one[0])
+        first, others = [], []
+        for delta, own in begins:
+            tried = [self._estimates(delta, float(at)) for at in (own, *np.linspace(low, high, FREQUENCIES))]
+            # Of a pattern at a frequency one blade: a tuned disk has as many of each as blades.
+            ranked = sorted((max(some, key=_height) for some in tried if some), key=_height, reverse=True)
+            first += ranked[:1]
+            others += ranked[1:]
+        found = [*first, *sorted(others, key=_height, reverse=True)[:FURTHER]]
         ends: list[tuple[float, ResidualPeak]] = []
-        for _, blade, stuck, place in found[:CLIMBS]:
+        for _, blade, stuck, place in found:
             end = self._ended(blade, stuck, place, bounds, tuned)
             ends += [] if end is None else [(end.peak, end)]
         return max(ends, key=lambda pair: pair[0], default=(0.0, None))[1]
 
-    def _estimates(
-        self, delta: Real, hertz: float
-    ) -> list[tuple[float, int, tuple[int, ...], _Place]]:  # fmt: skip
-        """Return for each blade what forces may make of its amplitude, to the first order, and where."""
+    def _estimates(self, delta: Real, hertz: float) -> list[_Estimate]:
+        """Return for each blade the amplitudes with its forces at the ends that the slopes point to."""
         found = []
         try:
             stuck, u = self._natural(_Place(delta, np.zeros(0), hertz))
             if not stuck:
                 return []
+            annulus = self._annulus(delta)
+            limits = np.array([_limit(annulus, i) for i in stuck])
+            # A motion as far to both sides has a kink: hardly any force says which of them it looks at.
+            aside = _ASIDE * limits * np.cos(np.arange(1.0, limits.size + 1.0))
             for blade in range(delta.size):
-                here = self._judged(_Place(delta, np.zeros(len(stuck)), hertz), blade, stuck, u)
+                here = self._judged(_Place(delta, aside, hertz), blade, stuck, u)
                 rooms = np.maximum(here.rooms.reshape(-1, 2), 0.0)
-                by_force = here.slope[delta.size : -1]
-                forces = np.where(by_force >= 0.0, rooms[:, 0], -rooms[:, 1])
-                estimate = here.value + float(by_force @ forces)
-                found.append((estimate, blade, stuck, _Place(delta, forces, hertz)))
-        except _NoResponseError:
+                carried = -here.room_slopes[
+                    ::2, delta.size : -1
+                ]  # d (kt u + s) / ds: a force s moves the mean
+                up = np.linalg.solve(carried.T, here.slope[delta.size : -1]) >= 0.0
+                for way in (up, ~up):
+                    forces = np.linalg.solve(carried, np.where(way, rooms[:, 0], -rooms[:, 1]))
+                    place = _Place(delta, forces, hertz)
+                    found.append((self._judged(place, blade, stuck, here.u).value, blade, stuck, place))
+        except (_NoResponseError, np.linalg.LinAlgError):
             pass  # a climb from elsewhere may come by
         return found
 
@@ -217,7 +233,7 @@ class ResidualSearch:
             scale = at(first).value
             minimize(
                 lambda z: (-at(z).value / scale, -at(z).slope * unit / scale), first, jac=True,
-                method="SLSQP", bounds=[(-1.0, 1.0)] * (first.size - 1) + [(0.0, 1.0)],
+                method="SLSQP", bounds=[(-1.0, 1.0)] * N + [(None, None)] * len(stuck) + [(0.0, 1.0)],
                 constraints=limited, options={"maxiter": 60, "ftol": _FLAT},
             )  # fmt: skip
         except _NoResponseError:
@@ -293,6 +309,10 @@ class ResidualSearch:
             u, amplitude.value, by_place(amplitude.by_parameters, amplitude.by_frequency), np.array(rooms),
             np.array(slopes),
         )  # fmt: skip
+
+
+def _height(estimate: _Estimate) -> float:
+    return estimate[0]
 
 
 def _limit(scene: Scene, i: int) -> float:

@@ -197,10 +197,10 @@ def _solved(search: DiskSearch, disk: SolvedDisk) -> dict[str, Any]:
 def _with_forces(residual: ResidualSearch, search: DiskSearch, found: dict[str, Any]) -> ResidualPeak | None:
     """Return the worst with forces left in contacts that stick, from the tuned disk and the worst pattern."""
     nothing, worst = np.zeros(search.scene.structure.sector_count), found["worst"]
-    begins = [
-        (nothing, found["tuned_at_hz"]), (np.array(worst.factors) - 1.0, worst.at_hz),
-    ]  # fmt: skip
-    return residual.worst(begins, search.around(nothing), found["tuned_peak"])
+    bounds, rng = search.around(nothing), np.random.default_rng(search.asked.seed)
+    begins = [(nothing, found["tuned_at_hz"]), (np.array(worst.factors) - 1.0, worst.at_hz)]
+    begins += [(bounds.drawn(rng), found["tuned_at_hz"]) for _ in range(search.asked.climbs)]
+    return residual.worst(begins, bounds, found["tuned_peak"])
 
 
 def _apart(search: DiskSearch, limit: LinearLimit, middle: Real, starts: int) -> list[Real]:

