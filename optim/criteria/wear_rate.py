@@ -30,18 +30,13 @@ def _rows(judged: Judged) -> list[CriterionRow]:
                 found = worst_slopes(judged.wear, worst, contact.name, Measure.FRICTION_POWER)
                 slope = coefficient * found.gradient
             what = f"wear rate of {contact.name} at {worst.at:.6g} Hz"
+            second = second_of(judged, worst, contact.name, Measure.FRICTION_POWER, coefficient)
             rows.append(
                 judged.row(
-                    WEAR_RATE,
-                    what,
-                    coefficient * worst.value,
-                    slope,
-                    at_hz=worst.at,
-                    bound=bound,
-                    weight=weight,
-                    second=second_of(judged, worst, contact.name, Measure.FRICTION_POWER, coefficient),
-                )  # fmt: skip
-            )
+                    WEAR_RATE, what, coefficient * worst.value, slope, at_hz=worst.at, bound=bound,
+                    weight=weight, second=second,
+                )
+            )  # fmt: skip
     return rows
 
 

@@ -187,8 +187,10 @@ class _Chain:
         """Return a gradient by the δ of the scenario's settings, then by the factors of free blades."""
         disk = self._scenario.disk
         factors = () if disk is None else disk.values
-        terms = [(c.paths, c.by_delta, 1.0) for c, _ in self._scenario.settings]
-        terms += [(row, float.__pos__, factor) for row, factor in zip(self._blades, factors, strict=False)]
+        terms: list[tuple[Sequence[str], Callable[[float], float], float]] = [
+            (c.paths, c.by_delta, 1.0) for c, _ in self._scenario.settings
+        ]
+        terms += [(row, float, factor) for row, factor in zip(self._blades, factors, strict=False)]
         return np.array([
             sum(by_path[self._places[p]] * slope(self._nominal[p]) for p in paths) / factor
             for paths, slope, factor in terms

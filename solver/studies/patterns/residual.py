@@ -153,7 +153,8 @@ class ResidualSearch:
                 ]  # d (kt u + s) / ds: a force s moves the mean
                 up = np.linalg.solve(carried.T, here.slope[delta.size : -1]) >= 0.0
                 for way in (up, ~up):
-                    forces = np.linalg.solve(carried, np.where(way, rooms[:, 0], -rooms[:, 1]))
+                    ends = np.where(way, rooms[:, 0], -rooms[:, 1])
+                    forces = np.asarray(np.linalg.solve(carried, ends), np.float64)
                     place = _Place(delta, forces, hertz)
                     found.append((self._judged(place, blade, stuck, here.u).value, blade, stuck, place))
         except (_NoResponseError, np.linalg.LinAlgError):
