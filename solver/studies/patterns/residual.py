@@ -129,8 +129,8 @@ class ResidualSearch:
             others += ranked[1:]
         found = [*first, *sorted(others, key=_height, reverse=True)[:FURTHER]]
         ends: list[tuple[float, ResidualPeak]] = []
-        for _, blade, stuck, place in found:
-            end = self._ended(blade, stuck, place, bounds, tuned)
+        for start in found:
+            end = self._ended(start, bounds, tuned)
             ends += [] if end is None else [(end.peak, end)]
         return max(ends, key=lambda pair: pair[0], default=(0.0, None))[1]
 
@@ -148,9 +148,8 @@ class ResidualSearch:
             for blade in range(delta.size):
                 here = self._judged(_Place(delta, aside, hertz), blade, stuck, u)
                 rooms = np.maximum(here.rooms.reshape(-1, 2), 0.0)
-                carried = -here.room_slopes[
-                    ::2, delta.size : -1
-                ]  # d (kt u + s) / ds: a force s moves the mean
+                # d (kt u + s) / ds: a force s moves the mean.
+                carried = -here.room_slopes[::2, delta.size : -1]
                 up = np.linalg.solve(carried.T, here.slope[delta.size : -1]) >= 0.0
                 for way in (up, ~up):
                     ends = np.where(way, rooms[:, 0], -rooms[:, 1])
@@ -161,34 +160,29 @@ class ResidualSearch:
             pass  # a climb from elsewhere may come by
         return found
 
-    def _ended(
-        self, blade: int, stuck: tuple[int, ...], place: _Place, bounds: Bounds, tuned: float
-    ) -> ResidualPeak | None:
-        """Return where a climb ends, made again with the contacts that stick there."""
+    def _ended(self, start: _Estimate, bounds: Bounds, tuned: float) -> ResidualPeak | None:
+        """Return where a climb ends; it goes on where another blade or other forces there do better."""
         best: tuple[_Judged, _Place, tuple[int, ...]] | None = None
+        of = start[1]
         for _ in range(_ROUNDS):
+            _, blade, stuck, place = start
             climbed = self._climbed(blade, stuck, place, bounds)
-            if climbed is None:
+            if climbed is None or (best is not None and climbed[0].value <= best[0].value):
                 break
-            best = (*climbed, stuck)
-            try:
-                further, _ = self._natural(climbed[1])
-            except _NoResponseError:
+            best, of = (*climbed, stuck), blade
+            again = self._estimates(climbed[1].delta, climbed[1].hertz)
+            start = max(again, key=_height, default=start)
+            if start[0] <= climbed[0].value:
                 break
-            if set(further) <= set(stuck):
-                break
-            forces = dict(zip(stuck, climbed[1].forces, strict=True))
-            stuck = tuple(sorted({*stuck, *further}))
-            place = _Place(climbed[1].delta, np.array([forces.get(i, 0.0) for i in stuck]), climbed[1].hertz)
         if best is None:
             return None
         judged, place, stuck = best
-        free = self._judged(_Place(place.delta, 0.0 * place.forces, place.hertz), blade, stuck, judged.u)
+        free = self._judged(_Place(place.delta, 0.0 * place.forces, place.hertz), of, stuck, judged.u)
         names = [contact.name for contact in self._annulus(place.delta).contacts]
         return ResidualPeak(
             factors=tuple((1.0 + place.delta).tolist()), contacts=tuple(names[i] for i in stuck),
             tractions=tuple(place.forces.tolist()), magnification=judged.value / tuned, peak=judged.value,
-            blade=blade, at_hz=place.hertz, without=free.value,
+            blade=of, at_hz=place.hertz, without=free.value,
         )  # fmt: skip
 
     def _climbed(

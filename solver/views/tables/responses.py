@@ -250,6 +250,12 @@ def wear_life(found: Json) -> Iterator[Block]:
         met = found["hours_to_limit"]
         said = "not reached" if met is None else f"reached after {units.number(met)} h"
         pairs.append((f"limit {units.length(found['limit'])}", said))
+    used = [one for one in found.get("used", ()) if one is not None]
+    if used:
+        met = found["hours_to_margin"]
+        share = f"{units.number(used[0], 4)} at the beginning, {units.number(used[-1], 4)} at the end"
+        pairs.append(("of the stress allowed", share))
+        pairs.append(("margin 1", "kept" if met is None else f"reached after {units.number(met)} h"))
     for one in found["switches"]:
         pairs.append(("another peak is highest", f"from {units.number(one)} h on"))
     if found["ended_by"]:
@@ -269,12 +275,12 @@ def wear_life(found: Json) -> Iterator[Block]:
         heads = ("contact", "depth", "load at first", "at last", "power at first", "at last")
         yield ResultTable("Contacts", heads, rows)
     if found["paths"]:
-        columns = [found[f"{name}_slopes"] for name in ("end", "highest", "limit")]
+        columns = [found[f"{name}_slopes"] for name in ("end", "highest", "limit", "margin")]
         slopes = [
             (path, *("" if one is None else f"{one:.6g}" for one in each))
             for path, *each in zip(found["paths"], *columns, strict=True)
         ]
-        by = ("by", "of the last amplitude", "of the largest", "of the time to the limit")
+        by = ("by", "of the last amplitude", "of the largest", "of the time to the limit", "to margin 1")
         yield ResultTable("Derivatives", by, slopes)
 
 
