@@ -236,7 +236,7 @@ def transient(found: Json) -> Iterator[Block]:
 
 def wear_life(found: Json) -> Iterator[Block]:
     """What contacts lose over hours, and what the response comes to."""
-    hours, amplitude, pairs = found["hours"], found["amplitude"], []
+    hours, amplitude, pairs = found["hours"], found["amplitude"], _chosen(found.get("chosen"))
     where = "at the highest peak" if found["at_peak"] else "at given frequencies"
     if hours:
         for name, at in (("max|x| at the beginning", 0), (f"after {units.number(hours[-1])} h", -1)):
@@ -282,6 +282,19 @@ def wear_life(found: Json) -> Iterator[Block]:
         ]
         by = ("by", "of the last amplitude", "of the largest", "of the time to the limit", "to margin 1")
         yield ResultTable("Derivatives", by, slopes)
+
+
+def _chosen(found: Json | None) -> list[tuple[str, str]]:
+    """What was chosen for the life, and the worst amplitude with it."""
+    if found is None:
+        return []
+    if found["at"] is None:
+        return [("chosen", found["status"])]
+    worst = f"{units.length(found['worst'])} at worst, {units.length(found['first'])} when new"
+    return [
+        (found["parameter"], f"{units.number(found['at'], 6)} {found['unit']}".rstrip()),
+        ("chosen", worst),
+    ]
 
 
 def least_worn_peak(found: Json) -> Iterator[Block]:
