@@ -32,7 +32,6 @@ from solver.response.wear_measures import (
     friction_work,
     least_load,
     slip_travel,
-    stick_room,
 )
 from solver.results.told import Piece
 from solver.wording import listing
@@ -89,13 +88,6 @@ class WearPoint:
         """Return the distance a contact rubs in one period [m]."""
         found = slip_travel(self._cycle, self._at(contact), self._changes)
         return None if found is None else _measured(found)
-
-    def room(self, contact: str, mu: float, left: float, sign: float) -> Measured:
-        """Return how far a contact that sticks with a force `left` in it [N] stays below its limit [N].
-
-        In the direction `sign` of its friction force; `mu` is the limit's coefficient.
-        """
-        return _measured(stick_room(self._cycle, self._at(contact), self._changes, (mu, left, sign)))
 
     def shares(self, contact: str) -> Shares | None:
         """Return the shares of the period a contact spends in stick, slip and separation."""

@@ -181,31 +181,8 @@ def least_load(cycle: ContactCycle, e: int, changes: Sequence[Change]) -> tuple[
         return float(N[0] - swing), np.array(slopes)
     if not np.all(np.isfinite(N)):
         return math.nan, np.full(len(changes), math.nan)
-    at = fourier.basis(np.array([_lowest(N)]), cycle.top)[0]
+    at = fourier.basis(np.array([lowest(N)]), cycle.top)[0]
     return float(at @ N), np.array([float(at @ each) for each in dN])
-
-
-def stick_room(
-    cycle: ContactCycle, e: int, changes: Sequence[Change], held: tuple[float, float, float]
-) -> tuple[float, Real]:
-    """Return how far contact `e`, whose slider moves on a line and sticks, stays below its limit [N].
-
-    That is the least of μN − ±(kt u + s) over the period, below 0 beyond the limit, with its slopes at a
-    fixed s. `held` is the friction coefficient, s [N] and the sign.
-    """
-    mu, left, sign = held
-    port, kt = cycle.ports(e)[0], cycle.table[e, KT]
-    U = cycle.full(cycle.U[port])
-    room = mu * cycle.normal_load(e) - sign * kt * U
-    room[0] -= sign * left
-    if not np.all(np.isfinite(room)):
-        return math.nan, np.full(len(changes), math.nan)
-    at = fourier.basis(np.array([_lowest(room)]), cycle.top)[0]
-    slopes = [
-        at @ (mu * cycle.load_change(e, one) - sign * (kt * cycle.full(one.dU[port]) + one.row[e, KT] * U))
-        for one in changes
-    ]
-    return float(at @ room), np.array(slopes, dtype=np.float64)
 
 
 def slip_travel(cycle: ContactCycle, e: int, changes: Sequence[Change]) -> tuple[float, Real] | None:
@@ -267,7 +244,7 @@ def _slip_ends(found: Segments) -> _Ends:
     return _Ends(sign=table[:, 0], direction=table[:, 1], tau=table[:, 2], moves=table[:, 3] > 0.0)
 
 
-def _lowest(N: Real) -> float:
+def lowest(N: Real) -> float:
     """Return where a load with coefficients `N` is least [rad]."""
     top = (N.size - 1) // 2
     c, s = np.zeros(top + 1), np.zeros(top + 1)

@@ -211,21 +211,11 @@ class Sensitivities:
         SettingError
             As `hessian`.
         """
-        self.check_second()
-        check_loads(self.balance.system, self._parameters, self._slopes)
-        if self._seconds is None:
-            self._seconds = second_numbers(self.balance.scene)
-        system, workspace = self.balance.system, self._workspace
-        u, omega = np.ascontiguousarray(solution, dtype=np.float64), TWO_PI * at_hz
-        try:
-            motion = whole_motion(system, self._matrices, self._dampings, omega)
-            contacts = contact_forces(system, self._seconds, u)
-            along = self._directions()
-            found = self._responses(u, omega, motion, contacts, along)
-        except (np.linalg.LinAlgError, FloatingPointError):
-            found = None
-        if found is None:
+        everything = self._moved(solution, at_hz)
+        if everything is None:
             return no_hessian(len(self.paths))
+        motion, contacts, along, found = everything
+        system, workspace = self.balance.system, self._workspace
         U, F = contacts.U, contacts.F
         by_F, by_U = np.einsum("cij,cj->ci", pairing, U), np.einsum("cij,ci->cj", pairing, F)
         pull = -(by_U + contacts.times_transposed(by_F)).reshape(-1)
@@ -248,6 +238,31 @@ class Sensitivities:
             by_frequency_twice=float(twice[0, 0]) * TWO_PI**2, mixed=twice[0, 1:] * TWO_PI,
             hessian=twice[1:, 1:],
         )  # fmt: skip
+
+    def motions(self, solution: Real, at_hz: float) -> Real | None:
+        """Return the derivatives of all slip motions by ω [m s/rad] and by the paths, (1 + n_paths, nc, n).
+
+        None where the balance is singular; raises SettingError as `hessian`.
+        """
+        everything = self._moved(solution, at_hz)
+        return None if everything is None else everything[3].dU
+
+    def _moved(
+        self, solution: Real, at_hz: float
+    ) -> tuple[WholeMotion, ContactForces, Directions, Responses] | None:
+        """Return linear part, contacts and what ω and every path move; None where that is singular."""
+        self.check_second()
+        check_loads(self.balance.system, self._parameters, self._slopes)
+        if self._seconds is None:
+            self._seconds = second_numbers(self.balance.scene)
+        u, omega = np.ascontiguousarray(solution, dtype=np.float64), TWO_PI * at_hz
+        try:
+            motion = whole_motion(self.balance.system, self._matrices, self._dampings, omega)
+            contacts, along = contact_forces(self.balance.system, self._seconds, u), self._directions()
+            found = self._responses(u, omega, motion, contacts, along)
+        except (np.linalg.LinAlgError, FloatingPointError):
+            return None
+        return None if found is None else (motion, contacts, along, found)
 
     def check_second(self) -> None:
         """Raise SettingError where laws or paths have no exact second derivatives here."""

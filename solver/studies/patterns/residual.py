@@ -27,11 +27,13 @@ from solver.arrays import Real
 from solver.balance.balance import Balance, build
 from solver.balance.simplifications import Effects
 from solver.balance.workspace import Workspace
+from solver.jit import fourier
+from solver.linear.contact_table import port_counts
 from solver.response.contact_response import ContactState, contact_responses
 from solver.response.stability.residual_forces import LeftForces
-from solver.response.wear import WearSensitivity
+from solver.response.wear_measures import lowest
 from solver.results.told import Piece
-from solver.scene.scene import Scene
+from solver.scene.scene import AnyContact, Scene
 from solver.sensitivity.gradient import Sensitivities
 from solver.studies.blades import blade_paths, mistuned
 from solver.studies.patterns.climbing import Bounds
@@ -105,6 +107,7 @@ class ResidualSearch:
     ) -> None:  # fmt: skip
         (self._scene, self._rows), self._of, self._dof = blade_paths(scene, of), tuple(of), dof
         self._band, self._harmonics, self._go_on = band, harmonics, go_on
+        self._last: tuple[bytes, Scene] | None = None
 
     def worst(
         self, begins: Sequence[tuple[Real, float]], bounds: Bounds, tuned: float
@@ -145,20 +148,30 @@ class ResidualSearch:
             limits = np.array([_limit(annulus, i) for i in stuck])
             # A motion as far to both sides has a kink: hardly any force says which of them it looks at.
             aside = _ASIDE * limits * np.cos(np.arange(1.0, limits.size + 1.0))
+            here = self._judged(_Place(delta, aside, hertz), 0, stuck, u)
+            rooms = np.maximum(here.rooms.reshape(-1, 2), 0.0)
+            # d (kt u + s) / ds: a force s moves the mean.
+            carried = -here.room_slopes[::2, delta.size : -1]
+            left = LeftForces.of(annulus, stuck)
             for blade in range(delta.size):
-                here = self._judged(_Place(delta, aside, hertz), blade, stuck, u)
-                rooms = np.maximum(here.rooms.reshape(-1, 2), 0.0)
-                # d (kt u + s) / ds: a force s moves the mean.
-                carried = -here.room_slopes[::2, delta.size : -1]
-                up = np.linalg.solve(carried.T, here.slope[delta.size : -1]) >= 0.0
+                by_force = left.by_force(self._seen(_Place(delta, aside, hertz), blade, left, here.u)[1])
+                up = np.linalg.solve(carried.T, by_force) >= 0.0
                 for way in (up, ~up):
                     ends = np.where(way, rooms[:, 0], -rooms[:, 1])
-                    forces = np.asarray(np.linalg.solve(carried, ends), np.float64)
-                    place = _Place(delta, forces, hertz)
-                    found.append((self._judged(place, blade, stuck, here.u).value, blade, stuck, place))
+                    place = _Place(delta, np.asarray(np.linalg.solve(carried, ends), np.float64), hertz)
+                    found.append((self._seen(place, blade, left, here.u)[0], blade, stuck, place))
         except (_NoResponseError, np.linalg.LinAlgError):
             pass  # a climb from elsewhere may come by
         return found
+
+    def _seen(self, place: _Place, blade: int, left: LeftForces, guess: Real) -> tuple[float, Real]:
+        """Return the amplitude of a blade with forces left in its contacts, and its slopes by these loads."""
+        scene = left.on(self._annulus(place.delta, blade), place.forces)
+        workspace, u = self._solved(scene, place.hertz, guess)
+        found = Sensitivities(workspace.balance, left.paths).gradient(u, place.hertz)
+        if not math.isfinite(found.value) or not np.all(np.isfinite(found.by_parameters)):
+            raise _NoResponseError
+        return found.value, found.by_parameters
 
     def _ended(self, start: _Estimate, bounds: Bounds, tuned: float) -> ResidualPeak | None:
         """Return where a climb ends; it goes on where another blade or other forces there do better."""
@@ -240,7 +253,10 @@ class ResidualSearch:
 
     def _annulus(self, delta: Real, blade: int = 0) -> Scene:
         """Return the mistuned disk written out, one of its blades observed."""
-        disk = mistuned(self._scene, of=self._of, values=(1.0 + delta).tolist())
+        if self._last is None or self._last[0] != delta.tobytes():
+            values = (1.0 + delta).tolist()
+            self._last = delta.tobytes(), mistuned(self._scene, of=self._of, values=values)
+        disk = self._last[1]
         observe = disk.observe.model_copy(update={"dof": f"{self._dof}@{blade}", "measure": "max_abs"})
         return disk.model_copy(update={"observe": observe})
 
@@ -286,24 +302,46 @@ class ResidualSearch:
                 (own * moved).sum(axis=1), left.by_force(by_paths[len(parts) :]), [by_hertz]
             ])  # fmt: skip
 
-        amplitude = Sensitivities(workspace.balance, paths).gradient(u, place.hertz)
-        if not math.isfinite(amplitude.value) or not np.all(np.isfinite(amplitude.by_parameters)):
+        seen = Sensitivities(workspace.balance, paths)
+        amplitude, moves = seen.gradient(u, place.hertz), seen.motions(u, place.hertz)
+        if moves is None or not np.all(np.isfinite(amplitude.by_parameters)):
             raise _NoResponseError
-        wear = WearSensitivity(workspace.balance, paths).at(place.hertz, u)
+        ks, top = workspace.balance.system.ks, workspace.balance.highest_harmonic
+        ports = np.append(0, np.cumsum(port_counts(annulus)))
+        motions = fourier.to_full(np.concatenate([u.reshape(1, *moves.shape[1:]), moves]), ks, top)
         rooms, slopes = [], []
         for k, i in enumerate(stuck):
-            given = annulus.contacts[i]
-            mu = 0.0 if given.friction is None else given.friction.mu
+            own = motions[:, ports[i] : ports[i + 1]]
             for sign in (1.0, -1.0):
-                room = wear.room(given.name, mu, float(place.forces[k]), sign)
-                slope = by_place(room.gradient, room.by_frequency)
+                room, by = _room(annulus.contacts[i], own, float(place.forces[k]), sign)
+                slope = by_place(by[1:], TWO_PI * by[0])
                 slope[N + k] -= sign
-                rooms.append(room.value)
+                rooms.append(room)
                 slopes.append(slope)
         return _Judged(
             u, amplitude.value, by_place(amplitude.by_parameters, amplitude.by_frequency), np.array(rooms),
             np.array(slopes),
         )  # fmt: skip
+
+
+def _room(contact: AnyContact, motions: Real, left: float, sign: float) -> tuple[float, Real]:
+    """Return how far a contact that sticks stays below its limit [N], the least of μN − ±(kt u + s).
+
+    With its derivatives (P,) at a fixed s, of motions (1 + P, ports, 2H + 1), the first those themselves.
+    """
+    slider = contact.friction
+    if slider is None:
+        return math.inf, np.zeros(len(motions) - 1)
+    load = contact.normal_load(motions[0])
+    room = np.zeros(max(load.size, motions.shape[-1]))
+    room[: load.size] += slider.mu * load
+    room[: motions.shape[-1]] -= sign * slider.kt * motions[0, slider.ports[0]]
+    room[0] -= sign * left
+    at = fourier.basis(np.array([lowest(room)]), (room.size - 1) // 2)[0]
+    moved = -sign * slider.kt * motions[1:, slider.ports[0]]
+    if slider.normal_port is not None:
+        moved = moved + slider.mu * slider.normal_stiffness * motions[1:, slider.normal_port]
+    return float(at @ room), np.asarray(moved @ at[: motions.shape[-1]])
 
 
 def _height(estimate: _Estimate) -> float:
