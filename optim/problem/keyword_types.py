@@ -66,9 +66,6 @@ class DesignKeywords(ProblemKeywords, total=False):
     """How many local optima are looked for; 2."""
     tolerance: float | None
     """Relative error of the peak up to which a performance curve suffices; 0.05."""
-    options: Mapping[str, Mapping[str, float]] | None
-    """A catalogue: name to the values of each option that can be had, of which the best is looked for;
-    `variables` may then be empty."""
     max_band_hz: float | None
     """Largest width of the resonance band allowed [Hz]."""
     weights: Mapping[str, float] | None

@@ -59,7 +59,7 @@ STUDIES = {
             "scene": "two-dof", "from": 10, "to": 200, "limit": 2.0, "harmonics": 3, "points": 4,
             "dampers": {"light": {"damper.N0": 50}, "heavy": {"damper.N0": 200}},
         },
-        {"Stress over the excitation": "light heavy", "Share of what is allowed": "margin 1"},
+        {"Amplitude over the excitation": "light heavy", "Share of what is allowed": "margin 1"},
     ),
     "wear": (
         {
@@ -82,7 +82,7 @@ STUDIES = {
 @pytest.mark.parametrize("kind", STUDIES)
 def test_a_study_is_drawn(browser: Browser, site: Site, kind: str) -> None:
     body, drawings = STUDIES[kind]
-    job = httpx.post(f"{site.url}/v1/jobs", json={"kind": kind, **body}).json()
+    job = httpx.post(f"{site.url}/v1/jobs", json={"kind": kind, **body}, timeout=120).json()
     with opened(browser, site) as (context, _):
         page = context.new_page()
         page.goto(f"{site.url}/?scene={body['scene']}&tab=runs&{kind}={job['id']}")

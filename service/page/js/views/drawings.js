@@ -15,17 +15,23 @@ function scaled(rows, unit) {
   return { name: scale.name, factor: scale.perMetre, unit: scale };
 }
 
+// A curve with the excitation that is allowed among its points.
+function through(x, y, one, of) {
+  const after = one.allowed === null ? -1 : x.findIndex((level) => level > one.allowed);
+  return after < 0 ? { x, y } : { x: x.toSpliced(after, 0, one.allowed), y: y.toSpliced(after, 0, of(one)) };
+}
+
 // Stress over the excitation of several dampers, and its share of what is allowed.
 function margin(result) {
   const { name, factor, unit } = scaled(result.stress, result.unit);
   const what = result.judged_by === "utilisation" ? "alternating stress" : "amplitude";
   const x = { name: `excitation [${result.level_unit}]`, log: true };
-  const lines = (rows, by) => rows.map((row, i) => ({ name: result.allowed[i].name, x: result.level, y: row.map(times(by)), colour: colour(i), shape: "circle", size: 2.4 }));
+  const lines = (rows, by, of) => rows.map((row, i) => ({ name: result.allowed[i].name, ...through(result.level, row.map(times(by)), result.allowed[i], of), colour: colour(i), shape: "circle", size: 2.4 }));
   const marks = result.allowed.flatMap((one, i) => (one.allowed === null ? [] : [{ ...one, colour: colour(i) }]));
   const drawings = [{
-    label: "Stress over the excitation", file: "margin",
+    label: `${what[0].toUpperCase()}${what.slice(1)} over the excitation`, file: "margin",
     draw: {
-      x, y: { name: `${what} [${name}]`, unit, zero: true, low: 0, pad: 0.08 }, series: lines(result.stress, factor),
+      x, y: { name: `${what} [${name}]`, unit, zero: true, low: 0, pad: 0.08 }, series: lines(result.stress, factor, (one) => one.value * factor),
       marks: marks.map((one) => ({ x: one.allowed, y: one.value * factor, colour: one.colour })),
     },
   }];
@@ -33,7 +39,7 @@ function margin(result) {
   return [...drawings, {
     label: "Share of what is allowed", file: "margin-used",
     draw: {
-      x, y: { name: "share of what is allowed", low: 0, high: Math.min(Math.max(...known(result.used), 1.1), 3) }, series: lines(result.used, 1),
+      x, y: { name: "share of what is allowed", low: 0, high: Math.min(Math.max(...known(result.used), 1.1), 3) }, series: lines(result.used, 1, () => 1),
       limits: [{ y: 1, name: "margin 1" }],
       marks: marks.map((one) => ({ x: one.allowed, y: 1, colour: one.colour, text: `${number(one.allowed, 4)} ${result.level_unit}` })),
     },
