@@ -8,6 +8,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from mistuned_cases import disk as friction_disk
 
 import optim
 import solver
@@ -165,6 +166,83 @@ def test_slopes_by_design_and_by_uncertainty_are_those_of_differences() -> None:
     for name, gradient in zip(variables, here.rows[0].gradient, strict=True):
         central = difference(lambda h: peak({**values, name: values[name] + h}, xi), 1e-3 * values[name])  # noqa: B023
         assert gradient == pytest.approx(central, rel=1e-6)
+
+
+def test_slopes_by_the_factors_of_free_blades_are_those_of_differences() -> None:
+    scene = friction_disk(sectors=3)
+    problem = pose(scene, variables={"shroud.N0": (10.0, 80.0)}, harmonics=3)
+    over = read_uncertain(
+        scene, problem.variables,
+        {"shroud.mu": [0.2, 0.4], "mistuning": {"of": ["root", "blade_mass"], "within": 0.05}},
+    )  # fmt: skip
+    xi, values = np.array([0.3, -0.4, 0.5, 0.2]), {"shroud.N0": 40.0}
+    here = outcome(problem, values, over.scenario(xi))
+    assert here.scenario.disk is not None
+    assert here.scenario.disk.values == pytest.approx(1.0 + 0.05 * xi[1:])
+    # Every blade is judged as it is in the same disk written out.
+    written = solver.mistuned(
+        scene.with_values({**values, "shroud.mu": 0.33}),
+        of=["root", "blade_mass"],
+        values=1.0 + 0.05 * xi[1:],
+    )
+    blades = solver.blade_peaks(written, dof="blade", harmonics=3)
+    for j in range(3):
+        mine = [row.value for row in here.rows if row.quantity is PEAK and f"blade@{j}" in row.case]
+        assert max(mine) == pytest.approx(blades.value[j], rel=1e-9)
+
+    def peak(place: np.ndarray, load: float = 40.0) -> float:
+        rows = outcome(problem, {"shroud.N0": load}, over.scenario(place), gradients=False).rows
+        return max(row.value for row in rows if row.quantity is PEAK)
+
+    top = max((row for row in here.rows if row.quantity is PEAK), key=lambda row: row.value)
+    slopes = over.by_xi(here.by_delta[here.rows.index(top)])
+    along = np.array([0.4, -0.5, 0.3, 0.7])
+    along_load = 4.0
+    slope = slopes @ along + along_load * top.gradient[0]
+    central = difference(lambda h: peak(xi + h * along, 40.0 + h * along_load), 4e-3)
+    assert slope == pytest.approx(central, rel=1e-5)
+
+
+@pytest.mark.long
+def test_no_mistuning_of_a_grid_is_worse_than_the_worst_case() -> None:
+    scene, bounds = friction_disk(sectors=3), {"shroud.N0": (40.0, 400.0)}
+    result = optim.robust_design(
+        scene,
+        uncertain={"mistuning": {"of": "root", "within": 0.03}},
+        variables=bounds,
+        harmonics=3,
+        samples=4,
+    )
+    assert result.status is RobustStatus.OPTIMAL
+    assert result.gap <= 1e-6
+    assert result.robust is not None
+    load = result.optimum["shroud.N0"]
+
+    def worst(load: float, factors: np.ndarray) -> float:
+        there = scene.with_values({"shroud.N0": load})
+        disks = (
+            solver.mistuned(there, of="root", values=one) for one in itertools.product(factors, repeat=3)
+        )
+        return max(
+            solver.blade_peaks(one, dof="blade", harmonics=3, every_branch=False).largest for one in disks
+        )
+
+    assert worst(load, np.linspace(0.97, 1.03, 5)) <= result.robust.worst_peak * (1.0 + 1e-6)
+    for factor in (0.9, 0.97, 1.03, 1.1):
+        assert worst(factor * load, np.array([0.97, 1.0, 1.03])) >= result.robust.worst_peak * (1.0 - 1e-6)
+    # The worst scenario in time, with more than three harmonics: the march of the whole annulus.
+    row = result.robust.worst
+    assert row is not None
+    assert row.scenario.disk is not None
+    written = solver.mistuned(
+        scene.with_values({"shroud.N0": load}), of="root", values=row.scenario.disk.values
+    )
+    peak = row.highest(PEAK)
+    assert peak is not None
+    raw = written.to_dict()
+    raw["observe"]["dof"] = peak.case.rpartition(" ")[2]  # type: ignore[index]
+    marched = solver.march(solver.Scene.from_dict(raw), frequency_hz=peak.at_hz)
+    assert marched.max_abs == pytest.approx(peak.value, rel=0.01)
 
 
 def difference(f: Callable[[float], float], h: float) -> float:

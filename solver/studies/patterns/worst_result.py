@@ -11,6 +11,7 @@ from solver.arrays import FloatOrNaN
 from solver.results.base import Drawn
 from solver.results.told import Piece
 from solver.results.views import Data, Views
+from solver.studies.patterns.residual import ResidualPeak
 
 
 class WorstMistuningStatus(Enum):
@@ -67,8 +68,8 @@ class WorstMistuning(Drawn):
         index="sector",
     )  # fmt: skip
     JSON: ClassVar = (
-        "scene dof of within rms detuning contacts tuned_peak tuned_at_hz worst whitehead martel power_bound"
-        " starts climbs alike climbed patterns best n_harmonics seconds completed=reached status"
+        "scene dof of within rms detuning contacts tuned_peak tuned_at_hz worst residual whitehead martel"
+        " power_bound starts climbs alike climbed patterns best n_harmonics seconds completed=reached status"
     )
 
     scene: Annotated[str, "Its name."]
@@ -77,10 +78,15 @@ class WorstMistuning(Drawn):
     within: Annotated[float, "Largest deviation of a factor."]
     rms: Annotated[float | None, "Largest root mean square of the deviations; none."]
     detuning: Annotated[float, "Deviation of the first and (negative) the last blade type of patterns."]
-    contacts: Annotated[str, "How they count: solved, stuck or open."]
+    contacts: Annotated[str, "How they count: solved, stuck, open or residual."]
     tuned_peak: Annotated[FloatOrNaN, "Highest peak of the tuned disk [m]."]
     tuned_at_hz: Annotated[FloatOrNaN, "Where [Hz]."]
     worst: Annotated[PatternPeak | None, "The worst pattern found."]
+    residual: Annotated[
+        ResidualPeak | None,
+        "The largest amplitude over factors, frequency and the forces that contacts which stick may hold; "
+        "none if it was not asked for, or no contact sticks.",
+    ] = None
     whitehead: Annotated[float, "Whitehead's bound of the magnification, (1 + √N)/2."]
     martel: Annotated[
         FloatOrNaN, "Martel's bound, with the damping of every nodal diameter; unknown where there is none."

@@ -236,7 +236,7 @@ def transient(found: Json) -> Iterator[Block]:
 
 def wear_life(found: Json) -> Iterator[Block]:
     """What contacts lose over hours, and what the response comes to."""
-    hours, amplitude, pairs = found["hours"], found["amplitude"], []
+    hours, amplitude, pairs = found["hours"], found["amplitude"], _chosen(found.get("chosen"))
     where = "at the highest peak" if found["at_peak"] else "at given frequencies"
     if hours:
         for name, at in (("max|x| at the beginning", 0), (f"after {units.number(hours[-1])} h", -1)):
@@ -250,6 +250,12 @@ def wear_life(found: Json) -> Iterator[Block]:
         met = found["hours_to_limit"]
         said = "not reached" if met is None else f"reached after {units.number(met)} h"
         pairs.append((f"limit {units.length(found['limit'])}", said))
+    used = [one for one in found.get("used", ()) if one is not None]
+    if used:
+        met = found["hours_to_margin"]
+        share = f"{units.number(used[0], 4)} at the beginning, {units.number(used[-1], 4)} at the end"
+        pairs.append(("of the stress allowed", share))
+        pairs.append(("margin 1", "kept" if met is None else f"reached after {units.number(met)} h"))
     for one in found["switches"]:
         pairs.append(("another peak is highest", f"from {units.number(one)} h on"))
     if found["ended_by"]:
@@ -269,13 +275,26 @@ def wear_life(found: Json) -> Iterator[Block]:
         heads = ("contact", "depth", "load at first", "at last", "power at first", "at last")
         yield ResultTable("Contacts", heads, rows)
     if found["paths"]:
-        columns = [found[f"{name}_slopes"] for name in ("end", "highest", "limit")]
+        columns = [found[f"{name}_slopes"] for name in ("end", "highest", "limit", "margin")]
         slopes = [
             (path, *("" if one is None else f"{one:.6g}" for one in each))
             for path, *each in zip(found["paths"], *columns, strict=True)
         ]
-        by = ("by", "of the last amplitude", "of the largest", "of the time to the limit")
+        by = ("by", "of the last amplitude", "of the largest", "of the time to the limit", "to margin 1")
         yield ResultTable("Derivatives", by, slopes)
+
+
+def _chosen(found: Json | None) -> list[tuple[str, str]]:
+    """What was chosen for the life, and the worst amplitude with it."""
+    if found is None:
+        return []
+    if found["at"] is None:
+        return [("chosen", found["status"])]
+    worst = f"{units.length(found['worst'])} at worst, {units.length(found['first'])} when new"
+    return [
+        (found["parameter"], f"{units.number(found['at'], 6)} {found['unit']}".rstrip()),
+        ("chosen", worst),
+    ]
 
 
 def least_worn_peak(found: Json) -> Iterator[Block]:

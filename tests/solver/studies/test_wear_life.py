@@ -309,3 +309,35 @@ def test_a_life_that_is_stopped_has_what_was_followed() -> None:
     assert later.status is WearLifeStatus.STOPPED
     assert 0.0 < later.hours[-1] < 0.1 / FADE
     assert math.isnan(at_once.highest)
+
+
+@pytest.mark.parametrize("running", [{}, {"frequency_hz": 1.05}], ids=["peak", "frequency"])
+def test_margin_1_is_reached_when_the_stress_of_the_amplitude_is(running: dict[str, float]) -> None:
+    """Of a motion without a mean the stress is a factor times the amplitude, and its limit an amplitude."""
+    plain = _oscillator(30.0)
+    wear, mission = (
+        WearLaw({"damper": COEFFICIENT}, {"damper": AREA}, {"damper": LOSS}),
+        Mission(6.0, **running),
+    )
+    life = wear_life(plain, mission, wear, harmonics=3, points=5, paths=("damper.N0",))
+    assert life.amplitude[-1] > 1.02 * life.amplitude[0]
+    limit = 0.5 * float(life.amplitude[0] + life.amplitude[-1])
+    goodman, static = 500.0, 100.0  # MPa: a fifth of the fatigue strength goes to the static stress
+    strength = 2e8 * limit / (1.0 - static / goodman) * 1e-6
+    judged = Scene.from_dict(
+        plain.to_dict()
+        | {
+            "recovery": [
+                {"name": "root", "unit": "MPa", "terms": {"x": 200.0}, "static": static, "material": "steel"}
+            ],
+            "materials": [
+                {"name": "steel", "fatigue_strength": strength * 1e6, "ultimate_strength": goodman * 1e6}
+            ],
+        }
+    )
+    found = wear_life(judged, mission, wear, limit=limit, harmonics=3, points=5, paths=("damper.N0",))
+    assert found.used == pytest.approx(found.amplitude / limit, rel=1e-8)
+    assert found.hours_to_margin == pytest.approx(found.hours_to_limit, rel=1e-7)
+    assert found.margin_slopes[0] == pytest.approx(found.limit_slopes[0], rel=1e-6)
+    assert np.isnan(life.used).all()
+    assert math.isnan(life.hours_to_margin)
