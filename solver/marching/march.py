@@ -23,7 +23,7 @@ from solver.marching.contacts import as_sparse, rows
 from solver.marching.equations import MarchEquations, equations_of_motion
 from solver.marching.kernels import state as kernel
 from solver.marching.kernels import taylor as stepping
-from solver.marching.result import MarchResult, MarchStatus, describe
+from solver.marching.result import MarchResult, MarchStatus, describe, of_harmonic
 from solver.marching.start import MarchStart, state_at
 from solver.results.watch import shows_progress
 from solver.scene.cyclic.annulus import annulus
@@ -147,6 +147,8 @@ def march(
         found = _twice_rigid(plan, equations, begins, steps, names, frequency_hz)
     else:
         found = _twice(plan, begins, steps, names, frequency_hz)
+    if scene.observe.harmonic is not None:
+        found = of_harmonic(found, scene.observe.harmonic)
     return replace(found, seconds=time.perf_counter() - begin)
 
 

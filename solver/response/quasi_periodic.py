@@ -164,6 +164,7 @@ def check(
     """Raise SettingError for what cannot be solved."""
     check_frequency("frequency_hz", frequency_hz)
     check_frequency("second_hz", second_hz)
+    scene.observe.check_whole("a response to two frequencies")
     if frequency_hz == second_hz:
         raise SettingError("second_hz", second_hz, "must differ from `frequency_hz`")
     if scene.rigid_contact is not None:
