@@ -31,6 +31,7 @@ from solver.scene.scene import Excitation, Scene
 
 FloatArray = NDArray[np.float64]
 LEAST_STEPS = 64
+RESOLVED = 0.375  # rad, turn of the fastest motion in a step of the finer of two runs
 FINER = 8  # times the least steps, where steps are of a lower order
 MOST_STEPS = 1_000_000
 PERIODS = 20_000  # at most, for each step size
@@ -240,14 +241,15 @@ def _check(frequency_hz: float, tolerance: float, max_periods: int) -> None:
 
 
 def steps_for(
-    system: kernel.System, forces: tuple[Excitation, ...], wanted: int | None, least: int = 0
-) -> int:
-    """Steps of the finer run: the fastest motion turns less than 0.375 rad in one of them."""
+    system: kernel.System, forces: tuple[Excitation, ...], wanted: int | None, least: int = 0,
+    turn: float = RESOLVED,
+) -> int:  # fmt: skip
+    """Steps of the finer run: the fastest motion turns less than `turn` in one of them [rad]."""
     full = system.W.value.size > system.W.start.size - 1 or bool(np.any(np.abs(system.L.value) != 1.0))
     turns = 2.0 * math.pi * _fastest(system, BALANCING if full else 1)
     load = int(np.max(np.nonzero(system.waves)[1], initial=0)) + 1
     harmonic = max(load, *(force.harmonic for force in forces))
-    least = max(least, LEAST_STEPS, 2 * math.ceil(turns / 1.5), 16 * harmonic)
+    least = max(least, LEAST_STEPS, 2 * math.ceil(0.25 * turns / turn), 16 * harmonic)
     finer = 2 if order_of(system) == kernel.ORDER else FINER
     chosen = max(2 * LEAST_STEPS, finer * least) if wanted is None else wanted
     if isinstance(chosen, Integral) and chosen % 2 == 0 and least <= chosen <= MOST_STEPS:

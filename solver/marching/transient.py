@@ -18,7 +18,7 @@ from solver.errors import SettingError
 from solver.marching.equations import MarchEquations, equations_of_motion
 from solver.marching.kernels import state as kernel
 from solver.marching.kernels import taylor as stepping
-from solver.marching.march import copied, order_of, row_names, settled_state, steps_for, whole
+from solver.marching.march import RESOLVED, copied, order_of, row_names, settled_state, steps_for, whole
 from solver.marching.ramp import Ramp, check, equations_over
 from solver.marching.result import MarchStatus, turning_points
 from solver.marching.start import MarchStart, state_at
@@ -33,6 +33,9 @@ FINEST = 5  # times that steps are halved to meet the tolerance
 SETTLED = 1e-10  # relative change over a period at the first frequency
 _CHUNK = 16_384  # steps between two looks at progress and stop
 _BETWEEN_SAMPLES = 4  # order of the cubics between samples
+# rad, turn of the fastest motion in the finer of the first two runs, the series being stable up to 3.4: what
+# motions as fast as that do to the largest amplitude is for the runs with finer steps to say.
+_STABLE = 1.5
 _SHARE = 0.5  # of what is left, that one more run with finer steps counts as
 _STATUS = {kernel.CHATTER: TransientStatus.CHATTER, kernel.NOT_FINITE: TransientStatus.NOT_FINITE}
 
@@ -156,7 +159,9 @@ class _Passage:
         if self.scene.speed_order is not None and first.end_hz != first.begin_hz:
             there = whole(self.scene.at_frequency(first.end_hz))
             systems.append(equations_of_motion(there, self.omega).system)
-        steps = max(steps_for(system, self.scene.forces, wanted) for system in systems)
+        fine = self.order == _BETWEEN_SAMPLES
+        turn = _STABLE if fine else RESOLVED
+        steps = max(steps_for(system, self.scene.forces, wanted, turn=turn) for system in systems)
         if steps * self.periods > MOST_STEPS:
             most = MOST_STEPS / steps / self.periods
             wanted_seconds = (
