@@ -230,7 +230,7 @@ def _system(
         shift=reduced.shift, leading=reduced.leading, span=reduced.span, loose=reduced.loose, hold=0,
         kind=parameter.code, omega=omega,
         level_reference=_level(scene), phase_reference=scene.value("excitation.phase"),
-        centred=int(scene.observe.centred), only=-1 if scene.observe.harmonic is None else scene.observe.harmonic,
+        centred=int(scene.observe.centred), only=scene.observe.harmonic or -1,
         haigh=np.zeros(4),
         parameter_reference=scene.value(parameter.path) if derivative is not None else 0.0,
         form=reduced.form, eigenvalues=reduced.eigenvalues, dampings=reduced.dampings,

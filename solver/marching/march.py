@@ -164,22 +164,24 @@ def row_names(scene: Scene) -> tuple[str, ...]:
 
 
 def settled_state(
-    scene: Scene, frequency_hz: float, tolerance: float, should_stop: Callable[[], bool] | None
-) -> tuple[kernel.State, MarchStatus]:
+    scene: Scene, equations: MarchEquations, frequency_hz: float, tolerance: float,
+    should_stop: Callable[[], bool] | None, turn: float = RESOLVED,
+) -> tuple[kernel.State, MarchStatus]:  # fmt: skip
     """March a scene as its annulus, without rigid contacts, from rest until it repeats.
+
+    `turn` is that of the fastest motion in a step [rad].
 
     Returns
     -------
     The state at the angle 0, velocities by that angle, and how the march ended.
     """
     omega = 2.0 * math.pi * frequency_hz
-    equations = equations_of_motion(scene, omega)
     plan = _Plan(
         system=equations.system, dof=equations.observed, tolerance=tolerance, max_periods=PERIODS,
         on_progress=None, should_stop=should_stop,
     )  # fmt: skip
     begins = state_at(equations, MarchStart(), row_names(scene), omega)
-    run = _run(plan, begins, steps_for(equations.system, scene.forces, None), done=0)
+    run = _run(plan, begins, steps_for(equations.system, scene.forces, None, turn=turn), done=0)
     return run.state, run.status
 
 

@@ -199,7 +199,7 @@ class Observe(Part):
     ] = "max_abs"
     harmonic: Annotated[
         Annotated[int, Field(strict=True, ge=1, le=1000)] | None,
-        "Measure this harmonic of the motion alone: amplitudes, peaks and limits are then of it, and a peak of "
+        "Measure this harmonic of the motion alone: amplitudes, peaks and limits are then of it; a peak of "
         "a harmonic above the excitation's is a superharmonic resonance.",
     ] = None
     band: Annotated[tuple[Positive, Positive], "Frequencies of interest [low, high] [Hz]."]

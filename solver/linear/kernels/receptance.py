@@ -127,7 +127,7 @@ def observer_receptance(system: System, p: float, out: Receptance) -> None:
 
 @compiled
 def scale_driven(system: System, p: float, out: Receptance) -> None:
-    """Multiply the motions under the unit excitation by its level and phase; what is not measured is 0."""
+    """Multiply motions under the unit excitation by its level and phase; what is not measured is 0."""
     for k in range(system.ks.size):
         f, df = excitation(system, p, system.ks[k])
         out.x_linear[1, k] = f * out.x_linear[1, k] + df * out.x_linear[0, k]

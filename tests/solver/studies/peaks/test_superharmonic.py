@@ -38,7 +38,7 @@ def oscillator(contact: dict[str, Any], k: float, c: float, force: float, harmon
 
 
 def jenkins(force: float, harmonic: int | None = 3) -> Scene:
-    """The SDOF of tests/test_vprnm.py of tmdsimpy 17d5fc3: m = 1, c = 0.01, k = 0.75, kt = 0.25, limit 0.2."""
+    """Of tests/test_vprnm.py of tmdsimpy 17d5fc3: m = 1, c = 0.01, k = 0.75, kt = 0.25, limit 0.2."""
     return oscillator({"kt": 0.25, "mu": 1.0, "N0": 0.2}, 0.75, 0.01, force, harmonic)
 
 
