@@ -1,8 +1,8 @@
 """The equations of a march in the modes of its structure: full matrices become diagonal ones.
 
-x = V q with Vᵀ M V = 1 makes of x'' = W (f − Lᵀ F) − A x − B x' rows q'' = Vᵀ f − (L V)ᵀ F − Λ q − D q'. A force
-acts on all modes: its DOF stays as a coordinate that never moves, whose pull goes to the modes. What is
-observed is a sum of modes, one more coordinate.
+x = V q with Vᵀ M V = 1 makes of x'' = W (f − Lᵀ F) − A x − B x' the rows
+q'' = Vᵀ f − (L V)ᵀ F − Λ q − D q'. A force acts on all modes: its DOF stays as a coordinate that never moves,
+whose pull goes to the modes. What is observed is a sum of modes, one more coordinate.
 """
 
 from __future__ import annotations

@@ -140,7 +140,7 @@ def scale_driven(system: System, p: float, out: Receptance) -> None:
 
 @compiled
 def measure_only(system: System, out: Any) -> None:
-    """Leave no way from the forces of other harmonics to the observed DOF than of the one that is measured."""
+    """Leave no way to the observed DOF but for the forces of the harmonic that is measured."""
     if system.only < 0:
         return
     for k in range(system.ks.size):
