@@ -50,6 +50,7 @@ from .modes.results import (
     PhaseResonance as PhaseResonance,
 )
 from .response.power_balance import PowerBalance as PowerBalance, power_balance as power_balance
+from .response.quasi_periodic import quasi_periodic as quasi_periodic
 from .response.solution import Solution as Solution, SolutionStatus as SolutionStatus
 from .response.solve import solve as solve
 from .response.stability.all_solutions import (

@@ -31,6 +31,7 @@ def test_a_kind_without_a_view_has_a_form_and_a_result(browser: Browser, site: S
             "controlled",
             "sensitivities",
             "transient",
+            "quasi-periodic",
             "wear",
             "distortion",
         }

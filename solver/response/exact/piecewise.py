@@ -100,6 +100,7 @@ class Piecewise:
     """
 
     def __init__(self, scene: Scene, omega: float) -> None:
+        scene.observe.check_whole("an exact orbit")
         model = linear_model(scene)
         check_structure(scene, model)
         self.scene, self.omega, self.n = scene, omega, model.n_coordinates

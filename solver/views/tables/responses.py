@@ -334,3 +334,27 @@ def _band(found: Json) -> str:
     above = f"{units.number(found['band_hz'])} Hz above {units.length(found['band_limit'])}"
     intervals = [f"{low:.6g} to {high:.6g}" for low, high in found["band_intervals_hz"]]
     return f"{above}: {', '.join(intervals)}" if intervals else above
+
+
+def quasi_periodic(found: Json) -> Iterator[Block]:
+    """What the response to two base frequencies is."""
+    first, second = units.number(found["frequency_hz"]), units.number(found["second_hz"])
+    pairs = []
+    if found["max_abs"] is not None:
+        pairs += [
+            ("max|x|", units.length(found["max_abs"])),
+            ("half peak to peak", units.length(found["half_peak_to_peak"])),
+            ("root mean square", units.length(found["rms"])),
+            (f"amplitude at {first} Hz", units.length(found["first_amplitude"])),
+            (f"amplitude at {second} Hz", units.length(found["second_amplitude"])),
+        ]
+        if found["error_estimate"] is not None:
+            pairs.append(
+                ("estimated error", f"{found['error_estimate'] / found['half_peak_to_peak']:.1e} of it")
+            )
+        between = " and ".join(f"{p} : {q}" for p, q in found["turns"])
+        pairs.append(("repeats after turns" if found["repeats"] else "between turns", between))
+    pairs += [(name, state) for name, state in found["contacts"].items()]
+    pairs += [("flags", ", ".join(found["flags"]))] if found["flags"] else []
+    pairs.append(("time", units.duration(found["seconds"])))
+    yield Summary(f"{found['scene']} at {first} and {second} Hz", pairs)
