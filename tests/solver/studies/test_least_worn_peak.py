@@ -20,7 +20,7 @@ GIVEN: dict[str, Any] = {"harmonics": 3}
 
 
 def _best(low: float = 90.0, high: float = 300.0, **more: Any) -> LeastWornPeak:
-    given = {**GIVEN, "looks": 4, **more}
+    given = {**GIVEN, "looks": 3, **more}
     return least_worn_peak(SCENE, LOAD, low, high, Mission(given.pop("hours", HOURS)), WEAR, **given)
 
 
