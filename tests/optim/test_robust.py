@@ -26,9 +26,10 @@ from solver.continuation.branches.observation import observing
 N0 = {"damper.N0": (60.0, 300.0)}
 KT_AND_MU = {"damper.kt": {"deviation": 0.2}, "damper.mu": [0.2, 0.4]}
 TWO = solver.load_scene("two-dof")
+HARMONICS = 5
 
 
-def peak_at(values: dict[str, float], harmonics: int = 11) -> float:
+def peak_at(values: dict[str, float], harmonics: int = HARMONICS) -> float:
     """The highest peak with some values of the scene, by a sweep."""
     branch = solver.sweep(TWO.with_values(values), harmonics=harmonics)
     assert branch.peak is not None
@@ -37,7 +38,7 @@ def peak_at(values: dict[str, float], harmonics: int = 11) -> float:
 
 @cache
 def worst_case() -> optim.RobustResult:
-    return optim.robust_design(TWO, uncertain=KT_AND_MU, variables=N0, samples=12)
+    return optim.robust_design(TWO, uncertain=KT_AND_MU, variables=N0, samples=12, harmonics=HARMONICS)
 
 
 def test_the_worst_case_is_that_of_a_grid_over_the_intervals() -> None:
@@ -79,7 +80,9 @@ def test_the_robust_optimum_stands_beside_the_nominal_one() -> None:
 
 @pytest.mark.long
 def test_a_load_that_is_only_met_within_ten_per_cent() -> None:
-    result = optim.robust_design(TWO, uncertain={"damper.N0": {"deviation": 0.1}}, variables=N0, samples=4)
+    result = optim.robust_design(
+        TWO, uncertain={"damper.N0": {"deviation": 0.1}}, variables=N0, samples=4, harmonics=HARMONICS
+    )
     assert result.status is RobustStatus.OPTIMAL
     ends = [peak_at({"damper.N0": result.optimum["damper.N0"] * share}) for share in np.linspace(0.9, 1.1, 9)]
     assert result.objective == pytest.approx(max(ends), rel=1e-6)
@@ -90,16 +93,16 @@ def test_a_load_that_is_only_met_within_ten_per_cent() -> None:
 
 def test_the_worst_of_an_ellipsoid_lies_on_its_edge() -> None:
     half_axes = {"damper.kt": 0.2, "damper.mu": 0.3}
-    problem = pose(TWO, variables=N0)
+    problem = pose(TWO, variables=N0, harmonics=HARMONICS)
     over = read_uncertain(TWO, problem.variables, {"half_axes": half_axes, "relative": True})
     values = {"damper.N0": 105.0}
     aspect = Aspect(quantity=PEAK, limited=False)
     found = pessimise(lambda scenario: outcome(problem, values, scenario), over, aspect, ())
     around = [
         peak_at({"damper.N0": 105.0, "damper.kt": 30.0 * (1 + 0.2 * x), "damper.mu": 0.3 * (1 + 0.3 * y)})
-        for x, y in ((math.cos(t), math.sin(t)) for t in np.linspace(0.0, 2.0 * math.pi, 48))
+        for x, y in ((math.cos(t), math.sin(t)) for t in np.linspace(0.0, 2.0 * math.pi, 24))
     ]
-    assert max(around) <= found.value <= max(around) * (1.0 + 1e-3)
+    assert max(around) <= found.value <= max(around) * (1.0 + 4e-3)
     assert np.linalg.norm(found.worst.scenario.xi) == pytest.approx(1.0, abs=1e-6)
 
 
@@ -107,7 +110,7 @@ def test_the_worst_of_samples_is_the_worst_of_them() -> None:
     samples = [
         {"damper.mu": mu, "damper.N0": {"deviation": d}} for mu, d in ((0.2, 0.1), (0.3, 0.0), (0.4, -0.1))
     ]
-    result = optim.robust_design(TWO, uncertain=samples, variables=N0)
+    result = optim.robust_design(TWO, uncertain=samples, variables=N0, harmonics=HARMONICS)
     assert result.status is RobustStatus.OPTIMAL
     each = [
         peak_at({"damper.mu": mu, "damper.N0": result.optimum["damper.N0"] * (1.0 + d)})
@@ -122,7 +125,7 @@ def test_the_worst_of_samples_is_the_worst_of_them() -> None:
 @pytest.mark.parametrize("aim", ["mean", "quantile"])
 def test_mean_and_quantile_are_those_of_the_samples_and_least(aim: str) -> None:
     result = optim.robust_design(
-        TWO, uncertain=KT_AND_MU, variables=N0, aim=aim, quantile=0.75, samples=6, seed=3, harmonics=5
+        TWO, uncertain=KT_AND_MU, variables=N0, aim=aim, quantile=0.75, samples=6, seed=3, harmonics=HARMONICS
     )
     assert result.status is RobustStatus.OPTIMAL
     problem = pose(TWO, variables=N0)
@@ -133,7 +136,7 @@ def test_mean_and_quantile_are_those_of_the_samples_and_least(aim: str) -> None:
         for scenario in drawn:
             (kt, by_kt), (mu, value) = scenario.settings
             values = {"damper.N0": load, "damper.kt": 30.0 * (1.0 + by_kt), "damper.mu": value}
-            peaks.append(peak_at(values, harmonics=5))
+            peaks.append(peak_at(values))
             assert (kt.name, mu.name) == ("damper.kt", "damper.mu")
         return float(np.mean(peaks)) if aim == "mean" else sorted(peaks)[4]
 

@@ -150,9 +150,9 @@ def _slopes(found: WearLife) -> np.ndarray:
 
 @pytest.mark.parametrize(
     ("seed", "at_peak"),
-    [(3, True), (0, False),
+    [(3, True),
      *(pytest.param(seed, True, marks=pytest.mark.long) for seed in (0, 1, 2, 4, 5, 6, 7, 8)),
-     *(pytest.param(seed, False, marks=pytest.mark.long) for seed in (1, 5))],
+     *(pytest.param(seed, False, marks=pytest.mark.long) for seed in (0, 1, 5))],
 )  # fmt: skip
 def test_derivatives_are_those_of_the_whole_life(seed: int, at_peak: bool) -> None:
     scene, hertz, _ = random_scene(seed)
@@ -283,6 +283,7 @@ def test_rigid_contacts_and_structures_without_friction_are_refused() -> None:
         _run(_oscillator(5.0, law="dahl", sigma=25.0, limit=2.0), 1.0, load_loss_per_depth=None)
 
 
+@pytest.mark.few(keep=("shroud-3d",))
 @pytest.mark.parametrize("name", ["platform-wedge", "shroud-3d"])
 def test_faces_of_a_shape_wear_by_their_normal_stiffness(name: str) -> None:
     scene = load_scene(name)
