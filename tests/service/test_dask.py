@@ -141,7 +141,7 @@ def threads_idle(service: EmbeddedService) -> bool:
 
 
 @pytest.mark.few(2)
-@pytest.mark.parametrize("kinds", [("sweep", "mistuning", "march"), tuple(BODIES)], ids=["three", "all"])
+@pytest.mark.parametrize("kinds", [("sweep", "mistuning"), tuple(BODIES)], ids=["two", "all"])
 def test_every_kind_gives_what_it_gives_here(
     service: tuple[EmbeddedService, DaskCluster], kinds: tuple[str, ...]
 ) -> None:
