@@ -142,6 +142,7 @@ from .studies.patterns.worst import worst_mistuning as worst_mistuning
 from .studies.patterns.worst_result import (
     IntentionalPattern as IntentionalPattern,
     PatternPeak as PatternPeak,
+    ResidualPeak as ResidualPeak,
     WorstMistuning as WorstMistuning,
     WorstMistuningStatus as WorstMistuningStatus,
 )

@@ -92,6 +92,7 @@ ON_THE_WAY = {"accuracy", "design", "map", "pareto", "peaks"}
 SOMETIMES = {
     "certificate",
     "certificates",
+    "chosen",
     "drift_per_period",
     "mean_range",
     "history",

@@ -18,7 +18,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Annotated
 
 import numpy as np
 from scipy.optimize import minimize
@@ -32,11 +31,11 @@ from solver.linear.contact_table import port_counts
 from solver.response.contact_response import ContactState, contact_responses
 from solver.response.stability.residual_forces import LeftForces
 from solver.response.wear_measures import lowest
-from solver.results.told import Piece
 from solver.scene.scene import AnyContact, Scene
 from solver.sensitivity.gradient import Sensitivities
 from solver.studies.blades import blade_paths, mistuned
 from solver.studies.patterns.climbing import Bounds
+from solver.studies.patterns.worst_result import ResidualPeak
 
 TWO_PI = 2.0 * math.pi
 FREQUENCIES = 12  # of the band, at which a climb may begin
@@ -45,20 +44,6 @@ KEPT = 1e-6  # share of a limit by which a force may exceed it
 _ASIDE = 1e-6
 _ROUNDS = 3  # of a climb, each with the contacts that stick where the one before ended
 _FLAT = 1e-10  # of the logarithm of the amplitude
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class ResidualPeak(Piece):
-    """The largest amplitude of a disk over its factors and the forces left in contacts that stick."""
-
-    factors: Annotated[tuple[float, ...], "One for each sector."]
-    contacts: Annotated[tuple[str, ...], "Contacts of the annulus that stick and keep a force."]
-    tractions: Annotated[tuple[float, ...], "The force each keeps beside kt u [N]."]
-    magnification: Annotated[float, "The largest max|x| relative to the peak of the tuned disk."]
-    peak: Annotated[float, "It [m]."]
-    blade: Annotated[int, "The sector that has it."]
-    at_hz: Annotated[float, "Where [Hz]."]
-    without: Annotated[float, "max|x| there of contacts that were free of force at the beginning [m]."]
 
 
 @dataclass(frozen=True, slots=True)

@@ -24,11 +24,12 @@ from solver.studies.patterns.climbing import LARGEST, WorstPattern, WorstSearch,
 from solver.studies.patterns.disk_search import DiskSearch, LinearLimit
 from solver.studies.patterns.intentional import IntentionalMistuning
 from solver.studies.patterns.linear_disk import TWO_PI, Contacts, DiskPeak
-from solver.studies.patterns.residual import ResidualPeak, ResidualSearch
+from solver.studies.patterns.residual import ResidualSearch
 from solver.studies.patterns.solved_disk import SolvedDisk, UnknownPeakError
 from solver.studies.patterns.worst_result import (
     IntentionalPattern,
     PatternPeak,
+    ResidualPeak,
     WorstMistuning,
     WorstMistuningStatus,
 )

@@ -11,7 +11,6 @@ from solver.arrays import FloatOrNaN
 from solver.results.base import Drawn
 from solver.results.told import Piece
 from solver.results.views import Data, Views
-from solver.studies.patterns.residual import ResidualPeak
 
 
 class WorstMistuningStatus(Enum):
@@ -38,6 +37,20 @@ class PatternPeak(Piece):
     peak: Annotated[float, "[m]."]
     blade: Annotated[int, "The sector that has it."]
     at_hz: Annotated[float, "Where [Hz]."]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class ResidualPeak(Piece):
+    """The largest amplitude of a disk over its factors and the forces left in contacts that stick."""
+
+    factors: Annotated[tuple[float, ...], "One for each sector."]
+    contacts: Annotated[tuple[str, ...], "Contacts of the annulus that stick and keep a force."]
+    tractions: Annotated[tuple[float, ...], "The force each keeps beside kt u [N]."]
+    magnification: Annotated[float, "The largest max|x| relative to the peak of the tuned disk."]
+    peak: Annotated[float, "It [m]."]
+    blade: Annotated[int, "The sector that has it."]
+    at_hz: Annotated[float, "Where [Hz]."]
+    without: Annotated[float, "max|x| there of contacts that were free of force at the beginning [m]."]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)

@@ -8,13 +8,13 @@ import pytest
 from mistuned_cases import disk
 
 import solver
-from solver import Scene, SettingError, WorstSearch, mistuned, worst_mistuning
+from solver import ResidualPeak, Scene, SettingError, WorstSearch, mistuned, worst_mistuning
 from solver.jit import fourier
 from solver.marching.start import MarchStart
 from solver.response.stability.residual_forces import LeftForces
 from solver.studies.instant import start_of
 from solver.studies.patterns.climbing import Bounds
-from solver.studies.patterns.residual import ResidualPeak, ResidualSearch, _Place
+from solver.studies.patterns.residual import ResidualSearch, _Place
 
 TIGHT = {"shroud.N0": 300.0, "platform.N0": 200.0}
 BAND = (1.0, 6.0)

@@ -312,7 +312,9 @@ def test_a_life_that_is_stopped_has_what_was_followed() -> None:
     assert math.isnan(at_once.highest)
 
 
-@pytest.mark.parametrize("running", [{}, {"frequency_hz": 1.05}], ids=["peak", "frequency"])
+@pytest.mark.parametrize(
+    "running", [pytest.param({}, marks=pytest.mark.long), {"frequency_hz": 1.05}], ids=["peak", "frequency"]
+)
 def test_margin_1_is_reached_when_the_stress_of_the_amplitude_is(running: dict[str, float]) -> None:
     """Of a motion without a mean the stress is a factor times the amplitude, and its limit an amplitude."""
     plain = _oscillator(30.0)
