@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 from numbers import Real
 
 import numpy as np
@@ -24,7 +26,7 @@ from solver.marching.ramp import Ramp, check, equations_over
 from solver.marching.result import MarchStatus, turning_points
 from solver.marching.start import MarchStart, state_at
 from solver.marching.transient_result import TransientResult, TransientStatus
-from solver.results.watch import OnProgress, ShouldStop, shows_progress
+from solver.results.watch import OnProgress, ShouldStop, part_of, shows_progress
 from solver.scene.scene import Scene
 
 MOST_WINDOWS = 2000  # of the envelope, over the whole run
@@ -49,6 +51,7 @@ def transient(
     end_hz: float | None = None,
     rate_hz_per_s: float | None = None,
     ramp_seconds: float | None = None,
+    rates: Sequence[float] = (),
     ring_down_seconds: float = 0.0,
     from_rest: bool = False,
     start: MarchStart | None = None,
@@ -70,6 +73,7 @@ def transient(
         run-down begins at the higher one.
     rate_hz_per_s, ramp_seconds : how fast the frequency changes [Hz/s], or how long that takes [s]; one of
         them, the latter where both frequencies are equal.
+    rates : several of them [Hz/s] in place of both: a run at each, of which the slowest is told in full.
     ring_down_seconds : how long the motion is followed after that, with no force but constant ones [s].
     from_rest : begin at rest, contacts without force; else in the motion that repeats at `begin_hz`.
     start : a motion to begin with instead of both.
@@ -84,6 +88,14 @@ def transient(
         An argument out of its range, a base that moves, a rigid contact.
     """
     began = time.perf_counter()
+    if len(rates):
+        single = partial(
+            transient, scene, begin_hz=begin_hz, end_hz=end_hz, ramp_seconds=ramp_seconds, start=start,
+            ring_down_seconds=ring_down_seconds, from_rest=from_rest, tolerance=tolerance,
+            steps_per_period=steps_per_period, should_stop=should_stop,
+        )  # fmt: skip
+        given = {} if rate_hz_per_s is None else {"rate_hz_per_s": rate_hz_per_s}
+        return _at_rates(single, given, rates, on_progress, began)
     ramps = ramps_of(
         scene, begin_hz=begin_hz, end_hz=end_hz, rate_hz_per_s=rate_hz_per_s, ramp_seconds=ramp_seconds,
         ring_down_seconds=ring_down_seconds,
@@ -101,6 +113,28 @@ def transient(
     if on_progress is not None and found.complete:
         on_progress(1.0, int(run.cycles))
     return _result(run, found, status, error, began)
+
+
+def _at_rates(
+    single: Callable[..., TransientResult], given: Mapping[str, float], rates: Sequence[float],
+    on_progress: OnProgress, began: float,
+) -> TransientResult:  # fmt: skip
+    """Run at each rate, the fastest first; return the slowest run with the largest amplitudes of all."""
+    for key, value in given.items():
+        raise SettingError(key, value, "must not be given beside `rates`")
+    found: list[TransientResult] = []
+    order = sorted(rates, reverse=True)
+    costs = np.cumsum([0.0, *(1.0 / max(float(rate), 1e-300) for rate in order)])
+    for i, rate in enumerate(order):
+        watch = part_of(on_progress, costs[i] / costs[-1], costs[i + 1] / costs[-1])
+        found.append(single(rate_hz_per_s=rate, on_progress=watch))
+        if found[-1].status is TransientStatus.STOPPED:
+            break
+    worst = next((one.status for one in found if not one.reached), TransientStatus.FINISHED)
+    return replace(
+        found[-1], rates=np.array(order[: len(found)]), status=worst,
+        rates_max_abs=np.array([one.max_abs for one in found]), seconds=time.perf_counter() - began,
+    )  # fmt: skip
 
 
 def _refined(

@@ -226,6 +226,8 @@ def transient(found: Json) -> Iterator[Block]:
         pairs.append(("largest max|x|", f"{units.length(found['max_abs'])} at {at}"))
     if found["error_estimate"] is not None:
         pairs.append(("estimated error", f"{found['error_estimate']:.1e} of it"))
+    for rate, size in zip(found.get("rates") or [], found.get("rates_max_abs") or [], strict=True):
+        pairs.append((f"at {units.number(rate)} Hz/s", units.length(size)))
     took = f"{units.number(found['ramp_seconds'])} s"
     if found["ring_down_seconds"] > 0.0:
         took += f", then {units.number(found['ring_down_seconds'])} s without excitation"

@@ -283,3 +283,19 @@ def test_full_matrices_are_followed_in_their_modes(damping: dict[str, Any]) -> N
     np.testing.assert_allclose(found.high, in_dofs.high, atol=1e-5 * found.max_abs)
     settled = solver.transient(scene, begin_hz=0.8, end_hz=0.8, ramp_seconds=5.0)
     assert settled.max_abs == pytest.approx(solver.march(scene, frequency_hz=0.8).max_abs, rel=1e-6)
+
+
+def test_several_rates_are_runs_at_each_and_come_to_the_peak() -> None:
+    zeta, rates = 0.1, [0.2, 0.02, 0.002]
+    asked: dict[str, Any] = {"begin_hz": 0.7, "end_hz": 1.3}
+    found = solver.transient(oscillator(zeta), **asked, rates=[0.02, 0.002, 0.2])
+    assert found.reached
+    assert found.rates.tolist() == rates
+    alone = [solver.transient(oscillator(zeta), **asked, rate_hz_per_s=rate).max_abs for rate in rates]
+    assert found.rates_max_abs.tolist() == alone
+    peak = 1.0 / (2.0 * zeta * math.sqrt(1.0 - zeta**2) * K)
+    assert alone[0] < alone[1] < alone[2] == pytest.approx(peak, rel=1e-2)
+    assert alone[2] < peak
+    for wrong in ({"rate_hz_per_s": 0.1}, {"ramp_seconds": 1.0}):
+        with pytest.raises(SettingError, match="must not be given beside"):
+            solver.transient(oscillator(zeta), **asked, rates=rates, **wrong)
