@@ -17,7 +17,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-from solver.certificate.boxes import boxed, claimed, orbit_at, set_out, settled
+from solver.certificate.boxes import boxed, claimed, set_out, settled
 from solver.certificate.summits import least_proved, peak_proved
 from solver.errors import MissingExtraError, SettingError
 from solver.response.exact.beside import orbit_beside
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from solver.response.exact.orbit import Orbit as ExactOrbit
 
 _Bounds = dict[str, tuple[float, float]]
-_BITS = (128, 256)
+_ANSWER, _GROWN = 70, 1.45  # bits of an answer, and by which balls grow from event to event
 MOST_WORK = 5000.0
 _MOVES = 8  # contacts moved
 _NARROW = 1e-16  # relative width of what is claimed; else more bits
@@ -144,15 +144,18 @@ def certify(
     solution = _written_out(solution)
     orbit, reason = None, solution.status.value
     if solution.converged:
+        check_certifiable(solution.scene)
         (piecewise, orbit), reason = orbit_beside(solution, polish=1), ""  # exact numbers go on from there
     raw: dict[str, Any] = {"certifies": "periodic orbit", "scene": solution.scene.name}
     status, bounds, work = CertificateStatus.NO_ORBIT, _Bounds(), 0.0
     if orbit is not None:
         raw["system"] = system_of(piecewise, solution.frequency_hz)
         if least_over:
-            raw["varies"] = loads_of(solution.scene, least_over)
-        if least_over and not raw["varies"]:
-            raise SettingError("least_over", least_over, "must be the path of a load, such as damper.N0")
+            varying = loads_of(solution.scene, least_over)
+            for j in varying:
+                raw["system"]["contacts"][j]["varies"] = True
+            if not varying:
+                raise SettingError("least_over", least_over, "must be the path of a load, such as damper.N0")
         proved = least_proved if least_over else peak_proved if peak else _proved
         with allowed(most_work, should_stop) as allowance:
             status, reason, bounds = _tried(partial(proved, raw, piecewise, orbit))
@@ -166,7 +169,7 @@ def certify(
         frequency_hz=bounds.get("frequency_hz", (solution.frequency_hz, solution.frequency_hz)),
         load_factor=bounds.get("load_factor", (1.0, 1.0)),
         half_peak_to_peak=bounds.get("half_peak_to_peak", unknown), events=len(course.get("events", ())),
-        held=tuple(contacts[int(j)]["name"] for j in course.get("fixed_sliders", ())),
+        held=tuple(contacts[int(j)]["name"] for j in course.get("fixed_forces", ())),
         bits=raw.get("bits", 0), seconds=time.perf_counter() - begun, certificate=raw if bounds else None,
     )  # fmt: skip
 
@@ -203,7 +206,15 @@ def _check_extra() -> None:
 def check_certifiable(scene: Scene) -> None:
     """Raise what `certify` would, before what it is to prove is computed."""
     _check_extra()
-    Piecewise(annulus(scene) if scene.structure.has_sectors else scene, 1.0)
+    piecewise = Piecewise(annulus(scene) if scene.structure.has_sectors else scene, 1.0)
+    for member in piecewise.members:
+        name, wanted = (
+            piecewise.scene.contacts[member.contact].name,
+            "must be finite where something is proved: ",
+        )
+        for key, value in (("kt", float(piecewise.kt[member.slider])), ("kn", member.kn)):
+            if math.isinf(value):
+                raise SettingError(f"{name}.{key}", value, wanted + "give it a large value")
 
 
 def loads_of(scene: Scene, path: str) -> list[int]:
@@ -219,46 +230,52 @@ def _proved(raw: dict[str, Any], piecewise: Piecewise, found: ExactOrbit) -> _Bo
 
     from solver.certificate.checker import RejectedError
 
-    kept = ctx.prec
+    kept, start = ctx.prec, set_out(raw, piecewise, found)
+    least = 64 * math.ceil((_ANSWER + _GROWN * len(raw["orbit"]["events"])) / 64)
+    most = 2 * max(least, 128)
     try:
-        for bits in _BITS:
+        for bits in range(max(least, 128), most + 1, 64):
             ctx.prec = raw["bits"] = bits
             try:
-                low, high = _kept_inward(raw, set_out(raw, piecewise, found))
+                low, high, _ = _kept_inward(raw, start)
             except RejectedError as error:
-                if bits == _BITS[-1] or error.contact >= 0:
+                if bits == most or (len(error.args) > 1 and error.args[-1] < 0):
                     raise
                 continue
-            if bits == _BITS[-1] or (low.rad() + high.rad()) <= _NARROW * (high - low):
+            if bits == most or (low.rad() + high.rad()) <= _NARROW * (high - low):
                 return claimed(raw, {"max_abs": high.max(-low), "half_peak_to_peak": (high - low) / 2})
         raise AssertionError
     finally:
         ctx.prec = kept
 
 
-def _kept_inward(raw: dict[str, Any], start: list[Any]) -> tuple[Any, Any]:
+def _kept_inward(raw: dict[str, Any], start: list[Any]) -> tuple[Any, Any, Any]:
     """Prove an orbit, contacts that stick at the edge of their limit moved inward; return its extremes."""
-    from solver.certificate.checker import RejectedError
+    from solver.certificate.checker import Orbit as CheckedOrbit, RejectedError
+    from solver.certificate.proof_work import Counted
 
+    system = Counted(raw["system"], {})
     for step in range(_MOVES):
-        orbit = orbit_at(raw)
+        orbit = CheckedOrbit(system, raw["orbit"])
         try:
-            raw["orbit"]["unknowns"], extremes = boxed(orbit, *settled(orbit, start))
+            unknowns, extremes = boxed(orbit, *settled(orbit, start))
         except RejectedError as error:
-            if not _moved_inward(raw, error, step):
+            if not _moved_inward(raw, step, *error.args):
                 raise
             last = error
         else:
+            raw["proof"] = {"unknowns": unknowns}
             return extremes
     raise last
 
 
-def _moved_inward(raw: dict[str, Any], error: RejectedError, step: int) -> bool:
+def _moved_inward(
+    raw: dict[str, Any], step: int, _: str, contact: int = -1, follows: int = 0, *rest: Any
+) -> bool:
     """Take a little of its force from a contact that sticks all the time at the edge of its limit."""
-    fixed, key = raw["orbit"]["fixed_sliders"], str(error.contact)
-    if key not in fixed or error.follows not in (1, -1):
+    fixed, key = raw["orbit"]["fixed_forces"], str(contact)
+    if key not in fixed or follows not in (1, -1):
         return False
-    contact = raw["system"]["contacts"][error.contact]
-    force = 10.0**step * _MOVED * contact["mu"] * abs(contact["load"][0][1])
-    fixed[key] += error.follows * force / contact["kt"]
+    of = raw["system"]["contacts"][contact]
+    fixed[key] -= follows * 10.0**step * _MOVED * of["mu"] * abs(of["waves"][0][1])
     return True

@@ -29,7 +29,10 @@ def system_of(piecewise: Piecewise, frequency_hz: float) -> dict[str, Any]:
     model, structure = linear_model(scene), scene.structure
     zero = np.zeros(1, np.int64)
     K, C, M = (np.real(each[0]) for each in model.at(zero, np.ones(1, np.bool_)))
-    springs: list[Any] = []
+    springs: list[Any] = [  # entry by entry
+        [[[i, 1.0]], [[k, 1.0]], float(K[i, k]), float(C[i, k])]
+        for i, k in zip(*np.nonzero((K != 0) | (C != 0)), strict=True)
+    ]
 
     if (
         isinstance(structure, LumpedStructure)
@@ -39,25 +42,23 @@ def system_of(piecewise: Piecewise, frequency_hz: float) -> dict[str, Any]:
     ):
         elements = elements_of(structure, ())
         at = {dof: i for i, dof in enumerate(elements.dofs)}
-        every = [*elements.springs, *((ends, 0.0, c) for ends, c in elements.dampers)]
-        for ends, k, c in every:
+        springs = []
+        for ends, k, c in [*elements.springs, *((ends, 0.0, c) for ends, c in elements.dampers)]:
             terms = [
                 [at[end.dof], sign]
                 for end, sign in zip(ends, (1.0, -1.0), strict=True)
                 if end.dof is not None
             ]
-            springs.append([terms, k, c + elements.beta * k])
-        K, C = np.zeros((n, n)), np.zeros((n, n))
+            springs.append([terms, terms, k, c + elements.beta * k])
     contacts, first = [], 0
     for contact in scene.contacts:
         ports = piecewise.ports[first : first + len(contact.end_keys)]
         contacts += [_contact(row, ports) for row in contact.rows()]
         first += len(contact.end_keys)
     return {
-        "frequency_hz": frequency_hz, "mass": M.tolist(), "damping": C.tolist(), "stiffness": K.tolist(),
-        "springs": springs, "contacts": contacts,
+        "frequency_hz": frequency_hz, "mass": M.tolist(), "springs": springs, "contacts": contacts,
         "forces": [
-            {"row": _terms(np.real(force.vector)), "wave": [force.harmonic, force.amplitude, force.phase]}
+            {"row": _terms(np.real(force.vector)), "waves": [[force.harmonic, force.amplitude, force.phase]]}
             for force in model.forces if force.amplitude != 0.0
         ],
         "observe": _terms(model.observe),
@@ -65,16 +66,17 @@ def system_of(piecewise: Piecewise, frequency_hz: float) -> dict[str, Any]:
 
 
 def _contact(row: Row, ports: Real) -> dict[str, Any]:
-    along = {"name": row.name, "row": _terms(ports[row.port])}
-    if row.follows is Follows.GAP:
-        return along | {"k": row.kt, "gap": row.gap}
-    waves = [(row.N1, row.N1_phase), *row.higher]
-    load = [[0, row.N0, 0.0], *([k, *wave] for k, wave in enumerate(waves, start=1) if wave[0] != 0.0)]
+    gap, along = row.follows is Follows.GAP, _terms(ports[row.port])
+    waves = [[0, row.N0, 0.0]]
+    for k, wave in enumerate([(row.N1, row.N1_phase), *row.higher], start=1):
+        waves += [[k, *wave]] if wave[0] != 0.0 else []
     moves = row.normal_port is not None
-    return along | {
-        "kt": None if math.isinf(row.kt) else row.kt, "mu": row.mu, "load": load, "kn": row.kn,
-        "normal": _terms(ports[row.normal_port]) if moves else [], "rest": row.rest,
-        "presses": bool(row.presses) and moves,
+    return {
+        "name": row.name, "row": [] if gap else along, "mu": 0.0 if gap else row.mu,
+        "kt": 0.0 if gap else row.kt, "waves": [] if gap else waves,
+        "kn": row.kt if gap else row.kn, "gap": row.gap if gap else 0.0,
+        "normal": along if gap else _terms(ports[row.normal_port]) if moves else [],
+        "rest": 0.0 if gap else row.rest, "presses": gap or (bool(row.presses) and moves), "varies": False,
     }  # fmt: skip
 
 
@@ -98,22 +100,25 @@ def orbit_of(piecewise: Piecewise, orbit: Orbit, system: System) -> tuple[dict[s
                 )
     for i in _hardly(states[0], events, times):
         del events[i], times[i]
-    moved = {each["contact"] for each in events}
-    sliders = {
-        member.contact: float(w[piecewise.elastic_at[member.slider]])
-        for member in piecewise.members
-        if not piecewise.rigid[member.slider] and first.state.sliders[member.slider] == STICK
-    }
+    moved, forces = {each["contact"] for each in events}, {}
+    for member in piecewise.members:
+        at = member.slider
+        if first.state.sliders[at] != FREE:
+            forces[member.contact] = float(first.mode.forces[at] @ w)
     found = {
         "begins": first.tau, "states": states[0], "events": events,
-        "fixed_sliders": {str(j): value for j, value in sliders.items() if j not in moved},
+        "fixed_forces": {
+            str(j): value for j, value in forces.items() if j not in moved and states[0][j] == "stick"
+        },
     }  # fmt: skip
     for _ in range(2):  # those that come to rest together, then those that go on together
         for i in range(1, len(events)):
             if times[i] - times[i - 1] < _AT_ONCE and CheckedOrbit(system, found).together(i):
                 events[i]["at_once"] = True
-    lasting = [*w[: 2 * piecewise.n].tolist(), *(value for j, value in sorted(sliders.items()) if j in moved)]
-    return found, [*lasting, *(at for at, each in zip(times, events, strict=True) if "at_once" not in each)]
+    begun = [first.tau, *(at for at, each in zip(times, events, strict=True) if "at_once" not in each)]
+    rates = (w[piecewise.n : 2 * piecewise.n] * piecewise.omega).tolist()
+    loose = [forces.get(j, 0.0) for j, each in enumerate(system.contacts) if j in moved and each["kt"]]
+    return found, [*w[: piecewise.n].tolist(), *rates, *loose, *(np.diff(begun) / piecewise.omega).tolist()]
 
 
 def _hardly(states: list[str], events: list[dict[str, Any]], times: list[float]) -> list[int]:
@@ -132,7 +137,7 @@ def _hardly(states: list[str], events: list[dict[str, Any]], times: list[float])
 def _way(piecewise: Piecewise, before: FlowPiece, w: Real, j: int, old: str, new: str) -> list[str]:
     """Return the states a contact goes through, those included that last no longer than floats tell."""
     slider = next((member.slider for member in piecewise.members if member.contact == j), None)
-    if slider is None or piecewise.rigid[slider]:
+    if slider is None:
         return [new]
     if old == "stick" and new == "open":
         return ["slip+" if before.mode.forces[slider] @ w > 0.0 else "slip-", new]
