@@ -1,4 +1,5 @@
 from .balance.simplifications import Effects as Effects
+from .certificate.cycles import certify_cycle as certify_cycle
 from .certificate.certificate import (
     Certificate as Certificate,
     CertificateStatus as CertificateStatus,

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from decimal import ROUND_CEILING, ROUND_FLOOR, Decimal, localcontext
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from solver.certificate.checker import Orbit
-    from solver.response.exact.orbit import Orbit as ExactOrbit
+    from solver.response.exact.flow import FlowPiece
     from solver.response.exact.piecewise import Piecewise
 
 _NEWTON, _WIDER = 12, 4  # steps; boxes tried
@@ -16,12 +17,11 @@ _SLOW = 1e-4  # by which a step falls with a derivative that still serves
 _DIGITS = 25
 
 
-def set_out(raw: dict[str, Any], piecewise: Piecewise, found: ExactOrbit) -> list[Any]:
+def set_out(raw: dict[str, Any], piecewise: Piecewise, pieces: Sequence[FlowPiece]) -> list[Any]:
     """Put the order of events into a certificate; return the unknowns."""
-    from solver.certificate.proof_work import Counted
     from solver.certificate.statement import orbit_of
 
-    raw["orbit"], start = orbit_of(piecewise, found, Counted(raw["system"], {}))
+    raw["orbit"], start = orbit_of(piecewise, pieces, raw["system"])
     return list(start)
 
 
@@ -52,7 +52,8 @@ def settled(orbit: Orbit, start: list[Any]) -> tuple[list[Any], float]:
         before, now = now, max(
             float(step.abs_upper()) / size for step, size in zip(steps, sizes, strict=True)
         )  # fmt: skip
-        if now <= 2.0 ** (-ctx.prec // 2):
+        unsure = max(float(step.rad()) / size for step, size in zip(steps, sizes, strict=True))
+        if now <= max(2.0 ** (-ctx.prec // 2), 2.0 * unsure):  # no step tells more than its rounding
             break
         if now > _SLOW * before:
             inverse = None

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from solver.response.exact.orbit import Orbit as ExactOrbit
 
 _Bounds = dict[str, tuple[float, float]]
-_ANSWER, _GROWN = 70, 1.45  # bits of an answer, and by which balls grow from event to event
+_ANSWER, _GROWN = 70, 3.1  # bits of an answer, and twice those by which balls grow from event to event
 MOST_WORK = 5000.0
 _MOVES = 8  # contacts moved
 _NARROW = 1e-16  # relative width of what is claimed; else more bits
@@ -137,7 +137,7 @@ def certify(
         Without python-flint.
     """
     begun = time.perf_counter()
-    _check_extra()
+    check_extra()
     from solver.certificate.proof_work import allowed
     from solver.certificate.statement import system_of
 
@@ -158,15 +158,23 @@ def certify(
                 raise SettingError("least_over", least_over, "must be the path of a load, such as damper.N0")
         proved = least_proved if least_over else peak_proved if peak else _proved
         with allowed(most_work, should_stop) as allowance:
-            status, reason, bounds = _tried(partial(proved, raw, piecewise, orbit))
+            status, reason, bounds = tried(partial(proved, raw, piecewise, orbit))
         work = allowance.done
-    unknown = (math.nan, math.nan)
+    proves = "least peak" if least_over else "peak" if peak else "response"
+    return told(raw, proves, (status, reason, bounds), work, begun, solution.frequency_hz)
+
+
+def told(
+    raw: dict[str, Any], proves: str, ended: tuple[CertificateStatus, str, _Bounds], work: float, begun: float,
+    frequency_hz: float,
+) -> Certificate:  # fmt: skip
+    """Return a certificate for how a proof ended."""
+    (status, reason, bounds), unknown = ended, (math.nan, math.nan)
     contacts, course = raw.get("system", {}).get("contacts", ()), raw.get("orbit", {})
     heights = (bounds[key] for key in ("least_peak", "peak", "max_abs") if key in bounds)
     return Certificate(
-        proves="least peak" if least_over else "peak" if peak else "response", status=status,
-        reason=reason, max_abs=next(heights, unknown), work=work,
-        frequency_hz=bounds.get("frequency_hz", (solution.frequency_hz, solution.frequency_hz)),
+        proves=proves, status=status, reason=reason, max_abs=next(heights, unknown), work=work,
+        frequency_hz=bounds.get("frequency_hz", (frequency_hz, frequency_hz)),
         load_factor=bounds.get("load_factor", (1.0, 1.0)),
         half_peak_to_peak=bounds.get("half_peak_to_peak", unknown), events=len(course.get("events", ())),
         held=tuple(contacts[int(j)]["name"] for j in course.get("fixed_forces", ())),
@@ -182,7 +190,7 @@ def _written_out(solution: Solution) -> Solution:
     return solve(disk, frequency_hz=solution.frequency_hz, harmonics=solution.n_harmonics)
 
 
-def _tried(prove: Callable[[], _Bounds]) -> tuple[CertificateStatus, str, _Bounds]:
+def tried(prove: Callable[[], _Bounds]) -> tuple[CertificateStatus, str, _Bounds]:
     """Return how a proof ended, why, and the bounds that it proved."""
     from solver.certificate.checker import RejectedError
     from solver.certificate.proof_work import ProofHaltedError
@@ -196,7 +204,7 @@ def _tried(prove: Callable[[], _Bounds]) -> tuple[CertificateStatus, str, _Bound
         return ended, "", {}
 
 
-def _check_extra() -> None:
+def check_extra() -> None:
     try:
         import flint  # noqa: F401 - whether it is there
     except ImportError as error:
@@ -205,7 +213,7 @@ def _check_extra() -> None:
 
 def check_certifiable(scene: Scene) -> None:
     """Raise what `certify` would, before what it is to prove is computed."""
-    _check_extra()
+    check_extra()
     piecewise = Piecewise(annulus(scene) if scene.structure.has_sectors else scene, 1.0)
     for member in piecewise.members:
         name, wanted = (
@@ -226,24 +234,31 @@ def loads_of(scene: Scene, path: str) -> list[int]:
 
 def _proved(raw: dict[str, Any], piecewise: Piecewise, found: ExactOrbit) -> _Bounds:
     """Complete a certificate by the box of its unknowns and by what it claims; return that as floats."""
+    start = set_out(raw, piecewise, found.pieces)
+    return in_more_bits(raw, partial(_kept_inward, raw, start))
+
+
+def in_more_bits(raw: dict[str, Any], prove: Callable[[], tuple[Any, Any, Any]]) -> _Bounds:
+    """Prove with as many bits as the number of events asks for, and with more; return the claims as floats."""
     from flint import ctx
 
     from solver.certificate.checker import RejectedError
 
-    kept, start = ctx.prec, set_out(raw, piecewise, found)
-    least = 64 * math.ceil((_ANSWER + _GROWN * len(raw["orbit"]["events"])) / 64)
-    most = 2 * max(least, 128)
+    kept, least = ctx.prec, 64 * math.ceil((_ANSWER + _GROWN * len(raw["orbit"]["events"])) / 64)
+    least = max(least, 128)
     try:
-        for bits in range(max(least, 128), most + 1, 64):
+        for bits in range(least, 2 * least + 1, 64):
             ctx.prec = raw["bits"] = bits
             try:
-                low, high, _ = _kept_inward(raw, start)
+                low, high, period = prove()
             except RejectedError as error:
-                if bits == most or (len(error.args) > 1 and error.args[-1] < 0):
+                if bits == 2 * least or (len(error.args) > 1 and error.args[-1] < 0):
                     raise
                 continue
-            if bits == most or (low.rad() + high.rad()) <= _NARROW * (high - low):
-                return claimed(raw, {"max_abs": high.max(-low), "half_peak_to_peak": (high - low) / 2})
+            if bits == 2 * least or (low.rad() + high.rad()) <= _NARROW * (high - low):
+                reached = {"max_abs": high.max(-low), "half_peak_to_peak": (high - low) / 2}
+                own = raw["system"]["frequency_hz"] is None
+                return claimed(raw, reached | ({"frequency_hz": 1 / period} if own else {}))
         raise AssertionError
     finally:
         ctx.prec = kept

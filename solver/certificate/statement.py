@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,6 @@ from solver.jit.fourier import Real
 from solver.linear.assembly import linear_model
 from solver.linear.structure_matrices import elements_of
 from solver.response.exact.flow import FlowPiece
-from solver.response.exact.orbit import Orbit
 from solver.response.exact.piecewise import FREE, STICK, MemberState, Piecewise
 from solver.scene.parts import LumpedStructure
 
@@ -23,15 +23,18 @@ _HARDLY = 1e-5  # rad: a slip that is shorter may be none
 _APART = 1e-9  # rad between events that floats do not tell apart
 
 
-def system_of(piecewise: Piecewise, frequency_hz: float) -> dict[str, Any]:
-    """Return a scene as a system: springs as they are in it, so that no sum of theirs is rounded."""
-    scene, n = piecewise.scene, piecewise.n
+def system_of(piecewise: Piecewise, frequency_hz: float | None) -> dict[str, Any]:
+    """Return a scene as a system: springs as they are in it, so that no sum of theirs is rounded.
+
+    `frequency_hz`: None of what nothing drives.
+    """
+    scene = piecewise.scene
     model, structure = linear_model(scene), scene.structure
     zero = np.zeros(1, np.int64)
     K, C, M = (np.real(each[0]) for each in model.at(zero, np.ones(1, np.bool_)))
     springs: list[Any] = [  # entry by entry
         [[[i, 1.0]], [[k, 1.0]], float(K[i, k]), float(C[i, k])]
-        for i, k in zip(*np.nonzero((K != 0) | (C != 0)), strict=True)
+        for i, k in np.argwhere((K != 0.0) | (C != 0.0)).tolist()
     ]
 
     if (
@@ -50,6 +53,9 @@ def system_of(piecewise: Piecewise, frequency_hz: float) -> dict[str, Any]:
                 if end.dof is not None
             ]
             springs.append([terms, terms, k, c + elements.beta * k])
+    if piecewise.mass_damping:
+        gas = piecewise.mass_damping * M
+        springs += [[[[i, 1.0]], [[k, 1.0]], 0.0, float(gas[i, k])] for i, k in np.argwhere(gas).tolist()]
     contacts, first = [], 0
     for contact in scene.contacts:
         ports = piecewise.ports[first : first + len(contact.end_keys)]
@@ -84,14 +90,16 @@ def _terms(row: Real) -> list[list[Any]]:
     return [[int(i), float(row[i])] for i in np.flatnonzero(row)]
 
 
-def orbit_of(piecewise: Piecewise, orbit: Orbit, system: System) -> tuple[dict[str, Any], list[float]]:
+def orbit_of(
+    piecewise: Piecewise, pieces: Sequence[FlowPiece], system: dict[str, Any]
+) -> tuple[dict[str, Any], list[float]]:
     """Return the order of events of an orbit, and its unknowns in floats."""
-    first, w = orbit.pieces[0], orbit.pieces[0].w
-    states = [_words(piecewise, piece.state) for piece in orbit.pieces]
+    first, w, n, omega = pieces[0], pieces[0].w, piecewise.n, piecewise.omega
+    states = [_words(piecewise, piece.state) for piece in pieces]
     events: list[dict[str, Any]] = []
     times: list[float] = []
-    for i, piece in enumerate(orbit.pieces[1:], start=1):
-        before = orbit.pieces[i - 1]
+    for i, piece in enumerate(pieces[1:], start=1):
+        before = pieces[i - 1]
         for j, (old, new) in enumerate(zip(states[i - 1], states[i], strict=True)):
             for word in () if old == new else _way(piecewise, before, piece.w, j, old, new):
                 events.append({"contact": j, "to": word})
@@ -111,14 +119,19 @@ def orbit_of(piecewise: Piecewise, orbit: Orbit, system: System) -> tuple[dict[s
             str(j): value for j, value in forces.items() if j not in moved and states[0][j] == "stick"
         },
     }  # fmt: skip
+    stated = System(system, {})
     for _ in range(2):  # those that come to rest together, then those that go on together
         for i in range(1, len(events)):
-            if times[i] - times[i - 1] < _AT_ONCE and CheckedOrbit(system, found).together(i):
+            if times[i] - times[i - 1] < _AT_ONCE and CheckedOrbit(stated, found).together(i):
                 events[i]["at_once"] = True
+    known = [forces.get(j, 0.0) for j, each in enumerate(system["contacts"]) if j in moved and each["kt"]]
+    start = [*w[:n].tolist(), *(w[n : 2 * n] * omega).tolist(), *known]
     begun = [first.tau, *(at for at, each in zip(times, events, strict=True) if "at_once" not in each)]
-    rates = (w[piecewise.n : 2 * piecewise.n] * piecewise.omega).tolist()
-    loose = [forces.get(j, 0.0) for j, each in enumerate(system.contacts) if j in moved and each["kt"]]
-    return found, [*w[: piecewise.n].tolist(), *rates, *loose, *(np.diff(begun) / piecewise.omega).tolist()]
+    if system["frequency_hz"] is None:  # where it moves fastest its place tells the phase
+        at = int(np.abs(w[n : 2 * n]).argmax())
+        found["pinned"] = [at, start.pop(at)]
+        begun.append(first.tau + 2.0 * math.pi)
+    return found, [*start, *(np.diff(begun) / omega).tolist()]
 
 
 def _hardly(states: list[str], events: list[dict[str, Any]], times: list[float]) -> list[int]:

@@ -49,7 +49,7 @@ def _in_long_numbers(
     kept = ctx.prec
     try:
         raw["certifies"], raw["bits"], ctx.prec = what, bits, bits
-        summits = _Summits(raw, set_out(raw, piecewise, found))
+        summits = _Summits(raw, set_out(raw, piecewise, found.pieces))
         if what == "peak":
             raw["proof"] = summits.beside(arb(1))
         else:
