@@ -78,7 +78,7 @@ def boxed(orbit: Orbit, y: list[Any], now: Any) -> tuple[list[str], tuple[Any, A
 
 
 def _sizes(orbit: Orbit, y: list[Any]) -> list[float]:
-    """Return what a change of each unknown is compared with: the largest of its kind; of forces kt times it."""
+    """Return what a change of each unknown is compared with: the largest of its kind; of forces by kt."""
     n, states = orbit.system.n, len(orbit.unknown)
     moved, fast, longest = (
         max((abs(float(y[k])) for k in own), default=1.0) or 1.0

@@ -31,7 +31,6 @@ from solver.scene.cyclic.annulus import annulus
 from solver.scene.scene import Scene
 
 if TYPE_CHECKING:
-    from solver.certificate.checker import RejectedError
     from solver.response.exact.orbit import Orbit as ExactOrbit
 
 _Bounds = dict[str, tuple[float, float]]
@@ -165,8 +164,8 @@ def certify(
 
 
 def told(
-    raw: dict[str, Any], proves: str, ended: tuple[CertificateStatus, str, _Bounds], work: float, begun: float,
-    frequency_hz: float,
+    raw: dict[str, Any], proves: str, ended: tuple[CertificateStatus, str, _Bounds], work: float,
+    begun: float, frequency_hz: float,
 ) -> Certificate:  # fmt: skip
     """Return a certificate for how a proof ended."""
     (status, reason, bounds), unknown = ended, (math.nan, math.nan)
@@ -198,13 +197,14 @@ def tried(prove: Callable[[], _Bounds]) -> tuple[CertificateStatus, str, _Bounds
     try:
         return CertificateStatus.CERTIFIED, "", prove()
     except RejectedError as error:
-        return CertificateStatus.NOT_CERTIFIED, str(error), {}
+        return CertificateStatus.NOT_CERTIFIED, error.args[0], {}
     except ProofHaltedError as error:
         ended = CertificateStatus.STOPPED if error.stopped else CertificateStatus.WORK_USED_UP
         return ended, "", {}
 
 
 def check_extra() -> None:
+    """Raise what is missing for proofs."""
     try:
         import flint  # noqa: F401 - whether it is there
     except ImportError as error:
@@ -239,7 +239,7 @@ def _proved(raw: dict[str, Any], piecewise: Piecewise, found: ExactOrbit) -> _Bo
 
 
 def in_more_bits(raw: dict[str, Any], prove: Callable[[], tuple[Any, Any, Any]]) -> _Bounds:
-    """Prove with as many bits as the number of events asks for, and with more; return the claims as floats."""
+    """Prove with as many bits as the events ask for, and with more; return the claims as floats."""
     from flint import ctx
 
     from solver.certificate.checker import RejectedError
@@ -266,7 +266,8 @@ def in_more_bits(raw: dict[str, Any], prove: Callable[[], tuple[Any, Any, Any]])
 
 def _kept_inward(raw: dict[str, Any], start: list[Any]) -> tuple[Any, Any, Any]:
     """Prove an orbit, contacts that stick at the edge of their limit moved inward; return its extremes."""
-    from solver.certificate.checker import Orbit as CheckedOrbit, RejectedError
+    from solver.certificate.checker import Orbit as CheckedOrbit
+    from solver.certificate.checker import RejectedError
     from solver.certificate.proof_work import Counted
 
     system = Counted(raw["system"], {})
@@ -285,7 +286,7 @@ def _kept_inward(raw: dict[str, Any], start: list[Any]) -> tuple[Any, Any, Any]:
 
 
 def _moved_inward(
-    raw: dict[str, Any], step: int, _: str, contact: int = -1, follows: int = 0, *rest: Any
+    raw: dict[str, Any], step: int, _: str, contact: int = -1, follows: int = 0, *_margin: Any
 ) -> bool:
     """Take a little of its force from a contact that sticks all the time at the edge of its limit."""
     fixed, key = raw["orbit"]["fixed_forces"], str(contact)

@@ -1,10 +1,10 @@
 """Check a certificate of periodic motions of a piecewise linear system: python checker.py CERTIFICATE.json
 
 Stands alone: it needs python-flint and nothing of the package; docs/certificates.md says what is stated. The
-state w = (x, dx/dt, a friction force of each contact, cos kωt, sin kωt, …) does not jump, and between two events
-w' = A w. With balls that enclose every rounding it is shown that Krawczyk's operator (Computing 4 (1969) 187) maps
-the box of the unknowns, the first state and how long pieces last, into its interior: exactly one orbit with these
-events is in it; that all inequalities of the contacts hold in between; and where the observed motion's extremes lie.
+state w = (x, dx/dt, a friction force of each contact, cos kωt, sin kωt, …) does not jump, and between events
+w' = A w. With balls that enclose every rounding it is shown that Krawczyk's operator (Computing 4 (1969) 187)
+maps the box of the unknowns, the first state and how long pieces last, into its interior: exactly one orbit
+with these events is in it; that all inequalities of the contacts hold; and where the motion's extremes lie.
 """
 
 import json
@@ -20,7 +20,7 @@ WORDS = {STICK: "rests", 1: "slips forward", -1: "slips backward", OPEN: "opens 
 
 
 class RejectedError(Exception):
-    """The certificate proves nothing: which inequality fails; its contact, what follows there, by how much."""
+    """The certificate proves nothing: which inequality fails; its contact, what follows, by how much."""
 
 
 def require(holds: Any, *told: Any) -> None:
@@ -73,7 +73,7 @@ class System:
         return row
 
     def mode(self, mode: tuple[int, ...]) -> Any:
-        """Return A; rows that are positive, by contact and what follows; a span h of polynomials; Σ |A h|^i."""
+        """Return A; rows that are positive, by contact and what follows; a span h; Σ |A h|^i."""
         if mode in self.made:
             return self.made[mode]
         A, rows = arb_mat(self.free), {}
@@ -92,8 +92,8 @@ class System:
         sizes, power, one = absolute(A), absolute(A), arb_mat(self.d, self.d, 1)
         for _ in range(6):
             power = (power * power).mid()
-        h = 0.8 / float(max(power.entries()).root(64))
-        bound = (one - sizes * (1.01 * h)).inv()
+        h = 0.8 / float(max(power.entries()).root(64))  # of polynomials
+        bound = (one - sizes * h).inv()
         require(min((bound * arb_mat(self.d, 1, [1] * self.d)).entries()) > 0, "polynomials reach too far")
         return self.made.setdefault(mode, (A, rows, h, bound))
 
@@ -101,7 +101,7 @@ class System:
         """Return e^{A length/2^i}, i = 0, 1, …, down to what polynomials reach."""
         if (key := (mode, length.mid().man_exp())) not in self.made:
             A, _, h, _ = self.mode(mode)
-            depth = max(0, math.ceil(math.log2(float(length.mid()) / h)))
+            depth = max(0, math.ceil(math.log2(1.01 * float(length.mid()) / h)))
             self.made[key] = [(A * (length.mid() / 2**depth)).exp()]
             for _ in range(depth):
                 self.made[key].insert(0, self.made[key][0] * self.made[key][0])
@@ -109,22 +109,21 @@ class System:
 
     def series(self, mode: tuple[int, ...], states: Any, h: Any, degree: int) -> Any:
         """Return Taylor coefficients of columns of states, and balls of what they lack up to h."""
-        (A, _, _, bound), terms = self.mode(mode), [states]
+        (A, _, most, bound), terms, h = self.mode(mode), [states], abs(h).upper()
+        require(h <= most, "a length is not known well enough")
         for k in range(1, degree + 2):
             terms.append(A * terms[-1] * (1 / arb(k)))
-        lack = absolute(bound * absolute(terms.pop())) * abs(h).upper() ** (degree + 1)
+        lack = absolute(bound * absolute(terms.pop())) * h ** (degree + 1)
         return terms, arb_mat([[arb(0, each) for each in row] for row in lack.tolist()])
 
     def after(self, mode: tuple[int, ...], states: Any, length: Any, more: Any = 0) -> Any:
         """Return columns of states after a length and a little more or less."""
-        (later,), lack = self.series(
-            mode, self.flow(mode, length)[0] * states, length - length.mid() + more, 0
-        )
-        return later + lack
+        later = self.flow(mode, length)[0] * states
+        return later + self.series(mode, later, length - length.mid() + more, 0)[1]
 
 
 class Orbit:
-    """A sequence of events; its unknowns are the first state, as far as it is unknown, and pieces' lengths."""
+    """A sequence of events; its unknowns are what is not known of the first state, and pieces' lengths."""
 
     def __init__(self, system: System, raw: dict[str, Any]) -> None:
         self.system, self.begins, self.events, self.groups = system, arb(raw["begins"]), [], list[list[int]]()
@@ -135,17 +134,14 @@ class Orbit:
             self.events.append((j, mode[j], new))
             mode = (*mode[:j], new, *mode[j + 1 :])
             self.modes.append(mode)
-            self.groups += [] if "at_once" in each else [[]]  # of events at one instant
+            alone = "at_once" not in each
+            self.groups += [[]] if alone else []  # of events at one instant
             self.groups[-1].append(i)
-            require(
-                "at_once" not in each or self.together(i),
-                f"events {i - 1} and {i} need not be at one instant",
-            )
+            require(alone or self.together(i), f"events {i - 1} and {i} need not be at one instant")
         require(mode == self.modes[0], "contacts do not end in the state they begin in")
         rub, moved = {j for j, c in enumerate(system.contacts) if c["kt"]}, {j for j, *_ in self.events}
-        require(
-            known.keys() == {str(j) for j in rub - moved if mode[j] == STICK}, "other forces are to be fixed"
-        )
+        still = {str(j) for j in rub - moved if mode[j] == STICK}
+        require(known.keys() == still, "other forces are to be fixed")
         self.known = {n + int(j): value for j, value in known.items()}
         self.returns = [*range(n), *(n + j for j in sorted(rub & moved))]
         if system.period is None:  # it begins where one of these has a value
@@ -159,9 +155,8 @@ class Orbit:
         (a, old, new), (b, before, after) = self.events[i - 1], self.events[i]
         one, other = self.system.contacts[a], self.system.contacts[b]
         if a == b or new == after == OPEN or old == before == OPEN:
-            return a != b and all(
-                one[key] == other[key] for key in ("waves", "normal", "kn", "gap", "varies")
-            )
+            load = ("waves", "normal", "kn", "gap", "varies")
+            return a != b and all(one[key] == other[key] for key in load)
         lines = one["row"], [[at, -factor] for at, factor in one["row"]]
         if other["row"] not in lines or any(c["kn"] or c["waves"][1:] for c in (one, other)):
             return False
@@ -169,17 +164,12 @@ class Orbit:
         ways = [self.events[k] for k in rests] == [(a, new, STICK), (b, after, STICK)]
         return new == after == STICK or (ways and any(set(rests) <= set(group) for group in self.groups))
 
-    def begun(self, i: int) -> dict[tuple[int, int], int]:
-        """Return the conditions that are 0 after event i, with the first derivative that is not."""
+    def zeros(self, i: int) -> tuple[tuple[int, int], dict[tuple[int, int], int]]:
+        """Return the condition that is 0 at event i; those after it, with the derivative that is not."""
         j, old, new = self.events[i]
         if OPEN in (old, new):
-            return {(j, follows): 1 for follows in (1, -1, OPEN)}
-        return {(j, old): 2} if new == STICK else {}
-
-    def ended(self, i: int) -> tuple[int, int]:
-        """Return the condition that is 0 at event i."""
-        j, old, new = self.events[i]
-        return j, OPEN if OPEN in (old, new) else new
+            return (j, OPEN), {(j, follows): 1 for follows in (1, -1, OPEN)}
+        return (j, new), {(j, old): 2} if new == STICK else {}
 
     def lengths(self, y: Any) -> list[Any]:
         """Return how long pieces last."""
@@ -192,9 +182,8 @@ class Orbit:
         """Return the equations at y; of the box y + away their derivative; and how pieces begin in it."""
         system, states, values, slope, starts = self.system, len(self.unknown), [], [], []
         z, D, lengths = arb_mat(system.d, 1), arb_mat(system.d, self.size), self.lengths(y)
-        more = (
-            lengths if away is None else self.lengths([a + b for a, b in zip(y, away.entries(), strict=True)])
-        )
+        box = y if away is None else (arb_mat([y]).transpose() + away).entries()
+        spare = [over - length.mid() for over, length in zip(self.lengths(box), lengths, strict=True)]
         for at, value in [*self.known.items(), *zip(self.unknown, y, strict=False)]:
             z[at, 0] = value
         for k, order in zip(range(system.one, system.d, 2), system.orders, strict=True):
@@ -208,21 +197,19 @@ class Orbit:
             starts.append((z, D, length))
             if away is not None:  # the last piece lasts less as others last longer, if the period is given
                 changes = [int(k == own) - int(k >= states and own == self.size) for k in range(self.size)]
-                end = system.after(mode, z + D * away, length, more[piece] - length)
-                D = system.after(mode, D, length, more[piece] - length) + A * end * arb_mat(
-                    1, self.size, changes
-                )
+                moves = A * system.after(mode, z + D * away, length, spare[piece])
+                D = system.after(mode, D, length, spare[piece]) + moves * arb_mat(1, self.size, changes)
             z = system.after(mode, z, length)
-            if group:
-                require(self.ended(group[0]) in rows, f"event {group[0]} cannot be in its mode")
-                values.append((rows[self.ended(group[0])] * z).entries())
-                slope.append((rows[self.ended(group[0])] * D).entries())
+            for key in [self.zeros(k)[0] for k in group[:1]]:
+                require(key in rows, f"event {group[0]} cannot be in its mode")
+                values.append((rows[key] * z).entries())
+                slope.append((rows[key] * D).entries())
         values += [[z[at, 0] - first[0][at, 0]] for at in self.returns]
         slope += [(D - first[1]).tolist()[at] for at in self.returns]
         return arb_mat(values), arb_mat(slope), starts
 
     def extremes(self, box: list[Any]) -> tuple[Any, Any, Any]:
-        """Require one orbit in the box and all inequalities; return its least and largest motion and period."""
+        """Require one orbit in the box, and all inequalities; return its extremes and its period."""
         y = [each.mid() for each in box]
         away = arb_mat([[each - middle] for each, middle in zip(box, y, strict=True)])
         value, slope, starts = self.shoot(y, away)
@@ -232,12 +219,10 @@ class Orbit:
             raise RejectedError("the derivative of the equations is singular: it is not isolated") from None
         moved = (arb_mat(self.size, self.size, 1) - inverse * slope) * away - inverse * value
         for i, (new, old) in enumerate(zip(moved.entries(), away.entries(), strict=True)):
-            told = f"unknown {i}: Krawczyk's operator needs a radius of {float(new.abs_upper()):.2e}, the box has"
-            require(
-                old.contains_interior(new),
-                f"{told} {float(old.rad()):.2e}: not isolated, or not known so well",
-            )
-        lengths, motion = self.lengths([a + b for a, b in zip(y, moved.entries(), strict=True)]), []
+            told = f"needs a radius of {float(new.abs_upper()):.2e}, the box has {float(old.rad()):.2e}"
+            told = f"unknown {i}: Krawczyk's operator {told}: not isolated, or not known so well"
+            require(old.contains_interior(new), told)
+        lengths, motion = self.lengths((arb_mat([y]).transpose() + moved).entries()), []
         for piece, (z, D, length) in enumerate(starts):
             motion += self.kept(piece, z + D * moved, length, lengths[piece] - length.mid())
         return least(motion), -least([(-p, rest, h) for p, rest, h in motion]), sum(lengths, arb(0))
@@ -246,23 +231,18 @@ class Orbit:
         """Require the conditions of a piece; return the motion: polynomials, what they lack, spans."""
         before, after = self.groups[piece - 1] if piece else [], [*self.groups, []][piece]
         mode = self.modes[after[0] if after else -1]
-        for power in self.system.flow(mode, length)[
-            1:
-        ]:  # halved and halved: no stiff piece is stepped through
+        _, *powers = self.system.flow(mode, length)
+        for power in powers:  # halved and halved again: no stiff piece is stepped through
             later = (power * states).tolist()
             states = arb_mat([[*old, *new] for old, new in zip(states.tolist(), later, strict=True)])
-        begun = {key: order for k in before for key, order in self.begun(k).items()}
-        ends, count, degree, motion = {self.ended(k) for k in after}, states.ncols(), ctx.prec // 4, []
+        begun = {key: order for k in before for key, order in self.zeros(k)[1].items()}
+        ends, count, degree, motion = {self.zeros(k)[0] for k in after}, states.ncols(), ctx.prec // 4, []
         spans = [length.mid() / count] * (count - 1) + [length.mid() / count + more]
         terms, lack = self.system.series(mode, states, spans[0].max(spans[-1]), degree)
         for key, row in [*self.system.mode(mode)[1].items(), (None, self.system.observe)]:
-            values, lacks = (
-                zip(*((row * term).entries() for term in terms), strict=True),
-                (row * lack).entries(),
-            )
-            for k, (h, p, rest) in enumerate(
-                zip(spans, map(arb_poly, map(list, values)), lacks, strict=True)
-            ):
+            values = zip(*((row * term).entries() for term in terms), strict=True)
+            for k, (h, value, rest) in enumerate(zip(spans, values, (row * lack).entries(), strict=True)):
+                p = arb_poly(list(value))
                 if key is None:
                     motion.append((p, rest, h.upper()))
                     continue

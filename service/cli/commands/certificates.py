@@ -45,7 +45,7 @@ def check_proof(
         try:
             checker.check(raw)
         except checker.RejectedError as error:
-            reasons.append(str(error))
+            reasons.append(error.args[0])
     reason = "; ".join(reasons)
     if as_json:
         print_json(
