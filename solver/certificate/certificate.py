@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from solver.response.exact.orbit import Orbit as ExactOrbit
 
 _Bounds = dict[str, tuple[float, float]]
-_ANSWER, _GROWN = 70, 3.1  # bits of an answer, and twice those by which balls grow from event to event
+_ANSWER, _GROWN = 40, 3.1  # bits of an answer, and twice those by which balls grow from event to event
 MOST_WORK = 5000.0
 _MOVES = 8  # contacts moved
 _NARROW = 1e-16  # relative width of what is claimed; else more bits

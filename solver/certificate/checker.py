@@ -89,12 +89,13 @@ class System:
                 rows[j, STICK] = speed * slips - limit * self.free
             elif state == STICK and c["kt"]:
                 rows[j, 1], rows[j, -1] = limit - force, limit + force
-        sizes, power, one = absolute(A), absolute(A), arb_mat(self.d, self.d, 1)
+        sizes = power = absolute(A)
         for _ in range(6):
             power = (power * power).mid()
         h = 0.8 / float(max(power.entries()).root(64))  # of polynomials
-        bound = (one - sizes * h).inv()
-        require(min((bound * arb_mat(self.d, 1, [1] * self.d)).entries()) > 0, "polynomials reach too far")
+        bound = (arb_mat(self.d, self.d, 1) - sizes * h).inv()
+        sums = (bound * arb_mat(self.d, 1, [1] * self.d)).entries()
+        require(all(each > 0 for each in sums), "polynomials reach too far")
         return self.made.setdefault(mode, (A, rows, h, bound))
 
     def flow(self, mode: tuple[int, ...], length: Any) -> list[Any]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -55,7 +56,7 @@ def test_a_march_ends_in_the_cycle_that_attracts(found: tuple[solver.Scene, solv
 
 def test_two_masses_that_the_scene_itself_feeds() -> None:
     """Gas couples the masses, without symmetry; the balance with more harmonics lies ever nearer."""
-    raw = one_mass(1.0, 39.478, 0.5, 30.0, 30.0).to_dict()
+    raw: dict[str, Any] = one_mass(1.0, 39.478, 0.5, 30.0, 30.0).to_dict()
     raw["structure"]["masses"]["y"] = 0.7
     raw["structure"]["springs"] += [{"name": "between", "between": ["x", "y"], "k": 25.0, "c": 0.1}]
     raw["structure"]["springs"] += [{"name": "other", "between": ["y", "ground"], "k": 20.0, "c": 0.1}]

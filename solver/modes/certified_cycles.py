@@ -22,6 +22,7 @@ from solver.certificate.certificate import (
 from solver.errors import SettingError
 from solver.jit.fourier import to_complex
 from solver.linear.assembly import linear_model
+from solver.modes.limit_cycles import LimitCycle
 from solver.response.exact.beside import begun_at
 from solver.response.exact.flow import Flow, NoMotionError
 from solver.response.exact.piecewise import Piecewise
@@ -29,7 +30,6 @@ from solver.results.watch import ShouldStop
 from solver.scene.scene import Scene
 
 if TYPE_CHECKING:
-    from solver.modes.limit_cycles import LimitCycle
     from solver.response.exact.flow import FlowPiece
 
 _PERIOD = 2.0 * math.pi
