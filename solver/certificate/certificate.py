@@ -274,7 +274,8 @@ def _kept_inward(raw: dict[str, Any], start: list[Any]) -> tuple[Any, Any, Any]:
     for step in range(_MOVES):
         orbit = CheckedOrbit(system, raw["orbit"])
         try:
-            unknowns, extremes = boxed(orbit, *settled(orbit, start))
+            start, now = settled(orbit, start)
+            unknowns, extremes = boxed(orbit, start, now)
         except RejectedError as error:
             if not _moved_inward(raw, step, *error.args):
                 raise

@@ -92,7 +92,7 @@ class System:
         sizes = power = absolute(A)
         for _ in range(6):
             power = (power * power).mid()
-        h = 0.8 / float(max(power.entries()).root(64))  # of polynomials
+        h = 0.8 / float(max(power.entries()).root(64))
         bound = (arb_mat(self.d, self.d, 1) - sizes * h).inv()
         sums = (bound * arb_mat(self.d, 1, [1] * self.d)).entries()
         require(all(each > 0 for each in sums), "polynomials reach too far")
@@ -102,7 +102,7 @@ class System:
         """Return e^{A length/2^i}, i = 0, 1, …, down to what polynomials reach."""
         if (key := (mode, length.mid().man_exp())) not in self.made:
             A, _, h, _ = self.mode(mode)
-            depth = max(0, math.ceil(math.log2(1.01 * float(length.mid()) / h)))
+            depth = max(0, math.ceil(math.log2(0.4 * float(length.mid()) / h)))
             self.made[key] = [(A * (length.mid() / 2**depth)).exp()]
             for _ in range(depth):
                 self.made[key].insert(0, self.made[key][0] * self.made[key][0])
@@ -111,7 +111,7 @@ class System:
     def series(self, mode: tuple[int, ...], states: Any, h: Any, degree: int) -> Any:
         """Return Taylor coefficients of columns of states, and balls of what they lack up to h."""
         (A, _, most, bound), terms, h = self.mode(mode), [states], abs(h).upper()
-        require(h <= most, "a length is not known well enough")
+        require(h <= most * (degree + 1), "a length is not known well enough")  # Σ |A h / (degree + 1)|^i
         for k in range(1, degree + 2):
             terms.append(A * terms[-1] * (1 / arb(k)))
         lack = absolute(bound * absolute(terms.pop())) * h ** (degree + 1)

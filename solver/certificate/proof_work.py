@@ -15,6 +15,7 @@ from solver.certificate.checker import System
 UNIT = 1e6  # products of balls
 _BITS = 128.0  # of which a product counts as one
 _EVERY = 0.1  # s between two questions to the caller
+_DIGITS = 32  # bits that a term gives beside a known exponential, about
 _EXPONENTIAL, _BESIDE = 20, 5  # products of matrices, about, in that of one, in one near 1
 
 
@@ -65,6 +66,19 @@ class Counted(System):
         """As that of a system."""
         _ALLOWED.get().spend(self.d**2 * states.ncols() * (degree + 2))
         return super().series(mode, states, h, degree)
+
+    def after(self, mode: tuple[int, ...], states: Any, length: Any, more: Any = 0) -> Any:
+        """As that of a system; beside a known exponential one column needs no other."""
+        middle = length.mid()
+        near = mode, f"{float(middle):.11e}"
+        if states.ncols() > 1 or (mode, middle.man_exp()) in self.made or near not in self.made:
+            return super().after(mode, states, length, more)
+        powers, there = self.made[near]
+        terms, begun = self.series(mode, states, middle - there, ctx.prec // _DIGITS)
+        for k, term in enumerate(terms):
+            begun += term * (middle - there) ** k
+        later = powers[0] * begun
+        return later + self.series(mode, later, length - middle + more, 0)[1]
 
     def flow(self, mode: tuple[int, ...], length: Any) -> list[Any]:
         """As that of a system; beside a known one it is that times an exponential near 1."""
