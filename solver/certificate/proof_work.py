@@ -15,7 +15,7 @@ from solver.certificate.checker import System
 UNIT = 1e6  # products of balls
 _BITS = 128.0  # of which a product counts as one
 _EVERY = 0.1  # s between two questions to the caller
-_DIGITS = 32  # bits that a term gives beside a known exponential, about
+_DIGITS = 24  # bits that a term gives beside a known exponential, about
 _EXPONENTIAL, _BESIDE = 20, 5  # products of matrices, about, in that of one, in one near 1
 
 
@@ -70,7 +70,7 @@ class Counted(System):
     def after(self, mode: tuple[int, ...], states: Any, length: Any, more: Any = 0) -> Any:
         """As that of a system; beside a known exponential one column needs no other."""
         middle = length.mid()
-        near = mode, f"{float(middle):.11e}"
+        near = mode, f"{float(middle):.8e}"
         if states.ncols() > 1 or (mode, middle.man_exp()) in self.made or near not in self.made:
             return super().after(mode, states, length, more)
         powers, there = self.made[near]
@@ -83,7 +83,7 @@ class Counted(System):
     def flow(self, mode: tuple[int, ...], length: Any) -> list[Any]:
         """As that of a system; beside a known one it is that times an exponential near 1."""
         middle = length.mid()
-        key, near = (mode, middle.man_exp()), (mode, f"{float(middle):.11e}")
+        key, near = (mode, middle.man_exp()), (mode, f"{float(middle):.8e}")
         if key not in self.made and near in self.made:
             (*others, last), there = self.made[near]
             powers = [last * (self.mode(mode)[0] * ((middle - there) / 2 ** len(others))).exp()]
