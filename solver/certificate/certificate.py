@@ -66,7 +66,7 @@ class Certificate(Piece):
         " held bits work seconds certificate"
     )
 
-    proves: Annotated[str, "What was to be proved: a response, a peak, a least peak."]
+    proves: Annotated[str, "What was to be proved: a response, a peak, a least peak, a limit cycle."]
     status: Annotated[CertificateStatus, "Whether it was proved."]
     reason: Annotated[str, "Which inequality fails, by how much, or why there is nothing to prove; or empty."]
     max_abs: Annotated[

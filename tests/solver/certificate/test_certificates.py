@@ -355,3 +355,6 @@ def test_the_command_proves_and_checks(capsys: pytest.CaptureFixture[str], tmp_p
     file.write_text("{}", encoding="utf-8")
     assert main(["check-proof", str(file)]) == 2
     assert "must be a certificate" in capsys.readouterr().err
+    file.write_text('{"claims": {"max_abs": ["1", "2"]}, "bits": 128}', encoding="utf-8")
+    assert main(["check-proof", str(file)]) == 2
+    assert "as this version writes it" in capsys.readouterr().err
