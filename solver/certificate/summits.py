@@ -110,12 +110,16 @@ class _Summits:
 
     def height(self, factor: Any) -> Any:
         """Return the peak for a factor of the loads."""
+        from solver.certificate.checker import least
 
         def reached(frequency: Any) -> Any:
             orbit = orbit_at(self.raw, frequency_hz=digits(frequency), load_factor=digits(factor))
-            self.y, now = settled(orbit, self.y)
-            low, high, _ = boxed(orbit, self.y, now)[1]
-            return high.max(-low).mid()
+            self.y, _ = settled(orbit, self.y)
+            parts = enumerate(orbit.shoot(self.y)[2])
+            motion = [each for piece, (z, _, length) in parts
+                      for each in orbit.kept(piece, z, length, length - length.mid())]  # fmt: skip
+            high, low = (-least([(sign * p, rest, h) for p, rest, h in motion]) for sign in (-1, 1))
+            return high.max(low).mid()
 
         self.at = _turning(reached, self.at)
         return reached(self.at)
