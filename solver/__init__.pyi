@@ -28,6 +28,7 @@ from .errors import (
 from .marching.march import march as march
 from .marching.start import MarchStart as MarchStart
 from .marching.transient import transient as transient
+from .modes.certified_cycles import certify_cycle as certify_cycle
 from .modes.driven.controlled import held_amplitude as held_amplitude
 from .modes.driven.phase_resonance import phase_resonance as phase_resonance
 from .modes.gradient import ModeGradient as ModeGradient, mode_gradient as mode_gradient

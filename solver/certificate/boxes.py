@@ -3,82 +3,64 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from decimal import ROUND_CEILING, ROUND_FLOOR, Decimal, localcontext
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from solver.certificate.checker import Orbit
-    from solver.response.exact.orbit import Orbit as ExactOrbit
+    from solver.response.exact.flow import FlowPiece
     from solver.response.exact.piecewise import Piecewise
 
 _NEWTON, _WIDER = 12, 4  # steps; boxes tried
-_GROWN = 1e11  # by which balls grow before a state is unknown anew
 _SLOW = 1e-4  # by which a step falls with a derivative that still serves
 _DIGITS = 25
 
 
-def set_out(raw: dict[str, Any], piecewise: Piecewise, found: ExactOrbit) -> list[Any]:
-    """Put the order of events into a certificate, and where states are unknown anew; return the unknowns."""
-    from solver.certificate.checker import Orbit, stated
-    from solver.certificate.proof_work import Counted
+def set_out(raw: dict[str, Any], piecewise: Piecewise, pieces: Sequence[FlowPiece]) -> list[Any]:
+    """Put the order of events into a certificate; return the unknowns."""
     from solver.certificate.statement import orbit_of
 
-    system = stated(raw, {}, Counted)
-    raw["orbit"], start = orbit_of(piecewise, found, system)
-    return _anew(raw["orbit"], Orbit(system, raw["orbit"]), start)
+    raw["orbit"], start = orbit_of(piecewise, pieces, raw["system"])
+    return list(start)
 
 
 def orbit_at(raw: dict[str, Any], **at: str) -> Orbit:
     """Return the orbit at a frequency [Hz] and a factor of the loads that vary."""
-    from solver.certificate.checker import Orbit, stated
+    from solver.certificate.checker import Orbit
     from solver.certificate.proof_work import Counted
 
-    return Orbit(stated(raw, at, Counted), raw["orbit"])
-
-
-def _anew(raw: dict[str, Any], orbit: Orbit, start: list[float]) -> list[Any]:
-    """Let the state be unknown anew before balls have grown too much; return the unknowns then."""
-    from flint import arb
-
-    if any(orbit.system.rigid):
-        return list(start)
-    found, grown = list(start[: len(orbit.anew[0][1])]), 0.0
-    starts = orbit.shoot([arb(each) for each in start])[2]
-    for piece, (group, (z, *_)) in enumerate(zip(orbit.groups, starts[1:], strict=True), start=1):
-        found.append(start[orbit.at[piece]])
-        radius = max(float(z[i, 0].rad()) for i in range(orbit.system.n))
-        grown = grown or radius
-        if radius > _GROWN * grown:
-            grown = radius
-            raw["events"][group[-1]]["anew"] = True
-            found += [z[at, 0].mid() for at in orbit.lasting(orbit.modes[group[-1] + 1])]
-    return found
+    return Orbit(Counted(raw["system"], at), raw["orbit"])
 
 
 def settled(orbit: Orbit, start: list[Any]) -> tuple[list[Any], float]:
     """Return the unknowns by Newton's method, and its last step relative to their sizes."""
-    from flint import arb, ctx
+    from flint import arb, arb_mat, ctx
 
-    from solver.certificate.checker import isolated
+    from solver.certificate.checker import RejectedError
 
     y = [arb(each) for each in start]
     sizes, inverse, now = _sizes(orbit, y), None, math.inf
     for _ in range(_NEWTON):
-        value, slope, _ = orbit.shoot(y, [arb(0)] * len(y) if inverse is None else None)
-        inverse = isolated(slope) if inverse is None else inverse
+        value, slope, _ = orbit.shoot(y, arb_mat(len(y), 1) if inverse is None else None)
+        try:
+            inverse = slope.mid().inv().mid() if inverse is None else inverse
+        except ZeroDivisionError:
+            raise RejectedError("the derivative of the equations is singular: it is not isolated") from None
         steps = (inverse * value).entries()
         y = [(each - step).mid() for each, step in zip(y, steps, strict=True)]
         before, now = now, max(
             float(step.abs_upper()) / size for step, size in zip(steps, sizes, strict=True)
         )  # fmt: skip
-        if now <= 2.0 ** (-ctx.prec // 2):
+        unsure = max(float(step.rad()) / size for step, size in zip(steps, sizes, strict=True))
+        if now <= max(2.0 ** (-ctx.prec // 2), 2.0 * unsure):  # no step tells more than its rounding
             break
         if now > _SLOW * before:
             inverse = None
     return y, now
 
 
-def boxed(orbit: Orbit, y: list[Any], now: Any) -> tuple[list[str], tuple[Any, Any]]:
+def boxed(orbit: Orbit, y: list[Any], now: Any) -> tuple[list[str], tuple[Any, Any, Any]]:
     """Return a box of the unknowns that holds exactly one orbit, and the extremes of its motion."""
     from flint import arb, ctx
 
@@ -90,19 +72,25 @@ def boxed(orbit: Orbit, y: list[Any], now: Any) -> tuple[list[str], tuple[Any, A
         try:
             return box, orbit.extremes([arb(each) for each in box])
         except RejectedError as error:
-            if wider == _WIDER - 1 or error.contact >= 0:
+            if wider == _WIDER - 1 or len(error.args) > 1:
                 raise
     raise AssertionError
 
 
 def _sizes(orbit: Orbit, y: list[Any]) -> list[float]:
-    """Return what a change of each unknown is compared with: the largest of its kind, and 1 of instants."""
-    n, sizes = orbit.system.n, [1.0] * orbit.size
-    sliding, rate = (max(abs(float(each)) for each in y[k : k + n]) or 1.0 for k in (0, n))
-    for start, states in orbit.anew.values():
-        for k, at in enumerate(states, start=start):
-            sizes[k] = rate if n <= at < 2 * n else sliding
-    return sizes
+    """Return what a change of each unknown is compared with: the largest of its kind; of forces by kt."""
+    n, states = orbit.system.n, len(orbit.unknown)
+    moved, fast, longest = (
+        max((abs(float(y[k])) for k in own), default=1.0) or 1.0
+        for own in (
+            [k for k, at in enumerate(orbit.unknown) if at < n],
+            [k for k, at in enumerate(orbit.unknown) if n <= at < 2 * n],
+            range(states, orbit.size),
+        )
+    )
+    kt = [each["kt"] for each in orbit.system.contacts]
+    sizes = [moved if at < n else fast if at < 2 * n else kt[at - 2 * n] * moved for at in orbit.unknown]
+    return sizes + [longest] * (orbit.size - states)
 
 
 def digits(middle: Any) -> str:
