@@ -58,6 +58,7 @@ CASES = {
     "cluster": "cluster:mistuning_study",
     "spreading": "spreading:spreading",
     "mistuned": "mistuned:mistuned_disks",
+    "rig-coverage": "rigs:rig_coverage",
     "worst-mistuning": "mistuned:worst_patterns",
     "certificates": "certificates:certificates",
 }

@@ -27,7 +27,7 @@ from optim.methods.enough_harmonics import (
 from optim.methods.evaluator import DesignSearch, SearchStoppedError, Tally
 from optim.methods.global_look import WholeRange
 from optim.methods.kkt import FLAT_SLOPE, Local, LocalSearch
-from optim.problem.keys import ROBUST, DesignKeys, keywords
+from optim.problem.keys import OPTIONS, ROBUST, DesignKeys, keywords
 from optim.problem.problem import Method, Problem, pose
 from optim.problem.typed import Limit, with_limits
 from optim.results.design import DesignResult, DesignStatus
@@ -44,7 +44,7 @@ SAME_HEIGHT = 1e-9  # relative, of two levels that are one
 
 
 @shows_progress("design")
-@keywords(DesignKeys, without=ROBUST)
+@keywords(DesignKeys, without=(OPTIONS, *ROBUST))
 def design(
     scene: Scene,
     *,

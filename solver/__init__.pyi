@@ -28,6 +28,7 @@ from .errors import (
 from .marching.march import march as march
 from .marching.start import MarchStart as MarchStart
 from .marching.transient import transient as transient
+from .modes.certified_cycles import certify_cycle as certify_cycle
 from .modes.driven.controlled import held_amplitude as held_amplitude
 from .modes.driven.phase_resonance import phase_resonance as phase_resonance
 from .modes.gradient import ModeGradient as ModeGradient, mode_gradient as mode_gradient
@@ -50,6 +51,7 @@ from .modes.results import (
     PhaseResonance as PhaseResonance,
 )
 from .response.power_balance import PowerBalance as PowerBalance, power_balance as power_balance
+from .response.quasi_periodic import quasi_periodic as quasi_periodic
 from .response.solution import Solution as Solution, SolutionStatus as SolutionStatus
 from .response.solve import solve as solve
 from .response.stability.all_solutions import (
@@ -141,6 +143,7 @@ from .studies.patterns.worst import worst_mistuning as worst_mistuning
 from .studies.patterns.worst_result import (
     IntentionalPattern as IntentionalPattern,
     PatternPeak as PatternPeak,
+    ResidualPeak as ResidualPeak,
     WorstMistuning as WorstMistuning,
     WorstMistuningStatus as WorstMistuningStatus,
 )

@@ -21,6 +21,7 @@ from solver import (
     MistuningStatus as MistuningStatus,
     MistuningStudy as MistuningStudy,
     PatternPeak as PatternPeak,
+    ResidualPeak as ResidualPeak,
     Wave as Wave,
     WorstMistuning as WorstMistuning,
     WorstMistuningStatus as WorstMistuningStatus,

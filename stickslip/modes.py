@@ -11,6 +11,7 @@ from solver import (
     PeakCorrection as PeakCorrection,
     PerformanceCurve as PerformanceCurve,
     PhaseResonance as PhaseResonance,
+    certify_cycle as certify_cycle,
     corrected_peak as corrected_peak,
     held_amplitude as held_amplitude,
     limit_cycles as limit_cycles,

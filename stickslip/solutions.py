@@ -17,6 +17,7 @@ from solver import (
     hysteresis_loop as hysteresis_loop,
     motion as motion,
     power_balance as power_balance,
+    quasi_periodic as quasi_periodic,
     start_of as start_of,
     time_history as time_history,
     transient as transient,

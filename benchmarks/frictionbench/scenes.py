@@ -89,7 +89,9 @@ def answer(case: Case, harmonics: int, exact: bool = False) -> dict[str, float]:
         at = made.with_values({asked["variable"]: best.at})
         return {**_peak(at, H, "harmonics" in asked), "value": best.peak, "at": best.at}
     if what == "limit-cycle":
-        return _cycle(made, asked, H)
+        one = limit_cycle(made, asked, H)
+        estimate = 1e-12 * one.max_abs if "harmonics" in asked else one.max_abs_error
+        return {"value": one.max_abs, "at": one.frequency_hz, "estimate": estimate}
     raise NotOfferedError(f"nothing answers {what}")
 
 
@@ -146,16 +148,18 @@ def _peak(made: stickslip.Scene, H: int, defined: bool) -> dict[str, float]:
     }
 
 
-def _cycle(made: stickslip.Scene, asked: dict[str, Any], H: int) -> dict[str, float]:
+def limit_cycle(made: stickslip.Scene, asked: dict[str, Any], H: int) -> stickslip.modes.LimitCycle:
+    """Return the limit cycle that is asked for.
+
+    Raises
+    ------
+    ArithmeticError
+        There is none such.
+    """
     least = min(c.mu * c.N0 / c.kt for c in made.contacts if hasattr(c, "mu"))
     mode = stickslip.modes.nonlinear_mode(made, 1, amplitudes=(0.5 * least, 60.0 * least), harmonics=H)
     cycles = stickslip.modes.limit_cycles(mode).cycles
     wanted = [one for one in cycles if one.attracts == (asked["which"] == "attracting")]
     if not wanted:
         raise ArithmeticError(f"no such limit cycle among {len(cycles)}")
-    one = wanted[0]
-    return {
-        "value": one.max_abs,
-        "at": one.frequency_hz,
-        "estimate": 1e-12 * one.max_abs if "harmonics" in asked else one.max_abs_error,
-    }
+    return wanted[0]

@@ -90,6 +90,7 @@ class Criterion:
     weight: Annotated[str, "The word in `weights` by which it is minimised; empty if it is only limited."] = (
         ""
     )
+    needs: Annotated[str, "The key without which it cannot be minimised; empty without such."] = ""
     keys: Annotated[tuple[Key, ...], "The keys of its limit."] = ()
     read: Annotated[
         Callable[[CriterionContext], object],

@@ -6,13 +6,17 @@ The worst over a response is a maximum over the frequency, so its gradient is th
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 from typing import TYPE_CHECKING
 
 from optim.criteria.criterion import Criterion, CriterionContext, CriterionRow, Form, Judged, Key, of_sector
 from optim.criteria.key import number_or_table
 
 if TYPE_CHECKING:
+    from optim.criteria.response_gradients import Sensitivity
+    from optim.problem.variables import Real
+    from solver.response.worst_wear import Measure, WorstWear
     from solver.scene.scene import Scene
 
 _KEY = "max_friction_work"
@@ -28,10 +32,26 @@ def _rows(judged: Judged) -> list[CriterionRow]:
             FRICTION_WORK, f"friction work of {contact.name} at {worst.at:.6g} Hz", worst.value,
             None if judged.wear is None else worst_slopes(judged.wear, worst, contact.name).gradient,
             at_hz=worst.at, bound=bounds[of_sector(contact)],
+            second=second_of(judged, worst, contact.name, Measure.FRICTION_WORK),
         )
         for contact in judged.contacts(bounds)
         for worst in worst_wear(judged.branch, contact.name, Measure.FRICTION_WORK)
     ]  # fmt: skip
+
+
+def second_of(
+    judged: Judged, worst: WorstWear, contact: str, measure: Measure, factor: float = 1.0
+) -> Callable[[], Real] | None:
+    """Return what computes the second derivatives of a worst work or power, times `factor`, if there are."""
+    if judged.sensitivity is None or not judged.sensitivity.has_second:
+        return None
+    return partial(_times, factor, judged.sensitivity, worst, contact, measure)
+
+
+def _times(factor: float, sensitivity: Sensitivity, worst: WorstWear, contact: str, measure: Measure) -> Real:
+    from solver.response.worst_wear import worst_hessian
+
+    return factor * worst_hessian(sensitivity.amplitudes, worst, contact, measure)
 
 
 def _read(asked: CriterionContext) -> Mapping[str, float]:

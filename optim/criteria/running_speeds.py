@@ -72,6 +72,7 @@ RUNNING = CRITERION = Criterion(
     "frequencies; minimised times its `weight`.",
     rows=_rows,
     weight="running",
+    needs=_SPEEDS,
     keys=(
         Key(
             name=_SPEEDS,

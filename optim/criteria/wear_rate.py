@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from optim.criteria.criterion import Criterion, CriterionContext, CriterionRow, Form, Judged, Key, of_sector
-from optim.criteria.friction_work import by_contact
+from optim.criteria.friction_work import by_contact, second_of
 from optim.criteria.key import number_or_table
 
 _RATE, _COEFFICIENT = "max_wear_rate", "wear_coefficient"
@@ -19,7 +19,8 @@ def _rows(judged: Judged) -> list[CriterionRow]:
     """A row for every local maximum that competes, of every contact that is limited."""
     from solver.response.worst_wear import Measure, worst_slopes, worst_wear
 
-    limits: Mapping[str, tuple[float, float]] = judged.limit(WEAR_RATE) or {}
+    limits: Mapping[str, tuple[float | None, float]] = judged.limit(WEAR_RATE) or {}
+    weight = judged.weight(WEAR_RATE) * judged.case.weight
     rows = []
     for contact in judged.contacts(limits):
         bound, coefficient = limits[of_sector(contact)]
@@ -29,22 +30,26 @@ def _rows(judged: Judged) -> list[CriterionRow]:
                 found = worst_slopes(judged.wear, worst, contact.name, Measure.FRICTION_POWER)
                 slope = coefficient * found.gradient
             what = f"wear rate of {contact.name} at {worst.at:.6g} Hz"
+            second = second_of(judged, worst, contact.name, Measure.FRICTION_POWER, coefficient)
             rows.append(
-                judged.row(WEAR_RATE, what, coefficient * worst.value, slope, at_hz=worst.at, bound=bound)
-            )
+                judged.row(
+                    WEAR_RATE, what, coefficient * worst.value, slope, at_hz=worst.at, bound=bound,
+                    weight=weight, second=second,
+                )
+            )  # fmt: skip
     return rows
 
 
-def _read(asked: CriterionContext) -> Mapping[str, tuple[float, float]]:
-    """The limit and the coefficient of every contact named."""
+def _read(asked: CriterionContext) -> Mapping[str, tuple[float | None, float]]:
+    """The limit, if there is one, and the coefficient of every contact named."""
     from optim.errors import DesignError
 
-    limits = asked.values.get(_RATE)
-    if limits is None:
-        raise DesignError(_RATE, None, f"must be given with `{_COEFFICIENT}` [m³/s]")
     if _COEFFICIENT not in asked.values:
         raise DesignError(_COEFFICIENT, None, f"must be given with `{_RATE}` [m³/J]")
-    bounds, each = (by_contact(key, asked.values[key], asked.scene) for key in (_RATE, _COEFFICIENT))
+    each = by_contact(_COEFFICIENT, asked.values[_COEFFICIENT], asked.scene)
+    if _RATE not in asked.values:
+        return {name: (None, coefficient) for name, coefficient in each.items()}
+    bounds = by_contact(_RATE, asked.values[_RATE], asked.scene)
     for name in bounds:
         if name not in each:
             raise DesignError(_COEFFICIENT, asked.values[_COEFFICIENT], f"must have one of {name!r} too")
@@ -55,8 +60,10 @@ WEAR_RATE = CRITERION = Criterion(
     name="wear rate",
     unit="m³/s",
     help="The volume that wears off a contact in a second, a coefficient times its friction power, at any "
-    "frequency of the band.",
+    "frequency of the band; minimised times its `weight`.",
     rows=_rows,
+    weight="wear",
+    needs=_COEFFICIENT,
     keys=(
         Key(
             name=_RATE, annotation=number_or_table("m³/s", "contacts"), form=Form.NUMBER_OR_TABLE,

@@ -44,16 +44,20 @@ class Runs:
     runs : the data.
     unknowns : what is looked for.
     harmonics : highest harmonic of the balance.
+    slopes : compute derivatives; else the Jacobian is 0.
     """
 
     def __init__(
-        self, scene: Scene, runs: Sequence[MeasuredRows], unknowns: Unknowns, harmonics: int
-    ) -> None:
+        self, scene: Scene, runs: Sequence[MeasuredRows], unknowns: Unknowns, harmonics: int,
+        *, slopes: bool = True,
+    ) -> None:  # fmt: skip
         self.scene, self.runs, self.unknowns, self.harmonics = scene, tuple(runs), unknowns, harmonics
-        self.models = [run.model(scene, unknowns.paths, harmonics) for run in self.runs]
+        self._slopes = slopes
+        self.models = [run.model(scene, unknowns.paths if slopes else (), harmonics) for run in self.runs]
         self.observations = np.concatenate([run.observations for run in self.runs])
         sizes = [run.observations.size for run in self.runs]
         self.slices = [slice(end - size, end) for end, size in zip(np.cumsum(sizes), sizes, strict=True)]
+        self.fitted = len(unknowns) + sum(run.fitted_besides for run in self.runs)
         self.evaluations = 0
         self._last: Fitted | None = None
 
@@ -64,9 +68,10 @@ class Runs:
         values = self.unknowns.by_path(z)
         found: list[Predicted] = [model.evaluate(values) for model in self.models]
         by_paths = np.concatenate([one.slopes for one in found])
+        by_z = np.zeros((len(by_paths), len(self.unknowns)))
         self._last = Fitted(
             z=z.copy(), values=np.concatenate([one.values for one in found]),
-            jacobian=self.unknowns.by_scaled(z, by_paths),
+            jacobian=self.unknowns.by_scaled(z, by_paths) if self._slopes else by_z,
             reached=np.concatenate([one.reached for one in found]),
             states=tuple(one.states for one in found),
         )  # fmt: skip
@@ -98,6 +103,10 @@ class Runs:
     def thinned(self, most: int) -> Runs:
         """Return the same with at most so many points of each run."""
         return Runs(self.scene, [run.thinned(most) for run in self.runs], self.unknowns, self.harmonics)
+
+    def without_slopes(self) -> Runs:
+        """Return the same without derivatives, at a part of the work."""
+        return Runs(self.scene, self.runs, self.unknowns, self.harmonics, slopes=False)
 
 
 HUBER = 1.345  # standard deviations from which a residual weighs less: 95 % efficient without outliers
@@ -164,7 +173,7 @@ def _level(runs: Runs, found: LocalFit, sd: Real, known: np.ndarray, *, robust: 
     """Return the level of the noise that is not known, from what a fit left over."""
     counted = found.active & ~known
     rest = ((found.fitted.values - runs.observations) / sd)[counted]
-    share = rest.size / max(rest.size - len(runs.unknowns), 1)
+    share = rest.size / max(rest.size - runs.fitted, 1)
     if robust:
         return max(_NORMAL * float(np.median(np.abs(rest))) * math.sqrt(share), LEAST_LEVEL)
     return max(float(np.sqrt(np.mean(rest**2) * share)), LEAST_LEVEL)

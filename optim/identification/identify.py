@@ -83,7 +83,7 @@ def identify(
     """
     begun = time.perf_counter()
     known = read_unknowns(scene, unknowns, scaling, priors)
-    _check_settings(noise, starts, seed, harmonics)
+    check_fit(noise, starts, seed, harmonics)
     measured = read_data(scene, data, known.paths)
     conditions = read_candidates(scene, measured, known, candidates)
     runs, told = Runs(scene, measured, known, harmonics), Noise(level=noise, robust=robust)
@@ -96,7 +96,8 @@ def identify(
     return replace(result, seconds=time.perf_counter() - begun)
 
 
-def _check_settings(noise: float | None, starts: int, seed: int, harmonics: int) -> None:
+def check_fit(noise: float | None, starts: int, seed: int, harmonics: int) -> None:
+    """Raise DesignError unless these are settings of a fit."""
     if noise is not None and not (is_number(noise) and 0.0 < noise < 1.0):
         raise DesignError(
             "noise", noise, "must be a relative standard deviation between 0 and 1, 0.02 for 2 %"
@@ -133,8 +134,7 @@ def _judged(
     """Return what the fit tells, whether the model describes the data, and what to measure next."""
     level_known = best.level == 1.0
     info = information(runs, best, robust=told.robust, level_known=level_known)
-    size = _misfit(info.reduced_chi2) if level_known else _scatter(best.level)
-    misfit = f"{size} {doubts(runs, best, robust=told.robust)}".strip()
+    misfit = misfit_of(runs, best, info, robust=told.robust)
     level = best.level if not level_known else math.nan if told.level is None else told.level
     result = _described(runs, found, best, info, misfit, level)
     return replace(result, candidates=rank(runs, best, info, conditions))
@@ -176,6 +176,12 @@ def _described(
         values=by_path, other_optima=tuple(others), starts=found.starts, agreeing=found.agreeing,
         evaluations=runs.evaluations, harmonics=runs.harmonics, seconds=0.0,
     )  # fmt: skip
+
+
+def misfit_of(runs: Runs, best: LocalFit, info: Information, *, robust: bool) -> str:
+    """Return why the model does not describe the data; empty if it does."""
+    size = _misfit(info.reduced_chi2) if best.level == 1.0 else _scatter(best.level)
+    return f"{size} {doubts(runs, best, robust=robust)}".strip()
 
 
 def _misfit(reduced_chi2: float) -> str:

@@ -75,7 +75,7 @@ def information(runs: Runs, found: LocalFit, *, robust: bool, level_known: bool)
     """Return what the data tell at an optimum."""
     rest = found.residuals(runs.observations)
     rows = found.fitted.jacobian[found.active] / found.sd[found.active, None]
-    n, p = rest.size, len(runs.unknowns)
+    n, p = rest.size, runs.fitted
     free = max(n - p, 1)
     efficiency = 1.0
     if robust:

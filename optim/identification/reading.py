@@ -189,6 +189,8 @@ def _kind(table: Table, varied: Sequence[str]) -> DataKind:
         raise table.refusal(word, f"`kind` must be one of {', '.join(kinds)}")
     names = [name for name in table.columns if name not in varied]
     told = [kind for kind in kinds.values() if any(set(group) <= set(names) for group in kind.marks)]
+    if len(told) > 1:
+        told = [kind for kind in told if set(names) <= {column.name for column in kind.columns}]
     fitting = [kinds[word]] if word is not None else told
     if len(fitting) != 1 or fitting[0] not in told:
         groups = [" + ".join(group) for kind in (fitting or kinds.values()) for group in kind.marks]

@@ -57,6 +57,12 @@ def uncertainty_issues(scene: Scene, given: Mapping[str, Any], uncertain: object
     return [issue for error in refused for issue in _told(error, {"uncertain": uncertain})]
 
 
+def reading_issues(read: Callable[[], object], given: Mapping[str, Any]) -> list[Issue]:
+    """Return what the reading of keys of a description refuses, at the innermost field that is there."""
+    error = _refusal((), read)
+    return [] if error is None else _told(error, given)
+
+
 def _variables(scene: Scene, given: Mapping[str, Any]) -> Iterator[Piece]:
     """Yield the reading of each variable alone, or of the default."""
     variables: Mapping[str, Any] | None = given.get("variables")

@@ -152,7 +152,7 @@ class ProblemKeys(BaseModel):
         Option(Form.WHOLE_NUMBER, "--harmonics", "H", help=f"Highest harmonic kept; {HARMONICS}."),
     ] = Field(default=HARMONICS, description="Highest harmonic of the balance.")
     variables: Annotated[
-        Annotated[dict[VariableName, Pair], Field(min_length=1, max_length=MAX_VARIABLES)] | None,
+        Annotated[dict[VariableName, Pair], Field(max_length=MAX_VARIABLES)] | None,
         Option(
             Form.BOUNDS, "--variable", "PATH LO HI",
             help=f"A parameter and its bounds, for example {DISK_LOAD} 20 3000; paths that share a value are "
@@ -228,6 +228,14 @@ class NominalAndRobustKeys(ProblemKeys):
         default=None,
         description=f"Relative error of the peak up to which a performance curve suffices; {TOLERANCE}.",
     )  # fmt: skip
+    options: Annotated[dict[Name, dict[ParameterPath, Number]], Field(min_length=1, max_length=50)] | None = (
+        Field(
+            default=None,
+            description="A catalogue: name to the values of each option that can be had, of which the best "
+            "is looked for; `variables` may then be empty.",
+            examples=[{"soft": {"damper.kt": 15}, "stiff": {"damper.kt": 45}}],
+        )
+    )
     uncertain: Uncertain | None = Field(
         default=None,
         description="What is not known: a table of intervals, a table of an ellipsoid, or a list of samples.",
@@ -307,6 +315,8 @@ def of_front(model: type[Model]) -> type[Model]:
 
 DesignKeys = of_design(NominalAndRobustKeys)
 FrontKeys = of_front(PointsOfFront)
+OPTIONS = "options"
+"""The key of a catalogue."""
 ROBUST = ("uncertain", "aim", "quantile", "samples", "seed")
 """The keys of a design for which not everything is known."""
 

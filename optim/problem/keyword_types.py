@@ -69,8 +69,8 @@ class DesignKeywords(ProblemKeywords, total=False):
     max_band_hz: float | None
     """Largest width of the resonance band allowed [Hz]."""
     weights: Mapping[str, float] | None
-    """What is minimised: peak [1/m], band [1/Hz], stress [1/Pa], utilisation, running [1/m], mass [1/kg],
-    each times its weight; the peak alone."""
+    """What is minimised: peak [1/m], band [1/Hz], stress [1/Pa], utilisation, running [1/m], wear [1/m³/s],
+    mass [1/kg], each times its weight; the peak alone."""
 
 
 class FrontKeywords(ProblemKeywords, total=False):

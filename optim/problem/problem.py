@@ -111,9 +111,9 @@ def pose(scene: Scene, **given: Any) -> Problem:
     basins, weights = _basins(keys["basins"]), _weights(keys["weights"])
     for one in (one for one, weight in weights.items() if weight > 0.0 and one.lacking(scene)):
         raise DesignError(("weights", one.weight), weights[one], one.lacking(scene))
-    for one in (one for one, weight in weights.items() if weight > 0.0 and one.ranges is not None):
+    for one in (one for one, weight in weights.items() if weight > 0.0 and one.needs):
         if limits.of(one) is None:
-            raise DesignError(("weights", one.weight), weights[one], f"needs `{one.keys[0].name}`")
+            raise DesignError(("weights", one.weight), weights[one], f"needs `{one.needs}`")
     problem = Problem(
         scene=scene, variables=chosen, cases=cases, limit=limit, weights=weights,
         limits=limits, harmonics=_harmonics(keys["harmonics"]), start=read_start(chosen, keys["start"]),

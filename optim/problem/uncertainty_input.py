@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from scipy.special import gammaincinv
@@ -15,10 +16,12 @@ from optim.problem.variables import BoundedVariable, Real
 from solver.balance.parameter import Kind, resolve
 from solver.errors import Place, at
 from solver.scene.scene import Scene
+from solver.scene.structure_parameters import STRUCTURE
 
 ELLIPSOID = ("centre", "relative", "paths", "half_axes", "shape", "covariance", "confidence", "mistuning")
-MISTUNING = ("of", "spread", "seeds", "values")
+MISTUNING = ("of", "spread", "seeds", "values", "within")
 CONFIDENCE = 0.95
+LARGEST = 0.9  # deviation of a factor
 _DEVIATIONS = {"deviation": How.RELATIVE, "absolute_deviation": How.OFFSET}
 _INTERVAL = 'must be [low, high], {"deviation": 0.1} or {"absolute_deviation": 5.0}'
 _WHERE: Place = ("uncertain",)
@@ -40,19 +43,27 @@ def read_uncertain(scene: Scene, variables: Sequence[BoundedVariable], uncertain
           P, (x − c)ᵀ P⁻¹ (x − c) ≤ 1, or a ``covariance`` with the ``confidence`` its ellipsoid has. Without
           a centre the numbers are deviations from the nominal values, with ``relative`` relative ones (a
           matrix then needs ``paths``);
-        - samples, a list of ``{path: value}`` or ``{path: {"deviation": …}}``.
+        - samples, a list of ``{path: value}`` or ``{path: {"deviation": …}}``;
+        - what an identification found: the result, of which ``uncertain`` counts.
 
         Intervals and ellipsoids may have ``mistuning`` on top: ``{"of": …, "spread": 0.01, "seeds": [1, 2]}``
-        or ``{"of": …, "values": [[factor of each sector], …]}``.
+        or ``{"of": …, "values": [[factor of each sector], …]}``. ``{"of": …, "within": 0.03}``, with
+        intervals or alone, leaves every blade a factor from 0.97 to 1.03.
 
     Raises
     ------
     DesignError, SettingError, SceneError
         What is wrong: the key, the value, and what would be right.
     """
+    uncertain = getattr(uncertain, "uncertain", uncertain)
     chosen = {path for variable in variables for path in variable.paths}
     if isinstance(uncertain, Mapping) and uncertain:
-        disks = _disks(scene, uncertain.get("mistuning"), _WHERE)
+        mistuning = uncertain.get("mistuning")
+        if isinstance(mistuning, Mapping) and "within" in mistuning:
+            found = _free_blades(scene, chosen, uncertain, mistuning)
+            _check_extent(scene, variables, found)
+            return found
+        disks = _disks(scene, mistuning, _WHERE)
         ellipsoid = any(key in uncertain for key in ("half_axes", "shape", "covariance", "centre"))
         found = (_ellipsoid if ellipsoid else _intervals)(scene, chosen, uncertain, disks)
     elif isinstance(uncertain, Sequence) and not isinstance(uncertain, str) and uncertain:
@@ -103,6 +114,34 @@ def _intervals(
         shape=UncertaintyShape.BOX, coordinates=tuple(coordinates),
         centre=tuple(0.5 * (low + high) for low, high in ends),
         axes=_nested(np.diag([0.5 * (high - low) for low, high in ends])), ends=tuple(ends), disks=disks,
+    )  # fmt: skip
+
+
+def _free_blades(
+    scene: Scene, chosen: set[str], table: Mapping[str, object], mistuning: Mapping[str, object]
+) -> UncertainSet:
+    """Return intervals, and the factor of every blade within bounds as one more each."""
+    where, within = (*_WHERE, "mistuning"), mistuning["within"]
+    if set(mistuning) != {"of", "within"} or any(key in ELLIPSOID[:-1] for key in table):
+        raise DesignError(where, dict(mistuning), "must be `of` and `within` alone, beside intervals if any")
+    if not is_number(within) or not 0.0 < within <= LARGEST:
+        raise DesignError((*where, "within"), within, f"must be a number > 0 and <= {LARGEST}")
+    count = scene.structure.sector_count
+    (ones,) = _disks(scene, {"of": mistuning["of"], "values": [1.0] * count}, _WHERE)
+    disk = replace(ones, free=True)
+    rows = disk.paths(scene)
+    if not rows:
+        raise DesignError(where, dict(mistuning), "needs a structure of named parts: matrices have none")
+    plain = _intervals(scene, chosen, table, ())
+    for path in dict.fromkeys(path.partition("@")[0] for row in rows for path in row):
+        if path in chosen or path in plain.paths:
+            wanted = "is what every blade has a factor of: it cannot be a variable or uncertain besides"
+            raise DesignError((*where, "of"), path.removeprefix(STRUCTURE), wanted)
+    blades = tuple(Coordinate(name=f"blade {j}", paths=(), how=How.FACTOR) for j in range(count))
+    reach = [*np.diag(np.array(plain.axes).reshape(2 * (len(plain.ends),))), *([within] * count)]
+    return replace(
+        plain, coordinates=(*plain.coordinates, *blades), centre=(*plain.centre, *([0.0] * count)),
+        axes=_nested(np.diag(reach)), ends=(*plain.ends, *([(-within, within)] * count)), blades=disk.of,
     )  # fmt: skip
 
 

@@ -25,6 +25,7 @@ class How(Enum):
     VALUE = "value"
     RELATIVE = "relative deviation"
     OFFSET = "deviation"
+    FACTOR = "factor of a blade"  # its deviation from 1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,7 +50,7 @@ class Coordinate:
 
     def by_nominal(self, delta: float) -> float:
         """Return d value / d nominal."""
-        return {How.VALUE: 0.0, How.RELATIVE: 1.0 + delta, How.OFFSET: 1.0}[self.how]
+        return {How.VALUE: 0.0, How.RELATIVE: 1.0 + delta}.get(self.how, 1.0)
 
     def words(self, delta: float) -> str:
         """Return a number of it in words."""
@@ -68,6 +69,7 @@ class Disk:
     spread: Annotated[float, "Of the random factors, unless `values` are given."] = 0.0
     seed: Annotated[int, "Likewise."] = 0
     values: Annotated[tuple[float, ...], "The factors themselves."] = ()
+    free: Annotated[bool, "The factors may be any within bounds: derivatives by them count."] = False
 
     def table(self) -> dict[str, object]:
         """Return the table of a scene."""
@@ -84,9 +86,17 @@ class Disk:
             The scene is not cyclic, or the factors do not fit it.
         """
         # Loaded here: it brings the compiled loops along, which reading a problem does not need.
-        from solver.studies.blades import with_mistuning
+        from solver.studies.blades import blade_paths, mistuned, with_mistuning
 
+        if self.free:
+            return mistuned(blade_paths(scene, self.of)[0], of=self.of, values=self.values)
         return with_mistuning(scene, self.table())
+
+    def paths(self, scene: Scene) -> list[tuple[str, ...]]:
+        """Return the parameters of its annulus that each factor moves, of a disk whose factors are free."""
+        from solver.studies.blades import blade_paths
+
+        return blade_paths(scene, self.of)[1] if self.free else []
 
     def words(self) -> str:
         """Return it in words."""
@@ -107,6 +117,11 @@ class Scenario:
     ] = ()
     disk: Annotated[Disk | None, "The mistuned disk; None for the scene's own."] = None
     xi: Annotated[tuple[float, ...], "Its place in the unit box or ball; empty for a sample of a list."] = ()
+
+    @property
+    def given_disk(self) -> Disk | None:
+        """The disk, if its factors are given and no coordinates."""
+        return None if self.disk is None or self.disk.free else self.disk
 
     def words(self) -> str:
         """Return it in words."""
@@ -153,6 +168,9 @@ class UncertainSet:
         tuple[Disk, ...], "Each of them may be the disk at hand; empty if the scene's own is."
     ] = ()
     listed: Annotated[tuple[Scenario, ...], "The samples of a list."] = ()
+    blades: Annotated[
+        tuple[str, ...], "The parts whose factor of each blade is a coordinate, the last ones; empty if none."
+    ] = ()
 
     @property
     def finite(self) -> bool:
@@ -170,9 +188,15 @@ class UncertainSet:
     def scenario(self, xi: Real | Sequence[float], disk: Disk | None = None) -> Scenario:
         """Return the scenario of a place in the unit box or ball."""
         place = self.inside(np.asarray(xi, dtype=np.float64))
-        delta = np.array(self.centre) + np.array(self.axes) @ place
+        return self._of_delta((np.array(self.centre) + np.array(self.axes) @ place).tolist(), place, disk)
+
+    def _of_delta(self, delta: Sequence[float], place: Real, disk: Disk | None) -> Scenario:
+        """Return the scenario of δ, at a place in the unit box or ball."""
+        known = list(zip(self.coordinates, delta, strict=True))
+        factors = tuple(1.0 + d for c, d in known if c.how is How.FACTOR)
         return Scenario(
-            settings=tuple((c, float(d)) for c, d in zip(self.coordinates, delta, strict=True)), disk=disk,
+            settings=tuple((c, d) for c, d in known if c.how is not How.FACTOR),
+            disk=Disk(of=self.blades, values=factors, free=True) if factors else disk,
             xi=tuple(float(x) for x in place),
         )  # fmt: skip
 
@@ -234,8 +258,7 @@ class UncertainSet:
         delta = (np.array(self.centre) + np.array(self.axes) @ place).tolist()
         for i, (low, high) in enumerate(self.ends):
             delta[i] = low if place[i] == -1.0 else high if place[i] == 1.0 else delta[i]
-        settings = tuple((c, d) for c, d in zip(self.coordinates, delta, strict=True))
-        return Scenario(settings=settings, disk=disk, xi=tuple(float(x) for x in place))
+        return self._of_delta(delta, place, disk)
 
     def corners(self, most: int) -> tuple[tuple[float, ...], ...]:
         """Return the corners of the box, or the ends of the axes of the ball; none if more than `most`."""
@@ -270,7 +293,10 @@ class UncertainSet:
             answer["parameters"] = [
                 {"path": c.name, "how": c.how.value, "low": m - r, "high": m + r}
                 for c, m, r in zip(self.coordinates, self.centre, reach.tolist(), strict=True)
+                if c.how is not How.FACTOR
             ]
+        if self.blades:
+            answer["mistuning"] = {"of": list(self.blades), "within": self.ends[-1][1]}
         if self.listed:
             answer["samples"] = [scenario.to_json() for scenario in self.listed]
         if self.disks:

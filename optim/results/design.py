@@ -14,7 +14,7 @@ from optim.criteria.peak import PEAK
 from optim.problem.words import Method
 from optim.results.doubts import doubts_of
 from optim.results.json import conditions_json, evaluation_json, known_parts, looked_json
-from optim.results.parts import Checked, CurveCheck, LocalOptimum
+from optim.results.parts import CatalogueOption, Checked, CurveCheck, LocalOptimum
 from solver.arrays import FloatOrNaN
 from solver.results.base import Drawn, MadeOfResponses
 from solver.results.known import Known, Stable, Verdict, worst
@@ -116,7 +116,7 @@ class DesignResult(MadeOfResponses, Drawn):
         "scene method optimum peak n_harmonics=problem.harmonics peaks band_hz limit bands objective rows"
         " held_by error_estimate stable stable_ground errors warnings plateau chosen_by certainty checked"
         " curve looked_at evaluations newton_iterations tried basins seconds work active optimality"
-        " multipliers conditions broken reached status"
+        " multipliers conditions broken options reached status"
     )
 
     problem: Annotated[Problem, "What was asked."]
@@ -137,6 +137,9 @@ class DesignResult(MadeOfResponses, Drawn):
     checked: Annotated[
         tuple[Checked, ...],
         "The local optima again with twice the harmonics, where the estimated error of a peak is large.",
+    ] = ()
+    options: Annotated[
+        tuple[CatalogueOption, ...], "Of a catalogue its options, best first: the design is of the first."
     ] = ()
     curve: Annotated[
         CurveCheck | None, "Of the method performance-curve: the curve beside the whole response."

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from enum import Enum
 from typing import Annotated, Any, ClassVar
 
 from solver.results.told import Piece
@@ -39,6 +40,27 @@ class Checked(Piece):
     peak: Annotated[float, "Highest peak [m]; NaN where a response could not be computed."]
     objective: Annotated[float, "What is minimised; NaN likewise."]
     feasible: Annotated[bool, "Whether the limits are kept."]
+
+
+class OptionStatus(Enum):
+    """What became of an option; the value is a sentence."""
+
+    FEASIBLE = "It keeps all limits."
+    INFEASIBLE = "No design of it keeps all limits."
+    CUT = "Its mass alone is no better than the best design of another option."
+    UNKNOWN = "No design of it could be computed: use more harmonics or a narrower band."
+    STOPPED = "Stopped by the caller before it was looked at."
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class CatalogueOption(Piece):
+    """One option of a catalogue."""
+
+    name: Annotated[str, "As it was given."]
+    status: Annotated[OptionStatus, "What became of it."]
+    objective: Annotated[float, "Of its best design; inf without one."]
+    least: Annotated[float, "What its objective cannot fall below, by its mass alone."]
+    values: Annotated[Mapping[str, float], "Variable to value of its best design; empty without variables."]
 
 
 VERIFIED = "Its whole response was computed with all harmonics."

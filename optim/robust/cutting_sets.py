@@ -138,7 +138,7 @@ def _distinct(worse: Sequence[Outcome]) -> list[Outcome]:
     kept: list[Outcome] = []
     for found in worse:
         here = found.scenario
-        same = [other.scenario for other in kept if here.xi and other.scenario.disk == here.disk]
+        same = [other.scenario for other in kept if here.xi and other.scenario.given_disk == here.given_disk]
         if len(kept) < AT_ONCE and all(math.dist(other.xi, here.xi) >= CLOUD for other in same):
             kept.append(found)
     return kept

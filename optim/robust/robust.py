@@ -25,7 +25,7 @@ from optim.errors import DesignError
 from optim.methods.enough_harmonics import most_harmonics
 from optim.methods.evaluator import SearchStoppedError
 from optim.methods.kkt import KEPT
-from optim.problem.keys import FEWEST_SAMPLES, QUANTILE, SEED, DesignKeys, keywords
+from optim.problem.keys import FEWEST_SAMPLES, OPTIONS, QUANTILE, SEED, DesignKeys, keywords
 from optim.problem.numbers import is_number, whole, word
 from optim.problem.problem import pose
 from optim.problem.typed import Limit, with_limits
@@ -122,7 +122,7 @@ SAMPLES = {Aim.WORST_CASE: 32, Aim.MEAN: 64, Aim.QUANTILE: 64}
 
 
 @shows_progress("robust design")
-@keywords(DesignKeys)
+@keywords(DesignKeys, without=(OPTIONS,))
 def robust_design(
     scene: Scene,
     *,

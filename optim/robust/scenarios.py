@@ -24,7 +24,7 @@ from solver.continuation.branches.observation import observing
 from solver.continuation.branches.sweep import sweep
 from solver.continuation.settings import ContinuationSettings
 from solver.results.known import Known, worst_of
-from solver.studies.blades import blade_peaks
+from solver.studies.blades import blade_peaks, blade_rows
 
 ShouldStop = Callable[[], bool] | None
 
@@ -38,7 +38,9 @@ class Outcome:
         tuple[CriterionRow, ...],
         "What it is judged by, gradients by the variables; empty unless every response covered its range.",
     ]
-    by_delta: Annotated[Real, "Their derivatives by the δ of the scenario's settings, (n_rows, n)."]
+    by_delta: Annotated[
+        Real, "Their derivatives by the δ of the scenario's settings, then of free blades, (n_rows, n)."
+    ]
     responses: Annotated[int, "Frequency responses computed."]
 
     @property
@@ -70,9 +72,8 @@ def outcome(
     by_delta: list[Real] = []
     responses = 0
     for case in problem.cases:
-        nominal = case.scene.with_values(design)
-        chain = _Chain(problem, scenario, {path: nominal.value(path) for path in _touched(design, scenario)})
-        found, count = chain.rows(case, gradients, should_stop)
+        chain = _Chain(problem, scenario, case, design)
+        found, count = chain.rows(gradients, should_stop)
         responses += count
         if not found:
             return Outcome(scenario=scenario, rows=(), by_delta=np.zeros((0, 0)), responses=responses)
@@ -80,13 +81,10 @@ def outcome(
             second = None if row.second is None else chain.twice(row.second)
             rows.append(replace(row, gradient=chain.by_variables(row.gradient), second=second))
             by_delta.append(chain.by_delta(row.gradient))
-    n = len(scenario.settings)
     return Outcome(
-        scenario=scenario,
-        rows=tuple(rows),
-        by_delta=np.array(by_delta).reshape(len(rows), n),
+        scenario=scenario, rows=tuple(rows), by_delta=np.array(by_delta).reshape(len(rows), -1),
         responses=responses,
-    )
+    )  # fmt: skip
 
 
 def known_in(
@@ -101,25 +99,25 @@ def known_in(
     design = parameter_values(problem.variables, values)
     parts: list[Known] = []
     for case in problem.cases:
-        nominal = case.scene.with_values(design)
-        chain = _Chain(problem, scenario, {path: nominal.value(path) for path in _touched(design, scenario)})
-        parts += chain.known(case, should_stop)
+        parts += _Chain(problem, scenario, case, design).known(should_stop)
     return worst_of(parts)
-
-
-def _touched(design: Mapping[str, float], scenario: Scenario) -> tuple[str, ...]:
-    """Return every path whose value a design or a scenario sets."""
-    uncertain = [path for coordinate, _ in scenario.settings for path in coordinate.paths]
-    return tuple(dict.fromkeys([*design, *uncertain]))
 
 
 class _Chain:
     """The values of all paths in one scenario of one case, and the chain rule through them."""
 
-    def __init__(self, problem: Problem, scenario: Scenario, nominal: Mapping[str, float]) -> None:
+    def __init__(
+        self, problem: Problem, scenario: Scenario, case: LoadCase, design: Mapping[str, float]
+    ) -> None:
         self._problem, self._scenario = problem, scenario
-        self._nominal = nominal
-        self._places = {path: i for i, path in enumerate(nominal)}
+        nominal, disk = case.scene.with_values(design), scenario.disk
+        uncertain = [path for coordinate, _ in scenario.settings for path in coordinate.paths]
+        self._nominal = {path: nominal.value(path) for path in (*design, *uncertain)}
+        self._blades = () if disk is None else tuple(disk.paths(nominal))
+        self._case = case if disk is None else replace(case, scene=disk.on(case.scene))
+        here = self._case.scene
+        self._nominal |= {path: here.value(path) for row in self._blades for path in row}
+        self._places = {path: i for i, path in enumerate(self._nominal)}
         self._of: dict[str, tuple[Coordinate, float]] = {
             path: (coordinate, delta) for coordinate, delta in scenario.settings for path in coordinate.paths
         }
@@ -130,11 +128,9 @@ class _Chain:
             values[path] = coordinate.value(self._nominal[path], delta)
         return values
 
-    def rows(
-        self, case: LoadCase, gradients: bool, should_stop: ShouldStop
-    ) -> tuple[list[CriterionRow], int]:
-        """Return the rows of a case with their gradients by path, and the responses computed."""
-        problem, values = self._posed(case), self._values()
+    def rows(self, gradients: bool, should_stop: ShouldStop) -> tuple[list[CriterionRow], int]:
+        """Return the rows of the case with their gradients by path, and the responses computed."""
+        problem, values = self._posed(), self._values()
         if self._of_every_blade(problem):
             return _of_all_blades(problem, problem.cases[0], values, gradients, should_stop)
         evaluation = evaluate(
@@ -142,9 +138,9 @@ class _Chain:
         )  # fmt: skip
         return list(evaluation.rows), evaluation.computed
 
-    def known(self, case: LoadCase, should_stop: ShouldStop) -> list[Known]:
-        """Return how well the peaks of a case are known."""
-        problem, values = self._posed(case), self._values()
+    def known(self, should_stop: ShouldStop) -> list[Known]:
+        """Return how well the peaks of the case are known."""
+        problem, values = self._posed(), self._values()
         if self._of_every_blade(problem):
             scene = problem.cases[0].scene.with_values(values)
             peaks = blade_peaks(
@@ -154,17 +150,16 @@ class _Chain:
         evaluation = evaluate(problem, values, gradients=False, should_stop=should_stop)
         return [branch.known for branch in over_bands(evaluation).values()]
 
-    def _posed(self, case: LoadCase) -> Problem:
-        """Return the problem of one case in the scenario, every path a variable."""
-        disk = self._scenario.disk
-        here = case if disk is None else replace(case, scene=disk.on(case.scene))
-        return replace(self._problem, variables=_single(self._values()), cases=(here,))
+    def _posed(self) -> Problem:
+        """Return the problem of the case in the scenario, every path a variable."""
+        return replace(self._problem, variables=_single(self._values()), cases=(self._case,))
 
     def _of_every_blade(self, problem: Problem) -> bool:
         """Return whether all blades of a mistuned disk count."""
-        scene = problem.cases[0].scene
-        mistuned = self._scenario.disk is not None and scene.structure.has_sectors
-        return mistuned and "@" not in scene.observe.dof
+        disk, scene = self._scenario.disk, problem.cases[0].scene
+        if disk is None or disk.free:
+            return disk is not None
+        return scene.structure.has_sectors and "@" not in scene.observe.dof
 
     def _members(self) -> Real:
         """Return d path / d variable, (n_variables, n_paths); its own derivatives are 0."""
@@ -189,10 +184,16 @@ class _Chain:
         return coordinate.by_nominal(delta)
 
     def by_delta(self, by_path: Real) -> Real:
-        """Return a gradient by the δ of the scenario's settings."""
+        """Return a gradient by the δ of the scenario's settings, then by the factors of free blades."""
+        disk = self._scenario.disk
+        factors = () if disk is None else disk.values
+        terms: list[tuple[Sequence[str], Callable[[float], float], float]] = [
+            (c.paths, c.by_delta, 1.0) for c, _ in self._scenario.settings
+        ]
+        terms += [(row, float, factor) for row, factor in zip(self._blades, factors, strict=False)]
         return np.array([
-            sum(by_path[self._places[p]] * coordinate.by_delta(self._nominal[p]) for p in coordinate.paths)
-            for coordinate, _ in self._scenario.settings
+            sum(by_path[self._places[p]] * slope(self._nominal[p]) for p in paths) / factor
+            for paths, slope, factor in terms
         ])  # fmt: skip
 
 
@@ -214,7 +215,8 @@ def _of_all_blades(
     """Return the rows of a mistuned disk: those of the observed DOF in every sector, from one response."""
     here = case.scene.with_values(values)
     effects = effects_of(problem, here)
-    sectors, dof = here.structure.sector_count, here.observe.dof
+    blade = here.observe.dof.partition("@")[0]
+    blades = [f"{blade}@{j}" for j in range(len(blade_rows(here, blade)))]
     ranges = ranges_of(problem, case)
     rows: list[CriterionRow] = []
     for over in ranges:
@@ -224,10 +226,11 @@ def _of_all_blades(
         )  # fmt: skip
         if not branch.reached:
             return [], len(ranges)
-        for j in range(sectors):
-            name = f"{case.name}, {dof}@{j}"
-            seen = branch if j == 0 else observing(branch, f"{dof}@{j}", limit=problem.limit)
-            judge = Judge(problem=problem, case=replace(case, name=name), gradients=gradients)
+        for j, dof in enumerate(blades):
+            seen = branch if j == 0 else observing(branch, dof, limit=problem.limit)
+            judge = Judge(
+                problem=problem, case=replace(case, name=f"{case.name}, {dof}"), gradients=gradients
+            )
             rows += [row for row in judge.rows(seen, over) if j == 0 or row.quantity.each_blade]
     return rows, len(ranges)
 

@@ -123,7 +123,7 @@ def pessimise(
     else:
         tried = []
         for disk in uncertain.disks or (None,):
-            mine = [s for s in (*known, *besides) if s.disk == disk and uncertain.inside_of(s)]
+            mine = [s for s in (*known, *besides) if s.given_disk == disk and uncertain.inside_of(s)]
             ascent = _Ascent(asking, uncertain, aspect, disk)
             tried += ascent.run(mine)
             if thorough:

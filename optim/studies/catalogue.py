@@ -11,7 +11,6 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from enum import Enum
 from typing import Annotated, Any
 
 from optim.criteria.evaluation import evaluate, natural_scales
@@ -20,33 +19,15 @@ from optim.errors import DesignError
 from optim.methods.kkt import KEPT
 from optim.problem.problem import Problem, pose
 from optim.problem.variables import parameter_values
+from optim.problem.words import Method
+from optim.results.design import DesignResult, DesignStatus
+from optim.results.parts import CatalogueOption, OptionStatus
 from optim.search import solve_problem
 from solver.errors import at
 from solver.results.told import Piece
-from solver.results.watch import ShouldStop
+from solver.results.watch import OnProgress, ShouldStop
 from solver.scene.parameter_paths import AMPLITUDE
 from solver.scene.scene import Scene
-
-
-class OptionStatus(Enum):
-    """What became of an option; the value is a sentence."""
-
-    FEASIBLE = "It keeps all limits."
-    INFEASIBLE = "No design of it keeps all limits."
-    CUT = "Its mass alone is no better than the best design of another option."
-    UNKNOWN = "No design of it could be computed: use more harmonics or a narrower band."
-    STOPPED = "Stopped by the caller before it was looked at."
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class CatalogueOption(Piece):
-    """One option of a catalogue."""
-
-    name: Annotated[str, "As it was given."]
-    status: Annotated[OptionStatus, "What became of it."]
-    objective: Annotated[float, "Of its best design; inf without one."]
-    least: Annotated[float, "What its objective cannot fall below, by its mass alone."]
-    values: Annotated[Mapping[str, float], "Variable to value of its best design; empty without variables."]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
@@ -54,6 +35,9 @@ class CatalogueResult(Piece):
     """All options of a catalogue, best first; those cut off or without a design behind them."""
 
     options: Annotated[tuple[CatalogueOption, ...], "Best first."]
+    design: Annotated[
+        DesignResult, "The first of them as a design, the values of the option among those of its optimum."
+    ]
     seconds: Annotated[float, "Time taken [s]."]
 
     @property
@@ -64,8 +48,8 @@ class CatalogueResult(Piece):
 
 
 def catalogue(
-    scene: Scene, options: Mapping[str, Mapping[str, float]], *, should_stop: ShouldStop = None,
-    **problem: Any,
+    scene: Scene, options: Mapping[str, Mapping[str, float]], *, on_progress: OnProgress = None,
+    should_stop: ShouldStop = None, **problem: Any,
 ) -> CatalogueResult:  # fmt: skip
     """Find the best of several options, each with its best design.
 
@@ -73,6 +57,7 @@ def catalogue(
     ----------
     scene : what is designed.
     options : name to values of parameter paths.
+    on_progress : called with (share done, responses of the option so far).
     should_stop : asked between responses and within them.
     problem : the keys of `design`. ``variables={}`` leaves nothing but the options to choose: each is
         evaluated once.
@@ -83,37 +68,81 @@ def catalogue(
         A bad option, or a bad key of the problem.
     """
     begun = time.perf_counter()
+    posed = check_options(scene, options, problem)
+    bounds = {name: _least(each) for name, each in posed.items()}
+    found: list[tuple[CatalogueOption, DesignResult | None]] = []
+    best = float("inf")
+    for count, name in enumerate(sorted(posed, key=lambda one: bounds[one])):
+        design, status = None, OptionStatus.STOPPED
+        if bounds[name] >= best:
+            status = OptionStatus.CUT
+        elif not found or should_stop is None or not should_stop():
+            design = _searched(posed[name], _share(on_progress, count, len(posed)), should_stop)
+            status = _status(design)
+        option = _option(name, status, design, bounds[name])
+        if status is OptionStatus.FEASIBLE:
+            best = min(best, option.objective)
+        found.append((option, design))
+    order = list(OptionStatus)
+    found.sort(key=lambda pair: (order.index(pair[0].status), pair[0].objective))
+    ranked = tuple(option for option, _ in found)
+    first = next((o, design) for o, design in found if design is not None)
+    effort = [design for _, design in found if design is not None]
+    whole = replace(
+        _with_option(first[1], options[first[0].name]), options=ranked,
+        evaluations=sum(one.evaluations for one in effort), work=sum(one.work for one in effort),
+        seconds=time.perf_counter() - begun,
+    )  # fmt: skip
+    if any(option.status is OptionStatus.STOPPED for option in ranked):
+        whole = replace(whole, status=DesignStatus.STOPPED)
+    return CatalogueResult(options=ranked, design=whole, seconds=whole.seconds)
+
+
+def check_options(
+    scene: Scene, options: Mapping[str, Mapping[str, float]], problem: Mapping[str, Any]
+) -> dict[str, Problem]:
+    """Return the problem of each option.
+
+    Raises
+    ------
+    SettingError, SceneError, DesignError
+        A bad option, or a bad key of the problem.
+    """
     if not options:
         raise DesignError("options", dict(options), "must have at least one name with values")
-    posed = {name: _posed(scene, name, values, problem) for name, values in options.items()}
-    bounds = {name: _least(each) for name, each in posed.items()}
-    found: list[CatalogueOption] = []
-    best = float("inf")
-    for name in sorted(posed, key=lambda one: bounds[one]):
-        if should_stop is not None and should_stop():
-            status, objective, values = OptionStatus.STOPPED, float("inf"), dict[str, float]()
-        elif bounds[name] >= best:
-            status, objective, values = OptionStatus.CUT, float("inf"), {}
-        else:
-            status, objective, values = _searched(posed[name], should_stop)
-        if status is OptionStatus.FEASIBLE:
-            best = min(best, objective)
-        found.append(
-            CatalogueOption(name=name, status=status, objective=objective, least=bounds[name], values=values)
-        )
-    order = list(OptionStatus)
-    found.sort(key=lambda one: (order.index(one.status), one.objective))
-    return CatalogueResult(options=tuple(found), seconds=time.perf_counter() - begun)
+    posed: dict[str, Problem] = {}
+    for name, values in options.items():
+        with at("options", name):
+            here = scene.with_values(values)
+        posed[name] = pose(here, **with_variables(problem))
+        if problem.get("variables") == {}:
+            posed[name] = replace(posed[name], variables=())
+        for path in values:
+            if path in posed[name].paths:
+                raise DesignError(("options", name, path), values[path], "is a variable: it has no value")
+    return posed
 
 
-def _posed(scene: Scene, name: str, values: Mapping[str, float], problem: Mapping[str, Any]) -> Problem:
-    """Return the problem of one option; without variables one that has none."""
-    with at("options", name):
-        here = scene.with_values(values)
-    if problem.get("variables") != {}:
-        return pose(here, **problem)
-    # What stands there is left out again.
-    return replace(pose(here, **{**problem, "variables": {AMPLITUDE: (1.0, 2.0)}}), variables=())
+def with_variables(problem: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the keys of a problem with a variable that stands for none where ``variables`` is empty."""
+    return dict(problem) | ({"variables": {AMPLITUDE: (1.0, 2.0)}} if problem.get("variables") == {} else {})
+
+
+def _share(on_progress: OnProgress, count: int, of: int) -> OnProgress:
+    """Return what hears of the progress of one option among several."""
+    if on_progress is None:
+        return None
+    return lambda share, done: on_progress((count + share) / of, done)
+
+
+def _with_option(design: DesignResult, option: Mapping[str, float]) -> DesignResult:
+    """Return a design whose values are those of its option too."""
+    told = {
+        id(one): replace(one, values={**option, **one.values})
+        for one in (*design.history, *([design.evaluation] if design.evaluation else []))
+    }
+    evaluation = None if design.evaluation is None else told[id(design.evaluation)]
+    return replace(design, evaluation=evaluation, history=tuple(told[id(one)] for one in design.history))
 
 
 def _least(problem: Problem) -> float:
@@ -126,18 +155,36 @@ def _least(problem: Problem) -> float:
     return weight * sum(body.mass for body in lightest.bodies)
 
 
-def _searched(
-    problem: Problem, should_stop: ShouldStop
-) -> tuple[OptionStatus, float, dict[str, float]]:  # fmt: skip
-    """Return how an option ends, and its best design."""
-    evaluation, values = None, dict[str, float]()
+def _searched(problem: Problem, on_progress: OnProgress, should_stop: ShouldStop) -> DesignResult:
+    """Return the best design of an option; of one without variables its only one."""
     if problem.variables:
-        found = solve_problem(problem, should_stop=should_stop)
-        evaluation, problem = found.evaluation, found.problem
-    else:
-        evaluation = evaluate(problem, {}, gradients=False, errors=False, should_stop=should_stop)
-    if evaluation is None or not evaluation.good:
-        return OptionStatus.UNKNOWN, float("inf"), values
-    kept = evaluation.violation(natural_scales(problem)) <= KEPT
-    status = OptionStatus.FEASIBLE if kept else OptionStatus.INFEASIBLE
-    return status, evaluation.objective, dict(evaluation.values)
+        return solve_problem(problem, on_progress=on_progress, should_stop=should_stop)
+    begun = time.perf_counter()
+    only = evaluate(problem, {}, gradients=False, should_stop=should_stop)
+    stopped = not only.good and should_stop is not None and should_stop()
+    kept = only.good and only.violation(natural_scales(problem)) <= KEPT
+    status = DesignStatus.OPTIMAL if kept else DesignStatus.INFEASIBLE
+    if not only.good:
+        status = DesignStatus.STOPPED if stopped else DesignStatus.NO_RESPONSE
+    return DesignResult(
+        problem=problem, method=Method.AUTO, status=status, evaluation=only if only.good else None,
+        conditions=None, basins=(), history=(only,), evaluations=only.computed, work=float(only.computed),
+        seconds=time.perf_counter() - begun,
+    )  # fmt: skip
+
+
+def _status(found: DesignResult) -> OptionStatus:
+    """Return what became of an option that was searched."""
+    if found.evaluation is None or not found.evaluation.good:
+        return OptionStatus.STOPPED if found.status is DesignStatus.STOPPED else OptionStatus.UNKNOWN
+    kept = found.evaluation.violation(natural_scales(found.problem)) <= KEPT
+    return OptionStatus.FEASIBLE if kept else OptionStatus.INFEASIBLE
+
+
+def _option(name: str, status: OptionStatus, design: DesignResult | None, least: float) -> CatalogueOption:
+    """Return an option as it is told."""
+    only = None if design is None else design.evaluation
+    return CatalogueOption(
+        name=name, status=status, objective=float("inf") if only is None else only.objective, least=least,
+        values={} if only is None else dict(only.values),
+    )  # fmt: skip

@@ -198,6 +198,7 @@ COMMANDS = {
         ),
         CommandEntry("march", STUDY, "March in time until the motion repeats."),
         CommandEntry("transient", STUDY, "Run through a range of frequencies in time."),
+        CommandEntry("quasi-periodic", STUDY, "Find the response to two frequencies that are no multiples."),
         CommandEntry(
             "wear", STUDY,
             "Follow what friction wears off the contacts over hours, and the response meanwhile.",

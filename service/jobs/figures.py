@@ -91,14 +91,15 @@ def figures(table: Mapping[str, Any]) -> Iterator[FigureValue]:
 
 
 _LONGEST_WORDS = 500
-_DEEP = 2
+_DEEP = 3  # as the worst peak of a robust design lies
 
 
 def alone(result: Mapping[str, Any]) -> dict[str, Any]:
     """Return the numbers, words and truths in a result that stand alone, by their keys joined by dots.
 
-    Of lists of objects only how many they have, such as ``peaks.count``; curves are no figures. They are
-    stored beside the result, to be compared with those of another one.
+    Of lists of objects only how many they have, such as ``points.count``, and the one with the least peak,
+    such as ``points.peak`` and ``points.at``; curves are no figures. They are stored beside the result: what
+    sums it up or compares it with another one does not read it whole.
     """
     return dict(_alone("", result, 1))
 
@@ -111,6 +112,9 @@ def _alone(prefix: str, table: Mapping[str, Any], depth: int) -> Iterator[tuple[
             yield from _alone(f"{prefix}{key}.", value, depth + 1)
         elif isinstance(value, list) and all(isinstance(row, Mapping) for row in value):
             yield f"{prefix}{key}.count", len(value)
+            if peaks := [row for row in value if isinstance(row.get("peak"), int | float)]:
+                least = min(peaks, key=lambda row: float(row["peak"]))
+                yield from ((f"{prefix}{key}.{own}", least[own]) for own in ("peak", "at") if own in least)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -40,10 +40,9 @@ class _Paced:
     """
 
     def __init__(self, database: Database, pause: Callable[[float], bool] | None) -> None:
-        alone = pause is _at_once
-        self._wanted, self.most = (_WANTED_ALONE, _MOST_ALONE) if alone else (_WANTED_SECONDS, _MOST)
+        self._wanted, self.most = (_WANTED_ALONE, _MOST_ALONE) if pause is None else (_WANTED_SECONDS, _MOST)
         self._database = database
-        self._pause = pause or _sleep
+        self._pause = pause
         self._size = 4
         self.stopped = False
 
@@ -76,7 +75,7 @@ class _Paced:
         elif took < 0.5 * self._wanted:
             self._size = min(self.most, 2 * self._size)
         self._database.settle()
-        self.stopped = self._pause(time.monotonic() - begun)
+        self.stopped = self._pause is not None and self._pause(time.monotonic() - begun)
         return done
 
 
@@ -95,7 +94,8 @@ def prune(
     ----------
     keep_designs : of designs delete the sweeps alone.
     binned : those that were put in the bin before the time, in place of those that ended before it.
-    pause : called between transactions with the time the last one took [s]; True ends the work.
+    pause : called between transactions with the time the last one took [s]; True ends the work. None where
+        nobody else waits for the database: transactions are large then.
     on_progress : called with what was deleted in every round.
     """
     repository, paced = RetentionRepository(database), _Paced(database, pause)
@@ -137,11 +137,6 @@ def prune_uploads(
     repository, paced = RetentionRepository(database), _Paced(database, pause)
     old = repository.old_uploads(before)
     return Pruned(uploads=sum(paced.once(partial(repository.delete_upload, one, before)) for one in old))
-
-
-def _sleep(seconds: float) -> bool:
-    time.sleep(seconds)
-    return False
 
 
 class Retention:
@@ -265,10 +260,10 @@ def prune_database(
             counted = repository.count(before, keep_designs=keep_designs)
             return replace(counted, uploads=len(repository.old_uploads(before)) if uploads else 0)
         database.acquire()
-        found = prune(database, before, keep_designs=keep_designs, pause=_at_once)
-        found += empty_bin(database, before, pause=_at_once)
+        found = prune(database, before, keep_designs=keep_designs)
+        found += empty_bin(database, before)
         if uploads:
-            found += prune_uploads(database, before, pause=_at_once)
+            found += prune_uploads(database, before)
         if vacuum:
             shrink(url)
         return found
@@ -276,8 +271,3 @@ def prune_database(
         raise DatabaseError(f"{name} cannot be used: {error.orig}") from error
     finally:
         database.close()
-
-
-def _at_once(_seconds: float) -> bool:
-    """Without a pause: nobody else waits for the database."""
-    return False

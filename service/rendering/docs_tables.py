@@ -20,7 +20,7 @@ from optim.criteria.registry import criteria, limit_keys
 from optim.identification.data.measured import data_kinds
 from optim.identification.data.table import known_units
 from optim.identification.readers.registry import data_formats
-from optim.problem.keys import ROBUST, CaseRequest, DesignKeys, FrontKeys, options
+from optim.problem.keys import OPTIONS, ROBUST, CaseRequest, DesignKeys, FrontKeys, options
 from optim.problem.words import MethodWord, ScalingWord
 from service.jobs.common.scenes import HarmonicRequest, SceneRequest
 from service.jobs.kinds import SHIPPED
@@ -51,7 +51,7 @@ _WORDS = {get_args(MethodWord): "MethodWord | Method", get_args(ScalingWord): "S
 
 def keyword_source() -> str:
     """Return the text of the module."""
-    design, front = _keys_of(DesignKeys, ROBUST), _keys_of(FrontKeys, ("points",))
+    design, front = _keys_of(DesignKeys, (OPTIONS, *ROBUST)), _keys_of(FrontKeys, ("points",))
     both = {key: lines for key, lines in design.items() if key in front}
     classes = (
         _class("ProblemKeywords(TypedDict", "Those of a design and of a front.", both),

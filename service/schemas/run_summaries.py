@@ -21,80 +21,69 @@ Json = Mapping[str, Any]
 
 
 def run_summary(service: Service, run: RunRow, points: int) -> RunSummary:
-    """Return the summary of a run, with a curve of at most so many points."""
-    result: Json = {}
-    if run.job.state in _STATES:
-        result = service.jobs.result(run.job.result_of or run.id) or {}
+    """Return the summary of a run from the figures of its result, with a curve of at most so many points."""
+    known = run.job.state in _STATES
+    figures: Json = service.jobs.figures(run.job.result_of or run.id) if known else {}
     request = run.job.request or {}
-    peak, worst = _peak(result)
-    sweep = _sweep(service, run, peak) if result else None
-    robust = result.get("robust") if isinstance(result.get("robust"), Mapping) else None
-    band = (robust or result).get("band_hz")
+    peak, worst = _peak(figures)
+    sweep = _sweep(service, run, peak) if figures else None
     return RunSummary(
         id=run.id, request=request or None,
-        values=_values(request, result), peak=peak, worst=worst,
-        band_hz=band if isinstance(band, int | float) else None,
-        error_estimate=_number(result, "error_estimate"),
-        harmonics=_whole(result.get("n_harmonics")) or _whole(request.get("harmonics")),
-        found=_found(result), curve=None if sweep is None else _curve(service, sweep, points),
+        values=_values(request, figures), peak=peak, worst=worst,
+        band_hz=_number(figures, "robust.band_hz", "band_hz"),
+        error_estimate=_number(figures, "error_estimate"),
+        harmonics=_whole(figures.get("n_harmonics")) or _whole(request.get("harmonics")),
+        found=_found(figures), curve=None if sweep is None else _curve(service, sweep, points),
     )  # fmt: skip
 
 
-def _number(table: Json, key: str) -> float | None:
-    value = table.get(key)
-    return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else None
+def _number(figures: Json, *keys: str) -> float | None:
+    """The first of these that is a number."""
+    found = (figures.get(key) for key in keys)
+    numbers = (one for one in found if isinstance(one, int | float) and not isinstance(one, bool))
+    return next(map(float, numbers), None)
 
 
 def _whole(value: object) -> int | None:
     return value if isinstance(value, int) and not isinstance(value, bool) else None
 
 
-def _peak(result: Json) -> tuple[Peak | None, bool]:
-    """The peak of a response, of an optimum, of the ridge of a map; of a robust design the worst one."""
-    robust = result.get("robust")
-    if isinstance(robust, Mapping) and isinstance(robust.get("worst"), Mapping):
-        value, own = _number(robust["worst"], "peak"), robust.get("peak") or {}
-        return (None if value is None else Peak(value=value, at=_number(own, "at") or 0.0)), True
-    ridge = result.get("ridge")
-    places = [
-        result.get("peak"),
-        result.get("optimum"),
-        *([ridge.get("optimum")] if isinstance(ridge, Mapping) else []),
-    ]
-    for place in places:
-        if not isinstance(place, Mapping):
-            continue
-        value = _number(place, "value") if "value" in place else _number(place, "peak")
-        at = _number(place, "at")
-        if value is not None and at is not None:
-            return Peak(value=value, at=at), False
-    heights = [one for one in result.get("points") or () if isinstance(one, Mapping) and _number(one, "peak")]
-    if heights:
-        least = min(heights, key=lambda one: float(one["peak"]))
-        return Peak(value=float(least["peak"]), at=_number(least, "at") or 0.0), False
+_PEAKS = (
+    ("robust.worst.peak", "robust.peak.at"),
+    ("peak.value", "peak.at"),
+    ("peak.peak", "peak.at"),
+    ("optimum.value", "optimum.at"),
+    ("optimum.peak", "optimum.at"),
+    ("ridge.optimum.value", "ridge.optimum.at"),
+    ("ridge.optimum.peak", "ridge.optimum.at"),
+    ("points.peak", "points.at"),
+)
+"""Where results have their peak, and the place of it; that of a robust design is the worst one."""
+
+
+def _peak(figures: Json) -> tuple[Peak | None, bool]:
+    """The peak of a response, of an optimum, of the ridge of a map; whether it is the worst of several."""
+    for value, at in _PEAKS:
+        height, place = _number(figures, value), _number(figures, at)
+        worst = value.startswith("robust.")
+        if height is not None and (place is not None or worst or value.startswith("points.")):
+            return Peak(value=height, at=place or 0.0), worst
     return None, False
 
 
-def _values(request: Json, result: Json) -> dict[str, float | None]:
+def _values(request: Json, figures: Json) -> dict[str, float | None]:
     """Of a design its optimum, of an identification what was found, else what was set."""
-    for key in ("optimum", "values"):
-        found = result.get(key)
-        if (
-            isinstance(found, Mapping)
-            and found
-            and all(value is None or isinstance(value, int | float) for value in found.values())
-            and "at" not in found
-        ):
-            return dict(found)
+    for prefix in ("optimum.", "values."):
+        found = {key.removeprefix(prefix): one for key, one in figures.items() if key.startswith(prefix)}
+        if found and "at" not in found and all(isinstance(one, int | float) for one in found.values()):
+            return found
     given = request.get("set")
     return dict(given) if isinstance(given, Mapping) else {}
 
 
-def _found(result: Json) -> list[str]:
-    counts = (
-        (len(result[key]) if isinstance(result.get(key), list) else 0, words)
-        for key, words in (("basins", "optima"), ("points", "designs"), ("estimates", "parameters"))
-    )
+def _found(figures: Json) -> list[str]:
+    kinds = (("basins", "optima"), ("points", "designs"), ("estimates", "parameters"))
+    counts = ((figures.get(f"{key}.count", 0), words) for key, words in kinds)
     return [f"{count} {words}" for count, words in counts if count > 1]
 
 

@@ -50,6 +50,16 @@ class ContactForces:
             product[:, ports] = np.einsum("abij,pbj->pai", blocks, dU[:, ports])
         return product
 
+    def times_transposed(self, w: Real) -> Real:
+        """Return ∂F/∂Uᵀ w, (nc, n), of weights (nc, n)."""
+        product = np.empty(w.shape)
+        for e in range(self.system.laws.size):
+            ports, first = self.ports(e), int(self.system.first_block[e])
+            m = ports.stop - ports.start
+            blocks = self.dF_dU[first : first + m * m].reshape(m, m, *self.dF_dU.shape[1:])
+            product[ports] = np.einsum("abij,ai->bj", blocks, w[ports])
+        return product
+
     def along(self, slopes: Real, loads: Real) -> Real:
         """Return ∂F/∂p, (P, nc, n), for derivatives of the contact table and of the loads."""
         found = np.einsum("cij,pcj->pci", self.dF_dN, loads[:, self.system.owner])

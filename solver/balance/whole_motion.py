@@ -138,6 +138,7 @@ def whole_motion(
         Z is singular.
     """
     ks, given = system.ks.astype(np.float64), _levels(system, omega)
+    measured = ((system.only < 0) | (system.ks == system.only))[:, None]
     if matrices is None and system.form == DENSE:
         which = system.which
         matrices = HarmonicMatrices(
@@ -148,7 +149,8 @@ def whole_motion(
         # The mean has k = 1 and matrices without C and M, as in the compiled loops.
         found = _of_matrices(matrices, np.maximum(ks, 1.0)[:, None, None], omega)
         turned = {i: given * forces for i, forces in found.forces_by.items()}
-        return replace(found, forces=given * found.forces, forces_by=turned)
+        observe = measured * found.observe
+        return replace(found, forces=given * found.forces, forces_by=turned, observe=observe)
     values, which, k = system.eigenvalues[system.which], system.which, ks[:, None]
     alike = np.ones_like(values.real)
     modes = system.form == MODES
@@ -160,7 +162,7 @@ def whole_motion(
     return WholeMotion(
         inverse=np.asarray(1.0 / d, np.complex128), by_omega=slope, by_omega_twice=bend, by_structure=by,
         contact=system.contact_modes[which], back=system.contact_duals[which],
-        observe=system.observe_modes[which], forces=given * system.modal_forces,
+        observe=measured * system.observe_modes[which], forces=given * system.modal_forces,
     )  # fmt: skip
 
 

@@ -17,7 +17,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-from solver.certificate.boxes import boxed, claimed, orbit_at, set_out, settled
+from solver.certificate.boxes import boxed, claimed, set_out, settled
 from solver.certificate.summits import least_proved, peak_proved
 from solver.errors import MissingExtraError, SettingError
 from solver.response.exact.beside import orbit_beside
@@ -31,11 +31,10 @@ from solver.scene.cyclic.annulus import annulus
 from solver.scene.scene import Scene
 
 if TYPE_CHECKING:
-    from solver.certificate.checker import RejectedError
     from solver.response.exact.orbit import Orbit as ExactOrbit
 
 _Bounds = dict[str, tuple[float, float]]
-_BITS = (128, 256)
+_ANSWER, _GROWN = 40, 3.1  # bits of an answer, and twice those by which balls grow from event to event
 MOST_WORK = 5000.0
 _MOVES = 8  # contacts moved
 _NARROW = 1e-16  # relative width of what is claimed; else more bits
@@ -67,7 +66,7 @@ class Certificate(Piece):
         " held bits work seconds certificate"
     )
 
-    proves: Annotated[str, "What was to be proved: a response, a peak, a least peak."]
+    proves: Annotated[str, "What was to be proved: a response, a peak, a least peak, a limit cycle."]
     status: Annotated[CertificateStatus, "Whether it was proved."]
     reason: Annotated[str, "Which inequality fails, by how much, or why there is nothing to prove; or empty."]
     max_abs: Annotated[
@@ -137,36 +136,47 @@ def certify(
         Without python-flint.
     """
     begun = time.perf_counter()
-    _check_extra()
+    check_extra()
     from solver.certificate.proof_work import allowed
     from solver.certificate.statement import system_of
 
     solution = _written_out(solution)
     orbit, reason = None, solution.status.value
     if solution.converged:
+        check_certifiable(solution.scene)
         (piecewise, orbit), reason = orbit_beside(solution, polish=1), ""  # exact numbers go on from there
     raw: dict[str, Any] = {"certifies": "periodic orbit", "scene": solution.scene.name}
     status, bounds, work = CertificateStatus.NO_ORBIT, _Bounds(), 0.0
     if orbit is not None:
         raw["system"] = system_of(piecewise, solution.frequency_hz)
         if least_over:
-            raw["varies"] = loads_of(solution.scene, least_over)
-        if least_over and not raw["varies"]:
-            raise SettingError("least_over", least_over, "must be the path of a load, such as damper.N0")
+            varying = loads_of(solution.scene, least_over)
+            for j in varying:
+                raw["system"]["contacts"][j]["varies"] = True
+            if not varying:
+                raise SettingError("least_over", least_over, "must be the path of a load, such as damper.N0")
         proved = least_proved if least_over else peak_proved if peak else _proved
         with allowed(most_work, should_stop) as allowance:
-            status, reason, bounds = _tried(partial(proved, raw, piecewise, orbit))
+            status, reason, bounds = tried(partial(proved, raw, piecewise, orbit))
         work = allowance.done
-    unknown = (math.nan, math.nan)
+    proves = "least peak" if least_over else "peak" if peak else "response"
+    return told(raw, proves, (status, reason, bounds), work, begun, solution.frequency_hz)
+
+
+def told(
+    raw: dict[str, Any], proves: str, ended: tuple[CertificateStatus, str, _Bounds], work: float,
+    begun: float, frequency_hz: float,
+) -> Certificate:  # fmt: skip
+    """Return a certificate for how a proof ended."""
+    (status, reason, bounds), unknown = ended, (math.nan, math.nan)
     contacts, course = raw.get("system", {}).get("contacts", ()), raw.get("orbit", {})
     heights = (bounds[key] for key in ("least_peak", "peak", "max_abs") if key in bounds)
     return Certificate(
-        proves="least peak" if least_over else "peak" if peak else "response", status=status,
-        reason=reason, max_abs=next(heights, unknown), work=work,
-        frequency_hz=bounds.get("frequency_hz", (solution.frequency_hz, solution.frequency_hz)),
+        proves=proves, status=status, reason=reason, max_abs=next(heights, unknown), work=work,
+        frequency_hz=bounds.get("frequency_hz", (frequency_hz, frequency_hz)),
         load_factor=bounds.get("load_factor", (1.0, 1.0)),
         half_peak_to_peak=bounds.get("half_peak_to_peak", unknown), events=len(course.get("events", ())),
-        held=tuple(contacts[int(j)]["name"] for j in course.get("fixed_sliders", ())),
+        held=tuple(contacts[int(j)]["name"] for j in course.get("fixed_forces", ())),
         bits=raw.get("bits", 0), seconds=time.perf_counter() - begun, certificate=raw if bounds else None,
     )  # fmt: skip
 
@@ -179,7 +189,7 @@ def _written_out(solution: Solution) -> Solution:
     return solve(disk, frequency_hz=solution.frequency_hz, harmonics=solution.n_harmonics)
 
 
-def _tried(prove: Callable[[], _Bounds]) -> tuple[CertificateStatus, str, _Bounds]:
+def tried(prove: Callable[[], _Bounds]) -> tuple[CertificateStatus, str, _Bounds]:
     """Return how a proof ended, why, and the bounds that it proved."""
     from solver.certificate.checker import RejectedError
     from solver.certificate.proof_work import ProofHaltedError
@@ -187,13 +197,14 @@ def _tried(prove: Callable[[], _Bounds]) -> tuple[CertificateStatus, str, _Bound
     try:
         return CertificateStatus.CERTIFIED, "", prove()
     except RejectedError as error:
-        return CertificateStatus.NOT_CERTIFIED, str(error), {}
+        return CertificateStatus.NOT_CERTIFIED, error.args[0], {}
     except ProofHaltedError as error:
         ended = CertificateStatus.STOPPED if error.stopped else CertificateStatus.WORK_USED_UP
         return ended, "", {}
 
 
-def _check_extra() -> None:
+def check_extra() -> None:
+    """Raise what is missing for proofs."""
     try:
         import flint  # noqa: F401 - whether it is there
     except ImportError as error:
@@ -202,8 +213,16 @@ def _check_extra() -> None:
 
 def check_certifiable(scene: Scene) -> None:
     """Raise what `certify` would, before what it is to prove is computed."""
-    _check_extra()
-    Piecewise(annulus(scene) if scene.structure.has_sectors else scene, 1.0)
+    check_extra()
+    piecewise = Piecewise(annulus(scene) if scene.structure.has_sectors else scene, 1.0)
+    for member in piecewise.members:
+        name, wanted = (
+            piecewise.scene.contacts[member.contact].name,
+            "must be finite where something is proved: ",
+        )
+        for key, value in (("kt", float(piecewise.kt[member.slider])), ("kn", member.kn)):
+            if math.isinf(value):
+                raise SettingError(f"{name}.{key}", value, wanted + "give it a large value")
 
 
 def loads_of(scene: Scene, path: str) -> list[int]:
@@ -215,50 +234,65 @@ def loads_of(scene: Scene, path: str) -> list[int]:
 
 def _proved(raw: dict[str, Any], piecewise: Piecewise, found: ExactOrbit) -> _Bounds:
     """Complete a certificate by the box of its unknowns and by what it claims; return that as floats."""
+    start = set_out(raw, piecewise, found.pieces)
+    return in_more_bits(raw, partial(_kept_inward, raw, start))
+
+
+def in_more_bits(raw: dict[str, Any], prove: Callable[[], tuple[Any, Any, Any]]) -> _Bounds:
+    """Prove with as many bits as the events ask for, and with more; return the claims as floats."""
     from flint import ctx
 
     from solver.certificate.checker import RejectedError
 
-    kept = ctx.prec
+    kept, least = ctx.prec, 64 * math.ceil((_ANSWER + _GROWN * len(raw["orbit"]["events"])) / 64)
+    least = max(least, 128)
     try:
-        for bits in _BITS:
+        for bits in range(least, 2 * least + 1, 64):
             ctx.prec = raw["bits"] = bits
             try:
-                low, high = _kept_inward(raw, set_out(raw, piecewise, found))
-            except RejectedError:
-                if bits == _BITS[-1]:
+                low, high, period = prove()
+            except RejectedError as error:
+                if bits == 2 * least or (len(error.args) > 1 and error.args[-1] < 0):
                     raise
                 continue
-            if bits == _BITS[-1] or (low.rad() + high.rad()) <= _NARROW * (high - low):
-                return claimed(raw, {"max_abs": high.max(-low), "half_peak_to_peak": (high - low) / 2})
+            if bits == 2 * least or (low.rad() + high.rad()) <= _NARROW * (high - low):
+                reached = {"max_abs": high.max(-low), "half_peak_to_peak": (high - low) / 2}
+                own = raw["system"]["frequency_hz"] is None
+                return claimed(raw, reached | ({"frequency_hz": 1 / period} if own else {}))
         raise AssertionError
     finally:
         ctx.prec = kept
 
 
-def _kept_inward(raw: dict[str, Any], start: list[Any]) -> tuple[Any, Any]:
+def _kept_inward(raw: dict[str, Any], start: list[Any]) -> tuple[Any, Any, Any]:
     """Prove an orbit, contacts that stick at the edge of their limit moved inward; return its extremes."""
+    from solver.certificate.checker import Orbit as CheckedOrbit
     from solver.certificate.checker import RejectedError
+    from solver.certificate.proof_work import Counted
 
+    system = Counted(raw["system"], {})
     for step in range(_MOVES):
-        orbit = orbit_at(raw)
+        orbit = CheckedOrbit(system, raw["orbit"])
         try:
-            raw["orbit"]["unknowns"], extremes = boxed(orbit, *settled(orbit, start))
+            start, now = settled(orbit, start)
+            unknowns, extremes = boxed(orbit, start, now)
         except RejectedError as error:
-            if not _moved_inward(raw, error, step):
+            if not _moved_inward(raw, step, *error.args):
                 raise
             last = error
         else:
+            raw["proof"] = {"unknowns": unknowns}
             return extremes
     raise last
 
 
-def _moved_inward(raw: dict[str, Any], error: RejectedError, step: int) -> bool:
+def _moved_inward(
+    raw: dict[str, Any], step: int, _: str, contact: int = -1, follows: int = 0, *_margin: Any
+) -> bool:
     """Take a little of its force from a contact that sticks all the time at the edge of its limit."""
-    fixed, key = raw["orbit"]["fixed_sliders"], str(error.contact)
-    if key not in fixed or error.follows not in (1, -1):
+    fixed, key = raw["orbit"]["fixed_forces"], str(contact)
+    if key not in fixed or follows not in (1, -1):
         return False
-    contact = raw["system"]["contacts"][error.contact]
-    force = 10.0**step * _MOVED * contact["mu"] * abs(contact["load"][0][1])
-    fixed[key] += error.follows * force / contact["kt"]
+    of = raw["system"]["contacts"][contact]
+    fixed[key] -= follows * 10.0**step * _MOVED * of["mu"] * abs(of["waves"][0][1])
     return True

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,6 @@ from solver.jit.fourier import Real
 from solver.linear.assembly import linear_model
 from solver.linear.structure_matrices import elements_of
 from solver.response.exact.flow import FlowPiece
-from solver.response.exact.orbit import Orbit
 from solver.response.exact.piecewise import FREE, STICK, MemberState, Piecewise
 from solver.scene.parts import LumpedStructure
 
@@ -23,13 +23,19 @@ _HARDLY = 1e-5  # rad: a slip that is shorter may be none
 _APART = 1e-9  # rad between events that floats do not tell apart
 
 
-def system_of(piecewise: Piecewise, frequency_hz: float) -> dict[str, Any]:
-    """Return a scene as a system: springs as they are in it, so that no sum of theirs is rounded."""
-    scene, n = piecewise.scene, piecewise.n
+def system_of(piecewise: Piecewise, frequency_hz: float | None) -> dict[str, Any]:
+    """Return a scene as a system: springs as they are in it, so that no sum of theirs is rounded.
+
+    `frequency_hz`: None of what nothing drives.
+    """
+    scene = piecewise.scene
     model, structure = linear_model(scene), scene.structure
     zero = np.zeros(1, np.int64)
     K, C, M = (np.real(each[0]) for each in model.at(zero, np.ones(1, np.bool_)))
-    springs: list[Any] = []
+    springs: list[Any] = [  # entry by entry
+        [[[i, 1.0]], [[k, 1.0]], float(K[i, k]), float(C[i, k])]
+        for i, k in np.argwhere((K != 0.0) | (C != 0.0)).tolist()
+    ]
 
     if (
         isinstance(structure, LumpedStructure)
@@ -39,25 +45,26 @@ def system_of(piecewise: Piecewise, frequency_hz: float) -> dict[str, Any]:
     ):
         elements = elements_of(structure, ())
         at = {dof: i for i, dof in enumerate(elements.dofs)}
-        every = [*elements.springs, *((ends, 0.0, c) for ends, c in elements.dampers)]
-        for ends, k, c in every:
+        springs = []
+        for ends, k, c in [*elements.springs, *((ends, 0.0, c) for ends, c in elements.dampers)]:
             terms = [
                 [at[end.dof], sign]
                 for end, sign in zip(ends, (1.0, -1.0), strict=True)
                 if end.dof is not None
             ]
-            springs.append([terms, k, c + elements.beta * k])
-        K, C = np.zeros((n, n)), np.zeros((n, n))
+            springs.append([terms, terms, k, c + elements.beta * k])
+    if piecewise.mass_damping:
+        gas = piecewise.mass_damping * M
+        springs += [[[[i, 1.0]], [[k, 1.0]], 0.0, float(gas[i, k])] for i, k in np.argwhere(gas).tolist()]
     contacts, first = [], 0
     for contact in scene.contacts:
         ports = piecewise.ports[first : first + len(contact.end_keys)]
         contacts += [_contact(row, ports) for row in contact.rows()]
         first += len(contact.end_keys)
     return {
-        "frequency_hz": frequency_hz, "mass": M.tolist(), "damping": C.tolist(), "stiffness": K.tolist(),
-        "springs": springs, "contacts": contacts,
+        "frequency_hz": frequency_hz, "mass": M.tolist(), "springs": springs, "contacts": contacts,
         "forces": [
-            {"row": _terms(np.real(force.vector)), "wave": [force.harmonic, force.amplitude, force.phase]}
+            {"row": _terms(np.real(force.vector)), "waves": [[force.harmonic, force.amplitude, force.phase]]}
             for force in model.forces if force.amplitude != 0.0
         ],
         "observe": _terms(model.observe),
@@ -65,16 +72,17 @@ def system_of(piecewise: Piecewise, frequency_hz: float) -> dict[str, Any]:
 
 
 def _contact(row: Row, ports: Real) -> dict[str, Any]:
-    along = {"name": row.name, "row": _terms(ports[row.port])}
-    if row.follows is Follows.GAP:
-        return along | {"k": row.kt, "gap": row.gap}
-    waves = [(row.N1, row.N1_phase), *row.higher]
-    load = [[0, row.N0, 0.0], *([k, *wave] for k, wave in enumerate(waves, start=1) if wave[0] != 0.0)]
+    gap, along = row.follows is Follows.GAP, _terms(ports[row.port])
+    waves = [[0, row.N0, 0.0]]
+    for k, wave in enumerate([(row.N1, row.N1_phase), *row.higher], start=1):
+        waves += [[k, *wave]] if wave[0] != 0.0 else []
     moves = row.normal_port is not None
-    return along | {
-        "kt": None if math.isinf(row.kt) else row.kt, "mu": row.mu, "load": load, "kn": row.kn,
-        "normal": _terms(ports[row.normal_port]) if moves else [], "rest": row.rest,
-        "presses": bool(row.presses) and moves,
+    return {
+        "name": row.name, "row": [] if gap else along, "mu": 0.0 if gap else row.mu,
+        "kt": 0.0 if gap else row.kt, "waves": [] if gap else waves,
+        "kn": row.kt if gap else row.kn, "gap": row.gap if gap else 0.0,
+        "normal": along if gap else _terms(ports[row.normal_port]) if moves else [],
+        "rest": 0.0 if gap else row.rest, "presses": gap or (bool(row.presses) and moves), "varies": False,
     }  # fmt: skip
 
 
@@ -82,14 +90,16 @@ def _terms(row: Real) -> list[list[Any]]:
     return [[int(i), float(row[i])] for i in np.flatnonzero(row)]
 
 
-def orbit_of(piecewise: Piecewise, orbit: Orbit, system: System) -> tuple[dict[str, Any], list[float]]:
+def orbit_of(
+    piecewise: Piecewise, pieces: Sequence[FlowPiece], system: dict[str, Any]
+) -> tuple[dict[str, Any], list[float]]:
     """Return the order of events of an orbit, and its unknowns in floats."""
-    first, w = orbit.pieces[0], orbit.pieces[0].w
-    states = [_words(piecewise, piece.state) for piece in orbit.pieces]
+    first, w, n, omega = pieces[0], pieces[0].w, piecewise.n, piecewise.omega
+    states = [_words(piecewise, piece.state) for piece in pieces]
     events: list[dict[str, Any]] = []
     times: list[float] = []
-    for i, piece in enumerate(orbit.pieces[1:], start=1):
-        before = orbit.pieces[i - 1]
+    for i, piece in enumerate(pieces[1:], start=1):
+        before = pieces[i - 1]
         for j, (old, new) in enumerate(zip(states[i - 1], states[i], strict=True)):
             for word in () if old == new else _way(piecewise, before, piece.w, j, old, new):
                 events.append({"contact": j, "to": word})
@@ -98,22 +108,34 @@ def orbit_of(piecewise: Piecewise, orbit: Orbit, system: System) -> tuple[dict[s
                 )
     for i in _hardly(states[0], events, times):
         del events[i], times[i]
-    moved = {each["contact"] for each in events}
-    sliders = {
-        member.contact: float(w[piecewise.elastic_at[member.slider]])
-        for member in piecewise.members
-        if not piecewise.rigid[member.slider] and first.state.sliders[member.slider] == STICK
-    }
+    moved, forces = {each["contact"] for each in events}, {}
+    for member in piecewise.members:
+        at = member.slider
+        if first.state.sliders[at] != FREE:
+            forces[member.contact] = float(first.mode.forces[at] @ w)
     found = {
         "begins": first.tau, "states": states[0], "events": events,
-        "fixed_sliders": {str(j): value for j, value in sliders.items() if j not in moved},
+        "fixed_forces": {
+            str(j): value for j, value in forces.items() if j not in moved and states[0][j] == "stick"
+        },
     }  # fmt: skip
+    if own := system["frequency_hz"] is None:  # where it moves fastest its place tells the phase
+        at = int(np.abs(w[n : 2 * n]).argmax())
+        found["pinned"] = [at, float(w[at])]
+    stated = System(system, {})
     for _ in range(2):  # those that come to rest together, then those that go on together
         for i in range(1, len(events)):
-            if times[i] - times[i - 1] < _AT_ONCE and CheckedOrbit(system, found).together(i):
+            orbit = CheckedOrbit(stated, found)
+            near = times[i] - times[i - 1] < _AT_ONCE and orbit.together(i)
+            if near or events[i]["contact"] in orbit.twins:
                 events[i]["at_once"] = True
-    lasting = [*w[: 2 * piecewise.n].tolist(), *(value for j, value in sorted(sliders.items()) if j in moved)]
-    return found, [*lasting, *(at for at, each in zip(times, events, strict=True) if "at_once" not in each)]
+    known = [forces.get(at - 2 * n, 0.0) for at in CheckedOrbit(stated, found).returns[2 * n :]]
+    start = [*w[:n].tolist(), *(w[n : 2 * n] * omega).tolist(), *known]
+    begun = [first.tau, *(at for at, each in zip(times, events, strict=True) if "at_once" not in each)]
+    if own:
+        del start[found["pinned"][0]]
+        begun.append(first.tau + 2.0 * math.pi)
+    return found, [*start, *(np.diff(begun) / omega).tolist()]
 
 
 def _hardly(states: list[str], events: list[dict[str, Any]], times: list[float]) -> list[int]:
@@ -132,7 +154,7 @@ def _hardly(states: list[str], events: list[dict[str, Any]], times: list[float])
 def _way(piecewise: Piecewise, before: FlowPiece, w: Real, j: int, old: str, new: str) -> list[str]:
     """Return the states a contact goes through, those included that last no longer than floats tell."""
     slider = next((member.slider for member in piecewise.members if member.contact == j), None)
-    if slider is None or piecewise.rigid[slider]:
+    if slider is None:
         return [new]
     if old == "stick" and new == "open":
         return ["slip+" if before.mode.forces[slider] @ w > 0.0 else "slip-", new]

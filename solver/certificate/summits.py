@@ -49,15 +49,16 @@ def _in_long_numbers(
     kept = ctx.prec
     try:
         raw["certifies"], raw["bits"], ctx.prec = what, bits, bits
-        summits = _Summits(raw, set_out(raw, piecewise, found))
+        summits = _Summits(raw, set_out(raw, piecewise, found.pieces))
         if what == "peak":
-            raw["at"] = summits.beside(arb(1))
+            raw["proof"] = summits.beside(arb(1))
         else:
             at = _turning(lambda factor: -summits.height(factor), arb(1))
             loads = [at + at * k * arb(_BESIDE) for k in (-1, 0, 1)]
-            raw["at"] = [each for load in loads for each in summits.beside(load)]
-            raw["at"].append(summits.over_loads(at))
-        return claimed(raw, prove(raw, Counted))
+            raw["proof"] = {"three": [summits.beside(load) for load in loads], "over": summits.over_loads(at)}
+        bounds = prove(raw, raw["proof"], Counted)
+        told = ("peak", "frequency_hz") if what == "peak" else ("least_peak", "load_factor", "frequency_hz")
+        return claimed(raw, {name: bounds[name] for name in told})
     finally:
         ctx.prec = kept
 
@@ -109,27 +110,31 @@ class _Summits:
 
     def height(self, factor: Any) -> Any:
         """Return the peak for a factor of the loads."""
+        from solver.certificate.checker import least
 
         def reached(frequency: Any) -> Any:
             orbit = orbit_at(self.raw, frequency_hz=digits(frequency), load_factor=digits(factor))
-            self.y, now = settled(orbit, self.y)
-            low, high = boxed(orbit, self.y, now)[1]
-            return high.max(-low).mid()
+            self.y, _ = settled(orbit, self.y)
+            parts = enumerate(orbit.shoot(self.y)[2])
+            motion = [each for piece, (z, _, length) in parts
+                      for each in orbit.kept(piece, z, length, length - length.mid())]  # fmt: skip
+            high, low = (-least([(sign * p, rest, h) for p, rest, h in motion]) for sign in (-1, 1))
+            return high.max(low).mid()
 
         self.at = _turning(reached, self.at)
         return reached(self.at)
 
-    def beside(self, factor: Any) -> list[dict[str, Any]]:
+    def beside(self, factor: Any) -> dict[str, Any]:
         """Return orbits over a range about a peak, and below, at and above it."""
         self.height(factor)
-        width = self.at * _half_width()
-        found = [self._over(digits(factor), f"{digits(self.at)} +/- {(width * 1.01).str(5, radius=False)}")]
+        width, three = self.at * _half_width(), []
+        over = self._over(digits(factor), f"{digits(self.at)} +/- {(width * 1.01).str(5, radius=False)}")
         for k in (-1, 0, 1):
             where = {"load_factor": digits(factor), "frequency_hz": digits(self.at + k * width)}
             orbit = orbit_at(self.raw, **where)
             self.y, now = settled(orbit, self.y)
-            found.append(where | {"unknowns": boxed(orbit, self.y, now)[0]})
-        return found
+            three.append(where | {"unknowns": boxed(orbit, self.y, now)[0]})
+        return {"over": over, "three": three}
 
     def over_loads(self, factor: Any) -> dict[str, Any]:
         """Return an orbit at the peak for a factor, over the loads about it."""

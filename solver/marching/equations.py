@@ -113,6 +113,9 @@ class MarchEquations:
     ]
     index: Annotated[dict[str, int], "Coordinate of each DOF."]
     seen: Annotated[tuple[tuple[int, float], ...], "Coordinates that `observed` adds up, with their factors."]
+    modes: Annotated[FloatArray | None, "Motion of the DOFs in each, (n, n), where they are coordinates."] = (
+        None
+    )
 
 
 _IN_TIME = "cannot be marched in time: it is a term of the frequency domain; give dashpots or damping ratios"

@@ -23,7 +23,7 @@ from solver.marching.contacts import as_sparse, rows
 from solver.marching.equations import MarchEquations, equations_of_motion
 from solver.marching.kernels import state as kernel
 from solver.marching.kernels import taylor as stepping
-from solver.marching.result import MarchResult, MarchStatus, describe
+from solver.marching.result import MarchResult, MarchStatus, describe, of_harmonic
 from solver.marching.start import MarchStart, state_at
 from solver.results.watch import shows_progress
 from solver.scene.cyclic.annulus import annulus
@@ -31,6 +31,7 @@ from solver.scene.scene import Excitation, Scene
 
 FloatArray = NDArray[np.float64]
 LEAST_STEPS = 64
+RESOLVED = 0.375  # rad, turn of the fastest motion in a step of the finer of two runs
 FINER = 8  # times the least steps, where steps are of a lower order
 MOST_STEPS = 1_000_000
 PERIODS = 20_000  # at most, for each step size
@@ -147,6 +148,8 @@ def march(
         found = _twice_rigid(plan, equations, begins, steps, names, frequency_hz)
     else:
         found = _twice(plan, begins, steps, names, frequency_hz)
+    if scene.observe.harmonic is not None:
+        found = of_harmonic(found, scene.observe.harmonic)
     return replace(found, seconds=time.perf_counter() - begin)
 
 
@@ -161,22 +164,24 @@ def row_names(scene: Scene) -> tuple[str, ...]:
 
 
 def settled_state(
-    scene: Scene, frequency_hz: float, tolerance: float, should_stop: Callable[[], bool] | None
-) -> tuple[kernel.State, MarchStatus]:
+    scene: Scene, equations: MarchEquations, frequency_hz: float, tolerance: float,
+    should_stop: Callable[[], bool] | None, turn: float = RESOLVED,
+) -> tuple[kernel.State, MarchStatus]:  # fmt: skip
     """March a scene as its annulus, without rigid contacts, from rest until it repeats.
+
+    `turn` is that of the fastest motion in a step [rad].
 
     Returns
     -------
     The state at the angle 0, velocities by that angle, and how the march ended.
     """
     omega = 2.0 * math.pi * frequency_hz
-    equations = equations_of_motion(scene, omega)
     plan = _Plan(
         system=equations.system, dof=equations.observed, tolerance=tolerance, max_periods=PERIODS,
         on_progress=None, should_stop=should_stop,
     )  # fmt: skip
     begins = state_at(equations, MarchStart(), row_names(scene), omega)
-    run = _run(plan, begins, steps_for(equations.system, scene.forces, None), done=0)
+    run = _run(plan, begins, steps_for(equations.system, scene.forces, None, turn=turn), done=0)
     return run.state, run.status
 
 
@@ -238,14 +243,15 @@ def _check(frequency_hz: float, tolerance: float, max_periods: int) -> None:
 
 
 def steps_for(
-    system: kernel.System, forces: tuple[Excitation, ...], wanted: int | None, least: int = 0
-) -> int:
-    """Steps of the finer run: the fastest motion turns less than 0.375 rad in one of them."""
+    system: kernel.System, forces: tuple[Excitation, ...], wanted: int | None, least: int = 0,
+    turn: float = RESOLVED,
+) -> int:  # fmt: skip
+    """Steps of the finer run: the fastest motion turns less than `turn` in one of them [rad]."""
     full = system.W.value.size > system.W.start.size - 1 or bool(np.any(np.abs(system.L.value) != 1.0))
     turns = 2.0 * math.pi * _fastest(system, BALANCING if full else 1)
     load = int(np.max(np.nonzero(system.waves)[1], initial=0)) + 1
     harmonic = max(load, *(force.harmonic for force in forces))
-    least = max(least, LEAST_STEPS, 2 * math.ceil(turns / 1.5), 16 * harmonic)
+    least = max(least, LEAST_STEPS, 2 * math.ceil(0.25 * turns / turn), 16 * harmonic)
     finer = 2 if order_of(system) == kernel.ORDER else FINER
     chosen = max(2 * LEAST_STEPS, finer * least) if wanted is None else wanted
     if isinstance(chosen, Integral) and chosen % 2 == 0 and least <= chosen <= MOST_STEPS:

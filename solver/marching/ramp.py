@@ -50,6 +50,7 @@ class Ramp:
 
 def check(scene: Scene) -> None:
     """Raise SettingError where a scene cannot be followed while its frequency changes."""
+    scene.observe.check_whole("a run through a range of frequencies")
     if any(force.base for force in scene.excitation):
         wanted = "must be forces: a base that moves is followed at one frequency"
         raise SettingError("excitation", "base", wanted)

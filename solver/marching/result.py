@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
@@ -160,6 +160,13 @@ def describe(
         error_estimate=_step_error(max_abs, coarse, order) + transient,
         seconds=math.nan,
     )
+
+
+def of_harmonic(found: MarchResult, harmonic: int) -> MarchResult:
+    """Return a result whose amplitudes are of one harmonic of the motion alone, which its samples tell."""
+    size = 2.0 * abs(np.fft.rfft(found.displacement)[harmonic]) / found.displacement.size
+    error = found.error_estimate * found.max_abs / size if size > 0.0 else math.nan
+    return replace(found, max_abs=size, half_peak_to_peak=size, mean=0.0, error_estimate=error)
 
 
 def _extremes(record: Record) -> tuple[float, float]:

@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 from numbers import Real
 
 import numpy as np
@@ -18,12 +20,13 @@ from solver.errors import SettingError
 from solver.marching.equations import MarchEquations, equations_of_motion
 from solver.marching.kernels import state as kernel
 from solver.marching.kernels import taylor as stepping
-from solver.marching.march import copied, order_of, row_names, settled_state, steps_for, whole
+from solver.marching.march import RESOLVED, copied, order_of, row_names, settled_state, steps_for, whole
+from solver.marching.modal import in_modes, moved_to
 from solver.marching.ramp import Ramp, check, equations_over
 from solver.marching.result import MarchStatus, turning_points
 from solver.marching.start import MarchStart, state_at
 from solver.marching.transient_result import TransientResult, TransientStatus
-from solver.results.watch import OnProgress, ShouldStop, shows_progress
+from solver.results.watch import OnProgress, ShouldStop, part_of, shows_progress
 from solver.scene.scene import Scene
 
 MOST_WINDOWS = 2000  # of the envelope, over the whole run
@@ -33,6 +36,9 @@ FINEST = 5  # times that steps are halved to meet the tolerance
 SETTLED = 1e-10  # relative change over a period at the first frequency
 _CHUNK = 16_384  # steps between two looks at progress and stop
 _BETWEEN_SAMPLES = 4  # order of the cubics between samples
+# rad, turn of the fastest motion in the finer of the first two runs, the series being stable up to 3.4: what
+# motions as fast as that do to the largest amplitude is for the runs with finer steps to say.
+_STABLE = 1.5
 _SHARE = 0.5  # of what is left, that one more run with finer steps counts as
 _STATUS = {kernel.CHATTER: TransientStatus.CHATTER, kernel.NOT_FINITE: TransientStatus.NOT_FINITE}
 
@@ -45,6 +51,7 @@ def transient(
     end_hz: float | None = None,
     rate_hz_per_s: float | None = None,
     ramp_seconds: float | None = None,
+    rates: Sequence[float] = (),
     ring_down_seconds: float = 0.0,
     from_rest: bool = False,
     start: MarchStart | None = None,
@@ -66,6 +73,7 @@ def transient(
         run-down begins at the higher one.
     rate_hz_per_s, ramp_seconds : how fast the frequency changes [Hz/s], or how long that takes [s]; one of
         them, the latter where both frequencies are equal.
+    rates : several of them [Hz/s] in place of both: a run at each, of which the slowest is told in full.
     ring_down_seconds : how long the motion is followed after that, with no force but constant ones [s].
     from_rest : begin at rest, contacts without force; else in the motion that repeats at `begin_hz`.
     start : a motion to begin with instead of both.
@@ -80,11 +88,19 @@ def transient(
         An argument out of its range, a base that moves, a rigid contact.
     """
     began = time.perf_counter()
+    if len(rates):
+        single = partial(
+            transient, scene, begin_hz=begin_hz, end_hz=end_hz, ramp_seconds=ramp_seconds, start=start,
+            ring_down_seconds=ring_down_seconds, from_rest=from_rest, tolerance=tolerance,
+            steps_per_period=steps_per_period, should_stop=should_stop,
+        )  # fmt: skip
+        given = {} if rate_hz_per_s is None else {"rate_hz_per_s": rate_hz_per_s}
+        return _at_rates(single, given, rates, on_progress, began)
     ramps = ramps_of(
         scene, begin_hz=begin_hz, end_hz=end_hz, rate_hz_per_s=rate_hz_per_s, ramp_seconds=ramp_seconds,
         ring_down_seconds=ring_down_seconds,
     )  # fmt: skip
-    run = _Passage(scene, ramps)
+    run = _Passage(scene, ramps, modal=start is None)
     if not (isinstance(tolerance, Real) and 1e-12 <= tolerance <= 0.1):
         raise SettingError("tolerance", tolerance, "must be a number from 1e-12 to 0.1")
     if start is not None and from_rest:
@@ -97,6 +113,28 @@ def transient(
     if on_progress is not None and found.complete:
         on_progress(1.0, int(run.cycles))
     return _result(run, found, status, error, began)
+
+
+def _at_rates(
+    single: Callable[..., TransientResult], given: Mapping[str, float], rates: Sequence[float],
+    on_progress: OnProgress, began: float,
+) -> TransientResult:  # fmt: skip
+    """Run at each rate, the fastest first; return the slowest run with the largest amplitudes of all."""
+    for key, value in given.items():
+        raise SettingError(key, value, "must not be given beside `rates`")
+    found: list[TransientResult] = []
+    order = sorted(rates, reverse=True)
+    costs = np.cumsum([0.0, *(1.0 / max(float(rate), 1e-300) for rate in order)])
+    for i, rate in enumerate(order):
+        watch = part_of(on_progress, costs[i] / costs[-1], costs[i + 1] / costs[-1])
+        found.append(single(rate_hz_per_s=rate, on_progress=watch))
+        if found[-1].status is TransientStatus.STOPPED:
+            break
+    worst = next((one.status for one in found if not one.reached), TransientStatus.FINISHED)
+    return replace(
+        found[-1], rates=np.array(order[: len(found)]), status=worst,
+        rates_max_abs=np.array([one.max_abs for one in found]), seconds=time.perf_counter() - began,
+    )  # fmt: skip
 
 
 def _refined(
@@ -124,13 +162,14 @@ def _refined(
 class _Passage:
     """A scene and its ramps, time τ = omega t of the highest frequency."""
 
-    def __init__(self, scene: Scene, ramps: tuple[Ramp, ...]) -> None:
+    def __init__(self, scene: Scene, ramps: tuple[Ramp, ...], *, modal: bool) -> None:
         self.scene, self.ramps = scene, ramps
         self.omega = 2.0 * math.pi * max(ramps[0].begin_hz, ramps[0].end_hz)
         self.turned, self.passed = [0.0], [0.0]  # turns of the excitation, and time [s], before each and all
         self.equations: list[MarchEquations] = []
         for ramp in ramps:
-            self.equations.append(equations_over(scene, ramp, self.omega, self.turned[-1]))
+            own = equations_over(scene, ramp, self.omega, self.turned[-1])
+            self.equations.append(in_modes(own) if modal and scene.speed_order is None else own)
             self.turned.append(self.turned[-1] + float(ramp.cycles(np.array(ramp.seconds))))
             self.passed.append(self.passed[-1] + ramp.seconds)
 
@@ -150,13 +189,18 @@ class _Passage:
         system = self.equations[0].system
         return 2 if system.A_course.size else min(order_of(system), _BETWEEN_SAMPLES)
 
+    @property
+    def turn(self) -> float:
+        """Turn of the fastest motion in a step of the finer of the first two runs [rad]."""
+        return _STABLE if self.order == _BETWEEN_SAMPLES else RESOLVED
+
     def steps(self, wanted: int | None) -> int:
         """Steps in a period of the highest frequency, of the finer of the first two runs."""
         first, systems = self.ramps[0], [self.equations[0].system]
         if self.scene.speed_order is not None and first.end_hz != first.begin_hz:
             there = whole(self.scene.at_frequency(first.end_hz))
             systems.append(equations_of_motion(there, self.omega).system)
-        steps = max(steps_for(system, self.scene.forces, wanted) for system in systems)
+        steps = max(steps_for(system, self.scene.forces, wanted, turn=self.turn) for system in systems)
         if steps * self.periods > MOST_STEPS:
             most = MOST_STEPS / steps / self.periods
             wanted_seconds = (
@@ -302,12 +346,14 @@ def _start(
     if hertz == 0.0:
         raise SettingError("begin_hz", hertz, "must be > 0, or the run begin from rest (`from_rest`)")
     scene = whole(run.scene.at_frequency(hertz))
-    state, status = settled_state(scene, hertz, SETTLED, should_stop)
+    equations = in_modes(equations_of_motion(scene, 2.0 * math.pi * hertz))
+    state, status = settled_state(scene, equations, hertz, SETTLED, should_stop, turn=run.turn)
     if status is MarchStatus.STOPPED:
         return None, TransientStatus.STOPPED
     if status is not MarchStatus.CONVERGED:
         return None, TransientStatus.NOT_SETTLED
     state.v[:] *= 2.0 * math.pi * hertz / run.omega
+    moved_to(state, equations, run.equations[0])
     return state, TransientStatus.FINISHED
 
 

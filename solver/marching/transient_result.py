@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from typing import Annotated, ClassVar
+
+import numpy as np
 
 from solver.arrays import FloatOrNaN, Real
 from solver.results.base import Drawn
@@ -36,12 +38,12 @@ class TransientResult(Drawn):
 
     VIEWS: ClassVar = Views("solver.views", "responses:transient", "transients:transient_figure")
     DATA: ClassVar = Data(
-        "transient", {"time": "time frequency_hz high low"},
+        "transient", {"time": "time frequency_hz high low", "rates": "rates rates_max_abs"},
         "max_abs at_hz at_seconds steps_per_period error_estimate", scene="scene",
     )  # fmt: skip
     JSON: ClassVar = (
         "scene dof max_abs at_hz at_seconds time frequency_hz high low begin_hz end_hz ramp_seconds "
-        "ring_down_seconds steps_per_period error_estimate status seconds"
+        "ring_down_seconds steps_per_period error_estimate rates rates_max_abs status seconds"
     )
 
     scene: Annotated[str, "Name of the scene."]
@@ -63,3 +65,9 @@ class TransientResult(Drawn):
         FloatOrNaN, "Estimated error of `max_abs` relative to it, from a run with twice the step."
     ]
     seconds: Annotated[float, "Time taken [s]."]
+    rates: Annotated[Real, "Rates of several runs [Hz/s], the fastest first, (m,); else none."] = field(
+        default_factory=lambda: np.empty(0)
+    )
+    rates_max_abs: Annotated[Real, "Largest abs(x) of each [m], (m,)."] = field(
+        default_factory=lambda: np.empty(0)
+    )

@@ -53,7 +53,7 @@ def mode_at_amplitudes(
     SettingError
         As `nonlinear_mode`, and an unknown path.
     """
-    problem = pose(scene, mode, nodal_diameter, harmonics)
+    problem = pose(scene, mode, nodal_diameter, harmonics, paths=paths)
     logs = np.log(amplitudes)
     found = _from_guesses(problem, logs, guesses)
     if any(one is None for one in found):

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 
 from solver.balance.balance import Balance, build, check_harmonics
-from solver.balance.simplifications import Effects
+from solver.balance.simplifications import Effects, even_harmonics_reason
 from solver.errors import SettingError
 from solver.jit.fourier import Real
 from solver.linear.assembly import linear_model
@@ -106,7 +106,7 @@ def check_amplitudes(amplitudes: Sequence[float]) -> tuple[float, float]:
 
 def pose(
     scene: Scene, mode: int, nodal_diameter: int | None, harmonics: int, *, whole: bool = False,
-    kind: type[Equations] = Equations,
+    kind: type[Equations] = Equations, paths: Sequence[str] = (),
 ) -> ModeProblem:  # fmt: skip
     """Return the equations of a mode and where it begins; errors as `nonlinear_mode`.
 
@@ -114,16 +114,18 @@ def pose(
     ----------
     whole : keep whole matrices whatever the damping is.
     kind : what is asked of a motion.
+    paths : by which derivatives are wanted: some call for even harmonics.
     """
     if check_harmonics(harmonics) < 1:
         raise SettingError("harmonics", harmonics, "must be from 1: a mode needs harmonic 1")
     scene = at_nodal_diameter(scene, nodal_diameter)
     check_mode(scene, mode)
-    equations = kind(_balance(scene, harmonics, whole=whole))
+    even = even_harmonics_reason(scene, paths) is not None
+    equations = kind(_balance(scene, harmonics, whole=whole, even=even))
     found = _begin(equations, mode)
     if equations.structure.is_diagonal and not found[0].moves_contacts:
         # The modes kept are those that contacts or forces see.
-        equations = kind(_balance(scene, harmonics, whole=True))
+        equations = kind(_balance(scene, harmonics, whole=True, even=even))
         found = _begin(equations, mode)
     loads = [contact.load for contact in equations.balance.scene.contacts]
     turns = not any(load is not None and load.orders for load in loads)
@@ -132,8 +134,9 @@ def pose(
     )  # fmt: skip
 
 
-def _balance(scene: Scene, harmonics: int, *, whole: bool) -> Balance:
-    return build(scene, harmonics=harmonics, effects=Effects(whole_matrices=whole), poles=False)
+def _balance(scene: Scene, harmonics: int, *, whole: bool, even: bool) -> Balance:
+    effects = Effects(whole_matrices=whole, even_harmonics=even)
+    return build(scene, harmonics=harmonics, effects=effects, poles=False)
 
 
 def _begin(equations: Equations, mode: int) -> tuple[LinearMode, Real, list[LinearMode]]:

@@ -169,6 +169,7 @@ def structure_of(balance: Balance, alone: Complex | None = None) -> ModeStructur
     Poles do not carry the term in ζ: a balance of that form has to be built with whole matrices.
     """
     system, scene = balance.system, balance.scene
+    scene.observe.check_whole("a nonlinear mode")
     ks, which = system.ks, system.which
     moving, first = ks > 0, int(np.flatnonzero(ks == 1)[0])
     led = system.leading

@@ -26,7 +26,13 @@ from solver.jit import fourier
 from solver.jit.fourier import Real
 from solver.linear.kernels.receptance import receptance
 from solver.response.solution import Solution
-from solver.response.wear_measures import Change, ContactCycle, friction_work, least_load, slip_travel
+from solver.response.wear_measures import (
+    Change,
+    ContactCycle,
+    friction_work,
+    least_load,
+    slip_travel,
+)
 from solver.results.told import Piece
 from solver.wording import listing
 

@@ -150,6 +150,11 @@ def work_of(U: Real, F: Real, dU: Real, dF: Real, ks: Integer) -> tuple[Real, Re
     return math.pi * np.where(real, done, 0.0), math.pi * np.where(real, rises, 0.0)
 
 
+def work_pairing(ks: Integer, n: int) -> Real:
+    """Return the matrix P (n, n) of the work F·(P U) in a period."""
+    return math.pi * _speed(np.eye(n), ks).T
+
+
 def _speed(coefficients: Real, ks: Integer) -> Real:
     """Return the coefficients (..., n) of dq/dτ for those of the ascending harmonics `ks` alone."""
     first = int(ks[0] == 0)
@@ -176,7 +181,7 @@ def least_load(cycle: ContactCycle, e: int, changes: Sequence[Change]) -> tuple[
         return float(N[0] - swing), np.array(slopes)
     if not np.all(np.isfinite(N)):
         return math.nan, np.full(len(changes), math.nan)
-    at = fourier.basis(np.array([_lowest(N)]), cycle.top)[0]
+    at = fourier.basis(np.array([lowest(N)]), cycle.top)[0]
     return float(at @ N), np.array([float(at @ each) for each in dN])
 
 
@@ -239,7 +244,7 @@ def _slip_ends(found: Segments) -> _Ends:
     return _Ends(sign=table[:, 0], direction=table[:, 1], tau=table[:, 2], moves=table[:, 3] > 0.0)
 
 
-def _lowest(N: Real) -> float:
+def lowest(N: Real) -> float:
     """Return where a load with coefficients `N` is least [rad]."""
     top = (N.size - 1) // 2
     c, s = np.zeros(top + 1), np.zeros(top + 1)

@@ -46,8 +46,10 @@ from solver.response.wear_measures import (
     least_load,
     slip_travel,
     work_of,
+    work_pairing,
 )
 from solver.results.told import Piece
+from solver.sensitivity.gradient import Sensitivities
 from solver.sensitivity.nonsmooth import BESIDE, SMOOTH, beside, of_corner
 
 Number = TypeVar("Number", float, Real)
@@ -312,6 +314,27 @@ def worst_slopes(
     near, far = (_across(sensitivity, worst, contact, measure, share * BESIDE) for share in (1.0, 2.0))
     # Where nothing is found beside it, the derivative at the fixed frequency stands in.
     return here if near is None or far is None else replace(here, gradient=2.0 * near - far)
+
+
+def worst_hessian(sensitivities: Sensitivities, worst: WorstWear, contact: str, measure: Measure) -> Real:
+    """Return the second derivatives of a local worst friction work or power by parameters, (n, n).
+
+    NaN where it is a corner.
+
+    Raises
+    ------
+    SettingError
+        An unknown contact, or laws or paths without exact second derivatives.
+    """
+    balance = sensitivities.balance
+    e, ks = contact_index(balance, contact), balance.system.ks
+    pairing = np.zeros((balance.n_ports, balance.n_coefficients, balance.n_coefficients))
+    for a in balance.scene.contacts[e].RUBBING:
+        pairing[int(balance.system.first_port[e]) + a] = work_pairing(ks, balance.n_coefficients)
+    found = sensitivities.of_contacts(worst.solution, worst.at, pairing)
+    if measure is Measure.FRICTION_POWER:
+        found = found.times_frequency(worst.at)
+    return found.of_peak().hessian if worst.interior else found.hessian
 
 
 def _measured(

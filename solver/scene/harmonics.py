@@ -69,7 +69,7 @@ def forced_harmonics(scene: Scene, paths: Iterable[str] = ()) -> tuple[int, ...]
 
 
 def _forced(scene: Scene, paths: Iterable[str], orders: set[int], waves: frozenset[int]) -> tuple[int, ...]:
-    found = waves | orders
+    found = waves | orders | {scene.observe.harmonic or 0} - {0}
     if orders or any(changes_loads(scene, path) for path in paths):
         found |= {0}
     return tuple(sorted(found))

@@ -31,6 +31,7 @@ from solver.contacts.fields import (
 )
 from solver.contacts.laws.base import AnyContact
 from solver.contacts.laws.registry import DEFAULT, laws
+from solver.errors import SettingError
 from solver.scene.cyclic.sector_tables import CyclicBoundary as CyclicBoundary
 from solver.scene.cyclic.sector_tables import Mistuning as Mistuning
 from solver.scene.cyclic.sector_tables import Sectors
@@ -196,7 +197,18 @@ class Observe(Part):
         "What amplitudes, peaks and limits are of: max|x|, or (max x − min x)/2, which does not depend on "
         "the mean.",
     ] = "max_abs"
+    harmonic: Annotated[
+        Annotated[int, Field(strict=True, ge=1, le=1000)] | None,
+        "Measure this harmonic of the motion alone: amplitudes, peaks and limits are then of it; a peak of "
+        "a harmonic above the excitation's is a superharmonic resonance.",
+    ] = None
     band: Annotated[tuple[Positive, Positive], "Frequencies of interest [low, high] [Hz]."]
+
+    def check_whole(self, study: str) -> None:
+        """Raise SettingError where one harmonic alone is measured: `study` is of the whole motion."""
+        if self.harmonic is not None:
+            wanted = f"must be left out: {study} is of the whole motion"
+            raise SettingError("observe.harmonic", self.harmonic, wanted)
 
     @property
     def centred(self) -> bool:

@@ -23,7 +23,7 @@ from solver.balance.contact_hessian import (
     contact_forces,
 )
 from solver.balance.kernels.haigh import utilisation
-from solver.balance.kernels.jacobian import factorise, step_back
+from solver.balance.kernels.jacobian import factorise, step_back, step_back_transposed
 from solver.balance.parameter import Kind
 from solver.balance.parameter_derivatives import (
     check_smooth_structure,
@@ -192,6 +192,77 @@ class Sensitivities:
             by_frequency_twice=float(twice[0, 0]) * TWO_PI**2, mixed=twice[0, 1:] * TWO_PI,
             hessian=twice[1:, 1:],
         )  # fmt: skip
+
+    def of_contacts(self, solution: Real, at_hz: float, pairing: Real) -> AmplitudeHessian:
+        """Return Σ F_c·(P_c U_c) over the ports to second order in the frequency and all parameters.
+
+        With the adjoint λ of this number, (∂r/∂U)ᵀ λ = −(Pᵀ F + ∂F/∂Uᵀ P U), its Lagrangian has second
+        derivatives as that of an amplitude (`solver.sensitivity.hessian`), and those of the pairs besides:
+        F_i·P U_j + F_j·P U_i.
+
+        Parameters
+        ----------
+        solution : (n_unknowns,) slip motions [m], converged.
+        at_hz : their frequency [Hz].
+        pairing : P, (nc, n, n), such as that of friction work.
+
+        Raises
+        ------
+        SettingError
+            As `hessian`.
+        """
+        everything = self._moved(solution, at_hz)
+        if everything is None:
+            return no_hessian(len(self.paths))
+        motion, contacts, along, found = everything
+        system, workspace = self.balance.system, self._workspace
+        U, F = contacts.U, contacts.F
+        by_F, by_U = np.einsum("cij,cj->ci", pairing, U), np.einsum("cij,ci->cj", pairing, F)
+        pull = -(by_U + contacts.times_transposed(by_F)).reshape(-1)
+        step_back_transposed(workspace.system, workspace.point, pull)
+        pulls = self._amplitudes.of(pull.reshape(U.shape)).conj()
+        y = motion.solve_transposed(-np.einsum("kcn,ck->kn", motion.contact, pulls))
+        through = self._amplitudes.coefficients(-np.einsum("kcn,kn->ck", motion.back, y).conj())
+        none = np.zeros(0)
+        adjoint = Adjoint(
+            w=by_F + through, y=y, turns=np.zeros((0, system.ks.size), np.complex128), by=none,
+            by_twice=np.zeros((0, 0)),
+        )  # fmt: skip
+        dU, dF = found.dU, contacts.times(found.dU) + contacts.along(along.slopes, along.loads)
+        pairs = np.einsum("pci,cij,qcj->pq", dF, pairing, dU)
+        twice = lagrangian_hessian(self._amplitudes.ks, motion, contacts, along, found, adjoint)
+        twice = twice + pairs + pairs.T
+        slopes = np.einsum("ci,pci->p", by_F, dF) + np.einsum("ci,pci->p", by_U, dU)
+        return AmplitudeHessian(
+            value=float(np.sum(F * by_F)), by_frequency=float(slopes[0]) * TWO_PI, gradient=slopes[1:],
+            by_frequency_twice=float(twice[0, 0]) * TWO_PI**2, mixed=twice[0, 1:] * TWO_PI,
+            hessian=twice[1:, 1:],
+        )  # fmt: skip
+
+    def motions(self, solution: Real, at_hz: float) -> Real | None:
+        """Return the derivatives of all slip motions by ω [m s/rad] and by the paths, (1 + n_paths, nc, n).
+
+        None where the balance is singular; raises SettingError as `hessian`.
+        """
+        everything = self._moved(solution, at_hz)
+        return None if everything is None else everything[3].dU
+
+    def _moved(
+        self, solution: Real, at_hz: float
+    ) -> tuple[WholeMotion, ContactForces, Directions, Responses] | None:
+        """Return linear part, contacts and what ω and every path move; None where that is singular."""
+        self.check_second()
+        check_loads(self.balance.system, self._parameters, self._slopes)
+        if self._seconds is None:
+            self._seconds = second_numbers(self.balance.scene)
+        u, omega = np.ascontiguousarray(solution, dtype=np.float64), TWO_PI * at_hz
+        try:
+            motion = whole_motion(self.balance.system, self._matrices, self._dampings, omega)
+            contacts, along = contact_forces(self.balance.system, self._seconds, u), self._directions()
+            found = self._responses(u, omega, motion, contacts, along)
+        except (np.linalg.LinAlgError, FloatingPointError):
+            return None
+        return None if found is None else (motion, contacts, along, found)
 
     def check_second(self) -> None:
         """Raise SettingError where laws or paths have no exact second derivatives here."""

@@ -74,6 +74,15 @@ class AmplitudeHessian(Piece):
             hessian=self.hessian + np.outer(self.mixed, drift),
         )  # fmt: skip
 
+    def times_frequency(self, at_hz: float) -> AmplitudeHessian:
+        """Return the same of the number times the frequency, such as of power for work in a period."""
+        return AmplitudeHessian(
+            value=at_hz * self.value, by_frequency=at_hz * self.by_frequency + self.value,
+            gradient=at_hz * self.gradient,
+            by_frequency_twice=at_hz * self.by_frequency_twice + 2.0 * self.by_frequency,
+            mixed=at_hz * self.mixed + self.gradient, hessian=at_hz * self.hessian,
+        )  # fmt: skip
+
     def of_edge(self, dlimit: Real | None = None, ddlimit: Real | None = None) -> EdgeHessian:
         """Return the same of the frequency where the amplitude equals a limit, from a(ω(p), p) = limit(p).
 

@@ -49,6 +49,7 @@ class Observed:
     slopes: Annotated[
         Real, "(1 or 2, n_paths) array, their derivatives at a fixed frequency [m per unit of each]."
     ]
+    by_frequency: Annotated[Real, "(1 or 2,) array, their derivatives by the frequency [m/Hz]."]
     states: Annotated[
         Integer, "(n_contacts,) array of state codes, see `solver.response.contact_response.state_of`."
     ]
@@ -103,8 +104,11 @@ class ObservedSensitivities(Sensitivities):
         )  # fmt: skip
         if not good:
             return None
-        slopes = np.array([self._one(u, omega, row)[1] for row in range(values.size)])
-        return Observed(values=values, slopes=slopes.reshape(values.size, -1), states=states)
+        by_omega, slopes = zip(*(self._one(u, omega, row) for row in range(values.size)), strict=True)
+        return Observed(
+            values=values, slopes=np.array(slopes).reshape(values.size, -1), states=states,
+            by_frequency=TWO_PI * np.array(by_omega),
+        )  # fmt: skip
 
     def _aim(self, quantity: Quantity, harmonic: int) -> Real:
         """Fill the turns of a quantity of the motion just observed; return its values."""

@@ -26,8 +26,9 @@ from solver.results.known import NOTHING_KNOWN, Known
 from solver.results.views import Data, Views
 from solver.results.watch import shows_progress
 from solver.scene.cyclic.annulus import annulus, sectors_needed
-from solver.scene.parts import LumpedStructure, Mass, MatricesStructure
+from solver.scene.parts import CyclicStructure, LumpedStructure, Mass, MatricesStructure
 from solver.scene.scene import Scene
+from solver.scene.structure_parameters import STRUCTURE, named_parts
 from solver.wording import listing, nearest
 
 _ONE_MASS = LumpedStructure(kind="lumped", masses=(Mass(dof="x", m=1.0),))  # stands in for a large structure
@@ -275,6 +276,28 @@ def with_mistuning(scene: Scene, table: Mapping[str, object]) -> Scene:
     raw = small.to_dict()
     raw["structure"] = {**plain, "mistuning": dict(table)}
     return Scene.from_dict(raw)
+
+
+def blade_paths(scene: Scene, of: Sequence[str]) -> tuple[Scene, list[tuple[str, ...]]]:
+    """Return a cyclic scene whose mistuned masses have names, and the paths that each blade's factor moves.
+
+    The paths are those of its annulus (`mistuned`), one tuple for each sector; none of a structure given by
+    matrices, whose parts are no parameters.
+    """
+    structure = scene.structure
+    if not isinstance(structure, CyclicStructure):
+        return scene, []
+
+    def named(mass: Mass) -> Mass:
+        if mass.name is not None or mass.dof not in of:
+            return mass
+        return mass.model_copy(update={"name": f"mass-of-{mass.dof}"})
+
+    structure = structure.model_copy(update={"masses": tuple(map(named, structure.masses))})
+    dofs = set(of) - {part.name for part in named_parts(structure)}
+    parts = [x for x in named_parts(structure) if x.name in of or getattr(x, "dof", None) in dofs]
+    rows = [tuple(f"{STRUCTURE}{x.name}@{j}" for x in parts) for j in range(structure.sector_count)]
+    return scene.model_copy(update={"structure": structure}), rows
 
 
 def blade_amplitudes(solution: Solution, dof: str | None = None) -> BladeAmplitudes:

@@ -34,7 +34,7 @@ _SOLVED = 1e-9  # of |U − 1|
 _MOST = 40  # responses to find an allowed excitation
 
 
-class _Used(NamedTuple):
+class Used(NamedTuple):
     """What is used most of what is allowed in one response."""
 
     used: float
@@ -44,6 +44,27 @@ class _Used(NamedTuple):
     stress: float
 
 
+def judged_rows(scene: Scene) -> tuple[str, ...]:
+    """Return the recovered stresses that have a material."""
+    return tuple(one.name for one in scene.recovery if one.material is not None)
+
+
+def most_used(branch: Branch) -> Used:
+    """Return what is used most, of the stresses of a completed response that have a material."""
+    scene = branch.balance.scene
+    return max((_of_row(branch, row) for row in judged_rows(scene)), key=lambda one: one.used)
+
+
+def _of_row(branch: Branch, row: str) -> Used:
+    """Return how much a recovered stress is used."""
+    scene = branch.balance.scene
+    seen = observing(branch, row, measure=haigh_of(scene, row), peaks_alone=True)
+    peak = seen.peaks[0]
+    stress = observing(branch, row, measure="half_peak_to_peak", peaks_alone=True).peaks[0].value
+    unit = next(one.unit for one in scene.recovery if one.name == row)
+    return Used(peak.value, row, peak, seen, stress * STRESS_UNITS[unit])
+
+
 class _DamperResponses:
     """Responses of one damper at levels of the excitation."""
 
@@ -51,10 +72,10 @@ class _DamperResponses:
         self, scene: Scene, limit: float | None, harmonics: int, should_stop: ShouldStop
     ) -> None:  # fmt: skip
         self.scene, self._limit, self._harmonics, self._should_stop = scene, limit, harmonics, should_stop
-        self._rows = tuple(one.name for one in scene.recovery if one.material is not None)
+        self._rows = judged_rows(scene)
         self.parts: list[Branch] = []
 
-    def used(self, level: float) -> _Used | None:
+    def used(self, level: float) -> Used | None:
         """Return what is used most at a level; None where the response does not cover the band."""
         branch = sweep(
             self.scene.with_values({AMPLITUDE: level}),
@@ -66,19 +87,10 @@ class _DamperResponses:
         self.parts.append(branch)
         if not self._rows:
             used = branch.peak.value / (self._limit or math.nan)
-            return _Used(used, self.scene.observe.dof, branch.peak, branch, branch.peak.value)
-        return max((self._of(branch, row) for row in self._rows), key=lambda one: one.used)
+            return Used(used, self.scene.observe.dof, branch.peak, branch, branch.peak.value)
+        return most_used(branch)
 
-    def _of(self, branch: Branch, row: str) -> _Used:
-        """Return how much a recovered stress is used."""
-        scene = branch.balance.scene
-        seen = observing(branch, row, measure=haigh_of(scene, row), peaks_alone=True)
-        peak = seen.peaks[0]
-        stress = observing(branch, row, measure="half_peak_to_peak", peaks_alone=True).peaks[0].value
-        unit = next(one.unit for one in scene.recovery if one.name == row)
-        return _Used(peak.value, row, peak, seen, stress * STRESS_UNITS[unit])
-
-    def allowed(self, low: float, high: float) -> tuple[float, _Used] | None:
+    def allowed(self, low: float, high: float) -> tuple[float, Used] | None:
         """Return the level between two at which U = 1 and what is used there; U is below 1 at the lower."""
         level = 0.5 * (low + high)
         for _ in range(_MOST):
@@ -131,7 +143,7 @@ def margin_diagram(
     done = holes = stopped = 0
     for d, (name, changed) in enumerate(every.items()):
         level = _DamperResponses(changed, limit, harmonics, should_stop)
-        seen: list[_Used | None] = []
+        seen: list[Used | None] = []
         for i, amplitude in enumerate(levels):
             stopped = stopped or int(should_stop is not None and should_stop())
             here = None if stopped else level.used(float(amplitude))
@@ -158,7 +170,7 @@ def margin_diagram(
 
 
 def _allowed(
-    name: str, level: _DamperResponses, levels: np.ndarray, seen: list[_Used | None]
+    name: str, level: _DamperResponses, levels: np.ndarray, seen: list[Used | None]
 ) -> AllowedExcitation:  # fmt: skip
     """Return what a damper allows, by the first of its levels at which what is allowed is used up."""
     used = [math.nan if one is None else one.used for one in seen]

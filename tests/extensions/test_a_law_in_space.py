@@ -189,6 +189,7 @@ def test_its_parameters_have_gradients_and_sweeps(path: str) -> None:
     assert along.amplitude[-1] == pytest.approx(amplitude(1.3 * value), rel=1e-6)
 
 
+@pytest.mark.long
 def test_its_limit_is_designed() -> None:
     found = optim.design(scene(), variables={"pads.limit": (0.5, 60.0)}, harmonics=3)
     assert found.reached, found.status

@@ -28,9 +28,9 @@ _LINE = 110
 # What another step control, processor or clock would change: it is looked at elsewhere.
 _COUNTED = re.compile(
     r"seconds|time|error|residual|iterations|rejected|points|evaluations|responses|work|effort|pareto|"
-    r"closed form|[0-9#] samples"
+    r"closed form|[0-9#] samples|exact(?=  )"
 )
-_WAY = re.compile(r"closed form|# samples")  # which of them pays, the clock decides
+_WAY = re.compile(r"closed form|# samples|exact(?=  )")  # which of them pays, the clock decides
 _DURATION = re.compile(r"# (?:µs|ms|s|min)\b")
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?")
 

@@ -24,7 +24,8 @@ _LONG = {
     "accuracy": SCENES, "mistuning": CYCLIC, "pareto": SCENES, "controlled": SCENES[1:],
     "worst_mistuning": CYCLIC, "worst_mistuning-open": CYCLIC,
     "sweep-load": ("rub", "gap", "cubic"), "march": CYCLIC, "campbell": ("ring",), "solve-all": ("ring",),
-    "modes-resonance": ("ring", "two-dof"), "sweep": ("ring",), "peaks": ("bladed-disk",), "identify": SCENES,
+    "modes-resonance": ("ring", "two-dof"), "sweep": ("ring",),
+    "peaks": ("bladed-disk", "gap", "cubic"), "identify": SCENES,
 }  # fmt: skip
 MEASURED = """# excitation.amplitude = 100
 # damper.N0 = 100

@@ -90,6 +90,12 @@ _MEANT: dict[str, tuple[dict[str, Any], ...]] = {
         {"from": 1, "to": 2, "phase_resonance": True, "performance": True}, {"to": 2},
         {**_DISK, "from": 1e-5, "to": 1e-4, "nodal_diameter": 5},
     ),
+    "quasi-periodic": (
+        {}, {"frequency_hz": 1, "second_hz": 1, "amplitude": 1},
+        {"frequency_hz": 1, "second_hz": 2, "amplitude": 1, "dof": "x"},
+        {"frequency_hz": 1, "second_hz": 2, "amplitude": 1, "engine_order": 2},
+        {"frequency_hz": 1, "second_hz": 2, "amplitude": 1, "turns": 900},
+    ),
     "margin": (
         {}, {"from": 2, "to": 1}, {"from": 0, "to": 1}, {"from": 1, "to": 2, "points": 1},
         {"from": 1, "to": 2, "dampers": {}}, {"from": 1, "to": 2, "dampers": {"x": {"damper.N9": 1}}},

@@ -45,6 +45,12 @@ def test_each_option_has_its_best_design() -> None:
         assert one.objective == pytest.approx(alone.evaluation.objective, rel=1e-9)
         assert dict(one.values) == pytest.approx(dict(alone.optimum), rel=1e-6)
     assert found.best is not None
+    # The first option as a design: its values and those of the option lead to its peak.
+    assert found.design.options == found.options
+    assert set(found.design.optimum) == {"damper.N0", "damper.kt", "damper.mu"}
+    branch = solver.sweep(scene.with_values(found.design.optimum), harmonics=found.design.problem.harmonics)
+    assert branch.peak is not None
+    assert branch.peak.value == pytest.approx(found.best.objective, rel=1e-9)
     assert found.best.objective == min(one.objective for one in found.options)
 
 
@@ -69,5 +75,8 @@ def test_what_is_wrong_is_told() -> None:
     with pytest.raises(SettingError, match=r"damper\.N9") as refused:
         catalogue(scene, {"x": {"damper.N9": 1.0}})
     assert refused.value.place[:2] == ("options", "x")
+    with pytest.raises(DesignError, match="variable") as fixed:
+        catalogue(scene, {"x": {"damper.N0": 1.0}}, variables={"damper.N0": (20.0, 400.0)})
+    assert fixed.value.place == ("options", "x", "damper.N0")
     stopped = catalogue(scene, OPTIONS, should_stop=lambda: True)
     assert {one.status for one in stopped.options} == {OptionStatus.STOPPED}

@@ -10,6 +10,7 @@ import solver
 from optim.criteria.criterion import Criterion
 from optim.criteria.damping import DAMPING
 from optim.criteria.evaluation import evaluate
+from optim.criteria.friction_work import FRICTION_WORK
 from optim.criteria.mass import MASS
 from optim.criteria.running_speeds import RUNNING
 from optim.criteria.wear_rate import WEAR_RATE
@@ -51,6 +52,35 @@ def test_gradients_are_differences(quantity: Criterion, keys: dict[str, Any]) ->
         step = 1e-4 * value
         below, above = (row_of(quantity, keys, DESIGN | {path: value + s}) for s in (-step, step))
         assert row.gradient[i] == pytest.approx((above.value - below.value) / (2.0 * step), rel=1e-5)
+
+
+@pytest.mark.parametrize("keys", [WEAR_KEYS, {"max_friction_work": 1.0}], ids=["wear", "work"])
+def test_second_derivatives_of_wear_are_differences_of_gradients(keys: dict[str, Any]) -> None:
+    quantity = WEAR_RATE if "wear_coefficient" in keys else FRICTION_WORK
+    twice = row_of(quantity, keys).second()
+    for i, (path, value) in enumerate(DESIGN.items()):
+        step = 1e-4 * value
+        below, above = (row_of(quantity, keys, DESIGN | {path: value + s}).gradient for s in (-step, step))
+        assert twice[i] == pytest.approx(
+            (above - below) / (2.0 * step), rel=1e-5, abs=1e-6 * abs(twice).max()
+        )
+
+
+@pytest.mark.long
+def test_the_least_wear_rate_is_that_of_a_grid() -> None:
+    keys = {"weights": {"wear": 1e9, "peak": 0.05}, "wear_coefficient": 1e-12}
+    bounds = {"damper.N0": (20.0, 400.0)}
+    found = optim.design(two_dof(), variables=bounds, harmonics=3, **keys)
+    problem = pose(two_dof(), variables=bounds, harmonics=3, **keys)
+    grid = [
+        evaluate(problem, {"damper.N0": load}, gradients=False).objective
+        for load in np.geomspace(20.0, 400.0, 25)
+    ]
+    assert found.reached, found.status
+    assert found.evaluation is not None
+    assert found.evaluation.objective <= min(grid) * (1.0 + 1e-9)
+    (row, *_) = found.evaluation.of(WEAR_RATE)
+    assert row.weight == 1e9
 
 
 def test_the_running_amplitude_is_that_of_its_speeds() -> None:
@@ -126,7 +156,7 @@ def test_the_mass_is_that_of_the_bodies() -> None:
         ({"running_rpm": 50.0}, "/running_rpm", "must be a list"),
         ({"weights": {"running": 1.0}}, "/weights/running", "needs `running_rpm`"),
         ({"max_wear_rate": 1.0}, "/wear_coefficient", "must be given with `max_wear_rate`"),
-        ({"wear_coefficient": 1.0}, "/max_wear_rate", "must be given with `wear_coefficient`"),
+        ({"weights": {"wear": 1.0}}, "/weights/wear", "needs `wear_coefficient`"),
         (
             {"max_wear_rate": {"rim": 1.0}, "wear_coefficient": 1.0},
             "/max_wear_rate/rim",

@@ -10,7 +10,7 @@ import optim
 import solver
 from optim.errors import DesignError
 from optim.problem.issues import problem_issues, uncertainty_issues
-from optim.problem.keys import ROBUST, DesignKeys, FrontKeys, options
+from optim.problem.keys import OPTIONS, ROBUST, DesignKeys, FrontKeys, options
 from optim.problem.keyword_types import DesignKeywords, FrontKeywords
 from optim.problem.problem import pose
 from optim.problem.words import Aim, AimWord, Method, MethodWord, Scaling, ScalingWord
@@ -23,8 +23,8 @@ OF_NO_PROBLEM = {"scene", "limits", "on_progress", "should_stop", "on_best"}
 @pytest.mark.parametrize(
     ("function", "keys"),
     [
-        (optim.design, set(DesignKeys.model_fields) - set(ROBUST)),
-        (optim.robust_design, set(DesignKeys.model_fields)),
+        (optim.design, set(DesignKeys.model_fields) - {OPTIONS, *ROBUST}),
+        (optim.robust_design, set(DesignKeys.model_fields) - {OPTIONS}),
         (optim.pareto_front, set(FrontKeys.model_fields)),
     ],
 )
@@ -36,7 +36,7 @@ def test_the_arguments_are_the_keys(function: Callable[..., Any], keys: set[str]
 
 
 def test_checkers_know_the_keys() -> None:
-    assert set(get_type_hints(DesignKeywords)) == set(DesignKeys.model_fields) - set(ROBUST)
+    assert set(get_type_hints(DesignKeywords)) == set(DesignKeys.model_fields) - {OPTIONS, *ROBUST}
     assert set(get_type_hints(FrontKeywords)) == set(FrontKeys.model_fields) - {"points"}
 
 

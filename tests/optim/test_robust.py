@@ -8,6 +8,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from mistuned_cases import disk as friction_disk
 
 import optim
 import solver
@@ -25,9 +26,10 @@ from solver.continuation.branches.observation import observing
 N0 = {"damper.N0": (60.0, 300.0)}
 KT_AND_MU = {"damper.kt": {"deviation": 0.2}, "damper.mu": [0.2, 0.4]}
 TWO = solver.load_scene("two-dof")
+HARMONICS = 5
 
 
-def peak_at(values: dict[str, float], harmonics: int = 11) -> float:
+def peak_at(values: dict[str, float], harmonics: int = HARMONICS) -> float:
     """The highest peak with some values of the scene, by a sweep."""
     branch = solver.sweep(TWO.with_values(values), harmonics=harmonics)
     assert branch.peak is not None
@@ -36,7 +38,7 @@ def peak_at(values: dict[str, float], harmonics: int = 11) -> float:
 
 @cache
 def worst_case() -> optim.RobustResult:
-    return optim.robust_design(TWO, uncertain=KT_AND_MU, variables=N0, samples=12)
+    return optim.robust_design(TWO, uncertain=KT_AND_MU, variables=N0, samples=12, harmonics=HARMONICS)
 
 
 def test_the_worst_case_is_that_of_a_grid_over_the_intervals() -> None:
@@ -78,7 +80,9 @@ def test_the_robust_optimum_stands_beside_the_nominal_one() -> None:
 
 @pytest.mark.long
 def test_a_load_that_is_only_met_within_ten_per_cent() -> None:
-    result = optim.robust_design(TWO, uncertain={"damper.N0": {"deviation": 0.1}}, variables=N0, samples=4)
+    result = optim.robust_design(
+        TWO, uncertain={"damper.N0": {"deviation": 0.1}}, variables=N0, samples=4, harmonics=HARMONICS
+    )
     assert result.status is RobustStatus.OPTIMAL
     ends = [peak_at({"damper.N0": result.optimum["damper.N0"] * share}) for share in np.linspace(0.9, 1.1, 9)]
     assert result.objective == pytest.approx(max(ends), rel=1e-6)
@@ -89,16 +93,16 @@ def test_a_load_that_is_only_met_within_ten_per_cent() -> None:
 
 def test_the_worst_of_an_ellipsoid_lies_on_its_edge() -> None:
     half_axes = {"damper.kt": 0.2, "damper.mu": 0.3}
-    problem = pose(TWO, variables=N0)
+    problem = pose(TWO, variables=N0, harmonics=HARMONICS)
     over = read_uncertain(TWO, problem.variables, {"half_axes": half_axes, "relative": True})
     values = {"damper.N0": 105.0}
     aspect = Aspect(quantity=PEAK, limited=False)
     found = pessimise(lambda scenario: outcome(problem, values, scenario), over, aspect, ())
     around = [
         peak_at({"damper.N0": 105.0, "damper.kt": 30.0 * (1 + 0.2 * x), "damper.mu": 0.3 * (1 + 0.3 * y)})
-        for x, y in ((math.cos(t), math.sin(t)) for t in np.linspace(0.0, 2.0 * math.pi, 48))
+        for x, y in ((math.cos(t), math.sin(t)) for t in np.linspace(0.0, 2.0 * math.pi, 24))
     ]
-    assert max(around) <= found.value <= max(around) * (1.0 + 1e-3)
+    assert max(around) <= found.value <= max(around) * (1.0 + 4e-3)
     assert np.linalg.norm(found.worst.scenario.xi) == pytest.approx(1.0, abs=1e-6)
 
 
@@ -106,7 +110,7 @@ def test_the_worst_of_samples_is_the_worst_of_them() -> None:
     samples = [
         {"damper.mu": mu, "damper.N0": {"deviation": d}} for mu, d in ((0.2, 0.1), (0.3, 0.0), (0.4, -0.1))
     ]
-    result = optim.robust_design(TWO, uncertain=samples, variables=N0)
+    result = optim.robust_design(TWO, uncertain=samples, variables=N0, harmonics=HARMONICS)
     assert result.status is RobustStatus.OPTIMAL
     each = [
         peak_at({"damper.mu": mu, "damper.N0": result.optimum["damper.N0"] * (1.0 + d)})
@@ -121,7 +125,7 @@ def test_the_worst_of_samples_is_the_worst_of_them() -> None:
 @pytest.mark.parametrize("aim", ["mean", "quantile"])
 def test_mean_and_quantile_are_those_of_the_samples_and_least(aim: str) -> None:
     result = optim.robust_design(
-        TWO, uncertain=KT_AND_MU, variables=N0, aim=aim, quantile=0.75, samples=6, seed=3, harmonics=5
+        TWO, uncertain=KT_AND_MU, variables=N0, aim=aim, quantile=0.75, samples=6, seed=3, harmonics=HARMONICS
     )
     assert result.status is RobustStatus.OPTIMAL
     problem = pose(TWO, variables=N0)
@@ -132,7 +136,7 @@ def test_mean_and_quantile_are_those_of_the_samples_and_least(aim: str) -> None:
         for scenario in drawn:
             (kt, by_kt), (mu, value) = scenario.settings
             values = {"damper.N0": load, "damper.kt": 30.0 * (1.0 + by_kt), "damper.mu": value}
-            peaks.append(peak_at(values, harmonics=5))
+            peaks.append(peak_at(values))
             assert (kt.name, mu.name) == ("damper.kt", "damper.mu")
         return float(np.mean(peaks)) if aim == "mean" else sorted(peaks)[4]
 
@@ -165,6 +169,83 @@ def test_slopes_by_design_and_by_uncertainty_are_those_of_differences() -> None:
     for name, gradient in zip(variables, here.rows[0].gradient, strict=True):
         central = difference(lambda h: peak({**values, name: values[name] + h}, xi), 1e-3 * values[name])  # noqa: B023
         assert gradient == pytest.approx(central, rel=1e-6)
+
+
+def test_slopes_by_the_factors_of_free_blades_are_those_of_differences() -> None:
+    scene = friction_disk(sectors=3)
+    problem = pose(scene, variables={"shroud.N0": (10.0, 80.0)}, harmonics=3)
+    over = read_uncertain(
+        scene, problem.variables,
+        {"shroud.mu": [0.2, 0.4], "mistuning": {"of": ["root", "blade_mass"], "within": 0.05}},
+    )  # fmt: skip
+    xi, values = np.array([0.3, -0.4, 0.5, 0.2]), {"shroud.N0": 40.0}
+    here = outcome(problem, values, over.scenario(xi))
+    assert here.scenario.disk is not None
+    assert here.scenario.disk.values == pytest.approx(1.0 + 0.05 * xi[1:])
+    # Every blade is judged as it is in the same disk written out.
+    written = solver.mistuned(
+        scene.with_values({**values, "shroud.mu": 0.33}),
+        of=["root", "blade_mass"],
+        values=1.0 + 0.05 * xi[1:],
+    )
+    blades = solver.blade_peaks(written, dof="blade", harmonics=3)
+    for j in range(3):
+        mine = [row.value for row in here.rows if row.quantity is PEAK and f"blade@{j}" in row.case]
+        assert max(mine) == pytest.approx(blades.value[j], rel=1e-9)
+
+    def peak(place: np.ndarray, load: float = 40.0) -> float:
+        rows = outcome(problem, {"shroud.N0": load}, over.scenario(place), gradients=False).rows
+        return max(row.value for row in rows if row.quantity is PEAK)
+
+    top = max((row for row in here.rows if row.quantity is PEAK), key=lambda row: row.value)
+    slopes = over.by_xi(here.by_delta[here.rows.index(top)])
+    along = np.array([0.4, -0.5, 0.3, 0.7])
+    along_load = 4.0
+    slope = slopes @ along + along_load * top.gradient[0]
+    central = difference(lambda h: peak(xi + h * along, 40.0 + h * along_load), 4e-3)
+    assert slope == pytest.approx(central, rel=1e-5)
+
+
+@pytest.mark.long
+def test_no_mistuning_of_a_grid_is_worse_than_the_worst_case() -> None:
+    scene, bounds = friction_disk(sectors=3), {"shroud.N0": (40.0, 400.0)}
+    result = optim.robust_design(
+        scene,
+        uncertain={"mistuning": {"of": "root", "within": 0.03}},
+        variables=bounds,
+        harmonics=3,
+        samples=4,
+    )
+    assert result.status is RobustStatus.OPTIMAL
+    assert result.gap <= 1e-6
+    assert result.robust is not None
+    load = result.optimum["shroud.N0"]
+
+    def worst(load: float, factors: np.ndarray) -> float:
+        there = scene.with_values({"shroud.N0": load})
+        disks = (
+            solver.mistuned(there, of="root", values=one) for one in itertools.product(factors, repeat=3)
+        )
+        return max(
+            solver.blade_peaks(one, dof="blade", harmonics=3, every_branch=False).largest for one in disks
+        )
+
+    assert worst(load, np.linspace(0.97, 1.03, 5)) <= result.robust.worst_peak * (1.0 + 1e-6)
+    for factor in (0.9, 0.97, 1.03, 1.1):
+        assert worst(factor * load, np.array([0.97, 1.0, 1.03])) >= result.robust.worst_peak * (1.0 - 1e-6)
+    # The worst scenario in time, with more than three harmonics: the march of the whole annulus.
+    row = result.robust.worst
+    assert row is not None
+    assert row.scenario.disk is not None
+    written = solver.mistuned(
+        scene.with_values({"shroud.N0": load}), of="root", values=row.scenario.disk.values
+    )
+    peak = row.highest(PEAK)
+    assert peak is not None
+    raw = written.to_dict()
+    raw["observe"]["dof"] = peak.case.rpartition(" ")[2]  # type: ignore[index]
+    marched = solver.march(solver.Scene.from_dict(raw), frequency_hz=peak.at_hz)
+    assert marched.max_abs == pytest.approx(peak.value, rel=0.01)
 
 
 def difference(f: Callable[[float], float], h: float) -> float:

@@ -7,11 +7,13 @@ import pytest
 
 import optim
 import solver
+from optim.problem.problem import pose
 from optim.problem.uncertainty_input import read_uncertain
 from optim.problem.uncertainty_set import UncertainSet, UncertaintyShape
 
 N0 = {"damper.N0": (60.0, 300.0)}
 TWO = solver.load_scene("two-dof")
+DISK = solver.load_scene("bladed-disk")
 
 
 @pytest.mark.parametrize(
@@ -39,6 +41,7 @@ TWO = solver.load_scene("two-dof")
             ["uncertain.confidence", "2.0"],
         ),
         ({"mistuning": {"of": "m1", "spread": 0.1}}, ["two-dof", "cyclic"]),
+        ({"mistuning": {"of": "m1", "within": 0.1}}, ["two-dof", "cyclic"]),
         ([{"damper.mu": 0.3}, 3.0], ["uncertain[1]", "3.0"]),
         ([{"damper.mu": math.nan}], ["uncertain[0].damper.mu", "nan"]),
         ([{"damper.N0": 100.0}], ["damper.N0", "deviation"]),
@@ -67,3 +70,20 @@ def test_the_set_without_numbers_has_one_scenario_for_each_disk() -> None:
     over = UncertainSet(shape=UncertaintyShape.BOX)
     assert over.finite
     assert over.all() == ()
+
+
+@pytest.mark.parametrize(
+    ("mistuning", "words"),
+    [
+        ({"of": "tip_middle", "within": 1.5}, ["within", "0.9", "1.5"]),
+        ({"of": "tip_middle", "within": 0.1, "seeds": [1]}, ["mistuning", "alone"]),
+        ({"of": "tip_middle", "within": 0.1}, ["mistuning.of", "variable", "tip_middle"]),
+        ({"of": "nothing", "within": 0.1}, ["nothing"]),
+    ],
+)
+def test_bad_bounds_of_blades_are_named(mistuning: dict[str, object], words: list[str]) -> None:
+    variables = pose(DISK, variables={"structure.tip_middle": (4e5, 6e5)}).variables
+    with pytest.raises((optim.DesignError, solver.SettingError, solver.SceneError)) as caught:
+        read_uncertain(DISK, variables, {"mistuning": mistuning})
+    for word in words:
+        assert word in str(caught.value)

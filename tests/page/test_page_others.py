@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from typing import TYPE_CHECKING
 
 import httpx
@@ -30,6 +31,7 @@ def test_a_kind_without_a_view_has_a_form_and_a_result(browser: Browser, site: S
             "controlled",
             "sensitivities",
             "transient",
+            "quasi-periodic",
             "wear",
             "distortion",
         }
@@ -50,3 +52,56 @@ def test_a_kind_without_a_view_has_a_form_and_a_result(browser: Browser, site: S
         assert f"distortion={job['id']}" in page.url
         page.reload()
         expect(page.locator("#others-status")).to_contain_text("distortion is done")
+
+
+STUDIES = {
+    "margin": (
+        {
+            "scene": "two-dof", "from": 10, "to": 200, "limit": 2.0, "harmonics": 3, "points": 4,
+            "dampers": {"light": {"damper.N0": 50}, "heavy": {"damper.N0": 200}},
+        },
+        {"Amplitude over the excitation": "light heavy", "Share of what is allowed": "margin 1"},
+    ),
+    "wear": (
+        {
+            "scene": "two-dof", "hours": 1e-4, "coefficient": {"damper": 1e-11}, "area": {"damper": 2e-4},
+            "load_loss_per_depth": {"damper": 4e6}, "limit": 2.36, "harmonics": 3, "points": 9,
+        },
+        {"Amplitude over the life": "limit", "Loads over the life": "normal load [N]",
+         "Depths over the life": "wear depth"},
+    ),
+    "worst-mistuning": (
+        {
+            "scene": "bladed-disk", "of": ["tip_middle"], "within": 0.03, "contacts": "stuck", "starts": 6,
+            "patterns": ["AB", "ABB"],
+        },
+        {"Factors of the worst disk": "tip_middle", "Magnification of the peak": "AB ABB Whitehead's bound"},
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", STUDIES)
+def test_a_study_is_drawn(browser: Browser, site: Site, kind: str) -> None:
+    body, drawings = STUDIES[kind]
+    job = httpx.post(f"{site.url}/v1/jobs", json={"kind": kind, **body}, timeout=120).json()
+    with opened(browser, site) as (context, _):
+        page = context.new_page()
+        page.goto(f"{site.url}/?scene={body['scene']}&tab=runs&{kind}={job['id']}")
+        page.locator("html[data-ready]").wait_for(state="attached")
+        expect(page.locator("#others-status")).to_contain_text(f"{kind} is done", timeout=90_000)
+        expect(page.locator("#others-result svg.chart")).to_have_count(len(drawings))
+        for label, words in drawings.items():
+            chart = page.locator(f'#others-result svg.chart[aria-label="{label}"]')
+            expect(chart).to_be_visible()
+            for word in words.split():
+                expect(chart).to_contain_text(word)
+            assert chart.locator("path.series, rect.f1").count() >= 1
+            # Inside its frame, whatever the size of the numbers.
+            assert "NaN" not in chart.inner_html()
+        # The form says what was asked, tables of tables too.
+        assert "[object" not in str(
+            page.locator("#others-form input").evaluate_all("all => all.map(one => one.value)")
+        )
+        if folder := os.environ.get("PICTURES"):  # to look at them
+            page.set_viewport_size({"width": 1100, "height": 2600})
+            page.locator("#others").screenshot(path=f"{folder}/{kind}.png")

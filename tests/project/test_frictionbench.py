@@ -41,7 +41,10 @@ def test_the_cases_are_what_their_schema_says() -> None:
         assert (case["name"], case["number"]) == (name, number)
 
 
-@pytest.mark.parametrize("name", names())
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=pytest.mark.long if name == "patch-122-circle" else ()) for name in names()],
+)
 def test_a_case_becomes_a_scene_of_the_same_matrices(name: str) -> None:
     from solver.linear.assembly import linear_model
 

@@ -16,7 +16,7 @@ ROOT = Path(__file__).resolve().parent.parent.parent
 PAGE_NAME = "identification.md"
 PAGE = (ROOT / "docs" / PAGE_NAME).read_text(encoding="utf-8")
 BLOCKS = re.findall(r"^```(\w+)\n(.*?)^```$", PAGE, flags=re.MULTILINE | re.DOTALL)
-RIG, AGAIN = (text for language, text in BLOCKS if language == "python")
+RIG, AGAIN, POSTERIOR = (text for language, text in BLOCKS if language == "python")
 COMMANDS = [line for language, text in BLOCKS if language == "sh" for line in text.splitlines()]
 
 
@@ -57,6 +57,13 @@ def test_the_whole_way(rig: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert "damper.kt" in (rig / "damper.html").read_text(encoding="utf-8")
     exec(compile(AGAIN, PAGE_NAME, "exec"), {"__name__": "page"})
     assert "damper.mu" in capsys.readouterr().out
+    exec(compile(POSTERIOR, PAGE_NAME, "exec"), {"__name__": "page"})
+    told = re.search(r"of μ from ([\d.]+) to ([\d.]+), and a load of ([\d.]+) N", PAGE)
+    assert told is not None
+    printed = [float(one) for one in re.findall(r"-?\d+\.\d+", capsys.readouterr().out)]
+    assert [printed[0], printed[1], printed[4]] == pytest.approx(
+        [float(one) for one in told.groups()], rel=1e-3
+    )
 
 
 def test_the_page_is_that_of_the_registries() -> None:

@@ -9,10 +9,11 @@ import shlex
 import shutil
 import subprocess
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
 from textwrap import dedent
+from typing import Any
 
 import numpy as np
 import pytest
@@ -26,6 +27,7 @@ import solver
 from service.cli import main
 from service.cli.app import command
 from service.cli.options.problem_inputs import OPTIONS
+from service.cli.table import Deferred
 from service.jobs.registry import ABOUT_THE_RUN
 from service.jobs.strict_json import validated
 from service.jobs.studies.design import Design
@@ -53,6 +55,10 @@ BLOCKS = [
 COMMANDS = dict.fromkeys(line for language, text in BLOCKS if language == "sh" for line in text.splitlines())
 NO_MODULES = {"stickslip.db", "stickslip.audit"}  # a file and a logger
 ELSEWISE = ("make ", "export ", "curl ")  # beginnings of lines that are no command of ours
+# What takes seconds and has tests of its own: long; by default the words of a command are read.
+DEAR = re.compile(
+    r"stickslip (wear|margin|design --problem|accuracy|(map|peaks) bladed-disk)|weights=\{\"utilisation\""
+)
 LONGEST_README = 250
 
 
@@ -131,7 +137,21 @@ def test_requests_are_answered(line: str, server: str, tmp_path: Path) -> None:
     assert json.loads(done.stdout)
 
 
-@pytest.mark.parametrize("line", [line for line in COMMANDS if not line.startswith(ELSEWISE)])
+def cases(texts: Iterable[str]) -> list[Any]:
+    """Of each text a case; what is dear is long."""
+    return [pytest.param(text, marks=pytest.mark.long if DEAR.search(text) else ()) for text in texts]
+
+
+@pytest.mark.parametrize("line", [line for line in COMMANDS if DEAR.search(line)])
+def test_words_of_dear_commands_are_read(line: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(ROOT)
+    name, *words = shlex.split(line)[1:]
+    one = command().commands[name]
+    assert isinstance(one, Deferred)
+    assert one.load().make_context(name, list(words)).params["plot"] in (None, *words)
+
+
+@pytest.mark.parametrize("line", cases(line for line in COMMANDS if not line.startswith(ELSEWISE)))
 def test_commands_run(
     line: str, request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -169,7 +189,7 @@ def laws_as_before() -> Iterator[None]:
 
 
 @pytest.mark.usefixtures("laws_as_before")
-@pytest.mark.parametrize("code", blocks("python"))
+@pytest.mark.parametrize("code", cases(blocks("python")))
 def test_python_runs(
     code: str,
     request: pytest.FixtureRequest,

@@ -67,12 +67,15 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.long
+@pytest.mark.long
 def test_the_site_builds_without_a_warning_and_has_every_public_name(site: Path) -> None:
     for module, name in names():
         page = (site / f"reference-{module.replace('.', '-')}.html").read_text(encoding="utf-8")
         assert re.search(rf'<h2 id="[\w-]+">{name}<', page), f"{module}.{name} is not in the reference"
 
 
+@pytest.mark.long
 def test_the_site_has_every_page_and_picture_and_can_be_searched(site: Path) -> None:
     pages = {path.stem for path in (ROOT / "docs").glob("*.md")} - {"index"}
     assert pages <= {path.stem for path in site.glob("*.html")}
@@ -86,6 +89,7 @@ def test_the_site_has_every_page_and_picture_and_can_be_searched(site: Path) -> 
         assert words in index
 
 
+@pytest.mark.long
 def test_nothing_that_a_page_shows_or_links_is_missing(site: Path) -> None:
     pages = sorted(set(site.rglob("*.html")) - {site / "404.html"})
     assert {"index.html", "gallery.html", "design.html"} <= {path.name for path in pages}
@@ -96,6 +100,7 @@ def test_nothing_that_a_page_shows_or_links_is_missing(site: Path) -> None:
         assert [name for name in there if not (path.parent / name).exists()] == [], path.name
 
 
+@pytest.mark.long
 def test_pages_open_with_their_pictures(site: Path) -> None:
     """In a real Chromium: the front, and the page with all pictures."""
     api = pytest.importorskip("playwright.sync_api", reason="the package playwright is not installed")
@@ -112,6 +117,7 @@ def test_pages_open_with_their_pictures(site: Path) -> None:
         browser.close()
 
 
+@pytest.mark.long
 def test_the_site_needs_nothing_from_elsewhere(site: Path) -> None:
     """No fonts, styles or scripts of another server."""
     page = (site / "index.html").read_text(encoding="utf-8")
@@ -120,6 +126,7 @@ def test_the_site_needs_nothing_from_elsewhere(site: Path) -> None:
     assert [path for path in loaded if "://" in path] == []
 
 
+@pytest.mark.long
 def test_parameters_read_as_they_are_written(site: Path) -> None:
     """With a type and without, and where a description goes on in the next line."""
     page = (site / "reference-stickslip.html").read_text(encoding="utf-8")

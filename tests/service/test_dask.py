@@ -49,6 +49,10 @@ BODIES: dict[str, dict[str, Any]] = {
         "scene": "two-dof", "hours": 1e-4, "coefficient": {"damper": 1e-11}, "area": {"damper": 2e-4},
         "load_loss_per_depth": {"damper": 4e6}, "harmonics": 3,
     },
+    "quasi-periodic": {
+        "scene": "two-dof", "frequency_hz": 1.05, "second_hz": 1.3821, "amplitude": 60,
+        "harmonics": 3, "turns": 24,
+    },
     "transient": {"scene": "two-dof", "begin_hz": 0.9, "end_hz": 1.2, "ramp_seconds": 20.0},
     "accuracy": {"scene": "two-dof", "harmonics": [1, 3], "samples": [64], "repeats": 1},
     "campbell": {"scene": "two-dof", "speeds_rpm": [[60, 100]], "harmonics": 3},
@@ -137,7 +141,7 @@ def threads_idle(service: EmbeddedService) -> bool:
 
 
 @pytest.mark.few(2)
-@pytest.mark.parametrize("kinds", [("sweep", "mistuning", "march"), tuple(BODIES)], ids=["three", "all"])
+@pytest.mark.parametrize("kinds", [("sweep", "mistuning"), tuple(BODIES)], ids=["two", "all"])
 def test_every_kind_gives_what_it_gives_here(
     service: tuple[EmbeddedService, DaskCluster], kinds: tuple[str, ...]
 ) -> None:

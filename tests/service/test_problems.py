@@ -1,7 +1,9 @@
 """The description of a design problem: every key, what is wrong with it, and where that is told."""
 
 import inspect
+import json
 import math
+from pathlib import Path
 from typing import Any
 
 import httpx
@@ -11,6 +13,7 @@ from service_helpers import Shipped, is_problem, job_ids
 import optim
 import solver
 from optim.problem.problem import Method, pose
+from service.cli import main
 from service.errors import InvalidRequestError
 from service.jobs.common.problem import arguments
 from service.jobs.registry import ABOUT_THE_RUN
@@ -222,3 +225,36 @@ def test_over_http_nothing_is_written_of_what_is_refused(shipped: httpx.Client) 
     assert [entry["pointer"] for entry in problem["errors"]] == ["/cases/0/band", "/max_friction_work/bumper"]
     assert "low < high" in problem["errors"][0]["detail"]
     assert job_ids(shipped) == before
+
+
+OPTIONS: dict[str, Any] = {"soft": {"damper.kt": 15}, "stiff": {"damper.kt": 45}}
+
+
+def test_a_catalogue_is_a_key_and_what_is_wrong_with_it_is_told_where_it_is() -> None:
+    assert pointers({"options": {"soft": {"damper.kt": 15}, "odd": {"damper.k": 1}}}) == ["/options/odd"]
+    assert pointers({"options": {"x": {"damper.N0": 100}}}) == ["/options/x/damper.N0"]
+    assert pointers({"options": {}}) == ["/options"]
+    assert pointers({"options": OPTIONS, "uncertain": {"damper.mu": [0.2, 0.4]}}) == ["/options"]
+    assert pointers({"variables": {}}) == ["/variables"]
+    body = {"scene": "two-dof", "variables": {}, "options": OPTIONS, "harmonics": 3}
+    spec = resolve(validated(Design, body), Shipped()).spec
+    assert (spec["variables"], spec["options"]) == ({}, OPTIONS)
+
+
+def test_a_catalogue_of_a_problem_file_is_that_of_python(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    problem = {"scene": "two-dof", "variables": {}, "options": OPTIONS, "harmonics": 3}
+    (tmp_path / "catalogue.json").write_text(json.dumps(problem))
+    assert main(["design", "--problem", str(tmp_path / "catalogue.json"), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    found = optim.catalogue(solver.load_scene("two-dof"), OPTIONS, variables={}, harmonics=3)
+    assert found.best is not None
+    assert told["optimum"] == OPTIONS[found.best.name]
+    assert [one["name"] for one in told["options"]] == [one.name for one in found.options]
+    assert told["options"][0]["objective"] == pytest.approx(told["peak"]["value"], rel=1e-12)
+    assert told["objective"] == pytest.approx(found.best.objective, rel=1e-12)
+    assert main(["design", "--problem", str(tmp_path / "catalogue.json")]) == 0
+    words = capsys.readouterr().out
+    assert "It keeps all limits." in words
+    assert "stiff" in words

@@ -42,6 +42,10 @@ def asked(kind: str, name: str) -> dict[str, Any]:
             "area": {scene.contacts[0].name: 1e-4}, "points": 3,
             "load_loss_per_depth": {scene.contacts[0].name: 1e6},
         },
+        "quasi-periodic": {
+            "frequency_hz": middle, "second_hz": 1.37 * middle, "amplitude": force, "turns": 12,
+            "tolerance": 0.1, "dof": scene.dofs[0],
+        },
         "transient": {"begin_hz": low, "end_hz": middle, "ramp_seconds": 10.0 / middle, "from_rest": True},
         "margin": {"from": ends[0], "to": ends[1], "points": 2, "limit": 1e-4},
         "controlled": {"amplitude": 1e-5, **near},

@@ -73,6 +73,17 @@ BODIES: dict[str, tuple[str, Mapping[str, Any]]] = {
             "harmonics": 3,
         },
     ),
+    "quasi-periodic": (
+        "quasi-periodic",
+        {
+            "scene": "two-dof",
+            "frequency_hz": 1.05,
+            "second_hz": 1.3821,
+            "amplitude": 60,
+            "harmonics": 3,
+            "turns": 24,
+        },
+    ),
     "transient": ("transient", {"scene": "two-dof", "begin_hz": 0.9, "end_hz": 1.2, "ramp_seconds": 20.0}),
     "a march that does not settle": ("march", {**MARCH, "max_periods": 1}),
 }
@@ -81,6 +92,7 @@ ON_THE_WAY = {"accuracy", "design", "map", "pareto", "peaks"}
 SOMETIMES = {
     "certificate",
     "certificates",
+    "chosen",
     "drift_per_period",
     "mean_range",
     "history",

@@ -83,10 +83,6 @@ def before(days: float) -> datetime:
     return utc_now() - days * DAY
 
 
-def at_once(_seconds: float) -> bool:
-    return False
-
-
 @pytest.mark.parametrize("keep", [True, False])
 def test_old_jobs_go_with_all_they_computed(database: Database, keep: bool) -> None:
     output = JobOutput(result={}, sweeps=(sweep(), sweep()))
@@ -97,12 +93,12 @@ def test_old_jobs_go_with_all_they_computed(database: Database, keep: bool) -> N
     waiting, _ = JobRepository(database).submit(new_job(), queue_limit=10)
     expected = Pruned(jobs=5 if keep else 6, sweeps=11)
     assert RetentionRepository(database).count(before(30), keep_designs=keep) == expected
-    assert prune(database, before(30), keep_designs=keep, pause=at_once) == expected
+    assert prune(database, before(30), keep_designs=keep) == expected
     kept = 1 if keep else 0
     assert left(database) == {
         "jobs": 2 + kept, "results": 1 + kept, "sweeps": 2, "arrays": 2, "designs": kept
     }  # fmt: skip
-    assert prune(database, before(30), keep_designs=keep, pause=at_once) == Pruned()
+    assert prune(database, before(30), keep_designs=keep) == Pruned()
     jobs = JobRepository(database)
     assert jobs.get(young) is not None
     assert jobs.get(waiting.id) is not None
@@ -117,16 +113,16 @@ def test_an_answer_that_a_younger_job_gives_is_kept(database: Database, keep: bo
     row = jobs.get(young)
     assert row is not None
     assert row.result_of == source
-    assert prune(database, before(30), keep_designs=keep, pause=at_once) == Pruned()
+    assert prune(database, before(30), keep_designs=keep) == Pruned()
     assert jobs.result(source) == {"value": 1}
-    assert prune(database, before(5), keep_designs=keep, pause=at_once) == Pruned(jobs=2, sweeps=1)
+    assert prune(database, before(5), keep_designs=keep) == Pruned(jobs=2, sweeps=1)
     assert left(database)["jobs"] == 0
 
 
 def test_what_lost_its_sweeps_answers_nobody(database: Database) -> None:
     found = JobOutput(result={"optimum": 1}, sweeps=(sweep(),), design=design())
     old = ended(database, 40.0, found, spec_hash="b" * 64)
-    assert prune(database, before(30), keep_designs=True, pause=at_once) == Pruned(sweeps=1)
+    assert prune(database, before(30), keep_designs=True) == Pruned(sweeps=1)
     jobs = JobRepository(database)
     assert jobs.result(old) == {"optimum": 1}
     again, _ = jobs.submit(new_job(spec_hash="b" * 64, fresh=False), queue_limit=10)
@@ -183,10 +179,10 @@ def test_uploads_that_nobody_uses_go(database: Database) -> None:
     assert jobs.claim("one", utc_now() + DAY) is not None
     assert uploaded(database, 0.0, "again") == ids["again"]
     assert RetentionRepository(database).delete_upload(ids["again"], before(30)) == 0
-    assert prune_uploads(database, before(30), pause=at_once) == Pruned(uploads=2)
+    assert prune_uploads(database, before(30)) == Pruned(uploads=2)
     uploads = UploadRepository(database)
     assert {name for name, one in ids.items() if uploads.get(one) is None} == {"unused", "ended"}
-    assert prune_uploads(database, before(30), pause=at_once) == Pruned()
+    assert prune_uploads(database, before(30)) == Pruned()
     for one in (old, recent):
         assert jobs.get(one) is not None, "jobs are another matter"
 

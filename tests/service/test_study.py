@@ -23,13 +23,13 @@ OF_THE_COMMAND = {"--set", "--plot", "--out", "--json", "--report", "--uncertain
 # Functions besides that take keys of a study.
 BESIDES = {
     "solve": ("solver:solve_all",), "design": ("optim:robust_design",), "sensitivities": (),
-    "modes": ("solver:limit_cycles",),
+    "modes": ("solver:limit_cycles",), "wear": ("solver:least_worn_peak",),
 }  # fmt: skip
 # Keys that Python takes otherwise: as one of three words, as a pair, or by a function of its own.
 OTHERWISE: Mapping[str, set[str]] = {
     "controlled": {"no_stability"}, "march": {"history"}, "solve": {"every", "certify"},
-    "peaks": {"certify"}, "design": {"certify"},
-    "sweep": {"multipliers", "switched"},
+    "peaks": {"certify"}, "design": {"certify", "options"},
+    "sweep": {"multipliers", "switched"}, "wear": {"parameter", "start", "stop", "factors"},
     "modes": {
         "start", "stop", "performance", "aero_damping", "motions", "exact_peaks", "disturbance",
         "phase_resonance",

@@ -93,6 +93,11 @@ class MeasuredRows(ABC):
         return ()
 
     @property
+    def fitted_besides(self) -> int:
+        """How many numbers of its own, no parameters of the scene, its model fits to the observations."""
+        return 0
+
+    @property
     def unit_words(self) -> str:
         """What the observations are, with their unit."""
         return "displacements [m]"
@@ -137,6 +142,9 @@ SHIPPED = (
     "optim.identification.data.response",
     "optim.identification.data.loop",
     "optim.identification.data.mode",
+    "optim.identification.data.decay",
+    "optim.identification.data.resonance",
+    "optim.identification.data.peak",
 )
 
 

@@ -79,7 +79,7 @@ class ResponseModel(RunModel):
         reached = np.isfinite(slopes).all(axis=(1, 2)) & np.isfinite(found_values).all(axis=1)
         names = [contact.name for contact in balance.scene.contacts]
         return Predicted(
-            values=found_values.ravel(), slopes=slopes.reshape(-1, len(self._paths)),
+            values=found_values.ravel(), slopes=slopes.reshape(found_values.size, -1),
             reached=np.repeat(reached, parts), states={name: states[:, c] for c, name in enumerate(names)},
         )  # fmt: skip
 
@@ -120,6 +120,13 @@ class ResponseModel(RunModel):
         if np.isnan(self._near[i]).any():
             return -float(np.linalg.norm(found.values))
         return float(np.linalg.norm(found.values - self._near[i]))
+
+
+def observing_dof(scene: Scene, dof: str) -> Scene:
+    """Return the scene that observes a DOF."""
+    if dof == scene.observe.dof:
+        return scene
+    return scene.model_copy(update={"observe": scene.observe.model_copy(update={"dof": dof})})
 
 
 FLOOR = (
@@ -182,11 +189,10 @@ class ResponseRun(MeasuredRows):
 
     def model(self, scene: Scene, paths: Sequence[str], harmonics: int) -> RunModel:
         """As the base says."""
-        observe = scene.observe.model_copy(update={"dof": self.dof})
-        here = scene.model_copy(update={"observe": observe}) if self.dof != scene.observe.dof else scene
         return ResponseModel(
-            here, self.conditions, paths, frequency_hz=self.frequency_hz, quantity=self.quantity,
-            harmonic=self.harmonic, harmonics=harmonics, near=self.observations.reshape(-1, self.parts),
+            observing_dof(scene, self.dof), self.conditions, paths, frequency_hz=self.frequency_hz,
+            quantity=self.quantity, harmonic=self.harmonic, harmonics=harmonics,
+            near=self.observations.reshape(-1, self.parts),
         )  # fmt: skip
 
     def thinned(self, most: int) -> ResponseRun:

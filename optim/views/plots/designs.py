@@ -228,15 +228,15 @@ def identification_figure(answer: Mapping[str, Any], *, ax: Into = None) -> Figu
     answer : the JSON of `optim.Identification`, with at least one run.
     """
     runs: Sequence[Run] = answer["runs"]
-    loops = [run for run in runs if run["kind"] == LOOP]
-    modes = [run for run in runs if run["kind"] == MODE]
-    responses = [run for run in runs if run["kind"] not in (LOOP, MODE)]
-    panels = [shown for shown in (responses, loops, modes) if shown]
+    draws = {"response": _draw_responses, LOOP: _draw_loops}
+    kinds = sorted(
+        dict.fromkeys(run["kind"] for run in runs),
+        key=lambda kind: [*draws].index(kind) if kind in draws else 2,
+    )
     with style.styled():
-        page, axes = style.figure(5.6 * len(panels), 3.9, columns=len(panels), into=ax)
-        for one, shown in zip(axes, panels, strict=False):
-            draw = _draw_responses if shown is responses else _draw_modes if shown is modes else _draw_loops
-            draw(one, shown)
+        page, axes = style.figure(5.6 * len(kinds), 3.9, columns=len(kinds), into=ax)
+        for one, kind in zip(axes, kinds, strict=False):
+            draws.get(kind, _draw_curves)(one, [run for run in runs if run["kind"] == kind])
             one.set_title(f"{answer['scene']}: data, fit and 95 % band")
     return page
 
@@ -265,12 +265,14 @@ def _draw_loops(axes: Axes, runs: Sequence[Run]) -> None:
     _legend(axes, runs)
 
 
-def _draw_modes(axes: Axes, runs: Sequence[Run]) -> None:
-    """Draw damping ratios, or frequencies, over the modal amplitude."""
+def _draw_curves(axes: Axes, runs: Sequence[Run]) -> None:
+    """Draw what was measured over what it was measured at: modes, decays, phase resonances, peaks."""
     for run, colour in zip(runs, _colours(len(runs)), strict=True):
         _draw(axes, run, colour, 1.0, np.argsort(run["x"]), markers="o")
-    axes.set_xscale("log")
-    style.label(axes, "modal amplitude a [√kg m]", ", ".join(dict.fromkeys(run["quantity"] for run in runs)))
+    if runs[0]["kind"] == MODE:
+        axes.set_xscale("log")
+    over = runs[0].get("over", "modal amplitude a [√kg m]")
+    style.label(axes, over, ", ".join(dict.fromkeys(run["quantity"] for run in runs)))
     _legend(axes, runs)
 
 

@@ -28,7 +28,7 @@ def design(found: Json) -> Iterator[Block]:
         return
     title = f"Best damper of {found['scene']}"
     yield Summary(title if _kept(found) else f"{title}: not all limits can be kept", _pairs(found))
-    tables = (_limits(found), _active(found), _basins(found), _checked(found))
+    tables = (_options(found), _limits(found), _active(found), _basins(found), _checked(found))
     yield from (table for table in tables if table is not None)
 
 
@@ -194,6 +194,23 @@ def _checked(found: Json) -> ResultTable | None:
     ]
     columns = (*names, "harmonics", "peak", "keeps the limits")
     return ResultTable("Again with more harmonics", columns, rows)
+
+
+def _options(found: Json) -> ResultTable | None:
+    """The options of a catalogue, best first."""
+    options: Sequence[Json] = found.get("options", ())
+    if not options:
+        return None
+    rows = [
+        (
+            one["name"],
+            "" if one["objective"] is None else units.number(one["objective"], 6),
+            ", ".join(parameter(path, value) for path, value in one["values"].items()),
+            one["status"],
+        )
+        for one in options
+    ]
+    return ResultTable("Options", ("option", "objective", "values", "what became of it"), rows)
 
 
 def _limits(found: Json) -> ResultTable | None:

@@ -74,6 +74,9 @@ def uncertain_rows(found: Json) -> list[tuple[str, str]]:
         said.append(("samples", str(len(found["samples"]))))
     if "disks" in found:
         said.append(("mistuned disks", str(len(found["disks"]))))
+    if "mistuning" in found:
+        of, within = found["mistuning"]["of"], 100.0 * found["mistuning"]["within"]
+        said.append((f"{', '.join(of)} of every blade", f"within {within:.4g} % of the tuned one"))
     return said
 
 

@@ -45,7 +45,10 @@ def check_proof(
         try:
             checker.check(raw)
         except checker.RejectedError as error:
-            reasons.append(str(error))
+            reasons.append(error.args[0])
+        except (KeyError, IndexError, TypeError, ValueError) as error:
+            wanted = "must be a certificate as this version writes it"
+            raise InputError(f"`FILE`: {str(file)!r} {wanted}, got {error!r}") from error
     reason = "; ".join(reasons)
     if as_json:
         print_json(

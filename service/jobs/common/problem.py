@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from optim.criteria.key import Name as Name
 from optim.criteria.key import Pair as Pair
 from optim.criteria.key import Ranges as Ranges
-from optim.problem.keys import ROBUST, ProblemKeys
+from optim.problem.keys import OPTIONS, ROBUST, ProblemKeys
 from service.jobs.common.scenes import HarmonicRequest
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
 from service.jobs.registry import ABOUT_THE_JOB, JobKind
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
     from solver.scene.scene import Scene
 
 CERTIFY = "certify"
-_OF_OTHERS = ("points", CERTIFY, *ROBUST)
+_OF_OTHERS = ("points", CERTIFY, OPTIONS, *ROBUST)
 
 
 class ProblemRequest(ProblemKeys, Study, HarmonicRequest):
@@ -32,10 +33,16 @@ class ProblemRequest(ProblemKeys, Study, HarmonicRequest):
         """Return everything wrong with the problem."""
         # Loaded here, as below: it brings the compiled loops along, which a service that only lists does not
         # need.
-        from optim.problem.issues import problem_issues
+        from optim.problem.issues import problem_issues, reading_issues
 
-        known = {key: value for key, value in arguments(self).items() if key not in _OF_OTHERS}
-        return problem_issues(scene, known)
+        given = arguments(self)
+        known = {key: value for key, value in given.items() if key not in _OF_OTHERS}
+        if OPTIONS not in given:
+            return problem_issues(scene, known)
+        from optim.studies.catalogue import check_options, with_variables
+
+        found = problem_issues(scene, with_variables(known))
+        return found or reading_issues(partial(check_options, scene, given[OPTIONS], known), given)
 
     def sizes(self, scene: Scene) -> list[Issue]:
         """Return what is too large."""

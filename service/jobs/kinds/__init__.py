@@ -21,6 +21,7 @@ from service.jobs.studies.modes import Modes
 from service.jobs.studies.pareto import Pareto
 from service.jobs.studies.peaks import Peaks
 from service.jobs.studies.plan import Plan
+from service.jobs.studies.quasi_periodic import QuasiPeriodicStudy
 from service.jobs.studies.sensitivities import Sensitivities
 from service.jobs.studies.solve import Solve
 from service.jobs.studies.sweep import Sweep
@@ -49,6 +50,7 @@ SHIPPED = Registry(
         Solve.as_kind(),
         March.as_kind(),
         Transient.as_kind(),
+        QuasiPeriodicStudy.as_kind(),
         Wear.as_kind(),
         Accuracy.as_kind(),
         Campbell.as_kind(),

@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, RootModel
 
 import optim
 from optim.criteria.key import Form, Option
-from optim.problem.keys import ROBUST, NominalAndRobustKeys, of_design
+from optim.problem.keys import OPTIONS, ROBUST, NominalAndRobustKeys, of_design
 from service.jobs.common.problem import CERTIFY, ProblemRequest, arguments
 from service.jobs.common.proofs import CERTIFICATES, prepare, with_proofs
 from service.jobs.common.results import PeakAt, Table, answered
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from solver.scene.scene import Scene
 
 UNCERTAIN = "uncertain"
-_NOT_ROBUST = ("basins", CERTIFY)
+_NOT_ROBUST = ("basins", CERTIFY, OPTIONS)
 
 _EXAMPLE: dict[str, Any] = {
     "scene": "bladed-disk",
@@ -58,6 +58,7 @@ def design_result() -> type[BaseModel]:
         errors=_Rows, looked_at=_Rows, tried=_Rows, broken=_Rows, plateau=Table, conditions=Table | None,
         objective=float | None, limit=float | None, stable=str, stable_ground=str, newton_iterations=int,
         multipliers=list[float | None], certificates=CERTIFICATES,
+        options=_Rows,
         n_harmonics=(int, Field(description=_HARMONICS)),
     )()  # fmt: skip
     robust: Any = answered(
@@ -119,7 +120,7 @@ class _Design(NominalAndRobustKeys, ProblemRequest):
         apart, which = (_NOT_ROBUST, "without") if robust else (ROBUST, "with")
         words = f"is for a design {which} `uncertain` parameters"
         found = super().issues(scene) + [Issue((key,), words, given[key]) for key in apart if key in given]
-        known = {key: value for key, value in given.items() if key not in (CERTIFY, *ROBUST)}
+        known = {key: value for key, value in given.items() if key not in (CERTIFY, OPTIONS, *ROBUST)}
         return found + (uncertainty_issues(scene, known, given[UNCERTAIN]) if robust else [])
 
     def sizes(self, scene: Scene) -> list[Issue]:
@@ -139,8 +140,11 @@ class _Design(NominalAndRobustKeys, ProblemRequest):
         given = dict(asked)
         if proof := given.pop(CERTIFY, False):
             prepare(scene)
-        search = optim.robust_design if UNCERTAIN in given else optim.design
-        found: Any = search(scene, **given, **watch._asdict(), on_best=on_best)
+        if OPTIONS in given:
+            found: Any = optim.catalogue(scene, **given, **watch._asdict()).design
+        else:
+            search = optim.robust_design if UNCERTAIN in given else optim.design
+            found = search(scene, **given, **watch._asdict(), on_best=on_best)
         answer = Answer.of(found)
         return with_proofs(answer, *_peaks_of(found), watch) if proof and found.peak is not None else answer
 

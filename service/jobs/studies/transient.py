@@ -13,12 +13,13 @@ from service.jobs.common.scenes import Number, PositiveNumber, check
 from service.jobs.common.sizes import march_issues
 from service.jobs.registry import Flag
 from service.jobs.study import Study
-from solver.errors import Issue
+from solver.errors import Issue, SettingError
 
 if TYPE_CHECKING:
     from solver.marching.ramp import Ramp
     from solver.scene.scene import Scene
 
+_Rates = Annotated[list[PositiveNumber], Field(min_length=1, max_length=50)]
 _NotNegative = Annotated[Number, Field(ge=0.0)]
 
 
@@ -51,6 +52,10 @@ class Transient(Study):
     ramp_seconds: Annotated[PositiveNumber | None, Flag(metavar="T")] = Field(
         default=None, description="How long it takes from the one to the other [s]."
     )
+    rates: Annotated[_Rates | None, Flag("--rates", "R")] = Field(
+        default=None,
+        description="Several rates [Hz/s] in place of these: the largest amplitude over the rate.",
+    )
     ring_down_seconds: Annotated[_NotNegative, Flag(metavar="T")] = Field(
         default=0.0, description="How long the motion is followed after that without excitation [s]."
     )
@@ -70,7 +75,13 @@ class Transient(Study):
         from solver.marching.transient import ramps_of
 
         keys = ("begin_hz", "end_hz", "rate_hz_per_s", "ramp_seconds", "ring_down_seconds")
-        return ramps_of(scene, **{key: getattr(self, key) for key in keys})
+        given = {key: getattr(self, key) for key in keys}
+        if self.rates is None:
+            return ramps_of(scene, **given)
+        if self.rate_hz_per_s is not None:
+            raise SettingError("rate_hz_per_s", self.rate_hz_per_s, "must not be given beside `rates`")
+        runs = [ramps_of(scene, **{**given, "rate_hz_per_s": rate}) for rate in self.rates]
+        return tuple(ramp for run in runs for ramp in run)
 
     def issues(self, scene: Scene) -> list[Issue]:
         """Return what is wrong with the range and the rate."""

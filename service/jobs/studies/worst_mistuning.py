@@ -40,7 +40,7 @@ class WorstMistuningStudy(Study, HarmonicRequest):
     NAME, FUNCTION = "worst-mistuning", "solver:worst_mistuning"
     RESULT = answered(
         "solver.studies.patterns.worst_result:WorstMistuning", "WorstMistuningResult", worst=Table | None,
-        patterns=list[Table],
+        residual=Table | None, patterns=list[Table],
     )  # fmt: skip
     TOLD = "solver.views.tables.disks:worst_mistuning"
     SHOWS = "the worst pattern with its bounds, and intentional ones ([patterns](patterns.md))"
@@ -58,8 +58,10 @@ class WorstMistuningStudy(Study, HarmonicRequest):
     rms: Annotated[_Share | None, Flag(metavar="D")] = Field(
         default=None, description="Largest root mean square of the deviations."
     )
-    contacts: Literal["solved", "stuck", "open"] = Field(
-        default="solved", description="How contacts count: solved, or in a linear limit."
+    contacts: Literal["solved", "stuck", "open", "residual"] = Field(
+        default="solved",
+        description="How contacts count: solved, in a linear limit, or solved with the worst forces that "
+        "those which stick may hold.",
     )
     patterns: Annotated[list[_Pattern] | None, Field(max_length=_MOST_PATTERNS), Flag(metavar="AB")] = Field(
         default=None,
@@ -110,7 +112,7 @@ class WorstMistuningStudy(Study, HarmonicRequest):
         intentional = IntentionalMistuning(self.patterns or (), self.detuning)
         blades = check_bounds(scene, self.within, self.rms, intentional)
         mistuned(scene, of=self.of, values=[1.0] * len(blades))
-        if self.contacts != Contacts.SOLVED.value:
+        if self.contacts in (Contacts.STUCK.value, Contacts.OPEN.value):
             check_linear(scene, Contacts(self.contacts))
 
     def sizes(self, scene: Scene) -> list[Issue]:
@@ -118,7 +120,9 @@ class WorstMistuningStudy(Study, HarmonicRequest):
         count = len(self.patterns or ())
         solved = (self.climbs * self.climb + 5) * (1 + self.worst_of_patterns * count) + count
         points = (
-            POINTS_OF_A_SWEEP * (solved if self.contacts == "solved" else 1) * scene.structure.sector_count
+            POINTS_OF_A_SWEEP
+            * (solved if self.contacts in ("solved", "residual") else 1)
+            * scene.structure.sector_count
         )
         return balance_issues(
             "climb", scene, self.harmonics, points, "points of all sweeps", every_sector=True

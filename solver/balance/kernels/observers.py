@@ -74,7 +74,7 @@ def measure_through_modes(
             for i in range(system.ks.size):
                 here, s = cosine_position(system.ks, i), system.which[i]
                 value, change = complex(0.0), complex(0.0)
-                for m in range(seen.shape[2]):
+                for m in range(seen.shape[2] if system.only in (-1, system.ks[i]) else 0):
                     value += seen[j, s, m] * amplitudes[0, i, m]
                     change += seen[j, s, m] * amplitudes[1, i, m]
                 x[j, row, here], dx[here] = value.real, change.real

@@ -85,6 +85,7 @@ class System(NamedTuple):
     constant_mean: int  # 1: constant forces are loads, which the level of the excitation leaves alone
     phase_reference: float  # rad
     centred: int  # what is measured of the observed motion: FROM_REST, CENTRED or UTILISED
+    only: int  # the one harmonic of the observed motion that is measured, −1: the whole motion
     haigh: Real  # (4,) of a utilisation, see `solver.balance.kernels.haigh`
     parameter_reference: float  # the value of a structural parameter at which K, M, C stand
     least_size: float  # m, motions of the contacts far below it are rounding of what cancels in ū

@@ -147,6 +147,11 @@ class AnyContact(Element, InSpace):
         del turn, share
         return {}
 
+    def in_period_of(self, turns: int) -> dict[str, object]:
+        """The fields that differ where so many turns of its load make up the period."""
+        del turns
+        return {}
+
     # Contact table and kernel
 
     @classmethod

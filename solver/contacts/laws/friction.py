@@ -218,6 +218,15 @@ class FrictionContact(AnyContact):
         higher = tuple(each.in_sector(turn, standing=share is not None) for each in self.higher_load or ())
         return {**changed, "higher_load": higher or None}
 
+    def in_period_of(self, turns: int) -> dict[str, object]:
+        """The load as harmonics of a period of so many turns."""
+        first = LoadHarmonic(order=1, amplitude=self.N1_value, phase=self.N1_phase)
+        every = (*((first,) if self.N1_value else ()), *(self.higher_load or ()))
+        if turns == 1 or not every:
+            return {}
+        later = tuple(each.model_copy(update={"order": turns * each.order}) for each in every)
+        return {"N1": None, "N1_ratio": None, "N1_phase": 0.0, "higher_load": later}
+
     def fill(self, row: Real, highest: int) -> None:
         """Put its numbers into its row of the contact table; a load that is not tied has a ratio NaN."""
         del highest

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from solver.balance.balance import build
+from solver.balance.balance import Balance, build
 from solver.balance.kernels.observers import measure_through_modes
 from solver.balance.kernels.output import measure
 from solver.balance.kernels.residual import evaluate
@@ -119,18 +119,24 @@ def _workspaces(
     branch: Branch, dofs: Sequence[str], measure: str | Haigh | None = None
 ) -> list[Workspace]:  # fmt: skip
     """Return a workspace with each DOF observed; all share what is known of the resonances."""
-    posed, workspaces = branch.balance, list[Workspace]()
-    haigh = measure if isinstance(measure, Haigh) else None
-    how = {"measure": "half_peak_to_peak" if haigh else measure or posed.scene.observe.measure}
+    workspaces = list[Workspace]()
     for dof in dofs:
-        seen = posed.scene.observe.model_copy(update={"dof": dof, **how})
-        other = posed.scene.model_copy(update={"observe": seen})
-        balance = build(other, harmonics=posed.n_harmonics, effects=posed.effects)
-        if haigh is not None:
-            system = balance.system._replace(centred=UTILISED, haigh=np.array(haigh, dtype=np.float64))
-            balance = replace(balance, system=system)
+        balance = observed_balance(branch.balance, dof, measure)
         workspaces.append(Workspace.of(balance, observing_another=workspaces[0] if workspaces else None))
     return workspaces
+
+
+def observed_balance(posed: Balance, dof: str, measure: str | Haigh | None = None) -> Balance:
+    """Return the balance of a frequency response observed otherwise, see `observing`."""
+    haigh = measure if isinstance(measure, Haigh) else None
+    how = {"measure": "half_peak_to_peak" if haigh else measure or posed.scene.observe.measure}
+    seen = posed.scene.observe.model_copy(update={"dof": dof, **how})
+    other = posed.scene.model_copy(update={"observe": seen})
+    balance = build(other, harmonics=posed.n_harmonics, effects=posed.effects)
+    if haigh is None:
+        return balance
+    system = balance.system._replace(centred=UTILISED, haigh=np.array(haigh, dtype=np.float64))
+    return replace(balance, system=system)
 
 
 class _Observers:

@@ -127,7 +127,7 @@ def observer_receptance(system: System, p: float, out: Receptance) -> None:
 
 @compiled
 def scale_driven(system: System, p: float, out: Receptance) -> None:
-    """Multiply the motions under the unit excitation by its level and phase."""
+    """Multiply motions under the unit excitation by its level and phase; what is not measured is 0."""
     for k in range(system.ks.size):
         f, df = excitation(system, p, system.ks[k])
         out.x_linear[1, k] = f * out.x_linear[1, k] + df * out.x_linear[0, k]
@@ -135,6 +135,20 @@ def scale_driven(system: System, p: float, out: Receptance) -> None:
         for c in range(out.B.shape[2]):
             out.u_linear[1, k, c] = f * out.u_linear[1, k, c] + df * out.u_linear[0, k, c]
             out.u_linear[0, k, c] *= f
+    measure_only(system, out)
+
+
+@compiled
+def measure_only(system: System, out: Any) -> None:
+    """Leave no way to the observed DOF but for the forces of the harmonic that is measured."""
+    if system.only < 0:
+        return
+    for k in range(system.ks.size):
+        if system.ks[k] != system.only:
+            for order in range(out.x_linear.shape[0]):
+                out.x_linear[order, k] = 0.0
+                for c in range(out.B.shape[2]):
+                    out.B[order, k, c] = 0.0
 
 
 @compiled

@@ -27,7 +27,7 @@ from solver.linear.kernels.dynamic_stiffness import (
     fill_terms,
 )
 from solver.linear.kernels.modal_products import basis_of_modes, fill_product
-from solver.linear.kernels.receptance import PAIRS_UP_TO, clear, excitation
+from solver.linear.kernels.receptance import PAIRS_UP_TO, clear, excitation, measure_only
 
 
 class Jets(NamedTuple):
@@ -76,6 +76,7 @@ def fill_jets(system: System, omega: float, p: float, out: Jets) -> None:
             u[BY_P] = f * u[BY_P] + df * u[VALUE]
             for order in range(BY_P):
                 u[order] *= f
+    measure_only(system, out)
 
 
 @compiled

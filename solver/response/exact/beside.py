@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
-from solver.jit.fourier import Real
+from solver.jit.fourier import Complex, Real
 from solver.response.exact.flow import LiftsError, NoMotionError
 from solver.response.exact.orbit import POLISH, Orbit, beside, find
 from solver.response.exact.piecewise import FREE, STICK, MemberState, Piecewise
@@ -32,23 +33,31 @@ def orbit_beside(solution: Solution, polish: int = POLISH) -> tuple[Piecewise, O
         if system.rigid.any() or any(member.rigid_normal for member in system.members):
             found = find(system, *system.at_rest())  # it is exact itself
         else:
-            found = beside(system, *_begun(system, solution), 0.0, polish=polish)
+            given = zip(solution.contacts, solution.scene.contacts, strict=True)
+            forces = [each.force_over(contact, _START) for each, contact in given]
+            found = beside(system, *begun_at(system, all_coordinates(solution), forces), 0.0, polish=polish)
     except (LiftsError, NoMotionError):
         return system, None
     return system, found if isinstance(found, Orbit) else None
 
 
-def _begun(system: Piecewise, solution: Solution) -> tuple[Real, MemberState]:
-    """Return the state of a solution at τ = 0; what slips there is told by its force at once."""
-    n, (w, state), amplitudes = system.n, system.at_rest(), all_coordinates(solution)
+def begun_at(system: Piecewise, amplitudes: Complex, forces: Sequence[Real]) -> tuple[Real, MemberState]:
+    """Return the state at τ = 0 of a motion; what slips there is told by its force at once.
+
+    Parameters
+    ----------
+    amplitudes : (H + 1, n) of the harmonics.
+    forces : of every contact, its force at τ = 0 as an array of one [N].
+    """
+    n, (w, state) = system.n, system.at_rest()
     w[:n] = amplitudes.real.sum(axis=0)
     w[n : 2 * n] = -(np.arange(len(amplitudes)) @ amplitudes.imag)
     for i, member in enumerate(system.members):
         load, at = float(member.given @ w), float(system.d[member.slider] @ w[:n])
         state.closed[i] = load > 0.0
         state.sliders[member.slider] = STICK if load > 0.0 else FREE
-        force = solution.contacts[member.contact].force_over(solution.scene.contacts[member.contact], _START)
-        held = np.clip(float(force[0]), -member.mu * load, member.mu * load) if load > 0.0 else 0.0
+        force = float(forces[member.contact][0])
+        held = np.clip(force, -member.mu * load, member.mu * load) if load > 0.0 else 0.0
         w[system.elastic_at[member.slider]] = at - held / system.kt[member.slider]
     for i, (_, row, _, gap) in enumerate(system.gaps):
         state.pressed[i] = row @ w[:n] > gap

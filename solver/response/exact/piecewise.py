@@ -92,6 +92,7 @@ class Piecewise:
     ----------
     scene : lumped or of matrices, with contacts of the laws coulomb, elastic-normal and gap.
     omega : angular frequency [rad/s].
+    mass_damping : what the damping has besides, in units of the mass [1/s]; below 0 it feeds the motion.
 
     Raises
     ------
@@ -99,10 +100,12 @@ class Piecewise:
         A contact or a term of the structure that this has no place for, or rigid contacts in a closed loop.
     """
 
-    def __init__(self, scene: Scene, omega: float) -> None:
+    def __init__(self, scene: Scene, omega: float, mass_damping: float = 0.0) -> None:
+        scene.observe.check_whole("an exact orbit")
         model = linear_model(scene)
         check_structure(scene, model)
         self.scene, self.omega, self.n = scene, omega, model.n_coordinates
+        self.mass_damping = mass_damping
         zero = np.zeros(1, np.int64)
         K, C, M = (np.real(each[0]) for each in model.at(zero, np.ones(1, np.bool_)))
         self.inverse = np.linalg.inv(M) / omega**2
@@ -117,7 +120,7 @@ class Piecewise:
         self._check_independent()
         amplitudes = force_amplitudes(model, np.arange(self.top + 1))
         base = np.zeros((self.n, self.nw))
-        base[:, : self.n], base[:, self.n : 2 * self.n] = -K, -omega * C
+        base[:, : self.n], base[:, self.n : 2 * self.n] = -K, -omega * (C + mass_damping * M)
         base[:, self.nd :] = self._wave_rows(amplitudes)
         self.base = base
         self.observe = np.zeros(self.nw)

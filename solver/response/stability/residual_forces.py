@@ -11,6 +11,7 @@ reached; a wider one is not excluded.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated
 
@@ -23,13 +24,11 @@ from solver.balance.workspace import Workspace
 from solver.errors import SettingError
 from solver.jit import fourier
 from solver.jit.fourier import Real
-from solver.linear.contact_table import port_counts
 from solver.response.contact_response import ContactState, contact_responses
 from solver.response.history_dependence import held_sliders
 from solver.response.solution import Solution
 from solver.results.told import Piece
 from solver.scene.bodies.body import Load
-from solver.scene.bodies.kinematics import Form
 from solver.scene.scene import Scene
 from solver.sensitivity.gradient import Sensitivities
 
@@ -97,6 +96,61 @@ def amplitude_range(solution: Solution, effects: Effects | None = None) -> Ampli
 
 
 @dataclass(frozen=True, slots=True)
+class LeftForces:
+    """Forces that contacts which stick go on holding, as constant loads on the parts they join.
+
+    `sliding` are the contacts' numbers with the relative motion that each force is along.
+    """
+
+    sliding: tuple[tuple[int, int], ...]
+    terms: tuple[tuple[str, str, int, float], ...]
+
+    @classmethod
+    def of(cls, scene: Scene, stuck: Sequence[int]) -> LeftForces:
+        """Return the forces of some contacts, by their numbers.
+
+        Raises
+        ------
+        SettingError
+            A contact joins one sector with the next.
+        """
+        sliding = tuple((i, port) for i in stuck for port in scene.contacts[i].RUBBING)
+        forms = [scene.forms[i][port] for i, port in sliding]
+        if any(term.next for form in forms for term in form):
+            raise SettingError("scene", "contacts", "must not join one sector with the next")
+        terms = tuple(
+            (f"left-{k}-{j}", term.dof, k, term.factor)
+            for k, form in enumerate(forms)
+            for j, term in enumerate(form)
+        )
+        return cls(sliding, terms)
+
+    @property
+    def paths(self) -> list[str]:
+        """The parameters of a scene with them that they are."""
+        return [f"{name}.force" for name, *_ in self.terms]
+
+    def by_force(self, slopes: Real) -> Real:
+        """Return derivatives (…, forces) by the forces from those by `paths`."""
+        spread = np.zeros((len(self.terms), len(self.sliding)))
+        for row, (_, _, k, factor) in enumerate(self.terms):
+            spread[row, k] = -factor
+        return np.asarray(slopes @ spread)
+
+    def on(self, scene: Scene, forces: Real) -> Scene:
+        """Return a scene whose contacts stick whatever they carry, with the forces left in them as loads."""
+        stuck = {i for i, _ in self.sliding}
+        contacts = tuple(
+            contact.model_copy(update={"mu": STICKS}) if i in stuck else contact
+            for i, contact in enumerate(scene.contacts)
+        )
+        loads = tuple(
+            Load(name=name, dof=dof, force=-float(forces[k]) * factor) for name, dof, k, factor in self.terms
+        )
+        return scene.model_copy(update={"contacts": contacts, "loads": (*scene.loads, *loads)})
+
+
+@dataclass(frozen=True, slots=True)
 class _Reached:
     """A response with forces left in contacts: these [N], the motion, and max|x|, half range, mean [m]."""
 
@@ -112,10 +166,8 @@ class _Search:
         self._solution, self._stuck = solution, stuck
         self._effects = replace(effects, even_harmonics=True)
         scene = solution.scene
-        self._sliding = [(i, port) for i in stuck for port in scene.contacts[i].RUBBING]
-        self._forms = [scene.forms[i][port] for i, port in self._sliding]
-        ends = np.append(0, np.cumsum(port_counts(scene)))
-        self._begun = [int(ends[i]) + port for i, port in self._sliding]
+        self._left = LeftForces.of(scene, stuck)
+        self._sliding = self._left.sliding
         self.reached: list[_Reached] = []
         limits = []
         for i in stuck:
@@ -173,46 +225,22 @@ class _Search:
 
     def _ways(self, here: _Reached, sign: float) -> list[Real]:
         """Return the gradient's direction, and each force alone on its side of it."""
-        scene = self._scene(here.forces)
-        paths = [f"{name}.force" for name, _ in self._names()]
+        scene = self._left.on(self._solution.scene, here.forces)
         balance = build(scene, harmonics=self._solution.n_harmonics, effects=self._effects)
-        slopes = Sensitivities(balance, paths).gradient(here.u, self._solution.frequency_hz).by_parameters
-        gradient = np.zeros(len(self._sliding))
-        for slope, (_, (k, factor)) in zip(slopes, self._names(), strict=True):
-            gradient[k] -= factor * slope
+        slopes = Sensitivities(balance, self._left.paths).gradient(here.u, self._solution.frequency_hz)
+        gradient = self._left.by_force(slopes.by_parameters)
         size = float(np.linalg.norm(gradient))
         if not size > 0.0 or not math.isfinite(size):
             return []
         alone = [np.eye(len(gradient))[k] * np.sign(sign * g) for k, g in enumerate(gradient) if g != 0.0]
         return [sign * gradient / size, *(alone if len(alone) > 1 else ())]
 
-    def _names(self) -> list[tuple[str, tuple[int, float]]]:
-        """The loads that stand for the forces: name, which force, and its share along a DOF."""
-        return [
-            (f"left-{k}-{j}", (k, term.factor))
-            for k, form in enumerate(self._forms)
-            for j, term in enumerate(_terms(form))
-        ]
-
-    def _scene(self, forces: Real) -> Scene:
-        """The scene whose contacts stick whatever they carry, with the forces left in them as loads."""
-        scene = self._solution.scene
-        contacts = tuple(
-            contact.model_copy(update={"mu": STICKS}) if i in self._stuck else contact
-            for i, contact in enumerate(scene.contacts)
-        )
-        loads = tuple(
-            Load(name=f"left-{k}-{j}", dof=term.dof, force=-float(forces[k]) * term.factor)
-            for k, form in enumerate(self._forms)
-            for j, term in enumerate(_terms(form))
-        )
-        return scene.model_copy(update={"contacts": contacts, "loads": (*scene.loads, *loads)})
-
     def _at(self, forces: Real, guess: Real | None) -> _Reached | None:
         """Return the response with forces left in contacts, if these can hold them."""
         hertz = self._solution.frequency_hz
         omega = 2.0 * math.pi * hertz
-        balance = build(self._scene(forces), harmonics=self._solution.n_harmonics, effects=self._effects)
+        scene = self._left.on(self._solution.scene, forces)
+        balance = build(scene, harmonics=self._solution.n_harmonics, effects=self._effects)
         workspace = Workspace.of(balance)
         if guess is None:
             motions = np.concatenate([np.array(each.motions) for each in self._solution.contacts])
@@ -244,10 +272,3 @@ class _Search:
             if np.any(given.size(carried @ basis.T) > limit):
                 return False
         return True
-
-
-def _terms(form: Form) -> Form:
-    """The terms of a relative motion, of parts of the scene itself."""
-    if any(term.next for term in form):
-        raise SettingError("scene", "contacts", "must not join one sector with the next")
-    return form

@@ -38,7 +38,6 @@ from solver.scene.scene import (
     Mass,
     MatricesStructure,
     Node,
-    Observe,
     Scene,
     Spring,
     Structure,
@@ -221,8 +220,8 @@ def annulus(scene: Scene) -> Scene:
             for j in sectors
             for e in scene.excitation
         ),
-        observe=Observe(
-            dof=observed if "@" in observed else _in_sector(observed, 0), band=scene.observe.band
+        observe=scene.observe.model_copy(
+            update={"dof": observed if "@" in observed else _in_sector(observed, 0)}
         ),
         bodies=tuple(_body(b, j) for j in sectors for b in scene.bodies),
         nodes=tuple(_node(node, j) for j in sectors for node in scene.nodes),

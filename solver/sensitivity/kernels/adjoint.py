@@ -71,8 +71,8 @@ def amplitude_slopes(
         return 0
     high, low = tops[0, AMPLITUDE], -tops[1, AMPLITUDE]
     of_both = system.centred != FROM_REST
-    # Without a mean and even harmonics both extremes are the same by symmetry.
-    both = system.ks[0] == 0 and abs(high + low) <= SAME_HEIGHT * max(high, -low)
+    # Without a mean and even harmonics both extremes are the same by symmetry, as those of one harmonic are.
+    both = system.only < 0 and system.ks[0] == 0 and abs(high + low) <= SAME_HEIGHT * max(high, -low)
     if not both and not of_both and -low > high:
         for column in range(EXTREME_COLUMNS):
             tops[0, column], tops[1, column] = tops[1, column], tops[0, column]

@@ -38,6 +38,7 @@ class Contacts(Enum):
     SOLVED = "solved"
     STUCK = "stuck"
     OPEN = "open"
+    RESIDUAL = "residual"  # solved, with any forces that those which stick may hold
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -13,12 +13,10 @@ import numpy as np
 from solver.arrays import Real
 from solver.errors import SettingError
 from solver.results.watch import ShouldStop
-from solver.scene.parts import CyclicStructure, Mass
 from solver.scene.scene import Scene
-from solver.scene.structure_parameters import NUMBERS, STRUCTURE, named_parts
 from solver.sensitivity.gradient import Sensitivities
 from solver.sensitivity.nonsmooth import peak_gradient
-from solver.studies.blades import BladePeaks, blade_peaks, mistuned
+from solver.studies.blades import BladePeaks, blade_paths, blade_peaks, mistuned
 from solver.studies.patterns.climbing import ALIKE, Bounds, WorstSearch
 from solver.studies.patterns.linear_disk import TWO_PI, Contacts, DiskPeak, check_linear
 
@@ -55,7 +53,7 @@ class SolvedDisk:
         self, scene: Scene, of: Sequence[str], dof: str, band: tuple[float, float], harmonics: int,
         should_stop: ShouldStop,
     ) -> None:  # fmt: skip
-        self._scene, self._of = _with_names(scene, of), tuple(of)
+        (self._scene, self._paths), self._of = blade_paths(scene, of), tuple(of)
         self._dof, self._band, self._harmonics = dof, band, harmonics
         self._should_stop = should_stop
         self._known: dict[bytes, DiskPeak] = {}
@@ -97,13 +95,12 @@ class SolvedDisk:
         branch = found.branches[0] if len(found.branches) == 1 else found.worst_branch
         if branch is None or branch.peak is None:
             raise UnknownPeakError
-        rows = self._paths()
-        gradient = peak_gradient(
-            Sensitivities(branch.balance, [p for row in rows for p, _ in row]), branch.peak
-        )
+        rows, here = self._paths, branch.balance.scene
+        gradient = peak_gradient(Sensitivities(branch.balance, [p for row in rows for p in row]), branch.peak)
         by_path = gradient.gradient.reshape(len(rows), -1)
-        per_factor = np.array([[nominal for _, nominal in row] for row in rows])
-        return math.log(found.largest), np.asarray((by_path * per_factor).sum(axis=1) / found.largest)
+        moved = np.array([[here.value(path) for path in row] for row in rows])
+        by_factor = (by_path * moved).sum(axis=1) / (1.0 + delta)
+        return math.log(found.largest), np.asarray(by_factor / found.largest)
 
     def climbed(
         self,
@@ -167,17 +164,7 @@ class SolvedDisk:
     @property
     def differentiable(self) -> bool:
         """Whether the factors are of parts with parameters: those of matrices have none."""
-        return isinstance(self._scene.structure, CyclicStructure)
-
-    def _paths(self) -> list[list[tuple[str, float]]]:
-        """Return the parameters that the factor of each blade multiplies, with their tuned values."""
-        named = named_parts(self._scene.structure)
-        dofs = set(self._of) - {part.name for part in named}
-        parts = [part for part in named if part.name in self._of or getattr(part, "dof", None) in dofs]
-        return [
-            [(f"{STRUCTURE}{part.name}@{j}", float(getattr(part, NUMBERS[type(part)]))) for part in parts]
-            for j in range(self._scene.structure.sector_count)
-        ]
+        return bool(self._paths)
 
     def _peaks(self, delta: Real) -> BladePeaks:
         key = delta.tobytes()
@@ -198,18 +185,3 @@ class SolvedDisk:
 
 class _ClimbEndedError(Exception):
     """All responses of a climb are used, or it is to be stopped."""
-
-
-def _with_names(scene: Scene, of: Sequence[str]) -> Scene:
-    """Return a scene in which masses that factors are of have names, so that they are parameters."""
-    structure = scene.structure
-    if not isinstance(structure, CyclicStructure):
-        return scene
-
-    def named(mass: Mass) -> Mass:
-        if mass.name is not None or mass.dof not in of:
-            return mass
-        return mass.model_copy(update={"name": f"mass-of-{mass.dof}"})
-
-    masses = tuple(named(mass) for mass in structure.masses)
-    return scene.model_copy(update={"structure": structure.model_copy(update={"masses": masses})})

@@ -24,15 +24,18 @@ from solver.studies.patterns.climbing import LARGEST, WorstPattern, WorstSearch,
 from solver.studies.patterns.disk_search import DiskSearch, LinearLimit
 from solver.studies.patterns.intentional import IntentionalMistuning
 from solver.studies.patterns.linear_disk import TWO_PI, Contacts, DiskPeak
+from solver.studies.patterns.residual import ResidualSearch
 from solver.studies.patterns.solved_disk import SolvedDisk, UnknownPeakError
 from solver.studies.patterns.worst_result import (
     IntentionalPattern,
     PatternPeak,
+    ResidualPeak,
     WorstMistuning,
     WorstMistuningStatus,
 )
 
 _NO_PATTERNS, _SEARCH = IntentionalMistuning(), WorstSearch()
+_SOLVED = (Contacts.SOLVED, Contacts.RESIDUAL)
 _APART = 0.05  # of the bounds, by which two patterns to begin with differ
 _CANDIDATES = 2  # worst patterns of each linear limit that are solved
 _FEWER = 3  # of the climbs, that part is made on top of each intentional pattern
@@ -55,7 +58,8 @@ def worst_mistuning(
     within : largest deviation of a factor from 1.
     rms : largest root mean square of the deviations; none if left out.
     contacts : ``solved``, or in a linear limit all ``stuck`` or all ``open``, in which a disk takes seconds.
-        A disk without contacts is linear.
+        A disk without contacts is linear. ``residual`` is ``solved`` with the worst forces besides that
+        contacts which stick may hold, jointly with the factors.
     intentional : patterns of blade types that are compared.
     search : how many climbs are made.
     start, stop : frequencies [Hz], the scene's band if left out.
@@ -86,8 +90,14 @@ def worst_mistuning(
         intentional=intentional.deviations(len(blades)), worst_of_patterns=intentional.worst_of_patterns,
         on_progress=on_progress, should_stop=should_stop,
     )  # fmt: skip
-    if how is Contacts.SOLVED:
-        found = _solved(searched, SolvedDisk(searched.scene, names, dof, band, harmonics, should_stop))
+    if how in _SOLVED:
+        disk = SolvedDisk(searched.scene, names, dof, band, harmonics, should_stop)
+        if how is Contacts.RESIDUAL and not disk.differentiable:
+            raise SettingError("contacts", how.value, "needs a structure of named parts: matrices have none")
+        found = _solved(searched, disk)
+        if how is Contacts.RESIDUAL and found["worst"] is not None:
+            search_of = ResidualSearch(searched.scene, names, dof, band, harmonics, searched.go_on)
+            found["residual"] = _with_forces(search_of, searched, found)
     else:
         found = _linear(searched, how)
     if on_progress is not None and not searched.stopped:
@@ -95,7 +105,7 @@ def worst_mistuning(
     return WorstMistuning(
         scene=scene.name, dof=dof, of=names, within=within, rms=rms, detuning=intentional.detuning,
         contacts=how.value, whitehead=whitehead(len(blades)), starts=search.starts,
-        climbs=search.climbs if how is Contacts.SOLVED else 0, n_harmonics=harmonics, **found,
+        climbs=search.climbs if how in _SOLVED else 0, n_harmonics=harmonics, **found,
         seconds=time.perf_counter() - begun,
     )  # fmt: skip
 
@@ -185,6 +195,15 @@ def _solved(search: DiskSearch, disk: SolvedDisk) -> dict[str, Any]:
     }  # fmt: skip
 
 
+def _with_forces(residual: ResidualSearch, search: DiskSearch, found: dict[str, Any]) -> ResidualPeak | None:
+    """Return the worst with forces left in contacts that stick, from the tuned disk and the worst pattern."""
+    nothing, worst = np.zeros(search.scene.structure.sector_count), found["worst"]
+    bounds, rng = search.around(nothing), np.random.default_rng(search.asked.seed)
+    begins = [(nothing, found["tuned_at_hz"]), (np.array(worst.factors) - 1.0, worst.at_hz)]
+    begins += [(bounds.drawn(rng), found["tuned_at_hz"]) for _ in range(search.asked.climbs)]
+    return residual.worst(begins, bounds, found["tuned_peak"])
+
+
 def _apart(search: DiskSearch, limit: LinearLimit, middle: Real, starts: int) -> list[Real]:
     """Return the worst patterns of a linear limit that differ from each other."""
     climbs = search.worst(limit, middle, starts)
@@ -218,7 +237,7 @@ def _contacts(scene: Scene, contacts: str | Contacts) -> Contacts:
     found = Contacts(contacts)
     harmonics = {force.harmonic for force in scene.excitation}
     plain = not scene.contacts and len(harmonics) == 1 and 0 not in harmonics
-    return Contacts.OPEN if found is Contacts.SOLVED and plain else found
+    return Contacts.OPEN if found in _SOLVED and plain else found
 
 
 def _band(scene: Scene, start: float | None, stop: float | None) -> tuple[float, float]:

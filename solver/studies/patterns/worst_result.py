@@ -40,6 +40,20 @@ class PatternPeak(Piece):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class ResidualPeak(Piece):
+    """The largest amplitude of a disk over its factors and the forces left in contacts that stick."""
+
+    factors: Annotated[tuple[float, ...], "One for each sector."]
+    contacts: Annotated[tuple[str, ...], "Contacts of the annulus that stick and keep a force."]
+    tractions: Annotated[tuple[float, ...], "The force each keeps beside kt u [N]."]
+    magnification: Annotated[float, "The largest max|x| relative to the peak of the tuned disk."]
+    peak: Annotated[float, "It [m]."]
+    blade: Annotated[int, "The sector that has it."]
+    at_hz: Annotated[float, "Where [Hz]."]
+    without: Annotated[float, "max|x| there of contacts that were free of force at the beginning [m]."]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class IntentionalPattern(Piece):
     """An intentional pattern of blade types round the disk."""
 
@@ -67,8 +81,8 @@ class WorstMistuning(Drawn):
         index="sector",
     )  # fmt: skip
     JSON: ClassVar = (
-        "scene dof of within rms detuning contacts tuned_peak tuned_at_hz worst whitehead martel power_bound"
-        " starts climbs alike climbed patterns best n_harmonics seconds completed=reached status"
+        "scene dof of within rms detuning contacts tuned_peak tuned_at_hz worst residual whitehead martel"
+        " power_bound starts climbs alike climbed patterns best n_harmonics seconds completed=reached status"
     )
 
     scene: Annotated[str, "Its name."]
@@ -77,10 +91,15 @@ class WorstMistuning(Drawn):
     within: Annotated[float, "Largest deviation of a factor."]
     rms: Annotated[float | None, "Largest root mean square of the deviations; none."]
     detuning: Annotated[float, "Deviation of the first and (negative) the last blade type of patterns."]
-    contacts: Annotated[str, "How they count: solved, stuck or open."]
+    contacts: Annotated[str, "How they count: solved, stuck, open or residual."]
     tuned_peak: Annotated[FloatOrNaN, "Highest peak of the tuned disk [m]."]
     tuned_at_hz: Annotated[FloatOrNaN, "Where [Hz]."]
     worst: Annotated[PatternPeak | None, "The worst pattern found."]
+    residual: Annotated[
+        ResidualPeak | None,
+        "The largest amplitude over factors, frequency and the forces that contacts which stick may hold; "
+        "none if it was not asked for, or no contact sticks.",
+    ] = None
     whitehead: Annotated[float, "Whitehead's bound of the magnification, (1 + √N)/2."]
     martel: Annotated[
         FloatOrNaN, "Martel's bound, with the damping of every nodal diameter; unknown where there is none."

@@ -80,7 +80,10 @@ def _with_best_seen(tracker: Tracker, found: list[Lowest]) -> list[Lowest]:
     near, rows = SAME_PLACE * tracker.scale.span, rows_at(tracker, look.z)
     top = max((float(row[HEIGHT]) for row in rows.values()), default=-math.inf)
     best = Lowest(
-        z=look.z, rows=rows if abs(top / look.top - 1.0) <= EQUAL else {}, height=look.top, bracketed=False
+        z=look.z,
+        rows=rows if abs(top - look.top) <= EQUAL * look.top else {},
+        height=look.top,
+        bracketed=False,
     )
     return [best, *(one for one in found if abs(one.z - look.z) > near)]
 

@@ -131,28 +131,35 @@ class WearCourse:
         wearing, depths = self.wearing, state[: self.n].copy()
         found = self.conditions.at(wearing, depths, near, rates=rates)
         rate = wearing.per_watt * found.power
-        own = len(self.conditions.paths)
-        by_q = wearing.per_watt[:, None] * found.by_power
-        taken = np.zeros((len(wearing.losses), self.n))
-        for i, loss in enumerate(wearing.losses):
-            taken[i, loss.contact] = -loss.per_depth
-        moved = wearing.moved(self.conditions.paths, depths)
-        by_paths = by_q[:, :own] + by_q[:, own:] @ moved
-        by_own, amplitude_by_own = np.zeros((self.n, len(self.paths))), np.zeros(len(self.paths))
+        by_depths, by_own = self.by_state(wearing.per_watt[:, None] * found.by_power, depths)
         for k, path in enumerate(self.paths):
             if path in wearing.entries:
                 of = np.array(wearing.of_entry) == wearing.entries.index(path)
                 by_own[of, k] = (SECONDS_AN_HOUR / wearing.areas * found.power)[of]
-            else:
-                at = self.conditions.paths.index(path)
-                by_own[:, k] = by_paths[:, at]
-                amplitude_by_own[k] = found.by_amplitude[at] + found.by_amplitude[own:] @ moved[:, at]
+        amplitude_by_depths, amplitude_by_own = self.by_state(found.by_amplitude, depths)
         here = Here(
             hours=hours, depths=depths, slopes=state[self.n :].reshape(self.n, -1).copy(),
             motion=found.motion, power=found.power, rates=rate, amplitude=found.amplitude,
-            amplitude_by_depths=found.by_amplitude[own:] @ taken, amplitude_by_own=amplitude_by_own,
+            amplitude_by_depths=amplitude_by_depths, amplitude_by_own=amplitude_by_own,
         )  # fmt: skip
-        return here, by_q[:, own:] @ taken, by_own
+        return here, by_depths, by_own
+
+    def by_state(self, by_numbers: Real, depths: Real) -> tuple[Real, Real]:
+        """Return derivatives by depths (…, n), and by θ at fixed depths (…, m), 0 by wear coefficients.
+
+        `by_numbers` (…, q) are those by the paths of the conditions, then by what depths take from.
+        """
+        wearing, known = self.wearing, self.conditions.paths
+        taken = np.zeros((len(wearing.losses), self.n))
+        for i, loss in enumerate(wearing.losses):
+            taken[i, loss.contact] = -loss.per_depth
+        by_worn = by_numbers[..., len(known) :]
+        by_paths = by_numbers[..., : len(known)] + by_worn @ wearing.moved(known, depths)
+        by_own = np.zeros((*by_numbers.shape[:-1], len(self.paths)))
+        for k, path in enumerate(self.paths):
+            if path not in wearing.entries:
+                by_own[..., k] = by_paths[..., known.index(path)]
+        return by_worn @ taken, by_own
 
     def _slope(self, hours: float, state: Real) -> Real:
         """Return the right-hand side of depths and sensitivities."""

@@ -21,11 +21,13 @@ from solver.results.watch import OnProgress, ShouldStop, part_of, shows_progress
 from solver.scene.cyclic.annulus import written_out
 from solver.scene.scene import Scene
 from solver.sensitivity.gradient import Sensitivities
+from solver.studies.margin_diagram import judged_rows
 from solver.studies.wear_life.course import Here, WearCourse
-from solver.studies.wear_life.life_result import WearLife
+from solver.studies.wear_life.life_result import WearLife, WearLifeStatus
 from solver.studies.wear_life.mission import Mission, is_number
-from solver.studies.wear_life.operating_conditions import SETTINGS, OperatingConditions
+from solver.studies.wear_life.operating_conditions import SETTINGS, LostError, OperatingConditions
 from solver.studies.wear_life.wearing import LOAD, Wearing, WearLaw, wearing_of
+from solver.studies.wear_life.worn_margin import worn_margin
 
 MOST_POINTS = 10_000
 _FOLLOWING = 0.8  # share of the work
@@ -138,7 +140,12 @@ def _result(course: WearCourse, scene: Scene, limit: float | None, points: int, 
     rows = _rows(course, points) if stretches else []
     last, highest = (rows[-1], course.maxima()[0]) if rows else (None, None)
     met = None if limit is None else course.reaches(limit)
-    nothing = np.full(len(course.paths), math.nan)
+    nothing, margin = np.full(len(course.paths), math.nan), None
+    if rows and judged_rows(course.wearing.scene):
+        try:
+            margin = worn_margin(course, rows)
+        except LostError as lost:
+            course.status, course.why = WearLifeStatus.NO_RESPONSE, str(lost)
     known = course.paths and course.smooth
     ends = [_known(course, one) for one in (rows[0], rows[-1])] if rows else [NOTHING_KNOWN] * 2
     return WearLife(
@@ -152,6 +159,9 @@ def _result(course: WearCourse, scene: Scene, limit: float | None, points: int, 
         highest=math.nan if highest is None else highest.amplitude,
         highest_hours=math.nan if highest is None else highest.hours,
         limit=math.nan if limit is None else limit, hours_to_limit=math.nan if met is None else met.hours,
+        used=np.full(len(rows), math.nan) if margin is None else margin.used,
+        hours_to_margin=math.nan if margin is None else margin.hours,
+        margin_slopes=nothing if margin is None else margin.slopes,
         paths=course.paths, end_slopes=last.gradient if last is not None and known else nothing,
         highest_slopes=highest.gradient if highest is not None and known else nothing,
         limit_slopes=met.instant_moves if met is not None and known else nothing,

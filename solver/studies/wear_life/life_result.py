@@ -40,15 +40,17 @@ class WearLife(MadeOfResponses, Drawn):
     VIEWS: ClassVar = Views("solver.views", "responses:wear_life", "wear_life:wear_life_figure")
     DATA: ClassVar = Data(
         "wear-life", {
-            "hours": "hours amplitude frequency_hz", "contact hours": "depths loads power",
-            "contact": "contact=contacts", "path": "path=paths end_slopes highest_slopes limit_slopes",
+            "hours": "hours amplitude frequency_hz used", "contact hours": "depths loads power",
+            "contact": "contact=contacts",
+            "path": "path=paths end_slopes highest_slopes limit_slopes margin_slopes",
             "contact path": "depth_slopes",
-        }, "dof highest highest_hours limit hours_to_limit", scene="scene",
+        }, "dof highest highest_hours limit hours_to_limit hours_to_margin", scene="scene",
     )  # fmt: skip
     JSON: ClassVar = (
         "scene dof contacts hours amplitude frequency_hz depths loads power switches highest highest_hours"
-        " limit hours_to_limit paths end_slopes highest_slopes limit_slopes depth_slopes at_peak n_harmonics"
-        " steps responses seconds ended_by completed=reached status"
+        " limit hours_to_limit used hours_to_margin paths end_slopes highest_slopes limit_slopes"
+        " margin_slopes depth_slopes at_peak n_harmonics steps responses seconds ended_by completed=reached"
+        " status"
     )
 
     scene: Annotated[str, "Name of the scene."]
@@ -67,10 +69,15 @@ class WearLife(MadeOfResponses, Drawn):
     highest_hours: Annotated[FloatOrNaN, "When that is [h]."]
     limit: Annotated[FloatOrNaN, "The limit of the amplitude [m]; NaN if none was given."]
     hours_to_limit: Annotated[FloatOrNaN, "When the amplitude first reaches it [h]; NaN if it does not."]
+    used: Annotated[
+        Real, "Of a scene with strengths the greatest share of the stresses allowed, (T,); else NaN."
+    ]
+    hours_to_margin: Annotated[FloatOrNaN, "When all of it is used, margin 1 [h]; NaN if it is not."]
     paths: Annotated[tuple[str, ...], "What is differentiated by, parameter paths and wear coefficients."]
     end_slopes: Annotated[Real, "Derivatives of the last amplitude [m per unit], (m,)."]
     highest_slopes: Annotated[Real, "Those of the largest amplitude over all hours [m per unit], (m,)."]
     limit_slopes: Annotated[Real, "Those of the time to the limit [h per unit]; NaN without, (m,)."]
+    margin_slopes: Annotated[Real, "Those of the time to margin 1 [h per unit]; NaN without, (m,)."]
     depth_slopes: Annotated[Real, "Those of the last depths [m per unit], (n, m)."]
     at_peak: Annotated[bool, "It runs at the highest peak of the band; else at given frequencies."]
     n_harmonics: Annotated[int, "Highest harmonic asked for."]

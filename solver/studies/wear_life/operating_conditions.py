@@ -137,21 +137,31 @@ class OperatingConditions:
         """Return the peak at depths (n,) [m] that continues one of a neighbour; None if none is found."""
         return self._peak(self.balance(wearing.at(depths)), wearing, near)
 
+    def at_frequency(self, scene: Scene, hertz: float) -> tuple[Balance, PeriodicMotion]:
+        """Return the balance and the motion of a worn scene at a frequency [Hz].
+
+        Raises
+        ------
+        LostError
+            No response was found.
+        """
+        balance = self.balance(scene.at_frequency(hertz))
+        space, before = Workspace.of(balance), self._known.get(hertz)
+        found = None if before is None else space.solve_from(TWO_PI * hertz, before.u)
+        if found is None or not found.converged:
+            found = space.solve(TWO_PI * hertz)
+        self.solved += 1
+        if not found.converged:
+            raise LostError(f"At {hertz:g} Hz no response was found.")
+        motion = PeriodicMotion(hertz=hertz, u=found.u, moves=False)
+        self._known[hertz] = motion
+        return balance, motion
+
     def _at_blocks(self, wearing: Wearing, scene: Scene, *, rates: bool) -> WornResponse:
         """Return what contacts do at fixed frequencies: powers by the shares of time."""
         every = []
         for hertz, share in self.blocks or ():
-            there = scene.at_frequency(hertz)
-            balance = self.balance(there)
-            space, before = Workspace.of(balance), self._known.get(hertz)
-            found = None if before is None else space.solve_from(TWO_PI * hertz, before.u)
-            if found is None or not found.converged:
-                found = space.solve(TWO_PI * hertz)
-            self.solved += 1
-            if not found.converged:
-                raise LostError(f"At {hertz:g} Hz no response was found.")
-            motion = PeriodicMotion(hertz=hertz, u=found.u, moves=False)
-            self._known[hertz] = motion
+            balance, motion = self.at_frequency(scene, hertz)
             every.append((share, self._running(wearing, balance, motion, rates=rates)))
         highest = max((one for _, one in every), key=lambda one: one.amplitude)
         return replace(

@@ -29,6 +29,15 @@ def transient_figure(found: Mapping[str, Any], *, ax: Into = None) -> Figure:
         page, (over_time, over_frequency) = style.figure(9.2, 3.6, columns=2, into=ax)
         over_time.fill_between(time, low, high, color=style.BLUE, alpha=0.8, linewidth=0.0)
         over_time.axvline(found["at_seconds"], color=style.VERMILION, linewidth=0.8)
+        rates = numbers(found.get("rates") or [])
+        if rates.size:
+            sizes = numbers(found["rates_max_abs"]) * unit.per_metre
+            over_frequency.semilogx(rates, sizes, "o-", color=style.BLUE, markersize=4.0)
+            over_frequency.set_title(f"slowest: {unit.show(found['max_abs'])} at {found['at_hz']:.5g} Hz")
+            over_time.set_title(found["scene"])
+            style.label(over_time, "time [s]", f"{found['dof']} [{unit.name}]")
+            style.label(over_frequency, "rate [Hz/s]", f"largest |{found['dof']}| [{unit.name}]")
+            return page
         ramp = time <= found["ramp_seconds"]
         over_frequency.plot(frequency[ramp], np.maximum(high, -low)[ramp], color=style.BLUE)
         over_frequency.plot([found["at_hz"]], [largest], "o", color=style.VERMILION, markersize=4.0)

@@ -104,6 +104,7 @@ def worst_mistuning(found: Mapping[str, Any]) -> Iterator[Block]:
         place = f"blade {worst['blade']} at {worst['at_hz']:.6g} Hz"
         pairs.append(("worst", f"{worst['magnification']:.4g}: {units.length(worst['peak'])}, {place}"))
         pairs.append(("  its factors", ", ".join(f"{factor:.4f}" for factor in worst["factors"])))
+    pairs += _residual(found.get("residual"))
     pairs.append(("Whitehead's bound", f"{found['whitehead']:.4g}"))
     bounds = (("Martel's bound", "martel"), ("bound by the power at this frequency", "power_bound"))
     pairs += [(name, f"{found[key]:.4g}") for name, key in bounds if found[key] is not None]
@@ -115,6 +116,20 @@ def worst_mistuning(found: Mapping[str, Any]) -> Iterator[Block]:
     yield Summary(f"{found['scene']}, contacts {found['contacts']}, {size}", pairs)
     if found["patterns"]:
         yield _patterns(found)
+
+
+def _residual(found: Mapping[str, Any] | None) -> list[tuple[str, str]]:
+    """The worst with forces left in contacts that stick."""
+    if found is None:
+        return []
+    place = f"blade {found['blade']} at {found['at_hz']:.6g} Hz, {units.length(found['without'])} without"
+    height = units.length(found["peak"])
+    forces = zip(found["contacts"], found["tractions"], strict=True)
+    return [
+        ("with forces left in contacts", f"{found['magnification']:.4g}: {height}, {place}"),
+        ("  its factors", ", ".join(f"{factor:.4f}" for factor in found["factors"])),
+        ("  its forces", ", ".join(f"{name} {force:.4g} N" for name, force in forces)),
+    ]  # fmt: skip
 
 
 def _patterns(found: Mapping[str, Any]) -> ResultTable:

@@ -226,6 +226,8 @@ def transient(found: Json) -> Iterator[Block]:
         pairs.append(("largest max|x|", f"{units.length(found['max_abs'])} at {at}"))
     if found["error_estimate"] is not None:
         pairs.append(("estimated error", f"{found['error_estimate']:.1e} of it"))
+    for rate, size in zip(found.get("rates") or [], found.get("rates_max_abs") or [], strict=True):
+        pairs.append((f"at {units.number(rate)} Hz/s", units.length(size)))
     took = f"{units.number(found['ramp_seconds'])} s"
     if found["ring_down_seconds"] > 0.0:
         took += f", then {units.number(found['ring_down_seconds'])} s without excitation"
@@ -236,7 +238,7 @@ def transient(found: Json) -> Iterator[Block]:
 
 def wear_life(found: Json) -> Iterator[Block]:
     """What contacts lose over hours, and what the response comes to."""
-    hours, amplitude, pairs = found["hours"], found["amplitude"], []
+    hours, amplitude, pairs = found["hours"], found["amplitude"], _chosen(found.get("chosen"))
     where = "at the highest peak" if found["at_peak"] else "at given frequencies"
     if hours:
         for name, at in (("max|x| at the beginning", 0), (f"after {units.number(hours[-1])} h", -1)):
@@ -250,6 +252,12 @@ def wear_life(found: Json) -> Iterator[Block]:
         met = found["hours_to_limit"]
         said = "not reached" if met is None else f"reached after {units.number(met)} h"
         pairs.append((f"limit {units.length(found['limit'])}", said))
+    used = [one for one in found.get("used", ()) if one is not None]
+    if used:
+        met = found["hours_to_margin"]
+        share = f"{units.number(used[0], 4)} at the beginning, {units.number(used[-1], 4)} at the end"
+        pairs.append(("of the stress allowed", share))
+        pairs.append(("margin 1", "kept" if met is None else f"reached after {units.number(met)} h"))
     for one in found["switches"]:
         pairs.append(("another peak is highest", f"from {units.number(one)} h on"))
     if found["ended_by"]:
@@ -269,13 +277,26 @@ def wear_life(found: Json) -> Iterator[Block]:
         heads = ("contact", "depth", "load at first", "at last", "power at first", "at last")
         yield ResultTable("Contacts", heads, rows)
     if found["paths"]:
-        columns = [found[f"{name}_slopes"] for name in ("end", "highest", "limit")]
+        columns = [found[f"{name}_slopes"] for name in ("end", "highest", "limit", "margin")]
         slopes = [
             (path, *("" if one is None else f"{one:.6g}" for one in each))
             for path, *each in zip(found["paths"], *columns, strict=True)
         ]
-        by = ("by", "of the last amplitude", "of the largest", "of the time to the limit")
+        by = ("by", "of the last amplitude", "of the largest", "of the time to the limit", "to margin 1")
         yield ResultTable("Derivatives", by, slopes)
+
+
+def _chosen(found: Json | None) -> list[tuple[str, str]]:
+    """What was chosen for the life, and the worst amplitude with it."""
+    if found is None:
+        return []
+    if found["at"] is None:
+        return [("chosen", found["status"])]
+    worst = f"{units.length(found['worst'])} at worst, {units.length(found['first'])} when new"
+    return [
+        (found["parameter"], f"{units.number(found['at'], 6)} {found['unit']}".rstrip()),
+        ("chosen", worst),
+    ]
 
 
 def least_worn_peak(found: Json) -> Iterator[Block]:
@@ -315,3 +336,27 @@ def _band(found: Json) -> str:
     above = f"{units.number(found['band_hz'])} Hz above {units.length(found['band_limit'])}"
     intervals = [f"{low:.6g} to {high:.6g}" for low, high in found["band_intervals_hz"]]
     return f"{above}: {', '.join(intervals)}" if intervals else above
+
+
+def quasi_periodic(found: Json) -> Iterator[Block]:
+    """What the response to two base frequencies is."""
+    first, second = units.number(found["frequency_hz"]), units.number(found["second_hz"])
+    pairs = []
+    if found["max_abs"] is not None:
+        pairs += [
+            ("max|x|", units.length(found["max_abs"])),
+            ("half peak to peak", units.length(found["half_peak_to_peak"])),
+            ("root mean square", units.length(found["rms"])),
+            (f"amplitude at {first} Hz", units.length(found["first_amplitude"])),
+            (f"amplitude at {second} Hz", units.length(found["second_amplitude"])),
+        ]
+        if found["error_estimate"] is not None:
+            pairs.append(
+                ("estimated error", f"{found['error_estimate'] / found['half_peak_to_peak']:.1e} of it")
+            )
+        between = " and ".join(f"{p} : {q}" for p, q in found["turns"])
+        pairs.append(("repeats after turns" if found["repeats"] else "between turns", between))
+    pairs += [(name, state) for name, state in found["contacts"].items()]
+    pairs += [("flags", ", ".join(found["flags"]))] if found["flags"] else []
+    pairs.append(("time", units.duration(found["seconds"])))
+    yield Summary(f"{found['scene']} at {first} and {second} Hz", pairs)

@@ -23,6 +23,7 @@ COMMANDS = {
         "two-dof --hours 0.0001 --coefficient damper=1e-11 --area damper=0.0002 --load-loss damper=4e6"
         " --harmonics 3"
     ),
+    "quasi-periodic": "two-dof --frequency 1.05 --second 1.3821 --amplitude 60 --harmonics 3 --turns 24",
     "transient": "two-dof --from 0.9 --to 1.2 --rate 0.02",
     "peaks": "two-dof --parameter damper.N0 --from 50 --to 200 --harmonics 3",
     "map": "two-dof --parameter damper.N0 --from 50 --to 200 --steps 3 --frequencies 5 --harmonics 3",
@@ -80,6 +81,9 @@ def results() -> dict[str, Any]:
         "march": solver.march(scene, frequency_hz=1.2),
         "wear": solver.wear_life(
             scene, solver.Mission(1e-4), solver.WearLaw(1e-11, 2e-4, 4e6), limit=2.4, harmonics=3, points=5
+        ),
+        "quasi-periodic": solver.quasi_periodic(
+            scene, frequency_hz=1.05, second_hz=1.3821, amplitude=60, harmonics=3, turns=24
         ),
         "transient": solver.transient(scene, begin_hz=0.9, end_hz=1.2, rate_hz_per_s=0.02),
         "map": solver.response_map(scene, "damper.N0", 50, 200, steps=3, frequencies=5, harmonics=3),

@@ -51,7 +51,8 @@ def test_help_of_a_command_loads_no_numbers(study: str) -> None:
     assert loaded_by(study, "--help") & (SERVICE | PICTURES | DESIGN | NUMBERS) == {"pydantic"}
 
 
-@pytest.mark.parametrize("scene", ["two-dof --frequency 1", "bladed-disk --frequency 755"])
+@pytest.mark.few(2)
+@pytest.mark.parametrize("scene", ["bladed-disk --frequency 755", "two-dof --frequency 1"])
 def test_solve_loads_what_it_computes_with(scene: str) -> None:
     loaded = loaded_by("solve", *scene.split())
     assert "numba" in loaded

@@ -59,7 +59,7 @@ def share_proved(seeds: range) -> float:
 
 
 def test_random_scenes_are_proved() -> None:
-    assert share_proved(range(8)) >= 0.75
+    assert share_proved(range(4)) >= 0.75
 
 
 @pytest.mark.long
@@ -108,9 +108,9 @@ def _numbers(found: Any, place: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
 def _spoilt(raw: dict[str, Any], rng: np.random.Generator) -> dict[str, Any]:
     """Return a certificate with one thing wrong."""
     raw = copy.deepcopy(raw)
-    orbit, way = raw["orbit"], int(rng.integers(5))
+    orbit, unknowns, way = raw["orbit"], raw["proof"]["unknowns"], int(rng.integers(5))
     if way == 0:  # a number of the system or of where the orbit begins
-        places = [each for each in _numbers(raw) if each[0] in ("system", "orbit") and each[1] != "unknowns"]
+        places = [each for each in _numbers(raw) if each[0] in ("system", "orbit")]
         *path, last = places[int(rng.integers(len(places)))]
         holder: Any = raw
         for key in path:
@@ -120,13 +120,13 @@ def _spoilt(raw: dict[str, Any], rng: np.random.Generator) -> dict[str, Any]:
         i = int(rng.integers(len(orbit["events"]) - 1))
         orbit["events"][i : i + 2] = orbit["events"][i : i + 2][::-1]
     elif way == 2:  # an unknown beside its box
-        i = int(rng.integers(len(orbit["unknowns"])))
-        middle, radius = orbit["unknowns"][i].split(" +/- ")
-        orbit["unknowns"][i] = f"{float(middle) * (1.0 + 1e-9)!r} +/- {radius}"
+        i = int(rng.integers(len(unknowns)))
+        middle, radius = unknowns[i].split(" +/- ")
+        unknowns[i] = f"{float(middle) * (1.0 + 1e-9)!r} +/- {radius}"
     elif way == 3:  # boxes too small
-        for i, each in enumerate(orbit["unknowns"]):
+        for i, each in enumerate(unknowns):
             middle, radius = each.split(" +/- ")
-            orbit["unknowns"][i] = f"{middle} +/- {float(radius) * 1e-20!r}"
+            unknowns[i] = f"{middle} +/- {float(radius) * 1e-20!r}"
     else:  # claims that are narrower, or elsewhere
         key = str(rng.choice(list(raw["claims"])))
         low, high = map(float, raw["claims"][key])
@@ -197,11 +197,12 @@ def test_a_peak_is_proved_and_marches_lie_below_it(peak: stickslip.Certificate) 
     assert stickslip.march(scene, frequency_hz=before).max_abs == pytest.approx(low, rel=1e-7)
 
 
-def test_spoilt_certificates_of_peaks_are_rejected(peak: stickslip.Certificate) -> None:
+@pytest.mark.parametrize("count", [24, pytest.param(100, marks=pytest.mark.long)])
+def test_spoilt_certificates_of_peaks_are_rejected(peak: stickslip.Certificate, count: int) -> None:
     assert peak.certificate is not None
     raw, rng = json.loads(json.dumps(peak.certificate)), np.random.default_rng(3)
     checker.check(raw)
-    for i in range(100):
+    for i in range(count):
         with pytest.raises(checker.RejectedError):
             checker.check(_spoilt_peak(raw, i, rng))
 
@@ -209,6 +210,7 @@ def test_spoilt_certificates_of_peaks_are_rejected(peak: stickslip.Certificate) 
 def _spoilt_peak(raw: dict[str, Any], i: int, rng: np.random.Generator) -> dict[str, Any]:
     """Return a certificate of a peak with one thing wrong."""
     raw = copy.deepcopy(raw)
+    three = raw["proof"]["three"]
     if i % 4 == 0:  # a number of the system
         places = [each for each in _numbers(raw) if each[0] == "system" and each[1] != "frequency_hz"]
         *path, last = places[int(rng.integers(len(places)))]
@@ -217,10 +219,10 @@ def _spoilt_peak(raw: dict[str, Any], i: int, rng: np.random.Generator) -> dict[
             holder = holder[key]
         holder[last] *= 1.0 + float(10.0 ** rng.uniform(-12.0, -1.0))
     elif i % 4 == 1:  # two of the orbits that are compared
-        one, other = rng.choice([1, 2, 3], size=2, replace=False).tolist()
-        raw["at"][one], raw["at"][other] = raw["at"][other], raw["at"][one]
+        one, other = rng.choice([0, 1, 2], size=2, replace=False).tolist()
+        three[one], three[other] = three[other], three[one]
     elif i % 4 == 2:  # an unknown beside its box
-        unknowns = raw["at"][int(rng.integers(4))]["unknowns"]
+        unknowns = [raw["proof"]["over"], *three][int(rng.integers(4))]["unknowns"]
         k = int(rng.integers(len(unknowns)))
         middle, radius = unknowns[k].split(" +/- ")
         unknowns[k] = f"{float(middle) * (1.0 + 1e-9)!r} +/- {radius}"
@@ -289,7 +291,7 @@ def test_what_is_no_peak_says_so() -> None:
     found = stickslip.certify(stickslip.solve(scene, frequency_hz=1.6), peak=True)
     assert not found.reached
     assert found.certificate is None
-    assert "slips forward" in found.reason  # uphill, where other events happen
+    assert "no extreme" in found.reason  # uphill, up to where other events happen
 
 
 @pytest.mark.long
@@ -406,3 +408,6 @@ def test_the_command_proves_and_checks(capsys: pytest.CaptureFixture[str], tmp_p
     file.write_text("{}", encoding="utf-8")
     assert main(["check-proof", str(file)]) == 2
     assert "must be a certificate" in capsys.readouterr().err
+    file.write_text('{"claims": {"max_abs": ["1", "2"]}, "bits": 128}', encoding="utf-8")
+    assert main(["check-proof", str(file)]) == 2
+    assert "as this version writes it" in capsys.readouterr().err

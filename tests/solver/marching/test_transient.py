@@ -13,6 +13,8 @@ from scipy.special import wofz
 
 import solver
 from solver.errors import SettingError
+from solver.marching.equations import equations_of_motion
+from solver.marching.modal import in_modes
 from solver.marching.transient_result import TransientStatus
 from solver.scene.scene import Scene
 
@@ -252,3 +254,48 @@ def test_it_stops_when_asked_with_what_was_run_through() -> None:
     )
     assert found.status is TransientStatus.STOPPED
     assert 0 < found.time.size < 1000
+
+
+def coupled(damping: dict[str, Any]) -> Scene:
+    """Eight masses on springs to all others and to the ground, as full matrices; a slider, two forces."""
+    rng, n = np.random.default_rng(5), 8
+    k, names = np.triu(10.0 ** rng.uniform(0.5, 2.0, (n, n)), 1), [f"d{i}" for i in range(n)]
+    K = np.diag((k + k.T).sum(axis=1) + rng.uniform(5.0, 50.0, n)) - k - k.T
+    contact = {"name": "c", "between": ["d3", "d5"], "kt": 80.0, "mu": 0.4, "N0": 0.02, "N1_ratio": 0.5}
+    structure = {"kind": "matrices", "M": np.diag(rng.uniform(0.5, 2.0, n)).tolist(), "K": K.tolist()}
+    return Scene.from_dict({
+        "name": "coupled", "structure": {**structure, "dofs": names, **damping}, "contacts": [contact],
+        "excitation": [{"dof": "d1", "amplitude": 1.0}, {"dof": "d7", "amplitude": 0.3, "harmonic": 3}],
+        "observe": {"dof": "d4", "band": [0.2, 2.0]},
+    })  # fmt: skip
+
+
+@pytest.mark.parametrize("damping", [{"damping_ratio": 0.03}, {"stiffness_proportional_damping": 2e-3}])
+def test_full_matrices_are_followed_in_their_modes(damping: dict[str, Any]) -> None:
+    """From a given start they stay in their DOFs, and a march always does."""
+    scene = coupled(damping)
+    assert in_modes(equations_of_motion(scene, 1.0)).modes is not None
+    asked: dict[str, Any] = {"begin_hz": 0.4, "end_hz": 1.0, "ramp_seconds": 15.0}
+    in_dofs = solver.transient(scene, **asked, start=solver.MarchStart())
+    found = solver.transient(scene, **asked, from_rest=True)
+    assert found.reached
+    assert found.max_abs == pytest.approx(in_dofs.max_abs, rel=1e-6)
+    np.testing.assert_allclose(found.high, in_dofs.high, atol=1e-5 * found.max_abs)
+    settled = solver.transient(scene, begin_hz=0.8, end_hz=0.8, ramp_seconds=5.0)
+    assert settled.max_abs == pytest.approx(solver.march(scene, frequency_hz=0.8).max_abs, rel=1e-6)
+
+
+def test_several_rates_are_runs_at_each_and_come_to_the_peak() -> None:
+    zeta, rates = 0.1, [0.2, 0.02, 0.002]
+    asked: dict[str, Any] = {"begin_hz": 0.7, "end_hz": 1.3}
+    found = solver.transient(oscillator(zeta), **asked, rates=[0.02, 0.002, 0.2])
+    assert found.reached
+    assert found.rates.tolist() == rates
+    alone = [solver.transient(oscillator(zeta), **asked, rate_hz_per_s=rate).max_abs for rate in rates]
+    assert found.rates_max_abs.tolist() == alone
+    peak = 1.0 / (2.0 * zeta * math.sqrt(1.0 - zeta**2) * K)
+    assert alone[0] < alone[1] < alone[2] == pytest.approx(peak, rel=1e-2)
+    assert alone[2] < peak
+    for wrong in ({"rate_hz_per_s": 0.1}, {"ramp_seconds": 1.0}):
+        with pytest.raises(SettingError, match="must not be given beside"):
+            solver.transient(oscillator(zeta), **asked, rates=rates, **wrong)

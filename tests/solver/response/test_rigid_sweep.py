@@ -68,7 +68,7 @@ def test_over_another_parameter() -> None:
 
 
 def test_a_resonance_without_damping_ends_the_branch() -> None:
-    found = stickslip.sweep(one_mass(0.4), start=0.14, stop=0.18)
+    found = stickslip.sweep(one_mass(0.4), start=0.155, stop=0.17)
     assert found.status is stickslip.branches.BranchStatus.UNDAMPED
     assert found.values[-1] < 0.5 / math.pi
     assert found.bifurcations.marks[-1].why == found.status.value

@@ -161,7 +161,7 @@ def whitehead_case(sectors: int, order: int, starts: int) -> float:
     return found.worst.magnification
 
 
-@pytest.mark.parametrize(("sectors", "order"), [(4, 0), (6, 3)])
+@pytest.mark.parametrize(("sectors", "order"), [(6, 3)])
 def test_the_worst_disk_reaches_whiteheads_bound_to_a_percent(sectors: int, order: int) -> None:
     """Whitehead (1998): little damping, coupling that is symmetrical about the excited diameter."""
     assert whitehead_case(sectors, order, 60) == pytest.approx(whitehead(sectors), rel=0.01)
@@ -195,6 +195,7 @@ def test_any_engine_order_reaches_it_where_the_coupling_is_symmetrical_about_it(
     assert found.worst.magnification == pytest.approx(whitehead(sectors), rel=0.01)
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize(
     ("sectors", "order", "levels"), [(2, 0, 41), (2, 1, 41), (3, 0, 13), (3, 1, 13), (4, 1, 7), (4, 2, 7)]
 )
@@ -210,6 +211,7 @@ def test_no_pattern_of_brute_force_is_worse(sectors: int, order: int, levels: in
     assert highest >= 0.98 * found.worst.peak
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("seed", range(5))
 def test_no_random_disk_is_worse_than_the_worst_nor_than_the_bound(seed: int) -> None:
     rng = np.random.default_rng(50 + seed)
@@ -245,7 +247,7 @@ def test_martels_bound_is_its_closed_form() -> None:
     wanted = 0.5 * (1.0 + math.sqrt(float(np.sum(c[order] / c))))
     assert martel(disk, tuned_modes(disk), tuned.omega) == pytest.approx(wanted, rel=1e-5)
     assert power_bound(disk, tuned.omega, tuned.value) == pytest.approx(wanted, rel=1e-4)
-    found = worst_patterns(disk, Bounds(middle=np.zeros(sectors), within=0.02), 30, 1)
+    found = worst_patterns(disk, Bounds(middle=np.zeros(sectors), within=0.02), 10, 1)
     assert found[0].peak.value / tuned.value <= 1.02 * wanted
 
 
@@ -264,7 +266,7 @@ def test_an_rms_bound_is_kept_and_costs_something() -> None:
     rng = np.random.default_rng(1)
     disk = linear_disk(scene, ("root",), Contacts.OPEN, scene.observe.band, "b")
     bounds = Bounds(middle=np.zeros(8), within=0.03, rms=0.01)
-    assert max(disk.peak(bounds.drawn(rng)).value for _ in range(300)) <= held.worst.peak
+    assert max(disk.peak(bounds.drawn(rng)).value for _ in range(100)) <= held.worst.peak
 
 
 def test_intentional_patterns_are_those_of_full_matrices_and_ranked() -> None:

@@ -142,10 +142,12 @@ function drawingOf(drawing, width, height, nodes) {
 
 function bars(line, { box, xs, ys }) {
   const half = Math.max(0.3 * Math.abs(xs.at(1) - xs.at(0)), 1.5);
+  // From 0 up or down, or from the bottom where 0 is not in sight.
+  const foot = ys.log ? box.bottom : Math.min(ys.at(0), box.bottom);
   return line.x.map((value, i) => {
     if (line.y[i] === null) return null;
-    const top = ys.at(line.y[i]);
-    return svg("rect", { class: `f${line.colour ?? 1}`, x: xs.at(value) - half, width: 2 * half, y: top, height: Math.max(box.bottom - top, 0) });
+    const end = ys.at(line.y[i]);
+    return svg("rect", { class: `f${line.colour ?? 1}`, x: xs.at(value) - half, width: 2 * half, y: Math.min(end, foot), height: Math.abs(foot - end) });
   });
 }
 
@@ -221,7 +223,7 @@ function key({ entries }) {
     const y = 14 + ROW * row;
     return [
       line.width === 0
-        ? shape(line.shape ?? "circle", x + 11, y - 4, 3.5, line.colour ?? 1)
+        ? shape(line.shape ?? (line.bars ? "square" : "circle"), x + 11, y - 4, 3.5, line.colour ?? 1)
         : svg("path", { class: `series ${line.paint ?? `c${line.colour ?? 1}`}`, d: `M${x} ${y - 4}h22`, "stroke-dasharray": DASHES[line.dash] }),
       svg("text", { x: x + 28, y }, line.name),
     ];

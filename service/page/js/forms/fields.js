@@ -58,8 +58,8 @@ function endsOf({ minimum, exclusiveMinimum: above, maximum, exclusiveMaximum: b
 const HINTS = { pairs: "520 to 560, 600 to 620", numbers: "with commas", texts: "with commas", pair: "500 to 900" };
 
 // What stands in an empty field: what holds then, or how it is written.
-export const hintOf = ({ otherwise, kind, ends }) =>
-  (otherwise !== undefined && otherwise !== null && typeof otherwise !== "object" ? String(otherwise) : HINTS[kind] ?? (kind === "number" ? ends : ""));
+export const hintOf = ({ otherwise, kind, ends, of, schema }) =>
+  (of?.kind === "table" && schema.examples ? JSON.stringify(schema.examples[0]) : otherwise !== undefined && otherwise !== null && typeof otherwise !== "object" ? String(otherwise) : HINTS[kind] ?? (kind === "number" ? ends : ""));
 
 const plainTable = (value) => Object.entries(value).map(([path, one]) => `${path} = ${one}`).join(", ");
 
@@ -70,7 +70,8 @@ export function written(field, value, per = 1) {
   if (field.kind === "pairs") return value.map((pair) => pair.join(" to ")).join(", ");
   if (Array.isArray(value) && value.every((one) => typeof one !== "object")) return value.join(", ");
   if (field.kind === "number" && typeof value === "number") return String(Number((value * per).toPrecision(12)));
-  return field.kind === "table" && typeof value === "object" ? plainTable(value) : typeof value === "object" ? JSON.stringify(value) : String(value);
+  const plain = field.kind === "table" && Object.values(value).every((one) => typeof one !== "object");
+  return plain ? plainTable(value) : typeof value === "object" ? JSON.stringify(value) : String(value);
 }
 
 export function numberOf(text, pointer, words) {

@@ -5,7 +5,7 @@ import { number, quantity } from "../base/format.js";
 import { givenByScene, variable, variables } from "./scenes.js";
 
 const USUAL_HARMONICS = 11;
-const WITHOUT_HARMONICS = ["accuracy", "march", "transient", "interference"];
+const WITHOUT_HARMONICS = ["accuracy", "march", "transient", "interference", "quasi-periodic"];
 const CLOSE = 1e-9;
 
 const same = (a, b) => a === b || Math.abs(a - b) <= CLOSE * Math.max(Math.abs(a), Math.abs(b));

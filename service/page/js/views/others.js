@@ -1,14 +1,17 @@
-// Studies of kinds that have no view of their own: a form made of the schema of their body, any result as a table.
+// Studies of kinds that have no view of their own: a form made of the schema of their body, any result as a table,
+// and the drawings of those that have some.
 
 import { state } from "../base/address.js";
 import { byId, el, facts, say, show, table } from "../base/dom.js";
 import { on } from "../base/events.js";
 import { saveText } from "../base/exports.js";
 import { number } from "../base/format.js";
+import { chart } from "../charts/chart.js";
 import { schemaForm } from "../forms/form.js";
 import { resume, run } from "../network/jobs.js";
 import { askedFor, kindNames, kindOf, ofTheBar, proposed, refusedFor } from "../scene/kinds.js";
 import { VIEWS } from "../views.js";
+import { DRAWINGS } from "./drawings.js";
 
 const ROWS = 200;
 const forms = new Map();
@@ -66,8 +69,12 @@ const othersView = (name) => ({
   progress: ({ took }) => say("others-status", `${name}:${took}.`),
   result(result, sweeps) {
     say("others-status", sweeps.length ? `${name} is done; its sweeps are stored with it.` : `${name} is done.`);
-    show(byId("others-result"), facts(scalars(result)), columns(result),
+    const drawings = DRAWINGS[name]?.(result) ?? [];
+    const figures = drawings.map(() => el("div", { class: "figure" }));
+    show(byId("others-result"), ...drawings.map(({ label }, i) => el("div", {}, el("h3", {}, label), figures[i])), facts(scalars(result)), columns(result),
       el("button", { type: "button", onclick: () => saveText(JSON.stringify(result, null, 1), `${name}.json`, "application/json") }, "Save as JSON"));
+    // Drawn where they stand: a chart is as wide as its place.
+    drawings.forEach(({ label, file, draw }, i) => chart(figures[i], { label, file, height: 300 }).draw(draw));
   },
   failed(words, errors) {
     say("others-status", words, true);

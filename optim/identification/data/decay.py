@@ -1,0 +1,276 @@
+"""The kind `decay`: the amplitude of a ring-down over time.
+
+The motion stays on the nonlinear mode while it decays. Averaged over a period its action J = ½ ω a² falls by
+what is dissipated, dJ/dt = −2 ζ ω J (N. N. Bogoliubov, Y. A. Mitropolsky, Asymptotic Methods in the Theory of
+Non-Linear Oscillations, 1961, chapter 1), so that with s = ln a
+
+    ds/dt = −ζ(a) ω(a) / (1 + ½ d ln ω/ds),
+
+right to the order of ζ; a frequency that falls with the amplitude makes it decay faster. So t + c = τ(s), the
+integral from the largest amplitude down. ln(ζω) and ln ω of the mode at evenly spaced s go through cubic
+splines, which are linear in their values: derivatives by parameters are those of the same splines.
+
+When the decay began nobody knows as well as the rest of it: the shift c of each run is fitted to its
+amplitudes for every value of the parameters, and what is left is a function of these alone, with its exact
+derivatives (variable projection: G. Golub, V. Pereyra, Inverse Problems 19 (2003) R1).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Annotated, ClassVar
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from optim.identification.data.curve import CurveRun, columns_of
+from optim.identification.data.measured import Column, DataKind, MeasuredRows, Predicted, RunModel
+from optim.identification.data.mode import SHARPER, WORDS, checked_mode
+from optim.identification.data.table import Dimension, Table, check_monotone
+from optim.problem.variables import Real
+from solver.modes.at_amplitudes import ModePoints, mode_at_amplitudes
+from solver.modes.corrector import ModeState
+from solver.scene.scene import Scene
+
+_BEGINS, _ENDS = 1.5, 20.0  # factors on the amplitudes measured between which the mode is looked at
+_STEP = 0.08  # of ln a between its points
+_FINE = 8  # places between two of them at which τ is summed up
+_FEWEST = 8  # points of the mode that make a course
+_MOST_ROUNDS, _CLOSE = 50, 1e-12
+_TOLD = {"modal_amplitude": "modal amplitude a [√kg m]", "frequency": "frequency [Hz]", "time": "time [s]"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DecayRun(CurveRun):
+    """Amplitude, and perhaps frequency, over the time."""
+
+    mode: Annotated[int, "Number of the mode."]
+    nodal_diameter: Annotated[int | None, "Of a cyclic structure."]
+    range: Annotated[tuple[float, float], "Largest and smallest amplitude measured [√kg m]."]
+
+    KIND_NAME: ClassVar = "decay"
+
+    @property
+    def fitted_besides(self) -> int:
+        """As the base says: the shift of the time."""
+        return 1
+
+    @property
+    def unit_words(self) -> str:
+        """As the base says."""
+        return "modal amplitudes [√kg m]"
+
+    def share(self, name: str) -> float:
+        """As the base says: frequencies are measured much better."""
+        return SHARPER if name == "frequency" else 1.0
+
+    def model(self, scene: Scene, paths: Sequence[str], harmonics: int) -> RunModel:
+        """As the base says."""
+        return _DecayModel(self, scene, tuple(paths), harmonics)
+
+    @staticmethod
+    def told(name: str) -> str:
+        """As the base says."""
+        return _TOLD[name]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Along:
+    """s = ln a at times, and how it moves."""
+
+    s: Annotated[Real, "NaN beyond the course, (m,)."]
+    speed: Annotated[Real, "ds/dt, (m,)."]
+    by_paths: Annotated[Real, "ds/dp at fixed times, (m, n_paths)."]
+    bend: Annotated[Real, "Derivative of the speed by s, (m,)."]
+    speed_by_paths: Annotated[Real, "Derivatives of the speed by the paths at fixed times, (m, n_paths)."]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Course:
+    """s = ln a over the time, on a grid of s from the largest amplitude down."""
+
+    s: Annotated[Real, "Falling, (g,)."]
+    tau: Annotated[Real, "Time since the largest [s] and its derivatives by the paths, (g, 1 + n_paths)."]
+    damping: Annotated[CubicSpline, "ln(ζω) and its derivatives by the paths over s, (1 + n_paths,)."]
+    frequency: Annotated[CubicSpline, "ln ω and its derivatives likewise."]
+
+    def at(self, t: Real) -> _Along:
+        """Return the course at times."""
+        s = np.interp(t, self.tau[:, 0], self.s, left=math.nan, right=math.nan)
+        place = np.interp(t, self.tau[:, 0], np.arange(self.s.size, dtype=np.float64))
+        before = np.minimum(place.astype(np.int64), self.s.size - 2)
+        for _ in range(2):  # Newton's steps from the line between two places
+            s = s - (self._time(s, before)[:, 0] - t) / -self.paces(s)[:, 0]
+        paces = self.paces(s)
+        speed = -1.0 / paces[:, 0]
+        by_paths = -speed[:, None] * self._time(s, before)[:, 1:]
+        softer = 1.0 + 0.5 * self.frequency(s, 1)[:, 0]
+        bend = speed * (self.damping(s, 1)[:, 0] - 0.5 * self.frequency(s, 2)[:, 0] / softer)
+        by_speed = bend[:, None] * by_paths - speed[:, None] * paces[:, 1:] / paces[:, :1]
+        return _Along(s=s, speed=speed, by_paths=by_paths, bend=bend, speed_by_paths=by_speed)
+
+    def paces(self, s: Real) -> Real:
+        """Return −dτ/ds and its derivatives by the paths, (m, 1 + n_paths)."""
+        damping, softer = self.damping(s), 0.5 * self.frequency(s, 1)
+        pace = np.exp(-damping[:, :1])
+        found = pace * (softer - (1.0 + softer[:, :1]) * damping)
+        found[:, :1] = pace * (1.0 + softer[:, :1])
+        return np.asarray(found)
+
+    def _time(self, s: Real, before: np.ndarray) -> Real:
+        """Return τ and its derivatives at s by Simpson's rule from the place before, (m, 1 + n_paths)."""
+        begin, span = self.s[before], self.s[before] - s
+        inner = self.paces(begin) + 4.0 * self.paces(begin - 0.5 * span) + self.paces(s)
+        return np.asarray(self.tau[before] + span[:, None] * inner / 6.0)
+
+
+class _DecayModel(RunModel):
+    """The decay along the nonlinear mode of the scene."""
+
+    def __init__(self, run: DecayRun, scene: Scene, paths: tuple[str, ...], harmonics: int) -> None:
+        self._run, self._scene, self._paths, self._harmonics = run, scene, paths, max(harmonics, 1)
+        self._points: list[ModeState | None] = []
+        high, low = math.log(_BEGINS * run.range[0]), math.log(run.range[1] / _ENDS)
+        self._s = np.linspace(high, low, math.ceil((high - low) / _STEP) + 1)
+
+    def forget(self) -> None:
+        """As the base says."""
+        self._points = []
+
+    def evaluate(self, values: Mapping[str, float]) -> Predicted:
+        """As the base says."""
+        run = self._run
+        here = self._scene.with_values({**values, **run.conditions})
+        found = mode_at_amplitudes(
+            here, np.exp(self._s), self._paths, mode=run.mode, nodal_diameter=run.nodal_diameter,
+            harmonics=self._harmonics, guesses=self._points,
+        )  # fmt: skip
+        self._points = found.points
+        course = _course(self._s, found)
+        if course is None:
+            n = run.observations.size
+            nothing = np.full((n, len(self._paths)), np.nan)
+            return Predicted(values=np.full(n, np.nan), slopes=nothing, reached=np.zeros(n, bool))
+        shift, by_shift = _shift(course, run)
+        along = course.at(run.x + shift)
+        by_paths = along.by_paths + np.outer(along.speed, by_shift)
+        columns = {"modal_amplitude": (np.exp(along.s), np.exp(along.s)[:, None] * by_paths)}
+        told = course.frequency(along.s)
+        hertz = np.exp(told[:, 0]) / (2.0 * math.pi)
+        by_hertz = hertz[:, None] * (told[:, 1:] + course.frequency(along.s, 1)[:, :1] * by_paths)
+        columns["frequency"] = hertz, by_hertz
+        predicted = np.concatenate([columns[name][0] for name in run.data])
+        slopes = np.vstack([columns[name][1] for name in run.data])
+        near = np.abs(np.nan_to_num(along.s)[:, None] - self._s).argmin(axis=1)
+        return Predicted(
+            values=predicted, slopes=slopes, reached=np.isfinite(predicted) & np.isfinite(slopes).all(axis=1),
+            states={each.name: found.states[near, c] for c, each in enumerate(here.contacts)},
+        )  # fmt: skip
+
+
+def _course(s: Real, found: ModePoints) -> _Course | None:
+    """Return the course of the time, as far down as the mode was found and dissipates."""
+    good = np.isfinite(found.damping_ratio) & (found.damping_ratio > 0.0)
+    good &= np.isfinite(found.by_frequency).all(axis=1) & np.isfinite(found.by_damping).all(axis=1)
+    count = int(np.argmin(np.append(good, False)))
+    if count < _FEWEST:
+        return None
+    s, zeta, hertz = s[:count], found.damping_ratio[:count], found.frequency_hz[:count]
+    by_omega = found.by_frequency[:count] / hertz[:, None]
+    omega = np.column_stack([np.log(2.0 * math.pi * hertz), by_omega])
+    rate = omega + np.column_stack([np.log(zeta), found.by_damping[:count] / zeta[:, None]])
+    fine = np.linspace(s[0], s[-1], _FINE * (count - 1) + 1)
+    course = _Course(
+        s=fine, tau=np.zeros((fine.size, omega.shape[1])), damping=CubicSpline(s[::-1], rate[::-1]),
+        frequency=CubicSpline(s[::-1], omega[::-1]),
+    )  # fmt: skip
+    ends, middles = course.paces(fine), course.paces(0.5 * (fine[1:] + fine[:-1]))
+    steps = np.diff(-fine)[:, None] / 6.0 * (ends[:-1] + 4.0 * middles + ends[1:])
+    np.cumsum(steps, axis=0, out=course.tau[1:])
+    return course if (ends[:, 0] > 0.0).all() else None
+
+
+def _shift(course: _Course, run: DecayRun) -> tuple[float, Real]:
+    """Return the shift c of the time with which the amplitudes fit best, and its derivatives by the paths.
+
+    Σ w (a − y)² is least where g = Σ w (a − y) ∂a/∂c is 0, so dc/dp = −g_p / g_c. Of amplitudes not known the
+    first is the largest of those that the run is like.
+    """
+    t, y = run.x, run.data["modal_amplitude"]
+    known = bool(np.isfinite(y).all())
+    shift = float(np.interp(-math.log(y[0] if known else run.range[0]), -course.s, course.tau[:, 0]) - t[0])
+    if not known:
+        begin = course.at(np.array([shift + t[0]]))
+        return shift, np.asarray(-begin.by_paths[0] / begin.speed[0])
+    noise = run.noise_shape(run.observations)[: t.size] if run.sd is None else run.sd["modal_amplitude"]
+    low = float(-t[0])
+    high = max(float(course.tau[-1, 0] - t[-1]), low)
+    for _ in range(_MOST_ROUNDS):
+        along = course.at(t + shift)
+        inside = np.isfinite(along.s)
+        if not inside.any():
+            break
+        a, weights = np.exp(along.s[inside]), 1.0 / noise[inside] ** 2
+        by, rest = a * along.speed[inside], a - y[inside]
+        before, step = shift, float(np.sum(weights * by * rest) / np.sum(weights * by**2))
+        shift = min(max(shift - step, low), high)
+        if abs(shift - before) <= _CLOSE * float(t[-1] - t[0]):
+            break
+    along = course.at(t + shift)
+    inside = np.isfinite(along.s)
+    a, weights, speed = np.exp(along.s[inside]), 1.0 / noise[inside] ** 2, along.speed[inside]
+    rest, by_paths = weights * (a - y[inside]), along.by_paths[inside]
+    held = not low < shift < high
+    g_c = float(np.sum(weights * (a * speed) ** 2 + rest * a * speed * (speed + along.bend[inside])))
+    g_p = (weights * a**2 * speed) @ by_paths + (rest * a) @ (
+        by_paths * speed[:, None] + along.speed_by_paths[inside]
+    )
+    return shift, np.zeros(len(g_p)) if held or g_c == 0.0 else np.asarray(-g_p / g_c)
+
+
+def read_decay(scene: Scene, table: Table) -> MeasuredRows:
+    """Read the table of one run.
+
+    Raises
+    ------
+    DataError
+        What is wrong, with its line.
+    """
+    table.need(4, "points")
+    check_monotone(table, "time")
+    at, data, sd = columns_of(table, ("time",), _MEASURED)
+    falls = np.flatnonzero(np.diff(at["time"]) <= 0.0)
+    if falls.size:
+        raise table.error(int(falls[0]) + 1, "time", "must rise from row to row")
+    amplitude = data["modal_amplitude"]
+    if not amplitude[-1] < amplitude[0]:
+        wanted = "must fall: the last is to be below the first"
+        raise table.error(len(table) - 1, "modal_amplitude", wanted)
+    mode, diameter = checked_mode(scene, table)
+    return DecayRun(
+        source=table.source, conditions=dict(table.conditions), at=at, data=data, sd=sd, mode=mode,
+        nodal_diameter=diameter, range=(float(amplitude.max()), float(amplitude.min())),
+    )  # fmt: skip
+
+
+_MEASURED = {"frequency": "frequency_sd", "modal_amplitude": "modal_amplitude_sd"}
+
+KIND = DataKind(
+    name="decay",
+    help="The amplitude of a ring-down over time, and its frequency.",
+    columns=(
+        Column("time", Dimension.TIME, "Of each sample; of a loop without it, even over one period."),
+        Column(
+            "modal_amplitude", Dimension.NUMBER,
+            "a [√kg m], of a displacement divided by the mass-normalised mode shape there.",
+        ),
+        Column("frequency", Dimension.FREQUENCY, "Of the excitation; of the mode beside `modal_amplitude`."),
+        Column("frequency_sd", Dimension.FREQUENCY, "Standard deviation of each frequency, if it is known."),
+        Column("modal_amplitude_sd", Dimension.NUMBER, "Standard deviation of each, of a decay, if known."),
+    ),
+    marks=(("time", "modal_amplitude"),),
+    words=WORDS,
+    read=read_decay,
+)  # fmt: skip

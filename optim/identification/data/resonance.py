@@ -1,0 +1,197 @@
+"""The kind `resonance`: amplitude and frequency in phase resonance over the level of the excitation.
+
+A test with controlled phase finds the frequency at which harmonic 1 of a displacement lags the force by a
+quarter of a period, Re x̂ = 0. With the exact derivatives of x̂ by the frequency f and by parameters p,
+
+    df/dp = −Re x̂_p / Re x̂_f,   d|x̂|/dp = ∓(Im x̂_p + Im x̂_f df/dp).
+
+Of several such places that with the largest amplitude counts, found once on a whole response and followed
+from there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Annotated, ClassVar, NamedTuple
+
+import numpy as np
+
+from optim.identification.data.curve import CurveRun, columns_of
+from optim.identification.data.measured import Column, DataKind, MeasuredRows, Predicted, RunModel
+from optim.identification.data.response import NOT_REACHED, observing_dof
+from optim.identification.data.table import Dimension, Table, check_sign
+from optim.problem.variables import Real
+from solver.balance.balance import build
+from solver.balance.simplifications import Effects, even_harmonics_reason
+from solver.continuation.branches.sweep import sweep
+from solver.scene.parameter_paths import AMPLITUDE
+from solver.scene.scene import Scene
+from solver.sensitivity.observed import TWO_PI, Observed, ObservedSensitivities, Quantity
+
+SHARPER = 0.1  # noise of a frequency relative to it, where that of an amplitude is 1
+_MOST_STEPS, _CLOSE = 30, 1e-7  # of the frequency; then one step more is exact
+_FAR = 0.05  # relative change of the frequency beyond which a step is cut
+_TOLD = {
+    "level": "excitation [N]",
+    "resonance_frequency": "frequency [Hz]",
+    "resonance_amplitude": "amplitude [m]",
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ResonanceRun(CurveRun):
+    """Amplitude, and perhaps frequency, over the level."""
+
+    dof: Annotated[str, "Where."]
+
+    KIND_NAME: ClassVar = "resonance"
+
+    @property
+    def unit_words(self) -> str:
+        """As the base says."""
+        return "displacements [m]"
+
+    def share(self, name: str) -> float:
+        """As the base says: frequencies are measured better."""
+        return SHARPER if name == "resonance_frequency" else 1.0
+
+    def model(self, scene: Scene, paths: Sequence[str], harmonics: int) -> RunModel:
+        """As the base says."""
+        return _ResonanceModel(self, observing_dof(scene, self.dof), tuple(paths), harmonics)
+
+    @staticmethod
+    def told(name: str) -> str:
+        """As the base says."""
+        return _TOLD[name]
+
+
+class _Place(NamedTuple):
+    """A response near phase resonance."""
+
+    hertz: float
+    u: Real
+
+
+class _ResonanceModel(RunModel):
+    """The responses of the scene in phase resonance at the levels measured."""
+
+    def __init__(self, run: ResonanceRun, scene: Scene, paths: tuple[str, ...], harmonics: int) -> None:
+        self._run, self._scene, self._paths, self._harmonics = run, scene, paths, max(harmonics, 1)
+        self._effects = Effects(even_harmonics=even_harmonics_reason(scene, paths) is not None)
+        self.forget()
+
+    def forget(self) -> None:
+        """As the base says."""
+        self._places: list[_Place | None] = [None] * self._run.x.size
+
+    def evaluate(self, values: Mapping[str, float]) -> Predicted:
+        """As the base says."""
+        run, m = self._run, self._run.x.size
+        columns = {name: (np.full(m, np.nan), np.full((m, len(self._paths)), np.nan)) for name in run.data}
+        states = np.full((m, len(self._scene.contacts)), NOT_REACHED)
+        here = self._scene.with_values({**values, **run.conditions})
+        for i, level in enumerate(run.x.tolist()):
+            found = self._at(here.with_values({AMPLITUDE: level}), i)
+            if found is None:
+                continue
+            hertz, seen = found
+            drift = -seen.slopes[0] / seen.by_frequency[0]
+            size = abs(float(seen.values[1]))
+            by_size = np.sign(seen.values[1]) * (seen.slopes[1] + seen.by_frequency[1] * drift)
+            told = {"resonance_frequency": (hertz, drift), "resonance_amplitude": (size, by_size)}
+            for name, (column, slopes) in columns.items():
+                column[i], slopes[i] = told[name]
+            states[i] = seen.states
+        predicted = np.concatenate([column for column, _ in columns.values()])
+        slopes = np.vstack([slopes for _, slopes in columns.values()])
+        if AMPLITUDE in self._paths:  # the level stands in its place
+            slopes[:, self._paths.index(AMPLITUDE)] = 0.0
+        return Predicted(
+            values=predicted, slopes=slopes, reached=np.isfinite(predicted) & np.isfinite(slopes).all(axis=1),
+            states={each.name: states[:, c] for c, each in enumerate(here.contacts)},
+        )  # fmt: skip
+
+    def _at(self, scene: Scene, i: int) -> tuple[float, Observed] | None:
+        """Return frequency and response in phase resonance at level i; None where there is none."""
+        balance = build(scene, harmonics=self._harmonics, effects=self._effects)
+        seen = ObservedSensitivities(balance, self._paths)
+        place = self._places[i]
+        for known in (place, None) if place is not None else (None,):
+            begin = known or self._on_a_branch(scene, seen)
+            found = None if begin is None else self._solved(seen, begin)
+            if found is not None:
+                self._places[i] = found[0]
+                return found[0].hertz, found[1]
+        return None
+
+    def _on_a_branch(self, scene: Scene, seen: ObservedSensitivities) -> _Place | None:
+        """Return the place near phase resonance with the largest amplitude, of the response over the band."""
+        points = sweep(scene, harmonics=self._harmonics, effects=self._effects).solutions
+        at = [
+            (p[-1] / TWO_PI, p[:-1], seen.observed(p[:-1], p[-1] / TWO_PI, Quantity.COMPLEX)) for p in points
+        ]
+        good = [(hertz, u, one.values) for hertz, u, one in at if one is not None]
+        best, place = 0.0, None
+        for (_, _, before), (hertz, u, after) in pairwise(good):
+            if before[0] * after[0] <= 0.0 and abs(after[1]) > best:
+                best, place = abs(after[1]), _Place(hertz, u)
+        return place
+
+    def _solved(self, seen: ObservedSensitivities, begin: _Place) -> tuple[_Place, Observed] | None:
+        """Return the phase resonance next to a response, by Newton's method in the frequency."""
+        (hertz, u), settled = begin, False
+        for _ in range(_MOST_STEPS):
+            solution = seen.solve(hertz, (u,))
+            found = seen.observed(solution.u, hertz, Quantity.COMPLEX) if solution.converged else None
+            if found is None or not np.isfinite(found.by_frequency[0]) or found.by_frequency[0] == 0.0:
+                return None
+            u = solution.u
+            if settled:
+                return _Place(hertz, u), found
+            step = -float(found.values[0] / found.by_frequency[0])
+            settled = abs(step) <= _CLOSE * hertz
+            hertz += min(max(step, -_FAR * hertz), _FAR * hertz)
+        return None
+
+
+def read_resonance(scene: Scene, table: Table) -> MeasuredRows:
+    """Read the table of one run.
+
+    Raises
+    ------
+    DataError
+        What is wrong, with its line.
+    """
+    table.need(1, "levels")
+    check_sign(table, "level", positive=True)
+    at, data, sd = columns_of(table, ("level",), _MEASURED)
+    dof = table.words.get("dof", scene.observe.dof)
+    if scene.seen(dof) is None:
+        raise table.refusal(dof, f"`dof` must be one of {', '.join(scene.dofs)}")
+    if AMPLITUDE in table.conditions:
+        raise table.refusal(table.conditions[AMPLITUDE], f"{AMPLITUDE} is the column `level` here")
+    return ResonanceRun(
+        source=table.source, conditions=dict(table.conditions), at=at, data=data, sd=sd, dof=dof
+    )
+
+
+_MEASURED = {
+    "resonance_frequency": "resonance_frequency_sd", "resonance_amplitude": "resonance_amplitude_sd",
+}  # fmt: skip
+
+KIND = DataKind(
+    name="resonance",
+    help="Amplitude and frequency in phase resonance over the level of the excitation.",
+    columns=(
+        Column("level", Dimension.FORCE, "Amplitude of the excitation, `excitation.amplitude`."),
+        Column("resonance_amplitude", Dimension.LENGTH, "Of harmonic 1, which lags the force by 90°."),
+        Column("resonance_frequency", Dimension.FREQUENCY, "At which it does."),
+        Column("resonance_amplitude_sd", Dimension.LENGTH, "Standard deviation of each, if it is known."),
+        Column("resonance_frequency_sd", Dimension.FREQUENCY, "Standard deviation of each, if it is known."),
+    ),
+    marks=(("level", "resonance_amplitude"), ("level", "resonance_frequency")),
+    words={"dof": "Degree of freedom that was measured; the one the scene observes."},
+    read=read_resonance,
+)  # fmt: skip

@@ -1,0 +1,1 @@
+"""Posterior distributions of what is identified: samples, evidence, model choice, reassemblies."""

@@ -1,0 +1,90 @@
+"""The study `quasi-periodic`: the response to two base frequencies that are no multiples."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING, Annotated
+
+from pydantic import ConfigDict, Field
+
+from optim.criteria.key import Name
+from service.jobs.common.results import answered
+from service.jobs.common.scenes import FrequencyHz, HarmonicRequest, Number, check
+from service.jobs.common.sizes import balance_issues
+from service.jobs.registry import Flag
+from service.jobs.study import Study
+from solver.errors import Issue
+
+if TYPE_CHECKING:
+    from solver.scene.scene import Scene
+
+_RESPONSES = 7  # of long periods, at most as many as that
+
+
+class QuasiPeriodicStudy(Study, HarmonicRequest):
+    """Find the response to two frequencies that are no multiples.
+
+    Those are the scene's excitation, and one more force with a frequency of its own: a second engine order,
+    another shaft, flutter.
+    """
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [{"scene": "two-dof", "frequency_hz": 1.05, "second_hz": 1.3821, "amplitude": 60}]
+        }
+    )
+    NAME, FUNCTION = "quasi-periodic", "solver:quasi_periodic"
+    RESULT = answered(
+        "solver.response.quasi_periodic_result:QuasiPeriodic",
+        "QuasiPeriodicResult",
+        turns=list[list[int]],
+    )
+    TOLD = "solver.views.tables.responses:quasi_periodic"
+    SHOWS = "the response to two frequencies ([two base frequencies](quasi-periodic.md))"
+    FIGURE, EMPTY = "solver.views.plots.quasi_periodic:torus_figure", ("line_hz", "no response was found")
+    COUNTED = "looks"
+
+    frequency_hz: Annotated[FrequencyHz, Flag("--frequency", "HZ")] = Field(
+        description="Frequency of the scene's own excitation [Hz]."
+    )
+    second_hz: Annotated[FrequencyHz, Flag("--second", "HZ")] = Field(
+        description="Frequency of the second force [Hz]."
+    )
+    amplitude: Annotated[Number, Flag(metavar="N")] = Field(description="Amplitude of the second force [N].")
+    dof: Annotated[Name | None, Flag(metavar="NAME")] = Field(
+        default=None, description="DOF it acts on; that of the scene's first force."
+    )
+    phase: Annotated[Number, Flag(metavar="RAD")] = Field(default=0.0, description="Its phase [rad].")
+    engine_order: Annotated[int | None, Field(strict=True, ge=0, le=10_000), Flag(metavar="N")] = Field(
+        default=None, description="Its engine order on a disk; the scene's."
+    )
+    harmonics: Annotated[int, Field(strict=True, ge=1, le=80), Flag(metavar="H")] = Field(
+        default=7, description="Multiples of the faster frequency up to which all sums of the two are kept."
+    )
+    turns: Annotated[int, Field(strict=True, ge=12, le=1000), Flag(metavar="N")] = Field(
+        default=90,
+        description="Most turns of the faster frequency after which the motion is taken to repeat.",
+    )
+    tolerance: Annotated[float, Field(strict=True, gt=0.0, le=0.1), Flag(metavar="E")] = Field(
+        default=2e-3, description="Change by longer periods, relative, at which they are long enough."
+    )
+
+    def issues(self, scene: Scene) -> list[Issue]:
+        """Return what is wrong with frequencies, force and lengths."""
+        # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
+        from solver.response.quasi_periodic import check as checked
+        from solver.response.quasi_periodic import second_force
+
+        given = (self.frequency_hz, self.second_hz, self.harmonics, self.turns, self.tolerance)
+        force = partial(
+            second_force, scene, amplitude=self.amplitude, dof=self.dof, phase=self.phase,
+            engine_order=self.engine_order,
+        )  # fmt: skip
+        return check(partial(checked, scene, *given)) + check(force)
+
+    def sizes(self, scene: Scene) -> list[Issue]:
+        """Return what is too large."""
+        return balance_issues("turns", scene, self.harmonics * self.turns, 2 * _RESPONSES)
+
+
+STUDY = QuasiPeriodicStudy

@@ -1,0 +1,351 @@
+"""The response to two base frequencies that are no multiples of one another: a torus, not a closed orbit.
+
+The ratio of the frequencies is put between two ratios of whole numbers q/p. For each of them the motion
+repeats after p turns of the first and q of the second frequency, and the balance of that long period answers
+it on the events of the contacts, whose history along the torus is thus followed exactly. Harmonic n of it is
+n = k p + l q, a sum k f₁ + l f₂ of the two frequencies: both answers are of the same waves, and what is asked
+for lies linearly between them. Longer periods are taken until nothing changes any more.
+
+All harmonics up to the highest are kept, not only low sums |k| + |l|: where sums of a high order meet a
+resonance they count (at 29 : 41 the sum 15 f₁ − 10 f₂ is 0.5 % of the motion of `two-dof`).
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from solver.arrays import Real
+from solver.balance.balance import build
+from solver.balance.simplifications import even_harmonics_reason
+from solver.balance.workspace import Workspace
+from solver.continuation.from_nothing import solve_from_nothing
+from solver.errors import SettingError
+from solver.jit import fourier
+from solver.jit.fourier import Complex, Integer
+from solver.response.quasi_periodic_result import LINES, QuasiPeriodic, QuasiPeriodicStatus
+from solver.response.solution import MEAN_UNDETERMINED, Solution
+from solver.response.solve import describe, solve
+from solver.results.watch import OnProgress, ShouldStop, shows_progress
+from solver.scene.excitation import Excitation
+from solver.scene.harmonics import MOST_HARMONICS
+from solver.scene.parameter_paths import check_frequency
+from solver.scene.scene import Scene
+
+LEAST_TURNS = 12  # of the first look; each further one has twice as many
+_EXACT = 1e-12  # relative: a ratio this near to one of whole numbers is that ratio
+_SAFETY = 2.0  # fitted to random scenes against marches of very long periods
+_GRID = 256  # angles of a turn at which the extremes are compared
+_SECTION = 240  # points of the section
+
+
+@dataclass(frozen=True, slots=True)
+class _Torus:
+    """A motion x(θ₁, θ₂) = mean + Re Σ c exp(i (k θ₁ + l θ₂)), n sums."""
+
+    k: Integer
+    l: Integer  # noqa: E741 (the letter of the field)
+    c: Complex
+    mean: float
+
+    def at(self, first: Real, second: Real) -> Real:
+        """Return x at pairs of angles, (m,)."""
+        waves = np.exp(1j * (np.outer(first, self.k) + np.outer(second, self.l)))
+        return np.asarray(self.mean + (waves @ self.c).real)
+
+    def beside(self, other: _Torus, share: float) -> _Torus:
+        """Return the motion between this one (share 0) and another one (share 1)."""
+        found: dict[tuple[int, int], complex] = {}
+        for each, weight in ((self, 1.0 - share), (other, share)):
+            for k, l, c in zip(each.k.tolist(), each.l.tolist(), each.c.tolist(), strict=True):  # noqa: E741
+                found[k, l] = found.get((k, l), 0.0) + weight * c
+        k, l = np.array(list(found), np.int64).reshape(-1, 2).T  # noqa: E741
+        mean = (1.0 - share) * self.mean + share * other.mean
+        return _Torus(k, l, np.array(list(found.values()), np.complex128), mean)
+
+
+_NOWHERE = _Torus(np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0, np.complex128), math.nan)
+
+
+@dataclass(frozen=True, slots=True)
+class _Look:
+    """What periods of at most so many turns tell."""
+
+    torus: _Torus
+    sizes: Real
+    turns: tuple[tuple[int, int], ...]
+    nearest: Solution
+    repeats: bool
+
+    def measures(self) -> Real:
+        """Return max|x|, (max x - min x) / 2, root mean square and the amplitudes of the two tones."""
+        torus = self.torus
+        tones = [abs(torus.c[(torus.k == k) & (torus.l == 1 - k)].sum()) for k in (1, 0)]
+        return np.array([*self.sizes, math.sqrt(0.5 * float(np.sum(np.abs(torus.c) ** 2))), *tones])
+
+    def change(self, other: _Look) -> float:
+        """Return by how much what is determined differs from that of another look."""
+        first = int(MEAN_UNDETERMINED in self.nearest.flags)
+        return float(np.max(np.abs(self.measures() - other.measures())[first:]))
+
+
+@shows_progress("quasi-periodic")
+def quasi_periodic(
+    scene: Scene,
+    *,
+    frequency_hz: float,
+    second_hz: float,
+    amplitude: float,
+    dof: str | None = None,
+    phase: float = 0.0,
+    engine_order: int | None = None,
+    harmonics: int = 7,
+    turns: int = 90,
+    tolerance: float = 2e-3,
+    on_progress: OnProgress = None,
+    should_stop: ShouldStop = None,
+) -> QuasiPeriodic:
+    """Find the response of a scene to its excitation and one more force that has a frequency of its own.
+
+    Parameters
+    ----------
+    scene : what vibrates; its excitation and loads turn with the first frequency, as its speed does.
+    frequency_hz, second_hz : the two frequencies [Hz]. Where their ratio is one of whole numbers up to
+        `turns` the motion repeats, and depends on how the phases of the two stand to one another.
+    amplitude, dof, phase : of the second force, amplitude * cos(2 pi second_hz t + phase) [N, rad]; on the
+        DOF of the first force if left out.
+    engine_order : of the second force on a disk, whose sector j has engine_order * j * 2 pi / sectors added
+        to the phase; that of the scene if left out.
+    harmonics : multiples of the faster frequency up to which all sums of the two are kept.
+    turns : most turns of the faster frequency after which the motion is taken to repeat.
+    tolerance : change by longer periods, relative to the amplitude, at which they are long enough.
+    on_progress : called with the fraction done and the long periods solved.
+    should_stop : asked now and then; True ends it with the status STOPPED.
+
+    Raises
+    ------
+    SettingError
+        An argument out of its range, rigid contacts, a scene whose force has no single DOF and none is given.
+    """
+    began = time.perf_counter()
+    check(scene, frequency_hz, second_hz, harmonics, turns, tolerance)
+    second = second_force(scene, amplitude=amplitude, dof=dof, phase=phase, engine_order=engine_order)
+    question = _Question(scene.at_frequency(frequency_hz), second, frequency_hz, second_hz, harmonics)
+    looks: list[_Look] = []
+    limits = [turns // 2**i for i in range(int(math.log2(turns / LEAST_TURNS)) + 1)][::-1]
+    status, change = QuasiPeriodicStatus.NOT_CONVERGED, math.nan
+    for number, limit in enumerate(limits):
+        if should_stop is not None and should_stop():
+            status = QuasiPeriodicStatus.STOPPED
+            break
+        if (look := question.look(limit)) is None:
+            continue
+        status = QuasiPeriodicStatus.ACCURACY_NOT_REACHED
+        change = 0.0 if look.repeats else _SAFETY * look.change(looks[-1]) if looks else math.nan
+        looks.append(look)
+        if on_progress is not None:
+            on_progress((number + 1) / len(limits), len(looks))
+        if change <= tolerance * look.sizes[1]:
+            status = QuasiPeriodicStatus.CONVERGED
+            break
+    if on_progress is not None:
+        on_progress(1.0, len(looks))
+    return question.answer(looks, status, change, began)
+
+
+def check(
+    scene: Scene, frequency_hz: float, second_hz: float, harmonics: int, turns: int, tolerance: float
+) -> None:
+    """Raise SettingError for what cannot be solved."""
+    check_frequency("frequency_hz", frequency_hz)
+    check_frequency("second_hz", second_hz)
+    scene.observe.check_whole("a response to two frequencies")
+    if frequency_hz == second_hz:
+        raise SettingError("second_hz", second_hz, "must differ from `frequency_hz`")
+    if scene.rigid_contact is not None:
+        raise SettingError("scene", f"contact {scene.rigid_contact}", "must have a finite stiffness")
+    if not 0 < tolerance <= 0.1:
+        raise SettingError("tolerance", tolerance, "must be a number > 0 and <= 0.1")
+    if turns < LEAST_TURNS:
+        raise SettingError("turns", turns, f"must be at least {LEAST_TURNS}")
+    orders = {force.harmonic for force in scene.excitation}
+    highest = max(harmonics, 1, *orders)
+    if highest * turns > MOST_HARMONICS:
+        wanted = f"must be at most {MOST_HARMONICS // highest} with {highest} harmonics"
+        raise SettingError("turns", turns, wanted)
+
+
+def second_force(
+    scene: Scene, *, amplitude: float, dof: str | None, phase: float, engine_order: int | None
+) -> Excitation:
+    """Return the second force.
+
+    Raises
+    ------
+    SettingError
+        No such DOF, or none is given and the first force of the scene acts on several.
+    """
+    place = scene.excitation[0].dof if dof is None else dof
+    if place not in scene.dofs:
+        known = ", ".join(scene.dofs)
+        raise SettingError("dof", place, f"must be the DOF the second force acts on, one of {known}")
+    if engine_order is not None and not scene.structure.has_sectors:
+        raise SettingError("engine_order", engine_order, "must be left out: the scene has no sectors")
+    order = scene.engine_order if engine_order is None else engine_order
+    return Excitation(
+        dof=place, amplitude=amplitude, phase=phase,
+        engine_order=order if scene.structure.has_sectors else None,
+        pattern=scene.excitation[0].pattern,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class _Question:
+    """A scene at its speed, the second force, both frequencies [Hz] and the multiples kept."""
+
+    scene: Scene
+    second: Excitation
+    first_hz: float
+    second_hz: float
+    harmonics: int
+
+    def look(self, limit: int) -> _Look | None:
+        """Solve for the ratios next to that of the frequencies; None where one has no solution or none is."""
+        ratios = list(self._ratios(limit))
+        found = [self._solved(p, q) for p, q in ratios]
+        if not found or not all(each.converged for each in found):
+            return None
+        wanted = self.second_hz / self.first_hz
+        off = [q / p - wanted for p, q in ratios]
+        tori = [_torus(each, *turns) for each, turns in zip(found, ratios, strict=True)]
+        nearest = int(np.argmin(np.abs(off)))
+        exact = abs(off[nearest]) <= _EXACT * wanted
+        pairs = list(zip(found, tori, ratios, strict=True))
+        torus, sizes = (
+            tori[0],
+            np.array([_sizes(each, on, turns, repeats=exact) for each, on, turns in pairs]),
+        )
+        if len(tori) == 2:
+            share = off[0] / (off[0] - off[1])
+            torus = torus.beside(tori[1], share)
+            sizes = sizes + share * np.diff(sizes, axis=0)
+        return _Look(torus, sizes[0], tuple(ratios), found[nearest], exact)
+
+    def _ratios(self, limit: int) -> Iterator[tuple[int, int]]:
+        """Turns p and q of the two with q/p next below and above the ratio, or equal to it.
+
+        Where the contacts answer half-waves alike p and q are both odd: the motion is then as symmetric as
+        that on the torus. On a disk p and q have the residues for which one engine order of the long period
+        is both of them.
+        """
+        p, q = (each.ravel() for each in np.meshgrid(np.arange(1, limit + 1), np.arange(1, limit + 1)))
+        wave = self._order_of_long_period(p, q) >= 0
+        proper = (np.gcd(p, q) == 1) & (p != q) & wave
+        off = q / p - self.second_hz / self.first_hz
+        exact = proper & (np.abs(off) <= _EXACT * self.second_hz / self.first_hz)
+        # Only long periods, so that no look has a ratio of the one before: their difference tells the error.
+        proper &= 2 * np.maximum(p, q) > limit
+        symmetric = even_harmonics_reason(self._at(1, 1)) is None
+        odd = proper & (p % 2 == 1) & (q % 2 == 1)
+        proper = odd if symmetric and odd.any() else proper
+        for side in (exact,) if exact.any() else (proper & (off < 0.0), proper & (off > 0.0)):
+            if side.any():
+                at = np.flatnonzero(side)[np.argmin(np.abs(off[side]))]
+                yield int(p[at]), int(q[at])
+
+    def _order_of_long_period(self, p: Integer, q: Integer) -> Integer:
+        """The engine order of the long period by which both forces have their own, −1 where there is none."""
+        sectors = self.scene.structure.sector_count
+        orders = np.arange(sectors)[:, None]
+        both = (p * orders - self.scene.engine_order) % sectors == 0
+        both &= (q * orders - (self.second.engine_order or 0)) % sectors == 0
+        return np.where(both.any(axis=0), np.argmax(both, axis=0), -1)
+
+    def _at(self, p: int, q: int) -> Scene:
+        """The scene with p and q turns in its period."""
+        order: dict[str, Any] = {}
+        if self.scene.structure.has_sectors:
+            order = {"engine_order": int(self._order_of_long_period(np.array([p]), np.array([q]))[0])}
+        forces = [(force, p) for force in self.scene.excitation] + [(self.second, q)]
+        excitation = tuple(
+            force.model_copy(update={"harmonic": force.harmonic * each, **order}) for force, each in forces
+        )
+        contacts = tuple(one.model_copy(update=one.in_period_of(p)) for one in self.scene.contacts)
+        return self.scene.model_copy(update={"excitation": excitation, "contacts": contacts})
+
+    def _solved(self, p: int, q: int, *, estimated: bool = False) -> Solution:
+        """Solve the balance of p and q turns."""
+        scene, base, highest = self._at(p, q), self.first_hz / p, self.harmonics * max(p, q)
+        begun = time.perf_counter()
+        workspace = Workspace.of(build(scene, harmonics=highest))
+        found = solve_from_nothing(workspace, 2.0 * math.pi * base)
+        if not found.converged:
+            return solve(scene, frequency_hz=base, harmonics=highest)
+        return describe(workspace, found, base, begun, estimated=estimated)
+
+    def answer(
+        self, looks: list[_Look], status: QuasiPeriodicStatus, change: float, began: float
+    ) -> QuasiPeriodic:
+        """Read the result off the last look; what the harmonics left out do, off the first and shortest."""
+        torus, sizes, section = _NOWHERE, np.full(5, math.nan), np.empty(0)
+        turns: tuple[tuple[int, int], ...] = ()
+        if looks:
+            look, shortest = looks[-1], self._solved(*looks[0].turns[0], estimated=True)
+            torus, sizes, turns = look.torus, look.measures(), look.turns
+            change += shortest.error_estimate / shortest.half_peak_to_peak * float(sizes[1])
+            p, q = turns[0]
+            section = q * np.arange(p) / p % 1.0 if look.repeats else np.linspace(0.0, 1.0, _SECTION)
+        angle, still = 2.0 * math.pi * section, np.zeros(section.size)
+        hertz = torus.k * self.first_hz + torus.l * self.second_hz
+        moving = _Torus(torus.k, torus.l, 2j * math.pi * hertz * torus.c, 0.0)
+        top = np.argsort(-np.abs(torus.c))[:LINES]
+        max_abs, half, rms, first, second = sizes.tolist()
+        return QuasiPeriodic(
+            scene=self.scene.name, dof=self.scene.observe.dof, status=status, frequency_hz=self.first_hz,
+            second_hz=self.second_hz, max_abs=max_abs, half_peak_to_peak=half, rms=rms, mean=torus.mean,
+            first_amplitude=first, second_amplitude=second, repeats=bool(looks and looks[-1].repeats),
+            line_first=torus.k[top], line_second=torus.l[top], line_hz=np.abs(hertz[top]),
+            line_amplitude=np.abs(torus.c[top]), section=torus.at(still, angle),
+            section_velocity=moving.at(still, angle), turns=turns,
+            contacts={each.name: each.state.value for each in looks[-1].nearest.contacts} if looks else {},
+            flags=looks[-1].nearest.flags if looks else (), n_harmonics=self.harmonics,
+            error_estimate=change, seconds=time.perf_counter() - began,
+        )  # fmt: skip
+
+
+def _torus(found: Solution, p: int, q: int) -> _Torus:
+    """Read the motion of p and q turns as one on the torus: each harmonic is the sum of the least order."""
+    amplitudes = fourier.to_complex(found.observed)
+    n = np.flatnonzero(amplitudes)
+    n = n[n > 0]
+    inverse = pow(q, -1, p) if p > 1 else 0
+    reach = math.ceil(amplitudes.size / (p * q)) + 1
+    every = (n * inverse % p)[:, None] + p * np.arange(-reach, reach + 1)
+    firsts = (n[:, None] - every * q) // p
+    best = np.argmin(np.abs(every) + np.abs(firsts), axis=1)
+    rows = np.arange(n.size)
+    return _Torus(firsts[rows, best], every[rows, best], amplitudes[n], float(amplitudes[0].real))
+
+
+def _sizes(found: Solution, torus: _Torus, turns: tuple[int, int], *, repeats: bool) -> tuple[float, float]:
+    """Return max|x| and half peak to peak on the torus, of what they are on the curve of a long period.
+
+    The curve passes by the places where waves of low orders are largest together: by how much those are
+    larger on the torus than on the curve is known of these waves, on even grids.
+    """
+    if repeats:
+        return found.max_abs, found.half_peak_to_peak
+    low = np.abs(torus.k) + np.abs(torus.l) <= sum(turns) // 4
+    k, l, c = torus.k[low], torus.l[low], torus.c[low]  # noqa: E741
+    grid, line = np.zeros((_GRID, _GRID), complex), np.zeros(_GRID * max(turns), complex)
+    np.add.at(grid, (k % _GRID, l % _GRID), c)
+    np.add.at(line, k * turns[0] + l * turns[1], c)
+    everywhere, along = np.fft.ifft2(grid).real * grid.size, np.fft.ifft(line).real * line.size
+    above, below = max(everywhere.max() - along.max(), 0.0), max(along.min() - everywhere.min(), 0.0)
+    upward = torus.mean + everywhere.max() >= -torus.mean - everywhere.min()
+    return found.max_abs + (above if upward else below), found.half_peak_to_peak + 0.5 * (above + below)
