@@ -144,13 +144,13 @@ class Orbit:
             require(twin or alone or self.together(i), f"events {i - 1} and {i} need not be at one instant")
         require(mode == self.modes[0], "contacts do not end in the state they begin in")
         rub, moved = {j for j, c in enumerate(system.contacts) if c["kt"]}, {j for j, *_ in self.events}
-        still = {str(j) for j in rub - moved if mode[j] == STICK}
-        require(known.keys() == still, "other forces are to be fixed")
         self.known = {n + int(j): value for j, value in known.items()}
+        self.known |= [raw["pinned"]] if "pinned" in raw else []
         self.returns = [*range(n), *(n + j for j in sorted(rub & moved - self.twins.keys()))]
-        if system.period is None:  # it begins where one of these has a value
-            self.known[self.returns[raw["pinned"][0]]] = raw["pinned"][1]
-        self.unknown = [at for at in self.returns if at not in self.known]
+        free = [*self.returns, *(n + j for j in sorted(rub - moved) if mode[j] == STICK)]
+        self.unknown = [at for at in free if at not in self.known]  # what sticks returns as its motion does
+        count = len(self.returns) - (system.period is None)  # what nothing drives begins at a given place
+        require(len(self.unknown) == count == len(free) - len(self.known), "other states are to be fixed")
         self.size = len(self.returns) + len(self.groups)
         self.set = [(at, k, 1) for k, at in enumerate(self.unknown)]
         for b, (a, way) in self.twins.items():

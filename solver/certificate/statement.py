@@ -20,6 +20,7 @@ from solver.scene.parts import LumpedStructure
 
 _AT_ONCE = 1e-7  # rad: events this near each other may be one
 _HARDLY = 1e-5  # rad: a slip that is shorter may be none
+_NO_SPRING = 1e-12  # of the largest stiffness, below which one is rounding
 _APART = 1e-9  # rad between events that floats do not tell apart
 
 
@@ -113,15 +114,17 @@ def orbit_of(
         at = member.slider
         if first.state.sliders[at] != FREE:
             forces[member.contact] = float(first.mode.forces[at] @ w)
-    found = {
-        "begins": first.tau, "states": states[0], "events": events,
-        "fixed_forces": {
-            str(j): value for j, value in forces.items() if j not in moved and states[0][j] == "stick"
-        },
-    }  # fmt: skip
+    fixed = {str(j): value for j, value in forces.items() if j not in moved and states[0][j] == "stick"}
+    found = {"begins": first.tau, "states": states[0], "events": events, "fixed_forces": fixed}
     if own := system["frequency_hz"] is None:  # where it moves fastest its place tells the phase
         at = int(np.abs(w[n : 2 * n]).argmax())
         found["pinned"] = [at, float(w[at])]
+    elif (afloat := _afloat(system, n)) is not None and fixed:
+        # Friction alone holds it: its place is arbitrary as forces are, and one of those follows from others.
+        at = int(np.abs(afloat).argmax())
+        found["pinned"] = [at, float(w[at])]
+        held = {j: sum(f * afloat[i] for i, f in system["contacts"][int(j)]["row"]) for j in fixed}
+        del fixed[max(held, key=lambda j: abs(held[j]))]
     stated = System(system, {})
     for _ in range(2):  # those that come to rest together, then those that go on together
         for i in range(1, len(events)):
@@ -129,13 +132,25 @@ def orbit_of(
             near = times[i] - times[i - 1] < _AT_ONCE and orbit.together(i)
             if near or events[i]["contact"] in orbit.twins:
                 events[i]["at_once"] = True
-    known = [forces.get(at - 2 * n, 0.0) for at in CheckedOrbit(stated, found).returns[2 * n :]]
-    start = [*w[:n].tolist(), *(w[n : 2 * n] * omega).tolist(), *known]
+    values = [*w[:n].tolist(), *(w[n : 2 * n] * omega).tolist()]
+    values += [forces.get(j, 0.0) for j in range(len(system["contacts"]))]
+    start = [values[at] for at in CheckedOrbit(stated, found).unknown]
     begun = [first.tau, *(at for at, each in zip(times, events, strict=True) if "at_once" not in each)]
     if own:
-        del start[found["pinned"][0]]
         begun.append(first.tau + 2.0 * math.pi)
     return found, [*start, *(np.diff(begun) / omega).tolist()]
+
+
+def _afloat(system: dict[str, Any], n: int) -> Real | None:
+    """Return the one motion that no spring resists, None where there is none or more."""
+    K, eye = np.zeros((n, n)), np.eye(n)
+    normals = [(each["normal"], each["normal"], each["kn"], 0.0) for each in system["contacts"]]
+    for ends, terms, k, _ in [*system["springs"], *normals]:
+        column, row = (sum((f * eye[i] for i, f in each), np.zeros(n)) for each in (ends, terms))
+        K += k * np.outer(column, row)
+    _, sizes, motions = np.linalg.svd(K)
+    rank = int(np.sum(sizes > _NO_SPRING * sizes[0]))
+    return motions[-1] if rank == n - 1 else None
 
 
 def _hardly(states: list[str], events: list[dict[str, Any]], times: list[float]) -> list[int]:

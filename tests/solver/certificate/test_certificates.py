@@ -286,6 +286,33 @@ def test_contacts_that_are_alike_turn_together(between: list[str]) -> None:
         checker.check(raw)
 
 
+def test_what_friction_alone_holds_is_proved() -> None:
+    """Its place is arbitrary, and only some forces of what sticks balance: one of them is an unknown."""
+    between = ["x0", "x1"], ["x1", "x2"]
+    scene = stickslip.Scene.from_dict({
+        "name": "afloat", "structure": {"kind": "lumped", "masses": dict.fromkeys(("x0", "x1", "x2"), 1.0),
+            "springs": [
+                {"between": [one, "ground"], "k": k, "c": 0.05} for one, k in (("x0", 1.0), ("x2", 1.3))
+            ],
+        },
+        "contacts": [
+            {"name": each[0], "law": "coulomb", "between": each, "kt": 0.8, "mu": 0.5, "N0": 2.0}
+            for each in between
+        ],
+        "excitation": [{"dof": "x0", "amplitude": 0.3}], "observe": {"dof": "x0", "band": [0.1, 0.3]},
+    })  # fmt: skip
+    near = stickslip.solve(scene, frequency_hz=0.13)
+    found = stickslip.certify(near)
+    assert found.reached, found.reason
+    low, high = found.half_peak_to_peak
+    assert low * (1.0 - 1e-9) <= near.half_peak_to_peak <= high * (1.0 + 1e-9)
+    raw = json.loads(json.dumps(found.certificate))
+    checker.check(raw)
+    del raw["orbit"]["pinned"]
+    with pytest.raises(checker.RejectedError, match="other states are to be fixed"):
+        checker.check(raw)
+
+
 def test_what_is_no_peak_says_so() -> None:
     scene = stickslip.load_scene("two-dof")
     found = stickslip.certify(stickslip.solve(scene, frequency_hz=1.6), peak=True)
