@@ -59,7 +59,7 @@ def test_a_case_becomes_a_scene_of_the_same_matrices(name: str) -> None:
             )
 
 
-@pytest.mark.parametrize("name", ["one-slider", "floating-50", "goodman-klumpp-bar", "elastic-normal-0.5"])
+@pytest.mark.parametrize("name", ["one-slider", "floating-50", "two-dof-stuck", "elastic-normal-0.5"])
 def test_a_proof_is_checked_by_who_knows_nothing_of_us(name: str) -> None:
     """And the answer is what it claims."""
     raw = json.loads((HERE / "proofs" / f"{name}.json").read_text())
@@ -88,7 +88,7 @@ def test_an_answer_is_found_again_by_its_ways(name: str) -> None:
         float(KNOWN[name]["value"]), rel=1e-13 if found.get("enclosure") else 1e-9
     )
     assert found["ways"] == 1 or found["agreed_digits"] >= (
-        7.0 if name in FAST else KNOWN[name]["agreed_digits"] - 0.5
+        min(7.0 if name in FAST else 16.0, KNOWN[name]["agreed_digits"] - 0.5)
     )
 
 
