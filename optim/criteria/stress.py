@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from optim.criteria.criterion import Criterion, CriterionContext, CriterionRow, Form, Judged, Key
 from optim.criteria.key import number_or_table
 from optim.criteria.peak import COMPETES, maxima
-from solver.scene.materials import STRESS_UNITS
+from solver.results.units import STRESS_UNITS
 
 if TYPE_CHECKING:
     from solver.scene.materials import Haigh

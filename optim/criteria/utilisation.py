@@ -13,7 +13,6 @@ from optim.criteria.criterion import Criterion, CriterionContext, CriterionRow, 
 from optim.criteria.key import number_or_table
 from optim.criteria.peak import maxima
 from optim.criteria.stress import by_row, leading, of_row, seen_by
-from solver.scene.materials import haigh_of
 
 if TYPE_CHECKING:
     from solver.scene.parts import Recovered
@@ -32,6 +31,9 @@ def _lacking(scene: Scene) -> str:
 
 def _rows(judged: Judged) -> list[CriterionRow]:
     """A row for every peak of every utilisation that competes."""
+    # Loaded here: help of a command, which lists criteria, needs no numbers.
+    from solver.scene.materials import haigh_of
+
     bounds, scene = judged.limit(UTILISATION) or {}, judged.branch.balance.scene
     rows = _judged(scene)
     measures = {one.name: haigh_of(scene, one.name) for one in rows}

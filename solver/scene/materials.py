@@ -14,9 +14,8 @@ from pydantic import model_validator
 
 from solver.contacts.fields import Name, Part, Positive
 from solver.errors import Issue, Place
+from solver.results.units import STRESS_UNITS
 
-STRESS_UNITS = {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9, "N/mm2": 1e6, "N/mm²": 1e6}
-"""Units that stresses may have [Pa]."""
 LINES = ("goodman", "gerber", "soderberg")
 BENT = LINES.index("gerber")
 """The number of the line that is a parabola."""

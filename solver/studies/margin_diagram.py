@@ -20,8 +20,9 @@ from solver.continuation.branches.observation import observing
 from solver.continuation.branches.sweep import sweep
 from solver.continuation.peaks import Peak
 from solver.errors import SettingError, at
+from solver.results.units import STRESS_UNITS
 from solver.results.watch import OnProgress, ShouldStop, shows_progress
-from solver.scene.materials import STRESS_UNITS, haigh_of
+from solver.scene.materials import haigh_of
 from solver.scene.parameter_paths import AMPLITUDE, parameter_of
 from solver.scene.scene import Scene
 from solver.sensitivity.gradient import Sensitivities

@@ -221,8 +221,10 @@ def test_differences_have_the_paths_of_parameters() -> None:
         "excitation.amplitude": ("scene", 100.0, 7.0),
         "harmonics": ("settings", 5, 7),
     }
-    result = {"peak": {"value": 1.0, "at": 2.0, "deep": {"x": 1}}, "curve": [1.0], "peaks": [{}, {}]}
-    assert alone(result) == {"peak.value": 1.0, "peak.at": 2.0, "peaks.count": 2}
+    result = {"peak": {"value": 1.0, "at": 2.0, "deep": {"x": 1, "deeper": {"y": 2}}}, "curve": [1.0]}
+    result |= {"peaks": [{}, {}], "points": [{"peak": 3.0, "at": 1.0}, {"peak": 2.0, "at": 4.0}]}
+    of_lists = {"peaks.count": 2, "points.count": 2, "points.peak": 2.0, "points.at": 4.0}
+    assert alone(result) == {"peak.value": 1.0, "peak.at": 2.0, "peak.deep.x": 1, **of_lists}
 
 
 def test_a_link_shows_its_run_and_nothing_else(http: ServedClient, monkeypatch: pytest.MonkeyPatch) -> None:

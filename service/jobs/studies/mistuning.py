@@ -21,7 +21,6 @@ from service.jobs.parts import Division, JobPart, PartOutput, PartStoppedError
 from service.jobs.registry import Flag, JobKind
 from service.jobs.study import Answer, Study
 from solver.errors import Issue, SceneError, SettingError
-from solver.results.known import Known
 
 if TYPE_CHECKING:
     from solver import BladePeaks
@@ -246,6 +245,7 @@ def join(spec: Mapping[str, Any], outputs: Mapping[int, PartOutput]) -> JobOutpu
 def _peaks(part: PartOutput) -> list[BladePeaks]:
     """The peaks that a part found, a disk each."""
     import solver
+    from solver.results.known import Known
 
     value, at_hz = (part.arrays[key].array() for key in _OF_THE_PEAKS)
     return [
