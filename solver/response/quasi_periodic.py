@@ -73,7 +73,7 @@ _NOWHERE = _Torus(np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0, np.c
 
 
 @dataclass(frozen=True, slots=True)
-class _Look:
+class _LongPeriods:
     """What periods of at most so many turns tell."""
 
     torus: _Torus
@@ -88,7 +88,7 @@ class _Look:
         tones = [abs(torus.c[(torus.k == k) & (torus.l == 1 - k)].sum()) for k in (1, 0)]
         return np.array([*self.sizes, math.sqrt(0.5 * float(np.sum(np.abs(torus.c) ** 2))), *tones])
 
-    def change(self, other: _Look) -> float:
+    def change(self, other: _LongPeriods) -> float:
         """Return by how much what is determined differs from that of another look."""
         first = int(MEAN_UNDETERMINED in self.nearest.flags)
         return float(np.max(np.abs(self.measures() - other.measures())[first:]))
@@ -136,7 +136,7 @@ def quasi_periodic(
     check(scene, frequency_hz, second_hz, harmonics, turns, tolerance)
     second = second_force(scene, amplitude=amplitude, dof=dof, phase=phase, engine_order=engine_order)
     question = _Question(scene.at_frequency(frequency_hz), second, frequency_hz, second_hz, harmonics)
-    looks: list[_Look] = []
+    looks: list[_LongPeriods] = []
     limits = [turns // 2**i for i in range(int(math.log2(turns / LEAST_TURNS)) + 1)][::-1]
     status, change = QuasiPeriodicStatus.NOT_CONVERGED, math.nan
     for number, limit in enumerate(limits):
@@ -214,7 +214,7 @@ class _Question:
     second_hz: float
     harmonics: int
 
-    def look(self, limit: int) -> _Look | None:
+    def look(self, limit: int) -> _LongPeriods | None:
         """Solve for the ratios next to that of the frequencies; None where one has no solution or none is."""
         ratios = list(self._ratios(limit))
         found = [self._solved(p, q) for p, q in ratios]
@@ -234,7 +234,7 @@ class _Question:
             share = off[0] / (off[0] - off[1])
             torus = torus.beside(tori[1], share)
             sizes = sizes + share * np.diff(sizes, axis=0)
-        return _Look(torus, sizes[0], tuple(ratios), found[nearest], exact)
+        return _LongPeriods(torus, sizes[0], tuple(ratios), found[nearest], exact)
 
     def _ratios(self, limit: int) -> Iterator[tuple[int, int]]:
         """Turns p and q of the two with q/p next below and above the ratio, or equal to it.
@@ -289,7 +289,7 @@ class _Question:
         return describe(workspace, found, base, begun, estimated=estimated)
 
     def answer(
-        self, looks: list[_Look], status: QuasiPeriodicStatus, change: float, began: float
+        self, looks: list[_LongPeriods], status: QuasiPeriodicStatus, change: float, began: float
     ) -> QuasiPeriodic:
         """Read the result off the last look; what the harmonics left out do, off the first and shortest."""
         torus, sizes, section = _NOWHERE, np.full(5, math.nan), np.empty(0)

@@ -67,7 +67,7 @@ class ResonanceRun(CurveRun):
         return _TOLD[name]
 
 
-class _Place(NamedTuple):
+class _NearResonance(NamedTuple):
     """A response near phase resonance."""
 
     hertz: float
@@ -84,7 +84,7 @@ class _ResonanceModel(RunModel):
 
     def forget(self) -> None:
         """As the base says."""
-        self._places: list[_Place | None] = [None] * self._run.x.size
+        self._places: list[_NearResonance | None] = [None] * self._run.x.size
 
     def evaluate(self, values: Mapping[str, float]) -> Predicted:
         """As the base says."""
@@ -126,7 +126,7 @@ class _ResonanceModel(RunModel):
                 return found[0].hertz, found[1]
         return None
 
-    def _on_a_branch(self, scene: Scene, seen: ObservedSensitivities) -> _Place | None:
+    def _on_a_branch(self, scene: Scene, seen: ObservedSensitivities) -> _NearResonance | None:
         """Return the place near phase resonance with the largest amplitude, of the response over the band."""
         points = sweep(scene, harmonics=self._harmonics, effects=self._effects).solutions
         at = [
@@ -136,10 +136,12 @@ class _ResonanceModel(RunModel):
         best, place = 0.0, None
         for (_, _, before), (hertz, u, after) in pairwise(good):
             if before[0] * after[0] <= 0.0 and abs(after[1]) > best:
-                best, place = abs(after[1]), _Place(hertz, u)
+                best, place = abs(after[1]), _NearResonance(hertz, u)
         return place
 
-    def _solved(self, seen: ObservedSensitivities, begin: _Place) -> tuple[_Place, Observed] | None:
+    def _solved(
+        self, seen: ObservedSensitivities, begin: _NearResonance
+    ) -> tuple[_NearResonance, Observed] | None:
         """Return the phase resonance next to a response, by Newton's method in the frequency."""
         (hertz, u), settled = begin, False
         for _ in range(_MOST_STEPS):
@@ -149,7 +151,7 @@ class _ResonanceModel(RunModel):
                 return None
             u = solution.u
             if settled:
-                return _Place(hertz, u), found
+                return _NearResonance(hertz, u), found
             step = -float(found.values[0] / found.by_frequency[0])
             settled = abs(step) <= _CLOSE * hertz
             hertz += min(max(step, -_FAR * hertz), _FAR * hertz)
