@@ -19,7 +19,7 @@ from solver.arrays import Real
 BOUNDS = {"damper.kt": (4.0, 40.0), "damper.mu": (0.05, 1.0)}
 VARIED = "damper.mu"
 POPULATIONS, ASSEMBLIES = 25, 8
-NOISE, HARMONICS, TRUE_HARMONICS, DRAWS = 0.03, 3, 7, 150
+NOISE, HARMONICS, TRUE_HARMONICS, DRAWS = 0.03, 3, 7, 400
 ALLOWED = (0.88, 0.92)
 _NORMAL = 300  # populations of normal assemblies
 

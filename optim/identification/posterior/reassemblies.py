@@ -138,7 +138,8 @@ def reassemblies(
     for i, one in enumerate(data):
         progress = part_of(on_progress, i / len(data), (i + 1) / len(data), i)
         found.append(posterior(
-            scene, one, unknowns, scaling=scaling, noise=noise, harmonics=harmonics, starts=starts, seed=seed,
+            scene, one, unknowns, scaling=scaling, noise=noise, harmonics=harmonics, starts=starts,
+            seed=seed + i,  # else what few draws are wrong by would be alike in all
             draws=draws, on_progress=progress, should_stop=should_stop,
         ))  # fmt: skip
     return population(scene, known, varied, found, seed=seed, begun=begun)
