@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, ClassVar, Self
@@ -14,6 +13,7 @@ from optim.identification.data.measured import MeasuredRows
 from optim.identification.data.table import Table, check_sign
 from optim.problem.variables import Real
 from solver.results.told import json_numbers
+from solver.scene.parameter_paths import AMPLITUDE
 
 FLOOR = 0.01  # of the largest size of a column, below which noise in proportion to it falls no further
 
@@ -27,6 +27,10 @@ class CurveRun(MeasuredRows):
     sd: Annotated[Mapping[str, Real] | None, "Standard deviations of these, if known, (m,)."]
 
     KIND_NAME: ClassVar[str]
+    TOLD: ClassVar[Mapping[str, str]]
+    """Its columns in words, with their units."""
+    SHARES: ClassVar[Mapping[str, float]] = {}
+    """Noise of columns relative to their size, where that of the others is 1."""
 
     @property
     def x(self) -> Real:
@@ -48,12 +52,8 @@ class CurveRun(MeasuredRows):
         shapes = []
         for name, column in zip(self.data, self.curves(values), strict=True):
             size = np.abs(column)
-            shapes.append(self.share(name) * np.maximum(size, FLOOR * float(np.nanmax(size))))
+            shapes.append(self.SHARES.get(name, 1.0) * np.maximum(size, FLOOR * float(np.nanmax(size))))
         return np.concatenate(shapes)
-
-    @abstractmethod
-    def share(self, name: str) -> float:
-        """Return the noise of a column relative to its size, where that of the least known is 1."""
 
     def curves(self, values: Real) -> Sequence[Real]:
         """As the base says: each column over the rows."""
@@ -84,14 +84,9 @@ class CurveRun(MeasuredRows):
             more |= {other: column.tolist(), f"fit_{other}": json_numbers(values)}
         return {
             "kind": self.KIND_NAME, "source": self.source, "conditions": dict(self.conditions),
-            "quantity": self.told(name), "over": self.told(next(iter(self.at))), "x": self.x.tolist(),
+            "quantity": self.TOLD[name], "over": self.TOLD[next(iter(self.at))], "x": self.x.tolist(),
             "data": seen.tolist(), "fit": json_numbers(fit), "fit_sd": json_numbers(sd[-seen.size :]), **more,
         }  # fmt: skip
-
-    @staticmethod
-    @abstractmethod
-    def told(name: str) -> str:
-        """Return a column in words, with its unit."""
 
 
 def columns_of(
@@ -121,6 +116,13 @@ def columns_of(
         raise table.refusal(", ".join(given), wanted)
     sd = {name: columns[of] for name, of in named.items()} if given else None
     return {name: columns[name] for name in at if name in columns}, data, sd
+
+
+def check_level(table: Table) -> None:
+    """Raise DataError if levels are not above 0, or a condition of the run says one too."""
+    check_sign(table, "level", positive=True)
+    if AMPLITUDE in table.conditions:
+        raise table.refusal(table.conditions[AMPLITUDE], f"{AMPLITUDE} is the column `level` here")
 
 
 def whole_word(table: Table, word: str) -> int | None:

@@ -39,7 +39,6 @@ _STEP = 0.08  # of ln a between its points
 _FINE = 8  # places between two of them at which τ is summed up
 _FEWEST = 8  # points of the mode that make a course
 _MOST_ROUNDS, _CLOSE = 50, 1e-12
-_TOLD = {"modal_amplitude": "modal amplitude a [√kg m]", "frequency": "frequency [Hz]", "time": "time [s]"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,6 +50,12 @@ class DecayRun(CurveRun):
     range: Annotated[tuple[float, float], "Largest and smallest amplitude measured [√kg m]."]
 
     KIND_NAME: ClassVar = "decay"
+    TOLD: ClassVar = {
+        "modal_amplitude": "modal amplitude a [√kg m]",
+        "frequency": "frequency [Hz]",
+        "time": "time [s]",
+    }
+    SHARES: ClassVar = {"frequency": SHARPER}  # frequencies are measured much better
 
     @property
     def fitted_besides(self) -> int:
@@ -62,18 +67,9 @@ class DecayRun(CurveRun):
         """As the base says."""
         return "modal amplitudes [√kg m]"
 
-    def share(self, name: str) -> float:
-        """As the base says: frequencies are measured much better."""
-        return SHARPER if name == "frequency" else 1.0
-
     def model(self, scene: Scene, paths: Sequence[str], harmonics: int) -> RunModel:
         """As the base says."""
         return _DecayModel(self, scene, tuple(paths), harmonics)
-
-    @staticmethod
-    def told(name: str) -> str:
-        """As the base says."""
-        return _TOLD[name]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

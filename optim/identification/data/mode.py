@@ -29,11 +29,6 @@ WORDS = {
     "mode": "Number of the mode, 1 the slowest, contacts as they are at rest; 1.",
     "nodal_diameter": "Of a disk, negative for a backward wave; that of the engine order.",
 }
-_TOLD = {
-    "modal_amplitude": "modal amplitude a [√kg m]",
-    "frequency": "frequency [Hz]",
-    "damping_ratio": "damping ratio",
-}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,15 +39,17 @@ class ModeRun(CurveRun):
     nodal_diameter: Annotated[int | None, "Of a cyclic structure."]
 
     KIND_NAME: ClassVar = "mode"
+    TOLD: ClassVar = {
+        "modal_amplitude": "modal amplitude a [√kg m]",
+        "frequency": "frequency [Hz]",
+        "damping_ratio": "damping ratio",
+    }
+    SHARES: ClassVar = {"frequency": SHARPER}  # frequencies are measured much better
 
     @property
     def unit_words(self) -> str:
         """As the base says."""
         return "frequencies [Hz] and damping ratios"
-
-    def share(self, name: str) -> float:
-        """As the base says: frequencies are measured much better."""
-        return SHARPER if name == "frequency" else 1.0
 
     def model(self, scene: Scene, paths: Sequence[str], harmonics: int) -> RunModel:
         """As the base says."""
@@ -61,11 +58,6 @@ class ModeRun(CurveRun):
     def to_json(self, fitted: Real, sd: Real) -> dict[str, object]:
         """As the base says, with the number of the mode."""
         return {**CurveRun.to_json(self, fitted, sd), "mode": self.mode}
-
-    @staticmethod
-    def told(name: str) -> str:
-        """As the base says."""
-        return _TOLD[name]
 
 
 class _ModeModel(RunModel):

@@ -15,10 +15,10 @@ from typing import Annotated, ClassVar
 import numpy as np
 
 from optim.errors import DataError
-from optim.identification.data.curve import CurveRun, columns_of
+from optim.identification.data.curve import CurveRun, check_level, columns_of
 from optim.identification.data.measured import Column, DataKind, MeasuredRows, Predicted, RunModel
-from optim.identification.data.response import observing_dof
-from optim.identification.data.table import Dimension, Table, check_sign
+from optim.identification.data.response import measured_dof, observing_dof
+from optim.identification.data.table import Dimension, Table
 from optim.problem.variables import Real
 from solver.continuation.branch import Branch
 from solver.continuation.branches.sweep import sweep
@@ -29,8 +29,6 @@ from solver.sensitivity.gradient import Sensitivities
 from solver.sensitivity.nonsmooth import peak_gradient
 from solver.studies.blades import blade_peaks, blade_rows
 
-_TOLD = {"blade": "blade", "number": "number", "level": "excitation [N]", "peak": "largest amplitude [m]"}
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PeakRun(CurveRun):
@@ -40,19 +38,16 @@ class PeakRun(CurveRun):
     range: Annotated[tuple[float, float] | None, "Frequencies passed [Hz]; the scene's band."]
 
     KIND_NAME: ClassVar = "peak"
-
-    def share(self, name: str) -> float:  # noqa: ARG002
-        """As the base says."""
-        return 1.0
+    TOLD: ClassVar = {
+        "blade": "blade",
+        "number": "number",
+        "level": "excitation [N]",
+        "peak": "largest amplitude [m]",
+    }
 
     def model(self, scene: Scene, paths: Sequence[str], harmonics: int) -> RunModel:
         """As the base says."""
         return _PeakModel(self, scene, tuple(paths), harmonics)
-
-    @staticmethod
-    def told(name: str) -> str:
-        """As the base says."""
-        return _TOLD[name]
 
 
 class _PeakModel(RunModel):
@@ -112,14 +107,8 @@ def read_peak(scene: Scene, table: Table) -> MeasuredRows:
     table.need(1, "peaks")
     at, data, sd = columns_of(table, ("blade", "level"), _MEASURED)
     if "level" in at:
-        check_sign(table, "level", positive=True)
-        if AMPLITUDE in table.conditions:
-            raise table.refusal(table.conditions[AMPLITUDE], f"{AMPLITUDE} is the column `level` here")
-    dof = table.words.get("dof", scene.observe.dof.partition("@")[0] if "blade" in at else scene.observe.dof)
-    if "blade" in at:
-        _check_blades(scene, table, dof)
-    elif scene.seen(dof) is None:
-        raise table.refusal(dof, f"`dof` must be one of {', '.join(scene.dofs)}")
+        check_level(table)
+    dof = _checked_blades(scene, table) if "blade" in at else measured_dof(scene, table)
     band = table.number("from", scene.observe.band[0]), table.number("to", scene.observe.band[1])
     if not band[0] < band[1]:
         raise table.refusal(band, "`from` must be below `to`, both in Hz")
@@ -130,7 +119,9 @@ def read_peak(scene: Scene, table: Table) -> MeasuredRows:
     )  # fmt: skip
 
 
-def _check_blades(scene: Scene, table: Table, dof: str) -> None:
+def _checked_blades(scene: Scene, table: Table) -> str:
+    """Return the DOF of one sector that was measured; the numbers of blades are looked at."""
+    dof = table.words.get("dof", scene.observe.dof.partition("@")[0])
     try:
         count = len(blade_rows(scene, dof))
     except SettingError as error:
@@ -139,6 +130,7 @@ def _check_blades(scene: Scene, table: Table, dof: str) -> None:
     bad = np.flatnonzero((blades != np.round(blades)) | (blades < 0) | (blades >= count))
     if bad.size:
         raise table.error(int(bad[0]), "blade", f"must be the number of a sector, 0 to {count - 1}")
+    return dof
 
 
 _MEASURED = {"peak": "peak_sd"}

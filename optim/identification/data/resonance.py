@@ -18,10 +18,10 @@ from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
 
-from optim.identification.data.curve import CurveRun, columns_of
+from optim.identification.data.curve import CurveRun, check_level, columns_of
 from optim.identification.data.measured import Column, DataKind, MeasuredRows, Predicted, RunModel
-from optim.identification.data.response import NOT_REACHED, observing_dof
-from optim.identification.data.table import Dimension, Table, check_sign
+from optim.identification.data.response import NOT_REACHED, measured_dof, observing_dof
+from optim.identification.data.table import Dimension, Table
 from optim.problem.variables import Real
 from solver.balance.balance import build
 from solver.balance.simplifications import Effects, even_harmonics_reason
@@ -33,11 +33,6 @@ from solver.sensitivity.observed import TWO_PI, Observed, ObservedSensitivities,
 SHARPER = 0.1  # noise of a frequency relative to it, where that of an amplitude is 1
 _MOST_STEPS, _CLOSE = 30, 1e-7  # of the frequency; then one step more is exact
 _FAR = 0.05  # relative change of the frequency beyond which a step is cut
-_TOLD = {
-    "level": "excitation [N]",
-    "resonance_frequency": "frequency [Hz]",
-    "resonance_amplitude": "amplitude [m]",
-}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,24 +42,21 @@ class ResonanceRun(CurveRun):
     dof: Annotated[str, "Where."]
 
     KIND_NAME: ClassVar = "resonance"
+    TOLD: ClassVar = {
+        "level": "excitation [N]",
+        "resonance_frequency": "frequency [Hz]",
+        "resonance_amplitude": "amplitude [m]",
+    }
+    SHARES: ClassVar = {"resonance_frequency": SHARPER}  # frequencies are measured better
 
     @property
     def unit_words(self) -> str:
         """As the base says."""
         return "displacements [m]"
 
-    def share(self, name: str) -> float:
-        """As the base says: frequencies are measured better."""
-        return SHARPER if name == "resonance_frequency" else 1.0
-
     def model(self, scene: Scene, paths: Sequence[str], harmonics: int) -> RunModel:
         """As the base says."""
         return _ResonanceModel(self, observing_dof(scene, self.dof), tuple(paths), harmonics)
-
-    @staticmethod
-    def told(name: str) -> str:
-        """As the base says."""
-        return _TOLD[name]
 
 
 class _NearResonance(NamedTuple):
@@ -167,16 +159,12 @@ def read_resonance(scene: Scene, table: Table) -> MeasuredRows:
         What is wrong, with its line.
     """
     table.need(1, "levels")
-    check_sign(table, "level", positive=True)
+    check_level(table)
     at, data, sd = columns_of(table, ("level",), _MEASURED)
-    dof = table.words.get("dof", scene.observe.dof)
-    if scene.seen(dof) is None:
-        raise table.refusal(dof, f"`dof` must be one of {', '.join(scene.dofs)}")
-    if AMPLITUDE in table.conditions:
-        raise table.refusal(table.conditions[AMPLITUDE], f"{AMPLITUDE} is the column `level` here")
     return ResonanceRun(
-        source=table.source, conditions=dict(table.conditions), at=at, data=data, sd=sd, dof=dof
-    )
+        source=table.source, conditions=dict(table.conditions), at=at, data=data, sd=sd,
+        dof=measured_dof(scene, table),
+    )  # fmt: skip
 
 
 _MEASURED = {

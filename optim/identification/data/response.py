@@ -122,6 +122,20 @@ class ResponseModel(RunModel):
         return float(np.linalg.norm(found.values - self._near[i]))
 
 
+def measured_dof(scene: Scene, table: Table) -> str:
+    """Return the DOF that the head says was measured; the one the scene observes without it.
+
+    Raises
+    ------
+    DataError
+        The scene has none of that name.
+    """
+    dof = table.words.get("dof", scene.observe.dof)
+    if scene.seen(dof) is None:
+        raise table.refusal(dof, f"`dof` must be one of {', '.join(scene.dofs)}")
+    return dof
+
+
 def observing_dof(scene: Scene, dof: str) -> Scene:
     """Return the scene that observes a DOF."""
     if dof == scene.observe.dof:
@@ -266,9 +280,7 @@ def read_response(scene: Scene, table: Table) -> MeasuredRows:
             sd = sd * np.abs(factor)
     if quantity is Quantity.COMPLEX:
         data = data * np.exp(1j * here.value("excitation.phase") * table.number("harmonic", 1.0))
-    dof = table.words.get("dof", scene.observe.dof)
-    if scene.seen(dof) is None:
-        raise table.refusal(dof, f"`dof` must be one of {', '.join(scene.dofs)}")
+    dof = measured_dof(scene, table)
     return ResponseRun(
         source=table.source, conditions=dict(table.conditions), frequency_hz=frequencies, data=data, sd=sd,
         quantity=quantity, harmonic=int(table.number("harmonic", 1.0)), dof=dof,
