@@ -27,11 +27,10 @@ from scipy.interpolate import CubicSpline
 
 from optim.identification.data.curve import CurveRun, columns_of
 from optim.identification.data.measured import Column, DataKind, MeasuredRows, Predicted, RunModel
-from optim.identification.data.mode import SHARPER, WORDS, checked_mode
+from optim.identification.data.mode import SHARPER, WORDS, FollowedMode, checked_mode
 from optim.identification.data.table import Dimension, Table, check_monotone
 from optim.problem.variables import Real
-from solver.modes.at_amplitudes import ModePoints, mode_at_amplitudes
-from solver.modes.corrector import ModeState
+from solver.modes.at_amplitudes import ModePoints
 from solver.scene.scene import Scene
 
 _BEGINS, _ENDS = 1.5, 20.0  # factors on the amplitudes measured between which the mode is looked at
@@ -69,7 +68,7 @@ class DecayRun(CurveRun):
 
     def model(self, scene: Scene, paths: Sequence[str], harmonics: int) -> RunModel:
         """As the base says."""
-        return _DecayModel(self, scene, tuple(paths), harmonics)
+        return _DecayModel(self, scene, paths, harmonics)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -122,28 +121,19 @@ class _Course:
         return np.asarray(self.tau[before] + span[:, None] * inner / 6.0)
 
 
-class _DecayModel(RunModel):
+class _DecayModel(FollowedMode):
     """The decay along the nonlinear mode of the scene."""
 
-    def __init__(self, run: DecayRun, scene: Scene, paths: tuple[str, ...], harmonics: int) -> None:
-        self._run, self._scene, self._paths, self._harmonics = run, scene, paths, max(harmonics, 1)
-        self._points: list[ModeState | None] = []
+    def __init__(self, run: DecayRun, scene: Scene, paths: Sequence[str], harmonics: int) -> None:
+        super().__init__(scene, run.mode, run.nodal_diameter, paths, harmonics)
+        self._run = run
         high, low = math.log(_BEGINS * run.range[0]), math.log(run.range[1] / _ENDS)
         self._s = np.linspace(high, low, math.ceil((high - low) / _STEP) + 1)
-
-    def forget(self) -> None:
-        """As the base says."""
-        self._points = []
 
     def evaluate(self, values: Mapping[str, float]) -> Predicted:
         """As the base says."""
         run = self._run
-        here = self._scene.with_values({**values, **run.conditions})
-        found = mode_at_amplitudes(
-            here, np.exp(self._s), self._paths, mode=run.mode, nodal_diameter=run.nodal_diameter,
-            harmonics=self._harmonics, guesses=self._points,
-        )  # fmt: skip
-        self._points = found.points
+        names, found = self.looked_at({**values, **run.conditions}, np.exp(self._s))
         course = _course(self._s, found)
         if course is None:
             n = run.observations.size
@@ -162,7 +152,7 @@ class _DecayModel(RunModel):
         near = np.abs(np.nan_to_num(along.s)[:, None] - self._s).argmin(axis=1)
         return Predicted(
             values=predicted, slopes=slopes, reached=np.isfinite(predicted) & np.isfinite(slopes).all(axis=1),
-            states={each.name: found.states[near, c] for c, each in enumerate(here.contacts)},
+            states={name: found.states[near, c] for c, name in enumerate(names)},
         )  # fmt: skip
 
 

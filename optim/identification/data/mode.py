@@ -53,34 +53,55 @@ class ModeRun(CurveRun):
 
     def model(self, scene: Scene, paths: Sequence[str], harmonics: int) -> RunModel:
         """As the base says."""
-        return _ModeModel(self, scene, tuple(paths), harmonics)
+        return _ModeModel(self, scene, paths, harmonics)
 
     def to_json(self, fitted: Real, sd: Real) -> dict[str, object]:
         """As the base says, with the number of the mode."""
         return {**CurveRun.to_json(self, fitted, sd), "mode": self.mode}
 
 
-class _ModeModel(RunModel):
-    """The nonlinear mode of the scene at the amplitudes measured."""
+class FollowedMode(RunModel):
+    """A nonlinear mode, followed from one set of values to the next.
 
-    def __init__(self, run: ModeRun, scene: Scene, paths: tuple[str, ...], harmonics: int) -> None:
-        self._run, self._scene, self._paths, self._harmonics = run, scene, paths, max(harmonics, 1)
+    Parameters
+    ----------
+    scene, mode, nodal_diameter : whose, and which one.
+    paths, harmonics : of the derivatives, and kept.
+    """
+
+    def __init__(
+        self, scene: Scene, mode: int, nodal_diameter: int | None, paths: Sequence[str], harmonics: int
+    ) -> None:
+        self._scene, self._mode, self._nodal_diameter = scene, mode, nodal_diameter
+        self._paths, self._harmonics = tuple(paths), max(harmonics, 1)
         self._points: list[ModeState | None] = []
 
     def forget(self) -> None:
         """As the base says."""
         self._points = []
 
-    def evaluate(self, values: Mapping[str, float]) -> Predicted:
-        """As the base says."""
-        run = self._run
-        here = self._scene.with_values({**values, **run.conditions})
+    def looked_at(self, values: Mapping[str, float], amplitudes: Real) -> tuple[list[str], ModePoints]:
+        """Return the names of the contacts, and the mode at amplitudes."""
+        here = self._scene.with_values(values)
         found = mode_at_amplitudes(
-            here, run.x, self._paths, mode=run.mode, nodal_diameter=run.nodal_diameter,
+            here, amplitudes, self._paths, mode=self._mode, nodal_diameter=self._nodal_diameter,
             harmonics=self._harmonics, guesses=self._points,
         )  # fmt: skip
         self._points = found.points
-        return self._predicted(found, [contact.name for contact in here.contacts])
+        return [contact.name for contact in here.contacts], found
+
+
+class _ModeModel(FollowedMode):
+    """The nonlinear mode of the scene at the amplitudes measured."""
+
+    def __init__(self, run: ModeRun, scene: Scene, paths: Sequence[str], harmonics: int) -> None:
+        super().__init__(scene, run.mode, run.nodal_diameter, paths, harmonics)
+        self._run = run
+
+    def evaluate(self, values: Mapping[str, float]) -> Predicted:
+        """As the base says."""
+        names, found = self.looked_at({**values, **self._run.conditions}, self._run.x)
+        return self._predicted(found, names)
 
     def _predicted(self, found: ModePoints, names: Sequence[str]) -> Predicted:
         both = {

@@ -16,6 +16,7 @@ from typing import Annotated
 import numpy as np
 
 from optim.errors import DataError
+from optim.identification.data.curve import FLOOR
 from optim.identification.data.measured import Column, DataKind, MeasuredRows, Predicted, RunModel
 from optim.identification.data.table import Dimension, Table, check_monotone, check_sign
 from optim.problem.variables import Real
@@ -143,9 +144,6 @@ def observing_dof(scene: Scene, dof: str) -> Scene:
     return scene.model_copy(update={"observe": scene.observe.model_copy(update={"dof": dof})})
 
 
-FLOOR = (
-    0.01  # of the largest amplitude of a run, below which noise in proportion to amplitude falls no further
-)
 _FAR = 20.0  # ratio to the scene's band from which a frequency is taken for a wrong unit
 _MOST_DEGREES = 720.0
 _WORDS = {
