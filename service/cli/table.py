@@ -40,9 +40,10 @@ class CommandEntry:
     def function(self) -> Any:
         """Import the module and return what stands there."""
         if self.home == STUDY:
-            from service.cli.study_command import command_named
+            from service.cli.study_command import command_of
+            from service.jobs.study import study_named
 
-            return command_named(self.name)
+            return command_of(study_named(self.name))
         module, _, name = self.home.rpartition(".")
         return on_demand(f"service.cli.{module}:{name}")
 
