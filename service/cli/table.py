@@ -30,7 +30,7 @@ class CommandEntry:
         'Module of `service.cli` and function, ``"commands.scenes.scenes"``; `STUDY` for that of a study.',
     ]
     summary: Annotated[str, "The first line of the function's docstring, which `--help` shows."]
-    keyed: Annotated[bool, "It talks to a service, and takes ``--key-file``."] = False
+    keyed: Annotated[bool, "It talks to a service, and takes ``--url`` and ``--key-file``."] = False
     group: Annotated[bool, "What stands there is the class of a group, not a function."] = False
 
     def command(self) -> Deferred:
@@ -274,7 +274,7 @@ COMMANDS = {
             "Print what a job computed, or list the stored designs.", keyed=True,
         ),
         CommandEntry(
-            "mcp", "commands.client.mcp.mcp", "Let a language model use a running service.", keyed=True
+            "mcp", "commands.client.jobs.mcp", "Let a language model use a running service.", keyed=True
         ),
         CommandGroup("runs", "Name, find, compare and delete runs of a service.", RUNS),
         CommandGroup("projects", "Gather runs in projects.", PROJECTS),

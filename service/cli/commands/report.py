@@ -30,7 +30,7 @@ def report(
     A page that needs nothing else, or a PDF of a few sheets (with the extra `pdf`).
     """
     import solver
-    from service.cli.commands.client.jobs import client_of
+    from service.cli.options.parameters import client_of
     from service.rendering.report.about import about_run
     from service.rendering.report.sections import KINDS, Designed, problem_of_request
 
