@@ -51,7 +51,7 @@ from service.settings import traces
 from service.settings.kinds import registry_of
 from service.settings.settings import Settings
 from service.uploads.uploads import Uploads
-from service.workers.answers import AnswerLimits, Answers
+from service.workers.answers import Answers
 from service.workers.executors import executor_of
 from service.workers.preview_workers import Previews
 
@@ -84,15 +84,6 @@ class WholeDesign:
     row: DesignRecord
     job: JobRow
     result: dict[str, Any]
-
-
-def _answer_limits(settings: Settings) -> AnswerLimits:
-    return AnswerLimits(
-        workers=settings.answer_workers,
-        seconds=settings.answer_seconds,
-        memory_bytes=settings.answer_memory_bytes,
-        budget_seconds=settings.answer_budget_seconds,
-    )
 
 
 class Service:
@@ -130,7 +121,7 @@ class Service:
         self.lanes = Lanes(settings.database_seconds, self.meters)
         self.previews = Previews(settings.preview_seconds, memory_bytes=settings.answer_memory_bytes)
         self.answers = Answers(
-            answering.runs(self.registry, self.previews.registry), answering.warm_up, _answer_limits(settings)
+            answering.runs(self.registry, self.previews.registry), answering.warm_up, settings
         )
         self.queue = JobQueue(
             self.jobs, executor_of(settings, self.registry), settings, self.waiters, self.meters
