@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 from optim.criteria.evaluation import natural_scales
 from optim.criteria.linearised import Model
@@ -20,7 +21,7 @@ from optim.problem.words import Aim
 from optim.results.design import DesignStatus
 from optim.results.parts import NOMINAL, BestSoFar, OnBest
 from optim.robust.scenarios import Outcome, aim_model, known_in, outcome, together
-from optim.robust.worst_case import Asking, Aspect
+from optim.robust.worst_case import Aspect, Finding, pessimise
 from solver.results.known import Known
 from solver.results.spread import Ahead
 
@@ -100,12 +101,14 @@ class RobustSearch:
         unknown = {key: call for key, call in calls.items() if self._known_outcome(key) is None}
         self._ahead.compute(partial(outcome, self.problem, gradients=gradients), unknown)
 
-    def asking(self, values: Mapping[str, float]) -> Asking:
-        """Return what asks for a design in scenarios."""
-        return Asking(
-            lambda scenario: self.outcome(values, scenario),
-            lambda scenarios: self.ahead((values, scenario) for scenario in scenarios),
-        )
+    def pessimise(
+        self, values: Mapping[str, float], aspect: Aspect, known: Sequence[Scenario], **more: Any
+    ) -> Finding:  # fmt: skip
+        """Return the worst scenario of a design in one aspect; see `optim.robust.worst_case.pessimise`."""
+        return pessimise(
+            partial(self.outcome, values), self.uncertain, aspect, known,
+            ahead=lambda scenarios: self.ahead((values, scenario) for scenario in scenarios), **more,
+        )  # fmt: skip
 
     def _key(self, values: Mapping[str, float], scenario: Scenario, gradients: bool) -> Key:
         place = tuple(values[variable.name] for variable in self.variables)
