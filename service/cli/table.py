@@ -254,7 +254,7 @@ COMMANDS = {
         ),
         CommandEntry(
             "report", "commands.report.report",
-            "Write the report of a design or an identification that the service computed.",
+            "Write the report of a design or an identification that the service computed.", keyed=True,
         ),
         CommandEntry(
             "check-proof", "commands.certificates.check_proof",

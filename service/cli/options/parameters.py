@@ -83,7 +83,7 @@ def keyed(command: Command) -> Command:
     return with_parameters(with_client, [*listed, *where])
 
 
-def client_of(url: str, key_file: str | None = None) -> Client:
+def client_of(url: str, key_file: str | None) -> Client:
     """A client of the service at an address.
 
     Raises
