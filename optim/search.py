@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Unpack
 
 import numpy as np
 
-from optim.criteria.evaluation import evaluate, natural_scales
-from optim.criteria.linearised import Conditions, conditions, model_of
+from optim.criteria.evaluation import evaluate
 from optim.criteria.rows import DesignEvaluation
 from optim.methods.afterwards import looked_after, settled_status
 from optim.methods.eased import Eased
@@ -37,7 +36,6 @@ from solver.results.watch import OnProgress, ShouldStop, shows_progress
 from solver.scene.scene import Scene
 
 if TYPE_CHECKING:
-    from optim.methods.peak_tracking import Tracked
     from optim.problem.keyword_types import DesignKeywords
 
 SAME_HEIGHT = 1e-9  # relative, of two levels that are one
@@ -191,7 +189,9 @@ def _solved(
     `before`: of a search before with less known; `told`: designs whose responses serve again.
     """
     if problem.method is Method.PERFORMANCE_CURVE:
-        return _by_curve(problem, on_progress, should_stop)
+        from optim.methods.performance_curve import curve_optimum
+
+        return curve_optimum(problem, on_progress=on_progress, should_stop=should_stop)
     begun = time.perf_counter()
     tracked = None
     trackable = problem.method in (Method.AUTO, Method.TRACKED) and problem.why_not_tracked is None
@@ -200,12 +200,12 @@ def _solved(
 
         tracked = tracked_optimum(problem, on_progress=on_progress, should_stop=should_stop, on_best=on_best)
         if problem.method is Method.TRACKED or tracked.status is not DesignStatus.NOT_TRACKED:
-            return _of_tracked(problem, tracked, time.perf_counter() - begun)
+            return tracked
     earlier = told if before is None else (*before.looked_at, *before.history)
     search = DesignSearch(problem, on_progress, should_stop, on_best=on_best, before=earlier)
     eased = Eased.of(search, tracked)
     if eased.proven is not None:
-        return _of_tracked(problem, eased.proven, time.perf_counter() - begun)
+        return replace(eased.proven, seconds=time.perf_counter() - begun)
     found: list[Local] = []
     if before is not None and before.problem.cases is not problem.cases:
         before = None  # by another measure nothing is known but responses
@@ -295,41 +295,4 @@ def _result(search: DesignSearch, whole: WholeRange, status: DesignStatus, begun
         conditions=None if best is None else best.conditions, basins=basins_of(search, whole.found),
         looked_at=whole.looked_at, history=tuple(search.history), evaluations=responses,
         work=float(responses), seconds=time.perf_counter() - begun,
-    )  # fmt: skip
-
-
-def _by_curve(problem: Problem, on_progress: OnProgress, should_stop: ShouldStop) -> DesignResult:
-    """Search on the performance curve of one mode; the response at its optimum is judged like any other."""
-    from optim.methods.performance_curve import curve_optimum
-
-    begun = time.perf_counter()
-    found = curve_optimum(problem, on_progress=on_progress, should_stop=should_stop)
-    evaluation = found.evaluation
-    return DesignResult(
-        problem=problem, method=Method.PERFORMANCE_CURVE, status=found.status, evaluation=evaluation,
-        conditions=_conditions(problem, evaluation), basins=(), curve=found.check,
-        history=() if evaluation is None else (evaluation,),
-        evaluations=0 if evaluation is None else 1, work=0.0 if evaluation is None else 1.0,
-        seconds=time.perf_counter() - begun,
-    )  # fmt: skip
-
-
-def _conditions(problem: Problem, evaluation: DesignEvaluation | None) -> Conditions | None:
-    """Return the first-order conditions of an optimum that no local search has ended in."""
-    if evaluation is None or not evaluation.good:
-        return None
-    model = model_of(evaluation, problem.variables, evaluation.objective, natural_scales(problem))
-    return conditions(model, problem.variables)
-
-
-def _of_tracked(problem: Problem, tracked: Tracked, seconds: float) -> DesignResult:
-    """Put the result of the tracked peak together; its optimum is judged like that of any method."""
-    evaluation, status = tracked.evaluation, tracked.status
-    found = _conditions(problem, evaluation)
-    if found is not None and status is DesignStatus.OPTIMAL:
-        status = settled_status(found)
-    return DesignResult(
-        problem=problem, method=Method.TRACKED, status=status, evaluation=evaluation, conditions=found,
-        basins=tracked.basins, history=() if evaluation is None else (evaluation,),
-        evaluations=tracked.sweeps, work=tracked.work, seconds=seconds,
     )  # fmt: skip

@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 from optim.criteria.evaluation import evaluate, natural_scales
 from optim.criteria.linearised import Conditions, conditions, model_of
@@ -14,7 +15,7 @@ from optim.methods.enough_harmonics import MOST_HARMONICS
 from optim.methods.evaluator import DesignSearch, SearchStoppedError
 from optim.methods.kkt import KEPT, KKT_TOLERANCE, optimum_at
 from optim.methods.plateau import DesignPlateau, Tick, nothing, plateau_of
-from optim.problem.problem import Method
+from optim.problem.problem import Method, Problem
 from optim.results.design import DesignResult, DesignStatus
 from optim.results.doubts import DOUBTFUL, open_peaks
 from optim.results.json import known_parts
@@ -30,6 +31,22 @@ def settled_status(found: Conditions) -> DesignStatus:
     """Return whether a settled design is held by the bound of a variable."""
     held = any(multiplier > HELD for _, _, multiplier in found.bounds)
     return DesignStatus.AT_BOUND if held else DesignStatus.OPTIMAL
+
+
+def of_one(
+    problem: Problem, method: Method, status: DesignStatus, evaluation: DesignEvaluation | None, **more: Any
+) -> DesignResult:  # fmt: skip
+    """Return the result of a method without a local search; its optimum is judged like that of any."""
+    found = None
+    if evaluation is not None and evaluation.good:
+        model = model_of(evaluation, problem.variables, evaluation.objective, natural_scales(problem))
+        found = conditions(model, problem.variables)
+        status = settled_status(found) if status is DesignStatus.OPTIMAL else status
+    history = () if evaluation is None else (evaluation,)
+    return DesignResult(
+        problem=problem, method=method, status=status, evaluation=evaluation, conditions=found,
+        history=history, **more,
+    )  # fmt: skip
 
 
 def looked_after(

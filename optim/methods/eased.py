@@ -9,15 +9,17 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated
 
 from optim.criteria.criterion import Limits
+from optim.methods.afterwards import of_one
 from optim.methods.evaluator import DesignSearch, SearchStoppedError
 from optim.problem.problem import Method, Problem
 from optim.results.design import DesignStatus
 
 if TYPE_CHECKING:
-    from optim.methods.peak_tracking import Tracked
+    from optim.results.design import DesignResult
 
 NO_LIMITS = Limits()
 MOST_CASES = 4
+_OPTIMAL = (DesignStatus.OPTIMAL, DesignStatus.AT_BOUND)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,10 +30,10 @@ class Eased:
         tuple[dict[str, float], ...],
         "The one asked for, and the local optima of single cases without limits.",
     ]
-    proven: Annotated[Tracked | None, "The optimum without limits, if it keeps them all."] = None
+    proven: Annotated[DesignResult | None, "The optimum without limits, if it keeps them all."] = None
 
     @classmethod
-    def of(cls, search: DesignSearch, plain: Tracked | None = None) -> Eased:
+    def of(cls, search: DesignSearch, plain: DesignResult | None = None) -> Eased:
         """Return it; tracking goes on for `search` and is counted by it.
 
         `plain`: what tracking the problem itself came to, where that was tried.
@@ -47,9 +49,9 @@ class Eased:
             tracked = plain or tracked_optimum(
                 eased, on_progress=search.easing, should_stop=search.should_stop
             )  # fmt: skip
-            search.eased(tracked.sweeps)
+            search.eased(tracked.evaluations)
             starts += [dict(basin.values) for basin in tracked.basins]
-            if len(problem.cases) == 1 and tracked.status is DesignStatus.OPTIMAL and starts:
+            if len(problem.cases) == 1 and tracked.status in _OPTIMAL and starts:
                 proven = _kept(search, tracked)
                 if proven is not None:
                     return cls(starts=tuple(starts), proven=proven)
@@ -66,7 +68,7 @@ def _cases(problem: Problem) -> list[Problem]:
     return [one for one in plain if one.why_not_tracked is None]
 
 
-def _kept(search: DesignSearch, tracked: Tracked) -> Tracked | None:
+def _kept(search: DesignSearch, tracked: DesignResult) -> DesignResult | None:
     """Return the tracked optimum with the rows of its limits if it keeps them all."""
     if tracked.evaluation is None:
         return None
@@ -77,6 +79,7 @@ def _kept(search: DesignSearch, tracked: Tracked) -> Tracked | None:
     if not evaluation.good or evaluation.violation(search.scales) > 0.0:
         return None
     responses = evaluation.computed
-    return replace(
-        tracked, evaluation=evaluation, sweeps=tracked.sweeps + responses, work=tracked.work + responses
-    )
+    return of_one(
+        search.problem, Method.TRACKED, DesignStatus.OPTIMAL, evaluation, basins=tracked.basins,
+        evaluations=tracked.evaluations + responses, work=tracked.work + responses, seconds=tracked.seconds,
+    )  # fmt: skip

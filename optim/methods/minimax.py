@@ -10,7 +10,6 @@ BFGS matrix. Reference: Conn, Gould, Toint, Trust-Region Methods (SIAM
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -21,8 +20,6 @@ from optim.criteria.rows import DesignEvaluation, nearest
 from optim.methods.conic import Step, solve_subproblem
 from optim.methods.kkt import KEPT, Evaluate, Local, ModelOf, ended
 from optim.problem.variables import BoundedVariable, Real, snapped, unscaled
-
-Subproblem = Callable[[Model, Real, float], Step | None]
 
 FIRST_RADIUS = 0.2
 LARGEST_RADIUS = 0.5
@@ -40,8 +37,7 @@ NOTHING = 1e-9  # multipliers below it are rounding of the conic solver
 
 def minimax_search(
     evaluate: Evaluate, variables: tuple[BoundedVariable, ...], begin: DesignEvaluation, model_of: ModelOf, *,
-    solve: Subproblem | None = None, norm: float = np.inf, remembered: int = REMEMBERED,
-    enough: float = -np.inf,
+    ball: bool = False, remembered: int = REMEMBERED, enough: float = -np.inf,
 ) -> Local:  # fmt: skip
     """Improve a design until no first-order decrease is left.
 
@@ -51,12 +47,10 @@ def minimax_search(
     variables : the design variables.
     begin : a good evaluation to start from.
     model_of : the model of an evaluation.
-    solve : the convex subproblem; that of `optim.methods.conic` if left out.
-    norm : in which its trust region is round.
+    ball : whether the trust region is round, otherwise it is a box.
     remembered : designs whose rows are kept as cuts.
     enough : merit from which on nothing better is looked for.
     """
-    solve = solve or solve_subproblem
     n = len(variables)
     here, model = begin, model_of(begin)
     model = replace(model, penalty=min(FIRST_PENALTY * abs(model.objective) or PENALTY, PENALTY))
@@ -64,7 +58,7 @@ def minimax_search(
     seen: deque[Model] = deque(maxlen=remembered)
     for _ in range(MOST_STEPS):
         known = with_cuts(model, seen, CUTS_REACH * radius)
-        step = solve(known, _root(hessian), radius)
+        step = solve_subproblem(known, _root(hessian), radius, ball=ball)
         if step is None:
             break
         if _too_weak(model, step):
@@ -83,7 +77,7 @@ def minimax_search(
         if fresh.smooth:
             hessian = _curvature(model, fresh, _pulls(known, step), hessian, accepted=ratio > ENOUGH)
             seen.append(model if ratio > ENOUGH else fresh)
-        size = float(np.linalg.norm(step.step, norm))
+        size = float(np.linalg.norm(step.step, 2 if ball else np.inf))
         if ratio > 0.75 and size > 0.9 * radius:
             radius = min(2.0 * radius, LARGEST_RADIUS)
         elif ratio < 0.25:

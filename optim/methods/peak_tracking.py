@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Annotated
 
 from optim.criteria.evaluation import Judge, effects_of, evaluate, ranges_of
 from optim.criteria.peak import PEAK
 from optim.criteria.rows import CaseResponse, DesignEvaluation
-from optim.problem.problem import Problem
-from optim.results.design import DesignStatus
+from optim.methods.afterwards import of_one
+from optim.problem.problem import Method, Problem
+from optim.results.design import DesignResult, DesignStatus
 from optim.results.parts import PEAKS_OPEN, VERIFIED, BestSoFar, LocalOptimum, OnBest
 from solver.continuation.branch import Branch
 from solver.results.watch import OnProgress, ShouldStop
@@ -32,24 +32,13 @@ _STATUS = {
 }
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Tracked:
-    """What the tracked peak found."""
-
-    status: Annotated[DesignStatus, "How it ended."]
-    evaluation: Annotated[DesignEvaluation | None, "The optimum, or the best seen."]
-    basins: Annotated[tuple[LocalOptimum, ...], "The local minima met, best first."]
-    sweeps: Annotated[int, "Frequency responses computed."]
-    work: Annotated[float, "Everything, in frequency responses."]
-
-
 def tracked_optimum(
     problem: Problem,
     *,
     on_progress: OnProgress = None,
     should_stop: ShouldStop = None,
     on_best: OnBest = None,
-) -> Tracked:
+) -> DesignResult:
     """Find the least highest peak by following the peaks over the variable; see `solver.least_peak`.
 
     Parameters
@@ -59,6 +48,7 @@ def tracked_optimum(
     should_stop : asked between sweeps.
     on_best : told of every response that is the lowest so far.
     """
+    begun = time.perf_counter()
     case, variable = problem.cases[0], problem.variables[0]
     first = None if problem.start is None else problem.start[variable.name]
     effects = effects_of(problem, case.scene)
@@ -78,13 +68,10 @@ def tracked_optimum(
     )  # fmt: skip
     evaluation = _evaluation(problem, found)
     extra = float(evaluation is not None and problem.limit is not None)
-    return Tracked(
-        status=_STATUS[found.status],
-        evaluation=evaluation,
-        basins=basins,
-        sweeps=found.sweeps + int(extra),
-        work=found.work + extra,
-    )
+    return of_one(
+        problem, Method.TRACKED, _STATUS[found.status], evaluation, basins=basins,
+        evaluations=found.sweeps + int(extra), work=found.work + extra, seconds=time.perf_counter() - begun,
+    )  # fmt: skip
 
 
 class _Lowest:

@@ -13,18 +13,18 @@ import math
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Annotated
 
 import numpy as np
 from scipy.optimize import minimize, minimize_scalar
 
 from optim.criteria.evaluation import evaluate
 from optim.criteria.rows import DesignEvaluation
+from optim.methods.afterwards import of_one
 from optim.methods.evaluator import SearchStoppedError
 from optim.methods.surrogate import quasi_random
-from optim.problem.problem import Problem
+from optim.problem.problem import Method, Problem
 from optim.problem.variables import BoundedVariable, Real, by_variables, parameter_values, unscaled
-from optim.results.design import DesignStatus
+from optim.results.design import DesignResult, DesignStatus
 from optim.results.parts import CurveCheck
 from solver.modes.peaks.peak_correction import corrected_peak
 from solver.modes.peaks.peak_gradient import CurvePeak, peak_at_excitation
@@ -41,15 +41,6 @@ _MOST_CURVES, _SETTLED = 15, 1e-6  # of a local search, and the relative change 
 _LEVEL = 1e-9  # relative change of the peak over all designs below which it depends on none
 _EXACT_RESPONSES = 3.0  # the work of a tracked peak with two basins, at least (docs/modes.md)
 _NEAR = (0.2, 1.0)  # factors on the excitation a curve of one design covers
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ByCurve:
-    """What the curves found."""
-
-    status: Annotated[DesignStatus, "How it ended."]
-    evaluation: Annotated[DesignEvaluation | None, "The whole response at the optimum."]
-    check: Annotated[CurveCheck | None, "The curve beside it."]
 
 
 @dataclass(slots=True, kw_only=True)
@@ -89,7 +80,7 @@ class _Curves:
         return found.peak, np.where(np.isfinite(slope), slope, 0.0)
 
 
-def curve_optimum(problem: Problem, *, on_progress: OnProgress, should_stop: ShouldStop) -> ByCurve:
+def curve_optimum(problem: Problem, *, on_progress: OnProgress, should_stop: ShouldStop) -> DesignResult:
     """Find the design that makes the peak of one nonlinear mode least, and compute its response.
 
     Parameters
@@ -99,17 +90,27 @@ def curve_optimum(problem: Problem, *, on_progress: OnProgress, should_stop: Sho
     should_stop : asked between curves.
     """
     begun = time.perf_counter()
+
+    def ended(
+        status: DesignStatus, evaluation: DesignEvaluation | None = None, check: CurveCheck | None = None
+    ) -> DesignResult:
+        computed = int(evaluation is not None)
+        return of_one(
+            problem, Method.PERFORMANCE_CURVE, status, evaluation, basins=(), curve=check,
+            evaluations=computed, work=float(computed), seconds=time.perf_counter() - begun,
+        )  # fmt: skip
+
     curves = _Curves(problem=problem, should_stop=should_stop, on_progress=on_progress)
     try:
         shared = _shared(curves)
         z, curve = (_own(curves), None) if shared is None else shared
     except SearchStoppedError as stop:
-        return ByCurve(status=stop.status, evaluation=None, check=None)
+        return ended(stop.status)
     if z is None:
-        return ByCurve(status=DesignStatus.NO_CURVE, evaluation=None, check=None)
+        return ended(DesignStatus.NO_CURVE)
     peaks = [peak for _, peak in curves.seen]
     if max(peaks) - min(peaks) <= _LEVEL * max(peaks):
-        return ByCurve(status=DesignStatus.FLAT, evaluation=None, check=None)
+        return ended(DesignStatus.FLAT)
     values = unscaled(problem.variables, z)
     ratio = 1.0
     if curve is None:
@@ -131,9 +132,9 @@ def curve_optimum(problem: Problem, *, on_progress: OnProgress, should_stop: Sho
     if on_progress is not None:
         on_progress(1.0, curves.count)
     if not math.isfinite(exact):
-        return ByCurve(status=DesignStatus.NO_RESPONSE, evaluation=evaluation, check=check)
+        return ended(DesignStatus.NO_RESPONSE, evaluation, check)
     status = DesignStatus.APPROXIMATE if check.holds else DesignStatus.CURVE_OFF
-    return ByCurve(status=status, evaluation=evaluation, check=check)
+    return ended(status, evaluation, check)
 
 
 def sets_every_load(scene: Scene, variable: BoundedVariable) -> bool:

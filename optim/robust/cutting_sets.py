@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Annotated
 
 from optim.criteria.peak import PEAK
@@ -19,7 +19,7 @@ from optim.results.parts import SAME_PLACE
 from optim.robust.result import Cut, RobustStatus
 from optim.robust.scenarios import Outcome, number_of
 from optim.robust.search import RobustSearch
-from optim.robust.worst_case import MOST_BESIDES, Aspect, Finding, UnknownScenarioError, pessimise
+from optim.robust.worst_case import MOST_BESIDES, Aspect, Finding, UnknownScenarioError
 
 CLOSED = (
     1e-6  # relative excess of the worst scenario found over the master problem's, up to which it is solved
@@ -37,12 +37,9 @@ FEW = 8  # samples that the starts of a sampled search are judged by
 class SearchProgress:
     """What a search knows at any time."""
 
-    scenarios: Annotated[list[Scenario], "Those of the master problem."] = field(default_factory=list)
-    exceeded: Annotated[
-        list[float],
-        "By how much each was worse than those before when it came in; NaN if it was there from the start.",
-    ] = field(default_factory=list)
-    peaks: Annotated[list[float], "Highest peak of the design it was found at."] = field(default_factory=list)
+    cuts: Annotated[list[Cut], "The scenarios of the master problem, without multipliers."] = field(
+        default_factory=list
+    )
     best: Annotated[Local | None, "The best design so far."] = None
     gap: Annotated[
         float, "Relative excess of the worst scenario found over the worst of the master problem."
@@ -51,28 +48,31 @@ class SearchProgress:
         bool, "Whether the look over the whole uncertainty behind the gap came to its end."
     ] = False
 
+    @property
+    def scenarios(self) -> list[Scenario]:
+        """Those of the master problem."""
+        return [cut.scenario for cut in self.cuts]
+
     def add(self, found: Outcome, exceeds: float) -> bool:
         """Add a scenario to the master problem unless it is there."""
         if found.scenario in self.scenarios:
             return False
         row = found.highest(PEAK)
-        self.scenarios.append(found.scenario)
-        self.exceeded.append(exceeds)
-        self.peaks.append(math.nan if row is None else row.value)
+        self.cuts.append(_cut(found.scenario, math.nan if row is None else row.value, exceeds))
         return True
 
-    def cuts(self) -> tuple[Cut, ...]:
+    def weighed(self) -> tuple[Cut, ...]:
         """Return the scenarios with the force they hold the best design with."""
-        force = dict.fromkeys(range(len(self.scenarios)), 0.0)
+        force = dict.fromkeys(range(len(self.cuts)), 0.0)
         if self.best is not None:
             for row, multiplier in self.best.conditions.rows:
                 place = number_of(row) - 1
                 force[place] = force.get(place, 0.0) + multiplier
-        given = zip(self.scenarios, self.peaks, self.exceeded, strict=True)
-        return tuple(
-            Cut(scenario=scenario, peak=peak, exceeds=exceeds, multiplier=force[i])
-            for i, (scenario, peak, exceeds) in enumerate(given)
-        )
+        return tuple(replace(cut, multiplier=force[i]) for i, cut in enumerate(self.cuts))
+
+
+def _cut(scenario: Scenario, peak: float = math.nan, exceeds: float = math.nan) -> Cut:
+    return Cut(scenario=scenario, peak=peak, exceeds=exceeds, multiplier=0.0)
 
 
 def cutting_sets(
@@ -124,7 +124,7 @@ def _worse(
     progress.finished = True
     for aspect in search.aspects():
         master = aspect.worst(here.rows)
-        finding = pessimise(search.asking(values), search.uncertain, aspect, progress.scenarios)
+        finding = search.pessimise(values, aspect, progress.scenarios)
         if drawn and _excess(aspect, finding.value, master) <= CLOSED and not search.uncertain.finite:
             finding = _checked(search, values, aspect, progress, drawn)
         progress.finished = progress.finished and finding.finished
@@ -150,14 +150,11 @@ def _checked(
 ) -> Finding:  # fmt: skip
     """Return the worst scenarios again, looking at the whole set and climbing from the worst drawn ones."""
     inside = [scenario for scenario in drawn if search.uncertain.inside_of(scenario)]
-    asking = search.asking(values)
-    asking.several(inside)
-    asked = [asking(scenario) for scenario in inside]
+    search.ahead((values, scenario) for scenario in inside)
+    asked = [search.outcome(values, scenario) for scenario in inside]
     ranked = sorted((o for o in asked if o.good), key=lambda found: -aspect.worst(found.rows))
-    return pessimise(
-        asking, search.uncertain, aspect, progress.scenarios,
-        besides=[found.scenario for found in ranked[:MOST_BESIDES]], thorough=True,
-    )  # fmt: skip
+    besides = [found.scenario for found in ranked[:MOST_BESIDES]]
+    return search.pessimise(values, aspect, progress.scenarios, besides=besides, thorough=True)
 
 
 def _excess(aspect: Aspect, worst: float, master: float) -> float:
@@ -178,9 +175,7 @@ def sampled(
     basins, ended = _locals(search, _starts(search, nominal, few), few)
     if ended is not None:
         return ended
-    progress.scenarios = list(drawn)
-    progress.exceeded = [math.nan] * len(drawn)
-    progress.peaks = [math.nan] * len(drawn)
+    progress.cuts = [_cut(scenario) for scenario in drawn]
     best = min(basins, key=lambda basin: basin.standing)
     starts = [best.evaluation.values] + ([dict(nominal.optimum)] if nominal.optimum else [])
     begin = min(

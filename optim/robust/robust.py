@@ -39,7 +39,7 @@ from optim.robust.cutting_sets import CLOSED, SearchProgress, cutting_sets, samp
 from optim.robust.result import RobustResult, RobustStatus, Side, Spread
 from optim.robust.scenarios import Outcome, rank_of
 from optim.robust.search import RobustSearch
-from optim.robust.worst_case import MOST_BESIDES, Aspect, UnknownScenarioError, pessimise
+from optim.robust.worst_case import MOST_BESIDES, Aspect, UnknownScenarioError
 from optim.search import solve_problem
 from solver.results.known import worst_of
 from solver.results.watch import OnProgress, ShouldStop, shows_progress
@@ -90,14 +90,7 @@ def _worst(
     ranked = sorted((o for o in samples if o.good), key=lambda found: -aspect.worst(found.rows))
     besides = [found.scenario for found in ranked[:MOST_BESIDES]]
     try:
-        finding = pessimise(
-            search.asking(values),
-            search.uncertain,
-            aspect,
-            known,
-            besides=besides,
-            thorough=True,
-        )
+        finding = search.pessimise(values, aspect, known, besides=besides, thorough=True)
     except UnknownScenarioError as error:
         return None, error.scenario
     return finding.worst, None
@@ -287,7 +280,7 @@ def _result(search: RobustSearch, state: _State, status: RobustStatus) -> Robust
         status=status, design=state.nominal, nominal=state.sides.get("nominal"),
         robust=state.sides.get("robust"),
         objective=math.nan if best is None else search.objective(best, len(state.progress.scenarios)),
-        conditions=None if best is None else best.conditions, cuts=state.progress.cuts(),
+        conditions=None if best is None else best.conditions, cuts=state.progress.weighed(),
         gap=state.progress.gap, inner_look=state.progress.finished, unknown=state.unknown,
         designs=search.designs, responses=search.responses, seconds=0.0,
     )  # fmt: skip

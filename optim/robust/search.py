@@ -3,96 +3,30 @@
 from __future__ import annotations
 
 import math
-import threading
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
-from functools import lru_cache, partial
-
-import cvxpy
-import numpy as np
+from functools import partial
+from typing import Any
 
 from optim.criteria.evaluation import natural_scales
 from optim.criteria.linearised import Model
 from optim.criteria.rows import DesignEvaluation
-from optim.methods.conic import Index, Numbers, Programme, Step, duals_of, padded
 from optim.methods.evaluator import SearchStoppedError
 from optim.methods.kkt import Local
 from optim.methods.minimax import REMEMBERED, minimax_search
 from optim.problem.problem import Problem
 from optim.problem.uncertainty_set import Scenario, UncertainSet
-from optim.problem.variables import BoundedVariable, Real
+from optim.problem.variables import BoundedVariable
 from optim.problem.words import Aim
 from optim.results.design import DesignStatus
 from optim.results.parts import NOMINAL, BestSoFar, OnBest
 from optim.robust.scenarios import Outcome, aim_model, known_in, outcome, together
-from optim.robust.worst_case import Asking, Aspect
+from optim.robust.worst_case import Aspect, Finding, pessimise
 from solver.results.known import Known
 from solver.results.spread import Ahead
 
-_BLOCK = 4  # rows are padded to multiples of it
-_LOCK = threading.Lock()  # a problem keeps its numbers in itself
-
-
-def solve_cone(model: Model, root: Real, radius: float) -> Step | None:
-    """Solve the master problem of a model; None if the conic solver did not reach optimality.
-
-    Parameters
-    ----------
-    model : rows of the present design.
-    root : (n, n) R.
-    radius : of the trust region, in scaled variables.
-    """
-    groups = np.unique(model.groups)
-    most = max(int((model.groups == g).sum()) for g in groups)
-    with _LOCK:
-        cone = _cone(model.z.size, groups.size, padded(most, _BLOCK), padded(model.excess.size, _BLOCK))
-        return cone.solve(model, root, radius)
-
-
-@lru_cache(maxsize=32)
-def _cone(n: int, groups: int, rows: int, limited: int) -> _Cone:
-    return _Cone(n, groups, rows, limited)
-
-
-class _Cone(Programme):
-    """The second-order cone programme for n variables, so many rows in each group, so many limited rows.
-
-        minimise   Σ t_g + w + penalty · s
-        subject to aᵢ + gᵢᵀ d ≤ t_g(i)             every competing row i of every scenario, in groups g
-                   bⱼ + hⱼᵀ d ≤ s, s ≥ least       every limited row j, as relative excess over its bound
-                   ‖(√2 R d, w − 1)‖ ≤ w + 1       that is ½ |R d|² ≤ w
-                   ‖d‖ ≤ 1                         trust region
-                   low ≤ d ≤ high                  bounds
-
-    d is the step in scaled variables, in units of the radius, and rows are in the units of
-    `optim.methods.conic`; RᵀR is the convex part of the Hessian of the Lagrangian. With the many scenarios of
-    a mean every scenario is a group of its own; the number of rows in a group is padded, so that a problem is
-    compiled once for each shape and kept for the whole process.
-    """
-
-    def __init__(self, n: int, groups: int, rows: int, limited: int) -> None:
-        super().__init__(n)
-        t, w = cvxpy.Variable(groups), cvxpy.Variable()
-        self._heights, self._slopes = cvxpy.Parameter(groups * rows), cvxpy.Parameter((groups * rows, n))
-        self._rows_each = rows
-        owner = np.repeat(np.eye(groups), rows, axis=0)
-        self._row = self._heights + self._slopes @ self._d <= owner @ t
-        curved = cvxpy.hstack([math.sqrt(2.0) * (self._root @ self._d), w - 1.0])
-        cones = [cvxpy.SOC(w + 1.0, curved), cvxpy.SOC(cvxpy.Constant(1.0), self._d)]
-        self._pose(self._share * cvxpy.sum(t) + w, [self._row, *cones], limited)
-
-    def _fill(self, numbers: Numbers, places: list[Index]) -> Index:
-        spread = np.concatenate([np.resize(mine, self._rows_each) for mine in places])
-        self._heights.value, self._slopes.value = numbers.heights[spread], numbers.slopes[spread]
-        return spread
-
-    def _duals(self) -> Real:
-        return duals_of(self._row)
-
-
 MOST_RESPONSES = 20_000
 USUAL = 200.0  # responses of a usual search; what is left is not known beforehand
-EUCLIDEAN = 2.0
 OVER = {
     Aim.WORST_CASE: "Its peak is the highest of the {count} scenarios so far; others may be worse.",
     Aim.MEAN: "Best by the mean of {count} samples; its peak is the highest of them.",
@@ -167,12 +101,14 @@ class RobustSearch:
         unknown = {key: call for key, call in calls.items() if self._known_outcome(key) is None}
         self._ahead.compute(partial(outcome, self.problem, gradients=gradients), unknown)
 
-    def asking(self, values: Mapping[str, float]) -> Asking:
-        """Return what asks for a design in scenarios."""
-        return Asking(
-            lambda scenario: self.outcome(values, scenario),
-            lambda scenarios: self.ahead((values, scenario) for scenario in scenarios),
-        )
+    def pessimise(
+        self, values: Mapping[str, float], aspect: Aspect, known: Sequence[Scenario], **more: Any
+    ) -> Finding:  # fmt: skip
+        """Return the worst scenario of a design in one aspect; see `optim.robust.worst_case.pessimise`."""
+        return pessimise(
+            partial(self.outcome, values), self.uncertain, aspect, known,
+            ahead=lambda scenarios: self.ahead((values, scenario) for scenario in scenarios), **more,
+        )  # fmt: skip
 
     def _key(self, values: Mapping[str, float], scenario: Scenario, gradients: bool) -> Key:
         place = tuple(values[variable.name] for variable in self.variables)
@@ -252,8 +188,7 @@ class RobustSearch:
         """Return the end of the minimax search over scenarios that keeps so many designs' rows as cuts."""
         return minimax_search(
             lambda there: self.evaluation(there, scenarios), self.variables, begin,
-            lambda evaluation: self.model(evaluation, len(scenarios)), solve=solve_cone, norm=EUCLIDEAN,
-            remembered=remembered,
+            lambda evaluation: self.model(evaluation, len(scenarios)), ball=True, remembered=remembered,
         )  # fmt: skip
 
     def objective(self, local: Local, count: int) -> float:

@@ -93,11 +93,16 @@ class Finding:
 
 
 Ask = Callable[[Scenario], Outcome]
+Ahead = Callable[[Sequence[Scenario]], None]
+
+
+def _one_by_one(_scenarios: Sequence[Scenario]) -> None:
+    """For who asks in another way."""
 
 
 def pessimise(
     ask: Ask, uncertain: UncertainSet, aspect: Aspect, known: Sequence[Scenario], *,
-    besides: Sequence[Scenario] = (), thorough: bool = False,
+    ahead: Ahead = _one_by_one, besides: Sequence[Scenario] = (), thorough: bool = False,
 ) -> Finding:  # fmt: skip
     """Return the worst scenario of a design in one aspect.
 
@@ -107,6 +112,7 @@ def pessimise(
     uncertain : all scenarios.
     aspect : what is maximised.
     known : scenarios to start from.
+    ahead : told of scenarios that will be asked for.
     besides : more scenarios to try, drawn at random.
     thorough : look at the whole set.
 
@@ -116,15 +122,14 @@ def pessimise(
         A response could not be computed.
     """
     finished = uncertain.finite or thorough
-    asking = ask if isinstance(ask, Asking) else Asking(ask, _one_by_one)
     if uncertain.finite:
-        asking.several(list(uncertain.all()))
+        ahead(list(uncertain.all()))
         tried = [_asked(ask, scenario) for scenario in uncertain.all()]
     else:
         tried = []
         for disk in uncertain.disks or (None,):
             mine = [s for s in (*known, *besides) if s.given_disk == disk and uncertain.inside_of(s)]
-            ascent = _Ascent(asking, uncertain, aspect, disk)
+            ascent = _Ascent(ask, ahead, uncertain, aspect, disk)
             tried += ascent.run(mine)
             if thorough:
                 inside = sum(max(map(abs, s.xi)) < 1.0 for s in besides if s in mine)
@@ -143,27 +148,14 @@ def _asked(ask: Ask, scenario: Scenario) -> Outcome:
     return found
 
 
-@dataclass(frozen=True, slots=True)
-class Asking:
-    """How a design is asked for in scenarios: in one, and that several will be asked for."""
-
-    one: Ask
-    several: Callable[[Sequence[Scenario]], None]
-
-    def __call__(self, scenario: Scenario) -> Outcome:
-        """Return the design in a scenario."""
-        return self.one(scenario)
-
-
-def _one_by_one(_scenarios: Sequence[Scenario]) -> None:
-    """For who asks in another way."""
-
-
 class _Ascent:
     """The search of one disk over the unit box or ball."""
 
-    def __init__(self, ask: Asking, uncertain: UncertainSet, aspect: Aspect, disk: Disk | None) -> None:
-        self._ask, self._set, self._aspect, self._disk = ask, uncertain, aspect, disk
+    def __init__(
+        self, ask: Ask, ahead: Ahead, uncertain: UncertainSet, aspect: Aspect, disk: Disk | None
+    ) -> None:
+        self._ask, self._ahead = ask, ahead
+        self._set, self._aspect, self._disk = uncertain, aspect, disk
         self._tried: list[tuple[Real, Outcome]] = []
         self._climbed: list[Real] = []
 
@@ -262,7 +254,7 @@ class _Ascent:
     def _all_at(self, there: Sequence[Real]) -> None:
         """Ask for several places that do not depend on what is found at the others."""
         new = [inside for place in there if not self._tried_at(inside := self._set.inside(place))]
-        self._ask.several([self._set.scenario(place, self._disk) for place in new])
+        self._ahead([self._set.scenario(place, self._disk) for place in new])
         for place in there:
             self._at(place)
 

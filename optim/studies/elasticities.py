@@ -10,6 +10,8 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Mapping
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -72,7 +74,8 @@ def sensitivities(
         scene=here, status=SensitivityStatus.KNOWN if exist else SensitivityStatus.SINGULAR, branch=branch,
         peaks=peaks, rows=rows, band_by_limit=by_limit, left_out=left_out, seconds=0.0,
     )  # fmt: skip
-    return _sorted(found, begun)
+    in_order = tuple(sorted(rows, key=partial(_rank, found)))
+    return replace(found, rows=in_order, seconds=time.perf_counter() - begun)
 
 
 def _differentiable(
@@ -109,16 +112,8 @@ def _rows(
     return tuple(rows), by_limit
 
 
-def _sorted(found: SensitivityResult, begun: float) -> SensitivityResult:
-    """Return the result with what matters most first, of equals what the scene names first."""
-
-    def rank(row: ParameterSensitivity) -> tuple[bool, float]:
-        share = found.peak_elasticities(row)[0]
-        # μ and N0 of a contact matter alike: rounding would put now one first, now the other.
-        return math.isnan(share), -float(f"{abs(share):.6g}") if math.isfinite(share) else 0.0
-
-    return SensitivityResult(
-        scene=found.scene, status=found.status, branch=found.branch, peaks=found.peaks,
-        rows=tuple(sorted(found.rows, key=rank)), band_by_limit=found.band_by_limit, left_out=found.left_out,
-        seconds=time.perf_counter() - begun,
-    )  # fmt: skip
+def _rank(found: SensitivityResult, row: ParameterSensitivity) -> tuple[bool, float]:
+    """Return what brings first what matters most, of equals what the scene names first."""
+    share = found.peak_elasticities(row)[0]
+    # μ and N0 of a contact matter alike: rounding would put now one first, now the other.
+    return math.isnan(share), -float(f"{abs(share):.6g}") if math.isfinite(share) else 0.0

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -81,12 +80,6 @@ class Outputs:
             html.save(draw(), self.picture, data)
         if self.file is not None:
             save(data, self.file)
-
-
-def command_named(name: str) -> Callable[..., None]:
-    """Return the command of a study that comes with the service."""
-    study: type[Study] = import_module(f"service.jobs.studies.{name.replace('-', '_')}").STUDY
-    return command_of(study)
 
 
 def add_others(group: TyperGroup) -> None:

@@ -30,7 +30,7 @@ class CommandEntry:
         'Module of `service.cli` and function, ``"commands.scenes.scenes"``; `STUDY` for that of a study.',
     ]
     summary: Annotated[str, "The first line of the function's docstring, which `--help` shows."]
-    keyed: Annotated[bool, "It talks to a service, and takes ``--key-file``."] = False
+    keyed: Annotated[bool, "It talks to a service, and takes ``--url`` and ``--key-file``."] = False
     group: Annotated[bool, "What stands there is the class of a group, not a function."] = False
 
     def command(self) -> Deferred:
@@ -40,9 +40,10 @@ class CommandEntry:
     def function(self) -> Any:
         """Import the module and return what stands there."""
         if self.home == STUDY:
-            from service.cli.study_command import command_named
+            from service.cli.study_command import command_of
+            from service.jobs.study import study_named
 
-            return command_named(self.name)
+            return command_of(study_named(self.name))
         module, _, name = self.home.rpartition(".")
         return on_demand(f"service.cli.{module}:{name}")
 
@@ -253,7 +254,7 @@ COMMANDS = {
         ),
         CommandEntry(
             "report", "commands.report.report",
-            "Write the report of a design or an identification that the service computed.",
+            "Write the report of a design or an identification that the service computed.", keyed=True,
         ),
         CommandEntry(
             "check-proof", "commands.certificates.check_proof",
@@ -273,7 +274,7 @@ COMMANDS = {
             "Print what a job computed, or list the stored designs.", keyed=True,
         ),
         CommandEntry(
-            "mcp", "commands.client.mcp.mcp", "Let a language model use a running service.", keyed=True
+            "mcp", "commands.client.jobs.mcp", "Let a language model use a running service.", keyed=True
         ),
         CommandGroup("runs", "Name, find, compare and delete runs of a service.", RUNS),
         CommandGroup("projects", "Gather runs in projects.", PROJECTS),

@@ -79,7 +79,7 @@ class Client(Workbench):
     """
 
     def __init__(self, base_url: str, timeout: float = 30.0, *, key: str | None = None) -> None:
-        self._timeout = timeout
+        self.base_url, self._timeout = base_url, timeout
         self._transport = Transport(base_url, timeout, key)
 
     def __enter__(self) -> Self:

@@ -11,7 +11,7 @@ import logging
 import multiprocessing as mp
 import threading
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from multiprocessing.connection import wait
 from typing import Any
 
@@ -20,10 +20,10 @@ log = logging.getLogger("stickslip.notices")
 _CHANNEL = "stickslip"
 _SEND = "SELECT pg_notify(%s, notice) FROM unnest(%s::text[]) AS notice"
 _AGAIN_SECONDS = 2.0
-_ACCEPTED, _ENDED, _CANCEL, _WATCH, _LIVE = "accepted", "ended", "cancel", "watch", "live"
-_USED = "used"
-
-OfJob = Callable[[str], None]
+ACCEPTED, ENDED, CANCEL = "accepted", "ended", "cancel"
+"""A job waits; one ended, or went back to the queue; the cancel of a running one was asked for."""
+WATCH, LIVE, USED = "watch", "live", "used"
+"""A job is watched here; one that runs here got this far; owners use so much here."""
 
 
 class Notices:
@@ -35,23 +35,15 @@ class Notices:
         Opens a connection of psycopg that commits by itself.
     accepted : callable
         Called when a job waits that another service accepted, and when notices may have been missed.
-    ended : callable
-        Called with the id of a job that ended at another service.
-    cancel : callable
-        Called with the id of a running job whose cancel was asked for at another service.
-    watched, live : callable
-        Called with what another service says of a job that it watches, and of one that it runs.
-    used : callable
-        Called with what another service says of what owners use there.
+    hear : mapping
+        What is called with the text of a notice of another service, by its word.
     """
 
     def __init__(
-        self, connect: Callable[[], Any], *, accepted: Callable[[], None], ended: OfJob, cancel: OfJob,
-        watched: OfJob, live: OfJob, used: OfJob,
+        self, connect: Callable[[], Any], accepted: Callable[[], None],
+        hear: Mapping[str, Callable[[str], None]],
     ) -> None:  # fmt: skip
-        self._connect = connect
-        self._accepted = accepted
-        self._of_job = {_ENDED: ended, _CANCEL: cancel, _WATCH: watched, _LIVE: live, _USED: used}
+        self._connect, self._accepted, self._hears = connect, accepted, hear
         self._waiting: deque[str] = deque()
         self._wake_reader, self._wake_writer = mp.get_context("spawn").Pipe(duplex=False)
         self._awake = threading.Lock()
@@ -71,32 +63,9 @@ class Notices:
         if self._thread.ident is not None:
             self._thread.join(5.0)
 
-    def tell_accepted(self) -> None:
-        """A job waits."""
-        self._tell(_ACCEPTED)
-
-    def tell_ended(self, job_id: str) -> None:
-        """A job ended, or went back to the queue."""
-        self._tell(f"{_ENDED}:{job_id}")
-
-    def tell_cancel(self, job_id: str) -> None:
-        """The cancel of a running job was asked for."""
-        self._tell(f"{_CANCEL}:{job_id}")
-
-    def tell_watch(self, text: str) -> None:
-        """A job is watched here."""
-        self._tell(f"{_WATCH}:{text}")
-
-    def tell_live(self, text: str) -> None:
-        """A job that runs here got this far."""
-        self._tell(f"{_LIVE}:{text}")
-
-    def tell_used(self, text: str) -> None:
-        """Owners use so much here."""
-        self._tell(f"{_USED}:{text}")
-
-    def _tell(self, notice: str) -> None:
-        self._waiting.append(notice)
+    def tell(self, word: str, text: str = "") -> None:
+        """Tell the other services."""
+        self._waiting.append(f"{word}:{text}" if text else word)
         self._wake()
 
     def _wake(self) -> None:
@@ -146,8 +115,8 @@ class Notices:
     def _take(self, payload: str, sender: int) -> None:
         if sender == self._own:
             return
-        word, _, job_id = payload.partition(":")
-        if word == _ACCEPTED:
+        word, _, text = payload.partition(":")
+        if word == ACCEPTED:
             self._accepted()
-        elif word in self._of_job:
-            self._of_job[word](job_id)
+        elif word in self._hears:
+            self._hears[word](text)

@@ -11,6 +11,7 @@ import enum
 import inspect
 from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
+from importlib import import_module
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol
 
 from pydantic import BaseModel, ConfigDict
@@ -117,17 +118,18 @@ class Answer(NamedTuple):
 class Study(SceneRequest):
     """Root of the studies: the keys are fields, an alias is how bodies and options call one.
 
-    A subclass says its NAME, the FUNCTION that computes (``"solver:track_peak"``), the model of its RESULT;
-    which arguments of the function are GROUPED, objects of a class whose fields are keys (``{"search":
-    "solver:WorstSearch"}``); for people what it SHOWS, by which function a result is TOLD, which SWEEPS it
-    stores, what its progress has COUNTED; of its picture what makes the FIGURE, and the key that is EMPTY
-    where there is none, with what is said then. Its docstring is the help of the command, the first line of
-    which is its summary.
+    A subclass says its NAME, EXAMPLES of bodies, the FUNCTION that computes (``"solver:track_peak"``), the
+    model of its RESULT; which arguments of the function are GROUPED, objects of a class whose fields are keys
+    (``{"search": "solver:WorstSearch"}``); for people what it SHOWS, by which function a result is TOLD,
+    which SWEEPS it stores, what its progress has COUNTED; of its picture what makes the FIGURE, and the key
+    that is EMPTY where there is none, with what is said then. Its docstring is the help of the command, the
+    first line of which is its summary.
     """
 
     model_config = ConfigDict(validate_by_alias=True, defer_build=True)
 
     NAME: ClassVar[str]
+    EXAMPLES: ClassVar[tuple[Json, ...]]
     FUNCTION: ClassVar[str]
     RESULT: ClassVar[type[BaseModel] | Callable[[], type[BaseModel]]]
     TOLD: ClassVar[str] = ""
@@ -137,6 +139,12 @@ class Study(SceneRequest):
     GROUPED: ClassVar[Mapping[str, str]] = {}
     EMPTY: ClassVar[tuple[str, str]]
     FIGURE: ClassVar[str]
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **_config: Any) -> None:
+        """Let the schema of the body have the examples."""
+        if "EXAMPLES" in vars(cls):
+            cls.model_config["json_schema_extra"] = {"examples": [dict(one) for one in cls.EXAMPLES]}
 
     def issues(self, _scene: Scene) -> list[Issue]:
         """Return what is wrong for the scene, beyond the types of the keys."""
@@ -262,3 +270,10 @@ def resolve(request: Study, source: SceneSource) -> Resolved:
     scene = resolve_scene(request, source)
     require(request.issues(scene) or request.sizes(scene))
     return resolved(scene, **request.spec(scene))
+
+
+def study_named(name: str) -> type[Study]:
+    """Return a study that comes with the service; its module is called as it is, and has it alone."""
+    module = import_module(f"service.jobs.studies.{name.replace('-', '_')}")
+    made: list[type[Study]] = [one for one in vars(module).values() if getattr(one, "NAME", "") == name]
+    return made[-1]

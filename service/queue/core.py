@@ -9,13 +9,14 @@ import threading
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from importlib.metadata import version
 from queue import Empty, SimpleQueue
 from typing import Any
 
 from service.auth.allowances import Shared, Storage, highest_priority, share
 from service.auth.callers import KEYLESS, Caller
-from service.db import revisions
+from service.db import pg_notify, revisions
 from service.db.clock import Clock
 from service.db.engine import Database
 from service.db.models import JobState
@@ -51,7 +52,7 @@ from service.settings import traces
 from service.settings.kinds import registry_of
 from service.settings.settings import Settings
 from service.uploads.uploads import Uploads
-from service.workers.answers import AnswerLimits, Answers
+from service.workers.answers import Answers
 from service.workers.executors import executor_of
 from service.workers.preview_workers import Previews
 
@@ -84,15 +85,6 @@ class WholeDesign:
     row: DesignRecord
     job: JobRow
     result: dict[str, Any]
-
-
-def _answer_limits(settings: Settings) -> AnswerLimits:
-    return AnswerLimits(
-        workers=settings.answer_workers,
-        seconds=settings.answer_seconds,
-        memory_bytes=settings.answer_memory_bytes,
-        budget_seconds=settings.answer_budget_seconds,
-    )
 
 
 class Service:
@@ -130,7 +122,7 @@ class Service:
         self.lanes = Lanes(settings.database_seconds, self.meters)
         self.previews = Previews(settings.preview_seconds, memory_bytes=settings.answer_memory_bytes)
         self.answers = Answers(
-            answering.runs(self.registry, self.previews.registry), answering.warm_up, _answer_limits(settings)
+            answering.runs(self.registry, self.previews.registry), answering.warm_up, settings
         )
         self.queue = JobQueue(
             self.jobs, executor_of(settings, self.registry), settings, self.waiters, self.meters
@@ -144,19 +136,20 @@ class Service:
 
     def _make_notices(self) -> Notices:
         made = Notices(
-            self.database.own_connection,
-            accepted=self.queue.wake,
-            ended=self.waiters.ended_elsewhere,
-            cancel=self.queue.cancel_running,
-            watched=lambda text: elsewhere.watched(text),
-            live=lambda text: elsewhere.told(text),
-            used=lambda text: together.heard(text),
-        )
-        self._together = together = Together(made.tell_used)
+            self.database.own_connection, self.queue.wake,
+            {
+                pg_notify.ENDED: self.waiters.ended_elsewhere, pg_notify.CANCEL: self.queue.cancel_running,
+                pg_notify.WATCH: lambda text: elsewhere.watched(text),
+                pg_notify.LIVE: lambda text: elsewhere.told(text),
+                pg_notify.USED: lambda text: together.heard(text),
+            },
+        )  # fmt: skip
+        self._together = together = Together(partial(made.tell, pg_notify.USED))
         self.share(self.lanes.shared() | self.answers.shared())
-        elsewhere = Elsewhere(self.waiters, self.queue.live, made.tell_watch, made.tell_live)
+        ask, tell = partial(made.tell, pg_notify.WATCH), partial(made.tell, pg_notify.LIVE)
+        elsewhere = Elsewhere(self.waiters, self.queue.live, ask, tell)
         self._elsewhere = elsewhere
-        self.waiters.relay = made.tell_ended
+        self.waiters.relay = partial(made.tell, pg_notify.ENDED)
         return made
 
     def share(self, limits: Mapping[str, Shared]) -> None:
@@ -291,7 +284,7 @@ class Service:
         if row.state is JobState.ACCEPTED:
             self.queue.wake()
             if self._notices is not None:
-                self._notices.tell_accepted()
+                self._notices.tell(pg_notify.ACCEPTED)
         return row, inserted
 
     def _require_priority(self, request: JobRequest, caller: Caller) -> None:
@@ -355,7 +348,7 @@ class Service:
         if row.state is JobState.RUNNING:
             self.queue.cancel_running(job_id)
             if self._notices is not None:
-                self._notices.tell_cancel(job_id)
+                self._notices.tell(pg_notify.CANCEL, job_id)
         else:
             self.waiters.ended(job_id)
         return row

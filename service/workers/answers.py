@@ -8,8 +8,7 @@ import logging
 import signal
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 from service.auth.allowances import Buckets, Shared
 from service.errors import (
@@ -26,6 +25,9 @@ from service.workers.process_limits import ProcessLimits
 from service.workers.warm_pool import WarmPool, WarmTask
 from solver.errors import Issue
 
+if TYPE_CHECKING:
+    from service.settings.settings import Settings
+
 log = logging.getLogger("stickslip.answers")
 
 MOST_WAITING = 64
@@ -41,21 +43,6 @@ _WITHOUT_MEMORY = ("SIGABRT", "SIGSEGV", "SIGBUS")
 """How libraries end a process that gets no memory."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class AnswerLimits:
-    """What may be computed for answers."""
-
-    workers: Annotated[int, "Processes."]
-    seconds: Annotated[float, "Processor time of one computation [s]."]
-    memory_bytes: Annotated[int, "Memory of one computation."]
-    budget_seconds: Annotated[int, "Processor time of an owner in a minute [s]."]
-
-    @property
-    def of_an_owner(self) -> int:
-        """Computations of one owner at a time: one process is left for the others."""
-        return max(1, self.workers - 1)
-
-
 class Answers(WarmPool):
     """Computes answers.
 
@@ -65,16 +52,18 @@ class Answers(WarmPool):
         The function of each task; sent to the processes by name.
     warm_up : callable
         Called in every process before it takes a task; sent by name.
-    limits : AnswerLimits
+    settings : Settings
         What may be computed.
     """
 
-    def __init__(self, runs: Mapping[str, RunOn], warm_up: WarmUp, limits: AnswerLimits) -> None:
+    def __init__(self, runs: Mapping[str, RunOn], warm_up: WarmUp, settings: Settings) -> None:
         super().__init__(
-            runs, warm_up, workers=limits.workers, grace_seconds=_GRACE_SECONDS,
-            limits=ProcessLimits(memory_bytes=limits.memory_bytes, processor_seconds=limits.seconds),
+            runs, warm_up, workers=settings.answer_workers, grace_seconds=_GRACE_SECONDS,
+            limits=ProcessLimits(
+                memory_bytes=settings.answer_memory_bytes, processor_seconds=settings.answer_seconds
+            ),
         )  # fmt: skip
-        self._limits = limits
+        self._settings = settings
         self._budgets = Buckets()
         self._ended_one: set[str] = set()
 
@@ -101,9 +90,9 @@ class Answers(WarmPool):
         QueueFullError
             If too many wait, or for too long.
         """
-        wait = self._budgets.empty(owner, self._limits.budget_seconds)
+        wait = self._budgets.empty(owner, self._settings.answer_budget_seconds)
         if wait > 0.0:
-            most = f"{self._limits.budget_seconds} s of processor time a minute"
+            most = f"{self._settings.answer_budget_seconds} s of processor time a minute"
             detail = f"what was computed for answers took more than {most}: ask again in {wait:.0f} s"
             raise TooManyRequestsError(detail, retry_after=max(1, round(wait)))
         asked = WarmTask.of(task, spec, owner)
@@ -131,11 +120,12 @@ class Answers(WarmPool):
 
     def _next(self) -> WarmTask | None:
         """The first, but of each owner no more at a time than leaves a process for another."""
+        most = max(1, self._settings.answer_workers - 1)
         busy = Counter(asked.owner for asked in self._running.values())
         # While the process that an owner ended starts anew, the other one is not for the same owner.
-        whole = self.ready >= self._limits.workers
+        whole = self.ready >= self._settings.answer_workers
         for asked in self._waiting:
-            if busy[asked.owner] < self._limits.of_an_owner and (whole or asked.owner not in self._ended_one):
+            if busy[asked.owner] < most and (whole or asked.owner not in self._ended_one):
                 return asked
         return None
 
@@ -151,11 +141,11 @@ class Answers(WarmPool):
             told = (
                 json.loads(text) if len(text) < _INLINE_BYTES else await asyncio.to_thread(json.loads, text)
             )
-            self._budgets.spend(owner, self._limits.budget_seconds, told["seconds"])
+            self._budgets.spend(owner, self._settings.answer_budget_seconds, told["seconds"])
             return _accepted(told)
         if isinstance(outcome, Stopped):
             raise QueueFullError("the service stops", _RETRY_SECONDS)
-        self._budgets.spend(owner, self._limits.budget_seconds, self._limits.seconds)
+        self._budgets.spend(owner, self._settings.answer_budget_seconds, self._settings.answer_seconds)
         if isinstance(outcome, Lost):
             raise self._beyond(outcome, about)
         failure = outcome.failure
@@ -167,7 +157,7 @@ class Answers(WarmPool):
         """A process that ended did so at one of its limits, or at what it was given."""
         ended_by = "" if lost.signal is None else signal.Signals(lost.signal).name
         if ended_by in _AT_THE_TIME:
-            most = f"{self._limits.seconds:g} s of processor time"
+            most = f"{self._settings.answer_seconds:g} s of processor time"
             return _too_costly(about, most)
         log.warning("an answer was lost: %s", lost.reason)
         if ended_by in _WITHOUT_MEMORY:
@@ -175,7 +165,7 @@ class Answers(WarmPool):
         return QueueFullError(f"the answer was lost: {lost.reason}", _RETRY_SECONDS)
 
     def _too_much_memory(self, about: str) -> InvalidRequestError:
-        most = f"{self._limits.memory_bytes / 1e6:.0f} MB of memory"
+        most = f"{self._settings.answer_memory_bytes / 1e6:.0f} MB of memory"
         return _too_costly(about, most)
 
 

@@ -12,24 +12,25 @@ import itertools
 import logging
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 from importlib.metadata import version
 from queue import SimpleQueue
-from typing import Any
+from typing import Annotated, Any
 
 from distributed import Future, KilledWorker, Security
 
 from service.db.repositories import Attempt
 from service.errors import UnknownKindError
+from service.jobs.checkpoints import KeptPieces
 from service.jobs.outputs import Pace
 from service.jobs.registry import Registry
 from service.workers.base import ExecutorStatus, Failed, Finished, Lost, Outcome, Sink, Stopped
 from service.workers.cluster import Cluster, answer_of
 from service.workers.process_limits import UNLIMITED, ProcessLimits
 from service.workers.tasks import Order, TaskAnswer
-from service.workers.work import Flight, Work
-from service.workers.worker import Task, failure_of
+from service.workers.worker import failure_of
 
 log = logging.getLogger("stickslip.executor")
 
@@ -37,6 +38,55 @@ _WRITERS = 4
 _LOSSES = 1  # of a divided job, that cost no attempt
 
 _tokens = itertools.count(1)
+
+
+class Work:
+    """An attempt, and what is known of it.
+
+    Parameters
+    ----------
+    attempt : Attempt
+        What is computed.
+    losses : int
+        How often its worker may die without that it costs the attempt.
+    """
+
+    def __init__(self, attempt: Attempt, losses: int) -> None:
+        self.attempt = attempt
+        self.saved = attempt.saved
+        self.told = 0  # points of its branch that the queue knows
+        self.pending = True
+        self._losses = losses
+
+    def go_on(self, kept: Sequence[KeptPieces]) -> None:
+        """Order again what stopped on its way, behind what it kept."""
+        for one in kept:
+            before = () if one.anew else self.saved
+            known = {piece.part: piece for piece in (*before, *one.pieces)}
+            self.saved = tuple(known[part] for part in sorted(known))
+        self.pending = True
+
+    def may_lose(self) -> bool:
+        """Count a loss; whether the attempt can bear it."""
+        self._losses -= 1
+        return self._losses >= 0
+
+
+@dataclass(slots=True, kw_only=True)
+class Flight:
+    """An order on its way."""
+
+    work: Work
+    future: Future
+    begun: Annotated[int, "What its worker said when it began; 0 before."] = 0
+    worker: Annotated[str, "The address of that."] = ""
+    threads: Annotated[int, "How many orders that computes at a time."] = 0
+    deadline: Annotated[float, "When it is to have ended, once it was let go (monotonic) [s]."] = 0.0
+
+    def leaving(self, deadline: float) -> Flight:
+        """This one, let go."""
+        self.deadline = deadline
+        return self
 
 
 class DaskExecutor:
@@ -108,7 +158,8 @@ class DaskExecutor:
         if known:
             self._later(self._fill)
         else:
-            self._later(self._end, work, Failed(failure_of(_task(attempt), UnknownKindError(attempt.kind))))
+            error = UnknownKindError(attempt.kind)
+            self._later(self._end, work, Failed(failure_of(attempt.job_id, attempt.kind, error)))
 
     def stop_attempt(self, attempt: Attempt) -> None:
         """Let an attempt go; its workers see that it is not wanted any more."""
@@ -336,8 +387,3 @@ class DaskExecutor:
             self._leaving.clear()
         for work in running:
             self._later(self._end, work, Lost(reason))
-
-
-def _task(attempt: Attempt) -> Task:
-    """An attempt as messages about it name it."""
-    return Task(0, attempt.job_id, attempt.kind, attempt.spec)

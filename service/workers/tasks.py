@@ -30,7 +30,6 @@ from service.workers.spreading import BatchAnswer, Spreading, helped
 from service.workers.worker import (
     THREAD_LIMITS,
     Report,
-    Task,
     Throttle,
     checked,
     failure_of,
@@ -244,7 +243,7 @@ def compute(order: Order) -> bytes:
     try:
         return pickle.dumps(answer)
     except (pickle.PicklingError, TypeError, AttributeError) as error:
-        return pickle.dumps(TaskAnswer(failure=failure_of(_task(order), error)))
+        return pickle.dumps(TaskAnswer(failure=failure_of(order.job_id, order.kind, error)))
 
 
 def _answer(order: Order) -> TaskAnswer:
@@ -292,16 +291,11 @@ def _computed(order: Order, threads: int, progress: Throttle, stop: _OrderStop) 
         return TaskAnswer(failure=done.failure, retry=done.retry)
     except Exception as error:  # noqa: BLE001 - the boundary: whatever it is, the job must hear of it
         if not stop.obeyed:
-            return TaskAnswer(failure=failure_of(_task(order), error))
+            return TaskAnswer(failure=failure_of(order.job_id, order.kind, error))
     if not stop.obeyed:
         return TaskAnswer(output=output)
     kept.flush()
     return TaskAnswer(kept=tuple(stop.kept))
-
-
-def _task(order: Order) -> Task:
-    """An order as messages about it name it."""
-    return Task(0, order.job_id, order.kind, order.spec)
 
 
 def _warm(warm_up: WarmUp, limits: ProcessLimits) -> None:

@@ -323,7 +323,7 @@ def main(
         try:
             connection.send(Reply(task.token, done))
         except (pickle.PicklingError, TypeError, AttributeError) as error:
-            connection.send(Reply(task.token, Done(failure=failure_of(task, error))))
+            connection.send(Reply(task.token, Done(failure=failure_of(task.job_id, task.kind, error))))
 
 
 def _run_errand(errand: Errand, stop: _Stop, limits: ProcessLimits) -> bytes | None:
@@ -378,7 +378,7 @@ def _compute(
     except MemoryError as error:
         return out_of_memory(error, limits)
     except Exception as error:  # noqa: BLE001 - the boundary: whatever it is, the job must hear of it
-        return _stopped(kept) if stop.obeyed else Done(failure=failure_of(task, error))
+        return _stopped(kept) if stop.obeyed else Done(failure=failure_of(task.job_id, task.kind, error))
     return _stopped(kept) if stop.obeyed else Done(output=output)
 
 
@@ -402,7 +402,7 @@ def checked(output: JobOutput) -> JobOutput:
     return replace(output, result={}, encoded=encoded, figures=told, alone=alone(output.result))
 
 
-def failure_of(task: Task, error: Exception) -> JobFailure:
+def failure_of(job: str, kind: str, error: Exception) -> JobFailure:
     """A deterministic error, as the job keeps it."""
     if isinstance(error, SceneError):
         return JobFailure(kind=FailureKind.SCENE, detail=str(error), issues=error.issues)
@@ -410,6 +410,6 @@ def failure_of(task: Task, error: Exception) -> JobFailure:
         return JobFailure(kind=FailureKind.SETTING, detail=str(error))
     if isinstance(error, SolverError):
         return JobFailure(kind=FailureKind.GOAL, detail=str(error))
-    log.error("job %s (%s) met an unexpected error", task.job_id, task.kind, exc_info=error)
+    log.error("job %s (%s) met an unexpected error", job, kind, exc_info=error)
     detail = f"unexpected {type(error).__name__}: {error}"
     return JobFailure(kind=FailureKind.INTERNAL, detail=f"{detail}; the service's log has the details")

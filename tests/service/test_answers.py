@@ -17,9 +17,12 @@ from service.auth.allowances import Buckets
 from service.errors import InvalidRequestError, QueueFullError, TooManyRequestsError
 from service.jobs.answering import Answering, Words
 from service.jobs.registry import SceneSource, no_warm_up
-from service.workers.answers import AnswerLimits, Answers
+from service.settings.settings import Settings
+from service.workers.answers import Answers
 
-LIMITS = AnswerLimits(workers=2, seconds=0.5, memory_bytes=64 * 1024**2, budget_seconds=1000)
+LIMITS = Settings(
+    answer_workers=2, answer_seconds=0.5, answer_memory_bytes=64 * 1024**2, answer_budget_seconds=1000
+)
 
 
 def turn(words: Words, _source: SceneSource) -> dict[str, Any]:
@@ -106,7 +109,7 @@ def test_matrices_that_are_kept_make_room_for_others(answers: Answers) -> None:
 
 
 def test_one_owner_leaves_a_process_for_another(answers: Answers) -> None:
-    until(lambda: answers.ready == LIMITS.workers)
+    until(lambda: answers.ready == LIMITS.answer_workers)
     mine = [("turn", {"seconds": 0.3}, "eve")] * 3
     *first, other = [one["found"] for one in together(answers, *mine, ("turn", {"seconds": 0.0}, "ann"))]
     first.sort(key=lambda one: one["from"])
@@ -117,7 +120,7 @@ def test_one_owner_leaves_a_process_for_another(answers: Answers) -> None:
 
 def test_who_ended_a_process_waits_until_there_is_another(answers: Answers) -> None:
     """Else one who does nothing else would end both, in turn."""
-    until(lambda: answers.ready == LIMITS.workers)
+    until(lambda: answers.ready == LIMITS.answer_workers)
 
     async def ask() -> tuple[Any, bool]:
         with pytest.raises(InvalidRequestError):
@@ -148,7 +151,9 @@ def test_a_budget_that_is_used_up_fills_again() -> None:
 @pytest.mark.long
 def test_who_has_used_up_the_budget_is_told_when_to_ask_again() -> None:
     poor = Answers(
-        RUNS, no_warm_up, AnswerLimits(workers=1, seconds=1.5, memory_bytes=2**26, budget_seconds=1)
+        RUNS,
+        no_warm_up,
+        Settings(answer_workers=1, answer_seconds=1.5, answer_memory_bytes=2**26, answer_budget_seconds=1),
     )
     try:
         first, second, other = [

@@ -11,6 +11,7 @@ from contextlib import ExitStack, closing
 from datetime import timedelta
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import psycopg
 import pytest
@@ -18,7 +19,7 @@ from launch import free_port
 from postgresql_cluster import Cluster, binaries
 from private_kinds import PRIVATE
 from service_helpers import PATIENCE, pids, settings_of, until
-from sqlalchemy import column, func, make_url, select, text, update
+from sqlalchemy import ColumnElement, column, func, make_url, select, text, update
 
 from service.auth.callers import KEYLESS
 from service.cli import main
@@ -183,13 +184,17 @@ def test_a_connection_that_the_server_ended_while_it_lay_idle_is_replaced(url: s
     """Its next use finds that the server said something, and asks for another one."""
     with closing(Database(url, connections=1)) as database, closing(Database(url)) as other:
         jobs = JobRepository(database)
+        mine = text("datname = current_database() AND pid <> pg_backend_pid()")
+
+        def asked(what: ColumnElement[Any]) -> list[Any]:
+            query = select(what).select_from(text("pg_stat_activity")).where(mine)
+            with other.writing() as connection:
+                return list(connection.execute(query).scalars())
+
         for read in (partial(jobs.get, "none"), jobs.page):
             assert not read()
-            with other.writing() as connection:
-                pid = func.pg_terminate_backend(column("pid"))
-                mine = select(pid).select_from(text("pg_stat_activity"))
-                mine = mine.where(text("datname = current_database() AND pid <> pg_backend_pid()"))
-                assert True in connection.execute(mine).scalars().all()
+            assert True in asked(func.pg_terminate_backend(column("pid")))
+            until(lambda: not asked(column("pid")))  # to be told to end is not to have ended
             assert not read()
 
 

@@ -23,7 +23,7 @@ def robust(found: Json) -> Iterator[Block]:
     if sides:
         for path in sides[0][1]["values"]:
             rows.append((path, *(parameter(path, side["values"][path]) for _, side in sides)))
-        rows += [(name, *(show(side) for _, side in sides)) for name, show in _LINES]
+        rows += [(name, *(show(side) for _, side in sides)) for name, show in SIDE_LINES]
     aim = found["aim"] if found["quantile"] is None else f"{100.0 * found['quantile']:g} % {found['aim']}"
     title = f"Robust damper of {found['scene']}, {aim}"
     columns = ("", *(f"{name} optimum" for name, _ in sides))
@@ -80,11 +80,6 @@ def uncertain_rows(found: Json) -> list[tuple[str, str]]:
     return said
 
 
-def side_lines() -> tuple[tuple[str, Callable[[Json], str]], ...]:
-    """What is said of each optimum: a name, and how to say it."""
-    return _LINES
-
-
 def _length(value: float | None) -> str:
     return _UNKNOWN if value is None else units.length(value)
 
@@ -94,7 +89,7 @@ def _quantile(side: Json, share: float) -> str:
     return quantile_words(found[0], "peak", "samples", units.length) if found else _UNKNOWN
 
 
-_LINES: tuple[tuple[str, Callable[[Json], str]], ...] = (
+SIDE_LINES: tuple[tuple[str, Callable[[Json], str]], ...] = (
     ("peak, nothing uncertain", lambda side: _length(side["peak"]["value"])),
     ("worst peak", lambda side: _length(None if side["worst"] is None else side["worst"]["peak"])),
     ("in the scenario", lambda side: "" if side["worst"] is None else side["worst"]["scenario"]["words"]),

@@ -166,7 +166,7 @@ class _SceneTables:
     def table(self, between: list[float], *, bare: bool = False) -> dict[str, Any]:
         """All tables; bare without contacts, which do not move natural frequencies."""
         of = self.read.of
-        order = {} if of is None or of.engine_order is None else {"engine_order": of.engine_order}
+        order = {} if of is None else {"engine_order": of.engine_order}
         forced = self.excitation.get("dof") or next(iter(self.excitation["forces"]))
         return {
             "name": re.sub(r"[^A-Za-z0-9_-]", "-", self.target.stem)[:100],

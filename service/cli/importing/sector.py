@@ -6,7 +6,7 @@ import math
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from service.cli.failures import refused
 from service.cli.options.inputs import relative
@@ -23,44 +23,18 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DiskOptions:
-    """What the options say of the disk.
-
-    Attributes
-    ----------
-    sectors : int
-    low, high : str or None
-        A set of the deck, or numbers of nodes with commas; both None: found by position.
-    nodes : Path or None
-        The deck.
-    axis : (3,) list
-    pair_by : str
-    tolerance : float or None
-        In the units of the deck.
-    engine_order : int
-    """
+    """What the options say of the disk."""
 
     sectors: int
-    low: str | None
-    high: str | None
-    nodes: Path | None
-    axis: list[float]
-    pair_by: str
-    tolerance: float | None
     engine_order: int
+    deck: Path | None
+    axis: list[float]
+    cyclic: Annotated[dict[str, object], "What the table [structure.cyclic] says beside axis and deck."]
 
     def joined(self, target: Path) -> dict[str, object]:
         """The table [structure.cyclic] of a scene at `target`."""
-        table: dict[str, object] = {"axis": self.axis}
-        for key, text in (("low", self.low), ("high", self.high)):
-            if text is not None:
-                table[key] = _nodes(text)
-        if self.nodes is not None:
-            table["nodes"] = relative(self.nodes, target)
-        if self.pair_by != "position":
-            table["pair_by"] = self.pair_by
-        if self.tolerance is not None:
-            table["tolerance"] = self.tolerance
-        return table
+        nodes = {} if self.deck is None else {"nodes": relative(self.deck, target)}
+        return {"axis": self.axis, **self.cyclic, **nodes}
 
 
 def _nodes(text: str) -> str | list[int]:
@@ -91,10 +65,16 @@ def disk(asked: ImportOptions, deck: Path | None) -> DiskOptions | None:
         raise InputError(f"`--sectors` must be >= 1, got {asked.sectors}")
     if (asked.low is None) != (asked.high is None):
         raise InputError("`--low` and `--high` go together, or are both left out (then found by position)")
+    cyclic: dict[str, object] = {}
+    if asked.low is not None and asked.high is not None:
+        cyclic |= {"low": _nodes(asked.low), "high": _nodes(asked.high)}
+    if asked.pair_by != "position":
+        cyclic["pair_by"] = asked.pair_by
+    if asked.tolerance is not None:
+        cyclic["tolerance"] = asked.tolerance
+    order = 1 if asked.engine_order is None else asked.engine_order
     return DiskOptions(
-        sectors=asked.sectors, low=asked.low, high=asked.high, nodes=deck, axis=_axis(asked.axis),
-        pair_by=asked.pair_by, tolerance=asked.tolerance,
-        engine_order=1 if asked.engine_order is None else asked.engine_order,
+        sectors=asked.sectors, engine_order=order, deck=deck, axis=_axis(asked.axis), cyclic=cyclic
     )  # fmt: skip
 
 
@@ -243,12 +223,12 @@ def found_by_position(of: DiskOptions | None) -> list[str]:
     """What to know of boundaries that were not named."""
     if of is None:
         return []
-    if of.nodes is None:
+    if of.deck is None:
         return [
             "there is no deck: the rows are taken to be along the global axes; if nodes have frames of their "
             "own (GRID field 7, NBLOCK angles, *TRANSFORM), give it with --nodes"
         ]
-    if of.low is not None:
+    if "low" in of.cyclic:
         return []
     return [
         "the boundaries were found by position: faces that only touch the next sector, as of shrouds, lie "

@@ -10,14 +10,16 @@ import functools
 import inspect
 import os
 from collections.abc import Callable, Iterable
-from contextvars import ContextVar
-from functools import wraps
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
+from service.cli.options import shared as options
 from service.errors import InputError
+
+if TYPE_CHECKING:
+    from service.client.client import Client
 
 _Settings = TypeVar("_Settings")
 Command = Callable[..., None]
@@ -66,34 +68,44 @@ KeyFile = Annotated[
     ),
 ]
 
-_file: ContextVar[str | None] = ContextVar("key file", default=None)
-
 
 def keyed(command: Command) -> Command:
-    """The command with the option ``--key-file``; `given_key` reads it."""
+    """The command with the options ``--url`` and ``--key-file``; a client of that service is its `client`."""
 
-    @wraps(command)
-    def with_key(*args: object, key_file: str | None = None, **kwargs: object) -> None:
-        token = _file.set(key_file)
-        try:
-            command(*args, **kwargs)
-        finally:
-            _file.reset(token)
+    @functools.wraps(command)
+    def with_client(*, url: str, key_file: str | None, **given: Any) -> None:
+        with client_of(url, key_file) as client:
+            command(client=client, **given)
 
-    return with_parameters(with_key, [*parameters_of(command), keyword("key_file", KeyFile, None)])
+    own = inspect.signature(command, eval_str=True, locals={"Client": None}).parameters.values()
+    listed = [one for one in own if one.name != "client"]
+    where = [keyword("url", options.Url, options.DEFAULT_URL), keyword("key_file", KeyFile, None)]
+    return with_parameters(with_client, [*listed, *where])
 
 
-def given_key() -> str | None:
-    """The key of the running command, or None.
+def client_of(url: str, key_file: str | None) -> Client:
+    """A client of the service at an address.
 
     Raises
     ------
     InputError
-        If the file cannot be read, or what is there is no key.
+        If the address is none, the file cannot be read, or what is there is no key.
     """
+    import httpx
+
+    from service.client.client import Client
+
+    try:
+        return Client(url, key=_key(key_file))
+    except httpx.InvalidURL as error:
+        raise InputError(
+            f"`--url` must be a web address such as {options.DEFAULT_URL}, got {url!r}"
+        ) from error
+
+
+def _key(file: str | None) -> str | None:
     from service.auth.authenticator import id_of
 
-    file = _file.get()
     if file is None:
         where, key = KEY_VARIABLE, os.environ.get(KEY_VARIABLE, "").strip()
     else:

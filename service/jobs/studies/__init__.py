@@ -1,1 +1,1 @@
-"""The studies that come with the service, one a module; a class `STUDY` in each."""
+"""The studies that come with the service, one a module of its name."""

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
-from pydantic import ConfigDict, Field
+from pydantic import Field
 
 from service.jobs.common.results import answered
 from service.jobs.common.scenes import FrequencyHz, Harmonics, check
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from solver.scene.scene import Scene
     from solver.studies.study_results import AccuracyStudy
 
-_EXAMPLE: dict[str, Any] = {"scene": "two-dof", "frequency_hz": 1.2, "harmonics": [1, 3, 7], "samples": [64]}
 _MOST_WAYS = 30
 _MOST_SAMPLED = 50_000_000
 _Harmonics = Annotated[list[Harmonics], Field(min_length=1, max_length=_MOST_WAYS)]
@@ -32,7 +31,7 @@ class Accuracy(Study):
     Error against time of one point, for numbers of harmonics, contact forces in closed form and by samples.
     """
 
-    model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE]})
+    EXAMPLES = ({"scene": "two-dof", "frequency_hz": 1.2, "harmonics": [1, 3, 7], "samples": [64]},)
     NAME, FUNCTION = "accuracy", "solver:accuracy_study"
     RESULT = answered("solver.studies.study_results:AccuracyStudy", "AccuracyResult")
     TOLD = "solver.views.tables.responses:accuracy"
@@ -84,6 +83,3 @@ class Accuracy(Study):
         from service.jobs.common.records import sweep_records
 
         return () if found.branch is None else sweep_records([found.branch], intermediate=True)
-
-
-STUDY = Accuracy

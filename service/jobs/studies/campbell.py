@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
-from pydantic import ConfigDict, Field
+from pydantic import Field
 
 from optim.criteria.key import Pair, PositiveNumber, Ranges
 from service.jobs.common.results import answered
@@ -24,12 +24,6 @@ if TYPE_CHECKING:
     from solver.scene.scene import Scene
     from solver.views.plots.curves import Response
 
-_EXAMPLE: dict[str, Any] = {
-    "scene": "bladed-disk",
-    "speeds_rpm": [[40000, 50000]],
-    "orders": [1, 2, 3],
-    "limit": 8e-5,
-}
 _MOST_RPM = 6e10  # a revolution at the highest frequency that is accepted anywhere
 _Order = Annotated[int, Field(strict=True, ge=1, le=10_000)]
 
@@ -41,7 +35,7 @@ class Campbell(Study, HarmonicRequest):
     open are given beside them.
     """
 
-    model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE]})
+    EXAMPLES = ({"scene": "bladed-disk", "speeds_rpm": [[40000, 50000]], "orders": [1, 2, 3], "limit": 8e-5},)
     NAME, FUNCTION = "campbell", "optim:campbell_diagram"
     RESULT = answered("optim.studies.crossings:CampbellDiagram", "CampbellResult")
     TOLD = "optim.views.tables.studies:campbell"
@@ -109,6 +103,3 @@ class Campbell(Study, HarmonicRequest):
 
         chosen = [min(curves, key=lambda curve: distance(curve, order)) for order in result["orders"]]
         return campbell_figure(result, chosen)
-
-
-STUDY = Campbell

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any
 
-from pydantic import ConfigDict, Field
+from pydantic import Field
 
 from optim.criteria.key import Name
 from service.jobs.common.results import Table, answered
@@ -28,7 +28,7 @@ class Controlled(Study, HarmonicRequest):
     It says which force that takes, and what the contacts do.
     """
 
-    model_config = ConfigDict(json_schema_extra={"examples": [{"scene": "two-dof", "amplitude": 1.0}]})
+    EXAMPLES = ({"scene": "two-dof", "amplitude": 1.0},)
     NAME, FUNCTION = "controlled", "solver:held_amplitude"
     RESULT = answered(
         "solver.modes.results:HeldAmplitude",
@@ -78,6 +78,3 @@ class Controlled(Study, HarmonicRequest):
         if asked.get("no_stability"):
             given["stability"] = False
         return super().compute(scene, given, watch)
-
-
-STUDY = Controlled

@@ -34,17 +34,6 @@ if TYPE_CHECKING:
 UNCERTAIN = "uncertain"
 _NOT_ROBUST = ("basins", CERTIFY, OPTIONS)
 
-_EXAMPLE: dict[str, Any] = {
-    "scene": "bladed-disk",
-    "variables": {DISK_LOAD: [20, 3000], "root.kt": [1e6, 1e8]},
-    "cases": [{"name": "first bending"}, {"name": "twice the force", "set": {"excitation.amplitude": 100}}],
-    "limit": 8e-5,
-    "max_band_hz": 60,
-    "forbidden_hz": [[520, 560]],
-    "contact_states": {"shroud": "never-separates"},
-    "method": "auto",
-}
-
 
 _Rows = list[Table]
 _HARMONICS = "Highest harmonic kept; more than asked for where the peak needs them."
@@ -96,7 +85,21 @@ class _Design(NominalAndRobustKeys, ProblemRequest):
     problem file describes. An option given beside the file replaces the key it stands for.
     """
 
-    model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE]})
+    EXAMPLES = (
+        {
+            "scene": "bladed-disk",
+            "variables": {DISK_LOAD: [20, 3000], "root.kt": [1e6, 1e8]},
+            "cases": [
+                {"name": "first bending"},
+                {"name": "twice the force", "set": {"excitation.amplitude": 100}},
+            ],
+            "limit": 8e-5,
+            "max_band_hz": 60,
+            "forbidden_hz": [[520, 560]],
+            "contact_states": {"shroud": "never-separates"},
+            "method": "auto",
+        },
+    )
     NAME, FUNCTION, RESULT = "design", "optim:design", design_result
     KEYS = "those of [a design problem](design.md)"
     TOLD = "optim.views.tables.design:design"
@@ -189,4 +192,3 @@ class _Design(NominalAndRobustKeys, ProblemRequest):
 
 
 Design = of_design(_Design)
-STUDY = Design

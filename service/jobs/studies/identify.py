@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cache
 from typing import TYPE_CHECKING, Annotated, Any
 
-from pydantic import BeforeValidator, ConfigDict, Field
+from pydantic import BeforeValidator, Field
 
 from optim.criteria.key import Pair
 from optim.problem.keys import MAX_VARIABLES, VariableName
@@ -23,19 +23,6 @@ if TYPE_CHECKING:
 MOST_TABLES, MOST_NUMBERS = 200, 200_000
 EVALUATIONS = 30
 """Of all points one identification seldom has more."""
-_EXAMPLE: dict[str, Any] = {
-    "scene": "two-dof",
-    "harmonics": 3,
-    "starts": 2,
-    "data": [
-        {
-            "frequency": [1.0, 1.1, 1.2, 1.3, 1.4],
-            "amplitude": [1.93, 2.12, 1.77, 1.48, 1.25],
-            "conditions": {"excitation.amplitude": 100.0, "damper.N0": 100.0},
-        }
-    ],
-    "unknowns": {"damper.mu": [0.1, 0.6]},
-}
 
 
 _Values = Annotated[list[Number], Field(min_length=1, max_length=100)]
@@ -68,7 +55,21 @@ class Identify(Study, HarmonicRequest):
     tell, and which measurement would tell most.
     """
 
-    model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE]})
+    EXAMPLES = (
+        {
+            "scene": "two-dof",
+            "harmonics": 3,
+            "starts": 2,
+            "data": [
+                {
+                    "frequency": [1.0, 1.1, 1.2, 1.3, 1.4],
+                    "amplitude": [1.93, 2.12, 1.77, 1.48, 1.25],
+                    "conditions": {"excitation.amplitude": 100.0, "damper.N0": 100.0},
+                }
+            ],
+            "unknowns": {"damper.mu": [0.1, 0.6]},
+        },
+    )
     NAME, FUNCTION, RESULT = "identify", "optim:identify", identify_result
     TOLD = "optim.views.tables.identify:identification"
     SHOWS = "estimates, intervals, what the data do not tell ([identification](identification.md))"
@@ -138,6 +139,3 @@ class Identify(Study, HarmonicRequest):
         except SettingError as error:
             return [error.issue.at(*(error.place or ("data",)))]
         return []
-
-
-STUDY = Identify

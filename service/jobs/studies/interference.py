@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
-from pydantic import ConfigDict, Field
+from pydantic import Field
 
 from service.jobs.common.results import answered
 from service.jobs.common.scenes import PositiveNumber, check
@@ -30,7 +30,7 @@ class Interference(Study):
     Each with all contacts open and all stuck: friction moves a resonance between the two.
     """
 
-    model_config = ConfigDict(json_schema_extra={"examples": [{"scene": "bladed-disk", "speed_rpm": 11000}]})
+    EXAMPLES = ({"scene": "bladed-disk", "speed_rpm": 11000},)
     NAME, FUNCTION = "interference", "solver:interference_diagram"
     RESULT = answered("solver.studies.study_results:InterferenceDiagram", "InterferenceResult")
     TOLD = "solver.views.tables.disks:interference"
@@ -72,6 +72,3 @@ class Interference(Study):
         """Return why there is nothing to draw."""
         some = any(point["open_hz"] for point in result["diameters"])
         return "" if some else "it has no natural frequency to draw"
-
-
-STUDY = Interference

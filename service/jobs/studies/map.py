@@ -7,7 +7,7 @@ from dataclasses import replace
 from functools import cache
 from typing import TYPE_CHECKING, Annotated, Any
 
-from pydantic import ConfigDict, Field
+from pydantic import Field
 
 from service.jobs.common.results import Curve, KindResult, answered
 from service.jobs.common.scenes import CHECKED_BY, SCENE, stored_scene
@@ -26,9 +26,6 @@ if TYPE_CHECKING:
     from solver.scene.scene import Scene
     from solver.studies.response_map import MapGrid
 
-_EXAMPLE: dict[str, Any] = {
-    "scene": "bladed-disk", "parameter": DISK_LOAD, "from": 20, "to": 3000, "steps": 60, "frequencies": 400,
-}  # fmt: skip
 _Count = Annotated[int, Field(strict=True, ge=2, le=MOST_POINTS // 2)]
 
 
@@ -44,7 +41,10 @@ def map_result() -> type[KindResult]:
 class Map(Study, RangeRequest):
     """Map the response over frequency and a parameter, with the ridge of its peaks."""
 
-    model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE]})
+    EXAMPLES = ({
+        "scene": "bladed-disk", "parameter": DISK_LOAD, "from": 20, "to": 3000, "steps": 60,
+        "frequencies": 400,
+    },)  # fmt: skip
     NAME, FUNCTION, RESULT = "map", "solver:response_map", map_result
     TOLD = "solver.views.tables.tracks:response_map"
     SHOWS, SWEEPS = "the amplitude on the grid, the ridge of its peaks", "those that look for peaks"
@@ -161,4 +161,3 @@ def _ridge(spec: Mapping[str, Any], progress: OnProgress, should_stop: ShouldSto
 
 
 PARTS = Division(split=split, run_part=run_part, join=join)
-STUDY = Map

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any
 
-from pydantic import ConfigDict, Field
+from pydantic import Field
 
 from service.jobs.common.results import Table, answered
 from service.jobs.common.scenes import FrequencyHz
@@ -29,7 +29,7 @@ class March(Study):
     The independent referee of solve; of a cyclic scene the whole annulus is marched.
     """
 
-    model_config = ConfigDict(json_schema_extra={"examples": [{"scene": "two-dof", "frequency_hz": 1.2}]})
+    EXAMPLES = ({"scene": "two-dof", "frequency_hz": 1.2},)
     NAME, FUNCTION = "march", "solver:march"
     RESULT = answered(
         "solver.marching.result:MarchResult", "MarchResult", harmonics=list[float | None] | None,
@@ -74,6 +74,3 @@ class March(Study):
             result["history"] = history_of(found, SAMPLES)
         shown = found if found.converged else None
         return Answer(shown, result, found.converged, found.status.value, partial(found.plot, scene=scene))
-
-
-STUDY = March

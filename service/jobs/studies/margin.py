@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
-from pydantic import ConfigDict, Field
+from pydantic import Field
 
 from optim.criteria.key import Name, ParameterPath
 from service.jobs.common.results import Curve, answered
@@ -29,9 +29,7 @@ class Margin(Study, HarmonicRequest):
     Of a scene whose stresses have no material the amplitude is looked at, against a limit.
     """
 
-    model_config = ConfigDict(
-        json_schema_extra={"examples": [{"scene": "two-dof", "from": 10, "to": 200, "limit": 2.0}]}
-    )
+    EXAMPLES = ({"scene": "two-dof", "from": 10, "to": 200, "limit": 2.0},)
     NAME, FUNCTION = "margin", "solver:margin_diagram"
     RESULT = answered(
         "solver.studies.margin_result:MarginDiagram", "MarginResult", stress=list[Curve], used=list[Curve]
@@ -70,6 +68,3 @@ class Margin(Study, HarmonicRequest):
         """Return what is too large."""
         points = self.points * len(self.dampers or [1]) * POINTS_OF_A_SWEEP
         return balance_issues("points", scene, self.harmonics, points)
-
-
-STUDY = Margin

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any
 
-from pydantic import BeforeValidator, ConfigDict, Field, WithJsonSchema
+from pydantic import BeforeValidator, Field, WithJsonSchema
 
 from optim.criteria.key import Name
 from service.jobs.common.results import Table, answered
@@ -26,14 +26,6 @@ if TYPE_CHECKING:
     from solver import BladePeaks
     from solver.scene.scene import Scene
 
-_EXAMPLE: dict[str, Any] = {
-    "scene": "bladed-disk",
-    "of": ["tip_middle", "tip"],
-    "spread": 0.02,
-    "samples": 100,
-    "seed": 1,
-    "harmonics": 5,
-}
 _MOST_SAMPLES = 10_000
 _MOST_NAMES = 100
 _WORK_OF_A_PART = 4  # sectors × harmonics: 0.1 s, measured on bladed-disk
@@ -98,7 +90,10 @@ class Mistuning(Study, HarmonicRequest):
     Of each disk the highest peak of every blade, and how much higher it is than that of the tuned disk.
     """
 
-    model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE]})
+    EXAMPLES = ({
+        "scene": "bladed-disk", "of": ["tip_middle", "tip"], "spread": 0.02, "samples": 100, "seed": 1,
+        "harmonics": 5,
+    },)  # fmt: skip
     NAME, FUNCTION, RESULT = "mistuning", "solver:mistuning_study", mistuning_result
     TOLD = "solver.views.tables.disks:mistuning"
     SHOWS = "the magnification over many disks and the worst of them ([disks](disks.md))"
@@ -258,4 +253,3 @@ def _peaks(part: PartOutput) -> list[BladePeaks]:
 
 
 PARTS = Division(split=split, run_part=run_part, join=join)
-STUDY = Mistuning

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import TYPE_CHECKING, Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field, RootModel
+from pydantic import BaseModel, Field, RootModel
 
 import solver
 from service.jobs.common.results import Table, answered
@@ -135,9 +135,7 @@ class Modes(Study, HarmonicRequest):
     The modal amplitude a is mass-normalised: a² = Σ Q_kᴴ M Q_k over the harmonics, of one sector of a disk.
     """
 
-    model_config = ConfigDict(
-        json_schema_extra={"examples": [{"scene": "two-dof", "mode": 1, "from": 0.01, "to": 100}]}
-    )
+    EXAMPLES = ({"scene": "two-dof", "mode": 1, "from": 0.01, "to": 100},)
     NAME, FUNCTION, RESULT = "modes", "solver:nonlinear_mode", modes_result
     TOLD = "solver.views.tables.modes:mode"
     SHOWS = "frequency and damping ratio over the amplitude ([modes](modes.md))"
@@ -243,6 +241,3 @@ class Modes(Study, HarmonicRequest):
         from solver.views.plots.modes import mode_figure, resonance_figure
 
         return mode_figure(result) if result.get("damping_ratio") is not None else resonance_figure(result)
-
-
-STUDY = Modes

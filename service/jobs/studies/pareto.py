@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
-
-from pydantic import ConfigDict
+from typing import TYPE_CHECKING
 
 from optim.problem.keys import PointsOfFront, of_front
 from service.jobs.common.problem import ProblemRequest
@@ -18,8 +16,6 @@ if TYPE_CHECKING:
     from optim import ParetoResult as Front
     from solver.scene.scene import Scene
 
-_EXAMPLE: dict[str, Any] = {"scene": "bladed-disk", "variables": {DISK_LOAD: [20, 3000]}, "limit": 8e-5}
-
 
 pareto_result = answered("optim:ParetoResult", "ParetoResult", scene=str, dof=str, limit=float | None)
 
@@ -31,7 +27,7 @@ class _Pareto(PointsOfFront, ProblemRequest):
     costs. The problem is described as for `design`, without weights and a limit on the band.
     """
 
-    model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE]})
+    EXAMPLES = ({"scene": "bladed-disk", "variables": {DISK_LOAD: [20, 3000]}, "limit": 8e-5},)
     NAME, FUNCTION, RESULT = "pareto", "optim:pareto_front", pareto_result
     KEYS = "those of a design problem, `points`"
     TOLD = "optim.views.tables.design:front"
@@ -55,4 +51,3 @@ class _Pareto(PointsOfFront, ProblemRequest):
 
 
 Pareto = of_front(_Pareto)
-STUDY = Pareto

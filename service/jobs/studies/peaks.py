@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any
 
-from pydantic import ConfigDict, Field
+from pydantic import Field
 
 from service.jobs.common.proofs import CERTIFICATES, Certify, prepare, with_proofs
 from service.jobs.common.results import answered
@@ -31,11 +31,7 @@ class Peaks(Study, RangeRequest):
     With exact derivatives; sweeps check that no peak was missed, and the least highest peak is found.
     """
 
-    model_config = ConfigDict(
-        json_schema_extra={
-            "examples": [{"scene": "bladed-disk", "parameter": DISK_LOAD, "from": 20, "to": 3000}]
-        }
-    )
+    EXAMPLES = ({"scene": "bladed-disk", "parameter": DISK_LOAD, "from": 20, "to": 3000},)
     NAME, FUNCTION, RESULT = "peaks", "solver:track_peak", peaks_result
     TOLD = "solver.views.tables.tracks:track"
     SHOWS = "the highest peak over the parameter, where it is least ([peaks](peaks.md))"
@@ -78,6 +74,3 @@ class Peaks(Study, RangeRequest):
         from service.jobs.common.records import sweep_records
 
         return sweep_records(found.branches, intermediate=True)
-
-
-STUDY = Peaks

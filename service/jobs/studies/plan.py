@@ -31,7 +31,8 @@ def plan_result() -> type[KindResult]:
 class Plan(Study, HarmonicRequest):
     """Say which effects a scene calls for, and why."""
 
-    model_config = ConfigDict(defer_build=False, json_schema_extra={"examples": [EXAMPLE]})
+    model_config = ConfigDict(defer_build=False)
+    EXAMPLES = (EXAMPLE,)
     NAME, FUNCTION, RESULT = "plan", "solver:plan", plan_result
     TOLD = "solver.views.tables.responses:plan"
     SHOWS = "the effects in use and left out, sizes and estimated cost"
@@ -53,6 +54,3 @@ class Plan(Study, HarmonicRequest):
 
         found = solver.plan(scene, **with_effects(asked))
         return Answer(found, found.to_json(), True, "")
-
-
-STUDY = Plan

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any
 
-from pydantic import ConfigDict, Field
+from pydantic import Field
 
 from service.jobs.common.results import PeakAt, answered
 from service.jobs.common.scenes import HarmonicRequest, PositiveNumber
@@ -26,7 +26,7 @@ class Sensitivities(Study, HarmonicRequest):
     Exact derivatives through the whole solve; what matters most for the highest peak comes first.
     """
 
-    model_config = ConfigDict(json_schema_extra={"examples": [{"scene": "two-dof", "harmonics": 5}]})
+    EXAMPLES = ({"scene": "two-dof", "harmonics": 5},)
     NAME, FUNCTION = "sensitivities", "optim:sensitivities"
     RESULT = answered(
         "optim.studies.sensitivity_result:SensitivityResult", "SensitivitiesResult", peaks=list[PeakAt]
@@ -64,6 +64,3 @@ class Sensitivities(Study, HarmonicRequest):
         """Return why there is nothing to draw."""
         some = any(row["peak_percent"] is not None for row in result["rows"])
         return "" if some else "no parameter has a per cent"
-
-
-STUDY = Sensitivities

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from functools import cache
 from typing import TYPE_CHECKING, Annotated, Any
 
-from pydantic import ConfigDict, Field
+from pydantic import Field
 
 from service.jobs.common.results import Curve, KindResult, Table, result_model
 from service.jobs.common.scenes import FrequencyHz, HarmonicRequest
@@ -27,8 +27,6 @@ from solver.scene.descriptions import DAMPER_LOAD
 if TYPE_CHECKING:
     from solver.scene.scene import Scene
 
-_EXAMPLE: dict[str, Any] = {"scene": "two-dof", "frequency_hz": 1.2, "set": {DAMPER_LOAD: 80}}
-_EVERY: dict[str, Any] = {"scene": "two-dof", "frequency_hz": 1.05, "all": True, "starts": 8}
 _STOPPED = "The search was stopped: these are the solutions found until then."
 _NONE = "No solution was found: try more starts or more harmonics."
 
@@ -62,7 +60,10 @@ def solve_result() -> type[KindResult]:
 class Solve(Study, HarmonicRequest):
     """Compute one periodic response, or look for all of them."""
 
-    model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE, _EVERY]})
+    EXAMPLES = (
+        {"scene": "two-dof", "frequency_hz": 1.2, "set": {DAMPER_LOAD: 80}},
+        {"scene": "two-dof", "frequency_hz": 1.05, "all": True, "starts": 8},
+    )
     NAME, FUNCTION, RESULT = "solve", "solver:solve", solve_result
     TOLD = "solver.views.tables.responses:solution"
     SHOWS, COUNTED = "the response at one frequency", "solutions"
@@ -133,6 +134,3 @@ class Solve(Study, HarmonicRequest):
         reached, status = bool(found.solutions) and not found.stopped, _STOPPED if found.stopped else _NONE
         shown = largest if found.solutions else None
         return Answer(shown, largest.to_json() | found.to_json(), reached, status, largest.plot)
-
-
-STUDY = Solve

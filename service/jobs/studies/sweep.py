@@ -7,7 +7,7 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any
 
-from pydantic import ConfigDict, Field
+from pydantic import Field
 
 from service.jobs.checkpoints import Checkpoints
 from service.jobs.common.results import PeakAt, Table, answered
@@ -42,10 +42,6 @@ if TYPE_CHECKING:
     from solver.scene.scene import Scene
 
 FREQUENCY, SPEED = "frequency", "speed"
-_EXAMPLE: dict[str, Any] = {"scene": "bladed-disk", "from": 500, "to": 900, "set": {DISK_LOAD: 150}}
-_OVER_A_LOAD: dict[str, Any] = {
-    "scene": "bladed-disk", "parameter": DISK_LOAD, "from": 20, "to": 300, "frequency_hz": 755,
-}  # fmt: skip
 
 
 _LEAVING = "At each branch point its tangents and the branches that leave there."
@@ -65,7 +61,10 @@ class Sweep(Study, HarmonicRequest):
     By continuation: folds are passed, and only converged points count.
     """
 
-    model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE, _OVER_A_LOAD]})
+    EXAMPLES = (
+        {"scene": "bladed-disk", "from": 500, "to": 900, "set": {DISK_LOAD: 150}},
+        {"scene": "bladed-disk", "parameter": DISK_LOAD, "from": 20, "to": 300, "frequency_hz": 755},
+    )
     NAME, FUNCTION, RESULT = "sweep", "solver:sweep", sweep_result
     TOLD = "solver.views.tables.responses:branch"
     SHOWS, SWEEPS = "peaks, band, folds", "the branch"
@@ -242,6 +241,3 @@ def _beginning(checkpoints: Checkpoints) -> list[Stretch]:
     except (KeyError, ValueError, IndexError) as error:
         checkpoints.begin_anew(f"{type(error).__name__}: {error}")
         return []
-
-
-STUDY = Sweep

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
-from pydantic import ConfigDict, Field
+from pydantic import Field
 
 from optim.criteria.key import Name
 from service.jobs.common.results import Table, answered
@@ -21,10 +21,6 @@ if TYPE_CHECKING:
     from solver.scene.scene import Scene
 
 _MOST_STARTS, _MOST_CLIMB, _MOST_PATTERNS = 1000, 200, 50
-_EXAMPLE: dict[str, Any] = {
-    "scene": "bladed-disk", "of": ["tip_middle"], "within": 0.03, "patterns": ["AB", "ABB"], "starts": 30,
-    "harmonics": 3,
-}  # fmt: skip
 _Share = Annotated[float, Field(strict=True, gt=0.0, le=0.9)]
 _Pattern = Annotated[str, Field(pattern=r"^[A-Z]{1,100}$")]
 
@@ -36,7 +32,10 @@ class WorstMistuningStudy(Study, HarmonicRequest):
     Intentional patterns of blade types are ranked.
     """
 
-    model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE]})
+    EXAMPLES = ({
+        "scene": "bladed-disk", "of": ["tip_middle"], "within": 0.03, "patterns": ["AB", "ABB"],
+        "starts": 30, "harmonics": 3,
+    },)  # fmt: skip
     NAME, FUNCTION = "worst-mistuning", "solver:worst_mistuning"
     RESULT = answered(
         "solver.studies.patterns.worst_result:WorstMistuning", "WorstMistuningResult", worst=Table | None,
@@ -127,6 +126,3 @@ class WorstMistuningStudy(Study, HarmonicRequest):
         return balance_issues(
             "climb", scene, self.harmonics, points, "points of all sweeps", every_sector=True
         )
-
-
-STUDY = WorstMistuningStudy

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from optim.views.plots.designs import robust_figure
-from optim.views.tables.robust import effort_pairs, side_lines, uncertain_rows
+from optim.views.tables.robust import SIDE_LINES, effort_pairs, uncertain_rows
 from service.rendering.report.responses import DASHED, ReportLine, Sweeps, in_scenario, linear_lines
 from service.rendering.report.sections import (
     Designed,
@@ -116,7 +116,7 @@ def _over_the_uncertainty(found: Json) -> str:
     sides = _sides(found)
     if not sides:
         return ""
-    rows = [[name, *(show(side) for _, side in sides)] for name, show in side_lines()]
+    rows = [[name, *(show(side) for _, side in sides)] for name, show in SIDE_LINES]
     numbers = table(["", *(f"{name} optimum" for name, _ in sides)], rows)
     words = "Highest peak over the samples of the uncertainty, sorted, with the worst that was found"
     picture = image(robust_figure(found), words, f"{words}.") if found["nominal"] is not None else ""

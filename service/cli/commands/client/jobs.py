@@ -1,4 +1,4 @@
-"""The commands about jobs of a running service: watch, results, the stored designs, and every submission."""
+"""The commands about jobs of a running service: watch, results, designs, submissions, and that for models."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from service.cli.failures import BAD_INPUT, FELL_SHORT
 from service.cli.options import inputs
 from service.cli.options import shared as options
 from service.cli.options.inputs import amount, count
-from service.cli.options.parameters import given_key
 from service.cli.options.problem_inputs import scene_to_submit, uploaded
 from service.cli.progress import bar
 from service.errors import InputError
 from service.rendering.text import print_json, print_table, print_told, say, told
+from solver.errors import MissingExtraError
 from solver.results import units
 from solver.scene.parameter_paths import parameter
 
@@ -140,10 +140,9 @@ def tell(answer: AnswerModel, words: str, *, as_json: bool) -> None:
 _INPUT_FAILURES = ("scene", "setting")
 
 
-def watch(job: options.Job, as_json: options.Json = False, url: options.Url = options.DEFAULT_URL) -> None:
+def watch(client: Client, job: options.Job, as_json: options.Json = False) -> None:
     """Follow a job until it has ended."""
-    with client_of(url) as client:
-        ended = _follow(client, job)
+    ended = _follow(client, job)
     if as_json:
         print_json(ended.model_dump(mode="json"))
     else:
@@ -152,6 +151,7 @@ def watch(job: options.Job, as_json: options.Json = False, url: options.Url = op
 
 
 def results(
+    client: Client,
     job: Annotated[
         str | None, typer.Argument(metavar="[JOB]", help="Id of a job; the stored designs if left out.")
     ] = None,
@@ -167,7 +167,6 @@ def results(
     ] = None,
     plot: options.Plot = None,
     as_json: options.Json = False,
-    url: options.Url = options.DEFAULT_URL,
 ) -> None:
     """Print what a job computed, or list the stored designs."""
     from solver.views.plots import SUFFIXES
@@ -181,18 +180,16 @@ def results(
     if job is None:
         if picture is not None:
             raise InputError("`--plot` needs a JOB: a list is not drawn")
-        with client_of(url) as client:
-            designs = stored_designs(client, filters)
+        designs = stored_designs(client, filters)
         if file is not None:
             _write(file, designs)
         show_designs(designs, as_json=as_json)
         return
     refuse_filters(filters)
-    with client_of(url) as client:
-        ended = client.job(job)
-        answer = client.results(job)
-        if picture is not None:
-            _draw(client, ended.kind, answer, picture)
+    ended = client.job(job)
+    answer = client.results(job)
+    if picture is not None:
+        _draw(client, ended.kind, answer, picture)
     if file is not None:
         _write(file, answer.model_dump(mode="json"))
     _show(ended, answer, as_json=as_json)
@@ -204,15 +201,14 @@ def scene_of(name: str) -> Any:
     return scene_to_submit(name) if name.endswith(SCENE_FILES) else name
 
 
-def hand_in(url: str, body: Mapping[str, Any], *, wait: bool, as_json: bool) -> None:
+def hand_in(client: Client, body: Mapping[str, Any], *, wait: bool, as_json: bool) -> None:
     """Submit a job; print its id, or wait for its end and print what came out, with the id below."""
-    with client_of(url) as client:
-        job = client.submit(uploaded(client, body))
-        if not wait:
-            _announce(job, as_json=as_json)
-            return
-        ended = _follow(client, job.id)
-        answer = client.results(job.id)
+    job = client.submit(uploaded(client, body))
+    if not wait:
+        _announce(job, as_json=as_json)
+        return
+    ended = _follow(client, job.id)
+    answer = client.results(job.id)
     _show(ended, answer, as_json=as_json)
     _end(ended)
 
@@ -222,20 +218,6 @@ def _announce(job: JobAnswer, *, as_json: bool) -> None:
         print_json(job.model_dump(mode="json"))
     else:
         say(job.id)
-
-
-def client_of(url: str) -> Client:
-    """A client of the service at an address."""
-    import httpx
-
-    from service.client.client import Client
-
-    try:
-        return Client(url, key=given_key())
-    except httpx.InvalidURL as error:
-        raise InputError(
-            f"`--url` must be a web address such as {options.DEFAULT_URL}, got {url!r}"
-        ) from error
 
 
 def _follow(client: Client, job: str) -> JobAnswer:
@@ -283,6 +265,21 @@ def _write(file: Path, answer: Mapping[str, Any]) -> None:
 
     with whole(file) as temporary:
         temporary.write_text(json.dumps(answer, allow_nan=False) + "\n", "utf-8")
+
+
+def mcp(client: Client) -> None:
+    """Let a language model use a running service.
+
+    Reads requests of the Model Context Protocol from standard input and answers on standard output, as
+    programs with a model in them expect; ends with its input.
+    """
+    from service.client.mcp_tools import server
+
+    try:
+        tools = server(client)
+    except ModuleNotFoundError as error:
+        raise MissingExtraError("mcp", "mcp") from error
+    tools.run("stdio")
 
 
 def _end(job: JobAnswer) -> None:

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from service.cli.commands.client.jobs import MOST, client_of, listed, tell, tell_list
+from service.cli.commands.client.jobs import MOST, listed, tell, tell_list
 from service.cli.options import shared as options
 from service.cli.options.inputs import amount, count
 from service.errors import InputError
 from service.rendering.text import print_json, print_table, say
+
+if TYPE_CHECKING:
+    from service.client.client import Client
 
 OfProject = Annotated[
     str | None, typer.Option("--project", metavar="ID", help="Id of a project, as `projects list` shows it.")
@@ -47,6 +50,7 @@ def given_of(**changes: Any) -> dict[str, Any]:
 
 
 def show(
+    client: Client,
     project: OfProject = None,
     tag: Tags = None,
     text: Text = None,
@@ -54,12 +58,10 @@ def show(
     deleted: Binned = False,
     limit: Count = None,
     as_json: options.Json = False,
-    url: options.Url = options.DEFAULT_URL,
 ) -> None:
     """List the runs, newest first."""
     filters = {"project": project, "tag": tag, "text": text, "status": status, "deleted": deleted}
-    with client_of(url) as client:
-        found = listed(client.runs, limit, **filters)
+    found = listed(client.runs, limit, **filters)
     rows = [
         (one.id, one.kind, one.status.value, one.scene or "", one.name, ", ".join(one.tags), str(one.sweeps))
         for one in found
@@ -69,6 +71,7 @@ def show(
 
 
 def change(
+    client: Client,
     run: options.Job,
     name: Name = None,
     notes: Notes = None,
@@ -78,40 +81,33 @@ def change(
         typer.Option("--tag", metavar="WORD", help="In place of those it has; repeatable, empty for none."),
     ] = None,
     as_json: options.Json = False,
-    url: options.Url = options.DEFAULT_URL,
 ) -> None:
     """Change project, name, notes or tags of a run."""
     changes = given_of(name=name, notes=notes, project=project, tag=tag or None)
     if "tag" in changes:
         changes["tags"] = [word for word in changes.pop("tag") if word]
-    with client_of(url) as client:
-        tell(client.change_run(run, **changes), f"run {run} is changed", as_json=as_json)
+    tell(client.change_run(run, **changes), f"run {run} is changed", as_json=as_json)
 
 
-def delete(run: options.Job, as_json: options.Json = False, url: options.Url = options.DEFAULT_URL) -> None:
+def delete(client: Client, run: options.Job, as_json: options.Json = False) -> None:
     """Put a run in the bin.
 
     It has ended. `stickslip runs restore` takes it out until the service deletes it for good.
     """
-    with client_of(url) as client:
-        tell(client.delete_run(run), f"run {run} is in the bin", as_json=as_json)
+    tell(client.delete_run(run), f"run {run} is in the bin", as_json=as_json)
 
 
-def restore(run: options.Job, as_json: options.Json = False, url: options.Url = options.DEFAULT_URL) -> None:
+def restore(client: Client, run: options.Job, as_json: options.Json = False) -> None:
     """Take a run out of the bin."""
-    with client_of(url) as client:
-        tell(client.restore_run(run), f"run {run} is out of the bin", as_json=as_json)
+    tell(client.restore_run(run), f"run {run} is out of the bin", as_json=as_json)
 
 
-def compare(
-    a: First, b: Second, as_json: options.Json = False, url: options.Url = options.DEFAULT_URL
-) -> None:
+def compare(client: Client, a: First, b: Second, as_json: options.Json = False) -> None:
     """Say what differs between two runs.
 
     Their inputs as they were computed, and the main figures of their results.
     """
-    with client_of(url) as client:
-        found = client.compare(a, b)
+    found = client.compare(a, b)
     if as_json:
         print_json(found.model_dump(mode="json"))
         return
@@ -124,19 +120,13 @@ def compare(
     print_table("Results", ("figure", *heads), figures)
 
 
-def share(
-    run: options.Job,
-    days: Days = None,
-    as_json: options.Json = False,
-    url: options.Url = options.DEFAULT_URL,
-) -> None:
+def share(client: Client, run: options.Job, days: Days = None, as_json: options.Json = False) -> None:
     """Make a link to a run that needs no key.
 
     It is printed this once. Whoever has it can read the run and its results.
     """
-    with client_of(url) as client:
-        made = client.share_run(run, days)
-    tell(made, f"{url.rstrip('/')}{made.link}", as_json=as_json)
+    made = client.share_run(run, days)
+    tell(made, f"{client.base_url.rstrip('/')}{made.link}", as_json=as_json)
 
 
 def _word(value: Any) -> str:
@@ -150,56 +140,42 @@ NewName = Annotated[str, typer.Argument(metavar="NAME", help="Name of the projec
 
 
 def show_projects(
+    client: Client,
     text: Text = None,
     deleted: Binned = False,
     limit: Count = None,
     as_json: options.Json = False,
-    url: options.Url = options.DEFAULT_URL,
 ) -> None:
     """List the projects, newest first."""
-    with client_of(url) as client:
-        found = listed(client.projects, limit, text=text, deleted=deleted)
+    found = listed(client.projects, limit, text=text, deleted=deleted)
     rows = [(one.id, one.name, str(one.runs), f"{one.changed:%Y-%m-%d %H:%M}") for one in found]
     columns = ("id", "name", "runs", "changed [UTC]")
     tell_list(found, "Projects", columns, rows, as_json=as_json)
 
 
-def create_project(
-    name: NewName,
-    notes: Notes = None,
-    as_json: options.Json = False,
-    url: options.Url = options.DEFAULT_URL,
-) -> None:
+def create_project(client: Client, name: NewName, notes: Notes = None, as_json: options.Json = False) -> None:
     """Make a project and print its id."""
-    with client_of(url) as client:
-        made = client.make_project(name, notes or "")
+    made = client.make_project(name, notes or "")
     tell(made, made.id, as_json=as_json)
 
 
 def change_project(
+    client: Client,
     project: Project,
     name: Name = None,
     notes: Notes = None,
     as_json: options.Json = False,
-    url: options.Url = options.DEFAULT_URL,
 ) -> None:
     """Change name or notes of a project."""
     changes = given_of(name=name, notes=notes)
-    with client_of(url) as client:
-        tell(client.change_project(project, **changes), f"project {project} is changed", as_json=as_json)
+    tell(client.change_project(project, **changes), f"project {project} is changed", as_json=as_json)
 
 
-def delete_project(
-    project: Project, as_json: options.Json = False, url: options.Url = options.DEFAULT_URL
-) -> None:
+def delete_project(client: Client, project: Project, as_json: options.Json = False) -> None:
     """Put a project in the bin; its runs stay."""
-    with client_of(url) as client:
-        tell(client.delete_project(project), f"project {project} is in the bin", as_json=as_json)
+    tell(client.delete_project(project), f"project {project} is in the bin", as_json=as_json)
 
 
-def restore_project(
-    project: Project, as_json: options.Json = False, url: options.Url = options.DEFAULT_URL
-) -> None:
+def restore_project(client: Client, project: Project, as_json: options.Json = False) -> None:
     """Take a project out of the bin."""
-    with client_of(url) as client:
-        tell(client.restore_project(project), f"project {project} is out of the bin", as_json=as_json)
+    tell(client.restore_project(project), f"project {project} is out of the bin", as_json=as_json)

@@ -29,6 +29,7 @@ from service.settings.kinds import registry_here
 if TYPE_CHECKING:
     import inspect
 
+    from service.client.client import Client
     from service.jobs.common.problem import ProblemRequest
 
 
@@ -94,7 +95,7 @@ def submission(kind: JobKind, local: Command | None) -> Command:
     columns = None if local is None else options_of(local).get(_COLUMN)
 
     def submit(
-        name: str | None = None, wait: bool = False, as_json: bool = False, url: str = "",
+        client: Client, name: str | None = None, wait: bool = False, as_json: bool = False,
         column: list[str] | None = None, **given: Any,
     ) -> None:  # fmt: skip
         if columns is not None:
@@ -102,7 +103,7 @@ def submission(kind: JobKind, local: Command | None) -> Command:
         body = {one.key: one.in_body(given[one.parameter.name]) for one in made}
         scene = {} if name is None else {SCENE: scene_of(name)}
         told = {key: value for key, value in body.items() if value is not None}
-        hand_in(url, {"kind": kind.name, **scene, **told}, wait=wait, as_json=as_json)
+        hand_in(client, {"kind": kind.name, **scene, **told}, wait=wait, as_json=as_json)
 
     about_scene = [keyword("name", options.Scene)] if SCENE in kind.request.model_fields else []
     of_data = [] if columns is None else [columns]
@@ -134,18 +135,14 @@ def _of_a_problem(kind: JobKind, model: type[ProblemRequest], own: Sequence[KeyO
     beside = [one for one in own if one.flag not in taken]
 
     def submit(
-        flags: ProblemFlags,
-        name: str | None = None,
-        wait: bool = False,
-        as_json: bool = False,
-        url: str = "",
-        **given: Any,
-    ) -> None:
+        client: Client, flags: ProblemFlags, name: str | None = None, wait: bool = False,
+        as_json: bool = False, **given: Any,
+    ) -> None:  # fmt: skip
         further = {one.key: (one.flag, one.in_body(given[one.parameter.name])) for one in beside}
         told = problem_inputs.description(name, flags, kind.name, **further)
         problem_inputs.checked(told, model)
         body = {"kind": kind.name, **problem_inputs.body_to_submit(told)}
-        hand_in(url, body, wait=wait, as_json=as_json)
+        hand_in(client, body, wait=wait, as_json=as_json)
 
     parameters = [
         keyword(FLAGS, ProblemFlags),
@@ -157,9 +154,5 @@ def _of_a_problem(kind: JobKind, model: type[ProblemRequest], own: Sequence[KeyO
 
 def _with_options(command: Command, parameters: Sequence[inspect.Parameter]) -> Command:
     """The command with these parameters, and those that every submission has."""
-    ending = [
-        keyword("wait", options.Wait, False),
-        keyword("as_json", options.Json, False),
-        keyword("url", options.Url, options.DEFAULT_URL),
-    ]
+    ending = [keyword("wait", options.Wait, False), keyword("as_json", options.Json, False)]
     return with_parameters(command, [*parameters, *ending])
