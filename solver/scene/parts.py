@@ -211,6 +211,11 @@ class Observe(Part):
             raise SettingError("observe.harmonic", self.harmonic, wanted)
 
     @property
+    def measured(self) -> str:
+        """What drawings name as that whose amplitude is shown: the DOF, or one harmonic of it."""
+        return self.dof if self.harmonic is None else f"harmonic {self.harmonic} of {self.dof}"
+
+    @property
     def centred(self) -> bool:
         """Whether the motion counts from the middle of its range."""
         return self.measure == "half_peak_to_peak"

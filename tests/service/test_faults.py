@@ -107,7 +107,7 @@ def check_rows(site: Site) -> Counter[str]:
     return Counter(state.value for state in states.values())
 
 
-@pytest.mark.parametrize("number", [7, pytest.param(90, marks=pytest.mark.long)])
+@pytest.mark.parametrize("number", [4, pytest.param(90, marks=pytest.mark.long)])
 def test_one_service_on_sqlite(tmp_path: Path, number: int) -> None:
     site = Site(f"sqlite:///{tmp_path}/jobs.db", tmp_path, [free_port()])
     undergo(site, COMMON, number, seed=number)

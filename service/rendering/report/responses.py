@@ -140,7 +140,7 @@ def comparison_figure(scene: Scene, lines: Sequence[ReportLine]) -> Figure:
         axes.set_yscale("log")
         style.plain_log(axes.yaxis)
         axes.margins(x=0.0)
-        style.label(axes, "frequency [Hz]", f"amplitude, max |{scene.observe.dof}| [{unit.name}]")
+        style.label(axes, "frequency [Hz]", f"amplitude, max |{scene.observe.measured}| [{unit.name}]")
         axes.set_title(scene.name)
         columns = 4 if len(curves) <= 4 else 3
         axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=columns)

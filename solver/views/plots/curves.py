@@ -48,7 +48,7 @@ class Response:
             parameter=branch.parameter,
             values=values,
             amplitude=amplitude,
-            dof=branch.scene.observe.dof,
+            dof=branch.scene.observe.measured,
             peak=peak,
             limit=None if band is None else band.limit,
             intervals=() if band is None else band.intervals,

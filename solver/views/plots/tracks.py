@@ -45,10 +45,12 @@ def track_figure(track: Json, *, dof: str = "x", ax: Into = None) -> Figure:
             heights.plot([at], [least * unit.per_metre], **_DOT)
             for one in track["optimum"]["active"]:
                 places.plot([at], [one["frequency"]], **_DOT)
+            # At an end of the range the text stands inside.
+            side = {float(parameter.min()): "left", float(parameter.max()): "right"}.get(at, "center")
             text = f"least at {style.quantity(track['parameter_path'], at, 5)}\n{unit.show(least)}"
             heights.annotate(
                 text, (at, least * unit.per_metre), xytext=(0, -10), textcoords="offset points",
-                ha="center", va="top", color=style.VERMILION, linespacing=1.35,
+                ha=side, va="top", color=style.VERMILION, linespacing=1.35,
             )  # fmt: skip
         for axes in (heights, places):
             _scaled(axes, parameter)

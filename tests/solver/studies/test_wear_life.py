@@ -150,8 +150,8 @@ def _slopes(found: WearLife) -> np.ndarray:
 
 @pytest.mark.parametrize(
     ("seed", "at_peak"),
-    [(3, True),
-     *(pytest.param(seed, True, marks=pytest.mark.long) for seed in (0, 1, 2, 4, 5, 6, 7, 8)),
+    [(8, True),
+     *(pytest.param(seed, True, marks=pytest.mark.long) for seed in range(8)),
      *(pytest.param(seed, False, marks=pytest.mark.long) for seed in (0, 1, 5))],
 )  # fmt: skip
 def test_derivatives_are_those_of_the_whole_life(seed: int, at_peak: bool) -> None:
