@@ -45,12 +45,12 @@ def of_march(march: MarchResult, ax: Into = None, *, scene: Scene | None = None)
 
 def of_track(track: PeakTrack, ax: Into = None) -> Figure:
     """Draw the peak and its frequency over the parameter."""
-    return track_figure(track.to_json(), dof="x" if track.given is None else track.given.observe.measured, ax=ax)
+    return track_figure(track.to_json(), dof=_measured(track.given), ax=ax)
 
 
 def of_map(found: ResponseMap, ax: Into = None) -> Figure:
     """Draw the map with its ridge."""
-    return map_figure(found.to_json(), dof="x" if found.given is None else found.given.observe.measured, ax=ax)
+    return map_figure(found.to_json(), dof=_measured(found.given), ax=ax)
 
 
 def of_stability(found: Stability, ax: Into = None) -> Figure:
@@ -71,3 +71,7 @@ def of_amplitudes(blades: BladeAmplitudes, ax: Into = None) -> Figure:
 def of_blade_peaks(peaks: BladePeaks, ax: Into = None) -> Figure:
     """Draw the highest peak of every blade."""
     return blades_figure(peaks.value, f"highest peak, max |{peaks.dof}|", ax=ax)
+
+
+def _measured(scene: Scene | None) -> str:
+    return "x" if scene is None else scene.observe.measured
