@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
+import numpy as np
+
 from solver.arrays import FloatOrNaN, Real
 from solver.results.base import Drawn
 from solver.results.known import Stable, Verdict
@@ -118,6 +120,18 @@ class Solution(Drawn):
     ] = (math.nan, math.nan)
     _judged: list[Verdict] = field(default_factory=list, init=False, compare=False)  # once, when asked for
     _drifts: list[float] = field(default_factory=list, init=False, compare=False)
+
+    @classmethod
+    def without_numbers(
+        cls, *, highest: int, residual: float = math.nan, newton_iterations: int = 0,
+        flags: tuple[str, ...] = (), **told: Any,
+    ) -> Solution:  # fmt: skip
+        """Return what stands for a response that was not found; `highest` harmonic of its arrays."""
+        return cls(
+            **told, max_abs=math.nan, half_peak_to_peak=math.nan, mean=math.nan, contacts=(), flags=flags,
+            harmonics=np.full(highest + 1, np.nan), observed=np.full(2 * highest + 1, np.nan),
+            residual=residual, error_estimate=math.nan, newton_iterations=newton_iterations,
+        )  # fmt: skip
 
     @property
     def converged(self) -> bool:

@@ -15,12 +15,12 @@ import numpy as np
 
 from solver.errors import SettingError
 from solver.jit.fourier import Real
-from solver.response.contact_response import OPENS, ContactResponse, ContactState
+from solver.response.contact_response import ContactResponse, ContactState, flags_of
 from solver.response.exact.beside import orbit_beside
 from solver.response.exact.flow import LiftsError, NoMotionError, exponential, first_root, steps_of, taylor
 from solver.response.exact.orbit import PERIOD, ROUNDING, Ended, Orbit, find, follow, grazed
 from solver.response.exact.piecewise import STICK, MemberState, Mode, Piecewise
-from solver.response.solution import HISTORY_DEPENDENT, MEAN_UNDETERMINED, Solution, SolutionStatus
+from solver.response.solution import Solution, SolutionStatus
 from solver.response.stability.multipliers import Stability, growth_of, verdict_of
 from solver.scene.scene import Scene
 
@@ -124,7 +124,11 @@ def solve_beside(
     highest = max(harmonics, system.top)
     if isinstance(orbit, SolutionStatus):
         seconds = time.perf_counter() - begun
-        return _nothing(scene, frequency_hz, harmonics, highest, orbit, seconds), None
+        nothing = Solution.without_numbers(
+            scene=scene, frequency_hz=frequency_hz, n_harmonics=harmonics, status=orbit, highest=highest,
+            seconds=seconds,
+        )  # fmt: skip
+        return nothing, None
     solution = _described(system, orbit, frequency_hz, harmonics, highest, begun)
     solution._judged.append(verdict_of(_stability(orbit, frequency_hz, begun)))  # a by-product here
     return solution, orbit
@@ -265,13 +269,7 @@ def _flags(system: Piecewise, orbit: Orbit, contacts: tuple[ContactResponse, ...
         size = float(np.abs(direction).max())
         mean_open |= max(map(abs, seen)) > _MOVES * size
         range_open |= max(seen) - min(seen) > _MOVES * size
-    flags = [MEAN_UNDETERMINED] * mean_open + [HISTORY_DEPENDENT] * range_open
-    stuck = [each for each in contacts if each.state is ContactState.STUCK]
-    if stuck and len(stuck) == len(contacts):
-        flags.append("all_stuck")
-    if any(each.state in OPENS for each in contacts):
-        flags.append("separation")
-    return tuple(flags)
+    return flags_of(contacts, mean_open=mean_open, half_range_open=range_open)
 
 
 def _through(mode: Mode, length: float) -> Real:
@@ -289,15 +287,4 @@ def _stability(orbit: Orbit, frequency_hz: float, begun: float) -> Stability:
     return Stability(
         multipliers=multipliers, neutral=neutral, growth=growth_of(multipliers), frequency_hz=frequency_hz,
         seconds=time.perf_counter() - begun,
-    )  # fmt: skip
-
-
-def _nothing(
-    scene: Scene, frequency_hz: float, harmonics: int, highest: int, status: SolutionStatus, seconds: float
-) -> Solution:
-    return Solution(
-        scene=scene, frequency_hz=frequency_hz, n_harmonics=harmonics, status=status, max_abs=math.nan,
-        half_peak_to_peak=math.nan, mean=math.nan, harmonics=np.full(highest + 1, np.nan),
-        observed=np.full(2 * highest + 1, np.nan), contacts=(), flags=(), residual=math.nan,
-        error_estimate=math.nan, newton_iterations=0, seconds=seconds,
     )  # fmt: skip

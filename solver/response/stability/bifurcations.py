@@ -26,7 +26,7 @@ from solver.continuation.branch import AnyBranch, Branch, BranchStatus, Points
 from solver.continuation.branches.point_by_point import is_unique
 from solver.continuation.extrema.node_table import PointRow
 from solver.continuation.extrema.nodes import NodeSolver
-from solver.continuation.folds import fold_between, motion_scales
+from solver.continuation.folds import fold_between
 from solver.continuation.marks import Bifurcations, Mark, MarkKind
 from solver.jit.fourier import Real
 from solver.response.stability.floquet import branch_stability
@@ -123,12 +123,8 @@ class Along:
         return self.sign(node) == sign
 
     def _fold(self, i: int, left: PointRow, right: PointRow) -> Mark:
-        by_share = motion_scales(left, right)
-        ends = float(left.tangent[-1] * by_share[0]), float(right.tangent[-1] * by_share[1])
-        found = fold_between(partial(self.solver.between, left, right), *ends)
-        if found is None:
-            return self.mark(MarkKind.FOLD, left, i)
-        node, smooth = found
+        found = fold_between(partial(self.solver.between, left, right), left, right)
+        node, smooth = found or (left, True)
         return self.mark(MarkKind.FOLD, node, i, corner=not smooth)
 
     def halved(self, i: int, like_the_left: Callable[[PointRow], bool], most: int) -> PointRow:
