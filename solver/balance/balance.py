@@ -13,7 +13,7 @@ from solver.balance.simplifications import Effects, even_harmonics_reason
 from solver.balance.speed_line import speed_line
 from solver.contacts.kernels.columns import N0
 from solver.contacts.kernels.system import System
-from solver.errors import SettingError
+from solver.errors import SettingError, check_count
 from solver.jit.fourier import Integer
 from solver.jit.trig_polynomial import grid_size, grid_tables
 from solver.linear.assembly import linear_model, structure_derivative
@@ -68,18 +68,8 @@ class Balance:
 
 
 def check_harmonics(harmonics: int) -> int:
-    """Return `harmonics` if it is a usable highest harmonic.
-
-    Raises
-    ------
-    SettingError
-        Not an integer from 0 to `MOST_HARMONICS`.
-    """
-    if isinstance(harmonics, bool) or not isinstance(harmonics, (int, np.integer)):
-        raise SettingError("harmonics", harmonics, "must be a whole number")
-    if not 0 <= harmonics <= MOST_HARMONICS:
-        raise SettingError("harmonics", harmonics, f"must be from 0 to {MOST_HARMONICS}")
-    return harmonics
+    """Return `harmonics`; SettingError if it is no whole number from 0 to `MOST_HARMONICS`."""
+    return check_count("harmonics", harmonics, 0, MOST_HARMONICS)
 
 
 def build(

@@ -105,13 +105,7 @@ class ContactForces:
 
 
 def contact_forces(system: System, seconds: Integer, u: Real) -> ContactForces:
-    """Evaluate all contacts of a system whose laws have second derivatives, by the kernels `seconds`.
-
-    Raises
-    ------
-    FloatingPointError
-        A law has no answer at `u`.
-    """
+    """Evaluate all contacts by the kernels `seconds`; FloatingPointError where a law has no answer at `u`."""
     nc = system.owner.size
     n = u.size // max(nc, 1)
     table, load, _, _ = contact_values(system, 0.0, 0.0)

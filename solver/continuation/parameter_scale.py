@@ -66,13 +66,7 @@ class Scale:
 
 
 def scale_of(scene: Scene, path: str, start: float, stop: float) -> Scale:
-    """Return the range of a parameter.
-
-    Raises
-    ------
-    SettingError
-        A path the scene does not have, the frequency, or a range that is none.
-    """
+    """Return the range of a parameter; SettingError for the frequency, or a path or range that is none."""
     parameter = resolve(scene, path)
     if parameter.kind is Kind.FREQUENCY:
         raise SettingError("parameter", path, "cannot be the frequency: it is searched over the scene's band")

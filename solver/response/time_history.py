@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from solver.errors import SettingError
+from solver.errors import SettingError, check_count
 from solver.jit import fourier
 from solver.jit.fourier import Complex, Real
 from solver.linear.assembly import linear_model, row_of
@@ -121,7 +121,5 @@ def _check_converged(solution: Solution) -> None:
 
 
 def _angles(samples: int) -> Real:
-    good = isinstance(samples, (int, np.integer)) and not isinstance(samples, bool)
-    if not good or not 2 <= samples <= LARGEST_SAMPLES:
-        raise SettingError("samples", samples, f"must be a whole number from 2 to {LARGEST_SAMPLES}")
+    check_count("samples", samples, 2, LARGEST_SAMPLES)
     return np.asarray(2.0 * math.pi / samples * np.arange(samples))

@@ -187,13 +187,7 @@ def contact_wear(solution: Solution, paths: Sequence[str] = ()) -> dict[str, Con
 
 
 def contact_index(balance: Balance, contact: str) -> int:
-    """Return the number of a contact by its name.
-
-    Raises
-    ------
-    SettingError
-        There is none of that name.
-    """
+    """Return the number of a contact by its name; SettingError where there is none of that name."""
     names = [each.name for each in balance.scene.contacts]
     if contact not in names:
         raise SettingError("contact", contact, f"must be one of {listing(names)}")

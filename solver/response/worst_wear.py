@@ -50,7 +50,7 @@ from solver.response.wear_measures import (
 )
 from solver.results.told import Piece
 from solver.sensitivity.gradient import Sensitivities
-from solver.sensitivity.nonsmooth import BESIDE, SMOOTH, beside, of_corner
+from solver.sensitivity.nonsmooth import SMOOTH, corner_slopes
 
 Number = TypeVar("Number", float, Real)
 # Maxima below this share of the highest cannot lead within one step of an optimiser.
@@ -311,9 +311,15 @@ def worst_slopes(
     here = _measured(sensitivity, worst.at, worst.solution, contact, measure)
     if not worst.interior or not abs(here.by_frequency) * worst.at > SMOOTH * abs(here.value):
         return here
-    near, far = (_across(sensitivity, worst, contact, measure, share * BESIDE) for share in (1.0, 2.0))
+
+    def slopes(u: Real, at_hz: float) -> tuple[float, Real]:
+        found = _measured(sensitivity, at_hz, u, contact, measure)
+        return found.by_frequency, found.gradient
+
+    sign = -1.0 if measure is Measure.LEAST_LOAD else 1.0
+    corner = corner_slopes(sensitivity.balance, worst.at, worst.solution, slopes, sign)
     # Where nothing is found beside it, the derivative at the fixed frequency stands in.
-    return here if near is None or far is None else replace(here, gradient=2.0 * near - far)
+    return here if corner is None else replace(here, gradient=corner[0])
 
 
 def worst_hessian(sensitivities: Sensitivities, worst: WorstWear, contact: str, measure: Measure) -> Real:
@@ -353,19 +359,3 @@ def _measured(
         return found
     rise = at_hz * found.by_frequency + found.value
     return Measured(value=at_hz * found.value, by_frequency=rise, gradient=at_hz * found.gradient)
-
-
-def _across(
-    sensitivity: WearSensitivity, worst: WorstWear, contact: str, measure: Measure, distance: float
-) -> Real | None:
-    """Return the derivatives of a corner from solutions at a relative distance on both sides."""
-    sides = []
-    for way in (-1.0, 1.0):
-        at_hz = worst.at * (1.0 + way * distance)
-        solved = Workspace.of(sensitivity.balance).solve(2.0 * math.pi * at_hz, worst.solution)
-        u = beside(solved, worst.solution)
-        if u is None:
-            return None
-        found = _measured(sensitivity, at_hz, u, contact, measure)
-        sides.append((found.by_frequency, found.gradient))
-    return of_corner(*sides) if sides[0][0] * sides[1][0] < 0.0 else None

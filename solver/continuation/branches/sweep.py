@@ -197,13 +197,7 @@ def _curve(balance: Balance, stretch: Stretch) -> tuple[Real, Real]:
 
 
 def check_range(parameter: Parameter, start: float | None, stop: float | None) -> tuple[float, float]:
-    """Return the range of a continuation as floats.
-
-    Raises
-    ------
-    SettingError
-        An end is missing, not a value the parameter may have, or both are the same.
-    """
+    """Return the range of a continuation as floats; SettingError for ends that are none, or the same."""
     ends = []
     for name, value in (("start", start), ("stop", stop)):
         if value is None:

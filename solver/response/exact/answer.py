@@ -98,26 +98,14 @@ def panels_of(orbit: Orbit, highest: int) -> Panels:
 def solve_exactly(
     scene: Scene, frequency_hz: float, harmonics: int, *, near: Solution | None = None
 ) -> Solution:
-    """Return the response of a scene, to rounding; it is looked for beside a solution of the balance.
-
-    Raises
-    ------
-    SettingError
-        A part of the scene that has no place in an exact solution, see `Piecewise`.
-    """
+    """Return the response, to rounding, looked for beside one of the balance; errors as `Piecewise`."""
     return solve_beside(scene, frequency_hz, harmonics, near)[0]
 
 
 def solve_beside(
     scene: Scene, frequency_hz: float, harmonics: int, near: Orbit | Solution | None = None
 ) -> tuple[Solution, Orbit | None]:
-    """Return the response, to rounding, and its orbit; it is looked for beside `near`, else from rest.
-
-    Raises
-    ------
-    SettingError
-        As `solve_exactly`.
-    """
+    """Return the response and its orbit, looked for beside `near`, else from rest; errors as `Piecewise`."""
     begun = time.perf_counter()
     scene = scene.at_frequency(frequency_hz)
     system, orbit = _orbit_of(scene, frequency_hz, near)
@@ -135,13 +123,7 @@ def solve_beside(
 
 
 def stability_exactly(scene: Scene, frequency_hz: float) -> Stability:
-    """Return the Floquet multipliers of the response of a scene with rigid contacts.
-
-    Raises
-    ------
-    SettingError
-        A part of the scene that cannot stand beside rigid contacts, or there is no response.
-    """
+    """Return the multipliers with rigid contacts; errors as `Piecewise`, or where there is no response."""
     begun = time.perf_counter()
     _, orbit = _orbit_of(scene, frequency_hz)
     if isinstance(orbit, SolutionStatus):

@@ -61,13 +61,7 @@ class Orbits:
 
     @classmethod
     def of(cls, scene: Scene, path: str, harmonics: int, frequency_hz: float | None) -> Orbits:
-        """Return those over a path.
-
-        Raises
-        ------
-        SettingError
-            Unknown path, a missing or bad frequency, or a bad number of harmonics.
-        """
+        """Return those over a path; SettingError for one unknown, a bad frequency or harmonics."""
         parameter, fixed = resolve(scene, path), math.nan
         if parameter.kind is not Kind.FREQUENCY:
             if frequency_hz is None:

@@ -34,7 +34,7 @@ from solver.response.wear_measures import lowest
 from solver.scene.scene import AnyContact, Scene
 from solver.sensitivity.gradient import Sensitivities
 from solver.studies.blades import blade_paths, mistuned
-from solver.studies.patterns.climbing import Bounds
+from solver.studies.patterns.climbing import Bounds, root_mean_square
 from solver.studies.patterns.worst_result import ResidualPeak
 
 TWO_PI = 2.0 * math.pi
@@ -202,7 +202,8 @@ class ResidualSearch:
                 place = _Place(y[:N], y[N:-1], float(np.clip(y[-1], low, high)))
                 here = self._judged(place, blade, stuck, guess[0])
                 guess[0], known[z.tobytes()] = here.u, here
-                within = bounds.rms is None or _size(y[:N] - bounds.middle) <= bounds.rms * (1.0 + KEPT)
+                most = math.inf if bounds.rms is None else bounds.rms * (1.0 + KEPT)
+                within = root_mean_square(y[:N] - bounds.middle) <= most
                 if within and np.all(here.rooms >= -KEPT * np.repeat(limits, 2)):
                     kept.append((here.value, here, place))
             return known[z.tobytes()]
@@ -339,7 +340,3 @@ def _limit(scene: Scene, i: int) -> float:
     if slider is None or load is None:
         return 1.0
     return slider.mu * float(np.abs(load.coefficients).sum()) or 1.0
-
-
-def _size(off: Real) -> float:
-    return math.sqrt(float(np.mean(off**2)))

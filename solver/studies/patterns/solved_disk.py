@@ -71,26 +71,14 @@ class SolvedDisk:
         return tuple(found)
 
     def peak(self, delta: Real) -> DiskPeak:
-        """Return the highest peak of any blade.
-
-        Raises
-        ------
-        UnknownPeakError
-            The response did not reach the end of the band.
-        """
+        """Return the highest peak of any blade; UnknownPeakError where the band is not covered."""
         key = delta.tobytes()
         if key not in self._known:
             self._peaks(delta)
         return self._known[key]
 
     def slopes(self, delta: Real) -> tuple[float, Real]:
-        """Return the logarithm of the highest peak and its derivatives by δ, (N,).
-
-        Raises
-        ------
-        UnknownPeakError
-            The response did not reach the end of the band.
-        """
+        """Return the logarithm of the highest peak and its derivatives by δ, (N,); errors as `peak`."""
         found = self._peaks(delta)
         branch = found.branches[0] if len(found.branches) == 1 else found.worst_branch
         if branch is None or branch.peak is None:

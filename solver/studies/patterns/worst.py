@@ -252,13 +252,7 @@ def _band(scene: Scene, start: float | None, stop: float | None) -> tuple[float,
 
 
 def check_bounds(scene: Scene, within: float, rms: float | None, intentional: IntentionalMistuning) -> range:
-    """Return the sectors of a disk whose factors may be anywhere within bounds.
-
-    Raises
-    ------
-    SettingError
-        The scene is not cyclic, or bounds or patterns that cannot be.
-    """
+    """Return the sectors of a disk; SettingError if it is none, or for bounds or patterns that cannot be."""
     if not scene.structure.has_sectors:
         raise SettingError("scene", scene.name, "must have a cyclic structure to be mistuned")
     for key, value in (("within", within), *(() if rms is None else (("rms", rms),))):
