@@ -75,7 +75,7 @@ class BranchStatus(Enum):
 ROWS = ("solutions", "tangents", "states", "observed", "measures")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Points:
     """The rows of a branch, see `Branch`; of what is observed the coefficients of the harmonics kept."""
 

@@ -18,9 +18,7 @@ _COLOURS = (style.BLUE, style.VERMILION, style.GREEN, style.SKY, style.INK, styl
 def margin_figure(found: Mapping[str, Any], *, ax: Into = None) -> Figure:
     """Draw stress, and its share of what is allowed, over the excitation.
 
-    Parameters
-    ----------
-    found : as its `to_json` gives it, with at least one level.
+    The result is as its `to_json` gives it, with at least one level.
     """
     level, stresses = numbers(found["level"]), found["unit"] == "Pa"
     unit = "MPa" if stresses else found["unit"]

@@ -18,9 +18,7 @@ _NAMED = 6  # lines with their sum beside them
 def torus_figure(found: Mapping[str, Any], *, ax: Into = None) -> Figure:
     """Draw the lines k f₁ + l f₂, and displacement and velocity at each turn of the first frequency.
 
-    Parameters
-    ----------
-    found : as its `to_json` gives it, with at least one line.
+    The result is as its `to_json` gives it, with at least one line.
     """
     unit = units.length_unit(found["max_abs"])
     hertz, lines = numbers(found["line_hz"]), numbers(found["line_amplitude"]) * unit.per_metre

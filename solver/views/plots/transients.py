@@ -17,9 +17,7 @@ from solver.views.plots.tracks import numbers
 def transient_figure(found: Mapping[str, Any], *, ax: Into = None) -> Figure:
     """Draw the extremes of the motion over time, and the amplitude over the frequency while that changes.
 
-    Parameters
-    ----------
-    found : as its `to_json` gives it, with at least one window.
+    The result is as its `to_json` gives it, with at least one window.
     """
     time, frequency, high, low = (numbers(found[name]) for name in ("time", "frequency_hz", "high", "low"))
     unit = units.length_unit(found["max_abs"])

@@ -19,9 +19,7 @@ _MOST = 12  # contacts with a line each and a name
 def wear_life_figure(found: Mapping[str, Any], *, ax: Into = None) -> Figure:
     """Draw the amplitude over the hours with its limit, and the load and the depth of each contact.
 
-    Parameters
-    ----------
-    found : as its `to_json` gives it, with at least one instant.
+    The result is as its `to_json` gives it, with at least one instant.
     """
     hours, amplitude = numbers(found["hours"]), numbers(found["amplitude"])
     length, depths = units.length_unit(float(amplitude.max())), np.array(found["depths"])
