@@ -104,3 +104,10 @@ def resolve(scene: Scene, path: str) -> Parameter:
         path=path, kind=Kind[found.acts_on.name], active=active, unit=found.unit, least=found.least,
         column=columns_set.pop(),
     )  # fmt: skip
+
+
+def check_fixed(path: str, frequency_hz: float | None) -> float:
+    """Return the frequency [Hz] at which another parameter is followed; SettingError without a good one."""
+    if frequency_hz is None:
+        raise SettingError("frequency_hz", None, f"is needed when the parameter is `{path}`")
+    return check_frequency("frequency_hz", frequency_hz)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 import numpy as np
 
 from solver.arrays import FloatOrNaN, Real
+from solver.errors import SettingError
 from solver.results.base import Drawn
 from solver.results.known import Stable, Verdict
 from solver.results.views import Views, on_demand
@@ -198,3 +199,9 @@ class Solution(Drawn):
         )  # fmt: skip
         told = {"drift_per_period": self.ratchets, "mean_range": MEAN_UNDETERMINED in self.flags}
         return {key: value for key, value in found.items() if told.get(key, True)}
+
+
+def check_converged(solution: Solution) -> None:
+    """Raise SettingError where there is no response to go on from."""
+    if not solution.converged:
+        raise SettingError("solution", solution.status.value, "must have converged")

@@ -24,6 +24,7 @@ from typing import Annotated, TypeVar
 
 import numpy as np
 
+from solver.balance.balance import contact_index
 from solver.balance.kernels.locate import between
 from solver.balance.kernels.output import MEASURES
 from solver.balance.kernels.residual import contact_values, evaluate
@@ -37,7 +38,7 @@ from solver.continuation.extrema.nodes import share_scales
 from solver.errors import SettingError
 from solver.jit.fourier import Real
 from solver.linear.kernels.receptance import receptance
-from solver.response.wear import Measured, WearSensitivity, contact_index
+from solver.response.wear import Measured, WearSensitivity
 from solver.response.wear_measures import (
     Change,
     ContactCycle,
@@ -112,7 +113,7 @@ def worst_wear(
     SettingError
         An unknown contact, a law the measure has no meaning for, or a branch without a point.
     """
-    e = contact_index(branch.balance, contact)
+    e = contact_index(branch.scene, contact)
     if not len(branch.values):
         raise SettingError("branch", branch.status.value, "must have a point")
     found = _MaximaSearch(branch, e, measure).maxima()
@@ -333,7 +334,7 @@ def worst_hessian(sensitivities: Sensitivities, worst: WorstWear, contact: str, 
         An unknown contact, or laws or paths without exact second derivatives.
     """
     balance = sensitivities.balance
-    e, ks = contact_index(balance, contact), balance.system.ks
+    e, ks = contact_index(balance.scene, contact), balance.system.ks
     pairing = np.zeros((balance.n_ports, balance.n_coefficients, balance.n_coefficients))
     for a in balance.scene.contacts[e].RUBBING:
         pairing[int(balance.system.first_port[e]) + a] = work_pairing(ks, balance.n_coefficients)

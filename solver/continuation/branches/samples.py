@@ -19,10 +19,11 @@ from solver.balance.parameter import Kind
 from solver.balance.workspace import Workspace
 from solver.continuation.branch import Branch, BranchStatus
 from solver.continuation.branches.point_by_point import is_unique
-from solver.continuation.branches.sweep import check_range, walk, without_peaks
+from solver.continuation.branches.sweep import walk, without_peaks
 from solver.continuation.branches.symmetry_breaking import branch_flags
 from solver.continuation.extrema.node_table import PointRow
 from solver.continuation.extrema.nodes import NodeSolver
+from solver.continuation.parameter_scale import check_range
 from solver.continuation.segment import joined
 from solver.continuation.settings import ContinuationSettings
 from solver.results.watch import ShouldStop

@@ -15,7 +15,7 @@ import numpy as np
 
 from solver.balance.balance import Balance, build
 from solver.balance.kernels.output import MAX_ABS
-from solver.balance.parameter import Kind, Parameter
+from solver.balance.parameter import Kind
 from solver.balance.simplifications import Effects
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.system import is_spanned
@@ -30,6 +30,7 @@ from solver.continuation.extrema.extrema import Survey, band_limit
 from solver.continuation.from_nothing import solve_from_nothing
 from solver.continuation.kernels import state as walk_states
 from solver.continuation.kernels.pseudo_arclength import begin_walk
+from solver.continuation.parameter_scale import check_range
 from solver.continuation.peaks import Peak
 from solver.continuation.segment import Course, Stretch, go_on_from, joined, rows_of
 from solver.continuation.settings import ContinuationSettings
@@ -194,19 +195,6 @@ def _covering(
 def _curve(balance: Balance, stretch: Stretch) -> tuple[Real, Real]:
     """Values in user units and amplitudes [m] of the points."""
     return balance.parameter.all_outside(stretch.solutions[:, -1].copy()), stretch.measures[:, MAX_ABS]
-
-
-def check_range(parameter: Parameter, start: float | None, stop: float | None) -> tuple[float, float]:
-    """Return the range of a continuation as floats; SettingError for ends that are none, or the same."""
-    ends = []
-    for name, value in (("start", start), ("stop", stop)):
-        if value is None:
-            raise SettingError(name, None, f"is needed for a sweep of `{parameter.path}`")
-        ends.append(parameter.check(name, value))
-    first, last = ends
-    if first == last:
-        raise SettingError("stop", last, f"must differ from the start {first!r}")
-    return first, last
 
 
 def check_limit(limit: float | None) -> None:

@@ -112,8 +112,7 @@ def worst_mistuning(
             raise SettingError("contacts", how.value, "needs a structure of named parts: matrices have none")
         found = _solved(searched, disk)
         if how is Contacts.RESIDUAL and found["worst"] is not None:
-            search_of = ResidualSearch(searched.scene, names, dof, band, harmonics, searched.go_on)
-            found["residual"] = _with_forces(search_of, searched, found)
+            found["residual"] = _with_forces(ResidualSearch(disk, searched.go_on), searched, found)
     else:
         found = _linear(searched, how)
     if on_progress is not None and not searched.stopped:
