@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from numbers import Integral
 from types import MappingProxyType
 from typing import NamedTuple, Self
 
@@ -135,6 +136,15 @@ class SettingError(SolverError):
         self.value = value
         self.issue = Issue(place, wanted, Shown(f"{value!r}{hint}") if hint else value)
         super().__init__(self.issue.said())
+
+
+def check_count(name: str | Place, value: object, least: int, most: int | None = None, more: str = "") -> int:
+    """Return a whole number within bounds, as an int; SettingError else, which ends as `more` says."""
+    whole = int(value) if isinstance(value, Integral) and not isinstance(value, bool) else least - 1
+    if least <= whole and (most is None or whole <= most):
+        return whole
+    bounds = f">= {least}" if most is None else f"from {least} to {most}"
+    raise SettingError(name, value, f"must be a whole number {bounds}{more}")
 
 
 class FieldError(ValueError):

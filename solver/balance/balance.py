@@ -8,22 +8,22 @@ from typing import Annotated
 
 import numpy as np
 
-from solver.balance.parameter import Kind, Parameter, resolve
+from solver.balance.parameter import Kind, Parameter, check_fixed, resolve
 from solver.balance.simplifications import Effects, even_harmonics_reason
-from solver.balance.speed_line import speed_line
-from solver.contacts.kernels.columns import N0
+from solver.balance.speed_line import numbers_along_line, speed_line
 from solver.contacts.kernels.system import System
-from solver.errors import SettingError
+from solver.errors import SettingError, check_count
 from solver.jit.fourier import Integer
 from solver.jit.trig_polynomial import grid_size, grid_tables
 from solver.linear.assembly import linear_model, structure_derivative
 from solver.linear.condensation import reduce_model
-from solver.linear.contact_table import contact_set, contact_table, highest_load, port_stiffnesses
+from solver.linear.contact_table import contact_set, highest_load, port_stiffnesses
 from solver.scene.bodies.kinematics import static_forces
 from solver.scene.cyclic.annulus import check_in_annulus, written_out
 from solver.scene.harmonics import MOST_HARMONICS, forced_harmonics, kept_harmonics
-from solver.scene.parameter_paths import AMPLITUDE, check_frequency
+from solver.scene.parameter_paths import AMPLITUDE
 from solver.scene.scene import Scene
+from solver.wording import listing
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,18 +68,8 @@ class Balance:
 
 
 def check_harmonics(harmonics: int) -> int:
-    """Return `harmonics` if it is a usable highest harmonic.
-
-    Raises
-    ------
-    SettingError
-        Not an integer from 0 to `MOST_HARMONICS`.
-    """
-    if isinstance(harmonics, bool) or not isinstance(harmonics, (int, np.integer)):
-        raise SettingError("harmonics", harmonics, "must be a whole number")
-    if not 0 <= harmonics <= MOST_HARMONICS:
-        raise SettingError("harmonics", harmonics, f"must be from 0 to {MOST_HARMONICS}")
-    return harmonics
+    """Return `harmonics`; SettingError if it is no whole number from 0 to `MOST_HARMONICS`."""
+    return check_count("harmonics", harmonics, 0, MOST_HARMONICS)
 
 
 def build(
@@ -112,10 +102,8 @@ def build(
     ks = _harmonics(scene, path, check_harmonics(harmonics), effects)
     omega = 0.0
     if parameter.kind is not Kind.FREQUENCY:
-        if frequency_hz is None:
-            raise SettingError("frequency_hz", None, f"is needed when the parameter is `{path}`")
-        omega = 2.0 * math.pi * check_frequency("frequency_hz", frequency_hz)
-        scene = scene.at_frequency(frequency_hz)
+        hertz = check_fixed(path, frequency_hz)
+        omega, scene = 2.0 * math.pi * hertz, scene.at_frequency(hertz)
     if parameter.kind is Kind.LEVEL:
         check_level(scene)
     if parameter.kind is Kind.LEVEL and scene.value("excitation.amplitude") == 0.0:
@@ -219,11 +207,10 @@ def _system(
     load_order = highest_load(scene)
     highest = max(int(ks[-1]), load_order)
     cos_table, sin_table = grid_tables(grid_size(highest), highest)
-    line, table = speed_line(scene), contact_table(scene, int(ks[-1]))
-    table[line.follows, N0] = line.least
+    line = speed_line(scene)
     return System(
         ks=ks, load_ks=np.arange(load_order + 1, dtype=np.int64), which=reduced.which, cos_table=cos_table,
-        sin_table=sin_table, **contact_set(scene)._asdict(), contacts=table,
+        sin_table=sin_table, **contact_set(scene)._asdict(), contacts=numbers_along_line(scene, int(ks[-1])),
         samples=0, condense=0 if effects.every_contact else 1,
         least_size=reduced.least_size,
         active=parameter.active, load_rise=line.load_rise, level=line.level,
@@ -240,3 +227,11 @@ def _system(
         observe=reduced.observe,
         forces=reduced.forces, dforces=reduced.dforces, constant_mean=int(bool(static_forces(scene))),
     )  # fmt: skip
+
+
+def contact_index(scene: Scene, contact: str) -> int:
+    """Return the number of a contact by its name; SettingError where there is none of that name."""
+    names = [each.name for each in scene.contacts]
+    if contact not in names:
+        raise SettingError("contact", contact, f"must be one of {listing(names)}")
+    return names.index(contact)

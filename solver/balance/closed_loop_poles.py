@@ -23,9 +23,8 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 
 from solver.balance.parameter import Kind
-from solver.contacts.kernels.system import DENSE, MODES, POLES, System, by_reference
+from solver.contacts.kernels.system import DENSE, MODES, POLES, System
 from solver.jit.fourier import Complex, Flags, Integer, Real
-from solver.jit.separate import apart
 from solver.linear.assembly import linear_model
 from solver.linear.contact_table import port_stiffnesses
 
@@ -113,11 +112,6 @@ class ClosedLoop:
         return free.at, np.maximum(stuck.at, free.at), half_width
 
     def _ascending(self, stiffness: Complex) -> Poles:
-        if self.system.form == MODES and self.system.eigenvalues.shape[1] <= MOST_MODES:
-            at, half_width = np.empty((2, *self.system.eigenvalues.shape))
-            springs = np.diag(stiffness).real - self.system.shift
-            spring_poles(by_reference(self.system), springs, at, half_width)
-            return Poles(at=at, half_width=half_width)
         structures = np.arange(len(self.system.K if self.system.form == DENSE else self.system.eigenvalues))
         found = self._of(np.broadcast_to(stiffness, (structures.size, *stiffness.shape)), structures, None)
         order = structures[:, None], np.argsort(found.at, axis=1)
@@ -315,29 +309,3 @@ def coupled(values: Complex, more: Complex | None, X: Complex, Y: Complex, moved
     diagonal = np.arange(values.shape[-1])
     matrices[:, diagonal, diagonal] += values if more is None else values + more
     return np.asarray(matrices, np.complex128)
-
-
-@apart
-def spring_poles(system: System, stiffness: Real, at: Real, half_width: Real) -> None:
-    """Fill the resonances with a spring at every port, of a system whose form is MODES.
-
-    Parameters
-    ----------
-    stiffness : (nc,) of the springs, less the shift [N/m].
-    at, half_width : (ns, nm) in units of kω, ascending; damping is that of the modes to first order; filled.
-    """
-    ns, nm = system.eigenvalues.shape
-    matrix = np.empty((nm, nm), np.complex128)
-    for s in range(ns):
-        for a in range(nm):
-            for b in range(nm):
-                total = complex(system.eigenvalues[s, a].real if a == b else 0.0)
-                for c in range(stiffness.size):
-                    total += system.contact_duals[s, c, a] * stiffness[c] * system.contact_modes[s, c, b]
-                matrix[a, b] = total
-        squares, shapes = np.linalg.eigh(matrix)
-        for m in range(nm):
-            width = 0.0
-            for n in range(nm):
-                width += 0.5 * abs(shapes[n, m]) ** 2 * system.dampings[s, n]
-            at[s, m], half_width[s, m] = math.sqrt(max(squares[m], 0.0)), width

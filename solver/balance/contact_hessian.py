@@ -6,7 +6,7 @@ a scene do to rows, loads and excitation.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -40,23 +40,24 @@ class ContactForces:
         """Return the ports of an element."""
         return slice(int(self.system.first_port[e]), int(self.system.first_port[e + 1]))
 
-    def times(self, dU: Real) -> Real:
-        """Return ∂F/∂U dU, (P, nc, n), of motions (P, nc, n)."""
-        product = np.empty(dU.shape)
+    def _blocks(self) -> Iterator[tuple[slice, Real]]:
+        """Yield the ports of each element with its ∂F/∂U, (m, m, n, n)."""
         for e in range(self.system.laws.size):
             ports, first = self.ports(e), int(self.system.first_block[e])
             m = ports.stop - ports.start
-            blocks = self.dF_dU[first : first + m * m].reshape(m, m, *self.dF_dU.shape[1:])
+            yield ports, self.dF_dU[first : first + m * m].reshape(m, m, *self.dF_dU.shape[1:])
+
+    def times(self, dU: Real) -> Real:
+        """Return ∂F/∂U dU, (P, nc, n), of motions (P, nc, n)."""
+        product = np.empty(dU.shape)
+        for ports, blocks in self._blocks():
             product[:, ports] = np.einsum("abij,pbj->pai", blocks, dU[:, ports])
         return product
 
     def times_transposed(self, w: Real) -> Real:
         """Return ∂F/∂Uᵀ w, (nc, n), of weights (nc, n)."""
         product = np.empty(w.shape)
-        for e in range(self.system.laws.size):
-            ports, first = self.ports(e), int(self.system.first_block[e])
-            m = ports.stop - ports.start
-            blocks = self.dF_dU[first : first + m * m].reshape(m, m, *self.dF_dU.shape[1:])
+        for ports, blocks in self._blocks():
             product[ports] = np.einsum("abij,ai->bj", blocks, w[ports])
         return product
 
@@ -105,13 +106,7 @@ class ContactForces:
 
 
 def contact_forces(system: System, seconds: Integer, u: Real) -> ContactForces:
-    """Evaluate all contacts of a system whose laws have second derivatives, by the kernels `seconds`.
-
-    Raises
-    ------
-    FloatingPointError
-        A law has no answer at `u`.
-    """
+    """Evaluate all contacts by the kernels `seconds`; FloatingPointError where a law has no answer at `u`."""
     nc = system.owner.size
     n = u.size // max(nc, 1)
     table, load, _, _ = contact_values(system, 0.0, 0.0)

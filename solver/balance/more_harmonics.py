@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 
 from solver.balance.balance import Balance, build, with_harmonics
+from solver.balance.speed_line import numbers_along_line
 from solver.contacts.kernels.columns import NODES
 from solver.contacts.kernels.system import DENSE, System
 from solver.jit.fourier import Complex, Integer, Real
 from solver.jit.trig_polynomial import grid_size, grid_tables
-from solver.linear.contact_table import contact_table
 from solver.scene.harmonics import MULTIPLES, among, kept_harmonics, spread
 
 
@@ -28,7 +28,7 @@ def more_harmonics(balance: Balance, top: int, *, multiples: int = MULTIPLES) ->
         return _rebuilt(balance, top)
     highest = max(int(ks[-1]), 1)
     cos_table, sin_table = grid_tables(grid_size(highest), highest)
-    contacts = contact_table(balance.scene, int(ks[-1]))
+    contacts = numbers_along_line(balance.scene, int(ks[-1]))
     # Where a law is followed from node to node an estimate has to see what lies between them too.
     contacts[:, NODES] = np.maximum(contacts[:, NODES], 2.0 * balance.system.contacts[:, NODES])
     system = system._replace(cos_table=cos_table, sin_table=sin_table, contacts=contacts)

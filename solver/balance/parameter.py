@@ -65,13 +65,7 @@ class Parameter:
         return values / (2.0 * math.pi) if self.kind is Kind.FREQUENCY else values
 
     def check(self, name: str, value: float) -> float:
-        """Return `value` as a float if the parameter may have it.
-
-        Raises
-        ------
-        SettingError
-            Not a finite number, or out of the parameter's range; the message names `name`.
-        """
+        """Return a value that the parameter may have as a float; SettingError, which names `name`, else."""
         if (
             isinstance(value, bool)
             or not isinstance(value, (int, float, np.number))
@@ -88,13 +82,7 @@ class Parameter:
 
 
 def resolve(scene: Scene, path: str) -> Parameter:
-    """Return what `path` means in `scene`.
-
-    Raises
-    ------
-    SettingError
-        The scene has no such parameter; the message lists those it has.
-    """
+    """Return what `path` means in `scene`; SettingError with those that it has if it is none of them."""
     scene.check_path(path)
     active = np.zeros(len(scene.contacts))
     followed = follows_speed(scene, path)
@@ -116,3 +104,10 @@ def resolve(scene: Scene, path: str) -> Parameter:
         path=path, kind=Kind[found.acts_on.name], active=active, unit=found.unit, least=found.least,
         column=columns_set.pop(),
     )  # fmt: skip
+
+
+def check_fixed(path: str, frequency_hz: float | None) -> float:
+    """Return the frequency [Hz] at which another parameter is followed; SettingError without a good one."""
+    if frequency_hz is None:
+        raise SettingError("frequency_hz", None, f"is needed when the parameter is `{path}`")
+    return check_frequency("frequency_hz", frequency_hz)

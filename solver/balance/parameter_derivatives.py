@@ -29,13 +29,7 @@ from solver.scene.scene import MatricesStructure, Scene
 
 
 def resolved(balance: Balance, paths: Sequence[str]) -> tuple[Parameter, ...]:
-    """Return what the paths mean in the scene of a balance.
-
-    Raises
-    ------
-    SettingError
-        An unknown path, the frequency, or one that calls for even harmonics the balance left out.
-    """
+    """Return what paths mean; SettingError for one unknown, or that calls for harmonics left out."""
     scene, found = balance.scene, []
     check_given_loads(scene, paths)
     for path in paths:

@@ -8,9 +8,11 @@ from typing import Annotated
 
 import numpy as np
 
+from solver.contacts.kernels.columns import N0
 from solver.contacts.laws.harmonics import is_of_variation
 from solver.errors import SettingError
 from solver.jit.fourier import Integer, Real
+from solver.linear.contact_table import contact_table
 from solver.scene.bodies.body import REVOLUTIONS
 from solver.scene.parameter_paths import AMPLITUDE, follows_speed, parameter_of
 from solver.scene.scene import Scene
@@ -50,6 +52,13 @@ def speed_line(scene: Scene) -> SpeedLine:
         follows=np.array(list(values), dtype=np.int64), least=np.array(list(values.values())),
         load_rise=rise, level=level,
     )  # fmt: skip
+
+
+def numbers_along_line(scene: Scene, highest: int) -> Real:
+    """Return the numbers of all contacts, see `contact_table`, with loads that follow the speed at rest."""
+    table, line = contact_table(scene, highest), speed_line(scene)
+    table[line.follows, N0] = line.least
+    return table
 
 
 def check_given_loads(scene: Scene, paths: Iterable[str]) -> None:

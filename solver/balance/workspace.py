@@ -127,10 +127,7 @@ class Workspace:
         if not len(self.balance.system.loose) or self.balance.system.hold:
             return self._plain(p, ways, guess)
         if not self.friction_can_hold(p):
-            nothing = np.zeros(self.balance.n_unknowns)
-            return PointSolution(
-                converged=False, u=nothing, iterations=0, residual=np.inf, ratchets=True, above_friction=True
-            )
+            return replace(self._nothing(), ratchets=True, above_friction=True)
         # Under given loads what holds a part shows at once; a load that moves may hold it elsewhere.
         together = all(contact.keeps_together for contact in self.balance.scene.contacts)
         if together:
@@ -146,6 +143,11 @@ class Workspace:
         last = self._plain(p, ways[first:])
         lost = found.loses_power or last.loses_power
         return replace(last, iterations=found.iterations + last.iterations, loses_power=lost)
+
+    def _nothing(self) -> PointSolution:
+        """Return an attempt that was not made."""
+        u = np.zeros(self.balance.n_unknowns)
+        return PointSolution(converged=False, u=u, iterations=0, residual=np.inf)
 
     def friction_can_hold(self, p: float) -> bool:
         """Return whether friction can hold the mean loads on parts that contacts alone hold."""
@@ -359,9 +361,7 @@ class Workspace:
         count = self.balance.system.ks.size
         less = fewer_harmonics(self.balance, max(2 * count // 3, FEWEST_HARMONICS))
         if less.system.ks.size >= count:
-            nothing = np.zeros(self.balance.n_unknowns)
-            failed = PointSolution(converged=False, u=nothing, iterations=0, residual=np.inf)
-            return self.balance.system.ks, failed
+            return self.balance.system.ks, self._nothing()
         smaller = Workspace.of(less)
         ks, coarse = smaller._with_fewer_harmonics(p)
         u, good, norm, spent = np.zeros(smaller.balance.n_unknowns), False, np.inf, coarse.iterations

@@ -72,6 +72,26 @@ class BranchStatus(Enum):
     )
 
 
+ROWS = ("solutions", "tangents", "states", "observed", "measures")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Points:
+    """The rows of a branch, see `Branch`; of what is observed the coefficients of the harmonics kept."""
+
+    solutions: Real
+    tangents: Real
+    states: Integer
+    observed: Real
+    measures: Real
+
+    @classmethod
+    def of(cls, branch: Any, **others: Real) -> Points:
+        """Return the rows of what has them, some of them others."""
+        rows: dict[str, Any] = {name: getattr(branch, name) for name in ROWS}
+        return cls(**{**rows, **others})
+
+
 class Posed(Protocol):
     """What a branch is of: the problem that each of its points solves."""
 

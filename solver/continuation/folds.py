@@ -46,28 +46,26 @@ class OnBranch(Protocol):
 _Point = TypeVar("_Point", bound=OnArc)
 
 
-def motion_scales(left: OnBranch, right: OnBranch) -> tuple[float, float]:
-    """Return the factors that turn both tangents into derivatives by the share of the chord of the motion.
-
-    Around a fold λ goes there and back, so that the motion alone tells how far it is.
-    """
-    chord = right.solution[:-1] - left.solution[:-1]
-    length = float(chord @ chord)
-    at_left, at_right = float(chord @ left.tangent[:-1]), float(chord @ right.tangent[:-1])
-    return length / at_left if at_left != 0.0 else 0.0, length / at_right if at_right != 0.0 else 0.0
-
-
 def fold_between(
-    at_share: Callable[[float], _Point | None], before: float, after: float
+    at_share: Callable[[float], _Point | None], left: OnBranch, right: OnBranch
 ) -> tuple[_Point, bool] | None:
     """Return the fold between two points of a branch, and whether it is smooth (no corner).
+
+    Around a fold λ goes there and back, so that the motion alone tells how far it is: dλ/dshare is of the
+    share of its chord, and 0 where the motion is the same at both points, which then are one but for
+    rounding, with no fold between them.
 
     Parameters
     ----------
     at_share : the solution at a share of the way, None where there is none.
-    before, after : dλ/dshare at both points, of opposite signs; 0 where the motion is the same at both, which
-        then are one but for rounding, with no fold between them.
+    left, right : the points, with dλ of opposite signs.
     """
+    chord = right.solution[:-1] - left.solution[:-1]
+    length, along = float(chord @ chord), [float(chord @ each.tangent[:-1]) for each in (left, right)]
+    before, after = (
+        float(each.tangent[-1] * (length / by if by != 0.0 else 0.0))
+        for each, by in zip((left, right), along, strict=True)
+    )
     size = max(abs(before), abs(after))
     if size == 0.0:
         return None

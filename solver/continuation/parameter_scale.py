@@ -66,17 +66,22 @@ class Scale:
 
 
 def scale_of(scene: Scene, path: str, start: float, stop: float) -> Scale:
-    """Return the range of a parameter.
-
-    Raises
-    ------
-    SettingError
-        A path the scene does not have, the frequency, or a range that is none.
-    """
+    """Return the range of a parameter; SettingError for the frequency, or a path or range that is none."""
     parameter = resolve(scene, path)
     if parameter.kind is Kind.FREQUENCY:
         raise SettingError("parameter", path, "cannot be the frequency: it is searched over the scene's band")
-    first, last = parameter.check("start", start), parameter.check("stop", stop)
+    first, last = check_range(parameter, start, stop)
+    return Scale(parameter=parameter, start=first, stop=last)
+
+
+def check_range(parameter: Parameter, start: float | None, stop: float | None) -> tuple[float, float]:
+    """Return the range of a continuation as floats; SettingError for ends that are none, or the same."""
+    ends = []
+    for name, value in (("start", start), ("stop", stop)):
+        if value is None:
+            raise SettingError(name, None, f"is needed for a sweep of `{parameter.path}`")
+        ends.append(parameter.check(name, value))
+    first, last = ends
     if first == last:
         raise SettingError("stop", last, f"must differ from the start {first!r}")
-    return Scale(parameter=parameter, start=first, stop=last)
+    return first, last

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from solver.balance.kernels.output import MEASURES
 from solver.balance.kernels.residual import evaluate
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.system import AT_BRANCH_POINT, evaluation_by_value
-from solver.continuation.branch import BranchStatus
+from solver.continuation.branch import ROWS, BranchStatus, Points
 from solver.continuation.kernels.pseudo_arclength import begin_walk
 from solver.continuation.kernels.state import (
     COUNT,
@@ -33,18 +33,12 @@ from solver.linear.kernels.receptance import receptance
 from solver.results.told import Piece
 
 _ENDINGS = tuple(BranchStatus)
-_ROWS = ("solutions", "tangents", "states", "observed", "measures")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class Stretch(Piece):
-    """Some consecutive points of a branch; the arrays are those of `solver.continuation.branch.Branch`."""
+class Stretch(Points, Piece):
+    """Some consecutive points of a branch."""
 
-    solutions: Real
-    tangents: Real
-    states: Integer
-    observed: Real
-    measures: Real
     status: Annotated[BranchStatus | None, "How the branch ended with this stretch; None if it goes on."]
     newton_iterations: Annotated[int, "Since the branch began."]
     rejected_steps: Annotated[int, "Since the branch began."]
@@ -58,17 +52,14 @@ class Stretch(Piece):
 
     def first(self, count: int) -> Stretch:
         """Return the first points alone, without the state of a continuation, which is that of the last."""
-        return replace(
-            self, solutions=self.solutions[:count], tangents=self.tangents[:count],
-            states=self.states[:count], observed=self.observed[:count], measures=self.measures[:count],
-            status=None, walk=np.zeros(0),
-        )  # fmt: skip
+        rows: dict[str, Any] = {name: getattr(self, name)[:count] for name in ROWS}
+        return replace(self, **rows, status=None, walk=np.zeros(0))
 
     def to_arrays(self) -> dict[str, Real | Integer]:
         """Return everything as plain arrays, to be stored."""
         ending = -1 if self.status is None else _ENDINGS.index(self.status)
         counts = [ending, self.newton_iterations, self.rejected_steps, self.stepped_over]
-        arrays: dict[str, Real | Integer] = {name: getattr(self, name) for name in _ROWS}
+        arrays: dict[str, Real | Integer] = {name: getattr(self, name) for name in ROWS}
         return arrays | {
             "counts": np.array(counts, np.int64), "seconds": np.array([self.seconds]), "walk": self.walk,
         }  # fmt: skip
@@ -76,7 +67,7 @@ class Stretch(Piece):
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, Real | Integer]) -> Stretch:
         """Return the stretch of such arrays (KeyError, ValueError or IndexError if they are not that)."""
-        real = {name: np.ascontiguousarray(arrays[name], np.float64) for name in (*_ROWS, "walk")}
+        real = {name: np.ascontiguousarray(arrays[name], np.float64) for name in (*ROWS, "walk")}
         if real["measures"].shape[1] != MEASURES:
             raise ValueError(f"measures of a branch have {MEASURES} columns")
         ending, iterations, rejected, over = (int(number) for number in arrays["counts"])
@@ -114,26 +105,15 @@ class Course:
 
 def joined(stretches: Sequence[Stretch]) -> Stretch:
     """Return consecutive stretches as one; at least one."""
-    last = stretches[-1]
-    return Stretch(
-        solutions=np.concatenate([stretch.solutions for stretch in stretches]),
-        tangents=np.concatenate([stretch.tangents for stretch in stretches]),
-        states=np.concatenate([stretch.states for stretch in stretches]),
-        observed=np.concatenate([stretch.observed for stretch in stretches]),
-        measures=np.concatenate([stretch.measures for stretch in stretches]),
-        status=last.status, newton_iterations=last.newton_iterations, rejected_steps=last.rejected_steps,
-        stepped_over=last.stepped_over, seconds=last.seconds, walk=last.walk,
-    )  # fmt: skip
+    rows: dict[str, Any] = {name: np.concatenate([getattr(one, name) for one in stretches]) for name in ROWS}
+    return replace(stretches[-1], **rows)
 
 
-def rows_of(balance: Balance, count: int) -> tuple[Real, Real, Integer, Real, Real]:
-    """Return empty rows for `count` points: solutions, tangents, states, observed, measures."""
-    nt, n = balance.n_unknowns, balance.n_coefficients
-    return (
-        np.zeros((count, nt + 1)), np.zeros((count, nt + 1)),
-        np.zeros((count, len(balance.scene.contacts)), np.int64), np.zeros((count, n)),
-        np.zeros((count, MEASURES)),
-    )  # fmt: skip
+def rows_of(balance: Balance, count: int) -> dict[str, Any]:
+    """Return empty rows for `count` points, in the order of `ROWS`."""
+    nt, n, contacts = balance.n_unknowns, balance.n_coefficients, len(balance.scene.contacts)
+    rows = [np.zeros((count, width)) for width in (nt + 1, nt + 1, contacts, n, MEASURES)]
+    return dict(zip(ROWS, rows, strict=True)) | {"states": np.zeros((count, contacts), np.int64)}
 
 
 def state_of(walk: Walk) -> Real:
@@ -153,10 +133,7 @@ def go_on_from(workspace: Workspace, control: Control, stretch: Stretch) -> tupl
         The stretch is not of this balance: other sizes, or its last point is no solution.
     """
     balance, system, linear = workspace.balance, workspace.system, workspace.linear
-    rows = rows_of(balance, 0)
-    fits = all(
-        getattr(stretch, name).shape[1:] == row.shape[1:] for name, row in zip(_ROWS, rows, strict=True)
-    )
+    fits = all(getattr(stretch, name).shape[1:] == row.shape[1:] for name, row in rows_of(balance, 0).items())
     nt = balance.n_unknowns
     if not fits or stretch.walk.size != 6 * nt + 5 + NUMBERS or not len(stretch.solutions):
         raise _foreign(stretch)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -22,7 +23,6 @@ from solver.continuation.kernels.state import Control, Walk, walk_by_value
 from solver.continuation.segment import Stretch, rows_of, state_of
 from solver.continuation.settings import ContinuationSettings
 from solver.continuation.walk import Curve
-from solver.jit.fourier import Integer, Real
 
 STRETCH = 64  # points between two looks at the caller, at most
 _SHORT_STRETCH = 4  # the first of them where a point may take long
@@ -78,11 +78,12 @@ class BranchStretches(Curve[Stretch]):
         """Return the next stretch, of no more than `size` points, and how many the one behind it may have."""
         workspace, control, state, before = self._workspace, self._control, self._state, time.perf_counter()
         rows, springs = rows_of(workspace.balance, int(size)), workspace.springs.rows(int(size))
+        filled = [*rows.values(), springs]
         code, count = walk_on(
-            workspace.system, workspace.linear, workspace.point, control, state, int(size), *rows, springs
+            workspace.system, workspace.linear, workspace.point, control, state, int(size), *filled
         )
-        workspace.springs.keep(rows[0][:count], springs)
-        self._last = last = np.concatenate([self._last, rows[0][:count]])[-MANY:]
+        workspace.springs.keep(rows["solutions"][:count], springs)
+        self._last = last = np.concatenate([self._last, rows["solutions"][:count]])[-MANY:]
         if code == walk_states.RUNNING and stands_still(last, control):
             code = walk_states.STALLED
         status, again = _ENDINGS.get(code), None
@@ -97,13 +98,10 @@ class BranchStretches(Curve[Stretch]):
         longer = min(2.0, _STRETCH_SECONDS / max(time.perf_counter() - before, 1e-9))
         return stretch, min(STRETCH, max(1, int(size * longer)))
 
-    def _stretch(
-        self, rows: tuple[Real, Real, Integer, Real, Real], count: int, status: BranchStatus | None
-    ) -> Stretch:
+    def _stretch(self, rows: dict[str, Any], count: int, status: BranchStatus | None) -> Stretch:
         numbers = walk_by_value(self._state).numbers
         return Stretch(
-            solutions=rows[0][:count], tangents=rows[1][:count], states=rows[2][:count],
-            observed=rows[3][:count], measures=rows[4][:count], status=status,
+            **{name: row[:count] for name, row in rows.items()}, status=status,
             newton_iterations=self._spent + int(numbers[walk_states.ITERATIONS]),
             rejected_steps=int(numbers[walk_states.REJECTED]),
             stepped_over=int(numbers[walk_states.STEPPED_OVER]),

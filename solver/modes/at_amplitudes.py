@@ -117,9 +117,7 @@ def _between(
     """Return the point of an amplitude between two of a curve."""
     rise = other.log_amplitude - one.log_amplitude
     share = (log_amplitude - one.log_amplitude) / rise if rise else 0.0
-    same = one.mode == other.mode
-    guesses = [replace(one, y=one.y + share * (other.y - one.y))] if same else []
-    for guess in (*guesses, one, other):
+    for guess in (one.towards(other, share), one, other):
         found = correct(problem.equations, replace(guess, log_amplitude=log_amplitude), most=40)
         if found.converged:
             return found

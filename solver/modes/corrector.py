@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated
 
 import numpy as np
@@ -28,6 +28,19 @@ class ModeState:
     log_amplitude: Annotated[float, "Ln a."]
     mode: Annotated[int, "Number of the mode of the structure that is carried in q."]
     phase: Annotated[Complex, "(N,) the force that harmonic 1 lags by a quarter of a period."]
+
+    def towards(self, other: ModeState, share: float) -> ModeState:
+        """Return a guess a share of the way to another point; q is of one mode alone."""
+        y = self.y + share * (other.y - self.y) if self.mode == other.mode else self.y.copy()
+        rise = other.log_amplitude - self.log_amplitude
+        return replace(self, y=y, log_amplitude=self.log_amplitude + share * rise)
+
+    def scaled(self, size: int, factor: float, rest: Real | float = 0.0) -> ModeState:
+        """Return a guess with what moves about a rest, of `size` motions and q, times a factor."""
+        y = self.y.copy()
+        y[:size] = rest + factor * (y[:size] - rest)
+        y[size : size + 2] *= factor
+        return replace(self, y=y)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -19,6 +19,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 
 from solver.balance.balance import Balance
+from solver.balance.kernels.output import extremes
 from solver.balance.kernels.residual import evaluate
 from solver.balance.kernels.slopes import take_slopes
 from solver.balance.whole_motion import Amplitudes
@@ -142,6 +143,15 @@ class Equations:
     def follows(self, _before: Real, _y: Real) -> bool:
         """Return whether unknowns may follow others on one curve, beside being near to them."""
         return True
+
+    def top(self, x: Complex) -> tuple[float, Complex]:
+        """Return max|x| of the observed DOF [m], and c (nk, N) of its change Re Σ c_kᴴ dx_k."""
+        observe = self.structure.observe
+        observed = self.amplitudes.coefficients(np.einsum("kn,kn->k", observe, x))
+        high, at_high, low, at_low = extremes(self._system, observed)
+        sign, tau = (1.0, at_high) if high >= -low else (-1.0, at_low)
+        # The extreme of a smooth motion changes as the motion does at its instant.
+        return max(high, -low), sign * (observe * self.amplitudes.turn(tau)[:, None]).conj()
 
     def motions(self, w: Real) -> Real:
         """Return the motions of all ports, (nc, n), of those of the leading ones (r, n)."""

@@ -12,7 +12,7 @@ import numpy as np
 
 from solver.balance.balance import Balance, build, check_harmonics
 from solver.balance.simplifications import Effects, even_harmonics_reason
-from solver.errors import SettingError
+from solver.errors import SettingError, check_count
 from solver.jit.fourier import Real
 from solver.linear.assembly import linear_model
 from solver.modes.curve import follow
@@ -74,8 +74,7 @@ def nonlinear_mode(
     """
     begun = time.perf_counter()
     low, high = (math.log(each) for each in check_amplitudes(amplitudes))
-    if isinstance(most_points, bool) or not isinstance(most_points, int) or most_points < 1:
-        raise SettingError("most_points", most_points, "must be a whole number from 1")
+    check_count("most_points", most_points, 1)
     problem = pose(scene, mode, nodal_diameter, harmonics)
     equations = problem.equations
     first = begin(equations, problem.mode, problem.rest, low, turns=problem.turns)
@@ -87,13 +86,7 @@ def nonlinear_mode(
 
 
 def check_amplitudes(amplitudes: Sequence[float]) -> tuple[float, float]:
-    """Return smallest and largest amplitude.
-
-    Raises
-    ------
-    SettingError
-        Not two numbers with 0 < smallest < largest whose squares can be told.
-    """
+    """Return smallest and largest amplitude; SettingError where their squares cannot be told."""
     wanted = f"must be two numbers, {LEAST:g} <= smallest < largest <= {1.0 / LEAST:g} [√kg m]"
     try:
         low, high = (float(each) for each in amplitudes)
@@ -172,11 +165,7 @@ def at_nodal_diameter(scene: Scene, nodal_diameter: int | None) -> Scene:
         wanted = "must be left out: the structure has no sectors"
         raise SettingError("nodal_diameter", nodal_diameter, wanted)
     n = scene.structure.sector_count
-    good = isinstance(nodal_diameter, (int, np.integer)) and not isinstance(nodal_diameter, bool)
-    if not good or abs(nodal_diameter) > n // 2:
-        wanted = f"must be a whole number from {-(n // 2)} to {n // 2}, half the sectors"
-        raise SettingError("nodal_diameter", nodal_diameter, wanted)
-    order = int(nodal_diameter) % n
+    order = check_count("nodal_diameter", nodal_diameter, -(n // 2), n // 2, ", half the sectors") % n
     changed = tuple(
         force.model_copy(update={"engine_order": order}) if force.engine_order is not None else force
         for force in scene.excitation

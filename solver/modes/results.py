@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple
 import numpy as np
 
 from solver.arrays import Complex, Integer, Real
-from solver.errors import SettingError
+from solver.errors import SettingError, check_count
 from solver.results.base import Drawn
 from solver.results.views import Data, Views
 from solver.scene.scene import Scene
@@ -145,8 +145,7 @@ class NonlinearMode(ModalCurve):
 
         if contact not in self.contact_names:
             raise SettingError("contact", contact, f"must be one of {listing(self.contact_names)}")
-        if isinstance(samples, bool) or not isinstance(samples, int) or samples < 2:
-            raise SettingError("samples", samples, "must be a whole number from 2")
+        check_count("samples", samples, 2)
         at = self.contact_names.index(contact)
         ports = np.cumsum([0, *(len(each.end_keys) for each in self.scene.contacts)])
         motions = self.contact_motions[i, ports[at] : ports[at + 1]]

@@ -66,13 +66,7 @@ class Pattern:
 
 
 class Factors:
-    """Factors of Z + ρ (M b)(M b)ᴴ, the second in harmonic `first` alone, of entries Z (nk, L).
-
-    Raises
-    ------
-    numpy.linalg.LinAlgError
-        One is singular.
-    """
+    """Factors of Z + ρ (M b)(M b)ᴴ, the second in harmonic `first`, of entries Z (nk, L); or LinAlgError."""
 
     def __init__(self, pattern: Pattern, Z: Complex, first: int, rho: complex, b: Complex) -> None:
         self.Z, self._size = Z, pattern.size

@@ -247,10 +247,8 @@ def _raised(equations: Equations, found: Corrected, rest: Real, low: float) -> C
     # The last rise may be as short as it will.
     size, better, least = equations.size, found, min(_DECADE / 100.0, 0.5 * rise)
     while rise > least:
-        y, still = found.state.y.copy(), rest.reshape(-1)
-        y[:size] = still + (y[:size] - still) * math.exp(rise)
-        y[size : size + 2] *= math.exp(rise)
-        guess = replace(found.state, y=y, log_amplitude=found.state.log_amplitude + rise)
+        raised = found.state.scaled(size, math.exp(rise), rest.reshape(-1))
+        guess = replace(raised, log_amplitude=found.state.log_amplitude + rise)
         better = correct(equations, guess, most=_MOST_AT_FIRST)
         if better.converged:
             return carried_anew(equations, better)

@@ -15,6 +15,7 @@ from solver.contacts.kernels.columns import CLOSED, DEFORMING, TOUCHING
 from solver.contacts.kernels.stick_slip_events import LIFTING, SEPARATED, SLIPPING, STUCK
 from solver.jit import fourier
 from solver.jit.fourier import Real
+from solver.response.solution import HISTORY_DEPENDENT, MEAN_UNDETERMINED
 from solver.results.told import Piece
 from solver.scene.scene import AnyContact
 
@@ -123,6 +124,19 @@ def contact_responses(workspace: Workspace, u: Real, p: float) -> tuple[ContactR
         _contact(contact, int(state), slips[port], forces[port])
         for contact, state, port in zip(balance.scene.contacts, point.states, ports, strict=True)
     )
+
+
+def flags_of(
+    contacts: tuple[ContactResponse, ...], *, mean_open: bool, half_range_open: bool
+) -> tuple[str, ...]:
+    """Return the flags of a response with such contacts; whether its mean and half its range are open."""
+    stuck = [contact for contact in contacts if contact.state is ContactState.STUCK]
+    flags = {
+        MEAN_UNDETERMINED: mean_open, HISTORY_DEPENDENT: half_range_open,
+        "all_stuck": bool(stuck) and len(stuck) == len(contacts),
+        "separation": any(contact.state in OPENS for contact in contacts),
+    }  # fmt: skip
+    return tuple(flag for flag, holds in flags.items() if holds)
 
 
 def _contact(contact: AnyContact, state: int, motions: Real, forces: Real) -> ContactResponse:

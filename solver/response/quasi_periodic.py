@@ -183,13 +183,7 @@ def check(
 def second_force(
     scene: Scene, *, amplitude: float, dof: str | None, phase: float, engine_order: int | None
 ) -> Excitation:
-    """Return the second force.
-
-    Raises
-    ------
-    SettingError
-        No such DOF, or none is given and the first force of the scene acts on several.
-    """
+    """Return the second force; SettingError for a DOF that is none, or where several could be meant."""
     place = scene.excitation[0].dof if dof is None else dof
     if place not in scene.dofs:
         known = ", ".join(scene.dofs)

@@ -7,7 +7,10 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
+import numpy as np
+
 from solver.arrays import FloatOrNaN, Real
+from solver.errors import SettingError
 from solver.results.base import Drawn
 from solver.results.known import Stable, Verdict
 from solver.results.views import Views, on_demand
@@ -119,6 +122,18 @@ class Solution(Drawn):
     _judged: list[Verdict] = field(default_factory=list, init=False, compare=False)  # once, when asked for
     _drifts: list[float] = field(default_factory=list, init=False, compare=False)
 
+    @classmethod
+    def without_numbers(
+        cls, *, highest: int, residual: float = math.nan, newton_iterations: int = 0,
+        flags: tuple[str, ...] = (), **told: Any,
+    ) -> Solution:  # fmt: skip
+        """Return what stands for a response that was not found; `highest` harmonic of its arrays."""
+        return cls(
+            **told, max_abs=math.nan, half_peak_to_peak=math.nan, mean=math.nan, contacts=(), flags=flags,
+            harmonics=np.full(highest + 1, np.nan), observed=np.full(2 * highest + 1, np.nan),
+            residual=residual, error_estimate=math.nan, newton_iterations=newton_iterations,
+        )  # fmt: skip
+
     @property
     def converged(self) -> bool:
         """Whether the numbers are a solution."""
@@ -184,3 +199,9 @@ class Solution(Drawn):
         )  # fmt: skip
         told = {"drift_per_period": self.ratchets, "mean_range": MEAN_UNDETERMINED in self.flags}
         return {key: value for key, value in found.items() if told.get(key, True)}
+
+
+def check_converged(solution: Solution) -> None:
+    """Raise SettingError where there is no response to go on from."""
+    if not solution.converged:
+        raise SettingError("solution", solution.status.value, "must have converged")

@@ -25,9 +25,9 @@ from solver.jit import fourier
 from solver.jit.fourier import Real
 from solver.linear.condensation import loose_ports
 from solver.linear.modal import undamped_resonance
-from solver.response.contact_response import OPENS, ContactResponse, ContactState, contact_responses
+from solver.response.contact_response import contact_responses, flags_of
 from solver.response.history_dependence import has_another_solution, history_of
-from solver.response.solution import HISTORY_DEPENDENT, MEAN_UNDETERMINED, Solution, SolutionStatus
+from solver.response.solution import Solution, SolutionStatus
 from solver.results.notes import ABOVE_FRICTION
 from solver.scene.parameter_paths import check_frequency
 from solver.scene.scene import Scene
@@ -149,7 +149,7 @@ def describe(
     mean_open = mean_open or another
     return replace(
         solution,
-        flags=_flags(contacts, mean_open=mean_open, half_range_open=open_anyway or another),
+        flags=flags_of(contacts, mean_open=mean_open, half_range_open=open_anyway or another),
         error_estimate=error.half_peak_to_peak if mean_open else error.max_abs,
         mean_range=(math.nan, math.nan) if nothing_holds else history.mean_range,
         seconds=time.perf_counter() - begun,
@@ -200,32 +200,12 @@ def _nothing_holds_a_part(workspace: Workspace) -> bool:
     return bool(np.linalg.eigvalsh(held)[0] < FREE)
 
 
-def _flags(
-    contacts: tuple[ContactResponse, ...], *, mean_open: bool, half_range_open: bool
-) -> tuple[str, ...]:
-    stuck = [contact for contact in contacts if contact.state is ContactState.STUCK]
-    flags = []
-    if mean_open:
-        flags.append(MEAN_UNDETERMINED)
-    if half_range_open:
-        flags.append(HISTORY_DEPENDENT)
-    if stuck and len(stuck) == len(contacts):
-        flags.append("all_stuck")
-    if any(contact.state in OPENS for contact in contacts):
-        flags.append("separation")
-    return tuple(flags)
-
-
 def _failure(balance: Balance, frequency_hz: float, found: PointSolution, seconds: float) -> Solution:
-    nothing = np.full(2 * balance.highest_harmonic + 1, np.nan)
     status = SolutionStatus.RATCHETS if found.ratchets else SolutionStatus.NOT_CONVERGED
     if not found.ratchets and undamped_resonance(balance.scene, frequency_hz, balance.system.ks):
         status = SolutionStatus.UNDAMPED
-    return Solution(
-        scene=balance.scene, frequency_hz=frequency_hz, n_harmonics=balance.n_harmonics,
-        status=status,
-        max_abs=math.nan, half_peak_to_peak=math.nan, mean=math.nan,
-        harmonics=np.full(balance.highest_harmonic + 1, np.nan), observed=nothing, contacts=(),
-        flags=(ABOVE_FRICTION,) if found.above_friction else (),
-        residual=found.residual, error_estimate=math.nan, newton_iterations=found.iterations, seconds=seconds,
+    return Solution.without_numbers(
+        scene=balance.scene, frequency_hz=frequency_hz, n_harmonics=balance.n_harmonics, status=status,
+        highest=balance.highest_harmonic, flags=(ABOVE_FRICTION,) if found.above_friction else (),
+        residual=found.residual, newton_iterations=found.iterations, seconds=seconds,
     )  # fmt: skip

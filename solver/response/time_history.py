@@ -10,15 +10,15 @@ import math
 
 import numpy as np
 
-from solver.errors import SettingError
+from solver.balance.balance import contact_index
+from solver.errors import check_count
 from solver.jit import fourier
 from solver.jit.fourier import Complex, Real
 from solver.linear.assembly import linear_model, row_of
 from solver.linear.condensation import contacts_hold, force_amplitudes
 from solver.linear.contact_table import port_stiffnesses
 from solver.linear.model import LinearModel, dynamic_stiffness
-from solver.response.solution import Solution
-from solver.wording import listing
+from solver.response.solution import Solution, check_converged
 
 LARGEST_SAMPLES = 10_000_000
 
@@ -62,11 +62,8 @@ def hysteresis_loop(solution: Solution, contact: str, *, samples: int = 512) -> 
         The solution did not converge, an unknown contact, or a bad number of samples.
     """
     tau = _angles(samples)
-    _check_converged(solution)
-    names = [each.name for each in solution.contacts]
-    if contact not in names:
-        raise SettingError("contact", contact, f"must be one of {listing(names)}")
-    at = names.index(contact)
+    check_converged(solution)
+    at = contact_index(solution.scene, contact)
     given, found = solution.scene.contacts[at], solution.contacts[at]
     basis, omega = fourier.basis(tau, solution.highest_harmonic), 2.0 * math.pi * solution.frequency_hz
     return basis @ found.slip, found.force_over(given.at_frequency(omega), tau)
@@ -85,7 +82,7 @@ def all_coordinates(solution: Solution, *, first: int = 0) -> Complex:
     SettingError
         The solution did not converge.
     """
-    _check_converged(solution)
+    check_converged(solution)
     model = linear_model(solution.scene)
     ks = np.arange(first, solution.highest_harmonic + 1)
     diameters = model.diameters(ks)
@@ -115,13 +112,6 @@ def matrices(model: LinearModel, k: int) -> tuple[Complex, Complex, Complex]:
     return K, C, model.ports_at(n)[0]
 
 
-def _check_converged(solution: Solution) -> None:
-    if not solution.converged:
-        raise SettingError("solution", solution.status.value, "must have converged")
-
-
 def _angles(samples: int) -> Real:
-    good = isinstance(samples, (int, np.integer)) and not isinstance(samples, bool)
-    if not good or not 2 <= samples <= LARGEST_SAMPLES:
-        raise SettingError("samples", samples, f"must be a whole number from 2 to {LARGEST_SAMPLES}")
+    check_count("samples", samples, 2, LARGEST_SAMPLES)
     return np.asarray(2.0 * math.pi / samples * np.arange(samples))

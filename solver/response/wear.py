@@ -13,7 +13,7 @@ from typing import Annotated
 
 import numpy as np
 
-from solver.balance.balance import Balance, build, for_parameter
+from solver.balance.balance import Balance, build, contact_index, for_parameter
 from solver.balance.kernels.jacobian import factorise, step_back
 from solver.balance.kernels.residual import contact_values, evaluate
 from solver.balance.parameter import Kind
@@ -25,7 +25,7 @@ from solver.errors import SettingError
 from solver.jit import fourier
 from solver.jit.fourier import Real
 from solver.linear.kernels.receptance import receptance
-from solver.response.solution import Solution
+from solver.response.solution import Solution, check_converged
 from solver.response.wear_measures import (
     Change,
     ContactCycle,
@@ -34,7 +34,6 @@ from solver.response.wear_measures import (
     slip_travel,
 )
 from solver.results.told import Piece
-from solver.wording import listing
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
@@ -94,7 +93,7 @@ class WearPoint:
         return period_shares(self._cycle, self._at(contact))
 
     def _at(self, contact: str) -> int:
-        return contact_index(self._cycle.balance, contact)
+        return contact_index(self._cycle.balance.scene, contact)
 
 
 class WearSensitivity:
@@ -169,8 +168,7 @@ def contact_wear(solution: Solution, paths: Sequence[str] = ()) -> dict[str, Con
     SettingError
         The solution did not converge, or an unknown path.
     """
-    if not solution.converged:
-        raise SettingError("solution", solution.status.value, "must have converged")
+    check_converged(solution)
     scene = solution.scene
     effects = Effects(even_harmonics=even_harmonics_reason(scene, paths) is not None)
     balance = build(scene, harmonics=solution.n_harmonics, effects=effects)
@@ -184,20 +182,6 @@ def contact_wear(solution: Solution, paths: Sequence[str] = ()) -> dict[str, Con
         )
         for contact in scene.contacts
     }  # fmt: skip
-
-
-def contact_index(balance: Balance, contact: str) -> int:
-    """Return the number of a contact by its name.
-
-    Raises
-    ------
-    SettingError
-        There is none of that name.
-    """
-    names = [each.name for each in balance.scene.contacts]
-    if contact not in names:
-        raise SettingError("contact", contact, f"must be one of {listing(names)}")
-    return names.index(contact)
 
 
 def period_shares(cycle: ContactCycle, e: int) -> Shares | None:

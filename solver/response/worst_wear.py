@@ -24,6 +24,7 @@ from typing import Annotated, TypeVar
 
 import numpy as np
 
+from solver.balance.balance import contact_index
 from solver.balance.kernels.locate import between
 from solver.balance.kernels.output import MEASURES
 from solver.balance.kernels.residual import contact_values, evaluate
@@ -37,7 +38,7 @@ from solver.continuation.extrema.nodes import share_scales
 from solver.errors import SettingError
 from solver.jit.fourier import Real
 from solver.linear.kernels.receptance import receptance
-from solver.response.wear import Measured, WearSensitivity, contact_index
+from solver.response.wear import Measured, WearSensitivity
 from solver.response.wear_measures import (
     Change,
     ContactCycle,
@@ -50,7 +51,7 @@ from solver.response.wear_measures import (
 )
 from solver.results.told import Piece
 from solver.sensitivity.gradient import Sensitivities
-from solver.sensitivity.nonsmooth import BESIDE, SMOOTH, beside, of_corner
+from solver.sensitivity.nonsmooth import SMOOTH, corner_slopes
 
 Number = TypeVar("Number", float, Real)
 # Maxima below this share of the highest cannot lead within one step of an optimiser.
@@ -112,7 +113,7 @@ def worst_wear(
     SettingError
         An unknown contact, a law the measure has no meaning for, or a branch without a point.
     """
-    e = contact_index(branch.balance, contact)
+    e = contact_index(branch.scene, contact)
     if not len(branch.values):
         raise SettingError("branch", branch.status.value, "must have a point")
     found = _MaximaSearch(branch, e, measure).maxima()
@@ -311,9 +312,15 @@ def worst_slopes(
     here = _measured(sensitivity, worst.at, worst.solution, contact, measure)
     if not worst.interior or not abs(here.by_frequency) * worst.at > SMOOTH * abs(here.value):
         return here
-    near, far = (_across(sensitivity, worst, contact, measure, share * BESIDE) for share in (1.0, 2.0))
+
+    def slopes(u: Real, at_hz: float) -> tuple[float, Real]:
+        found = _measured(sensitivity, at_hz, u, contact, measure)
+        return found.by_frequency, found.gradient
+
+    sign = -1.0 if measure is Measure.LEAST_LOAD else 1.0
+    corner = corner_slopes(sensitivity.balance, worst.at, worst.solution, slopes, sign)
     # Where nothing is found beside it, the derivative at the fixed frequency stands in.
-    return here if near is None or far is None else replace(here, gradient=2.0 * near - far)
+    return here if corner is None else replace(here, gradient=corner[0])
 
 
 def worst_hessian(sensitivities: Sensitivities, worst: WorstWear, contact: str, measure: Measure) -> Real:
@@ -327,7 +334,7 @@ def worst_hessian(sensitivities: Sensitivities, worst: WorstWear, contact: str, 
         An unknown contact, or laws or paths without exact second derivatives.
     """
     balance = sensitivities.balance
-    e, ks = contact_index(balance, contact), balance.system.ks
+    e, ks = contact_index(balance.scene, contact), balance.system.ks
     pairing = np.zeros((balance.n_ports, balance.n_coefficients, balance.n_coefficients))
     for a in balance.scene.contacts[e].RUBBING:
         pairing[int(balance.system.first_port[e]) + a] = work_pairing(ks, balance.n_coefficients)
@@ -353,19 +360,3 @@ def _measured(
         return found
     rise = at_hz * found.by_frequency + found.value
     return Measured(value=at_hz * found.value, by_frequency=rise, gradient=at_hz * found.gradient)
-
-
-def _across(
-    sensitivity: WearSensitivity, worst: WorstWear, contact: str, measure: Measure, distance: float
-) -> Real | None:
-    """Return the derivatives of a corner from solutions at a relative distance on both sides."""
-    sides = []
-    for way in (-1.0, 1.0):
-        at_hz = worst.at * (1.0 + way * distance)
-        solved = Workspace.of(sensitivity.balance).solve(2.0 * math.pi * at_hz, worst.solution)
-        u = beside(solved, worst.solution)
-        if u is None:
-            return None
-        found = _measured(sensitivity, at_hz, u, contact, measure)
-        sides.append((found.by_frequency, found.gradient))
-    return of_corner(*sides) if sides[0][0] * sides[1][0] < 0.0 else None

@@ -49,6 +49,7 @@ from solver.sensitivity.hessian import (
     Directions,
     PeakHessian,
     Responses,
+    hessian_of,
     lagrangian_hessian,
     no_hessian,
 )
@@ -160,38 +161,21 @@ class Sensitivities:
             A contact whose law has no second derivatives, paths of one load that contradict each other, or
             paths on which loads or places of contacts do not depend linearly.
         """
-        system = self.balance.system
-        self.check_second()
-        check_loads(system, self._parameters, self._slopes)
-        if self._seconds is None:
-            self._seconds = second_numbers(self.balance.scene)
-        u, omega = np.ascontiguousarray(solution, dtype=np.float64), TWO_PI * at_hz
-        found = self._slopes_of(u, omega)
-        if not found:
+        everything = self._moved(solution, at_hz)
+        found = self._slopes_of(np.ascontiguousarray(solution, dtype=np.float64), TWO_PI * at_hz)
+        if everything is None or not found:
             return no_hessian(len(self.paths))
+        y, (turns, by, by_twice) = self._adjoint_motion(everything[0], 0), self._extremes()
+        adjoint = Adjoint(w=self._weights[0].copy(), y=y, turns=turns, by=by, by_twice=by_twice)
         try:
-            motion, contacts = (
-                whole_motion(system, self._matrices, self._dampings, omega),
-                contact_forces(system, self._seconds, u),
-            )
-            y, (turns, by, by_twice) = self._adjoint_motion(motion, 0), self._extremes()
-            adjoint = Adjoint(w=self._weights[0].copy(), y=y, turns=turns, by=by, by_twice=by_twice)
-            along = self._directions()
-            responses = self._responses(u, omega, motion, contacts, along)
-            if responses is None:
-                return no_hessian(len(self.paths))
-            twice = lagrangian_hessian(self._amplitudes.ks, motion, contacts, along, responses, adjoint)
-        except (np.linalg.LinAlgError, FloatingPointError):
+            twice = lagrangian_hessian(self._amplitudes.ks, *everything, adjoint)
+        except FloatingPointError:
             return no_hessian(len(self.paths))
         by_frequency, gradient = found[0]
         for _, other in found[1:]:
             kinks = np.flatnonzero(np.abs(other - gradient) > _KINK * np.abs(gradient).clip(np.abs(other)))
             twice[kinks + 1], twice[:, kinks + 1] = math.nan, math.nan
-        return AmplitudeHessian(
-            value=float(self._tops[0, AMPLITUDE]), by_frequency=by_frequency * TWO_PI, gradient=gradient,
-            by_frequency_twice=float(twice[0, 0]) * TWO_PI**2, mixed=twice[0, 1:] * TWO_PI,
-            hessian=twice[1:, 1:],
-        )  # fmt: skip
+        return hessian_of(float(self._tops[0, AMPLITUDE]), by_frequency, gradient, twice)
 
     def of_contacts(self, solution: Real, at_hz: float, pairing: Real) -> AmplitudeHessian:
         """Return Σ F_c·(P_c U_c) over the ports to second order in the frequency and all parameters.
@@ -233,11 +217,7 @@ class Sensitivities:
         twice = lagrangian_hessian(self._amplitudes.ks, motion, contacts, along, found, adjoint)
         twice = twice + pairs + pairs.T
         slopes = np.einsum("ci,pci->p", by_F, dF) + np.einsum("ci,pci->p", by_U, dU)
-        return AmplitudeHessian(
-            value=float(np.sum(F * by_F)), by_frequency=float(slopes[0]) * TWO_PI, gradient=slopes[1:],
-            by_frequency_twice=float(twice[0, 0]) * TWO_PI**2, mixed=twice[0, 1:] * TWO_PI,
-            hessian=twice[1:, 1:],
-        )  # fmt: skip
+        return hessian_of(float(np.sum(F * by_F)), float(slopes[0]), slopes[1:], twice)
 
     def motions(self, solution: Real, at_hz: float) -> Real | None:
         """Return the derivatives of all slip motions by ω [m s/rad] and by the paths, (1 + n_paths, nc, n).

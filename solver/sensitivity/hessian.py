@@ -25,6 +25,7 @@ from solver.contacts.load_derivatives import second_loads
 from solver.jit.fourier import Complex, Integer, Real
 from solver.results.told import Piece
 
+TWO_PI = 2.0 * math.pi
 STATIONARY = 1e-10  # largest share of a peak's height that a solution may lie below it
 
 
@@ -100,13 +101,17 @@ class AmplitudeHessian(Piece):
         return EdgeHessian(gradient=gradient, hessian=second / self.by_frequency)
 
 
+def hessian_of(value: float, by_omega: float, gradient: Real, twice: Real) -> AmplitudeHessian:
+    """Return a number with its derivatives by ω and the paths, `twice` (1 + n, 1 + n) by both."""
+    return AmplitudeHessian(
+        value=value, by_frequency=by_omega * TWO_PI, gradient=gradient, mixed=twice[0, 1:] * TWO_PI,
+        by_frequency_twice=float(twice[0, 0]) * TWO_PI**2, hessian=twice[1:, 1:],
+    )  # fmt: skip
+
+
 def no_hessian(n: int) -> AmplitudeHessian:
     """Return NaN for `n` parameters, where the balance is singular."""
-    nothing = np.full(n, math.nan)
-    return AmplitudeHessian(
-        value=math.nan, by_frequency=math.nan, gradient=nothing, by_frequency_twice=math.nan, mixed=nothing,
-        hessian=np.full((n, n), math.nan),
-    )  # fmt: skip
+    return hessian_of(math.nan, math.nan, np.full(n, math.nan), np.full((n + 1, n + 1), math.nan))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -13,13 +13,15 @@ at two distances, and extrapolated to it.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 from typing import Annotated
 
 import numpy as np
 
-from solver.balance.workspace import PointSolution, Workspace
+from solver.balance.balance import Balance
+from solver.balance.workspace import Workspace
 from solver.continuation.peaks import Peak
 from solver.jit.fourier import Real
 from solver.results.told import Piece
@@ -73,39 +75,43 @@ def peak_gradient(sensitivities: Sensitivities, peak: Peak) -> PeakGradient:
     elif abs(here.by_frequency) * peak.at <= SMOOTH * here.value:
         kind = PeakKind.SMOOTH
     elif math.isfinite(here.by_frequency):
-        near, far = (_across(sensitivities, peak, share * BESIDE) for share in (1.0, 2.0))
-        if near is not None and far is not None:
-            kind, (gradient, drift) = PeakKind.CORNER, 2.0 * near - far
+
+        def slopes(u: Real, at_hz: float) -> tuple[float, Real]:
+            found = sensitivities.gradient(u, at_hz)
+            return found.by_frequency, found.by_parameters
+
+        corner = corner_slopes(sensitivities.balance, peak.at, peak.solution, slopes)
+        if corner is not None:
+            kind, (gradient, drift) = PeakKind.CORNER, corner
     return PeakGradient(value=here.value, gradient=gradient, drift=drift, kind=kind)
 
 
-def _across(sensitivities: Sensitivities, peak: Peak, distance: float) -> Real | None:
-    """Return the derivatives of height and frequency of a corner, (2, n_paths), from both sides of it."""
-    sides = []
-    for way in (-1.0, 1.0):
-        at_hz = peak.at * (1.0 + way * distance)
-        solved = Workspace.of(sensitivities.balance).solve_from(2.0 * math.pi * at_hz, peak.solution)
-        u = beside(solved, peak.solution)
-        if u is None:
+def corner_slopes(
+    balance: Balance, at_hz: float, solution: Real, slopes: Callable[[Real, float], tuple[float, Real]],
+    sign: float = 1.0,
+) -> Real | None:  # fmt: skip
+    """Return the derivatives of height and frequency of a corner, (2, n_paths), extrapolated to it.
+
+    None where nothing is found beside it, or no corner.
+
+    Parameters
+    ----------
+    slopes : by the frequency and by the parameters, at a solution and its frequency [Hz].
+    sign : 1 where the height rises before the corner and falls behind it, −1 where it does the reverse.
+    """
+    found = []
+    for distance in (BESIDE, 2.0 * BESIDE):
+        sides = []
+        for way in (-1.0, 1.0):
+            there = at_hz * (1.0 + way * distance)
+            solved = Workspace.of(balance).solve_from(2.0 * math.pi * there, solution)
+            change = np.abs(solved.u - solution).max(initial=0.0)
+            if not solved.converged or change > FAR * np.abs(solution).max(initial=0.0):
+                return None
+            sides.append(slopes(solved.u, there))
+        (rise, left), (fall, right) = sides
+        if not sign * rise > 0.0 > sign * fall:
             return None
-        found = sensitivities.gradient(u, at_hz)
-        sides.append((found.by_frequency, found.by_parameters))
-    if not sides[0][0] > 0.0 > sides[1][0]:
-        return None
-    return np.array([of_corner(*sides), corner_drift(*sides)])
-
-
-def corner_drift(left: tuple[float, Real], right: tuple[float, Real]) -> Real:
-    """Return how a corner moves with parameters, from the slopes by frequency and those on both sides."""
-    return np.asarray(-(right[1] - left[1]) / (right[0] - left[0]))
-
-
-def of_corner(left: tuple[float, Real], right: tuple[float, Real]) -> Real:
-    """Return the derivatives of a corner from the slopes by frequency and parameters on both sides."""
-    return np.asarray(left[1] + left[0] * corner_drift(left, right))
-
-
-def beside(found: PointSolution, solution: Real) -> Real | None:
-    """Return what was solved for next to a solution; None if it is none on the same branch."""
-    change = np.abs(found.u - solution).max(initial=0.0)
-    return found.u if found.converged and change <= FAR * np.abs(solution).max(initial=0.0) else None
+        drift = -(right - left) / (fall - rise)
+        found.append(np.array([left + rise * drift, drift]))
+    return np.asarray(2.0 * found[0] - found[1])

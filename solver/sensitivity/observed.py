@@ -18,7 +18,7 @@ from typing import Annotated
 
 import numpy as np
 
-from solver.balance.balance import Balance
+from solver.balance.balance import Balance, contact_index
 from solver.balance.parameter_derivatives import contact_slopes, force_along, resolved
 from solver.balance.workspace import PointSolution, Workspace
 from solver.contacts.kernels.stick_slip_events import FAILED
@@ -27,7 +27,6 @@ from solver.errors import SettingError
 from solver.jit.fourier import Complex, Integer, Real
 from solver.sensitivity.gradient import Sensitivities
 from solver.sensitivity.kernels.adjoint import AMPLITUDE, SIGN, TAU, observe, slopes_along
-from solver.wording import listing
 
 TWO_PI = 2.0 * math.pi
 
@@ -152,10 +151,7 @@ class LoopSensitivities:
     """
 
     def __init__(self, balance: Balance, contact: str, paths: Sequence[str]) -> None:
-        names = [each.name for each in balance.scene.contacts]
-        if contact not in names:
-            raise SettingError("contact", contact, f"must be one of {listing(names)}")
-        at, system = names.index(contact), balance.system
+        at, system = contact_index(balance.scene, contact), balance.system
         if system.first_port[at + 1] - system.first_port[at] != 1:
             raise SettingError("contact", contact, "must be a contact with one relative motion")
         self._balance, self._at = balance, at

@@ -325,13 +325,7 @@ def blade_amplitudes(solution: Solution, dof: str | None = None) -> BladeAmplitu
 
 
 def blade_rows(scene: Scene, name: str) -> list[int]:
-    """Return the index of a DOF in each sector; in a cyclic scene the same one again and again.
-
-    Raises
-    ------
-    SettingError
-        No sector has such a DOF.
-    """
+    """Return the index of a DOF in each sector, in a cyclic scene the same; SettingError if there is none."""
     dofs, structure = scene.dofs, scene.structure
     if structure.has_sectors:
         rows = [dofs.index(name)] * structure.sector_count if name in dofs else []

@@ -133,13 +133,7 @@ def _check_ways(harmonics: Sequence[int], samples: Sequence[int], repeats: int) 
 
 
 def check_samples(samples: int) -> int:
-    """Return `samples` if a period may be sampled so.
-
-    Raises
-    ------
-    SettingError
-        Not a positive multiple of 4.
-    """
+    """Return `samples` if a period may be sampled so; SettingError if it is no positive multiple of 4."""
     whole = isinstance(samples, (int, np.integer)) and not isinstance(samples, bool)
     if not whole or samples < 4 or samples % 4:
         raise SettingError("samples", samples, "must be a positive multiple of 4")
@@ -147,13 +141,7 @@ def check_samples(samples: int) -> int:
 
 
 def sampled(balance: Balance, samples: int) -> Balance:
-    """Return the balance with contact forces from so many samples of a period, instead of in closed form.
-
-    Raises
-    ------
-    SettingError
-        Not a multiple of 4, or not above twice the highest harmonic.
-    """
+    """Return the balance with contact forces from samples of a period; SettingError if they are too few."""
     if check_samples(samples) <= 2 * balance.highest_harmonic:
         raise SettingError("samples", samples, f"must be > {2 * balance.n_harmonics} for these harmonics")
     system, contacts = balance.system, balance.scene.contacts

@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from solver.errors import SettingError
+from solver.errors import SettingError, check_count
 from solver.linear.extra_terms import depends_on_speed
 from solver.modes.nonlinear_mode import at_nodal_diameter
 from solver.results.watch import OnProgress, ShouldStop, shows_progress
@@ -108,13 +108,7 @@ def folded(order: int, sectors: int) -> tuple[int, Wave]:
 
 
 def checked_speed(scene: Scene, speed_rpm: float | None, orders: Sequence[int] | None) -> float | None:
-    """Return the speed [1/min] of the diagram of a scene, that of the scene if none is given.
-
-    Raises
-    ------
-    SettingError
-        A scene without sectors, or a bad speed or order, or none where one is needed.
-    """
+    """Return the speed [1/min] of the diagram of a scene, its own if none is given; errors as the diagram."""
     if not scene.structure.has_sectors:
         wanted = "must be a disk of equal sectors: only there are nodal diameters"
         raise SettingError("scene", scene.name, wanted)
@@ -138,14 +132,12 @@ def _check_orders(orders: Any) -> None:
     if not isinstance(orders, Sequence) or isinstance(orders, str) or not 0 < len(orders) <= MOST_ORDERS:
         raise SettingError("orders", orders, f"must be a list of 1 to {MOST_ORDERS} whole numbers >= 1")
     for i, order in enumerate(orders):
-        if not _whole(order) or order < 1:
-            raise SettingError(("orders", i), order, "must be a whole number >= 1")
+        check_count(("orders", i), order, 1)
 
 
 def _check(families: int, up_to_hz: float | None, within: float) -> None:
     """Raise SettingError for a bad number of families, frequency or distance."""
-    if not _whole(families) or not 1 <= families <= MOST_FAMILIES:
-        raise SettingError("families", families, f"must be a whole number from 1 to {MOST_FAMILIES}")
+    check_count("families", families, 1, MOST_FAMILIES)
     if up_to_hz is not None and not _positive(up_to_hz):
         raise SettingError("up_to_hz", up_to_hz, "must be a frequency above 0 [Hz]")
     if isinstance(within, bool) or not isinstance(within, int | float) or not 0.0 <= within <= 1.0:
@@ -155,10 +147,6 @@ def _check(families: int, up_to_hz: float | None, within: float) -> None:
 def _positive(value: Any) -> bool:
     good = isinstance(value, int | float) and not isinstance(value, bool)
     return good and 0.0 < value < math.inf
-
-
-def _whole(value: Any) -> bool:
-    return isinstance(value, int | np.integer) and not isinstance(value, bool)
 
 
 def _at_speed(scene: Scene, speed: float | None) -> Scene:

@@ -78,11 +78,8 @@ class _DamperResponses:
 
     def used(self, level: float) -> Used | None:
         """Return what is used most at a level; None where the response does not cover the band."""
-        branch = sweep(
-            self.scene.with_values({AMPLITUDE: level}),
-            harmonics=self._harmonics,
-            should_stop=self._should_stop,
-        )
+        there = self.scene.with_values({AMPLITUDE: level})
+        branch = sweep(there, harmonics=self._harmonics, should_stop=self._should_stop)
         if not branch.reached or branch.peak is None:
             return None
         self.parts.append(branch)
@@ -174,24 +171,19 @@ def _allowed(
     name: str, level: _DamperResponses, levels: np.ndarray, seen: list[Used | None]
 ) -> AllowedExcitation:  # fmt: skip
     """Return what a damper allows, by the first of its levels at which what is allowed is used up."""
-    used = [math.nan if one is None else one.used for one in seen]
-    first = next((i for i, one in enumerate(used) if one >= 1.0), None)
-    if first is None or first == 0:
-        best = max((one for one in seen if one is not None), key=lambda one: one.used, default=None)
-        best = seen[0] if first == 0 else best
-        row, hertz = ("", math.nan) if best is None else (best.row, best.peak.at)
-        value = math.nan if best is None else best.stress
-        end = "above" if first is None else "below"
-        return AllowedExcitation(name=name, allowed=math.nan, end=end, row=row, at_hz=hertz, value=value)
-    solved = level.allowed(float(levels[first - 1]), float(levels[first]))
-    if solved is None:
-        return AllowedExcitation(
-            name=name, allowed=math.nan, end="within", row="", at_hz=math.nan, value=math.nan
-        )
-    amplitude, there = solved
-    return AllowedExcitation(
-        name=name, allowed=amplitude, end="within", row=there.row, at_hz=there.peak.at, value=there.stress
-    )
+    first = next((i for i, one in enumerate(seen) if one is not None and one.used >= 1.0), None)
+    amplitude, there = math.nan, None
+    if first is None:
+        end = "above"
+        there = max((one for one in seen if one is not None), key=lambda one: one.used, default=None)
+    elif first == 0:
+        end, there = "below", seen[0]
+    else:
+        end, solved = "within", level.allowed(float(levels[first - 1]), float(levels[first]))
+        amplitude, there = solved or (amplitude, there)
+    nothing = "", math.nan, math.nan
+    row, hertz, value = nothing if there is None else (there.row, there.peak.at, there.stress)
+    return AllowedExcitation(name=name, allowed=amplitude, end=end, row=row, at_hz=hertz, value=value)
 
 
 def checked_dampers(

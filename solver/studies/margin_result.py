@@ -42,7 +42,7 @@ class AllowedExcitation(Piece):
 class MarginDiagram(MadeOfResponses, Drawn):
     """The greatest stress over the excitation of D dampers at n levels."""
 
-    VIEWS: ClassVar = Views("solver.views", "tracks:margin", "margins:margin_figure")
+    VIEWS: ClassVar = Views("solver.views", "tracks:margin", "tracks:margin_figure")
     DATA: ClassVar = Data(
         "margin", {
             "damper=allowed": "damper=name allowed end row at_hz value", "level": "level",

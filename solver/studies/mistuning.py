@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
 from solver.continuation.branch import Branch
-from solver.errors import SettingError
+from solver.errors import SettingError, check_count
 from solver.response.known import relative_sum
 from solver.results.watch import OnProgress, ShouldStop, part_of, shows_progress
 from solver.scene.parts import LumpedStructure, Mistuning
@@ -142,16 +142,9 @@ def joined_study(
 def disk_factors(
     scene: Scene, of: Sequence[str], spread: float, samples: int, seed: int
 ) -> list[tuple[float, ...]]:
-    """Return the factors of every disk of a study, one for each sector.
-
-    Raises
-    ------
-    SettingError, SceneError
-        As `mistuning_study`.
-    """
+    """Return the factors of every disk of a study, one for each sector; errors as `mistuning_study`."""
     with_mistuning(scene, {"of": list(of), "spread": 0.0, "seed": seed})  # refuses parts that are not there
-    if isinstance(samples, bool) or not isinstance(samples, int) or not 1 <= samples <= MOST_SAMPLES:
-        raise SettingError("samples", samples, f"must be a whole number from 1 to {MOST_SAMPLES}")
+    check_count("samples", samples, 1, MOST_SAMPLES)
     if not (math.isfinite(spread) and spread >= 0.0):
         raise SettingError("spread", spread, "must be a number >= 0")
     sectors = scene.structure.sector_count

@@ -22,7 +22,6 @@ from solver.scene.bodies.kinematics import static_forces
 from solver.scene.cyclic.annulus import sectors_needed
 from solver.scene.parts import MatricesStructure
 from solver.scene.scene import (
-    AnyContact,
     Scene,
 )
 from solver.studies.memory import dense_bytes
@@ -38,6 +37,10 @@ _PAIRS, _PRODUCTS, _DRIVEN, _INVERTED = 2e-9, 2.8e-10, 2e-9, 1.5e-9
 # Of the factors: unknowns³; products with the contacts' slopes; harmonics × eliminated ports³.
 _FACTORS, _SLOPES, _ELIMINATED = 3e-11, 1e-9, 4e-10
 _FREQUENCIES, _FEWER, _MANY = 101, 21, 100  # at which the stuck response is looked at; of many ports fewer
+
+
+_Said = tuple[str, bool, str]
+"""An effect: its name, whether it is computed, and why."""
 
 
 def point_seconds(balance: Balance, stuck: Real) -> float:
@@ -157,21 +160,16 @@ def plan(scene: Scene, *, harmonics: int = 11, effects: Effects | None = None) -
     balance = build(scene, harmonics=harmonics, effects=asked)
     stuck = stuck_forces(balance)
     carried = stuck.max(axis=0)
-    slips = tuple(_slip(balance, i, carried) for i in range(len(balance.scene.contacts)))
+    found: tuple[_Said, ...] = (
+        _condensation(balance), *_leading(balance), _one_sector(scene, asked),
+        *((f"separation of {contact.name}", *contact.separation) for contact in balance.scene.contacts),
+        *(_slip(balance, i, carried) for i in range(len(balance.scene.contacts))), _even_harmonics(balance),
+        *_nodal_diameters(balance), *_reduction(scene), ("linear part", True, _linear_part(balance)),
+        _stiffness_shift(balance.system.shift),
+    )  # fmt: skip
     return Plan(
         scene=scene.name,
-        effects=(
-            _condensation(balance),
-            *_leading(balance),
-            _one_sector(scene, asked),
-            *(_separation(contact) for contact in balance.scene.contacts),
-            *slips,
-            _even_harmonics(balance),
-            *_nodal_diameters(balance),
-            *_reduction(scene),
-            Effect(name="linear part", used=True, reason=_linear_part(balance)),
-            _stiffness_shift(balance.system.shift),
-        ),
+        effects=tuple(Effect(name=name, used=used, reason=reason) for name, used, reason in found),
         unknowns=balance.n_unknowns,
         linear_dofs=_linear_dofs(balance.scene),
         contacts=len(balance.scene.contacts),
@@ -183,35 +181,32 @@ def plan(scene: Scene, *, harmonics: int = 11, effects: Effects | None = None) -
     )
 
 
-def _condensation(balance: Balance) -> Effect:
+def _condensation(balance: Balance) -> _Said:
     dofs, coefficients = _linear_dofs(balance.scene), balance.n_coefficients
-    return Effect(
-        name="condensation",
-        used=True,
-        reason=(
-            f"the {dofs} linear DOFs are eliminated exactly: {balance.n_unknowns} unknowns "
-            f"(contacts x coefficients) instead of {dofs * coefficients}"
-        ),
+    reason = (
+        f"the {dofs} linear DOFs are eliminated exactly: {balance.n_unknowns} unknowns "
+        f"(contacts x coefficients) instead of {dofs * coefficients}"
     )
+    return "condensation", True, reason
 
 
-def _leading(balance: Balance) -> tuple[Effect, ...]:
+def _leading(balance: Balance) -> tuple[_Said, ...]:
     """Which motions a Newton step is solved for, where contacts are many enough for a choice."""
     ports, leading = balance.n_ports, balance.n_leading
     if ports < FEWEST_PORTS:
         return ()
     name, used = "every motion of the contacts in the Newton step", leading == ports
     if balance.effects.every_port:
-        return (Effect(name=name, used=True, reason="asked for, whether they follow from fewer or not"),)
+        return ((name, True, "asked for, whether they follow from fewer or not"),)
     if used:
         reason = f"few or none of the {ports} motions follow from others: the modes and bodies are as many"
-        return (Effect(name=name, used=True, reason=reason),)
+        return ((name, True, reason),)
     reason = (
         f"all {ports} follow from {leading} of them, those of modes and bodies: a step is solved for "
         f"{leading * balance.n_coefficients} instead of {balance.n_unknowns} unknowns (exact); second "
         "derivatives and tracked peaks take all of them"
     )
-    return (Effect(name=name, used=False, reason=reason),)
+    return ((name, False, reason),)
 
 
 def _linear_dofs(scene: Scene) -> int:
@@ -222,7 +217,7 @@ def _linear_dofs(scene: Scene) -> int:
     return named
 
 
-def _reduction(scene: Scene) -> tuple[Effect, ...]:
+def _reduction(scene: Scene) -> tuple[_Said, ...]:
     """What was left out of a large model when it was loaded, if it was reduced."""
     structure = scene.structure
     found = structure.reduction if isinstance(structure, MatricesStructure) else None
@@ -232,10 +227,10 @@ def _reduction(scene: Scene) -> tuple[Effect, ...]:
         f"{found.dofs} DOFs were reduced to the {len(structure.dofs)} in use and {found.modes} modes of the "
         f"rest, the highest at {found.highest_hz:.5g} Hz: raise `keep_modes` until the answer stays"
     )
-    return (Effect(name="reduction of the model", used=True, reason=reason),)
+    return (("reduction of the model", True, reason),)
 
 
-def _nodal_diameters(balance: Balance) -> tuple[Effect, ...]:
+def _nodal_diameters(balance: Balance) -> tuple[_Said, ...]:
     """Which nodal diameters of a sector given by matrices are built, and what each costs."""
     structure, order, ks = balance.scene.structure, balance.scene.engine_order, balance.system.ks
     if not isinstance(structure, MatricesStructure) or not structure.has_sectors:
@@ -247,21 +242,18 @@ def _nodal_diameters(balance: Balance) -> tuple[Effect, ...]:
         f"the harmonics kept of engine order {order} meet {', '.join(map(str, met))} of 0 to {count // 2}: "
         f"each is a Hermitian structure of {n} coordinates, decomposed once in about {cost:.2g} ms"
     )
-    return (Effect(name="nodal diameters", used=True, reason=reason),)
+    return (("nodal diameters", True, reason),)
 
 
-def _one_sector(scene: Scene, asked: Effects) -> Effect:
+def _one_sector(scene: Scene, asked: Effects) -> _Said:
     extent = sectors_needed(scene)
     cyclic = scene.structure.has_sectors
     forced = cyclic and extent.sectors == 1 and asked.every_sector
-    return Effect(
-        name="one sector for the annulus",
-        used=cyclic and extent.sectors == 1 and not forced,
-        reason=f"every sector was asked for, though {extent.reason}" if forced else extent.reason,
-    )
+    reason = f"every sector was asked for, though {extent.reason}" if forced else extent.reason
+    return "one sector for the annulus", cyclic and extent.sectors == 1 and not forced, reason
 
 
-def _slip(balance: Balance, i: int, stuck: Real) -> Effect:
+def _slip(balance: Balance, i: int, stuck: Real) -> _Said:
     """Say whether a contact is expected to slip: from the response of the structure with all contacts stuck.
 
     Only the expectation comes from here. Whether a contact is its spring is decided at every Newton step.
@@ -269,23 +261,23 @@ def _slip(balance: Balance, i: int, stuck: Real) -> Effect:
     contact = balance.scene.contacts[i]
     name = f"slip of {contact.name}"
     if balance.effects.every_contact:
-        return Effect(name=name, used=True, reason=f"{contact.name} was asked to stay in every Newton step")
+        return name, True, f"{contact.name} was asked to stay in every Newton step"
     friction, load = contact.friction, contact.load
     if friction is None or load is None or not contact.JENKINS:
-        return Effect(name=f"law of {contact.name}", used=True, reason=contact.evaluation)
+        return f"law of {contact.name}", True, contact.evaluation
     limit = friction.mu * max(load.least, 0.0)
     carried = stuck[balance.system.first_port[i]]
     words = f"stuck, {contact.name} would carry up to {carried:.4g} N in the band; its limit is {limit:.4g} N"
     if carried <= limit:
-        return Effect(
-            name=name,
-            used=False,
-            reason=f"{words}: while it sticks it is its spring of {friction.kt:g} N/m, checked at every step",
+        return (
+            name,
+            False,
+            f"{words}: while it sticks it is its spring of {friction.kt:g} N/m, checked at every step",
         )
-    return Effect(name=name, used=True, reason=words)
+    return name, True, words
 
 
-def _even_harmonics(balance: Balance) -> Effect:
+def _even_harmonics(balance: Balance) -> _Said:
     count = f"{balance.n_coefficients} coefficients a contact"
     reason = even_harmonics_reason(balance.scene)
     beyond = balance.system.ks[balance.system.ks > balance.n_harmonics]
@@ -297,13 +289,9 @@ def _even_harmonics(balance: Balance) -> Effect:
             "loads are constant, forces odd and no stiffness changes with the motion, so the response is "
             f"half-wave symmetric: {odd} … only"
         )
-        return Effect(name="even harmonics and mean", used=False, reason=f"{reason}, {count}")
+        return "even harmonics and mean", False, f"{reason}, {count}"
     reason = reason or "they were asked for"
-    return Effect(
-        name="even harmonics and mean",
-        used=True,
-        reason=f"{reason}: harmonics 0 to {balance.n_harmonics}, {count}",
-    )
+    return "even harmonics and mean", True, f"{reason}: harmonics 0 to {balance.n_harmonics}, {count}"
 
 
 def _linear_part(balance: Balance) -> str:
@@ -312,12 +300,7 @@ def _linear_part(balance: Balance) -> str:
     return _FORMS[balance.system.form]
 
 
-def _separation(contact: AnyContact) -> Effect:
-    may, reason = contact.separation
-    return Effect(name=f"separation of {contact.name}", used=may, reason=reason)
-
-
-def _stiffness_shift(shift: np.ndarray) -> Effect:
+def _stiffness_shift(shift: np.ndarray) -> _Said:
     used = bool(np.any(shift > 0.0))
     reason = (
         "a part is held in place by contacts alone, so their stiffness is moved into the structure and taken "
@@ -325,4 +308,4 @@ def _stiffness_shift(shift: np.ndarray) -> Effect:
         if used
         else "the structure alone holds every part in place"
     )
-    return Effect(name="contact stiffness in the structure", used=used, reason=reason)
+    return "contact stiffness in the structure", used, reason

@@ -14,7 +14,7 @@ from solver.balance.balance import build
 from solver.balance.simplifications import Effects
 from solver.balance.workspace import Workspace
 from solver.continuation.parameter_scale import Scale, scale_of
-from solver.errors import SettingError
+from solver.errors import SettingError, check_count
 from solver.jit.fourier import Integer, Real
 from solver.response.known import known_of_solution
 from solver.response.solution import MEAN_UNDETERMINED
@@ -219,16 +219,9 @@ def map_grid(
     ridge: bool = True,
     effects: Effects | None = None,
 ) -> MapGrid:
-    """Return the points of `response_map`, to be solved in strips on several processors.
-
-    Raises
-    ------
-    SettingError
-        As `response_map`.
-    """
+    """Return the points of `response_map`, to be solved in strips on several processors; errors as there."""
     for name, value in (("steps", steps), ("frequencies", frequencies)):
-        if isinstance(value, bool) or not isinstance(value, int) or value < 2:
-            raise SettingError(name, value, "must be a whole number >= 2")
+        check_count(name, value, 2)
     if steps * frequencies > MOST_POINTS:
         raise SettingError("steps", steps, f"times the frequencies must be at most {MOST_POINTS}")
     if ridge:

@@ -36,7 +36,7 @@ class Margin(Study, HarmonicRequest):
     )
     TOLD = "solver.views.tables.tracks:margin"
     SHOWS = "stress over the excitation, what each damper allows ([criteria](criteria.md))"
-    FIGURE, EMPTY = "solver.views.plots.margins:margin_figure", ("level", "it has no level to draw")
+    FIGURE, EMPTY = "solver.views.plots.tracks:margin_figure", ("level", "it has no level to draw")
     COUNTED = "responses"
 
     start: Annotated[PositiveNumber, Flag(metavar="A")] = Field(

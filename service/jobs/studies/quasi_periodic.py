@@ -41,7 +41,7 @@ class QuasiPeriodicStudy(Study, HarmonicRequest):
     )
     TOLD = "solver.views.tables.responses:quasi_periodic"
     SHOWS = "the response to two frequencies ([two base frequencies](quasi-periodic.md))"
-    FIGURE, EMPTY = "solver.views.plots.quasi_periodic:torus_figure", ("line_hz", "no response was found")
+    FIGURE, EMPTY = "solver.views.plots.transients:torus_figure", ("line_hz", "no response was found")
     COUNTED = "looks"
 
     frequency_hz: Annotated[FrequencyHz, Flag("--frequency", "HZ")] = Field(

@@ -59,7 +59,7 @@ class Wear(Study, HarmonicRequest):
     TOLD = "solver.views.tables.responses:wear_life"
     SHOWS, COUNTED = "depths, loads and amplitude over hours ([wear](wear.md#wear-over-life))", "responses"
     GROUPED: ClassVar = {"mission": "solver:Mission", "wear": "solver:WearLaw"}
-    FIGURE = "solver.views.plots.wear_life:wear_life_figure"
+    FIGURE = "solver.views.plots.transients:wear_life_figure"
     EMPTY = ("hours", "no response was found at the beginning")
 
     hours: Annotated[PositiveNumber, Field(le=1e9), Flag(metavar="H")] = Field(

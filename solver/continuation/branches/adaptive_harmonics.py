@@ -51,13 +51,7 @@ class _Attempt:
 
 
 def check_accuracy(accuracy: float) -> float:
-    """Return `accuracy` as a float if it is a usable relative error.
-
-    Raises
-    ------
-    SettingError
-        Not a number above 0 and below 1.
-    """
+    """Return `accuracy` as a float; SettingError if it is no number above 0 and below 1."""
     good = isinstance(accuracy, (int, float, np.number)) and not isinstance(accuracy, bool)
     if not good or not 0.0 < accuracy < 1.0:
         raise SettingError("accuracy", accuracy, "must be a relative error > 0 and < 1")

@@ -15,10 +15,10 @@ from solver.balance.kernels.output import measure
 from solver.balance.kernels.residual import evaluate
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.system import DENSE, UTILISED
-from solver.continuation.branch import Branch
+from solver.continuation.branch import Branch, Points
 from solver.continuation.branches.sweep import surveyed, with_error, with_points
 from solver.continuation.extrema.extrema import Survey
-from solver.continuation.extrema.node_table import PointRow, Points
+from solver.continuation.extrema.node_table import PointRow
 from solver.continuation.extrema.nodes import NodeSolver, numbers_of
 from solver.continuation.peaks import Peak
 from solver.jit.fourier import Real
@@ -53,7 +53,7 @@ def observing(
     workspace = _workspaces(branch, [dof], measure)[0]
     x, measures = _measured([workspace], branch.solutions, branch.tangents, branch.measures)
     seen = replace(branch, balance=workspace.balance, error_estimate=math.nan, newton_iterations=0)
-    survey = Survey.of(workspace, _points(branch, x[0], measures[0]))
+    survey = Survey.of(workspace, Points.of(branch, observed=x[0], measures=measures[0]))
     if peaks_alone:
         return replace(
             with_points(seen, survey.points), peaks=survey.peaks, band=None,
@@ -89,7 +89,7 @@ def highest_peaks(branch: Branch, dofs: Sequence[str]) -> tuple[list[Peak], Bran
     solver = NodeSolver(workspaces[0])
     nothing = np.zeros((len(branch.values), branch.balance.n_coefficients))
     observers = _Observers(solver, workspaces)
-    nodes = solver.nodes_of(_points(branch, nothing, branch.measures))
+    nodes = solver.nodes_of(Points.of(branch, observed=nothing))
     found: list[Peak] = []
     worst, peaks, certificate = 0, branch.peaks, branch.peak_certificate
     for j in range(len(dofs)):
@@ -105,14 +105,6 @@ def highest_peaks(branch: Branch, dofs: Sequence[str]) -> tuple[list[Peak], Bran
         seconds=branch.seconds + time.perf_counter() - begun,
     )  # fmt: skip
     return found, with_error(with_points(seen, points), workspaces[worst])
-
-
-def _points(branch: Branch, x: Real, measures: Real) -> Points:
-    """Return the points of a branch with the motion and the measures of another DOF."""
-    return Points(
-        solutions=branch.solutions, tangents=branch.tangents, measures=measures, observed=x,
-        states=branch.states,
-    )  # fmt: skip
 
 
 def _workspaces(

@@ -19,14 +19,13 @@ from solver.balance.parameter import Kind
 from solver.balance.workspace import Workspace
 from solver.continuation.branch import Branch, BranchStatus
 from solver.continuation.branches.point_by_point import is_unique
-from solver.continuation.branches.sweep import check_range, points_of, walk
+from solver.continuation.branches.sweep import walk, without_peaks
 from solver.continuation.branches.symmetry_breaking import branch_flags
-from solver.continuation.certificate import uncertain
 from solver.continuation.extrema.node_table import PointRow
 from solver.continuation.extrema.nodes import NodeSolver
+from solver.continuation.parameter_scale import check_range
 from solver.continuation.segment import joined
 from solver.continuation.settings import ContinuationSettings
-from solver.jit.fourier import to_full
 from solver.results.watch import ShouldStop
 from solver.scene.scene import Scene
 
@@ -64,15 +63,10 @@ def sampled(
         if not more:
             return None
         nodes += more
-    points = solver.points_of(nodes)
-    return Branch(
-        balance=balance, status=status, start=start, stop=stop,
-        values=balance.parameter.all_outside(points.solutions[:, -1].copy()), solutions=points.solutions,
-        tangents=points.tangents, states=points.states, measures=points.measures,
-        observed=to_full(points.observed, balance.system.ks, balance.highest_harmonic), peaks=(), band=None,
-        error_estimate=math.nan, newton_iterations=solver.spent, rejected_steps=0, stepped_over=0,
-        seconds=time.perf_counter() - begun, flags=branch_flags(workspace, points.solutions),
-        peak_certificate=uncertain("peaks between its points were not looked for"),
+    branch = without_peaks(balance, solver.points_of(nodes), status, start, stop)
+    return replace(
+        branch, newton_iterations=solver.spent, seconds=time.perf_counter() - begun,
+        flags=branch_flags(workspace, branch.solutions),
     )  # fmt: skip
 
 
@@ -91,4 +85,4 @@ def _until(solver: NodeSolver, last: PointRow, p: float, intervals: int) -> list
     settings = replace(settings, range_length=settings.range_length / intervals)
     ends = float(outside(last.at)), float(outside(p))
     arc = joined(list(walk(solver.workspace, *ends, settings, last.solution[:-1])))
-    return solver.nodes_of(points_of(arc))[1:] if arc.status is BranchStatus.COMPLETED else []
+    return solver.nodes_of(arc)[1:] if arc.status is BranchStatus.COMPLETED else []

@@ -15,11 +15,11 @@ import numpy as np
 
 from solver.balance.balance import Balance, build
 from solver.balance.kernels.output import MAX_ABS
-from solver.balance.parameter import Kind, Parameter
+from solver.balance.parameter import Kind
 from solver.balance.simplifications import Effects
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.system import is_spanned
-from solver.continuation.branch import Branch, BranchStatus
+from solver.continuation.branch import ROWS, Branch, BranchStatus, Points
 from solver.continuation.branches.adaptive_harmonics import sweep_to
 from solver.continuation.branches.point_by_point import is_unique, rows_before_a_turn, walk_by_points
 from solver.continuation.branches.symmetry_breaking import branch_flags
@@ -27,10 +27,10 @@ from solver.continuation.certificate import uncertain
 from solver.continuation.endings import AHEAD, too_stiff
 from solver.continuation.extrema.branch_error import branch_error
 from solver.continuation.extrema.extrema import Survey, band_limit
-from solver.continuation.extrema.node_table import Points
 from solver.continuation.from_nothing import solve_from_nothing
 from solver.continuation.kernels import state as walk_states
 from solver.continuation.kernels.pseudo_arclength import begin_walk
+from solver.continuation.parameter_scale import check_range
 from solver.continuation.peaks import Peak
 from solver.continuation.segment import Course, Stretch, go_on_from, joined, rows_of
 from solver.continuation.settings import ContinuationSettings
@@ -197,25 +197,6 @@ def _curve(balance: Balance, stretch: Stretch) -> tuple[Real, Real]:
     return balance.parameter.all_outside(stretch.solutions[:, -1].copy()), stretch.measures[:, MAX_ABS]
 
 
-def check_range(parameter: Parameter, start: float | None, stop: float | None) -> tuple[float, float]:
-    """Return the range of a continuation as floats.
-
-    Raises
-    ------
-    SettingError
-        An end is missing, not a value the parameter may have, or both are the same.
-    """
-    ends = []
-    for name, value in (("start", start), ("stop", stop)):
-        if value is None:
-            raise SettingError(name, None, f"is needed for a sweep of `{parameter.path}`")
-        ends.append(parameter.check(name, value))
-    first, last = ends
-    if first == last:
-        raise SettingError("stop", last, f"must differ from the start {first!r}")
-    return first, last
-
-
 def check_limit(limit: float | None) -> None:
     """Refuse a limit of the band that is no amplitude, by a SettingError."""
     if limit is not None and not (isinstance(limit, (int, float)) and np.isfinite(limit) and limit > 0.0):
@@ -261,10 +242,8 @@ def walk(
 
 def _no_start(balance: Balance, iterations: int, begun: float, status: BranchStatus) -> Stretch:
     """Return the stretch of a branch that could not begin."""
-    rows = rows_of(balance, 0)
     return Stretch(
-        solutions=rows[0], tangents=rows[1], states=rows[2], observed=rows[3], measures=rows[4],
-        status=status, newton_iterations=iterations, rejected_steps=0, stepped_over=0,
+        **rows_of(balance, 0), status=status, newton_iterations=iterations, rejected_steps=0, stepped_over=0,
         seconds=time.perf_counter() - begun, walk=np.zeros(0),
     )  # fmt: skip
 
@@ -280,18 +259,26 @@ def _finish(
         at_end = balance.parameter.outside(float(whole.solutions[-1, -1])) if len(whole.solutions) else start
         if undamped_resonance(balance.scene, at_end, balance.system.ks):
             status = BranchStatus.UNDAMPED
-    walked = Branch(
-        balance=balance, status=status, start=start, stop=stop, values=whole.solutions[:, -1],
-        solutions=whole.solutions, tangents=whole.tangents, observed=whole.observed, measures=whole.measures,
-        states=whole.states, peaks=(), band=None, error_estimate=math.nan,
-        newton_iterations=whole.newton_iterations, rejected_steps=whole.rejected_steps,
-        stepped_over=whole.stepped_over, seconds=math.nan, flags=(),
-        peak_certificate=uncertain("peaks between its points were not looked for"),
+    branch = replace(
+        without_peaks(balance, whole, status, start, stop), newton_iterations=whole.newton_iterations,
+        rejected_steps=whole.rejected_steps, stepped_over=whole.stepped_over,
     )  # fmt: skip
-    points = points_of(whole)
-    branch = surveyed(walked, Survey.of(workspace, points), limit) if peaks else with_points(walked, points)
+    branch = surveyed(branch, Survey.of(workspace, whole), limit) if peaks else branch
     flags = branch_flags(workspace, branch.solutions), _drive_flags(workspace, whole, status, start, stop)
     return replace(branch, flags=flags[0] + flags[1], seconds=time.perf_counter() - begun)
+
+
+def without_peaks(
+    balance: Balance, points: Points, status: BranchStatus, start: float, stop: float
+) -> Branch:
+    """Return the branch of points alone, on which nothing was looked for and no work is counted."""
+    walked = Branch(
+        **{name: getattr(points, name) for name in ROWS}, balance=balance, status=status, start=start,
+        stop=stop, values=points.solutions[:, -1], peaks=(), band=None, error_estimate=math.nan,
+        newton_iterations=0, rejected_steps=0, stepped_over=0, seconds=math.nan, flags=(),
+        peak_certificate=uncertain("peaks between its points were not looked for"),
+    )  # fmt: skip
+    return with_points(walked, points)
 
 
 def surveyed(branch: Branch, survey: Survey, limit: float | None) -> Branch:
@@ -323,12 +310,8 @@ def with_error(branch: Branch, workspace: Workspace | None = None) -> Branch:
     """Return a branch with the estimated error of its highest peak, if that was left out."""
     if math.isfinite(branch.error_estimate) or not branch.peaks:
         return branch
-    points = Points(
-        solutions=branch.solutions, tangents=branch.tangents, measures=branch.measures,
-        observed=branch.observed, states=branch.states,
-    )  # fmt: skip
     follow = None if branch.status is BranchStatus.STOPPED else highest_between
-    error = branch_error(workspace or Workspace.of(branch.balance), points, branch.peaks, follow)
+    error = branch_error(workspace or Workspace.of(branch.balance), Points.of(branch), branch.peaks, follow)
     return replace(branch, error_estimate=error)
 
 
@@ -344,14 +327,6 @@ def _drive_flags(
     return () if all(map(workspace.friction_can_hold, beyond)) else (ABOVE_FRICTION,)
 
 
-def points_of(whole: Stretch) -> Points:
-    """Return the rows of a stretch."""
-    return Points(
-        solutions=whole.solutions, tangents=whole.tangents, measures=whole.measures, observed=whole.observed,
-        states=whole.states,
-    )  # fmt: skip
-
-
 def highest_between(balance: Balance, low: float, high: float, guess: Real) -> Peak | None:
     """Return the highest peak of a balance between two λ (inside unit), from `guess`; None without one."""
     workspace, outside = Workspace.of(balance), balance.parameter.outside
@@ -361,5 +336,5 @@ def highest_between(balance: Balance, low: float, high: float, guess: Real) -> P
         stretches.append(stretch)
         if sum(len(each.solutions) for each in stretches) >= _MOST_FOLLOWED:
             break
-    survey = Survey.of(workspace, points_of(joined(stretches)))
+    survey = Survey.of(workspace, joined(stretches))
     return survey.peaks[0] if survey.peaks else None

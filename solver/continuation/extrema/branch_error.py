@@ -24,10 +24,10 @@ from solver.balance.more_harmonics import more_harmonics, pad
 from solver.balance.parameter import Kind
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.system import DENSE, MODES
+from solver.continuation.branch import Points
 from solver.continuation.extrema.driven import Way, may_exceed
 from solver.continuation.extrema.error_estimate import SAFETY, ErrorEstimator
 from solver.continuation.extrema.kernels.suspects import find_reaching
-from solver.continuation.extrema.node_table import Points
 from solver.continuation.peaks import Peak
 from solver.jit.fourier import Complex, Flags, Real
 from solver.scene.harmonics import among, spread

@@ -9,9 +9,10 @@ from typing import Annotated, Protocol
 import numpy as np
 
 from solver.balance.kernels.linearised_contacts import linearise, springs_at
+from solver.balance.whole_motion import Amplitudes
 from solver.balance.workspace import Workspace
 from solver.continuation.extrema.node_table import NodeTable, PointRow
-from solver.jit.fourier import Complex, Integer, Real, cosine_position
+from solver.jit.fourier import Complex, Integer, cosine_position
 
 _UNKNOWN = -2  # row of a node whose stiffness was not asked for
 
@@ -50,7 +51,7 @@ class LocalModel:
     def __init__(self, solver: OfBranch) -> None:
         self._solver = solver
         balance = solver.workspace.balance
-        self._system = balance.system
+        self._system, self.amplitudes = balance.system, Amplitudes(balance)
         self._rows = np.zeros(0, np.int64)
         self._springs: dict[int, Springs] = {}  # by the number of the node
         ends = pairwise(self._system.first_port.tolist())
@@ -155,18 +156,6 @@ class LocalModel:
             return None
         F = F + np.einsum("kcd,kd->kc", stiffness, change)
         return u + change, x - np.einsum("kc,kc->k", B, F)
-
-
-def unknowns(amplitudes: Complex, ks: Integer) -> Real:
-    """Return the unknowns of complex amplitudes (nk, nc), as `solver.balance.kernels.linearised_contacts`
-    gives them."""
-    turned = amplitudes.T
-    skipped = 1 if ks[0] == 0 else 0
-    real = np.zeros((turned.shape[0], 2 * len(ks) - skipped))
-    if skipped:
-        real[:, 0] = turned[:, 0].real
-    real[:, skipped::2], real[:, skipped + 1 :: 2] = turned[:, skipped:].real, -turned[:, skipped:].imag
-    return real.reshape(-1)
 
 
 def _cubic(t: float, a: Complex, da: Complex, b: Complex, db: Complex) -> Complex:

@@ -24,14 +24,15 @@ from solver.balance.kernels.output import HIGH, HIGH_SLOPE, LOW, LOW_SLOPE, MAX_
 from solver.balance.parameter import Kind
 from solver.balance.workspace import Workspace
 from solver.continuation.between import dense_between
+from solver.continuation.branch import Points
 from solver.continuation.certificate import PeakCertificate, certified, uncertain
 from solver.continuation.extrema.intervals import CURVES, highest_share, lowest_share, may_cross
 from solver.continuation.extrema.kernels.intervals import IS_BENT, WAVES, WORTH_POLISHING
-from solver.continuation.extrema.node_table import PointRow, Points
+from solver.continuation.extrema.node_table import PointRow
 from solver.continuation.extrema.nodes import NodeSolver, numbers_of
 from solver.continuation.extrema.resonance_search import ResonanceSearch, Search
 from solver.continuation.extrema.state_changes import ChangeSearch
-from solver.continuation.folds import fold_between, motion_scales
+from solver.continuation.folds import fold_between
 from solver.continuation.peaks import Band, Edge, Peak
 from solver.jit.fourier import Real
 
@@ -342,9 +343,7 @@ class Survey:
         folds = []
         for (left, right), turned in zip(pairwise(self._nodes), turns.tolist(), strict=True):
             if turned and max(left.measures[MAX_ABS], right.measures[MAX_ABS]) > limit:
-                by_share = motion_scales(left, right)
-                ends = float(left.tangent[-1] * by_share[0]), float(right.tangent[-1] * by_share[1])
-                found = fold_between(partial(self._solver.between, left, right), *ends)
+                found = fold_between(partial(self._solver.between, left, right), left, right)
                 if found is not None:
                     nodes.append(found[0])
                     if found[0].measures[MAX_ABS] > limit:

@@ -1,4 +1,4 @@
-"""The rows of a branch: all, one, and a table in which each keeps its number while others come between.
+"""The rows of a branch: one, and a table in which each keeps its number while others come between.
 
 A branch is looked at again whenever points were solved between others. Rows are stacked once, and what is
 known between two neighbours stays known.
@@ -6,7 +6,6 @@ known between two neighbours stays known.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple, TypeVar
 
 import numpy as np
@@ -15,17 +14,6 @@ from numpy.typing import NDArray
 from solver.jit.fourier import Integer, Real
 
 _Number = TypeVar("_Number", np.float64, np.int64)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Points:
-    """The rows of a branch; see `solver.continuation.branch.Branch`."""
-
-    solutions: Real
-    tangents: Real
-    measures: Real
-    observed: Real
-    states: Integer
 
 
 class PointRow(NamedTuple):

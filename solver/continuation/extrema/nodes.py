@@ -28,11 +28,12 @@ from solver.balance.kernels.output import (
 )
 from solver.contacts.kernels.system import evaluation_by_value
 from solver.continuation.between import closing_in
+from solver.continuation.branch import ROWS, Points
 from solver.continuation.extrema.contact_springs import LocalModel
 from solver.continuation.extrema.kernels import intervals
 from solver.continuation.extrema.kernels.intervals import look_between, middles_between
 from solver.continuation.extrema.kernels.state_changes import locate_change
-from solver.continuation.extrema.node_table import NodeTable, PointRow, Points
+from solver.continuation.extrema.node_table import NodeTable, PointRow
 from solver.continuation.folds import OnBranch
 from solver.jit.fourier import Integer, Real
 
@@ -107,11 +108,8 @@ class NodeSolver:
 
     def points_of(self, nodes: Sequence[PointRow]) -> Points:
         """Return nodes as the rows of a branch."""
-        rows, table = numbers_of(nodes), self.table
-        return Points(
-            solutions=table.solutions[rows], tangents=table.tangents[rows], measures=table.measures[rows],
-            observed=table.observed[rows], states=table.states[rows],
-        )  # fmt: skip
+        rows = numbers_of(nodes)
+        return Points(**{name: getattr(self.table, name)[rows] for name in ROWS})
 
     def _added(
         self, solutions: Real, tangents: Real, measures: Real, observed: Real, states: Integer

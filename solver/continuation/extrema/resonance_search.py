@@ -22,7 +22,7 @@ import numpy as np
 
 from solver.balance.kernels.output import HIGH, HIGH_SLOPE, LOW, LOW_SLOPE, MAX_ABS
 from solver.continuation.between import dense_between
-from solver.continuation.extrema.contact_springs import Resonance, unknowns
+from solver.continuation.extrema.contact_springs import Resonance
 from solver.continuation.extrema.kernels.suspects import find_suspects
 from solver.continuation.extrema.node_table import NodeTable, PointRow
 from solver.continuation.extrema.nodes import NodeSolver, numbers_of
@@ -287,7 +287,7 @@ class ResonanceSearch:
         straight = (1.0 - share) * left.solution[:-1] + share * right.solution[:-1]
         guesses = [straight]
         if predicted is not None and np.all(np.isfinite(predicted[0])):
-            guesses.insert(0, unknowns(predicted[0], self._loop.system.ks))
+            guesses.insert(0, self._model.amplitudes.coefficients(predicted[0].T).reshape(-1))
         return self._solver.at(at, guesses, onward)
 
     def _halved(

@@ -22,8 +22,6 @@ from dataclasses import replace
 import numpy as np
 
 from solver.balance.balance import Balance
-from solver.balance.kernels.output import extremes
-from solver.contacts.kernels.system import System, by_reference
 from solver.continuation.between import least_between
 from solver.jit.fourier import Complex, Real, cosine_position
 from solver.modes.corrector import Corrected, ModeState, correct
@@ -51,7 +49,6 @@ class Held(Forced):
     def __init__(self, balance: Balance) -> None:
         super().__init__(balance)
         self.target, self.whole = 1.0, False
-        self._kernel: System = by_reference(balance.system)
 
     def over(self, balance: Balance) -> Held:
         """Return the same question to another balance of the scene."""
@@ -75,11 +72,7 @@ class Held(Forced):
             row = np.zeros_like(x)
             row[s.first] = s.observe[s.first].conj() * seen / max(abs(seen), 1e-300)
             return abs(seen), row
-        observed = self.amplitudes.coefficients(np.einsum("kn,kn->k", s.observe, x))
-        high, at_high, low, at_low = extremes(self._kernel, observed)
-        sign, tau = (1.0, at_high) if high >= -low else (-1.0, at_low)
-        # The extreme of a smooth motion changes as the motion does at its instant.
-        return max(high, -low), sign * (s.observe * self.amplitudes.turn(tau)[:, None]).conj()
+        return self.top(x)
 
     def _second_last(self, x: Complex, _turned: Complex) -> Complex:
         """Return c of the change of the logarithm of what is held."""
@@ -210,8 +203,6 @@ def _linear(equations: Held, rest: Real, omega: float) -> ModeState:
 
 def _scaled(equations: Held, state: ModeState, rest: Real, factor: float) -> ModeState:
     """Return a guess with what moves, and the force, times a factor."""
-    size, still, y = equations.size, rest.reshape(-1), state.y.copy()
-    y[:size] = still + factor * (y[:size] - still)
-    y[size : size + 2] *= factor
-    y[-1] *= factor
-    return replace(state, y=y)
+    guess = state.scaled(equations.size, factor, rest.reshape(-1))
+    guess.y[-1] *= factor
+    return guess

@@ -166,10 +166,8 @@ class _Neighbourhood:
     def _scaled_to(self, state: ModeState, amplitude: float, depth: int = 0) -> Corrected | None:
         """Return the response of an amplitude at the same Ω, in smaller steps where it must."""
         held, before = self.equations, self.equations.target
-        y, ratio = state.y.copy(), amplitude / before
-        y[: held.size + 2] *= ratio
-        held.target = amplitude
-        found = self._at(replace(state, y=y), state.log_amplitude)
+        ratio, held.target = amplitude / before, amplitude
+        found = self._at(state.scaled(held.size, ratio), state.log_amplitude)
         if found is not None or depth == _HALVINGS or ratio == 1.0:
             return found
         held.target = before

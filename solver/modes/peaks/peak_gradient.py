@@ -18,15 +18,12 @@ from typing import Annotated
 
 import numpy as np
 
-from solver.balance.kernels.output import extremes
-from solver.contacts.kernels.system import System, by_reference
 from solver.jit.fourier import Complex, Real
 from solver.modes.corrector import Corrected, ModeState, correct, scales
 from solver.modes.equations import Evaluated
 from solver.modes.gradient import ModeSensitivities
 from solver.modes.nonlinear_mode import pose
 from solver.modes.peaks.performance import PerformanceCurve, crossing
-from solver.modes.results import NonlinearMode
 from solver.results.told import Piece
 
 _SAME = 1e-10  # ln of the force within which it is the one asked for
@@ -73,7 +70,7 @@ def peak_at_excitation(curve: PerformanceCurve, factor: float, paths: Sequence[s
         An unknown path.
     """
     nothing = np.full(len(paths), math.nan)
-    at = crossing(curve, factor)
+    at = crossing(curve.excitation, curve.peak, factor)
     if at is None:
         return CurvePeak(peak=math.nan, frequency_hz=math.nan, gradient=nothing)
     solver = _Solver(curve, paths)
@@ -98,14 +95,13 @@ class _Solver:
             whole=self._found.whole_matrices,
         )  # fmt: skip
         self._equations = problem.equations
-        self._kernel: System = by_reference(problem.equations.balance.system)
         self._sensitivities = (
             ModeSensitivities(problem.equations, paths, turns=problem.turns) if len(paths) else None
         )
 
     def solved(self, i: int, share: float, log_force: float) -> Corrected | None:
         """Return the point between i and i + 1 of a given force; None if it was not found."""
-        state = _between(self._found, i, share)
+        state = self._found.points[i].towards(self._found.points[i + 1], share)
         tried: list[tuple[float, float]] = []
         ends = sorted(self._found.points[j].log_amplitude for j in (i, i + 1))
         room = ends[1] - ends[0]
@@ -127,7 +123,8 @@ class _Solver:
             to = min(max(here + move, ends[0] - room), ends[1] + room)
             if to == here:
                 return None
-            state = _raised(point.state, to, self._equations.size)
+            raised = point.state.scaled(self._equations.size, math.exp(to - here))
+            state = replace(raised, log_amplitude=to)
         return None
 
     def _rise(self, point: Corrected) -> float:
@@ -140,11 +137,8 @@ class _Solver:
         at, state, s = point.at, point.state, self._equations.structure
         if at is None:
             raise ValueError("a point without a value is none of a curve")
-        hat, x = self._equations.amplitudes, at.x
-        observed = hat.coefficients(np.einsum("kn,kn->k", s.observe, x))
-        high, at_high, low, at_low = extremes(self._kernel, observed)
-        sign, tau, size = (1.0, at_high, high) if high >= -low else (-1.0, at_low, -low)
-        top = sign * (s.observe * hat.turn(tau)[:, None]).conj() / size
+        x = at.x
+        size, top = self._equations.top(x)
         seen = complex(np.vdot(s.force, x[s.first]))
         drive = np.zeros_like(x)
         drive[s.first] = s.force * seen / abs(seen) ** 2
@@ -152,7 +146,7 @@ class _Solver:
         log_force = math.log(2.0 * zeta * math.sqrt(1.0 - zeta**2)) + 2.0 * math.log(omega)
         log_force += 2.0 * state.log_amplitude - math.log(abs(seen))
         return _Reading(
-            log_peak=math.log(size), log_force=log_force, top=top, drive=drive,
+            log_peak=math.log(size), log_force=log_force, top=top / size, drive=drive,
             frequency_hz=omega * math.sqrt(max(1.0 - 2.0 * zeta**2, 0.0)) / (2.0 * math.pi),
             by_zeta=1.0 / zeta - zeta / (1.0 - zeta**2),
         )  # fmt: skip
@@ -209,19 +203,3 @@ class _Solver:
         phi += dy[-2] * (by_omega - s.times(dynamics.by_omega, at.x))
         phi -= dy[-1] * s.times(dynamics.by_zeta, at.x)
         return dynamics.solve(phi if pushes is None else phi + pushes)
-
-
-def _raised(state: ModeState, to: float, size: int) -> ModeState:
-    """Return a guess at another amplitude of the same shape."""
-    y = state.y.copy()
-    y[: size + 2] *= math.exp(to - state.log_amplitude)
-    return replace(state, y=y, log_amplitude=to)
-
-
-def _between(found: NonlinearMode, i: int, share: float) -> ModeState:
-    """Return a guess between points i and i + 1."""
-    one, other = found.points[i], found.points[i + 1]
-    # q is of one mode alone.
-    y = one.y + share * (other.y - one.y) if one.mode == other.mode else one.y.copy()
-    log_amplitude = one.log_amplitude + share * (other.log_amplitude - one.log_amplitude)
-    return ModeState(y=y, log_amplitude=log_amplitude, mode=one.mode, phase=one.phase)

@@ -13,7 +13,6 @@ homogeneous: forces, loads and motions grow together, so one curve serves every 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, NamedTuple
 
@@ -71,13 +70,22 @@ class PerformanceCurve(Drawn):
 
         Between points both go along straight lines over logarithms.
         """
-        return _highest(self.excitation, self.peak, self.frequency_hz, factor)
+        return self._highest(self.excitation, self.peak, factor)
 
     def at_load(self, factor: float) -> tuple[float, float]:
         """Return the same at a factor on every load, the excitation as it is; NaN where it is not known."""
         if not self.scales:
             return math.nan, math.nan
-        return _highest(self.load, self.peak_at_load, self.frequency_hz, factor)
+        return self._highest(self.load, self.peak_at_load, factor)
+
+    def _highest(self, places: Real, heights: Real, at: float) -> tuple[float, float]:
+        """Return the highest of the curve's crossings of a place, which it may pass several times."""
+        found = crossing(places, heights, at)
+        if found is None:
+            return math.nan, math.nan
+        i, share, height = found
+        before, behind = self.frequency_hz[i : i + 2]
+        return height, float((1.0 - share) * before + share * behind)
 
     @property
     def least(self) -> LeastOverLoads:
@@ -163,31 +171,16 @@ def grows_together(found: NonlinearMode) -> bool:
     return bool(np.abs(forces[1] - forces[0]).max(initial=0.0) <= _SAME * size)
 
 
-def crossing(curve: PerformanceCurve, factor: float) -> tuple[int, float] | None:
-    """Return the number of the point before the highest crossing of an excitation and the share beyond it."""
-    best, where = math.nan, None
-    for i, share, height in _crossings(curve.excitation, curve.peak, factor):
-        if not best >= height:
-            best, where = height, (i, share)
-    return where
+def crossing(places: Real, heights: Real, at: float) -> tuple[int, float, float] | None:
+    """Return the number of the point before the highest crossing of a place, the share beyond it, its height.
 
-
-def _crossings(places: Real, heights: Real, at: float) -> Iterator[tuple[int, float, float]]:
-    """Yield the number of the point before every crossing of a place, the share beyond it, and the height."""
-    if not at > 0.0:
-        return
-    for i in range(places.size - 1):
+    None where a curve does not pass the place.
+    """
+    found = []
+    for i in range(places.size - 1 if at > 0.0 else 0):
         one, other = places[i], places[i + 1]
         if not (0.0 < one < math.inf and 0.0 < other < math.inf) or (one - at) * (other - at) > 0.0:
             continue
         share = 0.0 if one == other else math.log(at / one) / math.log(other / one)
-        yield i, share, float(heights[i] ** (1.0 - share) * heights[i + 1] ** share)
-
-
-def _highest(places: Real, heights: Real, frequencies: Real, at: float) -> tuple[float, float]:
-    """Return the highest of a curve's crossings of a place, which it may pass several times."""
-    best, where = math.nan, math.nan
-    for i, share, height in _crossings(places, heights, at):
-        if not best >= height:
-            best, where = height, (1.0 - share) * frequencies[i] + share * frequencies[i + 1]
-    return float(best), float(where)
+        found.append((i, share, float(heights[i] ** (1.0 - share) * heights[i + 1] ** share)))
+    return max(found, key=lambda each: each[2], default=None)

@@ -15,12 +15,12 @@ import numpy as np
 
 from solver.errors import SettingError
 from solver.jit.fourier import Real
-from solver.response.contact_response import OPENS, ContactResponse, ContactState
+from solver.response.contact_response import ContactResponse, ContactState, flags_of
 from solver.response.exact.beside import orbit_beside
 from solver.response.exact.flow import LiftsError, NoMotionError, exponential, first_root, steps_of, taylor
 from solver.response.exact.orbit import PERIOD, ROUNDING, Ended, Orbit, find, follow, grazed
 from solver.response.exact.piecewise import STICK, MemberState, Mode, Piecewise
-from solver.response.solution import HISTORY_DEPENDENT, MEAN_UNDETERMINED, Solution, SolutionStatus
+from solver.response.solution import Solution, SolutionStatus
 from solver.response.stability.multipliers import Stability, growth_of, verdict_of
 from solver.scene.scene import Scene
 
@@ -98,46 +98,32 @@ def panels_of(orbit: Orbit, highest: int) -> Panels:
 def solve_exactly(
     scene: Scene, frequency_hz: float, harmonics: int, *, near: Solution | None = None
 ) -> Solution:
-    """Return the response of a scene, to rounding; it is looked for beside a solution of the balance.
-
-    Raises
-    ------
-    SettingError
-        A part of the scene that has no place in an exact solution, see `Piecewise`.
-    """
+    """Return the response, to rounding, looked for beside one of the balance; errors as `Piecewise`."""
     return solve_beside(scene, frequency_hz, harmonics, near)[0]
 
 
 def solve_beside(
     scene: Scene, frequency_hz: float, harmonics: int, near: Orbit | Solution | None = None
 ) -> tuple[Solution, Orbit | None]:
-    """Return the response, to rounding, and its orbit; it is looked for beside `near`, else from rest.
-
-    Raises
-    ------
-    SettingError
-        As `solve_exactly`.
-    """
+    """Return the response and its orbit, looked for beside `near`, else from rest; errors as `Piecewise`."""
     begun = time.perf_counter()
     scene = scene.at_frequency(frequency_hz)
     system, orbit = _orbit_of(scene, frequency_hz, near)
     highest = max(harmonics, system.top)
     if isinstance(orbit, SolutionStatus):
         seconds = time.perf_counter() - begun
-        return _nothing(scene, frequency_hz, harmonics, highest, orbit, seconds), None
+        nothing = Solution.without_numbers(
+            scene=scene, frequency_hz=frequency_hz, n_harmonics=harmonics, status=orbit, highest=highest,
+            seconds=seconds,
+        )  # fmt: skip
+        return nothing, None
     solution = _described(system, orbit, frequency_hz, harmonics, highest, begun)
     solution._judged.append(verdict_of(_stability(orbit, frequency_hz, begun)))  # a by-product here
     return solution, orbit
 
 
 def stability_exactly(scene: Scene, frequency_hz: float) -> Stability:
-    """Return the Floquet multipliers of the response of a scene with rigid contacts.
-
-    Raises
-    ------
-    SettingError
-        A part of the scene that cannot stand beside rigid contacts, or there is no response.
-    """
+    """Return the multipliers with rigid contacts; errors as `Piecewise`, or where there is no response."""
     begun = time.perf_counter()
     _, orbit = _orbit_of(scene, frequency_hz)
     if isinstance(orbit, SolutionStatus):
@@ -265,13 +251,7 @@ def _flags(system: Piecewise, orbit: Orbit, contacts: tuple[ContactResponse, ...
         size = float(np.abs(direction).max())
         mean_open |= max(map(abs, seen)) > _MOVES * size
         range_open |= max(seen) - min(seen) > _MOVES * size
-    flags = [MEAN_UNDETERMINED] * mean_open + [HISTORY_DEPENDENT] * range_open
-    stuck = [each for each in contacts if each.state is ContactState.STUCK]
-    if stuck and len(stuck) == len(contacts):
-        flags.append("all_stuck")
-    if any(each.state in OPENS for each in contacts):
-        flags.append("separation")
-    return tuple(flags)
+    return flags_of(contacts, mean_open=mean_open, half_range_open=range_open)
 
 
 def _through(mode: Mode, length: float) -> Real:
@@ -289,15 +269,4 @@ def _stability(orbit: Orbit, frequency_hz: float, begun: float) -> Stability:
     return Stability(
         multipliers=multipliers, neutral=neutral, growth=growth_of(multipliers), frequency_hz=frequency_hz,
         seconds=time.perf_counter() - begun,
-    )  # fmt: skip
-
-
-def _nothing(
-    scene: Scene, frequency_hz: float, harmonics: int, highest: int, status: SolutionStatus, seconds: float
-) -> Solution:
-    return Solution(
-        scene=scene, frequency_hz=frequency_hz, n_harmonics=harmonics, status=status, max_abs=math.nan,
-        half_peak_to_peak=math.nan, mean=math.nan, harmonics=np.full(highest + 1, np.nan),
-        observed=np.full(2 * highest + 1, np.nan), contacts=(), flags=(), residual=math.nan,
-        error_estimate=math.nan, newton_iterations=0, seconds=seconds,
     )  # fmt: skip

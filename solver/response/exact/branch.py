@@ -9,18 +9,16 @@ from typing import Annotated
 import numpy as np
 
 from solver.balance.balance import check_harmonics
-from solver.balance.parameter import Kind, Parameter, resolve
+from solver.balance.parameter import Kind, Parameter, check_fixed, resolve
 from solver.continuation.branch import AnyBranch
 from solver.continuation.marks import Bifurcations, Mark, MarkKind
 from solver.continuation.peaks import Peak
-from solver.errors import SettingError
 from solver.jit.fourier import Real
 from solver.response.exact.answer import solve_beside
 from solver.response.exact.orbit import Orbit
 from solver.response.known import known_of_solution
 from solver.response.solution import MEAN_UNDETERMINED, Solution
 from solver.results.known import Known, Stable, Verdict
-from solver.scene.parameter_paths import check_frequency
 from solver.scene.scene import Scene
 
 
@@ -61,18 +59,10 @@ class Orbits:
 
     @classmethod
     def of(cls, scene: Scene, path: str, harmonics: int, frequency_hz: float | None) -> Orbits:
-        """Return those over a path.
-
-        Raises
-        ------
-        SettingError
-            Unknown path, a missing or bad frequency, or a bad number of harmonics.
-        """
+        """Return those over a path; SettingError for one unknown, a bad frequency or harmonics."""
         parameter, fixed = resolve(scene, path), math.nan
         if parameter.kind is not Kind.FREQUENCY:
-            if frequency_hz is None:
-                raise SettingError("frequency_hz", None, f"is needed when the parameter is `{path}`")
-            fixed = check_frequency("frequency_hz", frequency_hz)
+            fixed = check_fixed(path, frequency_hz)
             scene = scene.at_frequency(fixed)
         return cls(
             scene=scene, parameter=parameter, n_harmonics=check_harmonics(harmonics), frequency_hz=fixed

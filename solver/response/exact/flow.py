@@ -90,12 +90,7 @@ class Flow:
     pieces: list[FlowPiece] = field(default_factory=list)
 
     def run(self, length: float) -> None:
-        """Go on for an angle; the pieces of the way are in `pieces`.
-
-        Raises
-        ------
-        LiftsError, NoMotionError
-        """
+        """Go on for an angle, the pieces of the way in `pieces`; raises LiftsError, NoMotionError."""
         self.pieces = []
         end, at_once = self.tau + length, 0
         for _ in range(_MOST_EVENTS):

@@ -53,12 +53,7 @@ class Orbit:
 def find(
     system: Piecewise, w: Real, state: MemberState, *, tau: float = 0.0, most_periods: int = MOST_PERIODS
 ) -> Orbit | Ended:
-    """Find the periodic motion that a start leads to, at an angle.
-
-    Raises
-    ------
-    LiftsError, NoMotionError
-    """
+    """Find the periodic motion that a start leads to, at an angle; raises as `Flow.run`."""
     flow, periods, some = Flow(system, w, state, tau), 0, 2
     while periods < most_periods:
         drifts = []
@@ -78,14 +73,10 @@ def find(
 
 
 def follow(system: Piecewise, near: Orbit) -> Orbit | Ended:
-    """Find the periodic motion that begins as one of nearby values did; give up soon.
+    """Find the periodic motion that begins as one nearby did; give up soon. Raises as `Flow.run`.
 
     Where directions are open, where parts stand is a matter of history: a start from rest decides it, as far
     as it settles soon.
-
-    Raises
-    ------
-    LiftsError, NoMotionError
     """
     piece = near.pieces[0]
     if piece.w.size != system.nw:
@@ -105,12 +96,7 @@ def follow(system: Piecewise, near: Orbit) -> Orbit | Ended:
 def beside(
     system: Piecewise, w: Real, state: MemberState, tau: float, *, polish: int = POLISH
 ) -> Orbit | Ended:
-    """Find the periodic motion near a start at an angle; give up soon. `polish`: Newton's steps beyond.
-
-    Raises
-    ------
-    LiftsError, NoMotionError
-    """
+    """Find the motion near a start, with `polish` steps beyond; give up soon. Raises as `Flow.run`."""
     march = Flow(system, w, state, tau)
     march.run(PERIOD)
     found = _newton(system, march, 1, polish)

@@ -19,9 +19,10 @@ from solver.balance.kernels.output import HALF_RANGE, MAX_ABS, MEAN, MEASURES, R
 from solver.balance.parameter import Kind
 from solver.continuation.between import closing_in, least_between
 from solver.continuation.branch import BranchStatus
-from solver.continuation.branches.sweep import check_limit, check_range
+from solver.continuation.branches.sweep import check_limit
 from solver.continuation.certificate import uncertain
 from solver.continuation.extrema.extrema import band_limit
+from solver.continuation.parameter_scale import check_range
 from solver.continuation.peaks import Band, Edge, Peak
 from solver.continuation.segment import Course
 from solver.continuation.settings import ContinuationSettings

@@ -17,7 +17,7 @@ import numpy as np
 from solver.balance.balance import build
 from solver.balance.simplifications import Effects
 from solver.continuation.from_nothing import solve_from_nothing
-from solver.errors import SettingError
+from solver.errors import SettingError, check_count
 from solver.response.solution import Solution
 from solver.response.solve import describe
 from solver.response.stability import MOST_STARTS
@@ -135,11 +135,8 @@ def solve_all(
     """
     begun = time.perf_counter()
     check_frequency("frequency_hz", frequency_hz)
-    for name, value, least in (("starts", starts, 0), ("seed", seed, 0)):
-        whole = isinstance(value, int) and not isinstance(value, bool)
-        if not whole or not least <= value <= (MOST_STARTS if name == "starts" else 2**63 - 1):
-            top = MOST_STARTS if name == "starts" else "2^63 - 1"
-            raise SettingError(name, value, f"must be a whole number from {least} to {top}")
+    check_count("starts", starts, 0, MOST_STARTS)
+    check_count("seed", seed, 0, 2**63 - 1)
     only = uniqueness(scene, frequency_hz)
     effects = effects or Effects()
     if not only.proven:

@@ -22,11 +22,11 @@ from solver.balance.balance import Balance
 from solver.balance.kernels.jacobian import factorise
 from solver.balance.kernels.output import MAX_ABS
 from solver.balance.workspace import Workspace
-from solver.continuation.branch import AnyBranch, Branch, BranchStatus
+from solver.continuation.branch import AnyBranch, Branch, BranchStatus, Points
 from solver.continuation.branches.point_by_point import is_unique
-from solver.continuation.extrema.node_table import PointRow, Points
+from solver.continuation.extrema.node_table import PointRow
 from solver.continuation.extrema.nodes import NodeSolver
-from solver.continuation.folds import fold_between, motion_scales
+from solver.continuation.folds import fold_between
 from solver.continuation.marks import Bifurcations, Mark, MarkKind
 from solver.jit.fourier import Real
 from solver.response.stability.floquet import branch_stability
@@ -58,33 +58,19 @@ def bifurcations(branch: AnyBranch, *, multipliers: bool = False) -> Bifurcation
     begun = time.perf_counter()
     if not isinstance(branch, Branch):
         return branch.bifurcations  # exact orbits come with their multipliers
-    if not len(branch.values):
-        return Bifurcations(
-            unstable=np.zeros(0, bool), marks=(), known_by="determinant", parameter=branch.parameter,
-            seconds=time.perf_counter() - begun,
-        )  # fmt: skip
-    if is_unique(branch.balance) and branch.reached:
-        return Bifurcations(
-            unstable=np.zeros(len(branch.values), bool), marks=(), known_by="uniqueness",
-            parameter=branch.parameter, seconds=time.perf_counter() - begun,
-        )  # fmt: skip
-    along = Along(
-        branch.balance,
-        Points(
-            solutions=branch.solutions, tangents=branch.tangents, measures=branch.measures,
-            observed=np.zeros((len(branch.values), branch.balance.n_coefficients)), states=branch.states,
-        ),
-    )  # fmt: skip
-    marks: tuple[Mark, ...] = ()
-    if is_unique(branch.balance):
-        unstable, known_by = np.zeros(len(branch.values), bool), "uniqueness"
-    elif multipliers:
-        unstable, marks, known_by = *_by_multipliers(branch, along), "multipliers"
-    else:
-        unstable, marks, known_by = along.signs < 0.0, along.by_determinant(), "determinant"
+    count, unique, marks = len(branch.values), is_unique(branch.balance), tuple[Mark, ...]()
+    unstable, known_by = np.zeros(count, bool), "uniqueness" if unique and count else "determinant"
+    if count and not (unique and branch.reached):
+        nothing = np.zeros((count, branch.balance.n_coefficients))
+        along = Along(branch.balance, Points.of(branch, observed=nothing))
+        if not unique and multipliers:
+            unstable, marks, known_by = *_by_multipliers(branch, along), "multipliers"
+        elif not unique:
+            unstable, marks = along.signs < 0.0, along.by_determinant()
+        marks = (*marks, *_end(branch, along))
     return Bifurcations(
-        unstable=unstable, marks=(*marks, *_end(branch, along)), known_by=known_by,
-        parameter=branch.parameter, seconds=time.perf_counter() - begun,
+        unstable=unstable, marks=marks, known_by=known_by, parameter=branch.parameter,
+        seconds=time.perf_counter() - begun,
     )  # fmt: skip
 
 
@@ -137,12 +123,8 @@ class Along:
         return self.sign(node) == sign
 
     def _fold(self, i: int, left: PointRow, right: PointRow) -> Mark:
-        by_share = motion_scales(left, right)
-        ends = float(left.tangent[-1] * by_share[0]), float(right.tangent[-1] * by_share[1])
-        found = fold_between(partial(self.solver.between, left, right), *ends)
-        if found is None:
-            return self.mark(MarkKind.FOLD, left, i)
-        node, smooth = found
+        found = fold_between(partial(self.solver.between, left, right), left, right)
+        node, smooth = found or (left, True)
         return self.mark(MarkKind.FOLD, node, i, corner=not smooth)
 
     def halved(self, i: int, like_the_left: Callable[[PointRow], bool], most: int) -> PointRow:

@@ -15,7 +15,7 @@ from solver.jit.fourier import Complex, Real
 from solver.linear.assembly import linear_model
 from solver.linear.contact_table import port_counts
 from solver.linear.model import with_inertia
-from solver.response.solution import Solution
+from solver.response.solution import Solution, check_converged
 from solver.response.stability.monodromy import (
     PERIOD,
     LinearPart,
@@ -54,8 +54,7 @@ def stability(
     StoppedError
         `should_stop` said so.
     """
-    if not solution.converged:
-        raise SettingError("solution", solution.status.value, "must have converged")
+    check_converged(solution)
     if solution.scene.rigid_contact is not None:
         from solver.response.exact.answer import stability_exactly  # loaded by such scenes alone
 

@@ -80,19 +80,16 @@ def amplitude_range(solution: Solution, effects: Effects | None = None) -> Ampli
         return AmplitudeRange(
             max_abs=most, half_peak_to_peak=half, mean=(low, high), contacts=names, exact=True
         )
+    ends = [(math.nan, math.nan)] * 3
     # What slips in one direction cannot be made to stick for the sake of the other.
-    in_part = any(solution.contacts[i].state is not ContactState.STUCK for i in stuck)
-    if scene.structure.has_sectors or in_part:
-        unknown = (math.nan, math.nan)
-        return AmplitudeRange(
-            max_abs=unknown, half_peak_to_peak=unknown, mean=unknown, contacts=names, exact=False
-        )
-    search = _Search(solution, stuck, effects or Effects())
-    search.both_ways()
+    whole = all(solution.contacts[i].state is ContactState.STUCK for i in stuck)
+    if whole and not scene.structure.has_sectors:
+        search = _Search(solution, stuck, effects or Effects())
+        search.both_ways()
+        ends = [search.ends(which) for which in range(3)]
     return AmplitudeRange(
-        max_abs=search.ends(0), half_peak_to_peak=search.ends(1), mean=search.ends(2), contacts=names,
-        exact=False,
-    )  # fmt: skip
+        max_abs=ends[0], half_peak_to_peak=ends[1], mean=ends[2], contacts=names, exact=False
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,13 +104,7 @@ class LeftForces:
 
     @classmethod
     def of(cls, scene: Scene, stuck: Sequence[int]) -> LeftForces:
-        """Return the forces of some contacts, by their numbers.
-
-        Raises
-        ------
-        SettingError
-            A contact joins one sector with the next.
-        """
+        """Return the forces of contacts, by their numbers; SettingError where one joins two sectors."""
         sliding = tuple((i, port) for i in stuck for port in scene.contacts[i].RUBBING)
         forms = [scene.forms[i][port] for i, port in sliding]
         if any(term.next for form in forms for term in form):

@@ -21,9 +21,8 @@ import numpy as np
 from solver.balance.balance import Balance
 from solver.balance.simplifications import breaks_symmetry
 from solver.balance.workspace import PointSolution, Workspace
-from solver.continuation.branch import BranchStatus
+from solver.continuation.branch import BranchStatus, Points
 from solver.continuation.branches.sweep import walk
-from solver.continuation.extrema.node_table import Points
 from solver.continuation.marks import MarkKind
 from solver.continuation.segment import Stretch, joined
 from solver.continuation.settings import ContinuationSettings
@@ -160,10 +159,7 @@ class SolutionSearch:
             last, way = rows[-1], whole.tangents[-1]
             guess = last[:-1] + (self.omega - last[-1]) / way[-1] * way[:-1]
             self.keep(self.workspace.solve_from(self.omega, guess), "branch")
-        return Points(
-            solutions=rows, tangents=whole.tangents, measures=whole.measures, observed=whole.observed,
-            states=whole.states,
-        )  # fmt: skip
+        return whole
 
     def sign(self, u: Real) -> int:
         """Return the sign of the determinant of dr/du."""

@@ -19,7 +19,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from solver.arrays import Complex, Real
-from solver.errors import SettingError
+from solver.errors import check_count
 from solver.studies.patterns.linear_disk import DiskPeak, LinearDisk
 
 LARGEST = 0.9  # deviation of a factor
@@ -45,7 +45,7 @@ class Bounds:
     def inside(self, delta: Real) -> Real:
         """Return deviations within the bounds near some."""
         off = np.clip(delta - self.middle, -self.within, self.within)
-        size = math.sqrt(float(np.mean(off**2)))
+        size = root_mean_square(off)
         return self.middle + (off if self.rms is None or size <= self.rms else off * (self.rms / size))
 
     def hold(self, delta: Real) -> bool:
@@ -69,11 +69,7 @@ class Bounds:
         def fall(z: Real) -> tuple[float, Real]:
             nonlocal kept, highest
             off = self.within * z
-            share = (
-                1.0
-                if self.rms is None
-                else min(1.0, self.rms / max(math.sqrt(float(np.mean(off**2))), 1e-300))
-            )
+            share = 1.0 if self.rms is None else min(1.0, self.rms / max(root_mean_square(off), 1e-300))
             value, slope = rise(self.middle + share * off)
             if value > highest:
                 kept, highest = self.middle + share * off, value
@@ -116,10 +112,8 @@ class WorstSearch:
     seed: int = 1
 
     def __post_init__(self) -> None:
-        counts = (("starts", self.starts, 1), ("climbs", self.climbs, 0), ("climb", self.climb, 0))
-        for key, value, least in counts:
-            if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= MOST_STARTS:
-                raise SettingError(key, value, f"must be a whole number from {least} to {MOST_STARTS}")
+        for key, least in (("starts", 1), ("climbs", 0), ("climb", 0)):
+            check_count(key, getattr(self, key), least, MOST_STARTS)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -209,6 +203,11 @@ def _of_mode(inverse: Complex, gain: complex, wave: Complex, blade: int, more: f
     q = np.where(np.abs(wave) > 1e-6, wave, 1e-6)
     q[blade] *= 1.0 + more if abs(1.0 + more) > 1e-3 else 1e-3
     return np.asarray(-((inverse @ q) / (gain * q)).real)
+
+
+def root_mean_square(off: Real) -> float:
+    """Return √mean δ²."""
+    return math.sqrt(float(np.mean(off**2)))
 
 
 def alike(found: Sequence[WorstPattern]) -> int:

@@ -236,13 +236,7 @@ def _sector_by_sector(whole: Scene, m: int) -> Integer:
 
 
 def check_linear(scene: Scene, contacts: Contacts) -> int:
-    """Return the one harmonic that the forces of a linear limit have.
-
-    Raises
-    ------
-    SettingError
-        There are several, a base moves, or a contact that is to stick is rigid.
-    """
+    """Return the one harmonic of forces; SettingError of several, a moving base, rigid ones to stick."""
     if any(force.base is not None for force in scene.excitation):
         raise SettingError(
             "scene", scene.name, "must be shaken by forces, not by its base, for a linear limit"

@@ -33,11 +33,11 @@ from solver.response.stability.residual_forces import LeftForces
 from solver.response.wear_measures import lowest
 from solver.scene.scene import AnyContact, Scene
 from solver.sensitivity.gradient import Sensitivities
-from solver.studies.blades import blade_paths, mistuned
-from solver.studies.patterns.climbing import Bounds
+from solver.studies.patterns.climbing import Bounds, root_mean_square
+from solver.studies.patterns.linear_disk import TWO_PI
+from solver.studies.patterns.solved_disk import SolvedDisk
 from solver.studies.patterns.worst_result import ResidualPeak
 
-TWO_PI = 2.0 * math.pi
 FREQUENCIES = 12  # of the band, at which a climb may begin
 FURTHER = 2  # climbs beyond the best of each pattern
 KEPT = 1e-6  # share of a limit by which a force may exceed it
@@ -76,22 +76,11 @@ class _NoResponseError(Exception):
 class ResidualSearch:
     """A disk whose worst mistuning and worst residual forces are looked for.
 
-    Parameters
-    ----------
-    scene : cyclic, not mistuned.
-    of : what the factors multiply; parts with parameters.
-    dof : the observed DOF of a sector.
-    band : of the frequency [Hz].
-    harmonics : highest one kept.
-    go_on : asked before each response.
+    Its factors are of parts with parameters; `go_on` is asked before each response.
     """
 
-    def __init__(
-        self, scene: Scene, of: Sequence[str], dof: str, band: tuple[float, float], harmonics: int,
-        go_on: Callable[[], bool],
-    ) -> None:  # fmt: skip
-        (self._scene, self._rows), self._of, self._dof = blade_paths(scene, of), tuple(of), dof
-        self._band, self._harmonics, self._go_on = band, harmonics, go_on
+    def __init__(self, disk: SolvedDisk, go_on: Callable[[], bool]) -> None:
+        self._disk, self._rows, self._go_on = disk, disk.paths, go_on
         self._last: tuple[bytes, Scene] | None = None
 
     def worst(
@@ -107,7 +96,7 @@ class ResidualSearch:
         bounds : of δ.
         tuned : peak of the tuned disk [m].
         """
-        low, high = self._band
+        low, high = self._disk.band
         first, others = [], []
         for delta, own in begins:
             tried = [self._estimates(delta, float(at)) for at in (own, *np.linspace(low, high, FREQUENCIES))]
@@ -187,7 +176,7 @@ class ResidualSearch:
         self, blade: int, stuck: tuple[int, ...], begin: _Place, bounds: Bounds
     ) -> tuple[_Judged, _Place] | None:
         """Return the highest place on a climb at which every force is within its limit."""
-        N, (low, high) = begin.delta.size, self._band
+        N, (low, high) = begin.delta.size, self._disk.band
         annulus = self._annulus(begin.delta)
         limits = np.array([_limit(annulus, i) for i in stuck])
         unit = np.concatenate([np.full(N, bounds.within), limits, [high - low]])
@@ -202,7 +191,8 @@ class ResidualSearch:
                 place = _Place(y[:N], y[N:-1], float(np.clip(y[-1], low, high)))
                 here = self._judged(place, blade, stuck, guess[0])
                 guess[0], known[z.tobytes()] = here.u, here
-                within = bounds.rms is None or _size(y[:N] - bounds.middle) <= bounds.rms * (1.0 + KEPT)
+                most = math.inf if bounds.rms is None else bounds.rms * (1.0 + KEPT)
+                within = root_mean_square(y[:N] - bounds.middle) <= most
                 if within and np.all(here.rooms >= -KEPT * np.repeat(limits, 2)):
                     kept.append((here.value, here, place))
             return known[z.tobytes()]
@@ -239,10 +229,9 @@ class ResidualSearch:
     def _annulus(self, delta: Real, blade: int = 0) -> Scene:
         """Return the mistuned disk written out, one of its blades observed."""
         if self._last is None or self._last[0] != delta.tobytes():
-            values = (1.0 + delta).tolist()
-            self._last = delta.tobytes(), mistuned(self._scene, of=self._of, values=values)
+            self._last = delta.tobytes(), self._disk.annulus(delta)
         disk = self._last[1]
-        observe = disk.observe.model_copy(update={"dof": f"{self._dof}@{blade}", "measure": "max_abs"})
+        observe = disk.observe.model_copy(update={"dof": f"{self._disk.dof}@{blade}", "measure": "max_abs"})
         return disk.model_copy(update={"observe": observe})
 
     def _natural(self, place: _Place) -> tuple[tuple[int, ...], Real]:
@@ -261,7 +250,7 @@ class ResidualSearch:
         """Return a response of a disk with all harmonics, the mean among them."""
         if not self._go_on():
             raise _NoResponseError
-        balance: Balance = build(scene, harmonics=self._harmonics, effects=Effects(even_harmonics=True))
+        balance: Balance = build(scene, harmonics=self._disk.harmonics, effects=Effects(even_harmonics=True))
         workspace = Workspace.of(balance)
         omega = TWO_PI * hertz
         found = workspace.solve(omega) if guess is None else workspace.solve_from(omega, guess)
@@ -339,7 +328,3 @@ def _limit(scene: Scene, i: int) -> float:
     if slider is None or load is None:
         return 1.0
     return slider.mu * float(np.abs(load.coefficients).sum()) or 1.0
-
-
-def _size(off: Real) -> float:
-    return math.sqrt(float(np.mean(off**2)))

@@ -53,8 +53,8 @@ class SolvedDisk:
         self, scene: Scene, of: Sequence[str], dof: str, band: tuple[float, float], harmonics: int,
         should_stop: ShouldStop,
     ) -> None:  # fmt: skip
-        (self._scene, self._paths), self._of = blade_paths(scene, of), tuple(of)
-        self._dof, self._band, self._harmonics = dof, band, harmonics
+        (self.scene, self.paths), self._of = blade_paths(scene, of), tuple(of)
+        self.dof, self.band, self.harmonics = dof, band, harmonics
         self._should_stop = should_stop
         self._known: dict[bytes, DiskPeak] = {}
         self._last: tuple[bytes, BladePeaks] | None = None
@@ -64,38 +64,30 @@ class SolvedDisk:
     def linear_limits(self) -> tuple[Contacts, ...]:
         """The linear limits it has, to begin from the worst patterns of."""
         found = []
-        for contacts in (Contacts.STUCK, Contacts.OPEN) if self._scene.contacts else (Contacts.OPEN,):
+        for contacts in (Contacts.STUCK, Contacts.OPEN) if self.scene.contacts else (Contacts.OPEN,):
             with suppress(SettingError):
-                check_linear(self._scene, contacts)
+                check_linear(self.scene, contacts)
                 found.append(contacts)
         return tuple(found)
 
-    def peak(self, delta: Real) -> DiskPeak:
-        """Return the highest peak of any blade.
+    def annulus(self, delta: Real) -> Scene:
+        """Return the disk with the factors 1 + δ written out."""
+        return mistuned(self.scene, of=self._of, values=(1.0 + delta).tolist())
 
-        Raises
-        ------
-        UnknownPeakError
-            The response did not reach the end of the band.
-        """
+    def peak(self, delta: Real) -> DiskPeak:
+        """Return the highest peak of any blade; UnknownPeakError where the band is not covered."""
         key = delta.tobytes()
         if key not in self._known:
             self._peaks(delta)
         return self._known[key]
 
     def slopes(self, delta: Real) -> tuple[float, Real]:
-        """Return the logarithm of the highest peak and its derivatives by δ, (N,).
-
-        Raises
-        ------
-        UnknownPeakError
-            The response did not reach the end of the band.
-        """
+        """Return the logarithm of the highest peak and its derivatives by δ, (N,); errors as `peak`."""
         found = self._peaks(delta)
         branch = found.branches[0] if len(found.branches) == 1 else found.worst_branch
         if branch is None or branch.peak is None:
             raise UnknownPeakError
-        rows, here = self._paths, branch.balance.scene
+        rows, here = self.paths, branch.balance.scene
         gradient = peak_gradient(Sensitivities(branch.balance, [p for row in rows for p in row]), branch.peak)
         by_path = gradient.gradient.reshape(len(rows), -1)
         moved = np.array([[here.value(path) for path in row] for row in rows])
@@ -164,15 +156,14 @@ class SolvedDisk:
     @property
     def differentiable(self) -> bool:
         """Whether the factors are of parts with parameters: those of matrices have none."""
-        return bool(self._paths)
+        return bool(self.paths)
 
     def _peaks(self, delta: Real) -> BladePeaks:
         key = delta.tobytes()
         if self._last is None or self._last[0] != key:
-            scene = mistuned(self._scene, of=self._of, values=(1.0 + delta).tolist())
             self.responses += 1
             found = blade_peaks(
-                scene, *self._band, dof=self._dof, harmonics=self._harmonics, every_branch=False,
+                self.annulus(delta), *self.band, dof=self.dof, harmonics=self.harmonics, every_branch=False,
                 should_stop=self._should_stop,
             )  # fmt: skip
             if not math.isfinite(found.largest):

@@ -11,6 +11,7 @@ from solver.arrays import FloatOrNaN
 from solver.results.base import Drawn
 from solver.results.told import Piece
 from solver.results.views import Data, Views
+from solver.studies.mistuning_result import MistuningStatus
 
 
 class WorstMistuningStatus(Enum):
@@ -21,10 +22,7 @@ class WorstMistuningStatus(Enum):
         "The response of a pattern did not reach the end of the band, so the worst is that of the others: "
         "use more harmonics or another band."
     )
-    NO_RESPONSE = (
-        "The tuned disk has no peak to compare with, or its response did not reach the end of the band: use "
-        "another band or an excitation above 0."
-    )
+    NO_RESPONSE = MistuningStatus.NO_RESPONSE.value
     STOPPED = "The search was stopped by the caller: the worst is that of the patterns so far."
 
 

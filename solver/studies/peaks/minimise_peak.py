@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from solver.balance.simplifications import Effects
-from solver.errors import SettingError
+from solver.errors import SettingError, check_count
 from solver.first_use import renamed
 from solver.results.watch import shows_progress
 from solver.scene.scene import Scene
@@ -91,8 +91,7 @@ def least_peak(
         A bad path, range or number of harmonics or basins, or a first sweep outside the range.
     """
     begun = time.perf_counter()
-    if isinstance(basins, bool) or not isinstance(basins, int) or basins < 1:
-        raise SettingError("basins", basins, "must be a whole number >= 1")
+    check_count("basins", basins, 1)
     pace = replace(_PACE, above=WIDE) if thorough and basins > 1 else _PACE
     allowance = Allowance(should_stop, RESPONSES * (THOROUGHLY if thorough else 1.0))
     tracker = Tracker(scene, parameter, start, stop, harmonics, effects, pace, allowance)

@@ -111,13 +111,7 @@ class Looking(ABC):
         self.allowance.check(self.work)
 
     def look(self, z: float) -> Look:
-        """Sweep at z; one that takes far longer than those before is given up, and not complete.
-
-        Raises
-        ------
-        HaltedError
-            The caller wants it to end, or the work allowed is used up.
-        """
+        """Sweep at z; one that takes far longer than those before is given up. Raises as `check`."""
         self.check()
         scene = self._scene.with_values({self.balance.parameter.path: self.scale.outside(z)})
         branch = sweep_within(scene, self._harmonics, self._effects, self.allowance)

@@ -98,15 +98,10 @@ class _TooLongError(Exception):
 
 
 def sweep_within(scene: Scene, harmonics: int, effects: Effects | None, allowance: Allowance) -> Branch:
-    """Sweep over the band of a scene; one that takes far longer than those before is given up.
+    """Sweep over a band; HaltedError if the caller wants it to end. What takes far too long is given up.
 
     Of that one a beginning without peaks is returned, with all its Newton iterations: to look for peaks
     among its many points would cost several times what it has cost already.
-
-    Raises
-    ------
-    HaltedError
-        The caller wants it to end.
     """
     spent = 0
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from solver.balance.simplifications import Effects
 from solver.continuation.extrema.kernels.peak_continuation import DHEIGHT, HEIGHT, OMEGA, Z
-from solver.errors import SettingError
+from solver.errors import check_count
 from solver.jit.fourier import Real
 from solver.results.watch import shows_progress
 from solver.scene.scene import Scene
@@ -66,8 +66,7 @@ def track_peak(
         A bad path, range, number of harmonics or of checks.
     """
     begun = time.perf_counter()
-    if isinstance(checks, bool) or not isinstance(checks, int) or checks < 0:
-        raise SettingError("checks", checks, "must be a whole number >= 0")
+    check_count("checks", checks, 0)
     allowance = Allowance(should_stop, RESPONSES * (THOROUGHLY + checks / 20.0))
     tracker = Tracker(scene, parameter, start, stop, harmonics, effects, allowance=allowance)
     try:

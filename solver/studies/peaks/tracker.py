@@ -71,13 +71,7 @@ EXACTLY = 1e-6  # relative distance within which a peak is one that was solved a
 
 
 def check_laws(scene: Scene) -> None:
-    """Refuse contacts whose force has no exact second derivatives.
-
-    Raises
-    ------
-    SettingError
-        A contact with such a law.
-    """
+    """Refuse contacts whose force has no exact second derivatives, by a SettingError."""
     others = without_second(scene.contacts)
     if others:
         wanted = f"has contacts whose law has no second derivatives, so its peaks are not tracked: {others}"
@@ -216,17 +210,12 @@ class Tracker(Looking):
         return None if place is None else place[0]
 
     def solved(self, line: Line, z: float, *, fitting: bool = True) -> Place | None:
-        """Return row, solution and tangent of a line between two of its rows; None if it is not found.
+        """Return row, solution and tangent of a line between two rows, None if not found; raises as `check`.
 
         Parameters
         ----------
         fitting : whether it has to fit the rows beside it; otherwise about as high, or higher, will do,
             because a kink may lie between: what is found is attained in any case.
-
-        Raises
-        ------
-        HaltedError
-            The caller wants it to end, or the work allowed is used up.
         """
         if not self.allowance.ended:
             self.check()

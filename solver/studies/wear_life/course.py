@@ -115,13 +115,7 @@ class WearCourse:
         return len(self.wearing.places)
 
     def here(self, hours: float, state: Real, near: PeriodicMotion | None, *, rates: bool = False) -> Here:
-        """Return everything at a time and its state.
-
-        Raises
-        ------
-        LostError
-            No response was found.
-        """
+        """Return everything at a time and its state; LostError where no response is found."""
         return self._all(hours, state, near, rates=rates)[0]
 
     def _all(

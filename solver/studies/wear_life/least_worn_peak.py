@@ -19,7 +19,7 @@ import numpy as np
 
 from solver.arrays import FloatOrNaN, Real
 from solver.continuation.parameter_scale import scale_of
-from solver.errors import SettingError
+from solver.errors import SettingError, check_count
 from solver.results.base import Shown
 from solver.results.views import Data, Views
 from solver.results.watch import OnProgress, ShouldStop, shows_progress
@@ -108,8 +108,7 @@ def least_worn_peak(
     begun = time.perf_counter()
     low, high = _checked_factors(factors)
     since, longest = _checked_since(from_hours, mission.hours), replace(mission, hours=mission.hours * high)
-    if isinstance(looks, bool) or not isinstance(looks, int) or not FEWEST_LOOKS <= looks <= 1000:
-        raise SettingError("looks", looks, f"must be a whole number from {FEWEST_LOOKS} to 1000")
+    check_count("looks", looks, FEWEST_LOOKS, 1000)
     scale = scale_of(scene, parameter, start, stop)
 
     def look(z: float) -> _LifeLook:

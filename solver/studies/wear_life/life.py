@@ -13,7 +13,7 @@ from solver.arrays import Real
 from solver.balance.balance import check_harmonics
 from solver.balance.simplifications import Effects, even_harmonics_reason
 from solver.continuation.branches.sweep import sweep
-from solver.errors import SettingError
+from solver.errors import SettingError, check_count
 from solver.response.known import known_of_solution
 from solver.response.solve import solve
 from solver.results.known import NOTHING_KNOWN, Known
@@ -89,13 +89,7 @@ def course_of(
     scene: Scene, mission: Mission, wear: WearLaw, *, paths: Sequence[str] = (), tolerance: float = 1e-6,
     harmonics: int = 11, should_stop: ShouldStop = None,
 ) -> WearCourse:  # fmt: skip
-    """Return a life that was not followed yet, by the arguments of `wear_life`.
-
-    Raises
-    ------
-    SettingError
-        As `wear_life`.
-    """
+    """Return a life that was not followed yet, by the arguments of `wear_life`; errors as there."""
     # The points of a shape's faces wear each by itself: they become contacts of their own.
     whole = written_out(scene).model_copy(update={"dampers": ()})
     wearing = wearing_of(whole, wear)
@@ -122,8 +116,7 @@ def check_looks(limit: float | None, points: int) -> None:
     """Raise SettingError where a limit of the amplitude or a number of instants is out of its range."""
     if limit is not None and (not is_number(limit) or not 0.0 < limit < math.inf):
         raise SettingError("limit", limit, "must be an amplitude > 0 [m]")
-    if isinstance(points, bool) or not isinstance(points, int) or not 2 <= points <= MOST_POINTS:
-        raise SettingError("points", points, f"must be a whole number from 2 to {MOST_POINTS}")
+    check_count("points", points, 2, MOST_POINTS)
 
 
 def _check_path(scene: Scene, wearing: Wearing, path: object) -> None:

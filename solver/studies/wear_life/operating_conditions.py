@@ -93,13 +93,7 @@ class OperatingConditions:
         return build(scene, harmonics=self.harmonics, effects=self.effects)
 
     def swept(self, scene: Scene) -> Branch:
-        """Return the response over the band.
-
-        Raises
-        ------
-        LostError
-            It does not cover the band, or has no peak.
-        """
+        """Return the response over the band; LostError where it does not cover that, or has no peak."""
         branch = sweep(
             scene, harmonics=self.harmonics, settings=SETTINGS, should_stop=self.should_stop,
             effects=self.effects,
@@ -112,17 +106,12 @@ class OperatingConditions:
     def at(
         self, wearing: Wearing, depths: Real, near: PeriodicMotion | None, *, rates: bool = True
     ) -> WornResponse:
-        """Return what contacts do at depths (n,) [m].
+        """Return what contacts do at depths (n,) [m]; LostError where no response is found.
 
         Parameters
         ----------
         near : a peak of a neighbour; None for the highest of the band.
         rates : whether the power is differentiated too.
-
-        Raises
-        ------
-        LostError
-            No response was found.
         """
         scene = wearing.at(depths)
         if self.blocks is not None:
@@ -138,13 +127,7 @@ class OperatingConditions:
         return self._peak(self.balance(wearing.at(depths)), wearing, near)
 
     def at_frequency(self, scene: Scene, hertz: float) -> tuple[Balance, PeriodicMotion]:
-        """Return the balance and the motion of a worn scene at a frequency [Hz].
-
-        Raises
-        ------
-        LostError
-            No response was found.
-        """
+        """Return balance and motion of a worn scene at a frequency [Hz]; LostError without a response."""
         balance = self.balance(scene.at_frequency(hertz))
         space, before = Workspace.of(balance), self._known.get(hertz)
         found = None if before is None else space.solve_from(TWO_PI * hertz, before.u)

@@ -98,13 +98,7 @@ class Wearing:
         return contact.value_of(loss.key) - loss.per_depth * float(depths[loss.contact])
 
     def at(self, depths: Real) -> Scene:
-        """Return the scene with its contacts worn by `depths` (n,) [m]; nothing falls below its least.
-
-        Raises
-        ------
-        SettingError
-            A number that the law does not take.
-        """
+        """Return the scene worn by `depths` (n,) [m], nothing below its least; or SettingError of a law."""
         contacts = list(self.scene.contacts)
         for loss in self.losses:
             place, value = self.places[loss.contact], max(self.number(loss, depths), loss.least)

@@ -39,13 +39,7 @@ class WornMargin:
 
 
 def worn_margin(course: WearCourse, rows: Sequence[Here]) -> WornMargin:
-    """Return what of the stresses allowed is used at some instants of a life that was followed.
-
-    Raises
-    ------
-    LostError
-        A response of the worn scene does not cover the band.
-    """
+    """Return what of the stresses allowed is used at instants of a life; errors as `swept`."""
     used = np.array([_used(course, row.depths)[0] for row in rows])
     nothing = np.full(len(course.paths), math.nan)
     over = next((i for i, one in enumerate(used) if one >= 1.0), None)

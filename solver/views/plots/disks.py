@@ -25,10 +25,7 @@ _NAMED = 40  # orders that still have room for their numbers
 def interference_figure(answer: Json, *, ax: Into = None) -> Figure:
     """Frequencies with all contacts open and stuck at each nodal diameter, and the orders at the speed.
 
-    Parameters
-    ----------
-    answer : the JSON of `solver.InterferenceDiagram`, with at least one nodal diameter.
-    ax : axes to draw into, as `solver.views.plots.style.figure`.
+    Of the JSON of `solver.InterferenceDiagram`, with at least one nodal diameter.
     """
     half = answer["sectors"] // 2
     top = _HEADROOM * _highest(answer)
@@ -122,10 +119,7 @@ def _draw_orders(axes: Axes, answer: Json, top: float) -> None:
 def mistuning_figure(answer: Mapping[str, Any], *, ax: Into = None) -> Figure:
     """The share of disks below every magnification; beside it the peaks of the blades of the worst disk.
 
-    Parameters
-    ----------
-    answer : the JSON of `solver.MistuningStudy`, with at least one disk whose peaks are known.
-    ax : axes to draw into, as `solver.views.plots.style.figure`.
+    Of the JSON of `solver.MistuningStudy`, with at least one disk whose peaks are known.
     """
     factors = np.sort([s["magnification"] for s in answer["samples"] if s["magnification"] is not None])
     worst, tuned = answer["worst"], answer["tuned"]["peak"]
@@ -156,10 +150,7 @@ def mistuning_figure(answer: Mapping[str, Any], *, ax: Into = None) -> Figure:
 def worst_mistuning_figure(answer: Json, *, ax: Into = None) -> Figure:
     """The factors of the worst pattern, and the magnifications beside the bounds.
 
-    Parameters
-    ----------
-    answer : the JSON of `solver.WorstMistuning`, with a worst pattern.
-    ax : axes to draw into, as `solver.views.plots.style.figure`.
+    Of the JSON of `solver.WorstMistuning`, with a worst pattern.
     """
     worst = answer["worst"]
     percent = 100.0 * (np.array(worst["factors"]) - 1.0)
@@ -203,7 +194,6 @@ def blades_figure(heights: Real, what: str, *, ax: Into = None) -> Figure:
     ----------
     heights : (sectors,) array [m]; NaN where it is not known.
     what : the heights in words.
-    ax : axes to draw into, as `solver.views.plots.style.figure`.
     """
     known = heights[np.isfinite(heights)]
     unit = units.length_unit(float(known.max(initial=0.0)))

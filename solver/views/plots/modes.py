@@ -19,10 +19,7 @@ _STUCK = ("stuck", "separated", "closed")
 def mode_figure(answer: Mapping[str, Any], *, ax: Into = None) -> Figure:
     """Frequency beside damping ratio; the part in which every contact sticks or is open is thin.
 
-    Parameters
-    ----------
-    answer : the JSON of `solver.NonlinearMode`, with at least one point.
-    ax : axes to draw into, as `solver.views.plots.style.figure`.
+    Of the JSON of `solver.NonlinearMode`, with at least one point.
     """
     amplitude = np.array(answer["amplitude"])
     linear = np.array([all(one in _STUCK for one in row) for row in answer["states"]], dtype=bool)
@@ -51,7 +48,6 @@ def performance_figure(answer: Mapping[str, Any], *, dof: str = "x", ax: Into = 
     ----------
     answer : the JSON of `solver.PerformanceCurve`.
     dof : name of the observed DOF.
-    ax : axes to draw into, as `solver.views.plots.style.figure`.
     """
     over = "load" if answer["scales"] else "excitation"
     places = np.array(answer[over], dtype=np.float64)
@@ -68,10 +64,7 @@ def performance_figure(answer: Mapping[str, Any], *, dof: str = "x", ax: Into = 
 def held_figure(answer: Mapping[str, Any], *, ax: Into = None) -> Figure:
     """The factor on the excitation beside the phase, where one amplitude is held; what is unstable dashed.
 
-    Parameters
-    ----------
-    answer : the JSON of `solver.HeldAmplitude`, with at least one point.
-    ax : axes to draw into, as `solver.views.plots.style.figure`.
+    Of the JSON of `solver.HeldAmplitude`, with at least one point.
     """
     frequency = np.array(answer["frequency"])
     growing = np.array([one is False for one in answer["stable"]], dtype=bool)
@@ -98,10 +91,7 @@ def held_figure(answer: Mapping[str, Any], *, ax: Into = None) -> Figure:
 def resonance_figure(answer: Mapping[str, Any], *, ax: Into = None) -> Figure:
     """The frequency of phase resonance beside the factor on the excitation it takes.
 
-    Parameters
-    ----------
-    answer : the JSON of `solver.PhaseResonance`, with at least one point.
-    ax : axes to draw into, as `solver.views.plots.style.figure`.
+    Of the JSON of `solver.PhaseResonance`, with at least one point.
     """
     amplitude = np.array(answer["amplitude"])
     with style.styled():

@@ -91,7 +91,6 @@ def motion_figure(motion: Motion, *, ax: Into = None) -> Figure:
     Parameters
     ----------
     motion : what is drawn.
-    ax : axes to draw into, as `solver.views.plots.style.figure`.
     """
     loops = motion.loops[:MOST_LOOPS]
     bars = motion.harmonics is not None
@@ -128,7 +127,6 @@ def harmonics_figure(heights: FloatArray, title: str, *, dof: str = "x", ax: Int
     heights : (H + 1,) |mean| and the amplitudes [m].
     title : what it is of.
     dof : the observed DOF.
-    ax : axes to draw into, as `solver.views.plots.style.figure`.
     """
     with style.styled():
         page, (axes,) = style.figure(5.0, 3.2, into=ax)
@@ -165,7 +163,6 @@ def multipliers_figure(found: Stability, *, ax: Into = None) -> Figure:
     Parameters
     ----------
     found : of one response.
-    ax : axes to draw into, as `solver.views.plots.style.figure`.
     """
     around = np.linspace(0.0, 2.0 * np.pi, 361)
     outside = np.abs(found.multipliers) > 1.0

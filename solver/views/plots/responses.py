@@ -61,7 +61,6 @@ def response_figure(
     response : the curve.
     asked : limits drawn as lines, forbidden ranges shaded from the limit upwards.
     title : the scene's name if left out.
-    ax : axes to draw into, as `solver.views.plots.style.figure`.
     """
     asked = asked or Demands()
     unit = units.length_unit(float(response.amplitude.max()))

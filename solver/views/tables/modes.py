@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 from solver.results import units
@@ -10,51 +10,32 @@ from solver.results.told import Block, ResultTable, Summary
 
 _MOST_ROWS = 40
 _LEVEL = 1e-9  # relative difference of damping ratios that is none
+_Column = tuple[str, str, Callable[[Any], str]]  # its head, key, and how a value is told
+_AMPLITUDE: _Column = "a [√kg m]", "amplitude", "{:.4g}".format
+_FREQUENCY: _Column = "frequency [Hz]", "frequency", "{:.6g}".format
+_FACTOR: _Column = "× excitation", "excitation", "{:.4g}".format
 
 
 def held(found: Mapping[str, Any]) -> Iterator[Block]:
     """Frequency, force, phase and states of the contacts where one amplitude is held."""
     size = units.length(found["amplitude"])
     title = f"{found['scene']}, |{found['dof']}| held at {size}, {found['n_harmonics']} harmonics"
-    count = len(found["frequency"])
-    if count:
-        rows = [
-            [
-                f"{found['frequency'][i]:.6g}", f"{found['excitation'][i]:.4g}", f"{found['phase'][i]:.1f}",
-                units.length(found["max_abs"][i]), {None: "?", True: "yes", False: "no"}[found["stable"][i]],
-                _states(found, i),
-            ]
-            for i in _thinned(count)
-        ]  # fmt: skip
-        heads = [
-            "frequency [Hz]", "× excitation", "phase [deg]", f"max |{found['dof']}|", "stable", "contacts",
-        ]  # fmt: skip
-        yield ResultTable(title, heads, rows)
-    pairs = [("points", str(count)), ("time", units.duration(found["seconds"]))]
+    pairs = [("points", str(len(found["frequency"]))), ("time", units.duration(found["seconds"]))]
     if found["least"] is not None:
         best = found["least"]
         pairs.insert(0, ("least force", f"{best['excitation']:.5g} times, at {best['frequency']:.6g} Hz"))
     if found["stability_unknown"]:
         pairs.append(("stability", found["stability_unknown"]))
-    yield Summary("" if count else title, pairs)
+    phase = "phase [deg]", "phase", "{:.1f}".format
+    stable = "stable", "stable", {None: "?", True: "yes", False: "no"}.__getitem__
+    yield from _curve(found, title, pairs, [_FREQUENCY, _FACTOR, phase, _height(found), stable])
 
 
 def resonance(found: Mapping[str, Any]) -> Iterator[Block]:
     """Amplitude, frequency, force and states of the contacts in phase resonance."""
+    pairs = [("points", str(len(found["frequency"]))), ("time", units.duration(found["seconds"]))]
     title = f"{found['scene']}, phase resonance of mode {found['mode']}"
-    count = len(found["amplitude"])
-    if count:
-        rows = [
-            [
-                f"{found['amplitude'][i]:.4g}", units.length(found["max_abs"][i]),
-                f"{found['frequency'][i]:.6g}", f"{found['excitation'][i]:.4g}", _states(found, i),
-            ]
-            for i in _thinned(count)
-        ]  # fmt: skip
-        heads = ["a [√kg m]", f"max |{found['dof']}|", "frequency [Hz]", "× excitation", "contacts"]
-        yield ResultTable(title, heads, rows)
-    pairs = [("points", str(count)), ("time", units.duration(found["seconds"]))]
-    yield Summary("" if count else title, pairs)
+    yield from _curve(found, title, pairs, [_AMPLITUDE, _height(found), _FREQUENCY, _FACTOR])
 
 
 def mode(found: Mapping[str, Any]) -> Iterator[Block]:
@@ -65,13 +46,6 @@ def mode(found: Mapping[str, Any]) -> Iterator[Block]:
     of = "" if found["nodal_diameter"] is None else f", nodal diameter {found['nodal_diameter']}"
     title = f"{found['scene']}, mode {found['mode']}{of}, {found['n_harmonics']} harmonics"
     count = len(found["amplitude"])
-    if count:
-        rows = [_row(found, i) for i in _thinned(count)]
-        heads = [
-            "a [√kg m]", f"max |{found['dof']}|", "frequency [Hz]", "damping ratio", "± by harmonics",
-            "contacts",
-        ]  # fmt: skip
-        yield ResultTable(title, heads, rows)
     pairs = [("points", f"{count}, {found['newton_iterations']} Newton iterations")]
     if count:
         # Where damping is level, rounding would choose among its places.
@@ -80,11 +54,29 @@ def mode(found: Mapping[str, Any]) -> Iterator[Block]:
         at = f"a = {found['amplitude'][best]:.4g} √kg m, {found['frequency'][best]:.6g} Hz"
         pairs.insert(0, ("most damping", f"{ratios[best]:.5g} at {at}"))
     pairs.append(("time", units.duration(found["seconds"])))
-    yield Summary("" if count else title, pairs)
+    damping = ("damping ratio", "damping_ratio", "{:.5g}".format), ("± by harmonics", "damping_error", _error)
+    yield from _curve(found, title, pairs, [_AMPLITUDE, _height(found), _FREQUENCY, *damping])
     if found.get("performance"):
         yield from _performance(found["performance"], found["dof"])
     if found.get("limit_cycles"):
         yield _cycles(found["limit_cycles"], found["dof"])
+
+
+def _height(found: Mapping[str, Any]) -> _Column:
+    return f"max |{found['dof']}|", "max_abs", units.length
+
+
+def _curve(
+    found: Mapping[str, Any], title: str, pairs: list[tuple[str, str]], columns: Sequence[_Column]
+) -> Iterator[Block]:
+    """A point a row, thinned to a page, with the states of the contacts, and what is said of all."""
+    rows = [
+        [*(told(found[key][i]) for _, key, told in columns), _states(found, i)]
+        for i in _thinned(len(found["frequency"]))
+    ]
+    if rows:
+        yield ResultTable(title, [*(head for head, _, _ in columns), "contacts"], rows)
+    yield Summary("" if rows else title, pairs)
 
 
 def _performance(curve: Mapping[str, Any], dof: str) -> Iterator[Block]:
@@ -150,17 +142,6 @@ def _states(found: Mapping[str, Any], i: int) -> str:
         return "none"
     same = len(set(states)) == 1
     return states[0] if same else ", ".join(f"{n}: {s}" for n, s in zip(names, states, strict=True))
-
-
-def _row(found: Mapping[str, Any], i: int) -> list[str]:
-    return [
-        f"{found['amplitude'][i]:.4g}",
-        units.length(found["max_abs"][i]),
-        f"{found['frequency'][i]:.6g}",
-        f"{found['damping_ratio'][i]:.5g}",
-        _error(found["damping_error"][i]),
-        _states(found, i),
-    ]
 
 
 def _thinned(count: int) -> list[int]:

@@ -127,7 +127,7 @@ def _all_solutions(found: Json) -> Iterator[Block]:
 
 def branch(found: Json) -> Iterator[Block]:
     """A branch: its peaks and its band."""
-    path, values = found["parameter_path"], found["parameter"]
+    path = found["parameter_path"]
     pairs = _peaks(found, path)
     if found["error_estimate"] is not None:
         pairs.append(("estimated error", f"{units.length(found['error_estimate'])} of the highest"))
@@ -144,10 +144,14 @@ def branch(found: Json) -> Iterator[Block]:
     pairs += _marks(found, path)
     pairs.append(("points", f"{found['points']} ({effort}, {found['folds']} folds)"))
     pairs.append(("time", units.duration(found["seconds"])))
-    title = f"{found['scene']}, {path}"
-    if values:
-        title += f" from {parameter(path, values[0])} to {parameter(path, values[-1])}"
-    yield Summary(f"{title}, {found['n_harmonics']} harmonics", pairs)
+    yield Summary(title_over(found), pairs)
+
+
+def title_over(found: Json) -> str:
+    """Scene, parameter with its ends, and harmonics of what goes over a parameter."""
+    path, values = found["parameter_path"], found["parameter"]
+    ends = f" from {parameter(path, values[0])} to {parameter(path, values[-1])}" if values else ""
+    return f"{found['scene']}, {path}{ends}, {found['n_harmonics']} harmonics"
 
 
 def _marks(found: Json, path: str) -> Pairs:

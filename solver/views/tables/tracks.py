@@ -9,7 +9,7 @@ from solver.results import units
 from solver.results.known import known_pairs
 from solver.results.told import Block, ResultTable, Summary
 from solver.scene.parameter_paths import parameter
-from solver.views.tables.responses import proved
+from solver.views.tables.responses import proved, title_over
 
 Json = Mapping[str, Any]
 Pairs = list[tuple[str, str]]
@@ -21,7 +21,7 @@ def track(found: Json) -> Iterator[Block]:
     pairs = [*_ridge(found), *_plateau(found), *_sure(found), *proved(found.get("certificates") or ())]
     pairs.append(("points", f"{len(found['parameter'])}, {found['sweeps']} sweeps"))
     pairs.append(("time", units.duration(found["seconds"])))
-    yield Summary(_title(found), pairs)
+    yield Summary(title_over(found), pairs)
 
 
 def response_map(found: Json) -> Iterator[Block]:
@@ -45,7 +45,7 @@ def response_map(found: Json) -> Iterator[Block]:
         pairs.append(("note", ON_THE_GRID))
     pairs += _sure(found if "measure" in found else found["ridge"] or {})
     pairs.append(("time", units.duration(found["seconds"])))
-    yield Summary(_title(found), pairs)
+    yield Summary(title_over(found), pairs)
 
 
 def margin(found: Json) -> Iterator[Block]:
@@ -79,14 +79,6 @@ def _ends(one: Json, unit: str) -> str:
     if one["allowed"] is not None:
         return f"{one['allowed']:.6g} {unit}"
     return {"below": "less than the range", "above": "more than the range"}.get(one["end"], "not known")
-
-
-def _title(found: Json) -> str:
-    path, values = found["parameter_path"], found["parameter"]
-    title = f"{found['scene']}, {path}"
-    if values:
-        title += f" from {parameter(path, values[0])} to {parameter(path, values[-1])}"
-    return f"{title}, {found['n_harmonics']} harmonics"
 
 
 def _ridge(found: Json) -> Pairs:

@@ -9,7 +9,9 @@ import pytest
 import optim
 import solver
 from solver.balance.balance import build
+from solver.balance.more_harmonics import more_harmonics
 from solver.balance.workspace import Workspace
+from solver.contacts.kernels.columns import N0
 from solver.errors import SceneError, SettingError
 from solver.scene.scene import Scene
 from solver.sensitivity.gradient import Sensitivities
@@ -60,6 +62,17 @@ def test_a_sweep_along_the_line_is_solved_at_each_speed() -> None:
     marched = solver.march(Scene.from_dict(raw), frequency_hz=70.0)
     found = solver.solve(Scene.from_dict(raw), frequency_hz=70.0, harmonics=41)
     assert found.half_peak_to_peak == pytest.approx(marched.half_peak_to_peak, rel=1e-5)
+
+
+def test_the_error_along_the_line_is_what_more_harmonics_change() -> None:
+    scene = Scene.from_dict(rotor())
+    few, many = (solver.sweep(scene, harmonics=count) for count in (5, 21))
+    assert few.peak is not None
+    assert many.peak is not None
+    assert abs(many.peak.value - few.peak.value) <= few.error_estimate <= 1e-3 * few.peak.value
+    assert solver.sweep(scene, accuracy=1e-4).reached
+    wide, built = more_harmonics(build(scene, harmonics=5), 11).system, build(scene, harmonics=11).system
+    assert wide.contacts[:, N0].tolist() == built.contacts[:, N0].tolist() == [0.2]
 
 
 def test_gradients_along_the_line_are_differences() -> None:

@@ -15,13 +15,15 @@ from solver.response.stability.residual_forces import LeftForces
 from solver.studies.instant import start_of
 from solver.studies.patterns.climbing import Bounds
 from solver.studies.patterns.residual import ResidualSearch, _Place
+from solver.studies.patterns.solved_disk import SolvedDisk
 
 TIGHT = {"shroud.N0": 300.0, "platform.N0": 200.0}
 BAND = (1.0, 6.0)
 
 
 def search(scene: Scene, harmonics: int = 3) -> ResidualSearch:
-    return ResidualSearch(scene, ("root", "blade_mass"), "blade", BAND, harmonics, lambda: True)
+    disk = SolvedDisk(scene, ("root", "blade_mass"), "blade", BAND, harmonics, None)
+    return ResidualSearch(disk, lambda: True)
 
 
 @pytest.mark.parametrize("law", ["coulomb", "elastic-normal"])

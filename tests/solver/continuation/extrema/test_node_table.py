@@ -5,7 +5,8 @@ import pytest
 
 import solver
 from solver.balance.workspace import Workspace
-from solver.continuation.extrema.node_table import NodeTable, Points
+from solver.continuation.branch import Points
+from solver.continuation.extrema.node_table import NodeTable
 from solver.continuation.extrema.nodes import NodeSolver
 
 
@@ -30,10 +31,8 @@ def test_a_look_after_nodes_came_between_is_that_of_a_solver_that_never_looked(n
     scene = solver.load_scene(name)
     start, stop = scene.observe.band
     branch = solver.sweep(scene, start=start, stop=stop, harmonics=3)
-    points = Points(
-        solutions=branch.solutions, tangents=branch.tangents, measures=branch.measures,
-        observed=np.zeros((len(branch.values), branch.balance.n_coefficients)), states=branch.states,
-    )  # fmt: skip
+    nothing = np.zeros((len(branch.values), branch.balance.n_coefficients))
+    points = Points.of(branch, observed=nothing)
     top = float(branch.peak.value)
     looked = NodeSolver(Workspace.of(branch.balance))
     nodes = looked.nodes_of(points)
