@@ -70,6 +70,10 @@ BODIES: dict[str, dict[str, Any]] = {
     "margin": {"scene": "two-dof", "from": 20, "to": 120, "points": 3, "limit": 2.0, "harmonics": 3},
     "sensitivities": {"scene": "two-dof", "harmonics": 3},
     "plan": {"scene": "two-dof"},
+    "posterior": {
+        "scene": "two-dof", "unknowns": {"damper.N0": [20, 500]}, "harmonics": 3, "starts": 1, "draws": 100,
+        "data": [{"frequency": [0.9, 1.0, 1.1], "amplitude": [0.85, 1.95, 2.1], "sd": [0.02, 0.02, 0.02]}],
+    },
     "identify": {
         "scene": "two-dof", "unknowns": {"damper.N0": [20, 500]}, "harmonics": 3, "starts": 1,
         "data": [{"frequency": [0.9, 1.0, 1.1], "amplitude": [0.85, 1.95, 2.1]}],

@@ -21,6 +21,7 @@ from service.jobs.studies.modes import Modes
 from service.jobs.studies.pareto import Pareto
 from service.jobs.studies.peaks import Peaks
 from service.jobs.studies.plan import Plan
+from service.jobs.studies.posterior import PosteriorStudy
 from service.jobs.studies.quasi_periodic import QuasiPeriodicStudy
 from service.jobs.studies.sensitivities import Sensitivities
 from service.jobs.studies.solve import Solve
@@ -58,6 +59,7 @@ SHIPPED = Registry(
         Mistuning.as_kind(),
         WorstMistuningStudy.as_kind(),
         Identify.as_kind(),
+        PosteriorStudy.as_kind(),
         Modes.as_kind(),
         Controlled.as_kind(),
         Sensitivities.as_kind(),
