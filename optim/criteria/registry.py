@@ -20,6 +20,7 @@ SHIPPED = (
     "optim.criteria.friction_work",
     "optim.criteria.wear_rate",
     "optim.criteria.damping",
+    "optim.criteria.quality",
     "optim.criteria.mass",
     "optim.criteria.separation",
 )

@@ -12,11 +12,13 @@ from optim.criteria.damping import DAMPING
 from optim.criteria.evaluation import evaluate
 from optim.criteria.friction_work import FRICTION_WORK
 from optim.criteria.mass import MASS
+from optim.criteria.quality import QUALITY
 from optim.criteria.running_speeds import RUNNING
 from optim.criteria.wear_rate import WEAR_RATE
 from optim.errors import DesignError
 from optim.problem.issues import problem_issues
 from optim.problem.problem import pose
+from solver.modes.at_amplitudes import mode_at_amplitudes
 from solver.scene.scene import Scene
 
 HARMONICS = 5
@@ -25,6 +27,7 @@ DESIGN = {"damper.N0": 105.0, "damper.kt": 30.0}
 RUNNING_KEYS = {"running_rpm": [[66.0, 78.0]], "weights": {"running": 1.0}}
 WEAR_KEYS = {"max_wear_rate": 1e-9, "wear_coefficient": 1e-12}
 DAMPING_KEYS = {"min_damping": {"ratio": 0.02, "amplitude": 3.0}}
+QUALITY_KEYS = {"quality_factor": {"amplitude": 3.0}, "weights": {"quality": 1.0}}
 
 
 def two_dof(**values: float) -> Scene:
@@ -43,8 +46,9 @@ def row_of(quantity: Criterion, keys: dict[str, Any], design: dict[str, float] =
         (RUNNING, {"running_rpm": [50.0], "max_running_amplitude": 1.0}),
         (WEAR_RATE, WEAR_KEYS),
         (DAMPING, DAMPING_KEYS),
+        (QUALITY, QUALITY_KEYS),
     ],
-    ids=["range", "speed", "wear", "damping"],
+    ids=["range", "speed", "wear", "damping", "quality"],
 )
 def test_gradients_are_differences(quantity: Criterion, keys: dict[str, Any]) -> None:
     row = row_of(quantity, keys)
@@ -54,9 +58,17 @@ def test_gradients_are_differences(quantity: Criterion, keys: dict[str, Any]) ->
         assert row.gradient[i] == pytest.approx((above.value - below.value) / (2.0 * step), rel=1e-5)
 
 
-@pytest.mark.parametrize("keys", [WEAR_KEYS, {"max_friction_work": 1.0}], ids=["wear", "work"])
-def test_second_derivatives_of_wear_are_differences_of_gradients(keys: dict[str, Any]) -> None:
-    quantity = WEAR_RATE if "wear_coefficient" in keys else FRICTION_WORK
+@pytest.mark.parametrize(
+    ("quantity", "keys"),
+    [
+        (WEAR_RATE, WEAR_KEYS),
+        (FRICTION_WORK, {"max_friction_work": 1.0}),
+        (DAMPING, DAMPING_KEYS),
+        (QUALITY, QUALITY_KEYS),
+    ],
+    ids=["wear", "work", "damping", "quality"],
+)
+def test_second_derivatives_are_differences_of_gradients(quantity: Criterion, keys: dict[str, Any]) -> None:
     twice = row_of(quantity, keys).second()
     for i, (path, value) in enumerate(DESIGN.items()):
         step = 1e-4 * value
@@ -132,6 +144,19 @@ def test_the_damping_is_that_of_the_mode() -> None:
     assert row.bound == -0.02
 
 
+def test_the_best_damped_design_is_that_of_a_grid() -> None:
+    """Of free decays the mode's damping is largest there, whatever the peak of the response is."""
+    bounds = {"damper.N0": (20.0, 400.0)}
+    found = optim.design(two_dof(), variables=bounds, harmonics=3, **QUALITY_KEYS)
+    ratios = [
+        mode_at_amplitudes(two_dof(N0=load), np.array([3.0]), (), harmonics=3).damping_ratio[0]
+        for load in np.geomspace(20.0, 400.0, 60)
+    ]
+    assert found.reached, found.status
+    assert found.evaluation is not None
+    assert 0.999 * 0.5 / max(ratios) <= found.evaluation.objective <= 0.5 / max(ratios) * (1.0 + 1e-9)
+
+
 def test_the_mass_is_that_of_the_bodies() -> None:
     scene = solver.load_scene("platform-wedge")
     names = [body.name for body in scene.bodies]
@@ -165,6 +190,9 @@ def test_the_mass_is_that_of_the_bodies() -> None:
         ({"min_damping": {"ratio": 0.1}}, "/min_damping", "must be a table with `ratio`, `amplitude`"),
         ({"min_damping": {"ratio": 0.1, "amplitude": 1.0, "mode": 9}}, "/min_damping/mode", "mode"),
         ({"min_damping": {"ratio": 0.1, "amplitude": -1.0}}, "/min_damping/amplitude", "> 0"),
+        ({"weights": {"quality": 1.0}}, "/weights/quality", "needs `quality_factor`"),
+        ({"quality_factor": {"most": 9.0}}, "/quality_factor", "must be a table with `amplitude`"),
+        ({"quality_factor": {"amplitude": 1.0, "ratio": 1.0}}, "/quality_factor/ratio", "is not known"),
         ({"max_mass": 1.0}, "/max_mass", "needs `bodies`"),
         ({"weights": {"mass": 1.0}}, "/weights/mass", "needs `bodies`"),
     ],

@@ -51,6 +51,7 @@ EVERY_KEY: dict[str, Any] = {
     "max_wear_rate": 1e-12,
     "wear_coefficient": {"shroud": 1e-13, "root": 1e-13},
     "min_damping": {"ratio": 0.001, "amplitude": 1e-6},
+    "quality_factor": {"most": 500, "amplitude": 1e-6},
     "forbidden_hz": [[520, 560], [880, 890]],
     "speeds_rpm": [[36000, 37000]],
     "max_friction_work": {"shroud": 0.02},
