@@ -50,6 +50,13 @@ EVERY_KEY: dict[str, Any] = {
     "max_running_amplitude": 1e-4,
     "max_wear_rate": 1e-12,
     "wear_coefficient": {"shroud": 1e-13, "root": 1e-13},
+    "worn": {
+        "hours": 20,
+        "coefficient": {"shroud": 1e-14},
+        "area": {"shroud": 1e-4},
+        "most": 1e-3,
+        "load_loss_per_depth": {"shroud": 1e6},
+    },
     "min_damping": {"ratio": 0.001, "amplitude": 1e-6},
     "quality_factor": {"most": 500, "amplitude": 1e-6},
     "forbidden_hz": [[520, 560], [880, 890]],
