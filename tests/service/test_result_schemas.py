@@ -103,6 +103,19 @@ BODIES: dict[str, tuple[str, Mapping[str, Any]]] = {
             "turns": 24,
         },
     ),
+    "a curve over two frequencies": (
+        "quasi-periodic",
+        {
+            "scene": "two-dof",
+            "frequency_hz": 1.04,
+            "to_hz": 1.06,
+            "points": 2,
+            "second_hz": 1.3821,
+            "amplitude": 60,
+            "harmonics": 3,
+            "turns": 24,
+        },
+    ),
     "transient": ("transient", {"scene": "two-dof", "begin_hz": 0.9, "end_hz": 1.2, "ramp_seconds": 20.0}),
     "a march that does not settle": ("march", {**MARCH, "max_periods": 1}),
 }

@@ -24,13 +24,15 @@ OF_THE_COMMAND = {"--set", "--plot", "--out", "--json", "--report", "--uncertain
 BESIDES = {
     "solve": ("solver:solve_all",), "design": ("optim:robust_design",), "sensitivities": (),
     "modes": ("solver:limit_cycles",), "wear": ("solver:least_worn_peak",),
+    "quasi-periodic": ("solver:quasi_periodic_curve",),
     "posterior": ("optim:compare_models", "optim:reassemblies"),
 }  # fmt: skip
 # Keys that Python takes otherwise: as one of three words, as a pair, or by a function of its own.
 OTHERWISE: Mapping[str, set[str]] = {
     "controlled": {"no_stability"}, "march": {"history"}, "solve": {"every", "certify"},
     "peaks": {"certify"}, "design": {"certify", "options"}, "sweep": {"multipliers", "switched"},
-    "posterior": {"varied", "assemblies", "models"}, "wear": {"parameter", "start", "stop", "factors"},
+    "quasi-periodic": {"to_hz"}, "posterior": {"varied", "assemblies", "models"},
+    "wear": {"parameter", "start", "stop", "factors"},
     "modes": {
         "start", "stop", "performance", "aero_damping", "motions", "exact_peaks", "disturbance",
         "phase_resonance",
