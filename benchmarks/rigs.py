@@ -75,7 +75,11 @@ def population(number: int) -> list[Held]:
     z[:, at] = np.clip(middle[at] + spread * rng.normal(size=ASSEMBLIES), 0.01, 0.99)
     data = [measured(scene.with_values(unknowns.by_path(one)), rng) for one in z]
     found = optim.reassemblies(
-        scene, data, BOUNDS, [VARIED], harmonics=HARMONICS, starts=1, draws=DRAWS, seed=number
+        scene,
+        data,
+        BOUNDS,
+        [VARIED],
+        sampling=optim.Sampling(harmonics=HARMONICS, starts=1, draws=DRAWS, seed=number),
     )
     held = []
     for truth, one in zip(z, found.assemblies, strict=True):

@@ -17,6 +17,7 @@ from .identification.posterior.result import (
     Posterior as Posterior,
     PosteriorStatus as PosteriorStatus,
 )
+from .identification.posterior.sampling import Sampling as Sampling
 from .identification.result import Identification as Identification, IdentifyStatus as IdentifyStatus
 from .problem.typed import Case as Case, Limit as Limit
 from .results.design import DesignResult as DesignResult, DesignStatus as DesignStatus

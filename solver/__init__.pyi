@@ -52,6 +52,11 @@ from .modes.results import (
 )
 from .response.power_balance import PowerBalance as PowerBalance, power_balance as power_balance
 from .response.quasi_periodic import quasi_periodic as quasi_periodic
+from .response.quasi_periodic_curve import (
+    QuasiPeriodicCurve as QuasiPeriodicCurve,
+    TorusCurveStatus as TorusCurveStatus,
+    quasi_periodic_curve as quasi_periodic_curve,
+)
 from .response.solution import Solution as Solution, SolutionStatus as SolutionStatus
 from .response.solve import solve as solve
 from .response.stability.all_solutions import (

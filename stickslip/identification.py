@@ -11,6 +11,7 @@ from optim import (
     Posterior as Posterior,
     PosteriorStatus as PosteriorStatus,
     ReassemblyStatus as ReassemblyStatus,
+    Sampling as Sampling,
     compare_models as compare_models,
     posterior as posterior,
     reassemblies as reassemblies,

@@ -18,6 +18,7 @@ from solver import (
     motion as motion,
     power_balance as power_balance,
     quasi_periodic as quasi_periodic,
+    quasi_periodic_curve as quasi_periodic_curve,
     start_of as start_of,
     time_history as time_history,
     transient as transient,

@@ -1,66 +1,104 @@
 """The damping ratio of a nonlinear mode at an amplitude, from below.
 
-Its derivatives by the parameters are those of the mode at that amplitude (`solver.modes.gradient`), whatever
-the excitation.
+Its derivatives by the parameters are those of the mode at that amplitude (`solver.modes.gradient` and
+`hessian`), whatever the excitation.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Annotated, Any
 
 from optim.criteria.criterion import Criterion, CriterionContext, CriterionRow, Form, Judged, Key
 from optim.criteria.key import number_or_table
 
 if TYPE_CHECKING:
+    from optim.problem.variables import Real
     from solver.scene.scene import Scene
 
 _KEY = "min_damping"
-_WORDS = ("ratio", "amplitude", "mode")
 
 
-def _rows(judged: Judged) -> list[CriterionRow]:
-    """The row of the mode; not a number where the mode does not reach the amplitude."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ModeDamping:
+    """The damping ratio of a mode at an amplitude."""
+
+    what: Annotated[str, "In words."]
+    value: Annotated[float, "NaN where the mode does not reach the amplitude."]
+    slope: Annotated[Real | None, "By the parameter paths, (n_paths,); None without gradients."] = None
+    second: Annotated[Callable[[], Real] | None, "Computes the second derivatives, if there are any."] = None
+
+
+def damping_of(judged: Judged, amplitude: float, mode: int) -> ModeDamping:
+    """Return the damping ratio of a mode at a modal amplitude."""
     import numpy as np
 
     from solver.errors import SettingError
-    from solver.modes.at_amplitudes import mode_at_amplitudes
+    from solver.modes.at_amplitudes import damping_hessian, mode_at_amplitudes
 
+    balance, paths = judged.branch.balance, judged.problem.paths if judged.gradients else ()
+    what, kept = f"of mode {mode} at {amplitude:g} √kg m", balance.n_harmonics
+    try:
+        found = mode_at_amplitudes(balance.scene, np.array([amplitude]), paths, mode=mode, harmonics=kept)
+    except SettingError:  # the scene has the mode: this design alone has no equilibrium to move about
+        return ModeDamping(what=what, value=math.nan)
+    value, point = float(found.damping_ratio[0]), found.points[0]
+    if judged.sensitivity is None or point is None:
+        return ModeDamping(what=what, value=value)
+    second = partial(damping_hessian, balance.scene, paths, point, mode=mode, harmonics=kept)
+    return ModeDamping(
+        what=what, value=value, slope=found.by_damping[0],
+        second=second if judged.sensitivity.has_second else None,
+    )  # fmt: skip
+
+
+def _rows(judged: Judged) -> list[CriterionRow]:
+    """The row of the mode."""
     if (asked := judged.limit(DAMPING)) is None:
         return []
     ratio, amplitude, mode = asked
-    balance, paths = judged.branch.balance, judged.problem.paths if judged.gradients else ()
-    what, value, slope = f"damping ratio of mode {mode} at {amplitude:g} √kg m", math.nan, None
-    try:
-        found = mode_at_amplitudes(
-            balance.scene, np.array([amplitude]), paths, mode=mode, harmonics=balance.n_harmonics
-        )
-        value, slope = float(found.damping_ratio[0]), found.by_damping[0] if judged.gradients else None
-    except SettingError:
-        pass  # the scene has the mode: this design alone has no equilibrium that it could move about
-    return [judged.row(DAMPING, what, value, slope, bound=ratio)]
+    found = damping_of(judged, amplitude, mode)
+    what = f"damping ratio {found.what}"
+    return [judged.row(DAMPING, what, found.value, found.slope, bound=ratio, second=found.second)]
 
 
-def _read(asked: CriterionContext) -> tuple[float, float, int]:
-    """The least ratio, the modal amplitude and the number of the mode."""
+def read_mode(asked: CriterionContext, key: str, number: str, *, needed: bool) -> tuple[Any, float, int]:
+    """Read a table of a modal amplitude, perhaps the number of a mode, and a limit.
+
+    Parameters
+    ----------
+    key, number : of the table, and of its limit.
+    needed : whether that must be given; else it is None without.
+
+    Returns
+    -------
+    The limit, the modal amplitude [√kg m] and the number of the mode.
+    """
     from optim.errors import DesignError
     from optim.problem.numbers import positive, whole
     from solver.errors import at
     from solver.modes.nonlinear_mode import pose
 
-    given: Any = asked.values[_KEY]
-    if not isinstance(given, Mapping) or not {"ratio", "amplitude"} <= set(given):
-        raise DesignError(_KEY, given, "must be a table with `ratio`, `amplitude` [√kg m] and perhaps `mode`")
+    given: Any = asked.values[key]
+    wanted = {number, "amplitude"} if needed else {"amplitude"}
+    if not isinstance(given, Mapping) or not wanted <= set(given):
+        more = f"`{number}`, `amplitude` [√kg m] and perhaps `mode`"
+        more = more if needed else f"`amplitude` [√kg m], perhaps `mode` and `{number}`"
+        raise DesignError(key, given, f"must be a table with {more}")
+    words = (number, "amplitude", "mode")
     for word in given:
-        if word not in _WORDS:
-            raise DesignError((_KEY, word), given[word], f"is not known; there are {', '.join(_WORDS)}")
-    number = given.get("mode", 1)
-    number = int(number) if isinstance(number, float) and number.is_integer() else number
-    mode = whole((_KEY, "mode"), number, least=1)
-    with at(_KEY, "mode"):
+        if word not in words:
+            raise DesignError((key, word), given[word], f"is not known; there are {', '.join(words)}")
+    mode = given.get("mode", 1)
+    mode = int(mode) if isinstance(mode, float) and mode.is_integer() else mode
+    mode = whole((key, "mode"), mode, least=1)
+    with at(key, "mode"):
         pose(asked.scene, mode, None, 1)
-    return positive((_KEY, "ratio"), given["ratio"]), positive((_KEY, "amplitude"), given["amplitude"]), mode
+    limit = positive((key, number), given[number]) if number in given else None
+    return limit, positive((key, "amplitude"), given["amplitude"]), mode
 
 
 def _ratio(_scene: Scene) -> float:
@@ -82,6 +120,6 @@ DAMPING = CRITERION = Criterion(
             option_help="Least damping ratio: ratio=…, amplitude=… [√kg m], perhaps mode=…; repeatable.",
         ),
     ),
-    read=_read,
+    read=partial(read_mode, key=_KEY, number="ratio", needed=True),
     scale=_ratio,
 )  # fmt: skip

@@ -51,8 +51,14 @@ class ProblemKeywords(TypedDict, total=False):
     """Largest wear rate [m³/s], of every friction contact or by contact."""
     wear_coefficient: float | Mapping[str, float] | None
     """Volume worn off by a unit of friction work [m³/J], of every contact limited or by contact."""
+    worn: Mapping[str, object] | None
+    """The life: `hours`, wear `coefficient` [m³/J], `area` [m²], and perhaps `load_loss_per_depth` [N/m],
+    `stiffness_loss_per_depth` [N/m²], `frequency_hz`, `from_hours`, `least_factor`, `largest_factor` of the
+    coefficient, `most` [m]."""
     min_damping: float | Mapping[str, float] | None
     """Least damping `ratio` of a `mode` (the first) at a modal `amplitude` [√kg m]."""
+    quality_factor: float | Mapping[str, float] | None
+    """Of which `mode` (the first) at which modal `amplitude` [√kg m], and the `most` it may be."""
     max_mass: float | None
     """Largest mass of all bodies [kg]."""
     contact_states: Mapping[str, Literal["never-separates"]] | None
@@ -70,7 +76,7 @@ class DesignKeywords(ProblemKeywords, total=False):
     """Largest width of the resonance band allowed [Hz]."""
     weights: Mapping[str, float] | None
     """What is minimised: peak [1/m], band [1/Hz], stress [1/Pa], utilisation, running [1/m], wear [1/m³/s],
-    mass [1/kg], each times its weight; the peak alone."""
+    worn [1/m], quality, mass [1/kg], each times its weight; the peak alone."""
 
 
 class FrontKeywords(ProblemKeywords, total=False):

@@ -11,6 +11,7 @@ import numpy as np
 from solver.results.dataset import Dataset, Variable
 from solver.scene.parameter_paths import parameter_unit
 from solver.views.to_dataset import attributes, column
+from solver.views.to_dataset import described as described  # of classes that say their data set
 
 if TYPE_CHECKING:
     from optim.criteria.rows import DesignEvaluation

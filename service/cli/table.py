@@ -222,6 +222,10 @@ COMMANDS = {
             "identify", "commands.identify.identify",
             "Find parameters from measured responses and hysteresis loops.",
         ),
+        CommandEntry(
+            "posterior", "commands.identify.posterior",
+            "Sample what is known of parameters after measurements.",
+        ),
     ),
     "Disks and modes": (
         CommandEntry(

@@ -244,10 +244,10 @@ def _with_points(
     )
 
 
-def equations_of_motion(scene: Scene, omega: float) -> MarchEquations:
-    """The equations of a scene in the angle tau = omega t."""
+def equations_of_motion(scene: Scene, omega: float, *, swept: bool = False) -> MarchEquations:
+    """The equations of a scene in the angle tau = omega t; `swept` as of `with_base`."""
     A, B, W, index = _with_couplings(scene, *_equations(scene))
-    seen = [(index[dof], factor) for dof, factor in scene.seen(scene.observe.dof) or ()]
+    seen = tuple((index[dof], factor) for dof, factor in scene.seen(scene.observe.dof) or ())
     observed = seen[0][0]
     pushes = [
         (index[dof], force.amplitude * factor, force.phase + phase, force.harmonic)
@@ -261,8 +261,8 @@ def equations_of_motion(scene: Scene, omega: float) -> MarchEquations:
     if scene.observe.dof not in index and not moves:
         A, B, W, observed = with_sum(seen, A, B, W)
     if moves:
-        A, B, W, observed, driving = with_base(scene, A, B, W, index, omega)
-        pushes += driving
+        A, B, W, seen, driving = with_base(scene, A, B, W, index, omega, swept=swept)
+        observed, pushes = A.shape[0] - 1, pushes + driving
     A, B, W = A / omega**2, B / omega, W / omega**2
     dof, amplitude, phase, harmonic = zip(*pushes, strict=True) if pushes else ((), (), (), ())
     placed = [(row, own) for one, own in zip(scene.contacts, scene.forms, strict=True) for row in one.rows()]
@@ -277,4 +277,4 @@ def equations_of_motion(scene: Scene, omega: float) -> MarchEquations:
         omega=omega,
         **columns(placed, index, A.shape[0]),
     )
-    return MarchEquations(system, observed, index, tuple(seen))
+    return MarchEquations(system, observed, index, seen)

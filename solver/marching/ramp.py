@@ -18,6 +18,7 @@ from scipy.sparse import csr_array
 
 from solver.arrays import Real
 from solver.errors import SettingError
+from solver.marching.base import base_over
 from solver.marching.contacts import as_sparse
 from solver.marching.equations import MarchEquations, equations_of_motion
 from solver.marching.kernels import state as kernel
@@ -51,9 +52,6 @@ class Ramp:
 def check(scene: Scene) -> None:
     """Raise SettingError where a scene cannot be followed while its frequency changes."""
     scene.observe.check_whole("a run through a range of frequencies")
-    if any(force.base for force in scene.excitation):
-        wanted = "must be forces: a base that moves is followed at one frequency"
-        raise SettingError("excitation", "base", wanted)
     if scene.rigid_contact is not None:
         wanted = "must have a finite stiffness in a run through a range of frequencies"
         raise SettingError("scene", f"contact {scene.rigid_contact}", wanted)
@@ -74,14 +72,23 @@ def equations_over(scene: Scene, ramp: Ramp, omega: float, turned: float) -> Mar
     """
     end = ramp.seconds * omega
     hertz = np.linspace(ramp.begin_hz, ramp.end_hz, 3)
-    first = equations_of_motion(whole(scene.at_frequency(float(hertz[0]))), omega)
+    first = equations_of_motion(whole(scene.at_frequency(float(hertz[0]))), omega, swept=ramp.driven)
     system = first.system
     rate = 0.5 * (ramp.end_hz - ramp.begin_hz) / ramp.seconds * 2.0 * math.pi / omega**2
     turn = np.array([2.0 * math.pi * math.fmod(turned, 1.0), 2.0 * math.pi * ramp.begin_hz / omega, rate])
     system = system._replace(turn=turn)
     if scene.speed_order is not None and ramp.begin_hz != ramp.end_hz:
-        rest = (equations_of_motion(whole(scene.at_frequency(float(f))), omega).system for f in hertz[1:])
+        rest = (
+            equations_of_motion(whole(scene.at_frequency(float(f))), omega, swept=ramp.driven).system
+            for f in hertz[1:]
+        )
         system = _following([system, *rest], end)
+    if ramp.driven and any(force.base for force in scene.excitation):
+        ends = [[e.amplitude for e in scene.at_frequency(f).excitation if e.base] for f in hertz[[0, 2]]]
+        if ends[0] != ends[1]:
+            wanted = "must not follow the speed in a run through a range of frequencies"
+            raise SettingError("excitation", "amplitude of a base", wanted)
+        system = base_over(whole(scene), system, float(turn[1]), 2.0 * rate)
     if not ramp.driven:
         off = np.where(system.force_harmonic == 0, system.force_amplitude, 0.0)
         system = system._replace(force_amplitude=off)

@@ -35,13 +35,18 @@ class MarchStart:
 
 
 def state_at(
-    equations: MarchEquations, start: MarchStart, names: tuple[str, ...], omega: float
+    equations: MarchEquations,
+    start: MarchStart,
+    names: tuple[str, ...],
+    omega: float,
+    base: tuple[kernel.Real, kernel.Real] | None = None,
 ) -> kernel.State:
     """Return the state of a march.
 
     Parameters
     ----------
     equations : of the scene, at `omega` [rad/s]; names : of the rows of the contacts.
+    base : displacements and velocities (n,) of a base and of what it drives, where they are prescribed.
 
     Raises
     ------
@@ -52,6 +57,8 @@ def state_at(
     n, rows = system.A.start.size - 1, system.kt.size
     x = _vector("displacements", start.displacements, index, n)
     v = _vector("velocities", start.velocities, index, n) / omega
+    for vector, given in zip((x, v), base or (), strict=False):
+        vector[:] = np.where(np.isnan(given), vector, given)
     if equations.observed not in index.values():
         for vector in (x, v):
             vector[equations.observed] = sum(factor * vector[at] for at, factor in equations.seen)

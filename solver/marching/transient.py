@@ -17,6 +17,7 @@ import numpy as np
 
 from solver import arrays
 from solver.errors import SettingError
+from solver.marching.base import base_begins
 from solver.marching.equations import MarchEquations, equations_of_motion
 from solver.marching.kernels import state as kernel
 from solver.marching.kernels import taylor as stepping
@@ -75,7 +76,8 @@ def transient(
         them, the latter where both frequencies are equal.
     rates : several of them [Hz/s] in place of both: a run at each, of which the slowest is told in full.
     ring_down_seconds : how long the motion is followed after that, with no force but constant ones [s].
-    from_rest : begin at rest, contacts without force; else in the motion that repeats at `begin_hz`.
+    from_rest : begin at rest, contacts without force; else in the motion that repeats at `begin_hz`. A base
+        moves from the beginning as prescribed, and what is counted from it rests relative to it.
     start : a motion to begin with instead of both.
     tolerance : of the largest amplitude, relative.
     steps_per_period : steps in a period of the highest frequency; chosen by the tolerance when left out.
@@ -85,7 +87,7 @@ def transient(
     Raises
     ------
     SettingError
-        An argument out of its range, a base that moves, a rigid contact.
+        An argument out of its range, a rigid contact.
     """
     began = time.perf_counter()
     if len(rates):
@@ -339,8 +341,11 @@ def _start(
 ) -> tuple[kernel.State | None, TransientStatus]:
     """Return the state a run begins with; None where the motion at the first frequency does not repeat."""
     if start is not None or from_rest:
-        names = row_names(whole(run.scene))
-        begins = state_at(run.equations[0], start or MarchStart(), names, run.omega)
+        scene, first = whole(run.scene), run.equations[0]
+        turning = 2.0 * math.pi * run.ramps[0].begin_hz / run.omega
+        moves = any(force.base for force in scene.excitation)
+        base = base_begins(scene, first.index, first.system, turning) if moves else None
+        begins = state_at(first, start or MarchStart(), row_names(scene), run.omega, base)
         return begins, TransientStatus.FINISHED
     hertz = run.ramps[0].begin_hz
     if hertz == 0.0:

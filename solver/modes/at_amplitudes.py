@@ -13,8 +13,9 @@ from solver.jit.fourier import Integer, Real
 from solver.modes.corrector import Corrected, ModeState, correct
 from solver.modes.curve import LEAST_SHARE, follow, share_of_first
 from solver.modes.gradient import ModeSensitivities
+from solver.modes.hessian import mode_hessian
 from solver.modes.nonlinear_mode import MOST_POINTS, ModeProblem, pose
-from solver.modes.start import begin
+from solver.modes.start import begin, phase_of
 from solver.scene.scene import Scene
 
 _BELOW = 0.9  # of the smallest amplitude, where a curve is begun
@@ -76,6 +77,19 @@ def mode_at_amplitudes(
     )  # fmt: skip
 
 
+def damping_hessian(
+    scene: Scene, paths: Sequence[str], guess: ModeState, *, mode: int = 1, harmonics: int = 11
+) -> Real:
+    """Return the second derivatives of the damping ratio by paths at a point of a mode, (n_paths, n_paths).
+
+    `guess` is that point, of `mode_at_amplitudes`; the others as there. Raises SettingError as
+    `solver.modes.hessian.mode_hessian`.
+    """
+    problem = pose(scene, mode, None, harmonics, paths=paths)
+    sensitivities = ModeSensitivities(problem.equations, paths, turns=problem.turns)
+    return mode_hessian(sensitivities, guess)[1]
+
+
 def _from_guesses(
     problem: ModeProblem, logs: Real, guesses: Sequence[ModeState | None]
 ) -> list[Corrected | None]:
@@ -86,7 +100,10 @@ def _from_guesses(
     for i, guess in enumerate(guesses):
         if guess is None or guess.y.size != size or guess.phase.size != equations.structure.force.size:
             continue
-        one = correct(equations, replace(guess, log_amplitude=float(logs[i])))
+        # A phase that is given is that of the excitation, which may have turned since.
+        phase = guess.phase if problem.turns else phase_of(equations)
+        phase = phase / np.linalg.norm(phase)
+        one = correct(equations, replace(guess, log_amplitude=float(logs[i]), phase=phase))
         moved = abs(float(one.state.y[-2]) / float(guess.y[-2]) - 1.0)
         if one.converged and moved < _FAR and share_of_first(equations, one) >= LEAST_SHARE:
             found[i] = one

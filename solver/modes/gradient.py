@@ -97,46 +97,49 @@ class ModeSensitivities:
     """
 
     def __init__(self, equations: Equations, paths: Sequence[str], *, turns: bool) -> None:
-        self._equations, self._turns = equations, turns
+        self.equations, self.turns = equations, turns
         balance = equations.balance
         check_no_line(balance.scene)
-        self._parameters = resolved(balance, paths)
-        self._slopes, self._loads = contact_slopes(balance, self._parameters)
-        self._matrices = matrices_of_paths(balance, self._parameters, whole=True)
+        self.parameters = resolved(balance, paths)
+        self.slopes, self.loads = contact_slopes(balance, self.parameters)
+        self.matrices = matrices_of_paths(balance, self.parameters, whole=True)
 
     def at(self, state: ModeState) -> tuple[Real, Real]:
         """Return the derivatives of ω [rad/s] and ζ at a point by the paths, then by ln a; (n_paths + 1,)."""
-        equations, count = self._equations, len(self._parameters)
+        equations, count = self.equations, len(self.parameters)
         at = equations.evaluate(state.y, state.log_amplitude, state.phase, state.mode)
         nothing = np.full(count + 1, math.nan)
         if at is None:
             return nothing, nothing
-        columns = scales(state.y, equations.size)
-        scaled = at.jacobian * columns
-        rows = np.abs(scaled).max(axis=1)
-        units = np.zeros((state.y.size, 2))
-        units[-2, 0], units[-1, 1] = columns[-2], columns[-1]
-        try:
-            adjoint = np.linalg.lstsq((scaled / rows[:, None]).T, units, rcond=1e-13)[0] / rows[:, None]
-        except np.linalg.LinAlgError:
+        inverse = self.inverse(state, at)
+        if inverse is None:
             return nothing, nothing
         changes = np.zeros((count + 1, state.y.size))
         for i in range(count):
             changes[i] = self._residual(i, state, at)
         changes[count, equations.size + 3] = -1.0  # ln √(xᴴ M x) = ln a
-        found = -changes @ adjoint
-        return found[:, 0], found[:, 1]
+        return -changes @ inverse[-2], -changes @ inverse[-1]
+
+    def inverse(self, state: ModeState, at: Evaluated) -> Real | None:
+        """Return J⁻¹ in the units of the unknowns and equations, (m, m); None where it is not found."""
+        columns = scales(state.y, self.equations.size)
+        scaled = at.jacobian * columns
+        rows = np.abs(scaled).max(axis=1)
+        try:
+            return np.asarray(np.linalg.pinv(scaled / rows[:, None], rcond=1e-13) * columns[:, None] / rows)
+        except np.linalg.LinAlgError:
+            return None
 
     def changes(self, state: ModeState, at: Evaluated) -> tuple[Real, list[Complex]]:
         """Return ∂r/∂p of every path, (n_paths, m), and what it pushes on the coordinates, (nk, N) each."""
-        count = len(self._parameters)
+        count = len(self.parameters)
         rows = [self._residual(i, state, at) for i in range(count)]
         pushes = [self._change(i, state, at).pushes for i in range(count)]
         return np.array(rows).reshape(count, state.y.size), pushes
 
     def _residual(self, i: int, state: ModeState, at: Evaluated) -> Real:
         """Return ∂r/∂p of path i."""
-        equations, s = self._equations, self._equations.structure
+        equations, s = self.equations, self.equations.structure
         hat, size = equations.amplitudes, equations.size
         change = self._change(i, state, at)
         dx = at.dynamics.solve(change.pushes)
@@ -155,31 +158,31 @@ class ModeSensitivities:
 
     def _change(self, i: int, state: ModeState, at: Evaluated) -> _Change:
         """Return what path i changes."""
-        parameter, s = self._parameters[i], self._equations.structure
+        parameter, s = self.parameters[i], self.equations.structure
         if parameter.kind is Kind.STRUCTURE:
             return self._of_structure(i, state, at)
         pushes = np.zeros(at.x.shape, np.complex128)
-        system = self._equations.balance.system
+        system = self.equations.balance.system
         if parameter.kind is Kind.LEVEL:
             if s.ks[0] == 0 and not system.constant_mean:
-                (level,), _ = excitation_slopes(self._equations.balance, [parameter])
+                (level,), _ = excitation_slopes(self.equations.balance, [parameter])
                 pushes[0] = level * s.constant
             return _Change(pushes=pushes)
         if parameter.kind is Kind.FORCE_PHASE:
-            turned = 0.0 if self._turns else np.vdot(1j * state.phase, at.x[s.first])
+            turned = 0.0 if self.turns else np.vdot(1j * state.phase, at.x[s.first])
             return _Change(pushes=pushes, phase=complex(turned))
-        hat, equations = self._equations.amplitudes, self._equations
+        hat, equations = self.equations.amplitudes, self.equations
         dF = equations.lead(self._force_slopes(i, state))
         return _Change(pushes=-(s.back @ hat.of(dF).T[:, :, None])[:, :, 0])
 
     def _force_slopes(self, i: int, state: ModeState) -> Real:
         """Return ∂F/∂p of every port, (nc, n), by path i."""
-        equations, omega = self._equations, float(state.y[-2])
+        equations, omega = self.equations, float(state.y[-2])
         motions = equations.motions(state.y[: equations.size].reshape(equations.r, equations.n))
         found = np.zeros((equations.balance.n_ports, equations.n))
-        for e in np.flatnonzero(np.any(self._slopes[i] != 0.0, axis=1)).tolist():
+        for e in np.flatnonzero(np.any(self.slopes[i] != 0.0, axis=1)).tolist():
             ports = slice(*equations.balance.system.first_port[e : e + 2].tolist())
-            along = self._slopes[i, e], self._loads[i, e]
+            along = self.slopes[i, e], self.loads[i, e]
             _, found[ports], _ = force_along(
                 equations.balance, equations.point, e, motions[ports], omega, *along
             )
@@ -187,7 +190,7 @@ class ModeSensitivities:
 
     def _of_structure(self, i: int, state: ModeState, at: Evaluated) -> _Change:
         """Return what a parameter of the structure, of bodies or of places changes."""
-        s, given = self._equations.structure, cast(HarmonicMatrices, self._matrices)
+        s, given = self.equations.structure, cast(HarmonicMatrices, self.matrices)
         omega, zeta = float(state.y[-2]), float(state.y[-1])
         dK, dC, dM = given.by[i]
         x = (s.shapes @ at.x[:, :, None])[:, :, 0]
@@ -205,7 +208,7 @@ class ModeSensitivities:
         self, given: HarmonicMatrices, dL: Complex, pushes: Complex, x: Complex
     ) -> tuple[Complex, Complex]:
         """Return the pushes with those of moved contacts, and the motions ∂L x of the leading ports."""
-        equations, system = self._equations, self._equations.balance.system
+        equations, system = self.equations, self.equations.balance.system
         hat, moved = equations.amplitudes, np.einsum("kcn,kn->ck", dL, x)
         # The stiffness moved into the structure is in ∂Z, where it follows the contacts.
         forces = hat.of(equations.point.F) - system.shift[:, None] * np.einsum("kcn,kn->ck", given.L, x)

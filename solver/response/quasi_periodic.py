@@ -21,8 +21,9 @@ from typing import Any
 import numpy as np
 
 from solver.arrays import Real
-from solver.balance.balance import build
+from solver.balance.balance import Balance, build
 from solver.balance.simplifications import even_harmonics_reason
+from solver.balance.whole_motion import Amplitudes
 from solver.balance.workspace import Workspace
 from solver.continuation.from_nothing import solve_from_nothing
 from solver.errors import SettingError
@@ -73,6 +74,32 @@ _NOWHERE = _Torus(np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0, np.c
 
 
 @dataclass(frozen=True, slots=True)
+class _ContactMotions:
+    """The slip motions of a long period as waves on the torus, from which another one can begin."""
+
+    k: Integer
+    l: Integer  # noqa: E741 (the letter of the field)
+    u: Complex  # (nc, n) amplitudes
+
+    @classmethod
+    def of(cls, u: Real, balance: Balance, p: int, q: int) -> _ContactMotions:
+        """Return those of unknowns (n_unknowns,) of p and q turns."""
+        ks = balance.system.ks
+        k, l = _sums(ks, p, q, int(ks[-1]) + 1)  # noqa: E741
+        return cls(k, l, Amplitudes(balance).of(u.reshape(-1, balance.n_coefficients)))
+
+    def guess(self, balance: Balance, p: int, q: int) -> Real:
+        """Return the unknowns of p and q turns: waves whose sum is no harmonic kept are left out."""
+        amplitudes = Amplitudes(balance)
+        place = {n: i for i, n in enumerate(balance.system.ks.tolist())}
+        found = np.zeros((len(self.u), len(place)), np.complex128)
+        for n, c in zip((self.k * p + self.l * q).tolist(), self.u.T, strict=True):
+            if abs(n) in place:
+                found[:, place[abs(n)]] += c if n >= 0 else c.conj()
+        return amplitudes.coefficients(found).reshape(-1)
+
+
+@dataclass(frozen=True, slots=True)
 class _LongPeriods:
     """What periods of at most so many turns tell."""
 
@@ -81,6 +108,7 @@ class _LongPeriods:
     turns: tuple[tuple[int, int], ...]
     nearest: Solution
     repeats: bool
+    motions: _ContactMotions | None
 
     def measures(self) -> Real:
         """Return max|x|, (max x - min x) / 2, root mean square and the amplitudes of the two tones."""
@@ -135,7 +163,25 @@ def quasi_periodic(
     began = time.perf_counter()
     check(scene, frequency_hz, second_hz, harmonics, turns, tolerance)
     second = second_force(scene, amplitude=amplitude, dof=dof, phase=phase, engine_order=engine_order)
-    question = _Question(scene.at_frequency(frequency_hz), second, frequency_hz, second_hz, harmonics)
+    question = Question(scene.at_frequency(frequency_hz), second, frequency_hz, second_hz, harmonics)
+    watch = TorusWatch(on_progress, should_stop)
+    return respond(question, turns, tolerance, None, watch, began)[0]
+
+
+@dataclass(frozen=True, slots=True)
+class TorusWatch:
+    """Who watches, over a part of the whole."""
+
+    on_progress: OnProgress = None
+    should_stop: ShouldStop = None
+
+
+def respond(
+    question: Question, turns: int, tolerance: float, start: _ContactMotions | None, watch: TorusWatch,
+    began: float,
+) -> tuple[QuasiPeriodic, _ContactMotions | None]:  # fmt: skip
+    """Answer a question, from a motion known to be near; return what another one can begin with, too."""
+    on_progress, should_stop = watch.on_progress, watch.should_stop
     looks: list[_LongPeriods] = []
     limits = [turns // 2**i for i in range(int(math.log2(turns / LEAST_TURNS)) + 1)][::-1]
     status, change = QuasiPeriodicStatus.NOT_CONVERGED, math.nan
@@ -143,8 +189,9 @@ def quasi_periodic(
         if should_stop is not None and should_stop():
             status = QuasiPeriodicStatus.STOPPED
             break
-        if (look := question.look(limit)) is None:
+        if (look := question.look(limit, start)) is None:
             continue
+        start = look.motions
         status = QuasiPeriodicStatus.ACCURACY_NOT_REACHED
         change = 0.0 if look.repeats else _SAFETY * look.change(looks[-1]) if looks else math.nan
         looks.append(look)
@@ -155,7 +202,7 @@ def quasi_periodic(
             break
     if on_progress is not None:
         on_progress(1.0, len(looks))
-    return question.answer(looks, status, change, began)
+    return question.answer(looks, status, change, began), start
 
 
 def check(
@@ -199,7 +246,7 @@ def second_force(
 
 
 @dataclass(frozen=True, slots=True)
-class _Question:
+class Question:
     """A scene at its speed, the second force, both frequencies [Hz] and the multiples kept."""
 
     scene: Scene
@@ -208,10 +255,11 @@ class _Question:
     second_hz: float
     harmonics: int
 
-    def look(self, limit: int) -> _LongPeriods | None:
+    def look(self, limit: int, start: _ContactMotions | None) -> _LongPeriods | None:
         """Solve for the ratios next to that of the frequencies; None where one has no solution or none is."""
         ratios = list(self._ratios(limit))
-        found = [self._solved(p, q) for p, q in ratios]
+        solved = [self._solved(p, q, start) for p, q in ratios]
+        found = [each for each, _ in solved]
         if not found or not all(each.converged for each in found):
             return None
         wanted = self.second_hz / self.first_hz
@@ -228,7 +276,8 @@ class _Question:
             share = off[0] / (off[0] - off[1])
             torus = torus.beside(tori[1], share)
             sizes = sizes + share * np.diff(sizes, axis=0)
-        return _LongPeriods(torus, sizes[0], tuple(ratios), found[nearest], exact)
+        motions = solved[nearest][1] or start
+        return _LongPeriods(torus, sizes[0], tuple(ratios), found[nearest], exact, motions)
 
     def _ratios(self, limit: int) -> Iterator[tuple[int, int]]:
         """Turns p and q of the two with q/p next below and above the ratio, or equal to it.
@@ -272,15 +321,21 @@ class _Question:
         contacts = tuple(one.model_copy(update=one.in_period_of(p)) for one in self.scene.contacts)
         return self.scene.model_copy(update={"excitation": excitation, "contacts": contacts})
 
-    def _solved(self, p: int, q: int, *, estimated: bool = False) -> Solution:
-        """Solve the balance of p and q turns."""
+    def _solved(
+        self, p: int, q: int, start: _ContactMotions | None, *, estimated: bool = False
+    ) -> tuple[Solution, _ContactMotions | None]:
+        """Solve the balance of p and q turns, from motions known to be near."""
         scene, base, highest = self._at(p, q), self.first_hz / p, self.harmonics * max(p, q)
         begun = time.perf_counter()
         workspace = Workspace.of(build(scene, harmonics=highest))
-        found = solve_from_nothing(workspace, 2.0 * math.pi * base)
+        guess = None if start is None else start.guess(workspace.balance, p, q)
+        found = solve_from_nothing(workspace, 2.0 * math.pi * base, guess)
+        if not found.converged and guess is not None:
+            found = solve_from_nothing(workspace, 2.0 * math.pi * base)
         if not found.converged:
-            return solve(scene, frequency_hz=base, harmonics=highest)
-        return describe(workspace, found, base, begun, estimated=estimated)
+            return solve(scene, frequency_hz=base, harmonics=highest), None
+        motions = _ContactMotions.of(found.u, workspace.balance, p, q)
+        return describe(workspace, found, base, begun, estimated=estimated), motions
 
     def answer(
         self, looks: list[_LongPeriods], status: QuasiPeriodicStatus, change: float, began: float
@@ -289,7 +344,7 @@ class _Question:
         torus, sizes, section = _NOWHERE, np.full(5, math.nan), np.empty(0)
         turns: tuple[tuple[int, int], ...] = ()
         if looks:
-            look, shortest = looks[-1], self._solved(*looks[0].turns[0], estimated=True)
+            look, shortest = looks[-1], self._solved(*looks[0].turns[0], looks[0].motions, estimated=True)[0]
             torus, sizes, turns = look.torus, look.measures(), look.turns
             change += shortest.error_estimate / shortest.half_peak_to_peak * float(sizes[1])
             p, q = turns[0]
@@ -317,13 +372,18 @@ def _torus(found: Solution, p: int, q: int) -> _Torus:
     amplitudes = fourier.to_complex(found.observed)
     n = np.flatnonzero(amplitudes)
     n = n[n > 0]
+    return _Torus(*_sums(n, p, q, amplitudes.size), amplitudes[n], float(amplitudes[0].real))
+
+
+def _sums(n: Integer, p: int, q: int, count: int) -> tuple[Integer, Integer]:
+    """Return k and l of the sums k p + l q of least order that are harmonics n below `count`, (m,) each."""
     inverse = pow(q, -1, p) if p > 1 else 0
-    reach = math.ceil(amplitudes.size / (p * q)) + 1
+    reach = math.ceil(count / (p * q)) + 1
     every = (n * inverse % p)[:, None] + p * np.arange(-reach, reach + 1)
     firsts = (n[:, None] - every * q) // p
     best = np.argmin(np.abs(every) + np.abs(firsts), axis=1)
     rows = np.arange(n.size)
-    return _Torus(firsts[rows, best], every[rows, best], amplitudes[n], float(amplitudes[0].real))
+    return firsts[rows, best], every[rows, best]
 
 
 def _sizes(found: Solution, torus: _Torus, turns: tuple[int, int], *, repeats: bool) -> tuple[float, float]:

@@ -167,7 +167,7 @@ def lagrangian_hessian(
         hessian[i + 1, 0] -= both
     twice = second_forces(ks, motion.forces, along.level, along.phase)
     hessian += np.einsum("kn,ijkn->ij", y, twice).real
-    hessian += _of_contacts(contacts, along, found.dU, adjoint.w)
+    hessian += contacts_along(contacts, along, found.dU, adjoint.w)
     moved = np.einsum("ek,kn,ikn->eik", adjoint.turns, motion.observe, found.dx)
     bends = -(ks**2 * adjoint.turns * np.einsum("kn,kn->k", motion.observe, x)).sum(axis=1).real
     for by, q, bend in zip(adjoint.by, (1j * ks * moved).sum(axis=2).real, bends, strict=True):
@@ -182,7 +182,7 @@ def _dot(y: Complex, x: Complex) -> float:
     return float(np.einsum("kn,kn->", y, x).real)
 
 
-def _of_contacts(contacts: ContactForces, along: Directions, dU: Real, w: Real) -> Real:
+def contacts_along(contacts: ContactForces, along: Directions, dU: Real, w: Real) -> Real:
     """Return w·F_ij of all contacts along the directions."""
     pulls = np.einsum("cn,cnm->cm", w, contacts.dF_dN)
     twice = second_loads(contacts.system.contacts, along.slopes)

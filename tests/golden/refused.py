@@ -59,6 +59,8 @@ _DESIGN: tuple[dict[str, Any], ...] = (
     {"aim": "mean", "samples": 5}, {"uncertain": {"damper.mu": 1}, "method": "x"},
     {"uncertain": {"damper.mu": 1}, "max_friction_work": {"x": 1}},
 )  # fmt: skip
+_MODEL: dict[str, Any] = {"scene": "two-dof", "unknowns": {"damper.mu": [0.1, 1]}}
+_MEASURED = {"data": [{"frequency": [1, 1.2], "amplitude": [1.9, 1.7]}], "unknowns": _MODEL["unknowns"]}
 _MEANT: dict[str, tuple[dict[str, Any], ...]] = {
     "sweep": (
         {"from": 2, "to": 2}, {"from": -1}, {"parameter": "damper.N2"}, {"parameter": "damper.N0"},
@@ -125,6 +127,15 @@ _MEANT: dict[str, tuple[dict[str, Any], ...]] = {
     "identify": (
         {"data": [{"frequency": [1], "amplitude": [1, 2]}], "unknowns": {"damper.mu": [0.1, 0.6]}},
         {"data": [], "unknowns": {}}, {"data": ["a.csv"], "unknowns": {"damper.mu": [0.1, 0.6]}},
+    ),
+    "posterior": (
+        {"data": [], "unknowns": {}},
+        *({**_MEASURED, **one} for one in (
+            {"draws": 3}, {"sampler": "gibbs"}, {"weights": {"two-dof": 1}}, {"assemblies": [0]},
+            {"varied": ["damper.mu"], "assemblies": [0, 1]}, {"models": {"two-dof": _MODEL}},
+            {"models": {"x": {**_MODEL, "scene": "nowhere"}}}, {"models": {"x": 3}},
+            {"models": {"x": {**_MODEL, "unknowns": {"damper.nu": [0.1, 1]}}}},
+        )),
     ),
     "nothing": ({},),
 }  # fmt: skip

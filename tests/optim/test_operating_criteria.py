@@ -12,11 +12,14 @@ from optim.criteria.damping import DAMPING
 from optim.criteria.evaluation import evaluate
 from optim.criteria.friction_work import FRICTION_WORK
 from optim.criteria.mass import MASS
+from optim.criteria.quality import QUALITY
 from optim.criteria.running_speeds import RUNNING
 from optim.criteria.wear_rate import WEAR_RATE
+from optim.criteria.worn_peak import WORN
 from optim.errors import DesignError
 from optim.problem.issues import problem_issues
 from optim.problem.problem import pose
+from solver.modes.at_amplitudes import mode_at_amplitudes
 from solver.scene.scene import Scene
 
 HARMONICS = 5
@@ -25,6 +28,10 @@ DESIGN = {"damper.N0": 105.0, "damper.kt": 30.0}
 RUNNING_KEYS = {"running_rpm": [[66.0, 78.0]], "weights": {"running": 1.0}}
 WEAR_KEYS = {"max_wear_rate": 1e-9, "wear_coefficient": 1e-12}
 DAMPING_KEYS = {"min_damping": {"ratio": 0.02, "amplitude": 3.0}}
+QUALITY_KEYS = {"quality_factor": {"amplitude": 3.0}, "weights": {"quality": 1.0}}
+
+LIFE = {"hours": 1e-4, "coefficient": 1e-11, "area": 2e-4, "load_loss_per_depth": 4e6}
+WORN_KEYS = {"worn": LIFE, "weights": {"worn": 1.0}}
 
 
 def two_dof(**values: float) -> Scene:
@@ -43,8 +50,11 @@ def row_of(quantity: Criterion, keys: dict[str, Any], design: dict[str, float] =
         (RUNNING, {"running_rpm": [50.0], "max_running_amplitude": 1.0}),
         (WEAR_RATE, WEAR_KEYS),
         (DAMPING, DAMPING_KEYS),
+        (QUALITY, QUALITY_KEYS),
+        pytest.param(WORN, WORN_KEYS, marks=pytest.mark.long),
+        pytest.param(WORN, WORN_KEYS | {"worn": {**LIFE, "frequency_hz": 1.1}}, marks=pytest.mark.long),
     ],
-    ids=["range", "speed", "wear", "damping"],
+    ids=["range", "speed", "wear", "damping", "quality", "worn", "worn at a frequency"],
 )
 def test_gradients_are_differences(quantity: Criterion, keys: dict[str, Any]) -> None:
     row = row_of(quantity, keys)
@@ -54,9 +64,17 @@ def test_gradients_are_differences(quantity: Criterion, keys: dict[str, Any]) ->
         assert row.gradient[i] == pytest.approx((above.value - below.value) / (2.0 * step), rel=1e-5)
 
 
-@pytest.mark.parametrize("keys", [WEAR_KEYS, {"max_friction_work": 1.0}], ids=["wear", "work"])
-def test_second_derivatives_of_wear_are_differences_of_gradients(keys: dict[str, Any]) -> None:
-    quantity = WEAR_RATE if "wear_coefficient" in keys else FRICTION_WORK
+@pytest.mark.parametrize(
+    ("quantity", "keys"),
+    [
+        (WEAR_RATE, WEAR_KEYS),
+        (FRICTION_WORK, {"max_friction_work": 1.0}),
+        (DAMPING, DAMPING_KEYS),
+        (QUALITY, QUALITY_KEYS),
+    ],
+    ids=["wear", "work", "damping", "quality"],
+)
+def test_second_derivatives_are_differences_of_gradients(quantity: Criterion, keys: dict[str, Any]) -> None:
     twice = row_of(quantity, keys).second()
     for i, (path, value) in enumerate(DESIGN.items()):
         step = 1e-4 * value
@@ -132,6 +150,68 @@ def test_the_damping_is_that_of_the_mode() -> None:
     assert row.bound == -0.02
 
 
+def test_the_best_damped_design_is_that_of_a_grid() -> None:
+    """Of free decays the mode's damping is largest there, whatever the peak of the response is."""
+    bounds = {"damper.N0": (20.0, 400.0)}
+    found = optim.design(two_dof(), variables=bounds, harmonics=3, **QUALITY_KEYS)
+    ratios = [
+        mode_at_amplitudes(two_dof(N0=load), np.array([3.0]), (), harmonics=3).damping_ratio[0]
+        for load in np.geomspace(20.0, 400.0, 60)
+    ]
+    assert found.reached, found.status
+    assert found.evaluation is not None
+    assert 0.999 * 0.5 / max(ratios) <= found.evaluation.objective <= 0.5 / max(ratios) * (1.0 + 1e-9)
+
+
+def test_the_gradient_of_a_worn_peak_is_that_of_lives_beside() -> None:
+    worn = {**LIFE, "frequency_hz": 1.1, "most": 3.0}
+    problem = pose(two_dof(), variables={"damper.N0": (20.0, 400.0)}, harmonics=1, worn=worn)
+    low, here, high = (evaluate(problem, {"damper.N0": load}).of(WORN)[0] for load in (104.99, 105.0, 105.01))
+    assert here.gradient[0] == pytest.approx((high.value - low.value) / 0.02, rel=1e-5)
+    assert here.bound == 3.0
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("more", [{}, {"from_hours": 0.0}, {"largest_factor": 2.0}])
+def test_the_best_load_for_a_life_is_that_of_a_grid_of_lives(more: dict[str, float]) -> None:
+    """The loads along a life, and the peak of the scene with each of them looked at by itself."""
+    bounds, hours = {"damper.N0": (100.0, 200.0)}, 2e-4
+    keys = {"worn": {**LIFE, "hours": hours, **more}, "weights": {"worn": 1.0}}
+    found = optim.design(two_dof(), variables=bounds, harmonics=1, **keys)
+    assert found.reached, found.status
+    assert found.evaluation is not None
+    factors = np.linspace(1.0, more.get("largest_factor", 1.0), 4)
+
+    def worst(load: float) -> float:
+        law = solver.WearLaw(1e-11, 2e-4, load_loss_per_depth=4e6)
+        mission = solver.Mission(hours * factors[-1])
+        life = solver.wear_life(two_dof(N0=load), mission, law, points=9, harmonics=1)
+        counts = life.hours >= more.get("from_hours", hours * (1.0 - 1e-9))
+        worn = [
+            solver.sweep(two_dof(N0=float(left)), harmonics=1).peak.value for left in life.loads[0][counts]
+        ]
+        return max(worn)
+
+    best = found.optimum["damper.N0"]
+    assert worst(best) == pytest.approx(found.evaluation.objective, rel=1e-5)
+    assert all(worst(best * share) > found.evaluation.objective for share in (0.97, 1.03))
+
+
+@pytest.mark.long
+def test_a_limit_on_the_worn_peak_holds_a_design() -> None:
+    """The least peak when new wears above the limit: the best design that does not is the one just on it."""
+    bounds = {"damper.N0": (60.0, 200.0)}
+    free = optim.design(two_dof(), variables=bounds, harmonics=1, worn=LIFE)
+    assert free.evaluation is not None
+    (worn,) = free.evaluation.of(WORN)
+    most = 0.5 * (worn.value + free.evaluation.peaks[0].value)
+    held = optim.design(two_dof(), variables=bounds, harmonics=1, worn={**LIFE, "most": most})
+    assert held.reached, held.status
+    assert held.evaluation is not None
+    assert held.evaluation.of(WORN)[0].value == pytest.approx(most, rel=1e-5)
+    assert any("worn peak" in one for one in held.active)
+
+
 def test_the_mass_is_that_of_the_bodies() -> None:
     scene = solver.load_scene("platform-wedge")
     names = [body.name for body in scene.bodies]
@@ -165,6 +245,15 @@ def test_the_mass_is_that_of_the_bodies() -> None:
         ({"min_damping": {"ratio": 0.1}}, "/min_damping", "must be a table with `ratio`, `amplitude`"),
         ({"min_damping": {"ratio": 0.1, "amplitude": 1.0, "mode": 9}}, "/min_damping/mode", "mode"),
         ({"min_damping": {"ratio": 0.1, "amplitude": -1.0}}, "/min_damping/amplitude", "> 0"),
+        ({"weights": {"worn": 1.0}}, "/weights/worn", "needs `worn`"),
+        ({"worn": {"hours": 1.0}}, "/worn", "must be a table with hours, coefficient, area"),
+        ({"worn": {**LIFE, "hour": 1.0}}, "/worn/hour", "is not known"),
+        ({"worn": {**LIFE, "hours": -1.0}}, "/worn/hours", "must be a number > 0"),
+        ({"worn": {**LIFE, "area": {"rim": 1.0}}}, "/worn/area/rim", "rim"),
+        ({"worn": {**LIFE, "from_hours": 9.0}}, "/worn/from_hours", "must be from 0 to"),
+        ({"weights": {"quality": 1.0}}, "/weights/quality", "needs `quality_factor`"),
+        ({"quality_factor": {"most": 9.0}}, "/quality_factor", "must be a table with `amplitude`"),
+        ({"quality_factor": {"amplitude": 1.0, "ratio": 1.0}}, "/quality_factor/ratio", "is not known"),
         ({"max_mass": 1.0}, "/max_mass", "needs `bodies`"),
         ({"weights": {"mass": 1.0}}, "/weights/mass", "needs `bodies`"),
     ],

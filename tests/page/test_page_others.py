@@ -27,6 +27,7 @@ def test_a_kind_without_a_view_has_a_form_and_a_result(browser: Browser, site: S
             "solve",
             "margin",
             "mistuning",
+            "posterior",
             "worst-mistuning",
             "controlled",
             "sensitivities",

@@ -70,6 +70,18 @@ BODIES: dict[str, dict[str, Any]] = {
     "margin": {"scene": "two-dof", "from": 20, "to": 120, "points": 3, "limit": 2.0, "harmonics": 3},
     "sensitivities": {"scene": "two-dof", "harmonics": 3},
     "plan": {"scene": "two-dof"},
+    "posterior": {
+        "scene": {
+            "name": "rig",
+            "structure": {
+                "kind": "lumped", "masses": {"m": 1.0},
+                "springs": [{"between": ["m", "ground"], "k": 41.0, "c": 0.5}],
+            },
+            "excitation": {"dof": "m", "amplitude": 2.0}, "observe": {"dof": "m", "band": [0.8, 1.3]},
+        },
+        "data": [{"frequency": [0.9, 1.0, 1.1], "amplitude": [0.22, 0.56, 0.27], "sd": [0.02, 0.02, 0.02]}],
+        "unknowns": {"excitation.amplitude": [1.0, 3.0]}, "harmonics": 1, "starts": 1, "draws": 160,
+    },
     "identify": {
         "scene": "two-dof", "unknowns": {"damper.N0": [20, 500]}, "harmonics": 3, "starts": 1,
         "data": [{"frequency": [0.9, 1.0, 1.1], "amplitude": [0.85, 1.95, 2.1]}],

@@ -53,6 +53,13 @@ def asked(kind: str, name: str) -> dict[str, Any]:
         "campbell": {"speeds_rpm": [[60 * middle, 61 * middle]]}, "interference": {"speed_rpm": 3000},
         "worst-mistuning": {"of": [scene.observe.dof], "starts": 1, "climbs": 1, "climb": 1, **near},
         "mistuning": {"of": [scene.observe.dof], "samples": 1, **near}, "modes": {"from": 1e-5, "to": 2e-5},
+        "posterior": {
+            "data": [{
+                "frequency": at, "amplitude": [_height(scene, one) for one in at],
+                "sd": [1e-3 * _height(scene, one) for one in at],
+            }],
+            "unknowns": {FORCE: ends}, "starts": 1, "draws": 100, "sampler": "importance",
+        },
         "identify": {
             "data": [{"frequency": at, "amplitude": [_height(scene, one) for one in at]}],
             "unknowns": {FORCE: ends}, "starts": 1,

@@ -17,6 +17,24 @@ DISK = solver.load_scene("bladed-disk").to_dict()
 SMALL_DISK = {**DISK, "structure": {**DISK["structure"], "sectors": 3}}
 OVER = {**TWO, "parameter": "damper.N0", "from": 60, "to": 90}
 MARCH = {"scene": "two-dof", "frequency_hz": 1.2}
+LINEAR = {
+    "name": "rig",
+    "structure": {
+        "kind": "lumped",
+        "masses": {"m": 1.0},
+        "springs": [{"between": ["m", "ground"], "k": 41.0, "c": 0.5, "name": "spring"}],
+    },
+    "excitation": {"dof": "m", "amplitude": 2.0},
+    "observe": {"dof": "m", "band": [0.8, 1.3]},
+}
+MEASURED: dict[str, Any] = {
+    "scene": LINEAR,
+    "harmonics": 1,
+    "data": [{"frequency": [0.9, 1.0, 1.1], "amplitude": [0.22, 0.56, 0.27], "sd": [0.02, 0.02, 0.02]}],
+    "unknowns": {"excitation.amplitude": [1.0, 3.0]},
+    "starts": 1,
+}
+DRAWN = {**MEASURED, "draws": 100, "sampler": "importance"}
 BODIES: dict[str, tuple[str, Mapping[str, Any]]] = {
     "solve": ("solve", {**TWO, "frequency_hz": 1.2}),
     "solve for all": ("solve", {**TWO, "frequency_hz": 1.2, "all": True, "starts": 2}),
@@ -50,14 +68,15 @@ BODIES: dict[str, tuple[str, Mapping[str, Any]]] = {
         "accuracy",
         {"scene": "two-dof", "frequency_hz": 1.2, "harmonics": [1, 3], "samples": [16], "repeats": 1},
     ),
-    "identify": (
-        "identify",
-        {
-            **TWO,
-            "data": [{"frequency": [1.0, 1.2, 1.4], "amplitude": [1.93, 1.77, 1.25]}],
-            "unknowns": {"damper.mu": [0.1, 0.6]},
-            "starts": 1,
-        },
+    "identify": ("identify", MEASURED),
+    "posterior": ("posterior", DRAWN),
+    "posteriors of models": (
+        "posterior",
+        {**DRAWN, "models": {"softer": {"scene": LINEAR, "unknowns": {"structure.spring": [38, 43]}}}},
+    ),
+    "posterior of assemblies": (
+        "posterior",
+        {**DRAWN, "data": 3 * MEASURED["data"], "varied": ["excitation.amplitude"], "assemblies": [0, 1, 2]},
     ),
     "march": ("march", {**MARCH, "history": True}),
     "wear": (
@@ -78,6 +97,19 @@ BODIES: dict[str, tuple[str, Mapping[str, Any]]] = {
         {
             "scene": "two-dof",
             "frequency_hz": 1.05,
+            "second_hz": 1.3821,
+            "amplitude": 60,
+            "harmonics": 3,
+            "turns": 24,
+        },
+    ),
+    "a curve over two frequencies": (
+        "quasi-periodic",
+        {
+            "scene": "two-dof",
+            "frequency_hz": 1.04,
+            "to_hz": 1.06,
+            "points": 2,
             "second_hz": 1.3821,
             "amplitude": 60,
             "harmonics": 3,

@@ -24,12 +24,15 @@ OF_THE_COMMAND = {"--set", "--plot", "--out", "--json", "--report", "--uncertain
 BESIDES = {
     "solve": ("solver:solve_all",), "design": ("optim:robust_design",), "sensitivities": (),
     "modes": ("solver:limit_cycles",), "wear": ("solver:least_worn_peak",),
+    "quasi-periodic": ("solver:quasi_periodic_curve",),
+    "posterior": ("optim:compare_models", "optim:reassemblies"),
 }  # fmt: skip
 # Keys that Python takes otherwise: as one of three words, as a pair, or by a function of its own.
 OTHERWISE: Mapping[str, set[str]] = {
     "controlled": {"no_stability"}, "march": {"history"}, "solve": {"every", "certify"},
-    "peaks": {"certify"}, "design": {"certify", "options"},
-    "sweep": {"multipliers", "switched"}, "wear": {"parameter", "start", "stop", "factors"},
+    "peaks": {"certify"}, "design": {"certify", "options"}, "sweep": {"multipliers", "switched"},
+    "quasi-periodic": {"to_hz"}, "posterior": {"varied", "assemblies", "models"},
+    "wear": {"parameter", "start", "stop", "factors"},
     "modes": {
         "start", "stop", "performance", "aero_damping", "motions", "exact_peaks", "disturbance",
         "phase_resonance",
@@ -80,7 +83,10 @@ def test_every_face_has_the_same_keys(name: str) -> None:
     flags = {made[key].flag for key in own}
     command = TOP[name].function()
     taken = set(options_of(command)) - OF_THE_COMMAND
-    if name == "identify":  # measured data are files, an argument of the command, and what their columns are
+    if name in (
+        "identify",
+        "posterior",
+    ):  # measured data are files, an argument of the command, and what their columns are
         flags = flags - {"--data"} | {"--column"}
     if issubclass(study, ProblemRequest):  # tables stand in the problem file alone
         flags = {one.flag for one in options(study).values()}

@@ -1,14 +1,22 @@
 """The kind `decay`: the amplitude of a ring-down over time.
 
-The motion stays on the nonlinear mode while it decays. Averaged over a period its action J = ½ ω a² falls by
-what is dissipated, dJ/dt = −2 ζ ω J (N. N. Bogoliubov, Y. A. Mitropolsky, Asymptotic Methods in the Theory of
-Non-Linear Oscillations, 1961, chapter 1), so that with s = ln a
+The motion stays on the nonlinear mode while it decays, and its energy E falls by what is dissipated. With s =
+ln a and the mode's damping ratio that is ω³ζa² a second, so that
 
-    ds/dt = −ζ(a) ω(a) / (1 + ½ d ln ω/ds),
+    ds/dt = −ζ(a) ω(a) / g,     g = (dE/ds) / (ω a)².
 
-right to the order of ζ; a frequency that falls with the amplitude makes it decay faster. So t + c = τ(s), the
-integral from the largest amplitude down. ln(ζω) and ln ω of the mode at evenly spaced s go through cubic
-splines, which are linear in their values: derivatives by parameters are those of the same splines.
+Of springs that store what they take, E is an integral of ω dJ with the action J = ½ ω a² (N. N. Bogoliubov,
+Y. A. Mitropolsky, Asymptotic Methods in the Theory of Non-Linear Oscillations, 1961, chapter 1), and g = 1 +
+½ d ln ω/ds. Friction under loads that stand stores less. Unloading follows the backbone f(x) doubled (G.
+Masing, 1926), so that a cycle whose amplitude falls by Δa is not closed, and takes a f'(a) Δa besides the
+area of the loop: at the reversal dE = a (k + f'(a)) da. The losses tell f': of a closed loop W = 8∫f da −
+4 a f, so that f'' = −W''/(4a), and with η = W/a²
+
+    ω² g = ω₀² − ¼ dη/ds − ¾ η − ½ ∫η ds,      η = 2π (ζω² − ζ₀ω₀ω),
+
+from the smallest amplitude up, where what dissipates is viscous. The frequency of what decays is ω √(1 − ζ²).
+So t + c = τ(s), the integral from the largest amplitude down. ln(ζω), ln ω and g at evenly spaced s go
+through cubic splines, which are linear in their values: derivatives by parameters are those of the same.
 
 When the decay began nobody knows as well as the rest of it: the shift c of each run is fitted to its
 amplitudes for every value of the parameters, and what is left is a function of these alone, with its exact
@@ -19,7 +27,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -30,6 +38,7 @@ from optim.identification.data.measured import Column, DataKind, MeasuredRows, P
 from optim.identification.data.mode import SHARPER, WORDS, FollowedMode, checked_mode
 from optim.identification.data.table import Dimension, Table, check_monotone
 from optim.problem.variables import Real
+from solver.balance.simplifications import even_harmonics_reason
 from solver.modes.at_amplitudes import ModePoints
 from solver.scene.scene import Scene
 
@@ -90,6 +99,7 @@ class _Course:
     tau: Annotated[Real, "Time since the largest [s] and its derivatives by the paths, (g, 1 + n_paths)."]
     damping: Annotated[CubicSpline, "ln(ζω) and its derivatives by the paths over s, (1 + n_paths,)."]
     frequency: Annotated[CubicSpline, "ln ω and its derivatives likewise."]
+    stored: Annotated[CubicSpline, "g and its derivatives likewise."]
 
     def at(self, t: Real) -> _Along:
         """Return the course at times."""
@@ -101,18 +111,30 @@ class _Course:
         paces = self.paces(s)
         speed = -1.0 / paces[:, 0]
         by_paths = -speed[:, None] * self._time(s, before)[:, 1:]
-        softer = 1.0 + 0.5 * self.frequency(s, 1)[:, 0]
-        bend = speed * (self.damping(s, 1)[:, 0] - 0.5 * self.frequency(s, 2)[:, 0] / softer)
+        bend = speed * (self.damping(s, 1) - self.stored(s, 1) / self.stored(s))[:, 0]
         by_speed = bend[:, None] * by_paths - speed[:, None] * paces[:, 1:] / paces[:, :1]
         return _Along(s=s, speed=speed, by_paths=by_paths, bend=bend, speed_by_paths=by_speed)
 
     def paces(self, s: Real) -> Real:
         """Return −dτ/ds and its derivatives by the paths, (m, 1 + n_paths)."""
-        damping, softer = self.damping(s), 0.5 * self.frequency(s, 1)
+        damping, stored = self.damping(s), self.stored(s)
         pace = np.exp(-damping[:, :1])
-        found = pace * (softer - (1.0 + softer[:, :1]) * damping)
-        found[:, :1] = pace * (1.0 + softer[:, :1])
+        found = pace * (stored - stored[:, :1] * damping)
+        found[:, :1] = pace * stored[:, :1]
         return np.asarray(found)
+
+    def hertz(self, along: _Along) -> tuple[Real, Real]:
+        """Return the frequency of the decaying motion [Hz], (m,), and its derivatives by the paths at s."""
+        told, damping = self.frequency(along.s), self.damping(along.s)
+        zeta2 = np.exp(2.0 * (damping[:, 0] - told[:, 0]))
+        hertz = np.exp(told[:, 0]) * np.sqrt(np.maximum(1.0 - zeta2, 0.0)) / (2.0 * math.pi)
+        less = (zeta2 / np.maximum(1.0 - zeta2, 1e-300))[:, None]
+
+        def moved(by: Real, by_damping: Real) -> Real:
+            return np.asarray(hertz[:, None] * (by - less * (by_damping - by)))
+
+        by_s = moved(self.frequency(along.s, 1)[:, :1], self.damping(along.s, 1)[:, :1])
+        return hertz, moved(told[:, 1:], damping[:, 1:]) + by_s * along.by_paths
 
     def _time(self, s: Real, before: np.ndarray) -> Real:
         """Return τ and its derivatives at s by Simpson's rule from the place before, (m, 1 + n_paths)."""
@@ -127,6 +149,8 @@ class _DecayModel(FollowedMode):
     def __init__(self, run: DecayRun, scene: Scene, paths: Sequence[str], harmonics: int) -> None:
         super().__init__(scene, run.mode, run.nodal_diameter, paths, harmonics)
         self._run = run
+        rubs = all(contact.RUBBING for contact in scene.contacts)
+        self._slides = rubs and even_harmonics_reason(scene, paths) is None
         high, low = math.log(_BEGINS * run.range[0]), math.log(run.range[1] / _ENDS)
         self._s = np.linspace(high, low, math.ceil((high - low) / _STEP) + 1)
 
@@ -134,19 +158,16 @@ class _DecayModel(FollowedMode):
         """As the base says."""
         run = self._run
         names, found = self.looked_at({**values, **run.conditions}, np.exp(self._s))
-        course = _course(self._s, found)
+        course = _course(self._s, found, slides=self._slides)
         if course is None:
             n = run.observations.size
             nothing = np.full((n, len(self._paths)), np.nan)
             return Predicted(values=np.full(n, np.nan), slopes=nothing, reached=np.zeros(n, bool))
         shift, by_shift = _shift(course, run)
         along = course.at(run.x + shift)
-        by_paths = along.by_paths + np.outer(along.speed, by_shift)
-        columns = {"modal_amplitude": (np.exp(along.s), np.exp(along.s)[:, None] * by_paths)}
-        told = course.frequency(along.s)
-        hertz = np.exp(told[:, 0]) / (2.0 * math.pi)
-        by_hertz = hertz[:, None] * (told[:, 1:] + course.frequency(along.s, 1)[:, :1] * by_paths)
-        columns["frequency"] = hertz, by_hertz
+        along = replace(along, by_paths=along.by_paths + np.outer(along.speed, by_shift))
+        columns = {"modal_amplitude": (np.exp(along.s), np.exp(along.s)[:, None] * along.by_paths)}
+        columns["frequency"] = course.hertz(along)
         predicted = np.concatenate([columns[name][0] for name in run.data])
         slopes = np.vstack([columns[name][1] for name in run.data])
         near = np.abs(np.nan_to_num(along.s)[:, None] - self._s).argmin(axis=1)
@@ -156,8 +177,11 @@ class _DecayModel(FollowedMode):
         )  # fmt: skip
 
 
-def _course(s: Real, found: ModePoints) -> _Course | None:
-    """Return the course of the time, as far down as the mode was found and dissipates."""
+def _course(s: Real, found: ModePoints, *, slides: bool) -> _Course | None:
+    """Return the course of the time, as far down as the mode was found and dissipates.
+
+    `slides`: contacts are friction under loads that stand, and store as Masing's rule has it.
+    """
     good = np.isfinite(found.damping_ratio) & (found.damping_ratio > 0.0)
     good &= np.isfinite(found.by_frequency).all(axis=1) & np.isfinite(found.by_damping).all(axis=1)
     count = int(np.argmin(np.append(good, False)))
@@ -168,14 +192,34 @@ def _course(s: Real, found: ModePoints) -> _Course | None:
     omega = np.column_stack([np.log(2.0 * math.pi * hertz), by_omega])
     rate = omega + np.column_stack([np.log(zeta), found.by_damping[:count] / zeta[:, None]])
     fine = np.linspace(s[0], s[-1], _FINE * (count - 1) + 1)
+    up, damping, frequency = s[::-1], CubicSpline(s[::-1], rate[::-1]), CubicSpline(s[::-1], omega[::-1])
+    stored = _stored_by_friction(up, rate[::-1], omega[::-1]) if slides else 0.5 * frequency(up, 1)
+    stored[:, 0] += 0.0 if slides else 1.0
     course = _Course(
-        s=fine, tau=np.zeros((fine.size, omega.shape[1])), damping=CubicSpline(s[::-1], rate[::-1]),
-        frequency=CubicSpline(s[::-1], omega[::-1]),
+        s=fine, tau=np.zeros((fine.size, omega.shape[1])), damping=damping, frequency=frequency,
+        stored=CubicSpline(up, stored),
     )  # fmt: skip
     ends, middles = course.paces(fine), course.paces(0.5 * (fine[1:] + fine[:-1]))
     steps = np.diff(-fine)[:, None] / 6.0 * (ends[:-1] + 4.0 * middles + ends[1:])
     np.cumsum(steps, axis=0, out=course.tau[1:])
     return course if (ends[:, 0] > 0.0).all() else None
+
+
+def _stored_by_friction(s: Real, rate: Real, omega: Real) -> Real:
+    """Return g with its derivatives at rising s, (n, 1 + n_paths), of ln(ζω) and ln ω with theirs."""
+
+    def grown(logs: Real) -> Real:
+        """Return e to the power of logarithms, with derivatives."""
+        sizes = np.exp(logs[:, :1])
+        return np.hstack([sizes, sizes * logs[:, 1:]])
+
+    loss = 2.0 * math.pi * (grown(rate + omega) - grown(rate[:1] + omega))
+    of_s = CubicSpline(s, loss)
+    stiff = grown(2.0 * omega[:1]) - 0.25 * of_s(s, 1) - 0.75 * loss - 0.5 * of_s.antiderivative()(s)
+    squares = np.exp(-2.0 * omega[:, :1])
+    found = squares * (stiff - 2.0 * stiff[:, :1] * omega)
+    found[:, :1] = squares * stiff[:, :1]
+    return np.asarray(found)
 
 
 def _shift(course: _Course, run: DecayRun) -> tuple[float, Real]:

@@ -17,12 +17,15 @@ import numpy as np
 from scipy.special import logsumexp
 
 from optim.errors import DesignError
-from optim.identification.posterior.posterior import DRAWS, posterior
-from optim.identification.posterior.result import InBlocks, Posterior
+from optim.identification.posterior.posterior import posterior
+from optim.identification.posterior.result import Posterior
+from optim.identification.posterior.sampling import SAMPLING, Sampling
 from optim.identification.reading import Given
 from optim.problem.numbers import is_number
 from solver.arrays import FloatOrNaN
-from solver.results.told import Block, Piece, ResultTable, Summary
+from solver.results.base import Drawn
+from solver.results.told import Piece
+from solver.results.views import Data, Views
 from solver.results.watch import OnProgress, ShouldStop, part_of, shows_progress
 from solver.scene.scene import Scene
 
@@ -53,10 +56,16 @@ class ModelEvidence(Piece):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class ModelChoice(InBlocks):
+class ModelChoice(Drawn):
     """Models, the most probable first."""
 
-    JSON: ClassVar = "status models"
+    VIEWS: ClassVar = Views("optim.views", "posterior:model_choice", "posteriors:model_choice_figure")
+    DATA: ClassVar = Data(
+        "model-choice", {"model=models": "model=name probability probability_error"
+        " log_evidence=posterior.log_evidence log_evidence_error=posterior.log_evidence_error"},
+        scene="",
+    )  # fmt: skip
+    JSON: ClassVar = "reached status models"
 
     status: Annotated[ChoiceStatus, "How it ended."]
     models: Annotated[tuple[ModelEvidence, ...], "The most probable first; as given without probabilities."]
@@ -66,19 +75,6 @@ class ModelChoice(InBlocks):
         """The most probable model; None without probabilities."""
         return None if self.status is ChoiceStatus.UNKNOWN else self.models[0]
 
-    def blocks(self) -> Sequence[Block]:
-        """As the base says."""
-        rows = []
-        for one in self.models:
-            found = one.posterior
-            rows.append((
-                one.name, f"{one.probability:.3g}", f"{one.probability_error:.1g}",
-                f"{found.log_evidence:.4g} ± {found.log_evidence_error:.2g}", f"{100.0 * found.noise:.3g} %",
-                "does not describe the data" if found.misfit else "",
-            ))  # fmt: skip
-        heads = ("model", "probability", "± error", "ln evidence", "noise", "")
-        return ResultTable("models", heads, rows), Summary("", [("status", self.status.value)])
-
 
 @shows_progress("models")
 def compare_models(
@@ -86,11 +82,7 @@ def compare_models(
     data: Sequence[Given],
     *,
     weights: Mapping[str, float] | None = None,
-    noise: float | None = None,
-    harmonics: int = 11,
-    starts: int = 16,
-    seed: int = 0,
-    draws: int = DRAWS,
+    sampling: Sampling = SAMPLING,
     on_progress: OnProgress = None,
     should_stop: ShouldStop = None,
 ) -> ModelChoice:
@@ -99,7 +91,7 @@ def compare_models(
     Parameters
     ----------
     models : name to (scene, unknowns within bounds): such as Coulomb, Iwan and a contact in space.
-    data, noise, harmonics, starts, seed, draws : as of `posterior`; the same for every model.
+    data, sampling : as of `posterior`; the same for every model.
     weights : how probable each model is before the data, relative to the others; equal if left out.
     on_progress, should_stop : as of `identify`.
 
@@ -118,10 +110,9 @@ def compare_models(
     for i, (name, (scene, unknowns)) in enumerate(models.items()):
         progress = part_of(on_progress, i / len(models), (i + 1) / len(models), i)
         found[name] = posterior(
-            scene, data, unknowns, noise=noise, harmonics=harmonics, starts=starts, seed=seed, draws=draws,
-            sampler="importance", on_progress=progress, should_stop=should_stop,
-        )  # fmt: skip
-    return _chosen(found, before, seed)
+            scene, data, unknowns, sampling=sampling, on_progress=progress, should_stop=should_stop
+        )
+    return _chosen(found, before, sampling.seed)
 
 
 def _chosen(found: Mapping[str, Posterior], before: Mapping[str, float], seed: int) -> ModelChoice:

@@ -11,24 +11,21 @@ from typing import Annotated
 import numpy as np
 
 from optim.errors import DesignError
-from optim.identification.fit import LEAST_LEVEL, STARTS, LocalFit, Noise, Runs, search
-from optim.identification.identify import check_fit, misfit_of
+from optim.identification.fit import LEAST_LEVEL, LocalFit, Noise, Runs, search
+from optim.identification.identify import misfit_of
 from optim.identification.information import information
 from optim.identification.posterior.importance import TRUSTED, Weighted, importance
 from optim.identification.posterior.nuts import CHAINS, ENOUGH, nuts
 from optim.identification.posterior.result import Marginal, Posterior, PosteriorStatus
+from optim.identification.posterior.sampling import SAMPLING, Sampling
 from optim.identification.posterior.target import Target
 from optim.identification.reading import Given, read_data
 from optim.identification.unknowns import read_unknowns
-from optim.problem.numbers import is_number
 from optim.problem.variables import Real
 from solver.balance.parameter import resolve
 from solver.results.watch import OnProgress, ShouldStop, shows_progress
 from solver.scene.scene import Scene
 
-SAMPLERS = ("auto", "importance", "nuts")
-DRAWS = 600
-_FEWEST, _MOST = 100, 100_000
 _WORTH = 100.0  # independent draws below which importance sampling has failed
 _WARM = 100  # draws of a chain that find its step
 _LOST = 0.01  # share of places that may be lost
@@ -53,12 +50,7 @@ def posterior(
     *,
     scaling: Mapping[str, str] | None = None,
     priors: Mapping[str, Sequence[float]] | None = None,
-    noise: float | None = None,
-    harmonics: int = 11,
-    starts: int = STARTS,
-    seed: int = 0,
-    draws: int = DRAWS,
-    sampler: str = "auto",
+    sampling: Sampling = SAMPLING,
     on_progress: OnProgress = None,
     should_stop: ShouldStop = None,
 ) -> Posterior:
@@ -68,44 +60,32 @@ def posterior(
 
     Parameters
     ----------
-    scene, data, unknowns, scaling, priors, noise, harmonics, starts, seed : as of `identify`.
-    draws : how many samples; as many evaluations of all runs by importance, several times as many by NUTS.
-    sampler : ``importance``, adaptive importance sampling from the optimum; ``nuts``, four chains of the
-        no-U-turn sampler; ``auto``, the latter where the diagnosis of the former fails.
+    scene, data, unknowns, scaling, priors : as of `identify`.
+    sampling : noise, harmonics, starts and draws.
     on_progress, should_stop : as of `identify`.
 
     Raises
     ------
     DataError, DesignError, SettingError
-        As `identify`; draws or a sampler that cannot be; data without noise when none is given.
+        As `identify`; data without noise when none is given.
     """
     begun = time.perf_counter()
     known = read_unknowns(scene, unknowns, scaling, priors)
-    check_fit(noise, starts, seed, harmonics)
-    _check(draws, sampler)
-    runs, told = (
-        Runs(scene, read_data(scene, data, known.paths), known, harmonics),
-        Noise(level=noise, robust=False),
-    )
-    found = search(runs, told, starts=starts, seed=seed, on_progress=on_progress, should_stop=should_stop)
+    runs = Runs(scene, read_data(scene, data, known.paths), known, sampling.harmonics)
+    found = search(
+        runs, Noise(level=sampling.noise, robust=False), starts=sampling.starts, seed=sampling.seed,
+        on_progress=on_progress, should_stop=should_stop,
+    )  # fmt: skip
     if found.best is None:
         stopped = should_stop is not None and should_stop()
         nothing = PosteriorStatus.STOPPED if stopped else PosteriorStatus.NO_FIT
         return _result(runs, _none(len(known)), nothing, "", math.nan, begun)
-    result = sampled(runs, found.best, told, draws=draws, sampler=sampler, seed=seed)
+    result = sampled(runs, found.best, sampling)
     return replace(result, seconds=time.perf_counter() - begun)
 
 
-def _check(draws: int, sampler: str) -> None:
-    whole = isinstance(draws, (int, np.integer)) and is_number(draws)
-    if not whole or not _FEWEST <= draws <= _MOST:
-        raise DesignError("draws", draws, f"must be a whole number from {_FEWEST} to {_MOST}")
-    if sampler not in SAMPLERS:
-        raise DesignError("sampler", sampler, f"must be one of {', '.join(SAMPLERS)}")
-
-
-def sampled(runs: Runs, best: LocalFit, told: Noise, *, draws: int, sampler: str, seed: int) -> Posterior:
-    """Return the posterior about a fit; arguments as of `posterior`.
+def sampled(runs: Runs, best: LocalFit, sampling: Sampling) -> Posterior:
+    """Return the posterior about a fit.
 
     Raises
     ------
@@ -114,17 +94,17 @@ def sampled(runs: Runs, best: LocalFit, told: Noise, *, draws: int, sampler: str
     """
     begun = time.perf_counter()
     if best.level <= LEAST_LEVEL:
-        raise DesignError("noise", told.level, "must be given: the data show none")
+        raise DesignError("noise", sampling.noise, "must be given: the data show none")
     level_known = best.level == 1.0
     info = information(runs, best, robust=False, level_known=level_known)
     misfit = misfit_of(runs, best, info, robust=False)
-    noise = best.level if not level_known else math.nan if told.level is None else told.level
+    noise = best.level if not level_known else math.nan if sampling.noise is None else sampling.noise
     if not best.active.all():
         return _result(runs, _none(len(runs.unknowns)), PosteriorStatus.LOST, misfit, noise, begun)
-    target = Target(runs, best, told.level)
+    target = Target(runs, best, sampling.noise)
     before = target.evaluations
     mode = target.mode()
-    drawn = _none(target.dimensions) if mode is None else _drawn(target, *mode, draws, sampler, seed)
+    drawn = _none(target.dimensions) if mode is None else _drawn(target, *mode, sampling)
     status = PosteriorStatus.MODEL_DOUBTFUL if misfit else PosteriorStatus.SAMPLED
     if not len(drawn.x):
         status = PosteriorStatus.UNRELIABLE
@@ -138,9 +118,9 @@ def _none(n: int) -> _Sampled:
     return _Sampled(x=np.zeros((0, n)), weighted=None, sampler="")
 
 
-def _drawn(target: Target, mode: Real, covariance: Real, draws: int, sampler: str, seed: int) -> _Sampled:
+def _drawn(target: Target, mode: Real, covariance: Real, sampling: Sampling) -> _Sampled:
     """Return draws of a target by the sampler asked for."""
-    rng = np.random.default_rng(seed)
+    draws, sampler, rng = sampling.draws, sampling.sampler, np.random.default_rng(sampling.seed)
     weighted = None
     if sampler != "nuts":
         weighted = importance(target.log, mode, covariance, draws, rng)

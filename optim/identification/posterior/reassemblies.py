@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Annotated, ClassVar
 
@@ -25,14 +25,16 @@ from scipy.optimize import minimize
 
 from optim.errors import DesignError
 from optim.identification.posterior.importance import TRUSTED, importance
-from optim.identification.posterior.posterior import DRAWS, posterior
-from optim.identification.posterior.result import InBlocks, Marginal, Posterior
+from optim.identification.posterior.posterior import posterior
+from optim.identification.posterior.result import Marginal, Posterior
+from optim.identification.posterior.sampling import SAMPLING, Sampling
 from optim.identification.reading import Given
 from optim.identification.unknowns import Unknowns, read_unknowns
 from optim.problem.variables import Real
 from solver.arrays import FloatOrNaN
 from solver.balance.parameter import resolve
-from solver.results.told import Block, ResultTable, Summary
+from solver.results.base import Drawn
+from solver.results.views import Data, Views
 from solver.results.watch import OnProgress, ShouldStop, part_of, shows_progress
 from solver.scene.scene import Scene
 
@@ -52,9 +54,14 @@ class ReassemblyStatus(Enum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class Population(InBlocks):
+class Population(Drawn):
     """A population of assemblies."""
 
+    VIEWS: ClassVar = Views("optim.views", "posterior:population", "posteriors:posterior_figure")
+    DATA: ClassVar = Data(
+        "population", {"parameter=middles": "parameter=name mean sd low high", "draw parameter": "samples"},
+        rows=("draw",),
+    )  # fmt: skip
     JSON: ClassVar = "scene reached status middles spreads varied names samples pareto_k assemblies seconds"
 
     scene: Annotated[str, "Its name."]
@@ -73,25 +80,9 @@ class Population(InBlocks):
     seconds: Annotated[float, "Time taken [s]."]
 
     @property
-    def reached(self) -> bool:
-        """Whether the samples can be used."""
-        return self.status is ReassemblyStatus.KNOWN
-
-    @property
     def uncertain(self) -> list[dict[str, float]]:
         """Scenarios for a robust design: at most 32 assemblies that may come."""
         return [dict(zip(self.names, row, strict=True)) for row in self.samples[:_SCENARIOS].tolist()]
-
-    def blocks(self) -> Sequence[Block]:
-        """As the base says."""
-        heads = ("parameter", "mean", "± sd", "90 % interval")
-        rows = [one.row() for one in self.middles]
-        spreads = [one.row() for one in self.spreads]
-        return (
-            ResultTable(f"{self.scene}, {len(self.assemblies)} assemblies: medians", heads, rows),
-            ResultTable("spread over assemblies", heads, spreads),
-            Summary("", [("status", self.status.value)]),
-        )
 
 
 @shows_progress("reassemblies")
@@ -102,11 +93,7 @@ def reassemblies(
     varied: Sequence[str],
     *,
     scaling: Mapping[str, str] | None = None,
-    noise: float | None = None,
-    harmonics: int = 11,
-    starts: int = 16,
-    seed: int = 0,
-    draws: int = DRAWS,
+    sampling: Sampling = SAMPLING,
     on_progress: OnProgress = None,
     should_stop: ShouldStop = None,
 ) -> Population:
@@ -118,7 +105,7 @@ def reassemblies(
     data : of each assembly, at least three, its files or tables as of `identify`.
     unknowns : path to (low, high); wide enough that every assembly lies well within.
     varied : those of the unknowns that each assembly has a value of its own of.
-    scaling, noise, harmonics, starts, seed, draws : as of `posterior`.
+    scaling, sampling : as of `posterior`; each assembly has a seed of its own.
     on_progress, should_stop : as of `identify`.
 
     Raises
@@ -137,12 +124,12 @@ def reassemblies(
     found = []
     for i, one in enumerate(data):
         progress = part_of(on_progress, i / len(data), (i + 1) / len(data), i)
+        own = replace(sampling, seed=sampling.seed + i)  # else what few draws are wrong by is alike in all
         found.append(posterior(
-            scene, one, unknowns, scaling=scaling, noise=noise, harmonics=harmonics, starts=starts,
-            seed=seed + i,  # else what few draws are wrong by would be alike in all
-            draws=draws, on_progress=progress, should_stop=should_stop,
+            scene, one, unknowns, scaling=scaling, sampling=own, on_progress=progress,
+            should_stop=should_stop,
         ))  # fmt: skip
-    return population(scene, known, varied, found, seed=seed, begun=begun)
+    return population(scene, known, varied, found, seed=sampling.seed, begun=begun)
 
 
 def population(

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-from abc import abstractmethod
-from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 from typing import Annotated, ClassVar
@@ -12,7 +10,9 @@ from typing import Annotated, ClassVar
 import numpy as np
 
 from solver.arrays import FloatOrNaN, Real
-from solver.results.told import Block, Piece, ResultTable, Summary
+from solver.results.base import Drawn
+from solver.results.told import Piece
+from solver.results.views import Data, Views
 
 LEVEL = 0.9
 _SCENARIOS = 32
@@ -59,32 +59,26 @@ class Marginal(Piece):
             name=name, unit=unit, mean=float(draws.mean()), sd=float(draws.std()), interval=(low, high)
         )
 
-    def row(self) -> tuple[str, ...]:
-        """Return it as cells of a table."""
-        low, high = self.interval
-        told = f"{self.mean:.6g} {self.unit}".rstrip(), f"{self.sd:.2g}", f"{low:.6g} to {high:.6g}"
-        return (self.name, *(told if math.isfinite(self.mean) else ("not told", "", "")))
+    @property
+    def low(self) -> float:
+        """Lower end of the interval."""
+        return self.interval[0]
 
-
-class InBlocks(Piece):
-    """A result that is told by its tables."""
-
-    __slots__ = ()
-
-    @abstractmethod
-    def blocks(self) -> Sequence[Block]:
-        """What people read of it."""
-
-    def summary(self) -> Summary:
-        """The tables as names with values."""
-        blocks = self.blocks()
-        return Summary(blocks[0].title, tuple(pair for block in blocks for pair in block.pairs))
+    @property
+    def high(self) -> float:
+        """Upper end of it."""
+        return self.interval[1]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class Posterior(InBlocks):
+class Posterior(Drawn):
     """The posterior of unknowns."""
 
+    VIEWS: ClassVar = Views("optim.views", "posterior:posterior", "posteriors:posterior_figure")
+    DATA: ClassVar = Data(
+        "posterior", {"parameter=marginals": "parameter=name mean sd low high", "draw parameter": "samples"},
+        "sampler", rows=("draw",),
+    )  # fmt: skip
     JSON: ClassVar = (
         "scene reached status marginals log_evidence log_evidence_error sampler pareto_k r_hat effective"
         " misfit noise names samples evaluations seconds"
@@ -108,11 +102,6 @@ class Posterior(InBlocks):
     seconds: Annotated[float, "Time taken [s]."]
 
     @property
-    def reached(self) -> bool:
-        """Whether the samples can be used."""
-        return self.status is PosteriorStatus.SAMPLED
-
-    @property
     def uncertain(self) -> list[dict[str, float]]:
         """Scenarios for a robust design: at most 32 of the draws; none unless they can be used."""
         kept = self.samples[:_SCENARIOS] if self.reached else self.samples[:0]
@@ -122,15 +111,3 @@ class Posterior(InBlocks):
         """Return the ends that hold an unknown with a probability, as much below as above."""
         draws = self.samples[:, self.names.index(name)] if self.reached else np.zeros(0)
         return Marginal.of(name, "", draws, level).interval
-
-    def blocks(self) -> tuple[Block, ...]:
-        """What people read of it."""
-        rows = [one.row() for one in self.marginals]
-        pairs = [
-            ("sampler", f"{self.sampler}, worth {self.effective:.0f} draws, {self.evaluations} evaluations"),
-            ("ln evidence", f"{self.log_evidence:.4g} ± {self.log_evidence_error:.2g}"),
-            *([("warning", self.misfit)] if self.misfit else []),
-            ("status", self.status.value),
-        ]
-        heads = ("parameter", "mean", "± sd", "90 % interval")
-        return ResultTable(f"{self.scene}, posterior", heads, rows), Summary("", pairs)

@@ -1,4 +1,4 @@
-"""`stickslip identify`: parameters of a scene from measured responses and hysteresis loops."""
+"""`stickslip identify` and `posterior`: parameters of a scene from measured responses and loops."""
 
 from __future__ import annotations
 
@@ -9,13 +9,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from service.cli.commands.report import SUFFIXES, write
+from service.cli.failures import refused
 from service.cli.options import inputs
 from service.cli.study_command import Keys, Outputs, give, watched
 from service.jobs.studies.identify import Identify
+from service.jobs.studies.posterior import PosteriorStudy
 from solver.scene.descriptions import DISK_LOAD
 
 if TYPE_CHECKING:
-    from optim import Identification
+    from service.jobs.study import Answer
+    from solver.scene.scene import Scene
 
 Data = Annotated[
     list[str],
@@ -69,15 +72,10 @@ def _identify(
     told = inputs.output_path("--report", report, SUFFIXES)
     scene = inputs.scene(name, values)
     asked = {"data": data, **_KEYS.read(given)}
-    with _KEYS.named(), watched(Identify) as watch:
-        if column:
-            from optim.identification.reading import with_columns
-
-            asked["data"] = with_columns(scene, data, column)
-        answer = Identify.compute(scene, asked, watch)
+    answer = _computed(_KEYS, scene, asked, column)
     found: Any = answer.result
     if problem is not None and found.fitted:
-        _write(problem, name, inputs.settings(values), found)
+        _write(problem, name, {**inputs.settings(values), **found.values}, found.uncertain)
     if told is not None:
         from service.rendering.report.sections import Designed
 
@@ -86,6 +84,37 @@ def _identify(
     give(Identify, answer, outputs, scene, as_json=as_json)
 
 
+def _computed(keys: Keys, scene: Scene, asked: dict[str, Any], columns: list[str] | None) -> Answer:
+    """Compute what is asked of files."""
+    study = keys.study
+    if wrong := study.model_construct(**asked).issues(scene):
+        raise refused(wrong, keys.flags)
+    with keys.named(), watched(study) as watch:
+        if columns:
+            from optim.identification.reading import with_columns
+
+            asked = {**asked, "data": with_columns(scene, asked["data"], columns)}
+        return study.compute(scene, asked, watch)
+
+
+def _posterior(
+    name: str, data: list[str], column: list[str] | None, values: list[str] | None, plot: str | None,
+    out: str | None, uncertain: str | None, as_json: bool, **given: Any,
+) -> None:  # fmt: skip
+    outputs = Outputs.asked(plot, out)
+    problem = inputs.output_path("--uncertain", uncertain, (".toml",))
+    scene = inputs.scene(name, values)
+    answer = _computed(_OF_POSTERIOR, scene, {"data": data, **_OF_POSTERIOR.read(given)}, column)
+    kept = getattr(answer.result, "uncertain", None)
+    if problem is not None and kept:
+        _write(problem, name, inputs.settings(values), kept)
+    give(PosteriorStudy, answer, outputs, scene, as_json=as_json)
+
+
+_OF_POSTERIOR = Keys.of(PosteriorStudy, "data")
+posterior = _OF_POSTERIOR.command(
+    _posterior, {"data": Data}, {"column": Columns, "uncertain": Uncertain}, doc=PosteriorStudy.__doc__
+)
 _KEYS = Keys.of(Identify, "data")
 identify = _KEYS.command(
     _identify,
@@ -95,8 +124,8 @@ identify = _KEYS.command(
 )
 
 
-def _write(file: Path, name: str, given: dict[str, float], found: Identification) -> None:
-    """Write the scene with its estimates as a design problem with what is left uncertain."""
+def _write(file: Path, name: str, values: dict[str, float], uncertain: Any) -> None:
+    """Write the scene with values as a design problem with what is left uncertain."""
     from solver.scene.toml import toml_text
 
     there = Path(name)
@@ -105,5 +134,5 @@ def _write(file: Path, name: str, given: dict[str, float], found: Identification
         "Identified parameters, uncertain as the data leave them:",
         f"stickslip design --problem {file.name} --variable PATH LO HI",
     )
-    body = {"scene": scene, "set": {**given, **found.values}, "uncertain": found.uncertain}
+    body = {"scene": scene, "set": values, "uncertain": uncertain}
     file.write_text(toml_text(body, head), encoding="utf-8")

@@ -94,7 +94,7 @@ def join_words(arguments: Sequence[str]) -> list[str]:
 def _several(arguments: Sequence[str]) -> dict[str, int]:
     """How many words follow an option of a command each time, where that is more than one."""
     named = [word for word in arguments[:2] if word != "submit"][:1]
-    if named == ["identify"]:
+    if named in (["identify"], ["posterior"]):
         return {"--unknown": 3, "--prior": 3}
     if not arguments or arguments[0] not in ("design", "pareto", "submit"):
         return {}

@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Collection, Mapping
 from functools import cache, lru_cache
 from importlib.metadata import version
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Protocol
 
 from pydantic import BeforeValidator, Field, WithJsonSchema
 
@@ -62,11 +62,14 @@ SceneReference = Annotated[
 ]
 
 
+SetValues = Annotated[dict[ParameterPath, Number], BeforeValidator(_few)]
+
+
 class SceneRequest(JobRequest):
     """A request about a scene."""
 
     scene: SceneReference = Field(description="Name of a shipped or stored scene, or the scene as an object.")
-    set: Annotated[dict[ParameterPath, Number], BeforeValidator(_few)] = Field(
+    set: SetValues = Field(
         default={}, max_length=MOST_SET, description=f'Values of parameters, {{"{DAMPER_LOAD}": 100}}.'
     )
 
@@ -79,7 +82,19 @@ class HarmonicRequest(SceneRequest):
     )
 
 
-def resolve_scene(request: SceneRequest, source: SceneSource) -> Scene:
+class OfScene(Protocol):
+    """What names a scene and sets values of it."""
+
+    @property
+    def scene(self) -> Any:
+        """Its name, or the scene as an object."""
+
+    @property
+    def set(self) -> Mapping[str, float]:
+        """Values by their paths."""
+
+
+def resolve_scene(request: OfScene, source: SceneSource) -> Scene:
     """The scene of a request with its values set.
 
     Raises

@@ -20,8 +20,8 @@ def warm_up() -> None:
 
 NAMES = (
     "sweep", "map", "peaks", "design", "pareto", "margin", "solve", "march", "transient", "quasi-periodic",
-    "wear", "accuracy", "campbell", "interference", "mistuning", "worst-mistuning", "identify", "modes",
-    "controlled", "sensitivities", "plan",
+    "wear", "accuracy", "campbell", "interference", "mistuning", "worst-mistuning", "identify", "posterior",
+    "modes", "controlled", "sensitivities", "plan",
 )  # fmt: skip
 SHIPPED = Registry([study_named(name).as_kind() for name in NAMES], warm_up)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from pydantic import BeforeValidator, Field
 
@@ -18,6 +18,8 @@ from service.jobs.study import Study
 from solver.errors import Issue, SceneError, SettingError
 
 if TYPE_CHECKING:
+    from optim.identification.data.measured import MeasuredRows
+    from optim.identification.unknowns import Unknowns
     from solver.scene.scene import Scene
 
 MOST_TABLES, MOST_NUMBERS = 200, 200_000
@@ -48,33 +50,10 @@ def identify_result() -> type[KindResult]:
     )()  # fmt: skip
 
 
-class Identify(Study, HarmonicRequest):
-    """Find parameters from measured responses and hysteresis loops.
+class Measured(Study, HarmonicRequest):
+    """Root of the studies that ask measured data about unknowns."""
 
-    Least squares over whole responses, from many starts: estimates with 95 % intervals, what the data do not
-    tell, and which measurement would tell most.
-    """
-
-    EXAMPLES = (
-        {
-            "scene": "two-dof",
-            "harmonics": 3,
-            "starts": 2,
-            "data": [
-                {
-                    "frequency": [1.0, 1.1, 1.2, 1.3, 1.4],
-                    "amplitude": [1.93, 2.12, 1.77, 1.48, 1.25],
-                    "conditions": {"excitation.amplitude": 100.0, "damper.N0": 100.0},
-                }
-            ],
-            "unknowns": {"damper.mu": [0.1, 0.6]},
-        },
-    )
-    NAME, FUNCTION, RESULT = "identify", "optim:identify", identify_result
-    TOLD = "optim.views.tables.identify:identification"
-    SHOWS = "estimates, intervals, what the data do not tell ([identification](identification.md))"
-    EMPTY, COUNTED = ("runs", "there is no fit to draw"), "places"
-    FIGURE = "optim.views.plots.designs:identification_figure"
+    EVALUATIONS: ClassVar[int] = EVALUATIONS
 
     data: Annotated[
         list[dict[str, Any]],
@@ -103,12 +82,6 @@ class Identify(Study, HarmonicRequest):
     noise: Annotated[Annotated[float, Field(strict=True, gt=0.0, lt=1.0)] | None, Flag(metavar="R")] = Field(
         default=None, description="Noise relative to the amplitude; found from the data if left out."
     )
-    robust: bool = Field(default=False, description="Let outliers weigh less (Huber).")
-    candidates: Annotated[dict[ParameterPath, _Values] | None, Flag("--candidate", "PATH=V,V,…")] = Field(
-        default=None,
-        max_length=10,
-        description="Conditions of measurements that could be made next: path to values.",
-    )
     starts: Annotated[int, Field(strict=True, ge=1, le=1000), Flag(metavar="N")] = Field(
         default=16, description="Places within the bounds that are tried."
     )
@@ -120,22 +93,65 @@ class Identify(Study, HarmonicRequest):
         """Return what is too large; what is not is read, as a run will read it, to see what is wrong."""
         columns = [[v for v in table.values() if isinstance(v, list)] for table in self.data]
         points = sum(max(map(len, lists), default=0) for lists in columns)
-        needed, words = EVALUATIONS * max(points, 1), "points of all runs"
-        return balance_issues("data", scene, self.harmonics, needed, words) or self._read(scene)
+        needed, words = self.EVALUATIONS * max(points, 1), "points of all runs"
+        return balance_issues("data", scene, self.harmonics, needed, words) or self.read_issues(scene)
 
-    def _read(self, scene: Scene) -> list[Issue]:
+    def read_issues(self, scene: Scene) -> list[Issue]:
         """Return what is wrong with the whole description, by the pointer of its field."""
         # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
-        from optim.identification.next_measurement import read_candidates
         from optim.identification.reading import read_data
         from optim.identification.unknowns import read_unknowns
 
         try:
             known = read_unknowns(scene, self.unknowns, self.scaling, self.priors)
-            runs = read_data(scene, self.data, known.paths)
-            read_candidates(scene, runs, known, self.candidates)
+            self.look_further(scene, read_data(scene, self.data, known.paths), known)
         except SceneError as error:
             return [issue.at("data") for issue in error.issues]
         except SettingError as error:
             return [error.issue.at(*(error.place or ("data",)))]
         return []
+
+    def look_further(self, _scene: Scene, _runs: tuple[MeasuredRows, ...], _unknowns: Unknowns) -> None:
+        """Raise SceneError or SettingError for what is wrong beyond that."""
+
+
+class Identify(Measured):
+    """Find parameters from measured responses and hysteresis loops.
+
+    Least squares over whole responses, from many starts: estimates with 95 % intervals, what the data do not
+    tell, and which measurement would tell most.
+    """
+
+    EXAMPLES = (
+        {
+            "scene": "two-dof",
+            "harmonics": 3,
+            "starts": 2,
+            "data": [
+                {
+                    "frequency": [1.0, 1.1, 1.2, 1.3, 1.4],
+                    "amplitude": [1.93, 2.12, 1.77, 1.48, 1.25],
+                    "conditions": {"excitation.amplitude": 100.0, "damper.N0": 100.0},
+                }
+            ],
+            "unknowns": {"damper.mu": [0.1, 0.6]},
+        },
+    )
+    NAME, FUNCTION, RESULT = "identify", "optim:identify", identify_result
+    TOLD = "optim.views.tables.identify:identification"
+    SHOWS = "estimates, intervals, what the data do not tell ([identification](identification.md))"
+    EMPTY, COUNTED = ("runs", "there is no fit to draw"), "places"
+    FIGURE = "optim.views.plots.designs:identification_figure"
+
+    robust: bool = Field(default=False, description="Let outliers weigh less (Huber).")
+    candidates: Annotated[dict[ParameterPath, _Values] | None, Flag("--candidate", "PATH=V,V,…")] = Field(
+        default=None,
+        max_length=10,
+        description="Conditions of measurements that could be made next: path to values.",
+    )
+
+    def look_further(self, scene: Scene, runs: tuple[MeasuredRows, ...], unknowns: Unknowns) -> None:
+        """Raise what is wrong with the candidates."""
+        from optim.identification.next_measurement import read_candidates
+
+        read_candidates(scene, runs, unknowns, self.candidates)

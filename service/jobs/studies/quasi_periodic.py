@@ -2,23 +2,39 @@
 
 from __future__ import annotations
 
-from functools import partial
-from typing import TYPE_CHECKING, Annotated
+from collections.abc import Mapping
+from functools import cache, partial
+from typing import TYPE_CHECKING, Annotated, Any
 
-from pydantic import ConfigDict, Field
+from pydantic import BaseModel, Field, RootModel
 
 from optim.criteria.key import Name
 from service.jobs.common.results import answered
 from service.jobs.common.scenes import FrequencyHz, HarmonicRequest, Number, check
 from service.jobs.common.sizes import balance_issues
-from service.jobs.registry import Flag
-from service.jobs.study import Study
+from service.jobs.registry import Flag, Json
+from service.jobs.study import Answer, Study, Watch
 from solver.errors import Issue
 
 if TYPE_CHECKING:
+    from solver.results.told import Told
     from solver.scene.scene import Scene
 
 _RESPONSES = 7  # of long periods, at most as many as that
+
+
+@cache
+def quasi_periodic_result() -> type[BaseModel]:
+    """Return the schema of a response to two frequencies, or of a curve of them with `to_hz`."""
+    one: Any = answered(
+        "solver.response.quasi_periodic_result:QuasiPeriodic", "QuasiPeriodicResult", turns=list[list[int]]
+    )()
+    other: Any = answered("solver:QuasiPeriodicCurve", "QuasiPeriodicCurveResult")()
+
+    class TorusResult(RootModel[one | other]):
+        """A response to two frequencies; with `to_hz` a curve of them over the first."""
+
+    return TorusResult
 
 
 class QuasiPeriodicStudy(Study, HarmonicRequest):
@@ -28,24 +44,21 @@ class QuasiPeriodicStudy(Study, HarmonicRequest):
     another shaft, flutter.
     """
 
-    model_config = ConfigDict(
-        json_schema_extra={
-            "examples": [{"scene": "two-dof", "frequency_hz": 1.05, "second_hz": 1.3821, "amplitude": 60}]
-        }
-    )
-    NAME, FUNCTION = "quasi-periodic", "solver:quasi_periodic"
-    RESULT = answered(
-        "solver.response.quasi_periodic_result:QuasiPeriodic",
-        "QuasiPeriodicResult",
-        turns=list[list[int]],
-    )
+    EXAMPLES = ({"scene": "two-dof", "frequency_hz": 1.05, "second_hz": 1.3821, "amplitude": 60},)
+    NAME, FUNCTION, RESULT = "quasi-periodic", "solver:quasi_periodic", quasi_periodic_result
     TOLD = "solver.views.tables.responses:quasi_periodic"
     SHOWS = "the response to two frequencies ([two base frequencies](quasi-periodic.md))"
-    FIGURE, EMPTY = "solver.views.plots.transients:torus_figure", ("line_hz", "no response was found")
+    FIGURE = "solver.views.plots.transients:torus_drawn"
     COUNTED = "looks"
 
     frequency_hz: Annotated[FrequencyHz, Flag("--frequency", "HZ")] = Field(
         description="Frequency of the scene's own excitation [Hz]."
+    )
+    to_hz: Annotated[FrequencyHz | None, Flag("--to", "HZ")] = Field(
+        default=None, description="Its last value, where a curve over it is wanted [Hz]."
+    )
+    points: Annotated[int, Field(strict=True, ge=2, le=2000), Flag(metavar="N")] = Field(
+        default=41, description="Values of it of a curve, evenly."
     )
     second_hz: Annotated[FrequencyHz, Flag("--second", "HZ")] = Field(
         description="Frequency of the second force [Hz]."
@@ -75,6 +88,11 @@ class QuasiPeriodicStudy(Study, HarmonicRequest):
         from solver.response.quasi_periodic import check as checked
         from solver.response.quasi_periodic import second_force
 
+        if self.to_hz is not None:
+            from solver.response.quasi_periodic_curve import curve_points
+
+            if wrong := check(partial(curve_points, self.frequency_hz, self.to_hz, self.points)):
+                return wrong
         given = (self.frequency_hz, self.second_hz, self.harmonics, self.turns, self.tolerance)
         force = partial(
             second_force, scene, amplitude=self.amplitude, dof=self.dof, phase=self.phase,
@@ -84,7 +102,31 @@ class QuasiPeriodicStudy(Study, HarmonicRequest):
 
     def sizes(self, scene: Scene) -> list[Issue]:
         """Return what is too large."""
-        return balance_issues("turns", scene, self.harmonics * self.turns, 2 * _RESPONSES)
+        points = 1 if self.to_hz is None else self.points
+        return balance_issues("turns", scene, self.harmonics * self.turns, 2 * _RESPONSES * points)
 
+    @classmethod
+    def compute(cls, scene: Scene, asked: Mapping[str, Any], watch: Watch) -> Answer:
+        """Find one response, or a curve of them."""
+        if "to_hz" in asked:
+            # Loaded here: the command's help needs no numbers.
+            from solver import quasi_periodic_curve
 
-STUDY = QuasiPeriodicStudy
+            return Answer.of(quasi_periodic_curve(scene, **asked, **watch._asdict()))
+        given = {key: value for key, value in asked.items() if key != "points"}
+        return super().compute(scene, given, watch)
+
+    @classmethod
+    def result_class(cls, result: Json) -> type[Told]:
+        """Return the class of a stored result."""
+        from solver.response.quasi_periodic_curve import QuasiPeriodicCurve
+        from solver.response.quasi_periodic_result import QuasiPeriodic
+
+        return QuasiPeriodicCurve if isinstance(result["frequency_hz"], list) else QuasiPeriodic
+
+    @classmethod
+    def empty(cls, result: Json) -> str:
+        """Return why there is nothing to draw."""
+        curve = isinstance(result["frequency_hz"], list)
+        some = any(one is not None for one in result["max_abs"]) if curve else result["line_hz"]
+        return "" if some else "no response was found"

@@ -6,7 +6,7 @@ import math
 from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
-from pydantic import ConfigDict, Field
+from pydantic import Field
 
 from service.jobs.common.results import answered
 from service.jobs.common.scenes import Number, PositiveNumber, check
@@ -29,11 +29,7 @@ class Transient(Study):
     A run-up, run-down or sine sweep at a constant rate, with a ring-down behind it if wanted.
     """
 
-    model_config = ConfigDict(
-        json_schema_extra={
-            "examples": [{"scene": "two-dof", "begin_hz": 0.5, "end_hz": 1.6, "rate_hz_per_s": 0.01}]
-        }
-    )
+    EXAMPLES = ({"scene": "two-dof", "begin_hz": 0.5, "end_hz": 1.6, "rate_hz_per_s": 0.01},)
     NAME, FUNCTION = "transient", "solver:transient"
     RESULT = answered("solver.marching.transient_result:TransientResult", "TransientResult")
     TOLD = "solver.views.tables.responses:transient"
@@ -93,6 +89,3 @@ class Transient(Study):
         periods = sum(ramp.seconds for ramp in ramps) * max(ramps[0].begin_hz, ramps[0].end_hz)
         key = "rate_hz_per_s" if self.ramp_seconds is None else "ramp_seconds"
         return march_issues(scene, self.steps_per_period, math.ceil(periods), key)
-
-
-STUDY = Transient

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-from pydantic import ConfigDict, Field
+from pydantic import Field
 
 from optim.criteria.key import FrequencyHz, Name, ParameterPath
 from service.jobs.common.results import Curve, Table, answered
@@ -41,16 +41,10 @@ class Wear(Study, HarmonicRequest):
     Dissipated energy → depth of each contact → its load: the response and its power change, and so on.
     """
 
-    model_config = ConfigDict(
-        json_schema_extra={
-            "examples": [
-                {
-                    "scene": "bladed-disk", "hours": 20, "coefficient": {"shroud": 1e-14},
-                    "area": {"shroud": 1e-4}, "load_loss_per_depth": {"shroud": 1e6}, "harmonics": 5,
-                }
-            ]
-        }
-    )  # fmt: skip
+    EXAMPLES = ({
+        "scene": "bladed-disk", "hours": 20, "coefficient": {"shroud": 1e-14},
+        "area": {"shroud": 1e-4}, "load_loss_per_depth": {"shroud": 1e6}, "harmonics": 5,
+    },)  # fmt: skip
     NAME, FUNCTION = "wear", "solver:wear_life"
     RESULT = answered(
         "solver.studies.wear_life.life_result:WearLife", "WearResult", depths=_OfContacts, loads=_OfContacts,
@@ -177,6 +171,3 @@ class Wear(Study, HarmonicRequest):
         lives = 1 if self.parameter is None else self.looks + _CLOSING
         points = self.points + lives * (POINTS_OF_A_SWEEP if self.frequency_hz is None else 1) * _STEPS
         return balance_issues("points", scene, self.harmonics, points)
-
-
-STUDY = Wear

@@ -106,8 +106,8 @@ def least_worn_peak(
         As `wear_life`; a range, factors or looks that are none.
     """
     begun = time.perf_counter()
-    low, high = _checked_factors(factors)
-    since, longest = _checked_since(from_hours, mission.hours), replace(mission, hours=mission.hours * high)
+    low, high = checked_factors(factors)
+    since, longest = checked_since(from_hours, mission.hours), replace(mission, hours=mission.hours * high)
     check_count("looks", looks, FEWEST_LOOKS, 1000)
     scale = scale_of(scene, parameter, start, stop)
 
@@ -137,7 +137,7 @@ def least_worn_peak(
     )  # fmt: skip
 
 
-def _checked_since(from_hours: float | None, hours: float) -> float:
+def checked_since(from_hours: float | None, hours: float) -> float:
     """Return from when on the amplitude counts [h]."""
     since = hours if from_hours is None else from_hours
     if not isinstance(since, int | float) or isinstance(since, bool) or not 0.0 <= since <= hours:
@@ -145,7 +145,7 @@ def _checked_since(from_hours: float | None, hours: float) -> float:
     return since
 
 
-def _checked_factors(factors: Sequence[float]) -> tuple[float, float]:
+def checked_factors(factors: Sequence[float]) -> tuple[float, float]:
     """Return the least and the largest factor of the wear coefficients."""
     pair = list(factors)
     numbers = all(isinstance(one, int | float) and not isinstance(one, bool) for one in pair)

@@ -109,3 +109,34 @@ def wear_life_figure(found: Mapping[str, Any], *, ax: Into = None) -> Figure:
         style.label(loads, "running time [h]", "normal load [N]")
         style.label(worn, "running time [h]", f"depth [{depth.name}]")
     return page
+
+
+def torus_drawn(found: Mapping[str, Any], *, ax: Into = None) -> Figure:
+    """Draw a response or a curve of them, whichever it is."""
+    return (torus_curve_figure if isinstance(found["frequency_hz"], list) else torus_figure)(found, ax=ax)
+
+
+def torus_curve_figure(found: Mapping[str, Any], *, ax: Into = None) -> Figure:
+    """Draw the largest displacement, and the amplitudes of both tones, over the first frequency.
+
+    Parameters
+    ----------
+    found : as its `to_json` gives it, with at least one response.
+    """
+    hertz, largest = numbers(found["frequency_hz"]), numbers(found["max_abs"])
+    unit = units.length_unit(float(np.nanmax(largest)))
+    tones = (
+        ("first_amplitude", style.VERMILION, "at the first"),
+        ("second_amplitude", style.GREEN, "at the second"),
+    )
+    with style.styled():
+        page, (axes,) = style.figure(5.6, 3.6, columns=1, into=ax)
+        axes.plot(hertz, largest * unit.per_metre, "o-", color=style.BLUE, markersize=2.8, label="max|x|")
+        for key, colour, words in tones:
+            axes.plot(hertz, numbers(found[key]) * unit.per_metre, color=colour, label=f"amplitude {words}")
+        axes.axvline(found["second_hz"], color=style.GREY, linewidth=0.8, linestyle=":")
+        axes.set_title(f"{found['scene']} with {found['second_hz']:.5g} Hz beside")
+        style.label(axes, "first frequency [Hz]", f"{found['dof']} [{unit.name}]")
+        axes.set_ylim(bottom=0.0)
+        axes.legend()
+    return page

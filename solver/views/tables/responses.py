@@ -342,8 +342,24 @@ def _band(found: Json) -> str:
     return f"{above}: {', '.join(intervals)}" if intervals else above
 
 
+def _torus_curve(found: Json) -> Iterator[Block]:
+    """The responses to two base frequencies over the first of them."""
+    keys = ("max_abs", "rms", "first_amplitude", "second_amplitude", "error_estimate")
+    rows = []
+    for i, hertz in enumerate(found["frequency_hz"]):
+        sizes = ["" if found[key][i] is None else units.length(found[key][i]) for key in keys]
+        note = "repeats" if found["repeats"][i] else "" if found["known"][i] else "not known well"
+        rows.append((units.number(hertz), *sizes, note))
+    heads = ("frequency [Hz]", "max|x|", "root mean square", "at the first", "at the second", "± error", "")
+    yield ResultTable(f"{found['scene']} with {units.number(found['second_hz'])} Hz", heads, rows)
+    yield Summary("", [("time", units.duration(found["seconds"]))])
+
+
 def quasi_periodic(found: Json) -> Iterator[Block]:
-    """What the response to two base frequencies is."""
+    """What the response to two base frequencies is, or a curve of such responses."""
+    if isinstance(found["frequency_hz"], list):
+        yield from _torus_curve(found)
+        return
     first, second = units.number(found["frequency_hz"]), units.number(found["second_hz"])
     pairs = []
     if found["max_abs"] is not None:

@@ -104,7 +104,8 @@ def test_a_linear_model_with_known_noise_and_a_normal_prior_is_conjugate() -> No
     mean, sd = 2.2, 0.1
     found = optim.posterior(
         scene, data, {"excitation.amplitude": (1.2, 3.2)}, priors={"excitation.amplitude": (mean, sd)},
-        scaling={"excitation.amplitude": "linear"}, harmonics=1, starts=1, draws=500,
+        scaling={"excitation.amplitude": "linear"},
+        sampling=optim.Sampling(harmonics=1, starts=1, draws=500),
     )  # fmt: skip
     precision = unit @ unit / 0.05**2 + 1.0 / sd**2
     middle = (unit @ seen / 0.05**2 + mean / sd**2) / precision
@@ -184,7 +185,7 @@ def test_the_simpler_of_two_models_that_explain_the_same_is_more_probable() -> N
         "level": (scene, {"excitation.amplitude": (1.2, 3.2)}),
         "level and spring": (scene, {"excitation.amplitude": (1.2, 3.2), "s.a1": (0.01, 5.0)}),
     }
-    found = optim.compare_models(models, data, harmonics=1, starts=1, draws=200)
+    found = optim.compare_models(models, data, sampling=optim.Sampling(harmonics=1, starts=1, draws=200))
     assert found.best is not None
     assert found.best.name == "level"
     assert sum(one.probability for one in found.models) == pytest.approx(1.0)
@@ -197,9 +198,8 @@ def test_the_simpler_of_two_models_that_explain_the_same_is_more_probable() -> N
     [({"draws": 3}, "draws"), ({"sampler": "gibbs"}, "sampler"), ({"noise": 2.0}, "noise")],
 )
 def test_what_cannot_be_is_refused(asked: dict[str, Any], words: str) -> None:
-    scene, data, _ = linear()
     with pytest.raises(optim.DesignError, match=words):
-        optim.posterior(scene, data, {"excitation.amplitude": (1.2, 3.2)}, **asked)
+        optim.Sampling(**asked)
 
 
 def test_models_and_assemblies_that_cannot_be_are_refused() -> None:
@@ -225,7 +225,12 @@ def test_reassemblies_of_a_linear_mass_give_its_spread_and_scenarios_for_a_robus
         data.append([{"frequency": hertz, "real": noisy[::2], "imag": noisy[1::2], "sd": np.full(4, 0.01)}])
     name = "excitation.amplitude"
     found = optim.reassemblies(
-        scene, data, {name: (0.5, 4.0)}, [name], scaling={name: "linear"}, harmonics=1, starts=1, draws=120
+        scene,
+        data,
+        {name: (0.5, 4.0)},
+        [name],
+        scaling={name: "linear"},
+        sampling=optim.Sampling(harmonics=1, starts=1, draws=120),
     )
     assert found.reached
     (middle,), (spread,) = found.middles, found.spreads
@@ -250,9 +255,13 @@ def test_reassemblies_of_a_linear_mass_give_its_spread_and_scenarios_for_a_robus
 )
 def test_what_the_samples_are_not_worth_is_told(asked: dict[str, Any], status: optim.PosteriorStatus) -> None:
     scene, data, _ = linear()
+    asked = dict(asked)
     if "noise" in asked:
         data = [{key: values for key, values in data[0].items() if key != "sd"}]
-    found = optim.posterior(scene, data, {"excitation.amplitude": (1.2, 3.2)}, harmonics=1, starts=1, **asked)
+    stop = asked.pop("should_stop", None)
+    sampling = optim.Sampling(harmonics=1, starts=1, **asked)
+    bounds = {"excitation.amplitude": (1.2, 3.2)}
+    found = optim.posterior(scene, data, bounds, sampling=sampling, should_stop=stop)
     assert found.status is status
     assert not found.reached
     assert found.uncertain == []
@@ -280,9 +289,10 @@ def test_points_that_are_not_reached_leave_the_posterior_unknown() -> None:
         "resonance_frequency": [1.6, 1.02, 1.02, 1.02, 1.02, 1.02],
     }
     unknowns = {"s.kt": (50.0, 70.0)}
-    found = optim.posterior(scene, [data], unknowns, harmonics=1, starts=1, noise=0.05)
+    found = optim.posterior(
+        scene, [data], unknowns, sampling=optim.Sampling(harmonics=1, starts=1, noise=0.05)
+    )
     assert found.status is optim.PosteriorStatus.LOST
     lost = {"level": [0.1, 0.11], "resonance_frequency": [1.6, 1.6]}
-    assert (
-        optim.posterior(scene, [lost], unknowns, harmonics=1, starts=1).status is optim.PosteriorStatus.NO_FIT
-    )
+    none = optim.posterior(scene, [lost], unknowns, sampling=optim.Sampling(harmonics=1, starts=1))
+    assert none.status is optim.PosteriorStatus.NO_FIT

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 from typing import Any
@@ -62,6 +63,50 @@ def test_every_command_draws_and_writes(
     assert f'name = "{name}"' in data.attributes["scene"]  # type: ignore[operator]
     assert data.attributes["source"] in page  # type: ignore[operator]
     assert "<pre>" in page
+
+
+@pytest.mark.long
+def test_posteriors_of_files_are_drawn_written_and_handed_on(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A mass without contacts: its posterior, three assemblies, and a choice between two models."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*words: str) -> tuple[int, str, str]:
+        status = main([*asked, *words])
+        return status, *capsys.readouterr()
+
+    scene = {
+        "name": "rig",
+        "structure": {
+            "kind": "lumped", "masses": {"m": 1.0},
+            "springs": [{"between": ["m", "ground"], "k": 41.0, "c": 0.5, "name": "spring"}],
+        },
+        "excitation": {"dof": "m", "amplitude": 2.0}, "observe": {"dof": "m", "band": [0.8, 1.3]},
+    }  # fmt: skip
+    (tmp_path / "rig.json").write_text(json.dumps(scene))
+    (tmp_path / "a.csv").write_text("frequency,amplitude,sd\n0.9,0.22,0.02\n1.0,0.56,0.02\n1.1,0.27,0.02\n")
+    asked = ["posterior", "rig.json", "a.csv", "--unknown", "excitation.amplitude", "1", "3"]
+    asked += ["--starts", "1", "--harmonics", "1"]
+    asked += ["--draws", "160", "--sampler", "importance"]
+    status, out, err = run(*["--uncertain", "u.toml", "--plot", "p.png", "--out", "p.json", "--json"])
+    assert (status, err) == (0, "")
+    (amplitude,) = json.loads(out)["marginals"]
+    assert amplitude["interval"][0] < amplitude["mean"] < amplitude["interval"][1]
+    assert (tmp_path / "u.toml").read_text().count("[[uncertain]]") == 32
+    assert (tmp_path / "p.png").read_bytes().startswith(b"\x89PNG")
+    assert solver.load(tmp_path / "p.json")["samples"].shape == (160, 1)
+    models = json.dumps({"softer": {"scene": "rig.json", "unknowns": {"structure.spring": [38, 43]}}})
+    status, out, err = run("--models", models, "--plot", "m.png")
+    assert (status, err) == (0, "")
+    assert "softer" in out
+    asked[2:3] = ["a.csv"] * 3
+    status, out, err = run("--varied", "excitation.amplitude")
+    assert (status, err) == (0, "")
+    assert "3 assemblies" in out
+    status, _, err = run("--weights", "rig=2")
+    assert status == 2
+    assert "`--weights`" in err
 
 
 @pytest.mark.parametrize(

@@ -170,6 +170,43 @@ def test_two_engine_orders_of_a_disk_are_those_of_the_whole_annulus() -> None:
     assert found.half_peak_to_peak == pytest.approx(known.half_peak_to_peak, rel=5e-4)
 
 
+@pytest.mark.parametrize("load", [100.0, pytest.param(25.0, marks=pytest.mark.long)])
+def test_a_curve_is_that_of_its_points_and_of_marches(load: float) -> None:
+    """Begun with what the neighbour does; three of them marched over periods of up to 400 turns."""
+    scene, second = two_dof(N0=load), {"dof": "m2", "amplitude": 60.0}
+    keys: dict[str, Any] = {"second_hz": 1.3821, "harmonics": 5, "turns": 50, **second}
+    found = solver.quasi_periodic_curve(scene, frequency_hz=0.9, to_hz=1.3, points=3, **keys)
+    assert len(found.known) == 3
+    for i, hertz in enumerate(found.frequency_hz.tolist()):
+        alone = solver.quasi_periodic(scene, frequency_hz=hertz, **keys)
+        assert found.max_abs[i] == pytest.approx(alone.max_abs, rel=1e-6)
+        near = Fraction(1.3821 / hertz).limit_denominator(400)
+        known = marched(scene, hertz, near.denominator, near.numerator, **second)
+        mine = [each[i] for each in (found.max_abs, found.rms, found.first_amplitude, found.second_amplitude)]
+        off = np.abs(np.array(mine) - known).max()
+        assert off < (1.0 if found.known[i] else 3.0) * found.error_estimate[i]
+
+
+def test_a_curve_says_what_is_not_known_and_stops_when_asked() -> None:
+    keys: dict[str, Any] = {"second_hz": 1.0, "amplitude": 60.0, "harmonics": 3, "turns": 24}
+    found = solver.quasi_periodic_curve(
+        two_dof(N0=100.0), frequency_hz=0.9, to_hz=1.1, points=3, tolerance=0.1, **keys
+    )
+    assert found.status is solver.TorusCurveStatus.HOLES  # in its middle both are one frequency
+    assert np.isnan(found.max_abs).tolist() == [False, True, False]
+    asked = iter([False, False, True, True, True, True])
+    stopped = solver.quasi_periodic_curve(
+        two_dof(N0=100.0), frequency_hz=0.9, to_hz=1.2, points=9, should_stop=lambda: next(asked), **keys
+    )
+    assert stopped.status is solver.TorusCurveStatus.STOPPED
+    for given in ({"to_hz": 0.9}, {"points": 1}, {"to_hz": -1.0}):
+        with pytest.raises(SettingError) as refused:
+            solver.quasi_periodic_curve(
+                two_dof(N0=1.0), **{"frequency_hz": 0.9, "to_hz": 1.1, **keys, **given}
+            )
+        assert refused.value.name == next(iter(given))
+
+
 @pytest.mark.parametrize(
     ("given", "key"),
     [

@@ -106,11 +106,11 @@ def test_a_result_says_what_it_is(result: Any) -> None:
 # What a user gives, and what is short by itself.
 NOT_LOOKED_AT = {
     "Case", "ContinuationSettings", "Course", "Effects", "IntentionalMistuning", "Issue", "LawParameter",
-    "Limit", "MarchStart", "Mission", "Summary", "WearLaw", "WorstSearch",
+    "Limit", "MarchStart", "Mission", "Sampling", "Summary", "WearLaw", "WorstSearch",
 }  # fmt: skip
 
 
-REACHED = {"COMPLETED", "CONVERGED", "TRACKED", "OPTIMAL", "KNOWN"}
+REACHED = {"COMPLETED", "CONVERGED", "TRACKED", "OPTIMAL", "KNOWN", "SAMPLED", "COMPARED"}
 
 
 def public_dataclasses() -> list[type]:
