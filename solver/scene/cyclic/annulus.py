@@ -378,7 +378,7 @@ def _gas(scene: Scene, n: int) -> tuple[Coupling, ...]:
                 raise SettingError("damping", gas.dof, wanted)
             found.append(
                 Coupling(
-                    on=entry.on, of=entry.of, offset=entry.offset, k=entry.k.real, k_imaginary=entry.k.imag,
+                    on=gas.dof, of=gas.dof, offset=entry.offset, k=entry.k.real, k_imaginary=entry.k.imag,
                     c=entry.c.real,
                 )
             )  # fmt: skip
