@@ -182,5 +182,7 @@ def test_what_it_cannot_do_is_said() -> None:
     with pytest.raises(solver.SettingError, match="must be one `at_frequency`"):
         given.force_at(np.ones((1, 3)), np.ones(1), np.zeros(1))
     assert given.second_kernel is None
+    with pytest.raises(solver.SettingError, match=r"says how it is perturbed \(coulomb-viscous does not\)"):
+        solver.stability(solver.solve(scene(), frequency_hz=HZ, harmonics=5))
     with pytest.raises(solver.SettingError, match=r"d .*coulomb-viscous"):
         solver.track_peak(scene(), parameter="d.N0", start=0.2, stop=0.8)

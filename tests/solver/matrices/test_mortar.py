@@ -178,10 +178,15 @@ def test_faces_that_cannot_be_joined_are_refused() -> None:
 
 @pytest.fixture
 def model(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Two parts on springs with faces of 9 and of 16 nodes; matrices, names of rows, deck in mm."""
+    """The folder of two parts with faces of 9 and of 16 nodes, entered."""
     monkeypatch.chdir(tmp_path)
+    return written(tmp_path, 3)
+
+
+def written(tmp_path: Path, cells_across: int) -> Path:
+    """Two parts on springs, the face of one 2 x 2 cells: matrices, names of rows, deck in mm."""
     rng = np.random.default_rng(3)
-    (first, own), (second, other) = square((2, 2), 1, rng), square((3, 3), 101, rng)
+    (first, own), (second, other) = square((2, 2), 1, rng), square((cells_across,) * 2, 101, rng)
     labels = [f"{node}.{axis}" for node in (*first, *second) for axis in (1, 2, 3)]
     loose = rng.normal(size=(len(labels),) * 2)
     K = 2e5 * np.eye(len(labels)) + 1e3 * (loose @ loose.T)
@@ -190,7 +195,7 @@ def model(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     mmwrite(tmp_path / "M.mtx", coo_array(np.diag(mass)), symmetry="symmetric")
     (tmp_path / "rows.dof").write_text("\n".join(labels) + "\n")
     rows = [f"{node}, {20.0 * x}, {20.0 * y}, {z}\n" for node, (x, y, z) in (first | second).items()]
-    sets = "*NSET, NSET=TOP, GENERATE\n1, 9\n*NSET, NSET=FOOT, GENERATE\n101, 116\n"
+    sets = f"*NSET, NSET=TOP, GENERATE\n1, 9\n*NSET, NSET=FOOT, GENERATE\n101, {100 + len(second)}\n"
     cells = [f"{i}, {', '.join(map(str, cell))}\n" for i, cell in enumerate([*own, *other], start=1)]
     text = ["*NODE\n", *rows, "*ELEMENT, TYPE=S4\n", *cells, sets]
     (tmp_path / "deck.inp").write_text("".join(text))
@@ -224,6 +229,21 @@ def test_the_command_makes_a_patch_of_them(model: Path, capsys: pytest.CaptureFi
     assert found.converged
     assert main([*IMPORT, "--out", "other.toml", "--patch", FACE.replace("mortar", "nearest")]) != 0
     assert "`pairing` must be nodes or mortar, got 'nearest'" in " ".join(capsys.readouterr().err.split())
+
+
+def test_where_meshes_match_the_patch_is_that_of_nodes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(written(tmp_path, 2))
+    for name, patch in (("one", FACE), ("other", FACE.replace("pairing=mortar,", ""))):
+        assert main([*IMPORT, "--out", f"{name}.toml", "--patch", patch, "--force", "n5x=400"]) == 0
+    one, other = (solver.load_scene(tmp_path / f"{name}.toml") for name in ("one", "other"))
+    here, there = (linear_model(each).contact_here for each in (one, other))
+    np.testing.assert_allclose(here, there, atol=1e-12)
+    np.testing.assert_allclose([c.kn for c in one.contacts], [c.kn for c in other.contacts], rtol=1e-12)
+    answers = [solver.solve(each, frequency_hz=40.0, harmonics=3) for each in (one, other)]
+    assert answers[0].converged
+    assert answers[0].max_abs == pytest.approx(answers[1].max_abs, rel=1e-9)
 
 
 def test_spread_ends_are_checked(model: Path) -> None:
