@@ -116,9 +116,9 @@ def _areas(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np
     if len(points) == 1:
         return np.ones(1), None
     centred = points - points.mean(axis=0)
-    _, spans, axes = np.linalg.svd(centred, full_matrices=False)
+    axes = np.linalg.svd(centred, full_matrices=False)[2]
     flat = centred @ axes[:2].T if len(axes) > 1 else centred @ axes[:1].T
-    if len(points) == 2 or spans[1] <= _FLAT * spans[0]:
+    if is_line(points):
         return _lengths(flat[:, 0]), None
     try:
         corners = Delaunay(flat).simplices

@@ -65,7 +65,7 @@ def mortar(
     ------
     ValueError
         Nodes that are not in the deck, twice in a face, or inside the edges of elements of second order, a
-        normal of no length, or faces that do not lie over each other.
+        normal of no length, a single node, a line on an area, or faces that do not lie over each other.
     """
     along = np.asarray(normal, dtype=np.float64)
     if along.shape != (3,) or not 0.0 < np.linalg.norm(along) < np.inf:
@@ -74,7 +74,11 @@ def mortar(
     here, there = (positions(deck, checked_nodes(nodes)) for nodes in (first, second))
     there = there if turn is None else there @ turn.T
     axes = np.linalg.svd(along[None, :])[2][1:]
+    if min(len(here), len(there)) < 2:
+        raise ValueError("a face of a single node has no area to join: pair the nodes, or give a larger set")
     lines = is_line(here @ axes.T)
+    if lines != is_line(there @ axes.T):
+        raise ValueError("of two faces either both lie along a line, as in a plane, or neither")
     if lines:
         axes = axes.T @ np.linalg.svd((here - here.mean(axis=0)) @ axes.T)[2][0]
         axes = axes[None, :]

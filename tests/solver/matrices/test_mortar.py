@@ -168,6 +168,8 @@ def test_faces_that_cannot_be_joined_are_refused() -> None:
         ([1, 1, 2], list(second), Z, "node 1 is twice in a face"),
         ([1, 2, 99], list(second), Z, "node 99 is not in the deck"),
         ([], list(second), Z, "a face has no nodes"),
+        ([1], list(second), Z, "a face of a single node has no area"),
+        ([1, 2, 3], list(second), Z, "either both lie along a line"),
     ):
         with pytest.raises(ValueError, match=words):
             mortar(deck, nodes, others, normal)
