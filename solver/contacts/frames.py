@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, Literal
 
-from pydantic import BeforeValidator, Field, PlainSerializer, WithJsonSchema, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, PlainSerializer, WithJsonSchema, model_validator
 
 from solver.contacts.fields import EndName, Part, Signed, Vector
 
@@ -13,6 +13,7 @@ TANGENT_1, TANGENT_2, NORMAL = 0, 1, 2
 Axes = tuple[Vector, Vector, Vector]
 _PERPENDICULAR = 0.01  # largest cosine between directions that are typed as perpendicular
 _UNIT = 0.01  # a typed unit vector may be as far from length 1
+_UNIT_SUM = 1e-6  # so may be the sum of typed weights
 _ALONG_Z = 0.999  # a normal this near z has no horizontal tangent to speak of
 
 
@@ -91,6 +92,26 @@ Motions = Annotated[
 ]
 
 
+def _pairs(data: object) -> object:
+    return tuple(data.items()) if isinstance(data, dict) else data
+
+
+def _summing_to_one(weights: _Form) -> _Form:
+    total = sum(weight for _, weight in weights)
+    if abs(total - 1.0) > _UNIT_SUM or any(end == "ground" for end, _ in weights):
+        raise ValueError(f"`spread` must name nodes or bodies with weights that sum to 1, got {total:.9g}")
+    return weights
+
+
+Weights = Annotated[
+    _Form,
+    BeforeValidator(_pairs),
+    AfterValidator(_summing_to_one),
+    PlainSerializer(dict),
+    WithJsonSchema({"type": "object", "minProperties": 1, "additionalProperties": {"type": "number"}}),
+]
+
+
 class InSpace(Part):
     """A contact between bodies and nodes at a place, with directions; or one with motions written out."""
 
@@ -105,6 +126,11 @@ class InSpace(Part):
         Literal["auto"] | tuple[Vector, Vector] | None,
         "Both tangents; chosen if left out: the first in the plane xy.",
     ] = None
+    spread: Annotated[
+        Weights | None,
+        "In place of the second end: nodes or bodies with their weights, which sum to 1, as where meshes do "
+        "not match. `between` then says what the contact joins, and no more.",
+    ] = None
     motions: Annotated[
         Motions | None,
         "In place of these, each relative motion of the law as a sum of DOFs: factor [1, or m of a "
@@ -113,10 +139,10 @@ class InSpace(Part):
 
     @model_validator(mode="after")
     def _complete(self) -> InSpace:
-        given = [key for key in ("at", "normal", "tangents") if getattr(self, key) is not None]
+        given = [key for key in ("at", "normal", "tangents", "spread") if getattr(self, key) is not None]
         if self.motions is not None and given:
             raise ValueError(f"`motions` and `{given[0]}` of a contact exclude each other: give one")
-        for key, needed in (("normal", "at"), ("at", "normal"), ("tangents", "normal")):
+        for key, needed in (("normal", "at"), ("at", "normal"), ("tangents", "normal"), ("spread", "normal")):
             if key in given and needed not in given:
                 raise ValueError(f"`{key}` of a contact needs `{needed}` beside it")
         if self.normal is not None and not is_unit(self.normal):

@@ -18,7 +18,7 @@ from solver.linear.model import ExtraTerms, Terms
 from solver.matrices.values import frozen
 from solver.scene.bodies.body import REVOLUTIONS
 from solver.scene.cyclic.sector_blocks import full_elimination
-from solver.scene.linear_terms import Entry
+from solver.scene.linear_terms import End, Entry
 from solver.scene.scene import MatricesStructure, Scene
 from solver.scene.scene_parameter import Slope
 
@@ -53,6 +53,14 @@ class Coordinates:
     def rows(self, selected: NDArray[Any]) -> NDArray[Any]:
         """Return rows over the DOFs as rows over the coordinates; read-only."""
         return selected if self.direct else frozen(selected @ self.shapes)
+
+    def at(self, end: End) -> Real:
+        """Return a DOF, or a sum of them or of rows of the matrices, as a row over the coordinates (n,)."""
+        if isinstance(end, str):
+            return np.asarray(self.shapes[self.dofs.index(end)])
+        if end.dofs is None:
+            return np.pad(end.factors, (0, self.shapes.shape[1] - end.factors.size))
+        return np.asarray(end.factors @ self.shapes[[self.dofs.index(dof) for dof in end.dofs]])
 
     @property
     def key(self) -> tuple[object, ...]:
@@ -170,7 +178,7 @@ class _Sum:
     def add_entries(self, entries: tuple[Entry, ...], one: float, square: float, spin: float) -> None:
         """Add what is constant, goes with the squared speed and with the speed, times these factors."""
         for entry in entries:
-            on, of = (self._in.shapes[self._in.dofs.index(dof)] for dof in (entry.on, entry.of))
+            on, of = self._in.at(entry.on), self._in.at(entry.of)
             place = np.outer(on, of)
             self._at(self._K, entry.offset)[:] += (one * entry.k + square * entry.k_omega2) * place
             self._at(self._C, entry.offset)[:] += (one * entry.c + spin * entry.g) * place

@@ -20,6 +20,7 @@ from solver.marching.contacts import columns, selection, sparse_rows
 from solver.marching.kernels import state as kernel
 from solver.scene.bodies.body import REVOLUTIONS, Body
 from solver.scene.bodies.kinematics import dof_names, pair_form
+from solver.scene.linear_terms import End, dofs_at
 from solver.scene.scene import LumpedStructure, MatricesStructure, Scene
 
 FloatArray = NDArray[np.float64]
@@ -167,7 +168,7 @@ def _of_matrices(
     pushed = [dof for force in scene.forces for dof, *_ in force.parts]
     moved = [dof for force in scene.forces if force.base is not None for dof, *_ in force.base.shares]
     used = [*ends, *pushed, *moved, *(dof for dof, _ in scene.seen(scene.observe.dof) or ())]
-    used += [dof for entry in scene.entries for dof in (entry.on, entry.of)]
+    used += [dof for entry in scene.entries for end in (entry.on, entry.of) for dof in dofs_at(end)]
     spin = (scene.speed or 0.0) * REVOLUTIONS
     beside = {*own, *scene.points}
     *_, index = found = _of_structure(structure, [dof for dof in used if dof not in beside], spin)
@@ -201,15 +202,25 @@ def _with_couplings(
         if entry.k.imag != 0.0:
             raise SettingError("k_imaginary", entry.k.imag, _IN_TIME)
         k, c = entry.k.real + spin**2 * entry.k_omega2, entry.c.real + spin * entry.g
-        if entry.on in points:
-            K[index[entry.on] - n, index[entry.of]] += k
-            C[index[entry.on] - n, index[entry.of]] += c
+        on, at = (_row_at(end, index, W.shape[0]) for end in (entry.on, entry.of))
+        if isinstance(entry.on, str) and entry.on in points:
+            row = index[entry.on] - n
+            K[row], C[row] = K[row] + k * at.toarray()[0], C[row] + c * at.toarray()[0]
             continue
-        push = csr_array(W[:, [index[entry.on]]])
-        at = csr_array(([1.0], ([0], [index[entry.of]])), shape=(1, W.shape[0]))
+        push = W @ on.T
         A, B = A + k * (push @ at), B + c * (push @ at)
     A, B, W = (csr_array(each) for each in (A, B, W))
     return (*(_with_points(scene, A, B, W, K, C) if points else (A, B, W)), index)
+
+
+def _row_at(end: End, index: dict[str, int], size: int) -> csr_array:
+    """What an entry acts on as a row over the coordinates."""
+    if isinstance(end, str):
+        factors, columns = np.ones(1), np.array([index[end]])
+    else:
+        factors = end.factors
+        columns = np.arange(factors.size) if end.dofs is None else np.array([index[dof] for dof in end.dofs])
+    return csr_array((factors, (np.zeros(columns.size, np.int64), columns)), shape=(1, size))
 
 
 def _with_points(

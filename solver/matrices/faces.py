@@ -56,17 +56,11 @@ def face(
     ValueError
         Nodes that are not in the deck, twice in a face, or touch none of the other face, each named.
     """
-    for nodes in (first, second or ()):
-        twice = [node for node, times in Counter(nodes).items() if times > 1]
-        if twice:
-            raise ValueError(f"node {twice[0]} is twice in a face")
-    here = positions(deck, list(first))
-    if len(here) == 0:
-        raise ValueError("a face has no nodes")
+    here = positions(deck, checked_nodes(first))
     areas, plane = _areas(here)
     if second is None:
         return Face(pairs=[(node, None) for node in first], places=here, areas=areas, plane=plane)
-    there = positions(deck, list(second))
+    there = positions(deck, checked_nodes(second))
     if turn is not None:
         there = there @ turn.T
     near = tolerance if tolerance is not None else _tolerance(here, there)
@@ -78,6 +72,28 @@ def face(
         raise ValueError(_unmatched(alone, left, distance, near))
     pairs: list[tuple[int, int | None]] = list(zip(first, (second[i] for i in place), strict=True))
     return Face(pairs=pairs, places=here, areas=areas, plane=plane)
+
+
+def checked_nodes(nodes: Sequence[int]) -> list[int]:
+    """The nodes of a face.
+
+    Raises
+    ------
+    ValueError
+        There are none, or one is there twice.
+    """
+    twice = [node for node, times in Counter(nodes).items() if times > 1]
+    if twice:
+        raise ValueError(f"node {twice[0]} is twice in a face")
+    if not nodes:
+        raise ValueError("a face has no nodes")
+    return list(nodes)
+
+
+def is_line(points: NDArray[np.float64]) -> bool:
+    """Whether points lie along a line."""
+    spans = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    return len(points) == 2 or len(spans) < 2 or bool(spans[1] <= _FLAT * spans[0])
 
 
 def _tolerance(here: NDArray[np.float64], there: NDArray[np.float64]) -> float:
@@ -100,9 +116,9 @@ def _areas(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np
     if len(points) == 1:
         return np.ones(1), None
     centred = points - points.mean(axis=0)
-    _, spans, axes = np.linalg.svd(centred, full_matrices=False)
+    axes = np.linalg.svd(centred, full_matrices=False)[2]
     flat = centred @ axes[:2].T if len(axes) > 1 else centred @ axes[:1].T
-    if len(points) == 2 or spans[1] <= _FLAT * spans[0]:
+    if is_line(points):
         return _lengths(flat[:, 0]), None
     try:
         corners = Delaunay(flat).simplices

@@ -23,6 +23,7 @@ from solver.matrices.values import METRES, MOST_DOFS, UNITS, Matrix, NormalModes
 KEEP_MODES = "keep_modes"
 MAPPING, IN_UNITS, NODES = "mapping", "units", "nodes"
 _MATRICES = ("M", "K", "C", "G", "K_omega2")
+_COUPLED = "couplings/{}/K"  # the key of the stiffness that a coupling names
 _SKEW = {"K": "skew K", "C": "skew C"}  # what their symmetric parts leave
 
 
@@ -49,10 +50,23 @@ def with_files(raw: Mapping[str, object], folder: Path) -> dict[str, object]:
         raise _refusal("modes", f"`modes`: {error}", named=False) from error
     if tables.get("sectors") is not None:
         return {**raw, "structure": sector_with_files(tables, folder, _orders(raw))[0]}
-    found = read_matrices(tables, folder)
+    rows = raw.get("couplings")
+    couplings = list(rows) if isinstance(rows, list) else []
+    relaxing = {
+        _COUPLED.format(i): str(row["K"])
+        for i, row in enumerate(couplings)
+        if isinstance(row, dict) and isinstance(row.get("K"), str)
+    }
+    found = read_matrices(tables, folder, relaxing)
     if isinstance(tables.get("modes"), NormalModes):
         tables = _rows_in_use(tables)
-    return {**raw, "structure": as_kept(tables, found.matrices)[0]}
+    kept, reduced = as_kept(tables, found.matrices, found.parts)
+    for i, row in enumerate(couplings):
+        key = _COUPLED.format(i)
+        if key in found.parts:
+            part = found.parts[key].toarray() if reduced is None else np.asarray(reduced.matrices[key])
+            couplings[i] = {**row, "K": Matrix(part)}
+    return {**raw, "structure": kept} | ({"couplings": couplings} if relaxing else {})
 
 
 def sector_with_files(
@@ -83,11 +97,12 @@ def _orders(raw: Mapping[str, object]) -> list[int]:
     return [order for order in found if type(order) is int] or [0]
 
 
-def read_matrices(tables: dict[str, Any], folder: Path) -> MatrixSet:
+def read_matrices(tables: dict[str, Any], folder: Path, beside: Mapping[str, str] | None = None) -> MatrixSet:
     """The matrices that the files of a structure hold, in SI units.
 
     `mapping`, `units` and `nodes` are taken out of `tables`, and labels among its DOFs become rows. Rows are
-    along the global axes, whatever frames the deck gives to nodes (`nodes`, or that of `cyclic`).
+    along the global axes, whatever frames the deck gives to nodes (`nodes`, or that of `cyclic`). Files that
+    stand `beside` those of the structure are read as its parts, under their keys.
 
     Raises
     ------
@@ -98,6 +113,7 @@ def read_matrices(tables: dict[str, Any], folder: Path) -> MatrixSet:
     parts_given = tables.get("parts")
     if isinstance(parts_given, dict) and tables.get("sectors") is not None and paths:
         paths |= {PART + key: folder / name for key, name in parts_given.items() if isinstance(name, str)}
+    paths |= {PART + key: folder / name for key, name in (beside or {}).items()}
     mapping, units = tables.pop(MAPPING, None), tables.pop(IN_UNITS, "SI")
     if mapping is not None and not isinstance(mapping, str):
         raise _refusal(MAPPING, "must be the name of a file", mapping)
@@ -112,7 +128,9 @@ def read_matrices(tables: dict[str, Any], folder: Path) -> MatrixSet:
         try:
             parts[key] = read_labelled(path, key)
         except MatrixFileError as error:
-            issues.append(Issue(("structure", key), f"`{key}`: {error}", named=False))
+            own = beside is None or key.removeprefix(PART) not in beside
+            steps = ("structure", key) if own else tuple(key.removeprefix(PART).split("/"))
+            issues.append(Issue(steps, f"`{key if own else steps[-1]}`: {error}", named=False))
     if issues:
         raise SceneError(issues)
     try:
@@ -162,7 +180,9 @@ def _rows_in_use(tables: dict[str, Any]) -> dict[str, Any]:
     return {**tables, "modes": kept, "dofs": {name: row for row, name in enumerate(dofs)}}
 
 
-def as_kept(tables: dict[str, Any], sparse: dict[str, coo_array]) -> tuple[dict[str, Any], Reduced | None]:
+def as_kept(
+    tables: dict[str, Any], sparse: dict[str, coo_array], parts: Mapping[str, coo_array] | None = None
+) -> tuple[dict[str, Any], Reduced | None]:
     """Tables with the matrices as the scene keeps them: as they are, or reduced if `keep_modes` asks for it.
 
     Raises
@@ -187,12 +207,12 @@ def as_kept(tables: dict[str, Any], sparse: dict[str, coo_array]) -> tuple[dict[
     except ValueError as error:
         raise _refusal("dofs", str(error), named=False) from error
     try:
-        found = _reduced(sparse, dofs, keep, symmetric=tables.get("symmetric") is not False)
+        found = _reduced(sparse, parts or {}, dofs, keep, symmetric=tables.get("symmetric") is not False)
     except FieldError as error:
         raise SceneError([error.issue.below("structure")]) from error
     except ValueError as error:
         raise _refusal(KEEP_MODES, str(error), named=False) from error
-    values = {key: np.asarray(value) for key, value in found.matrices.items() if key not in _SKEW.values()}
+    values = {key: np.asarray(value) for key, value in found.matrices.items() if key in _MATRICES}
     for key, skew in _SKEW.items():
         if skew in found.matrices:
             values[key] = values[key] + np.asarray(found.matrices[skew])
@@ -202,9 +222,12 @@ def as_kept(tables: dict[str, Any], sparse: dict[str, coo_array]) -> tuple[dict[
     return {**tables, **matrices, "dofs": rows, "reduction": reduction}, found
 
 
-def _reduced(sparse: dict[str, coo_array], dofs: DofTable, keep: int, *, symmetric: bool) -> Reduced:
+def _reduced(
+    sparse: dict[str, coo_array], parts: Mapping[str, coo_array], dofs: DofTable, keep: int, *,
+    symmetric: bool,
+) -> Reduced:  # fmt: skip
     """The reduction of all matrices onto the vectors of the symmetric parts of M and K."""
-    others = {key: sparse[key] for key in _MATRICES[3:] if key in sparse}
+    others = {key: sparse[key] for key in _MATRICES[3:] if key in sparse} | dict(parts)
     given = dict(sparse)
     for key, skew in () if symmetric else _SKEW.items():
         if key in given:

@@ -13,7 +13,7 @@ from typing import Annotated, Any, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import GetCoreSchemaHandler
+from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import CoreSchema, core_schema
 
 # Forces over displacements, and moments over angles, in the units of the files: what they are in N/m and
@@ -169,6 +169,14 @@ class Matrix(ByContent):
         return core_schema.no_info_plain_validator_function(
             reader, serialization=core_schema.plain_serializer_function_ser_schema(cls.write)
         )
+
+    @classmethod
+    def __get_pydantic_json_schema__(
+        cls, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        """As a scene file gives it: the name of a file, rows, or a table of entries."""
+        rows = {"type": "array", "items": {"type": "array", "items": {"type": "number"}}}
+        return {"anyOf": [{"type": "string"}, rows, {"type": "object"}]}
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -146,10 +146,6 @@ def words_of(model: type[BaseModel]) -> dict[str, str]:
 
 def _matrices(properties: dict[str, Any]) -> None:
     """The keys of a structure from matrices as a file gives them: names of files, rows, labels."""
-    rows = {"type": "array", "items": {"type": "array", "items": {"type": "number"}}}
-    for key in ("M", "K", "C", "G", "K_omega2"):
-        properties[key] |= {"anyOf": [{"type": "string"}, rows, {"type": "object"}]}
-        properties[key].pop("default", None)
     properties["modes"] |= {"anyOf": [{"type": "string"}, {"type": "object"}]}
     row = {"type": ["integer", "string"], "minimum": 0}
     names = {"type": "array", "items": {"type": "string"}, "minItems": 1}

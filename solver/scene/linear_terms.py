@@ -14,23 +14,49 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from functools import reduce
+from dataclasses import dataclass, field
+from functools import lru_cache, reduce
 from operator import or_
-from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Discriminator, Field, GetCoreSchemaHandler, Tag, model_validator
 from pydantic_core import CoreSchema
 
 from solver.contacts.fields import DofName, MemberName, Name, NonNegative, Part, Positive, Signed
 from solver.extensions import Kinds
+from solver.matrices.values import ByContent, Matrix, differs
+
+if TYPE_CHECKING:
+    from solver.scene.parts import Structure
 
 Offset = Annotated[int, Field(strict=True, ge=-10_000, le=10_000)]
 _ROUNDING = 1e-14  # of the largest coefficient: less is what a Fourier transform leaves
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Along(ByContent):
+    """A sum of DOFs, or of the rows of a structure's matrices, as what an entry acts on."""
+
+    factors: Annotated[NDArray[np.float64], "Read-only, (n,)."]
+    dofs: Annotated[tuple[str, ...] | None, "Their DOFs; None: the rows of the matrices."] = None
+    digest: Annotated[str, "Hash of the content."] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._hold({"factors": self.factors}, self.dofs)
+
+
+End = str | Along
+
+
+def dofs_at(end: End) -> tuple[str, ...]:
+    """The DOFs that an end of an entry names."""
+    return (end,) if isinstance(end, str) else end.dofs or ()
+
+
 class Entry(NamedTuple):
-    """One entry of K and C between two DOFs.
+    """One entry of K and C between two DOFs, or sums of them.
 
     Attributes
     ----------
@@ -42,8 +68,8 @@ class Entry(NamedTuple):
     k_omega2 : stiffness per squared speed [N/m per (rad/s)²].
     """
 
-    on: str
-    of: str
+    on: End
+    of: End
     offset: int
     k: complex
     c: complex
@@ -78,6 +104,11 @@ class LinearTerm(Part, ABC):
     def points(self) -> tuple[str, ...]:
         """Names of the DOFs without inertia that it makes."""
         return ()
+
+    def misfit(self, structure: Structure) -> str | None:
+        """What is wrong with it beside a structure, or None."""
+        del structure
+        return None
 
     @abstractmethod
     def entries(self, sectors: int) -> tuple[Entry, ...]:
@@ -221,7 +252,99 @@ class MaxwellBranch(LinearTerm):
         )
 
 
-SHIPPED = (Coupling, MaxwellBranch)
+_NEGATIVE = 1e-8  # of the largest eigenvalue: less is rounding of 0 in a file
+_RELAXED = 1e-12  # of the largest eigenvalue: less is rounding of a motion that the part does not feel
+
+
+class ViscoelasticPart(LinearTerm):
+    """A part given by its stiffness matrix, which relaxes as the spring of a Maxwell branch does.
+
+    The structure gains k K iωτ / (1 + iωτ). With K = Σ λ_i v_i v_iᵀ that is a branch of the stiffness k λ_i
+    along each v_i: as many points without inertia, z_i' = −(z_i − v_iᵀ x)/τ, as K has rank (the internal
+    states of G. A. Lesieutre, E. Bianchini, J. Vib. Acoust. 117 (1995) 424, doi:10.1115/1.2874474). Several
+    branches of one K beside that of the structure are a Prony series, a rational function of iω with the
+    real poles and positive residues of a passive solid.
+
+    Attributes
+    ----------
+    K : Matrix
+        Stiffness of the part [N/m], symmetric, not negative.
+    on : tuple
+        DOFs of its rows; the rows of the structure's own matrices if left out.
+    point : str
+        Begins the names of its points: `point`, `point~2`, …
+    k : float
+        Share of K that relaxes.
+    tau : float
+        Relaxation time [s].
+    """
+
+    KIND = "viscoelastic"
+    DOFS = ("point", "on")
+    PARAMETERS: ClassVar = {"k": "1", "tau": "s"}
+    POSITIVE = True
+
+    kind: Literal["viscoelastic"]
+    K: Matrix
+    on: tuple[DofName, ...] | None = None
+    point: MemberName
+    k: Positive = 1.0
+    tau: Positive
+
+    @model_validator(mode="after")
+    def _relaxes(self) -> Self:
+        if self.on is not None and len(set(self.on)) < len(self.on):
+            raise ValueError(f"`on` must name different DOFs, got {list(self.on)}")
+        if self.on is not None and len(self.on) != self.K.size:
+            raise ValueError(f"`K` must have a row for each of the {len(self.on)} DOFs, got {self.K.size}")
+        if differs(self.K.array, self.K.array.T):
+            raise ValueError("`K` of a viscoelastic part must be symmetric")
+        values = np.linalg.eigvalsh(self.K.array)
+        if values[-1] <= 0.0 or values[0] < -_NEGATIVE * values[-1]:
+            wanted = "must be a stiffness: no eigenvalue below 0, and one above"
+            raise ValueError(f"`K` of a viscoelastic part {wanted}, got {values[0]:.4g} to {values[-1]:.4g}")
+        return self
+
+    @property
+    def points(self) -> tuple[str, ...]:
+        """One for each motion that the part feels."""
+        rank = len(_motions(self.K, self.on))
+        return (self.point, *(f"{self.point}~{i}" for i in range(2, rank + 1)))
+
+    def misfit(self, structure: Structure) -> str | None:
+        """Its rows must be those of the matrices of the structure, where it names no DOFs."""
+        if self.on is not None:
+            return None
+        own: Matrix | None = getattr(structure, "M", None)
+        if own is None or structure.has_sectors:
+            return "needs `on`, the DOFs of its rows: rows alone are those of M and K of a whole structure"
+        return None if self.K.size == own.size else f"must have {own.size} rows as M has, got {self.K.size}"
+
+    def entries(self, _sectors: int) -> tuple[Entry, ...]:
+        """A spring from each of its motions to a point, and a dashpot from there to the ground."""
+        found = []
+        for (size, motion), point in zip(_motions(self.K, self.on), self.points, strict=True):
+            k = self.k * size
+            found += [Entry(point, point, 0, k, k * self.tau, 0.0, 0.0)]
+            joined = ((motion, motion, k), (motion, point, -k), (point, motion, -k))
+            found += [Entry(a, b, 0, value, 0.0, 0.0, 0.0) for a, b, value in joined]
+        return tuple(found)
+
+    def in_sector(self, named: Callable[[str, int], str]) -> Self:
+        """The same in one sector of a disk that is written out."""
+        on = None if self.on is None else tuple(named(dof, 0) for dof in self.on)
+        return self.model_copy(update={"on": on, "point": named(self.point, 0)})
+
+
+@lru_cache(maxsize=64)
+def _motions(K: Matrix, on: tuple[str, ...] | None) -> tuple[tuple[float, Along], ...]:
+    """The stiffnesses above 0 of a part and the motions they are along, the stiffest first."""
+    values, vectors = np.linalg.eigh(K.array)
+    kept = [i for i in reversed(range(values.size)) if values[i] > _RELAXED * values[-1]]
+    return tuple((float(values[i]), Along(vectors[:, i].copy(), on)) for i in kept)
+
+
+SHIPPED = (Coupling, MaxwellBranch, ViscoelasticPart)
 COUPLINGS: Kinds[type[LinearTerm]] = Kinds(
     LinearTerm, "kind", lambda term: (term.KIND,), (__name__,), "SHIPPED"
 )

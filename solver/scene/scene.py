@@ -23,7 +23,7 @@ from solver.contacts.laws.elastic_normal import ElasticNormalContact
 from solver.contacts.laws.friction import FrictionContact
 from solver.contacts.laws.gap import GapSpring
 from solver.contacts.laws.polynomial import PolynomialSpring
-from solver.errors import SceneError, SettingError
+from solver.errors import Issue, SceneError, SettingError
 from solver.extensions import on_change
 from solver.results.told import Summary, html_of
 from solver.results.units import number
@@ -226,6 +226,12 @@ class Scene(Part):
             scene, issues = None, field_issues(error, raw)
         if not checked:
             issues += [*cross_issues(raw), *cyclic_issues(raw), *body_issues(raw), *term_issues(raw)]
+        if scene is not None and not issues:
+            issues += [
+                Issue(("couplings", i, "K"), wanted)
+                for i, each in enumerate(scene.couplings)
+                if (wanted := each.misfit(scene.structure))
+            ]
         if scene is None or issues:
             raise SceneError(issues)
         scene = scene if not scene.dampers else scene.model_copy(update=with_shapes(scene))

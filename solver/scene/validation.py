@@ -475,9 +475,10 @@ def _places(
     steps: Place, row: dict[str, Any], keys: tuple[str, ...], dofs: dict[str, None] | None
 ) -> Iterator[Issue]:
     for key in keys:
-        dof = row.get(key)
-        if isinstance(dof, str) and dofs is not None and dof not in dofs:
-            yield unknown_dof((*steps, key), key, dof, dof, list(dofs))
+        given = row.get(key)
+        for dof in given if isinstance(given, list) else [given]:
+            if isinstance(dof, str) and dofs is not None and dof not in dofs:
+                yield unknown_dof((*steps, key), key, dof, dof, list(dofs))
 
 
 def _has_speed(raw: dict[str, Any]) -> bool:

@@ -189,7 +189,10 @@ def test_what_is_wrong_is_told() -> None:
     assert (
         said["/couplings/0/c_per_speed"] == "`c_per_speed` needs the `speed` of rotation [1/min] of the scene"
     )
-    assert said["/couplings/1/kind"] == "`kind` must be one of coupling, maxwell, speed-damper, got 'oil'"
+    assert (
+        said["/couplings/1/kind"]
+        == "`kind` must be one of coupling, maxwell, viscoelastic, speed-damper, got 'oil'"
+    )
     line = {key: value for key, value in SCENE.items() if key != "speed"} | {"speed_order": 2000.0}
     with pytest.raises(solver.SettingError, match=r"along an engine-order line"):
         solver.sweep(solver.Scene.from_dict(line), "oil.c_per_speed", frequency_hz=HZ, start=0.0, stop=1e-3)
@@ -202,7 +205,9 @@ def test_a_scene_knows_it_while_it_is_registered() -> None:
     assert found["c_per_speed"]["description"] == "What it gains per speed [N s/m per rad/s]."
     unregister(SpeedDamper)
     try:
-        with pytest.raises(solver.SceneError, match=r"must be one of coupling, maxwell, got 'speed-damper'"):
+        with pytest.raises(
+            solver.SceneError, match=r"must be one of coupling, maxwell, viscoelastic, got 'speed-damper'"
+        ):
             solver.Scene.from_dict(SCENE)
     finally:
         register(SpeedDamper)

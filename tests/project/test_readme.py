@@ -294,7 +294,7 @@ def test_parts_of_scenes_are_read() -> None:
     found = [contact.law for contact in solver.Scene.from_dict(raw).contacts]
     assert found == [
         "elastic-normal", "coulomb-2d", "coulomb-3d", "gap", "polynomial", "iwan", "bouc-wen", "dahl",
-        "coulomb-tanh", "hunt-crossley",
+        "coulomb-tanh", "hunt-crossley", "coulomb-viscous",
     ]  # fmt: skip
 
 

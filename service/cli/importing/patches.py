@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from solver.matrices.load_set import MatrixSet
 
 GROUND = "ground"
+_Touched = tuple[int, Mapping[int, float], Any, Any]
+"""A node, what it touches with weights, its place and its area."""
 _NEXT = "@next"
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
@@ -73,16 +75,15 @@ class Patches:
             raise InputError(f"`--patch` {name!r}: the first face must be a set of nodes, got {ends[0]!r}")
         if ahead[1] and self._turn is None:
             raise InputError(f"`--patch` {name!r}: {ends[1]!r} lies in the next sector: give --sectors N")
-        found = self._paired(name, first, second, next_sector=ahead[1])
-        normal = self._normal(name, values.pop("normal", None), found.plane)
-        pairs = []
-        for (node, other), place, area in zip(found.pairs, found.places, found.areas, strict=True):
-            for one in (node, other):
-                if one is not None:
-                    self._nodes[one] = self._deck.nodes[one]
-            end = GROUND if other is None else f"n{other}" + (_NEXT if ahead[1] else "")
-            at = [float(value) * self._metres for value in place]
-            pairs.append({"between": [f"n{node}", end], "at": at, "area": float(area) * self._metres**2})
+        given, pairing = values.pop("normal", None), values.pop("pairing", "nodes")
+        if pairing not in ("nodes", "mortar"):
+            raise InputError(f"`--patch` {name!r}: `pairing` must be nodes or mortar, got {pairing!r}")
+        sector = _NEXT if ahead[1] else ""
+        try:
+            normal, touched = self._touched(name, given, (first, second), self._turned(sector), pairing)
+        except ValueError as error:
+            raise InputError(f"`--patch` {name!r}: {error}") from error
+        pairs = [self._point(*one, sector) for one in touched]
         law = values.pop("law", "coulomb-3d")
         self._dampers.append(
             {"name": name, "shape": "patch", "law": law, "normal": normal, **values, "pairs": pairs}
@@ -97,18 +98,49 @@ class Patches:
             raise InputError(f"`--patch` {name!r}: the deck has no set {end!r}; it has {known}")
         return list(dict.fromkeys(found))
 
-    def _paired(self, name: str, first: list[int], second: list[int] | None, *, next_sector: bool) -> Any:
-        from solver.matrices.faces import face
+    def _turned(self, sector: str) -> Any:
+        """The rotation to where a face touches; None where that is here."""
         from solver.matrices.sectors.elimination import rotation
 
-        turn = None
-        if next_sector and self._turn is not None:
-            sectors, axis = self._turn
-            turn = rotation(axis, 2.0 * math.pi / sectors)
-        try:
-            return face(self._deck, first, second, turn, self._tolerance)
-        except ValueError as error:
-            raise InputError(f"`--patch` {name!r}: {error}") from error
+        if not sector or self._turn is None:
+            return None
+        sectors, axis = self._turn
+        return rotation(axis, 2.0 * math.pi / sectors)
+
+    def _touched(
+        self, name: str, given: object, faces: tuple[list[int], list[int] | None], turn: Any, pairing: object
+    ) -> tuple[list[float], list[_Touched]]:
+        """The normal, and each node of the first face with what it touches of the second."""
+        from solver.matrices.faces import face
+        from solver.matrices.mortar import mortar
+
+        first, second = faces
+        if pairing == "mortar" and second is not None:
+            normal = self._normal(name, given, None)
+            found = mortar(self._deck, first, second, normal, turn)
+            return normal, [*zip(found.nodes, found.weights, found.places, found.areas, strict=True)]
+        lying = face(self._deck, first, second, turn, self._tolerance)
+        touched: list[_Touched] = [
+            (node, {} if other is None else {other: 1.0}, place, area)
+            for (node, other), place, area in zip(lying.pairs, lying.places, lying.areas, strict=True)
+        ]
+        return self._normal(name, given, lying.plane), touched
+
+    def _point(
+        self, node: int, touched: Mapping[int, float], place: Sequence[float], area: float, sector: str
+    ) -> dict[str, Any]:
+        """A point of a patch: a node, what it touches, where it is and its area."""
+        for one in (node, *touched):
+            self._nodes[one] = self._deck.nodes[one]
+        heaviest = max(touched, key=lambda other: touched[other], default=None)
+        end = GROUND if heaviest is None else f"n{heaviest}{sector}"
+        found: dict[str, Any] = {
+            "between": [f"n{node}", end], "at": [float(value) * self._metres for value in place],
+            "area": float(area) * self._metres**2,
+        }  # fmt: skip
+        if len(touched) > 1:
+            found["spread"] = {f"n{other}{sector}": weight for other, weight in touched.items()}
+        return found
 
     def _normal(self, name: str, given: object, plane: Any) -> list[float]:
         """The unit vector asked for; it is not guessed, because its sign says which way the face opens."""

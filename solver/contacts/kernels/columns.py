@@ -18,6 +18,8 @@ COLUMNS = HISTORY_WAY + 1
 COLUMN_KIND = 4
 # Elastic normal: stiffness [N/m], and 1.0 where the normal motion counts from the prestressed state.
 KN, PRESTRESSED = OWN, OWN + 1
+# Of a dashpot beside the tangential spring [N s/m].
+C_STICK = OWN
 # In space, beside these: stiffness of the second direction [N/m], NaN where it is that of the first.
 KT_SECOND = OWN + 2
 # Gap spring: stiffness [N/m] and gap [m].

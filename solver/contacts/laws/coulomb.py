@@ -21,7 +21,7 @@ class SlidesOnALine(FrictionContact):
         """Whether it has one slider with the events of `solver.contacts.segments`."""
         return True
 
-    def perturbed(self, motions: Real, load: Real) -> tuple[ContactPart, ...]:
+    def perturbed(self, motions: Real, load: Real) -> tuple[ContactPart, ...] | None:
         """Return how it follows small perturbations of a motion."""
         if self.is_rigid:
             wanted = "must be finite here: what is known of the stability of a rigid contact is in the answer"

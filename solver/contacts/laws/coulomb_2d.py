@@ -81,7 +81,7 @@ class SlidesInAPlane(FrictionContact):
 
         return force_in_space(path_in_space(motions, load, *self.tangential, self.mu), tau)
 
-    def shares(self, motions: Real, load: Real) -> Shares:
+    def shares(self, motions: Real, load: Real) -> Shares | None:
         """Return the shares of the period in stick, slip and separation."""
         if self.limits_apart:
             return super().shares(motions, load)
@@ -89,7 +89,7 @@ class SlidesInAPlane(FrictionContact):
 
         return shares_in_space(path_in_space(motions, load, *self.tangential, self.mu))
 
-    def perturbed(self, motions: Real, load: Real) -> tuple[ContactPart, ...]:
+    def perturbed(self, motions: Real, load: Real) -> tuple[ContactPart, ...] | None:
         """Return how it follows small perturbations of a motion."""
         if self.limits_apart:
             return super().perturbed(motions, load)

@@ -315,7 +315,7 @@ class FrictionContact(AnyContact):
         pairs = zip(slider.ports, slider.stiffnesses, strict=True)
         return np.array([force_by_segments(motions[port], load, kt, self.mu, tau) for port, kt in pairs])
 
-    def shares(self, motions: Real, load: Real) -> Shares:
+    def shares(self, motions: Real, load: Real) -> Shares | None:
         """Return the shares of the period in stick, slip and separation, by its segments."""
         from solver.contacts.segments import segments_of, shares_of
 
@@ -323,7 +323,7 @@ class FrictionContact(AnyContact):
         pairs = zip(slider.ports, slider.stiffnesses, strict=True)
         return shares_of(*(segments_of(motions[port], load, kt, self.mu) for port, kt in pairs))
 
-    def perturbed(self, motions: Real, load: Real) -> tuple[ContactPart, ...]:
+    def perturbed(self, motions: Real, load: Real) -> tuple[ContactPart, ...] | None:
         """Return how it follows small perturbations of a motion: each direction by itself."""
         from solver.contacts.pieces.line import friction_pieces
         from solver.contacts.pieces.piece import ContactPart

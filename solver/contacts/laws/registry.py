@@ -11,6 +11,7 @@ from solver.extensions import Kinds
 
 SHIPPED = (
     "solver.contacts.laws.coulomb",
+    "solver.contacts.laws.history.coulomb_viscous",
     "solver.contacts.laws.elastic_normal",
     "solver.contacts.laws.coulomb_2d",
     "solver.contacts.laws.coulomb_3d",

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -94,6 +94,13 @@ def drawn_edges(
     edges, which = np.unique(np.concatenate(pairs), axis=0, return_inverse=True)
     drawn = _bent(which.ravel(), normals[np.concatenate(owners)], len(edges))
     return np.asarray(known[edges[drawn]], np.int64)
+
+
+def faces_of(blocks: Sequence[tuple[ElementShape, Integer]], nodes: Collection[int]) -> list[list[int]]:
+    """The corners of each face of the surface that lies between these nodes; of shells, all their faces."""
+    faces = _surface(blocks)
+    inside = faces[(np.isin(faces, list(nodes)) | (faces < 0)).all(axis=1)]
+    return [[int(node) for node in face if node >= 0] for face in inside]
 
 
 def _surface(blocks: Sequence[tuple[ElementShape, Integer]]) -> Integer:

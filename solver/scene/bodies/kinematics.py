@@ -48,22 +48,24 @@ def forms_of(scene: Scene, contact: AnyContact) -> tuple[Form, ...]:
     if contact.axes is None or contact.at is None:
         return tuple(pair_form(pair) for pair in contact.pairs)
     directions = tuple(contact.axes[which] for which in contact.directions)
-    return placed_forms(scene, contact.between, contact.at, directions)
+    return placed_forms(scene, contact.between, contact.at, directions, contact.spread)
 
 
 def placed_forms(
-    scene: Scene, between: Between, at: Sequence[Any], directions: Sequence[Sequence[Any]]
-) -> tuple[Form, ...]:
-    """The motions of the first end against the second along directions at a point.
+    scene: Scene, between: Between, at: Sequence[Any], directions: Sequence[Sequence[Any]],
+    spread: tuple[tuple[str, float], ...] | None = None,
+) -> tuple[Form, ...]:  # fmt: skip
+    """The motions of the first end against the second, or against a weighted sum of ends, at a point.
 
     Point and directions may be symbols: the factors are then expressions in them.
     """
-    ends = [_end(scene, text) for text in between]
+    against = ((between[1], 1.0),) if spread is None else spread
+    ends = [(_end(scene, text), share) for text, share in ((between[0], -1.0), *against)]
     return tuple(
         _collected(
             [
-                Term(dof, ahead, sign * factor)
-                for (place, turn, ahead), sign in zip(ends, (1.0, -1.0), strict=True)
+                Term(dof, ahead, -share * factor)
+                for (place, turn, ahead), share in ends
                 if place is not None
                 for dof, factor in point_motion(place, _turned_back(at, turn), _turned_back(direction, turn))
             ]

@@ -16,7 +16,7 @@ from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
 from pydantic import Field, ValidationError, model_validator
 
 from solver.contacts.fields import EndName, Friction, Name, NonNegative, Part, Positive, Signed, Vector
-from solver.contacts.frames import cross, dot, frame, is_unit, unit
+from solver.contacts.frames import Weights, cross, dot, frame, is_unit, unit
 from solver.scene.bodies.body import Body, Row
 
 
@@ -27,6 +27,7 @@ class Spot(NamedTuple):
     between: tuple[str, str]
     at: tuple[Any, Any, Any]
     axes: tuple[tuple[Any, Any, Any], ...]
+    spread: dict[str, float] | None = None
 
 
 class Shape(Part):
@@ -95,6 +96,7 @@ class Shape(Part):
                 "between": list(spot.between), "at": list(spot.at), "normal": list(spot.axes[2]),
                 "tangents": [list(axis) for axis in spot.axes[:2]], "mu": self.mu,
                 **{key: getattr(self, key) * share for key in self.SHARED}, **self._settings,
+                **({} if spot.spread is None else {"spread": spot.spread}),
             }
             for spot, share in zip(self.spots(self.geometry), self.shares, strict=True)
         ]  # fmt: skip
@@ -108,10 +110,13 @@ MOST_PAIRS = 1000
 
 
 class PatchPoint(Part):
-    """Two nodes of a patch that lie on each other, or a node and the ground."""
+    """Two nodes of a patch that lie on each other, a node and the ground, or a node on a mesh of others."""
 
     between: Annotated[tuple[EndName, EndName], "Nodes of the first and the second face."]
     at: Annotated[Vector, "Where they are [m]."]
+    spread: Annotated[
+        Weights | None, "In place of the second node: nodes of the second face with weights that sum to 1."
+    ] = None
     area: Annotated[
         Positive, "Part of the face that belongs to them; in any unit, as only the share of it counts."
     ] = 1.0
@@ -152,7 +157,8 @@ class Patch(Shape):
         """Its points; no number moves them."""
         axes = frame(self.normal)
         for number, pair in enumerate(self.pairs):
-            yield Spot(f"{self.name}-{number}", pair.between, pair.at, axes)
+            spread = None if pair.spread is None else dict(pair.spread)
+            yield Spot(f"{self.name}-{number}", pair.between, pair.at, axes, spread)
 
 
 MOST_POINTS = 100

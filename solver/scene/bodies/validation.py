@@ -132,18 +132,22 @@ def _end_issues(
     cyclic = is_cyclic(structure)
 
     def of_end(place: Place, text: str, end: End) -> Iterator[Issue]:
+        key = str(place[-2])
         if end.dof is not None and end.dof not in known:
-            yield _unknown_place(place, "between", end.dof, known, dofs)
+            yield _unknown_place(place, key, end.dof, known, dofs)
         if end.next and not cyclic:
-            yield no_sector(place, "between", text)
+            yield no_sector(place, key, text)
         elif end.next and row.get("normal") is not None and not _has_axis(structure):
             sentence = (
-                f"`between`: {text!r} lies in the next sector, which is turned: "
+                f"`{key}`: {text!r} lies in the next sector, which is turned: "
                 "give the direction of the axis as `axis` of the structure (matrices: of [structure.cyclic])"
             )
             yield Issue(place, sentence, named=False)
 
     yield from pair_issues(steps, row.get("between"), of_end)
+    spread = row.get("spread")
+    for text in map(str, spread if isinstance(spread, dict) else ()):
+        yield from of_end((*steps[:-1], "spread", text), text, parse_end(text))
 
 
 def _has_axis(structure: dict[str, Any]) -> bool:

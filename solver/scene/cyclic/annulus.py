@@ -331,7 +331,8 @@ def _moving(scene: Scene, contact: AnyContact, j: int, n: int) -> tuple[dict[str
             sums[dof] = sums.get(dof, 0.0) + factor
         motions.append(tuple((dof, factor) for dof, factor in sums.items() if factor != 0.0))
     ends = tuple(_end(text, j, n) for text in contact.between)
-    update = {"between": ends, "motions": tuple(motions)} | dict.fromkeys(("at", "normal", "tangents"))
+    gone = dict.fromkeys(("at", "normal", "tangents", "spread"))
+    update = {"between": ends, "motions": tuple(motions)} | gone
     return update, [bool(motion) for motion in motions]
 
 
@@ -378,7 +379,7 @@ def _gas(scene: Scene, n: int) -> tuple[Coupling, ...]:
                 raise SettingError("damping", gas.dof, wanted)
             found.append(
                 Coupling(
-                    on=entry.on, of=entry.of, offset=entry.offset, k=entry.k.real, k_imaginary=entry.k.imag,
+                    on=gas.dof, of=gas.dof, offset=entry.offset, k=entry.k.real, k_imaginary=entry.k.imag,
                     c=entry.c.real,
                 )
             )  # fmt: skip
