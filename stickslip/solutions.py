@@ -1,6 +1,8 @@
 """One response: its motion in time, a run through many, power, stability, uniqueness, all that there are."""
 
 from solver import (
+    QuasiPeriodicCurve as QuasiPeriodicCurve,
+    TorusCurveStatus as TorusCurveStatus,
     AllSolutions as AllSolutions,
     AmplitudeRange as AmplitudeRange,
     Certificate as Certificate,

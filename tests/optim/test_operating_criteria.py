@@ -150,6 +150,7 @@ def test_the_damping_is_that_of_the_mode() -> None:
     assert row.bound == -0.02
 
 
+@pytest.mark.long
 def test_the_best_damped_design_is_that_of_a_grid() -> None:
     """Of free decays the mode's damping is largest there, whatever the peak of the response is."""
     bounds = {"damper.N0": (20.0, 400.0)}

@@ -57,7 +57,7 @@ class ReassemblyStatus(Enum):
 class Population(Drawn):
     """A population of assemblies."""
 
-    VIEWS: ClassVar = Views("optim.views", "posterior:population", "posteriors:posterior_figure")
+    VIEWS: ClassVar = Views("optim.views", "posterior:told", "posteriors:drawn")
     DATA: ClassVar = Data(
         "population", {"parameter=middles": "parameter=name mean sd low high", "draw parameter": "samples"},
         rows=("draw",),

@@ -74,7 +74,7 @@ class Marginal(Piece):
 class Posterior(Drawn):
     """The posterior of unknowns."""
 
-    VIEWS: ClassVar = Views("optim.views", "posterior:posterior", "posteriors:posterior_figure")
+    VIEWS: ClassVar = Views("optim.views", "posterior:told", "posteriors:drawn")
     DATA: ClassVar = Data(
         "posterior", {"parameter=marginals": "parameter=name mean sd low high", "draw parameter": "samples"},
         "sampler", rows=("draw",),

@@ -14,10 +14,10 @@ from solver.views.plots.style import Into
 
 def drawn(found: Mapping[str, Any], *, ax: Into = None) -> Figure:
     """Draw that of the three which it is."""
-    return (model_choice_figure if "models" in found else posterior_figure)(found, ax=ax)
+    return (_model_choice_figure if "models" in found else _posterior_figure)(found, ax=ax)
 
 
-def posterior_figure(found: Mapping[str, Any], *, ax: Into = None) -> Figure:
+def _posterior_figure(found: Mapping[str, Any], *, ax: Into = None) -> Figure:
     """Draw a histogram of the samples of each unknown; of a population, of assemblies that may come.
 
     Parameters
@@ -40,7 +40,7 @@ def posterior_figure(found: Mapping[str, Any], *, ax: Into = None) -> Figure:
     return page
 
 
-def model_choice_figure(found: Mapping[str, Any], *, ax: Into = None) -> Figure:
+def _model_choice_figure(found: Mapping[str, Any], *, ax: Into = None) -> Figure:
     """Draw the probability of each model, on a logarithmic scale.
 
     Parameters

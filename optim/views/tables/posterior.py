@@ -12,11 +12,11 @@ _HEADS = ("parameter", "mean", "± sd", "90 % interval")
 
 def told(found: Mapping[str, Any]) -> Iterator[Block]:
     """That of the three which it is."""
-    of = population if "assemblies" in found else model_choice if "models" in found else posterior
+    of = _population if "assemblies" in found else _model_choice if "models" in found else _posterior
     return of(found)
 
 
-def posterior(found: Mapping[str, Any]) -> Iterator[Block]:
+def _posterior(found: Mapping[str, Any]) -> Iterator[Block]:
     """Mean, deviation and interval of each unknown, and how the samples were got."""
     yield ResultTable(f"{found['scene']}, posterior", _HEADS, _rows(found["marginals"]))
     if found["sampler"]:
@@ -26,14 +26,14 @@ def posterior(found: Mapping[str, Any]) -> Iterator[Block]:
         yield Summary("", [("warning", found["misfit"])])
 
 
-def population(found: Mapping[str, Any]) -> Iterator[Block]:
+def _population(found: Mapping[str, Any]) -> Iterator[Block]:
     """Medians over the assemblies, and the spread of what varies."""
     title = f"{found['scene']}, {len(found['assemblies'])} assemblies: medians"
     yield ResultTable(title, _HEADS, _rows(found["middles"]))
     yield ResultTable("spread over assemblies", _HEADS, _rows(found["spreads"]))
 
 
-def model_choice(found: Mapping[str, Any]) -> Iterator[Block]:
+def _model_choice(found: Mapping[str, Any]) -> Iterator[Block]:
     """Probability and evidence of each model."""
     rows = []
     for one in found["models"]:

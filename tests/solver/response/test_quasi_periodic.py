@@ -170,7 +170,8 @@ def test_two_engine_orders_of_a_disk_are_those_of_the_whole_annulus() -> None:
     assert found.half_peak_to_peak == pytest.approx(known.half_peak_to_peak, rel=5e-4)
 
 
-@pytest.mark.parametrize("load", [100.0, pytest.param(25.0, marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("load", [100.0, 25.0])
 def test_a_curve_is_that_of_its_points_and_of_marches(load: float) -> None:
     """Begun with what the neighbour does; three of them marched over periods of up to 400 turns."""
     scene, second = two_dof(N0=load), {"dof": "m2", "amplitude": 60.0}
@@ -194,6 +195,8 @@ def test_a_curve_says_what_is_not_known_and_stops_when_asked() -> None:
     )
     assert found.status is solver.TorusCurveStatus.HOLES  # in its middle both are one frequency
     assert np.isnan(found.max_abs).tolist() == [False, True, False]
+    alone = solver.quasi_periodic(two_dof(N0=100.0), frequency_hz=1.1, tolerance=0.1, **keys)
+    assert found.max_abs[2] == pytest.approx(alone.max_abs, rel=1e-6)
     asked = iter([False, False, True, True, True, True])
     stopped = solver.quasi_periodic_curve(
         two_dof(N0=100.0), frequency_hz=0.9, to_hz=1.2, points=9, should_stop=lambda: next(asked), **keys
