@@ -110,6 +110,10 @@ def history_of(solution: Solution) -> History:
     """Return what a converged response does not say without its history."""
     sticking, scene = _sticking(solution), solution.scene
     given = all(contact.load_is_given for contact in scene.contacts)
+    pairs = zip(scene.contacts, solution.contacts, strict=False)
+    if any(contact.friction is None and found.state is ContactState.STUCK for contact, found in pairs):
+        # What keeps no slider, as friction with a dashpot, says nothing of what it holds after the start.
+        return History(mean_open=True, half_range_open=not given, mean_range=(math.nan, math.nan))
     if not sticking:
         only = (solution.mean, solution.mean) if given else (math.nan, math.nan)
         return History(mean_open=False, half_range_open=False, mean_range=only)
