@@ -9,12 +9,16 @@ from decimal import ROUND_CEILING, ROUND_FLOOR, Decimal, localcontext
 from itertools import accumulate, pairwise
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 if TYPE_CHECKING:
     from solver.certificate.checker import Orbit
     from solver.response.exact.flow import FlowPiece
     from solver.response.exact.piecewise import Piecewise
 
 _NEWTON, _WIDER = 12, 4  # steps; boxes tried
+_SEGMENT = 12  # instants of events, after which states are unknown anew
+_LINEAR = 1e-11  # of a step, which the next is about in floats
 _SLOW = 1e-4  # by which a step falls with a derivative that still serves
 _DIGITS = 25
 _AT_ONCE = 1e-7  # of 1 / ω: floats may have events this near each other in the wrong order
@@ -26,7 +30,21 @@ def set_out(raw: dict[str, Any], piecewise: Piecewise, pieces: Sequence[FlowPiec
     from solver.certificate.statement import orbit_of
 
     raw["orbit"], start = orbit_of(piecewise, pieces, raw["system"])
-    return _set_in_order(raw, start, _AT_ONCE / piecewise.omega)
+    return _begun_anew(raw, _set_in_order(raw, start, _AT_ONCE / piecewise.omega))
+
+
+def _begun_anew(raw: dict[str, Any], y: list[Any]) -> list[Any]:
+    """Make states unknown anew before balls have grown too much; return the unknowns."""
+    from flint import arb
+
+    orbit = orbit_at(raw)
+    if len(orbit.groups) <= _SEGMENT:
+        return y
+    starts = orbit.shoot([each.mid() for each in map(arb, y)])[2]
+    for piece, group in list(enumerate(orbit.groups, start=1))[_SEGMENT - 1 :: _SEGMENT]:
+        raw["orbit"]["events"][group[-1]]["anew"] = True
+        y += [each.mid() for each in starts[piece][0].entries()]
+    return y
 
 
 def _set_in_order(raw: dict[str, Any], start: list[float], at_once: float) -> list[Any]:
@@ -34,7 +52,9 @@ def _set_in_order(raw: dict[str, Any], start: list[float], at_once: float) -> li
 
     They are that only up to the rounding of the phases of their forces, so that Newton's method tells it.
     """
-    from flint import arb, arb_mat, ctx
+    from flint import arb, ctx
+
+    from solver.certificate.checker import inverse, rough
 
     with ctx.workprec(_ORDER_BITS):
         orbit, y = orbit_at(raw), [arb(each) for each in start]
@@ -45,8 +65,9 @@ def _set_in_order(raw: dict[str, Any], start: list[float], at_once: float) -> li
         if len(set(where)) == len(where) or max(contacts.values()) > 1:
             return y
         for _ in range(_NEWTON):
-            value, slope, _ = orbit.shoot(y, arb_mat(len(y), 1))
-            steps = slope.mid().solve(value.mid()).entries()
+            value, slope, _ = orbit.shoot(y, np.zeros(len(y)))
+            near = inverse(slope, np.array(_sizes(orbit, y)))
+            steps = (near.middle @ rough(value).middle)[:, 0]
             y = [(each - step).mid() for each, step in zip(y, steps, strict=True)]
             ends = list(accumulate(y[first:]))
             order = sorted(range(len(ends)), key=lambda k: (where[k], ends[k]))
@@ -58,7 +79,7 @@ def _set_in_order(raw: dict[str, Any], start: list[float], at_once: float) -> li
                 ends = [arb(0), *(ends[k] for k in order)]
                 y[first:] = [(after - before).mid() for before, after in pairwise(ends)]
                 orbit = orbit_at(raw)
-            elif max(float(abs(step)) for step in steps[first:]) < _KNOWN * at_once:
+            elif float(abs(steps[first:]).max()) < _KNOWN * at_once:
                 break
     return y
 
@@ -72,30 +93,27 @@ def orbit_at(raw: dict[str, Any], **at: str) -> Orbit:
 
 
 def settled(orbit: Orbit, start: list[Any]) -> tuple[list[Any], float]:
-    """Return the unknowns by Newton's method, and its last step relative to their sizes."""
-    from flint import arb, arb_mat, ctx
+    """Return the unknowns by Newton's method, and about how far off they are relative to their sizes."""
+    from flint import arb, ctx
 
-    from solver.certificate.checker import RejectedError
+    from solver.certificate.checker import inverse, rough
 
-    y = [arb(each) for each in start]
-    sizes, inverse, now = _sizes(orbit, y), None, math.inf
+    y, near, now = [arb(each) for each in start], None, math.inf
+    sizes = np.array(_sizes(orbit, y))
     for _ in range(_NEWTON):
-        value, slope, _ = orbit.shoot(y, arb_mat(len(y), 1) if inverse is None else None)
-        try:
-            inverse = slope.mid().inv().mid() if inverse is None else inverse
-        except ZeroDivisionError:
-            raise RejectedError("the derivative of the equations is singular: it is not isolated") from None
-        steps = (inverse * value).entries()
-        y = [(each - step).mid() for each, step in zip(y, steps, strict=True)]
-        before, now = now, max(
-            float(step.abs_upper()) / size for step, size in zip(steps, sizes, strict=True)
-        )  # fmt: skip
-        unsure = max(float(step.rad()) / size for step, size in zip(steps, sizes, strict=True))
-        if now <= max(2.0 ** (-ctx.prec // 2), 2.0 * unsure):  # no step tells more than its rounding
+        value, slope, _ = orbit.shoot(y, np.zeros(len(y)) if near is None else None)
+        near = inverse(slope, sizes).middle if near is None else near
+        rest = rough(value)
+        steps = (near @ rest.middle)[:, 0]
+        y = [(each - step).mid() for each, step in zip(y, steps.tolist(), strict=True)]
+        before, now = now, float((abs(steps) / sizes).max())
+        unsure = float(((abs(near) @ rest.off)[:, 0] / sizes).max())
+        left = max(now * max(now, _LINEAR), unsure)
+        if left <= max(2.0 ** (-ctx.prec * 3 // 5), unsure):  # no step tells more than its rounding
             break
         if now > _SLOW * before:
-            inverse = None
-    return y, now
+            near = None
+    return y, left
 
 
 def boxed(orbit: Orbit, y: list[Any], now: Any) -> tuple[list[str], tuple[Any, Any, Any]]:
@@ -123,12 +141,13 @@ def _sizes(orbit: Orbit, y: list[Any]) -> list[float]:
         for own in (
             [k for k, at in enumerate(orbit.unknown) if at < n],
             [k for k, at in enumerate(orbit.unknown) if n <= at < 2 * n],
-            range(states, orbit.size),
+            range(states, orbit.lasts),
         )
     )
-    kt = [each["kt"] for each in orbit.system.contacts]
-    sizes = [moved if at < n else fast if at < 2 * n else kt[at - 2 * n] * moved for at in orbit.unknown]
-    return sizes + [longest] * (orbit.size - states)
+    every = [moved] * n + [fast] * n + [(each["kt"] or 0.0) * moved or 1.0 for each in orbit.system.contacts]
+    every += [1.0] * (orbit.system.d - orbit.system.one)
+    sizes = [every[at] for at in orbit.unknown] + [longest] * (orbit.lasts - states)
+    return sizes + every * len(orbit.anew)
 
 
 def digits(middle: Any) -> str:

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from solver.response.exact.orbit import Orbit as ExactOrbit
 
 _Bounds = dict[str, tuple[float, float]]
-_ANSWER, _GROWN = 40, 3.1  # bits of an answer, and twice those by which balls grow from event to event
+_BITS = (128, 192, 256)
 MOST_WORK = 5000.0
 _MOVES = 8  # contacts moved
 _NARROW = 1e-16  # relative width of what is claimed; else more bits
@@ -239,23 +239,22 @@ def _proved(raw: dict[str, Any], piecewise: Piecewise, found: ExactOrbit) -> _Bo
 
 
 def in_more_bits(raw: dict[str, Any], prove: Callable[[], tuple[Any, Any, Any]]) -> _Bounds:
-    """Prove with as many bits as the events ask for, and with more; return the claims as floats."""
+    """Prove with 128 bits, and with more; return the claims as floats."""
     from flint import ctx
 
     from solver.certificate.checker import RejectedError
 
-    kept, least = ctx.prec, 64 * math.ceil((_ANSWER + _GROWN * len(raw["orbit"]["events"])) / 64)
-    least = max(least, 128)
+    kept = ctx.prec
     try:
-        for bits in range(least, 2 * least + 1, 64):
+        for bits in _BITS:
             ctx.prec = raw["bits"] = bits
             try:
                 low, high, period = prove()
             except RejectedError as error:
-                if bits == 2 * least or (len(error.args) > 1 and error.args[-1] < 0):
+                if bits == _BITS[-1] or (len(error.args) > 1 and error.args[-1] < 0):
                     raise
                 continue
-            if bits == 2 * least or (low.rad() + high.rad()) <= _NARROW * (high - low):
+            if bits == _BITS[-1] or (low.rad() + high.rad()) <= _NARROW * (high - low):
                 reached = {"max_abs": high.max(-low), "half_peak_to_peak": (high - low) / 2}
                 own = raw["system"]["frequency_hz"] is None
                 return claimed(raw, reached | ({"frequency_hz": 1 / period} if own else {}))

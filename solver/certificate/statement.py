@@ -127,9 +127,10 @@ def orbit_of(
         del fixed[max(held, key=lambda j: abs(held[j]))]
     stated = System(system, {})
     for _ in range(2):  # those that come to rest together, then those that go on together
+        orbit = CheckedOrbit(stated, found)
         for i in range(1, len(events)):
-            orbit = CheckedOrbit(stated, found)
-            near = times[i] - times[i - 1] < _AT_ONCE and orbit.together(i)
+            if near := times[i] - times[i - 1] < _AT_ONCE:
+                near = (orbit := CheckedOrbit(stated, found)).together(i)
             if near or events[i]["contact"] in orbit.twins:
                 events[i]["at_once"] = True
     values = [*w[:n].tolist(), *(w[n : 2 * n] * omega).tolist()]

@@ -8,6 +8,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -143,6 +144,42 @@ def test_spoilt_certificates_are_rejected(proved: dict[str, Any]) -> None:
             checker.check(_spoilt(proved, rng))
         refused += 1
     assert refused == 100
+
+
+def test_many_events_are_proved_with_states_that_are_unknown_anew() -> None:
+    """36 events with 128 bits; a state that is unknown anew is as little to be changed as the first."""
+    scene, hz = random_scene(38)
+    near = stickslip.solve(scene, frequency_hz=hz, harmonics=21)
+    found = stickslip.certify(near)
+    assert found.reached, found.reason
+    assert (found.events, found.bits) == (36, 128)
+    assert abs(near.max_abs - found.max_abs[0]) <= near.error_estimate
+    raw = json.loads(json.dumps(found.certificate))
+    checker.check(raw)
+    middle, radius = raw["proof"]["unknowns"][-3].split(" +/- ")
+    raw["proof"]["unknowns"][-3] = f"{float(middle) + 1e-9!r} +/- {radius}"
+    with pytest.raises(checker.RejectedError):
+        checker.check(raw)
+    anew = [each for each in raw["orbit"]["events"] if each.pop("anew", False)]
+    assert len(anew) == 3
+    with pytest.raises(checker.RejectedError, match="unknowns"):
+        checker.check(raw)
+
+
+def test_products_of_floats_are_bounded() -> None:
+    """Against rational numbers, of sizes from 1e-100 to 1e100, of long sums that cancel."""
+    rng = np.random.default_rng(5)
+    for _ in range(20):
+        a, b = (
+            checker.Rough(rng.normal(size=size) * 10.0 ** rng.integers(-100, 100), None)
+            for size in ((2, 30), (30, 2))
+        )
+        product, less = a @ b, a - checker.Rough(a.middle * (1.0 + 1e-15))
+        for i, k in np.ndindex(2, 2):
+            true = sum(Fraction(x) * Fraction(y) for x, y in zip(a.middle[i], b.middle[:, k], strict=True))
+            assert abs(true - Fraction(product.middle[i, k])) <= Fraction(product.off[i, k])
+            true = Fraction(a.middle[i, k]) - Fraction(a.middle[i, k] * (1.0 + 1e-15))
+            assert abs(true - Fraction(less.middle[i, k])) <= Fraction(less.off[i, k])
 
 
 # What cannot be proved, and what is proved of what is not determined
