@@ -17,7 +17,9 @@ if TYPE_CHECKING:
     from solver.response.exact.piecewise import Piecewise
 
 _NEWTON, _WIDER = 12, 4  # steps; boxes tried
-_SEGMENT = 12  # instants of events, after which states are unknown anew
+_GROWN = 1e4  # by which a derivative is off more, and a state is unknown anew
+_ANEW_BITS = 128
+_FEW = 100  # instants of events times the size of a state for which none is
 _LINEAR = 1e-11  # of a step, which the next is about in floats
 _SLOW = 1e-4  # by which a step falls with a derivative that still serves
 _DIGITS = 25
@@ -35,15 +37,20 @@ def set_out(raw: dict[str, Any], piecewise: Piecewise, pieces: Sequence[FlowPiec
 
 def _begun_anew(raw: dict[str, Any], y: list[Any]) -> list[Any]:
     """Make states unknown anew before balls have grown too much; return the unknowns."""
-    from flint import arb
+    from flint import arb, ctx
 
-    orbit = orbit_at(raw)
-    if len(orbit.groups) <= _SEGMENT:
-        return y
-    starts = orbit.shoot([each.mid() for each in map(arb, y)])[2]
-    for piece, group in list(enumerate(orbit.groups, start=1))[_SEGMENT - 1 :: _SEGMENT]:
-        raw["orbit"]["events"][group[-1]]["anew"] = True
-        y += [each.mid() for each in starts[piece][0].entries()]
+    with ctx.workprec(_ANEW_BITS):
+        orbit, y = orbit_at(raw), [each.mid() for each in map(arb, y)]
+        if len(orbit.groups) * orbit.system.d <= _FEW:
+            return y
+        sizes, starts = np.array(_every_size(orbit, y)), orbit.shoot(y, np.zeros(len(y)))[2][1:]
+    last = math.inf
+    for (z, D, *_), group in zip(starts, orbit.groups, strict=True):
+        off = float((D.off.max(axis=1) / sizes).max())
+        last = min(last, off)
+        if off > _GROWN * last:
+            last, raw["orbit"]["events"][group[-1]]["anew"] = off, True
+            y += [each.mid() for each in z.entries()]
     return y
 
 
@@ -56,7 +63,7 @@ def _set_in_order(raw: dict[str, Any], start: list[float], at_once: float) -> li
 
     from solver.certificate.checker import inverse, rough
 
-    with ctx.workprec(_ORDER_BITS):
+    with ctx.workprec(_ANEW_BITS):
         orbit, y = orbit_at(raw), [arb(each) for each in start]
         first = len(orbit.unknown)
         where = list(accumulate((length >= at_once for length in start[first + 1 :]), initial=0))  # clusters
@@ -134,20 +141,22 @@ def boxed(orbit: Orbit, y: list[Any], now: Any) -> tuple[list[str], tuple[Any, A
 
 
 def _sizes(orbit: Orbit, y: list[Any]) -> list[float]:
-    """Return what a change of each unknown is compared with: the largest of its kind; of forces by kt."""
-    n, states = orbit.system.n, len(orbit.unknown)
-    moved, fast, longest = (
-        max((abs(float(y[k])) for k in own), default=1.0) or 1.0
-        for own in (
-            [k for k, at in enumerate(orbit.unknown) if at < n],
-            [k for k, at in enumerate(orbit.unknown) if n <= at < 2 * n],
-            range(states, orbit.lasts),
-        )
+    """Return what a change of each unknown is compared with."""
+    every, lengths = _every_size(orbit, y), [float(each) for each in orbit.lengths(y)]
+    count = orbit.lasts - len(orbit.unknown)
+    return [every[at] for at in orbit.unknown] + [max(lengths)] * count + every * len(orbit.anew)
+
+
+def _every_size(orbit: Orbit, y: list[Any]) -> list[float]:
+    """Return the size of each number of a state: the largest of its kind where it begins; of forces by kt."""
+    n = orbit.system.n
+    moved, fast = (
+        max((abs(float(y[k])) for k, at in enumerate(orbit.unknown) if low <= at < low + n), default=1.0)
+        or 1.0
+        for low in (0, n)
     )
-    every = [moved] * n + [fast] * n + [(each["kt"] or 0.0) * moved or 1.0 for each in orbit.system.contacts]
-    every += [1.0] * (orbit.system.d - orbit.system.one)
-    sizes = [every[at] for at in orbit.unknown] + [longest] * (orbit.lasts - states)
-    return sizes + every * len(orbit.anew)
+    forces = [(each["kt"] or 0.0) * moved or 1.0 for each in orbit.system.contacts]
+    return [moved] * n + [fast] * n + forces + [1.0] * (orbit.system.d - orbit.system.one)
 
 
 def digits(middle: Any) -> str:

@@ -211,18 +211,16 @@ def check_extra() -> None:
         raise MissingExtraError("python-flint", "proof") from error
 
 
-def check_certifiable(scene: Scene) -> None:
-    """Raise what `certify` would, before what it is to prove is computed."""
+def check_certifiable(scene: Scene, *, rigid: bool = True) -> None:
+    """Raise what `certify` would, before what it is to prove is computed; `rigid`: friction may be."""
     check_extra()
     piecewise = Piecewise(annulus(scene) if scene.structure.has_sectors else scene, 1.0)
     for member in piecewise.members:
-        name, wanted = (
-            piecewise.scene.contacts[member.contact].name,
-            "must be finite where something is proved: ",
-        )
-        for key, value in (("kt", float(piecewise.kt[member.slider])), ("kn", member.kn)):
+        name = piecewise.scene.contacts[member.contact].name
+        for key, value in (("kt", 0.0 if rigid else float(piecewise.kt[member.slider])), ("kn", member.kn)):
             if math.isinf(value):
-                raise SettingError(f"{name}.{key}", value, wanted + "give it a large value")
+                wanted = "must be finite where something is proved: give it a large value"
+                raise SettingError(f"{name}.{key}", value, wanted)
 
 
 def loads_of(scene: Scene, path: str) -> list[int]:

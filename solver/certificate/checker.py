@@ -21,7 +21,7 @@ STICK, OPEN = 0, 2  # ±1 slips
 STATES = {"stick": STICK, "closed": STICK, "slip+": 1, "slip-": -1, "open": OPEN}
 WORDS = {STICK: "rests", 1: "slips forward", -1: "slips backward", OPEN: "opens or closes"}
 REACH, TERMS = 2, 18  # halvings of a span for its exponential in floats; powers in that
-ROUNDING, SLACK, TINY = 2.0**-52, 1.0 + 1e-9, 1e-290  # of a float; what bounds lack by their own rounding
+ROUNDING, SLACK, TINY = 2.0**-53, 1.0 + 1e-9, 1e-290  # of a float; what bounds lack by their own rounding
 
 
 class RejectedError(Exception):
@@ -140,7 +140,9 @@ class System:
             rows[j, OPEN] = -load if state == OPEN else load
         if held:  # by the forces under which u'' = 0
             lines, speeds = (arb_mat([each[i].entries() for each in held.values()]) for i in (0, 1))
-            forces = (speeds * (pulls := self.pull * lines.transpose())).solve(speeds * A)
+            pulls = self.pull * lines.transpose()
+            require((speeds * pulls).det() != 0, "the forces in contacts without springs are not determined")
+            forces = (speeds * pulls).solve(speeds * A)
             A -= pulls * forces
             for (j, (*_, limit)), force in zip(held.items(), forces.tolist(), strict=True):
                 rows |= {(j, way): limit - arb_mat([force]) * way for way in (1, -1)}
@@ -158,7 +160,7 @@ class System:
             step, E, P = rough(A * (length.mid() / 2 ** (depth + REACH))), *[every := np.eye(self.d)] * 2
             for k in range(TERMS, 0, -1):
                 E, P = every + step.middle @ E / k, every + step.size @ P / k
-            off = TERMS * (self.d + 4) * ROUNDING * P + P @ step.off @ P + sums / math.factorial(TERMS + 1)
+            off = P @ (step.off @ P + (self.d + 8) * ROUNDING * P) + sums / math.factorial(TERMS + 1)
             powers = [Rough(E, off)]
             for _ in range(REACH + depth):
                 powers.append(powers[-1] @ powers[-1])

