@@ -94,9 +94,9 @@ def _set_in_order(raw: dict[str, Any], start: list[float], at_once: float) -> li
 def orbit_at(raw: dict[str, Any], **at: str) -> Orbit:
     """Return the orbit at a frequency [Hz] and a factor of the loads that vary."""
     from solver.certificate.checker import Orbit
-    from solver.certificate.proof_work import Counted
+    from solver.certificate.proof_work import counted
 
-    return Orbit(Counted(raw["system"], at), raw["orbit"])
+    return Orbit(counted(raw["system"], at), raw["orbit"])
 
 
 def settled(orbit: Orbit, start: list[Any]) -> tuple[list[Any], float]:

@@ -17,7 +17,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-from solver.certificate.boxes import boxed, claimed, set_out, settled
+from solver.certificate.boxes import boxed, claimed, orbit_at, set_out, settled
 from solver.certificate.summits import least_proved, peak_proved
 from solver.errors import MissingExtraError, SettingError
 from solver.response.exact.beside import orbit_beside
@@ -263,13 +263,10 @@ def in_more_bits(raw: dict[str, Any], prove: Callable[[], tuple[Any, Any, Any]])
 
 def _kept_inward(raw: dict[str, Any], start: list[Any]) -> tuple[Any, Any, Any]:
     """Prove an orbit, contacts that stick at the edge of their limit moved inward; return its extremes."""
-    from solver.certificate.checker import Orbit as CheckedOrbit
     from solver.certificate.checker import RejectedError
-    from solver.certificate.proof_work import Counted
 
-    system = Counted(raw["system"], {})
     for step in range(_MOVES):
-        orbit = CheckedOrbit(system, raw["orbit"])
+        orbit = orbit_at(raw)
         try:
             start, now = settled(orbit, start)
             unknowns, extremes = boxed(orbit, start, now)

@@ -121,23 +121,10 @@ class System:
         """Return A; A in floats; rows that are positive, by contact and what follows; h; Σ |A h|^i."""
         if mode in self.made:
             return self.made[mode]
-        A, rows, held = arb_mat(self.free), dict[Any, Any](), dict[int, Any]()
-        for j, (c, state, load) in enumerate(zip(self.contacts, mode, self.loads, strict=True)):
-            own, limit, slips = self.row([[2 * self.n + j, 1]]), load * arb(c["mu"]), state * (state != OPEN)
-            line, speed, rate = self.row(c["row"]), self.row(c["row"], self.n), limit * self.free * slips
-            if c["kt"] is None:  # without a spring
-                own = limit * slips
-                rows |= {(j, STICK): speed * slips} if slips else {}
-                held |= {j: (line, speed, limit)} if state == STICK else {}
-            else:
-                speed *= arb(c["kt"])
-                A += own.transpose() * (speed if state == STICK else rate)
-                rows |= {(j, STICK): (speed - rate) * slips} if slips else {}
-                rows |= {(j, way): limit - own * way for way in (1, -1) if state == STICK and c["kt"]}
-            pressed = (load * int(state != OPEN) - self.row([[self.one, c["rest"]]])) * int(c["presses"])
-            A -= self.pull * line.transpose() * own
-            A -= self.pull * self.row(c["normal"]).transpose() * pressed
-            rows[j, OPEN] = -load if state == OPEN else load
+        parts = [self.part(j, state) for j, state in enumerate(mode)]
+        A = sum((part for part, *_ in parts), self.free)
+        rows = {key: row for _, own, _ in parts for key, row in own.items()}
+        held = {j: own for j, (_, _, own) in enumerate(parts) if own}
         if held:  # by the forces under which u'' = 0
             lines, speeds = (arb_mat([each[i].entries() for each in held.values()]) for i in (0, 1))
             pulls = self.pull * lines.transpose()
@@ -151,6 +138,26 @@ class System:
         sums = (bound * arb_mat(self.d, 1, [1] * self.d)).entries()
         require(all(each > 0 for each in sums), "polynomials reach too far")
         return self.made.setdefault(mode, (A, floats, rows, h, rough(bound).size))
+
+    def part(self, j: int, state: int) -> Any:
+        """Return what a contact adds to A, its rows, and the line, rate and limit of what sticks rigidly."""
+        if (key := ("part", j, state)) in self.made:
+            return self.made[key]
+        c, load, held = self.contacts[j], self.loads[j], tuple[Any, ...]()
+        own, limit, slips = self.row([[2 * self.n + j, 1]]), load * arb(c["mu"]), state * (state != OPEN)
+        line, speed, rate = self.row(c["row"]), self.row(c["row"], self.n), limit * self.free * slips
+        A, rows = arb_mat(self.d, self.d), {(j, OPEN): -load if state == OPEN else load}
+        if c["kt"] is None:  # without a spring
+            own, rate, held = limit * slips, 0 * rate, (line, speed, limit) if state == STICK else ()
+        else:
+            speed *= arb(c["kt"])
+            A += own.transpose() * (speed if state == STICK else rate)
+            rows |= {(j, way): limit - own * way for way in (1, -1) if state == STICK and c["kt"]}
+        rows |= {(j, STICK): (speed - rate) * slips} if slips else {}
+        pressed = (load * int(state != OPEN) - self.row([[self.one, c["rest"]]])) * int(c["presses"])
+        A -= self.pull * line.transpose() * own
+        A -= self.pull * self.row(c["normal"]).transpose() * pressed
+        return self.made.setdefault(key, (A, rows, held))
 
     def powers(self, mode: tuple[int, ...], length: Any) -> tuple[list[Rough], Any]:
         """Return e^{A length/2^i}, i = …, 1, 0, from a span on; Σ |what leads from a span to later ones|."""
