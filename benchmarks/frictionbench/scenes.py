@@ -120,13 +120,13 @@ def _response(made: stickslip.Scene, asked: dict[str, Any], H: int, exact: bool)
     loss = asked["what"] == "loss"
     found = solved(made, asked, max(H, OF_WORK) if exact and loss else H, exact)
     if loss:
-        # It has no estimate of its own. What twice the harmonics leave out is an eighth of it or less; of an
-        # exact motion only terms of the sum are left out.
+        # It has no estimate of its own. What twice the harmonics leave out may be half of it; of an exact
+        # motion only terms of the sum are left out.
         value = sum(one.work for one in found.contacts)
         if exact:
             return {"value": value, "estimate": abs(value - sum(_half(one).work for one in found.contacts))}
         finer = sum(one.work for one in solved(made, asked, min(2 * H, 1000)).contacts)
-        return {"value": value, "estimate": 1.25 * abs(finer - value)}
+        return {"value": value, "estimate": 2.0 * abs(finer - value)}
     half = asked["what"] == "half-peak-to-peak"
     return {"value": found.half_peak_to_peak if half else found.max_abs, "estimate": found.error_estimate}
 
