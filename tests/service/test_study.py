@@ -31,7 +31,7 @@ OTHERWISE: Mapping[str, set[str]] = {
     "peaks": {"certify"}, "design": {"certify", "options"},
     "sweep": {"multipliers", "switched"}, "wear": {"parameter", "start", "stop", "factors"},
     "modes": {
-        "start", "stop", "performance", "aero_damping", "motions", "exact_peaks", "disturbance",
+        "start", "stop", "performance", "aero_damping", "motions", "exact_peaks", "disturbance", "certify",
         "phase_resonance",
     },
 }  # fmt: skip
