@@ -71,7 +71,9 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
     listed = "; ".join(f"{name}: {(case.__doc__ or '').splitlines()[0]}" for name, case in cases.items())
     parser.add_argument("case", nargs="*", metavar="CASE", help=listed.replace("%", "%%"))
-    asked = parser.parse_args().case or list(cases)
+    parser.add_argument("--scenes", type=int, help="random scenes that certificates looks at")
+    given = parser.parse_args()
+    asked = given.case or list(cases)
     names = [case for name in asked for case in GROUPS.get(name, (name,))]
     unknown = [name for name in names if name not in cases]
     if unknown:
@@ -79,7 +81,7 @@ def main() -> int:
     wrong = 0
     for name in names:
         try:
-            cases[name]()
+            cases[name](**({"scenes": given.scenes} if name == "certificates" and given.scenes else {}))
         except WrongResultError as error:
             wrong += 1
             print(f"\n{name}: WRONG, no figure: {error}")

@@ -16,6 +16,10 @@ Case = dict[str, Any]
 ENDS = ("between", "between_second", "normal_between")
 
 
+class NotOfferedError(NotImplementedError):
+    """A code, or a way to an answer, has no such question; why is shown."""
+
+
 @cache
 def names() -> tuple[str, ...]:
     """Return the names of all cases, ladder by ladder."""
@@ -77,13 +81,13 @@ def piecewise_linear(case: Case) -> Case:
 
     Raises
     ------
-    NotImplementedError
+    NotOfferedError
         A limit is a circle.
     """
     case, contacts = written_out(case), []
     for one in case["contacts"]:
         if one.get("limit") == "circle":
-            raise NotImplementedError("a circular limit is not piecewise linear")
+            raise NotOfferedError("a circular limit is not piecewise linear")
         if one.get("limit") != "box":
             contacts.append(one)
             continue
@@ -132,14 +136,14 @@ def model(case: Case) -> Model:
 
     Raises
     ------
-    NotImplementedError
+    NotOfferedError
         A limit in the form of a circle, which is no row by itself.
     """
     case = written_out(case)
     dofs, rows = case["structure"]["dofs"], []
     for contact in case["contacts"]:
         if contact.get("limit") == "circle":
-            raise NotImplementedError(f"{contact['name']}: the adapter knows no circular limit")
+            raise NotOfferedError(f"{contact['name']}: the adapter knows no circular limit")
         for key in ("between", "between_second"):
             b = np.zeros(len(dofs))
             for dof, sign in zip(contact.get(key, ()), (1.0, -1.0), strict=False):

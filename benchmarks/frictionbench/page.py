@@ -21,8 +21,8 @@ with an enclosure (`proofs.py`), and harmonic balance at H, 2H, 4H … harmonics
 agree in fewer than ten digits, time marching too. {proved} answers have a proof in `proofs/`:
 `python solver/certificate/checker.py FILE` shows anew that the orbit exists, that it obeys every law of its
 contacts and how high it is, and needs nothing but python-flint. Losses are read off orbits that are
-enclosed alike. Rigid friction has no proof: a closed form, exact events in floats or time marching stand for
-it. Of {cases} answers {ten} agree to ten digits or more; the column *known*
+enclosed alike. Rigid friction has no balance: a closed form or exact events in floats stand beside its
+proof. Of {cases} answers {ten} agree to ten digits or more; the column *known*
 says to how many, *1 way* where there is but one. A limit in the form of a circle is not piecewise linear:
 there time marching stands for the events. The balance is this project's. A disk is solved and proved as
 the part of its annulus that the wave repeats after.

@@ -12,12 +12,12 @@ from contextlib import contextmanager
 from decimal import Decimal
 from typing import Any
 
-from flint import arb, arb_mat, ctx
+from flint import arb, ctx
 
 import stickslip
 from benchmarks.frictionbench import scenes
-from benchmarks.frictionbench.model import Case, piecewise_linear
-from solver.certificate.checker import STICK, Orbit, System
+from benchmarks.frictionbench.model import Case, NotOfferedError, piecewise_linear
+from solver.certificate.checker import STICK, Orbit, System, around, radii
 from solver.modes.certified_cycles import certify_cycle
 
 Answer = dict[str, Any]
@@ -34,18 +34,14 @@ def prove(case: Case) -> Answer:
 
     Raises
     ------
-    NotImplementedError
+    NotOfferedError
         The contacts are not piecewise linear, or what is asked is no property of one orbit.
     NotProvedError
         The proof does not succeed.
     """
     asked = case["asked"]
     if "harmonics" in asked or asked["what"] == "amplification":
-        raise NotImplementedError(
-            "a supremum" if asked["what"] == "amplification" else "of one harmonic alone"
-        )
-    if any(one.get("kt") == "inf" for one in case["contacts"]):
-        raise NotImplementedError("rigid friction has no proof")
+        raise NotOfferedError("a supremum" if asked["what"] == "amplification" else "of one harmonic alone")
     case = piecewise_linear(case)
     if asked["what"] == "limit-cycle":
         made = scenes.scene(case)
@@ -55,7 +51,10 @@ def prove(case: Case) -> Answer:
         guess = scenes.answer(case, HARMONICS)["at"]
         made = made.with_values({least: guess})
     if hz is None:
-        hz = stickslip.sweep(made, harmonics=HARMONICS).peak.at
+        highest = stickslip.sweep(made, harmonics=HARMONICS).peak
+        if highest is None:
+            raise NotProvedError("there is no peak")
+        hz = highest.at
     near = scenes.solved(made, {**asked, "frequency_hz": hz}, HARMONICS)
     proof = stickslip.certify(near, peak=asked["what"] == "peak", least_over=least, most_work=WORK)
     found = told(proof, asked)
@@ -64,7 +63,7 @@ def prove(case: Case) -> Answer:
 
 def told(proof: stickslip.solutions.Certificate, asked: Answer) -> Answer:
     """Return what a proof says of what is asked."""
-    if not proof.reached:
+    if proof.certificate is None:
         raise NotProvedError(proof.reason or proof.status.value)
     known = {"events": proof.events, "held": list(proof.held), "proof": proof.certificate}
     if asked["what"] in ("peak", "limit-cycle"):
@@ -101,16 +100,15 @@ def loss(raw: dict[str, Any]) -> Any:
     """Return the friction work of a period: μN times the way of every slider, under constant loads."""
     orbit = Orbit(System(raw["system"], {}), raw["orbit"])
     box = [arb(one) for one in raw["proof"]["unknowns"]]
-    y = [one.mid() for one in box]
-    away = arb_mat([[one - middle] for one, middle in zip(box, y, strict=True)])
-    *_, starts = orbit.shoot(y, away)
+    away = radii(box)
+    *_, starts = orbit.shoot([one.mid() for one in box], away)
     contacts, n = orbit.system.contacts, orbit.system.n
     places = defaultdict(list)
-    for (z, D, _), group in zip(starts[1:], orbit.groups, strict=True):
-        w = z + D * away
+    for (z, D, *_), group in zip(starts[1:], orbit.groups, strict=True):
+        w = around(z, D.size @ away)
         for j, _, new in (orbit.events[i] for i in group):
             if contacts[j]["kn"] or contacts[j]["waves"][1:]:
-                raise NotImplementedError("losses under moving loads")
+                raise NotOfferedError("losses under moving loads")
             if new == STICK:
                 slider = orbit.system.row([*contacts[j]["row"], [2 * n + j, -1 / arb(contacts[j]["kt"])]])
                 places[j].append((slider * w)[0, 0])

@@ -34,15 +34,11 @@ def told(adapter: Path) -> dict[str, Any]:
     """Return the constants of an adapter (NEEDS, RUNGS), read without running it."""
     found = {}
     for node in ast.parse(adapter.read_text()).body:
-        target = (
-            node.target
-            if isinstance(node, ast.AnnAssign)
-            else node.targets[0]
-            if isinstance(node, ast.Assign)
-            else None
-        )
+        if not isinstance(node, ast.Assign | ast.AnnAssign) or node.value is None:
+            continue
+        target = node.targets[0] if isinstance(node, ast.Assign) else node.target
         if isinstance(target, ast.Name) and target.id in ("NEEDS", "RUNGS"):
-            found[target.id] = ast.literal_eval(node.value)  # type: ignore[union-attr, arg-type]
+            found[target.id] = ast.literal_eval(node.value)
     return found
 
 

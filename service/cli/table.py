@@ -262,7 +262,7 @@ COMMANDS = {
         ),
         CommandEntry(
             "check-proof", "commands.certificates.check_proof",
-            "Check the proofs in a file that `solve`, `peaks` or `design --certify --json` wrote.",
+            "Check the proofs in a file that `solve`, `peaks`, `design` or `modes --certify --json` wrote.",
         ),
         CommandEntry("demo", "commands.service.demo", "Run the main job end to end, with pictures."),
     ),

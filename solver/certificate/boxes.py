@@ -9,12 +9,18 @@ from decimal import ROUND_CEILING, ROUND_FLOOR, Decimal, localcontext
 from itertools import accumulate, pairwise
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 if TYPE_CHECKING:
     from solver.certificate.checker import Orbit
     from solver.response.exact.flow import FlowPiece
     from solver.response.exact.piecewise import Piecewise
 
 _NEWTON, _WIDER = 12, 4  # steps; boxes tried
+_GROWN = 1e4  # by which a derivative is off more, and a state is unknown anew
+_ANEW_BITS = 128
+_FEW = 100  # instants of events times the size of a state for which none is
+_LINEAR = 1e-11  # of a step, which the next is about in floats
 _SLOW = 1e-4  # by which a step falls with a derivative that still serves
 _DIGITS = 25
 _AT_ONCE = 1e-7  # of 1 / ω: floats may have events this near each other in the wrong order
@@ -26,7 +32,26 @@ def set_out(raw: dict[str, Any], piecewise: Piecewise, pieces: Sequence[FlowPiec
     from solver.certificate.statement import orbit_of
 
     raw["orbit"], start = orbit_of(piecewise, pieces, raw["system"])
-    return _set_in_order(raw, start, _AT_ONCE / piecewise.omega)
+    return _begun_anew(raw, _set_in_order(raw, start, _AT_ONCE / piecewise.omega))
+
+
+def _begun_anew(raw: dict[str, Any], y: list[Any]) -> list[Any]:
+    """Make states unknown anew before balls have grown too much; return the unknowns."""
+    from flint import arb, ctx
+
+    with ctx.workprec(_ANEW_BITS):
+        orbit, y = orbit_at(raw), [each.mid() for each in map(arb, y)]
+        if len(orbit.groups) * orbit.system.d <= _FEW:
+            return y
+        sizes, starts = np.array(_every_size(orbit, y)), orbit.shoot(y, np.zeros(len(y)))[2][1:]
+    last = math.inf
+    for (z, D, *_), group in zip(starts, orbit.groups, strict=True):
+        off = float((D.off.max(axis=1) / sizes).max())
+        last = min(last, off)
+        if off > _GROWN * last:
+            last, raw["orbit"]["events"][group[-1]]["anew"] = off, True
+            y += [each.mid() for each in z.entries()]
+    return y
 
 
 def _set_in_order(raw: dict[str, Any], start: list[float], at_once: float) -> list[Any]:
@@ -34,9 +59,11 @@ def _set_in_order(raw: dict[str, Any], start: list[float], at_once: float) -> li
 
     They are that only up to the rounding of the phases of their forces, so that Newton's method tells it.
     """
-    from flint import arb, arb_mat, ctx
+    from flint import arb, ctx
 
-    with ctx.workprec(_ORDER_BITS):
+    from solver.certificate.checker import inverse, rough
+
+    with ctx.workprec(_ANEW_BITS):
         orbit, y = orbit_at(raw), [arb(each) for each in start]
         first = len(orbit.unknown)
         where = list(accumulate((length >= at_once for length in start[first + 1 :]), initial=0))  # clusters
@@ -45,8 +72,9 @@ def _set_in_order(raw: dict[str, Any], start: list[float], at_once: float) -> li
         if len(set(where)) == len(where) or max(contacts.values()) > 1:
             return y
         for _ in range(_NEWTON):
-            value, slope, _ = orbit.shoot(y, arb_mat(len(y), 1))
-            steps = slope.mid().solve(value.mid()).entries()
+            value, slope, _ = orbit.shoot(y, np.zeros(len(y)))
+            near = inverse(slope, np.array(_sizes(orbit, y)))
+            steps = (near.middle @ rough(value).middle)[:, 0]
             y = [(each - step).mid() for each, step in zip(y, steps, strict=True)]
             ends = list(accumulate(y[first:]))
             order = sorted(range(len(ends)), key=lambda k: (where[k], ends[k]))
@@ -58,7 +86,7 @@ def _set_in_order(raw: dict[str, Any], start: list[float], at_once: float) -> li
                 ends = [arb(0), *(ends[k] for k in order)]
                 y[first:] = [(after - before).mid() for before, after in pairwise(ends)]
                 orbit = orbit_at(raw)
-            elif max(float(abs(step)) for step in steps[first:]) < _KNOWN * at_once:
+            elif float(abs(steps[first:]).max()) < _KNOWN * at_once:
                 break
     return y
 
@@ -66,36 +94,33 @@ def _set_in_order(raw: dict[str, Any], start: list[float], at_once: float) -> li
 def orbit_at(raw: dict[str, Any], **at: str) -> Orbit:
     """Return the orbit at a frequency [Hz] and a factor of the loads that vary."""
     from solver.certificate.checker import Orbit
-    from solver.certificate.proof_work import Counted
+    from solver.certificate.proof_work import counted
 
-    return Orbit(Counted(raw["system"], at), raw["orbit"])
+    return Orbit(counted(raw["system"], at), raw["orbit"])
 
 
 def settled(orbit: Orbit, start: list[Any]) -> tuple[list[Any], float]:
-    """Return the unknowns by Newton's method, and its last step relative to their sizes."""
-    from flint import arb, arb_mat, ctx
+    """Return the unknowns by Newton's method, and about how far off they are relative to their sizes."""
+    from flint import arb, ctx
 
-    from solver.certificate.checker import RejectedError
+    from solver.certificate.checker import inverse, rough
 
-    y = [arb(each) for each in start]
-    sizes, inverse, now = _sizes(orbit, y), None, math.inf
+    y, near, now = [arb(each) for each in start], None, math.inf
+    sizes = np.array(_sizes(orbit, y))
     for _ in range(_NEWTON):
-        value, slope, _ = orbit.shoot(y, arb_mat(len(y), 1) if inverse is None else None)
-        try:
-            inverse = slope.mid().inv().mid() if inverse is None else inverse
-        except ZeroDivisionError:
-            raise RejectedError("the derivative of the equations is singular: it is not isolated") from None
-        steps = (inverse * value).entries()
-        y = [(each - step).mid() for each, step in zip(y, steps, strict=True)]
-        before, now = now, max(
-            float(step.abs_upper()) / size for step, size in zip(steps, sizes, strict=True)
-        )  # fmt: skip
-        unsure = max(float(step.rad()) / size for step, size in zip(steps, sizes, strict=True))
-        if now <= max(2.0 ** (-ctx.prec // 2), 2.0 * unsure):  # no step tells more than its rounding
+        value, slope, _ = orbit.shoot(y, np.zeros(len(y)) if near is None else None)
+        near = inverse(slope, sizes).middle if near is None else near
+        rest = rough(value)
+        steps = (near @ rest.middle)[:, 0]
+        y = [(each - step).mid() for each, step in zip(y, steps.tolist(), strict=True)]
+        before, now = now, float((abs(steps) / sizes).max())
+        unsure = float(((abs(near) @ rest.off)[:, 0] / sizes).max())
+        left = max(now * max(now, _LINEAR), unsure)
+        if left <= max(2.0 ** (-ctx.prec * 3 // 5), unsure):  # no step tells more than its rounding
             break
         if now > _SLOW * before:
-            inverse = None
-    return y, now
+            near = None
+    return y, left
 
 
 def boxed(orbit: Orbit, y: list[Any], now: Any) -> tuple[list[str], tuple[Any, Any, Any]]:
@@ -116,19 +141,22 @@ def boxed(orbit: Orbit, y: list[Any], now: Any) -> tuple[list[str], tuple[Any, A
 
 
 def _sizes(orbit: Orbit, y: list[Any]) -> list[float]:
-    """Return what a change of each unknown is compared with: the largest of its kind; of forces by kt."""
-    n, states = orbit.system.n, len(orbit.unknown)
-    moved, fast, longest = (
-        max((abs(float(y[k])) for k in own), default=1.0) or 1.0
-        for own in (
-            [k for k, at in enumerate(orbit.unknown) if at < n],
-            [k for k, at in enumerate(orbit.unknown) if n <= at < 2 * n],
-            range(states, orbit.size),
-        )
+    """Return what a change of each unknown is compared with."""
+    every, lengths = _every_size(orbit, y), [float(each) for each in orbit.lengths(y)]
+    count = orbit.lasts - len(orbit.unknown)
+    return [every[at] for at in orbit.unknown] + [max(lengths)] * count + every * len(orbit.anew)
+
+
+def _every_size(orbit: Orbit, y: list[Any]) -> list[float]:
+    """Return the size of each number of a state: the largest of its kind where it begins; of forces by kt."""
+    n = orbit.system.n
+    moved, fast = (
+        max((abs(float(y[k])) for k, at in enumerate(orbit.unknown) if low <= at < low + n), default=1.0)
+        or 1.0
+        for low in (0, n)
     )
-    kt = [each["kt"] for each in orbit.system.contacts]
-    sizes = [moved if at < n else fast if at < 2 * n else kt[at - 2 * n] * moved for at in orbit.unknown]
-    return sizes + [longest] * (orbit.size - states)
+    forces = [(each["kt"] or 0.0) * moved or 1.0 for each in orbit.system.contacts]
+    return [moved] * n + [fast] * n + forces + [1.0] * (orbit.system.d - orbit.system.one)
 
 
 def digits(middle: Any) -> str:

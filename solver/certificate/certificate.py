@@ -17,7 +17,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-from solver.certificate.boxes import boxed, claimed, set_out, settled
+from solver.certificate.boxes import boxed, claimed, orbit_at, set_out, settled
 from solver.certificate.summits import least_proved, peak_proved
 from solver.errors import MissingExtraError, SettingError
 from solver.response.exact.beside import orbit_beside
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from solver.response.exact.orbit import Orbit as ExactOrbit
 
 _Bounds = dict[str, tuple[float, float]]
-_ANSWER, _GROWN = 40, 3.1  # bits of an answer, and twice those by which balls grow from event to event
+_BITS = (128, 192, 256)
 MOST_WORK = 5000.0
 _MOVES = 8  # contacts moved
 _NARROW = 1e-16  # relative width of what is claimed; else more bits
@@ -211,18 +211,16 @@ def check_extra() -> None:
         raise MissingExtraError("python-flint", "proof") from error
 
 
-def check_certifiable(scene: Scene) -> None:
-    """Raise what `certify` would, before what it is to prove is computed."""
+def check_certifiable(scene: Scene, *, rigid: bool = True) -> None:
+    """Raise what `certify` would, before what it is to prove is computed; `rigid`: friction may be."""
     check_extra()
     piecewise = Piecewise(annulus(scene) if scene.structure.has_sectors else scene, 1.0)
     for member in piecewise.members:
-        name, wanted = (
-            piecewise.scene.contacts[member.contact].name,
-            "must be finite where something is proved: ",
-        )
-        for key, value in (("kt", float(piecewise.kt[member.slider])), ("kn", member.kn)):
+        name = piecewise.scene.contacts[member.contact].name
+        for key, value in (("kt", 0.0 if rigid else float(piecewise.kt[member.slider])), ("kn", member.kn)):
             if math.isinf(value):
-                raise SettingError(f"{name}.{key}", value, wanted + "give it a large value")
+                wanted = "must be finite where something is proved: give it a large value"
+                raise SettingError(f"{name}.{key}", value, wanted)
 
 
 def loads_of(scene: Scene, path: str) -> list[int]:
@@ -239,23 +237,22 @@ def _proved(raw: dict[str, Any], piecewise: Piecewise, found: ExactOrbit) -> _Bo
 
 
 def in_more_bits(raw: dict[str, Any], prove: Callable[[], tuple[Any, Any, Any]]) -> _Bounds:
-    """Prove with as many bits as the events ask for, and with more; return the claims as floats."""
+    """Prove with 128 bits, and with more; return the claims as floats."""
     from flint import ctx
 
     from solver.certificate.checker import RejectedError
 
-    kept, least = ctx.prec, 64 * math.ceil((_ANSWER + _GROWN * len(raw["orbit"]["events"])) / 64)
-    least = max(least, 128)
+    kept = ctx.prec
     try:
-        for bits in range(least, 2 * least + 1, 64):
+        for bits in _BITS:
             ctx.prec = raw["bits"] = bits
             try:
                 low, high, period = prove()
             except RejectedError as error:
-                if bits == 2 * least or (len(error.args) > 1 and error.args[-1] < 0):
+                if bits == _BITS[-1] or (len(error.args) > 1 and error.args[-1] < 0):
                     raise
                 continue
-            if bits == 2 * least or (low.rad() + high.rad()) <= _NARROW * (high - low):
+            if bits == _BITS[-1] or (low.rad() + high.rad()) <= _NARROW * (high - low):
                 reached = {"max_abs": high.max(-low), "half_peak_to_peak": (high - low) / 2}
                 own = raw["system"]["frequency_hz"] is None
                 return claimed(raw, reached | ({"frequency_hz": 1 / period} if own else {}))
@@ -266,13 +263,10 @@ def in_more_bits(raw: dict[str, Any], prove: Callable[[], tuple[Any, Any, Any]])
 
 def _kept_inward(raw: dict[str, Any], start: list[Any]) -> tuple[Any, Any, Any]:
     """Prove an orbit, contacts that stick at the edge of their limit moved inward; return its extremes."""
-    from solver.certificate.checker import Orbit as CheckedOrbit
     from solver.certificate.checker import RejectedError
-    from solver.certificate.proof_work import Counted
 
-    system = Counted(raw["system"], {})
     for step in range(_MOVES):
-        orbit = CheckedOrbit(system, raw["orbit"])
+        orbit = orbit_at(raw)
         try:
             start, now = settled(orbit, start)
             unknowns, extremes = boxed(orbit, start, now)

@@ -1,10 +1,11 @@
 """Check a certificate of periodic motions of a piecewise linear system: python checker.py CERTIFICATE.json
 
-Stands alone: it needs python-flint and nothing of the package; docs/certificates.md says what is stated. The
-state w = (x, dx/dt, a friction force of each contact, cos kωt, sin kωt, …) does not jump, and between events
-w' = A w. With balls that enclose every rounding it is shown that Krawczyk's operator (Computing 4 (1969) 187)
-maps the box of the unknowns, the first state and how long pieces last, into its interior: exactly one orbit
-with these events is in it; that all inequalities of the contacts hold; and where the motion's extremes lie.
+Stands alone: it needs python-flint, numpy, nothing of the package; docs/certificates.md says what is stated.
+The state w = (x, dx/dt, a friction force of each contact, cos kωt, sin kωt, …) does not jump, and between
+events w' = A w. With balls that enclose every rounding it is shown that Krawczyk's operator (Computing 4
+(1969) 187) maps the box of the unknowns, the first state, how long pieces last, some later states, into its
+interior: exactly one orbit with these events is in it; that all inequalities of the contacts hold; and where
+the motion's extremes lie. Derivatives, which multiply small differences alone, are floats with bounds.
 """
 
 import json
@@ -13,11 +14,14 @@ import sys
 from itertools import pairwise
 from typing import Any
 
+import numpy as np
 from flint import arb, arb_mat, arb_poly, ctx
 
 STICK, OPEN = 0, 2  # ±1 slips
 STATES = {"stick": STICK, "closed": STICK, "slip+": 1, "slip-": -1, "open": OPEN}
 WORDS = {STICK: "rests", 1: "slips forward", -1: "slips backward", OPEN: "opens or closes"}
+REACH, TERMS = 2, 18  # halvings of a span for its exponential in floats; powers in that
+ROUNDING, SLACK, TINY = 2.0**-53, 1.0 + 1e-9, 1e-290  # of a float; what bounds lack by their own rounding
 
 
 class RejectedError(Exception):
@@ -30,9 +34,49 @@ def require(holds: Any, *told: Any) -> None:
         raise RejectedError(*told)
 
 
-def absolute(matrix: Any) -> Any:
-    """Return upper bounds of the sizes of its entries."""
-    return arb_mat([[each.abs_upper() for each in row] for row in matrix.tolist()])
+class Rough:
+    """A matrix of floats, and how far off it is at most: a product A B of floats, whatever the order of its
+    sums of m terms, by m 2^-53 / (1 - m 2^-53) |A| |B| (Higham, Accuracy and Stability, 2002, chapter 3)."""
+
+    def __init__(self, middle: Any, off: Any = None) -> None:
+        self.middle, self.off = middle, np.zeros_like(middle) if off is None else off * SLACK + TINY
+        self.size = (abs(middle) + self.off) * SLACK  # upper bounds of the sizes of its entries
+
+    def __matmul__(self, other: "Rough") -> "Rough":
+        a, b, rounding = abs(self.middle), abs(other.middle), (len(other.middle) + 4) * ROUNDING
+        off = a @ (other.off + rounding * b) + self.off @ other.size
+        return Rough(self.middle @ other.middle, off)
+
+    def __sub__(self, other: "Rough") -> "Rough":
+        middle = self.middle - other.middle
+        return Rough(middle, self.off + other.off + ROUNDING * abs(middle))
+
+
+def rough(matrix: Any) -> Rough:
+    """Return balls as floats."""
+    shape, every = (matrix.nrows(), matrix.ncols()), matrix.entries()
+    middle, off = (np.array([float(e) for e in each]).reshape(shape) for each in (every, radii(every)))
+    return Rough(middle, off + ROUNDING * abs(middle))
+
+
+def radii(balls: Any) -> Any:
+    """Return the radii of balls."""
+    return np.array([float(each.rad()) for each in balls])
+
+
+def around(column: Any, more: Any) -> Any:
+    """Return a column of balls with a little more or less."""
+    return column + arb_mat([[arb(0, each * SLACK + TINY)] for each in more.ravel().tolist()])
+
+
+def inverse(slope: Rough, sizes: Any) -> Rough:
+    """Return floats near the inverse of a matrix, of unknowns of these sizes."""
+    columns = slope.middle * sizes
+    rows = 1.0 / abs(columns).max(1, keepdims=True, initial=TINY)
+    try:
+        return Rough(sizes[:, None] * np.linalg.inv(columns * rows) * rows.T)
+    except np.linalg.LinAlgError:
+        raise RejectedError("the derivative of the equations is singular: it is not isolated") from None
 
 
 class System:
@@ -49,9 +93,9 @@ class System:
             push -= self.row(ends).transpose() * (self.row(terms) * arb(k) + self.row(terms, n) * arb(c))
         for each in raw["forces"]:
             push += self.row(each["row"]).transpose() * self.row([], 0, each["waves"])
-        for i, inverse in enumerate(arb_mat(raw["mass"]).inv().tolist()):
+        for i, inverted in enumerate(arb_mat(raw["mass"]).inv().tolist()):
             self.free[i, n + i] = 1
-            for k, each in enumerate(inverse):
+            for k, each in enumerate(inverted):
                 self.pull[n + i, k] = each  # times the column of a force: what that adds to w'
         for i, order in zip(range(self.one + 2, self.d, 2), self.orders[1:], strict=True):
             self.free[i + 1, i] = order * 2 * arb.pi() / self.period
@@ -74,54 +118,86 @@ class System:
         return row
 
     def mode(self, mode: tuple[int, ...]) -> Any:
-        """Return A; rows that are positive, by contact and what follows; a span h; Σ |A h|^i."""
+        """Return A; A in floats; rows that are positive, by contact and what follows; h; Σ |A h|^i."""
         if mode in self.made:
             return self.made[mode]
-        A, rows = arb_mat(self.free), {}
-        for j, (c, state, load) in enumerate(zip(self.contacts, mode, self.loads, strict=True)):
-            force, speed = self.row([[2 * self.n + j, 1]]), self.row(c["row"], self.n) * arb(c["kt"])
-            limit, slips = load * arb(c["mu"]), state if state != OPEN else 0
-            pressed = (load * int(state != OPEN) - self.row([[self.one, c["rest"]]])) * int(c["presses"])
-            A += force.transpose() * (speed if state == STICK else limit * self.free * slips)
-            A -= self.pull * self.row(c["row"]).transpose() * force
-            A -= self.pull * self.row(c["normal"]).transpose() * pressed
-            rows[j, OPEN] = -load if state == OPEN else load
-            if slips:
-                rows[j, STICK] = speed * slips - limit * self.free
-            elif state == STICK and c["kt"]:
-                rows[j, 1], rows[j, -1] = limit - force, limit + force
-        sizes = power = absolute(A)
-        for _ in range(6):
-            power = (power * power).mid()
-        h = 0.8 / float(max(power.entries()).root(64))
-        bound = (arb_mat(self.d, self.d, 1) - sizes * h).inv()
+        parts = [self.part(j, state) for j, state in enumerate(mode)]
+        A = sum((part for part, *_ in parts), self.free)
+        rows = {key: row for _, own, _ in parts for key, row in own.items()}
+        held = {j: own for j, (_, _, own) in enumerate(parts) if own}
+        if held:  # by the forces under which u'' = 0
+            lines, speeds = (arb_mat([each[i].entries() for each in held.values()]) for i in (0, 1))
+            pulls = self.pull * lines.transpose()
+            require((speeds * pulls).det() != 0, "the forces in contacts without springs are not determined")
+            forces = (speeds * pulls).solve(speeds * A)
+            A -= pulls * forces
+            for (j, (*_, limit)), force in zip(held.items(), forces.tolist(), strict=True):
+                rows |= {(j, way): limit - arb_mat([force]) * way for way in (1, -1)}
+        h = 0.8 / float(max(abs(np.linalg.eigvals((floats := rough(A)).size))))
+        bound = (arb_mat(self.d, self.d, 1) - arb_mat(floats.size.tolist()) * h).inv()
         sums = (bound * arb_mat(self.d, 1, [1] * self.d)).entries()
         require(all(each > 0 for each in sums), "polynomials reach too far")
-        return self.made.setdefault(mode, (A, rows, h, bound))
+        return self.made.setdefault(mode, (A, floats, rows, h, rough(bound).size))
 
-    def flow(self, mode: tuple[int, ...], length: Any) -> list[Any]:
-        """Return e^{A length/2^i}, i = 0, 1, …, down to what polynomials reach."""
+    def part(self, j: int, state: int) -> Any:
+        """Return what a contact adds to A, its rows, and the line, rate and limit of what sticks rigidly."""
+        if (key := ("part", j, state)) in self.made:
+            return self.made[key]
+        c, load, held = self.contacts[j], self.loads[j], tuple[Any, ...]()
+        own, limit, slips = self.row([[2 * self.n + j, 1]]), load * arb(c["mu"]), state * (state != OPEN)
+        line, speed, rate = self.row(c["row"]), self.row(c["row"], self.n), limit * self.free * slips
+        A, rows = arb_mat(self.d, self.d), {(j, OPEN): -load if state == OPEN else load}
+        if c["kt"] is None:  # without a spring
+            own, rate, held = limit * slips, 0 * rate, (line, speed, limit) if state == STICK else ()
+        else:
+            speed *= arb(c["kt"])
+            A += own.transpose() * (speed if state == STICK else rate)
+            rows |= {(j, way): limit - own * way for way in (1, -1) if state == STICK and c["kt"]}
+        rows |= {(j, STICK): (speed - rate) * slips} if slips else {}
+        pressed = (load * int(state != OPEN) - self.row([[self.one, c["rest"]]])) * int(c["presses"])
+        A -= self.pull * line.transpose() * own
+        A -= self.pull * self.row(c["normal"]).transpose() * pressed
+        return self.made.setdefault(key, (A, rows, held))
+
+    def powers(self, mode: tuple[int, ...], length: Any) -> tuple[list[Rough], Any]:
+        """Return e^{A length/2^i}, i = …, 1, 0, from a span on; Σ |what leads from a span to later ones|."""
         if (key := (mode, length.mid().man_exp())) not in self.made:
-            A, _, h, _ = self.mode(mode)
-            depth = max(0, math.ceil(math.log2(0.4 * float(length.mid()) / h)))
-            self.made[key] = [(A * (length.mid() / 2**depth)).exp()]
-            for _ in range(depth):
-                self.made[key].insert(0, self.made[key][0] * self.made[key][0])
+            A, *_, h, sums = self.mode(mode)
+            depth = max(0, math.ceil(math.log2(float(length.mid()) / h) + 1e-9) - REACH)
+            step, E, P = rough(A * (length.mid() / 2 ** (depth + REACH))), *[every := np.eye(self.d)] * 2
+            for k in range(TERMS, 0, -1):
+                E, P = every + step.middle @ E / k, every + step.size @ P / k
+            off = P @ (step.off @ P + (self.d + 8) * ROUNDING * P) + sums / math.factorial(TERMS + 1)
+            powers = [Rough(E, off)]
+            for _ in range(REACH + depth):
+                powers.append(powers[-1] @ powers[-1])
+            for power in (powers := powers[REACH:])[:-1]:
+                every = every + power.size @ every
+            self.made[key] = powers, every
         return self.made[key]  # type: ignore[no-any-return]
 
-    def series(self, mode: tuple[int, ...], states: Any, h: Any, degree: int) -> Any:
-        """Return Taylor coefficients of columns of states, and balls of what they lack up to h."""
-        (A, _, most, bound), terms, h = self.mode(mode), [states], abs(h).upper()
-        require(h <= most * (degree + 1), "a length is not known well enough")  # Σ |A h / (degree + 1)|^i
-        for k in range(1, degree + 2):
-            terms.append(A * terms[-1] * (1 / arb(k)))
-        lack = absolute(bound * absolute(terms.pop())) * h ** (degree + 1)
-        return terms, arb_mat([[arb(0, each) for each in row] for row in lack.tolist()])
+    def series(self, mode: tuple[int, ...], states: Any, h: Any, most: Any = 1) -> Any:
+        """Return Taylor terms of columns of states after h, and what they lack up to `most` times as long."""
+        A, *_, span, sums = self.mode(mode)
+        step, terms, count = A * h, [states], ctx.prec // 4 + 22  # 4^22 / 22! and so on are below 2^-prec
+        require(h * most < span * 2**REACH * 2, "a length is not known well enough")
+        for k in range(1, count + 1):
+            terms.append(step * terms[-1] * (1 / arb(k)))
+        return terms, sums @ rough(terms.pop() * arb(most) ** count).size
 
-    def after(self, mode: tuple[int, ...], states: Any, length: Any, more: Any = 0) -> Any:
-        """Return columns of states after a length and a little more or less."""
-        later = self.flow(mode, length)[0] * states
-        return later + self.series(mode, later, length - length.mid() + more, 0)[1]
+    def march(self, mode: tuple[int, ...], z: Any, length: Any) -> tuple[list[Any], Any]:
+        """Return points near the first states of spans and the last one, and how far off these are at most of
+        one that begins at the first point."""
+        powers, every = self.powers(mode, length)
+        count, off, points = 2 ** (len(powers) - 1), np.zeros((self.d, 1)), [z.mid()]
+        part, few = length.mid() / count, count <= self.d // 8
+        flow = None if few else (self.mode(mode)[0] * part).exp()
+        for _ in range(count):
+            terms, lack = self.series(mode, points[-1], part) if few else ([flow * points[-1]], 0.0 * off)
+            found = sum(terms[1:], terms[0])
+            points.append(found.mid())
+            off = np.maximum(off, radii(found.entries())[:, None] + lack)
+        return points, every @ off * SLACK
 
 
 class Orbit:
@@ -151,7 +227,11 @@ class Orbit:
         self.unknown = [at for at in free if at not in self.known]  # what sticks returns as its motion does
         count = len(self.returns) - (system.period is None)  # what nothing drives begins at a given place
         require(len(self.unknown) == count == len(free) - len(self.known), "other states are to be fixed")
-        self.size = len(self.returns) + len(self.groups)
+        self.size = self.lasts = len(self.returns) + len(self.groups)
+        self.anew = dict[int, int]()
+        for piece, group in enumerate(self.groups, start=1):
+            if "anew" in raw["events"][group[-1]]:  # all of its first state is as unknown
+                self.anew[piece], self.size = self.size, self.size + system.d
         self.set = [(at, k, 1) for k, at in enumerate(self.unknown)]
         for b, (a, way) in self.twins.items():
             self.set += [(n + b, k, way * of) for at, k, of in self.set if at == n + a]
@@ -161,9 +241,10 @@ class Orbit:
         does: its force may be ±1 times that of a, and then its events are those of a; else 0."""
         one, other = (self.system.contacts[j] | {"name": ""} for j in (a, b))
         way, each = 1 if one["row"] == other["row"] else -1, pairwise(self.events)
-        same = other == one | {"row": [[at, way * factor] for at, factor in one["row"]]}
+        if other != one | {"row": [[at, way * factor] for at, factor in one["row"]]}:
+            return 0
         does = [((b, *(s if s == OPEN else way * s for s in old)), new) for (j, *old), new in each if j == a]
-        same = same and len(does) == sum(j == b for j, *_ in self.events)
+        same = len(does) == sum(j == b for j, *_ in self.events)
         return way * (same and all(mirrored == new for mirrored, new in does))
 
     def together(self, i: int) -> bool:
@@ -186,86 +267,101 @@ class Orbit:
         j, old, new = self.events[i]
         if OPEN in (old, new):
             return (j, OPEN), {(j, follows): 1 for follows in (1, -1, OPEN)}
+        if self.system.contacts[j]["kt"] is None:  # u' is 0 where it rests, which u'' need not be
+            begun = {} if new == STICK else {(j, STICK): 2 if old == STICK else 1}
+            return (j, new if old == STICK else STICK), begun
         return (j, new), {(j, old): 2} if new == STICK else {}
 
     def lengths(self, y: Any) -> list[Any]:
         """Return how long pieces last."""
-        found = list(y[len(self.unknown) :])
+        found = list(y[len(self.unknown) : self.lasts])
         found += [] if self.system.period is None else [self.system.period - sum(found, arb(0))]
         require(all(each > 0 for each in found), "a piece does not end after its start")
         return found
 
     def shoot(self, y: list[Any], away: Any = None) -> Any:
-        """Return the equations at y; of the box y + away their derivative; and how pieces begin in it."""
-        system, states, values, slope, starts = self.system, len(self.unknown), [], [], []
-        z, D, lengths = arb_mat(system.d, 1), arb_mat(system.d, self.size), self.lengths(y)
-        box = y if away is None else (arb_mat([y]).transpose() + away).entries()
-        spare = [over - length.mid() for over, length in zip(self.lengths(box), lengths, strict=True)]
+        """Return the equations at y; of the box y ± away their derivative; and how pieces begin in it."""
+        system, states, values, slopes, starts, ends = self.system, len(self.unknown), [], [], [], list[Any]()
+        z, set_, lengths = arb_mat(system.d, 1), np.zeros((system.d, self.size)), self.lengths(y)
+        box = y if away is None else around(arb_mat([y]).transpose(), away).entries()
         for at, value in self.known.items():
             z[at, 0] = value
         for k, order in zip(range(system.one, system.d, 2), system.orders, strict=True):
             z[k, 0], z[k + 1, 0] = (order * self.begins).cos(), (order * self.begins).sin()
         for at, k, factor in self.set:
-            z[at, 0], D[at, k] = factor * y[k], factor
-        first = z, D
-        for piece, group in enumerate([*self.groups, []]):
-            mode, length, own = self.modes[group[0] if group else -1], lengths[piece], states + piece
-            A, rows, *_ = system.mode(mode)
-            starts.append((z, D, length))
-            if away is not None:  # the last piece lasts less as others last longer, if the period is given
-                changes = [int(k == own) - int(k >= states and own == self.size) for k in range(self.size)]
-                moves = A * system.after(mode, z + D * away, length, spare[piece])
-                D = system.after(mode, D, length, spare[piece]) + moves * arb_mat(1, self.size, changes)
-            z = system.after(mode, z, length)
+            z[at, 0], set_[at, k] = factor * y[k], factor
+        first = z, (D := Rough(set_))
+        for piece, (group, over) in enumerate(zip([*self.groups, []], self.lengths(box), strict=True)):
+            if at := self.anew.get(piece, 0):
+                own = arb_mat([y[at : at + system.d]]).transpose(), Rough(np.eye(system.d, self.size, at))
+                ends.append(((z, D), own, range(system.d)))
+                z, D = own
+            mode, length, place = self.modes[group[0] if group else -1], lengths[piece], states + piece
+            _, A, rows, span, sums = system.mode(mode)
+            points, off = system.march(mode, z, length)
+            starts.append((z, D, length.mid(), points, off))
+            if away is None:
+                z = points[-1]
+            else:
+                spare = float((over - length.mid()).abs_upper()) * SLACK
+                require(spare < span, "a length is not known well enough")
+                changes = np.eye(1, self.size, place if place < self.lasts else self.size)
+                if not group and system.period is not None:  # the last piece lasts less as others last longer
+                    changes[0, states:place] = -1.0
+                E, rate, last = system.powers(mode, length)[0][-1], sums @ A.size, rough(points[-1])
+                near = off + E.size @ radii(z.entries())[:, None]
+                far = near + E.size @ (D.size @ away)[:, None]
+                far += rate @ (last.size + far) * spare  # as it lasts a little more or less
+                z = around(points[-1], near + rate @ (last.size + near) * float(length.rad()))
+                D = Rough(E.middle, E.off + rate @ E.size * spare) @ D
+                D -= A @ Rough(last.middle, last.off + far) @ Rough(-changes)
             for key in [self.zeros(k)[0] for k in group[:1]]:
                 require(key in rows, f"event {group[0]} cannot be in its mode")
-                values.append((rows[key] * z).entries())
-                slope.append((rows[key] * D).entries())
-        values += [[z[at, 0] - first[0][at, 0]] for at in self.returns]
-        slope += [(D - first[1]).tolist()[at] for at in self.returns]
-        return arb_mat(values), arb_mat(slope), starts
+                values += (rows[key] * z).entries()
+                slopes.append(rough(rows[key]) @ D)
+        for (end, slope), (own, unit), each in [*ends, ((z, D), first, self.returns)]:
+            values += [end[at, 0] - own[at, 0] for at in each]
+            slopes.append(Rough((slope - unit).middle[each], (slope - unit).off[each]))
+        every = (np.vstack([getattr(each, key) for each in slopes]) for key in ("middle", "off"))
+        return arb_mat([values]).transpose(), Rough(*every), starts
 
     def extremes(self, box: list[Any]) -> tuple[Any, Any, Any]:
         """Require one orbit in the box, and all inequalities; return its extremes and its period."""
-        y = [each.mid() for each in box]
-        away = arb_mat([[each - middle] for each, middle in zip(box, y, strict=True)])
+        y, away = [each.mid() for each in box], radii(box)
         value, slope, starts = self.shoot(y, away)
-        try:
-            inverse = slope.mid().inv().mid()
-        except ZeroDivisionError:
-            raise RejectedError("the derivative of the equations is singular: it is not isolated") from None
-        moved = (arb_mat(self.size, self.size, 1) - inverse * slope) * away - inverse * value
-        for i, (new, old) in enumerate(zip(moved.entries(), away.entries(), strict=True)):
-            told = f"needs a radius of {float(new.abs_upper()):.2e}, the box has {float(old.rad()):.2e}"
+        near = inverse(slope, away)
+        moved = (Rough(np.eye(self.size)) - near @ slope).size @ away + (near @ rough(value)).size[:, 0]
+        for i, (new, old) in enumerate(zip(moved * SLACK, away, strict=True)):
+            told = f"needs a radius of {new:.2e}, the box has {old:.2e}"
             told = f"unknown {i}: Krawczyk's operator {told}: not isolated, or not known so well"
-            require(old.contains_interior(new), told)
-        lengths, motion = self.lengths((arb_mat([y]).transpose() + moved).entries()), []
-        for piece, (z, D, length) in enumerate(starts):
-            motion += self.kept(piece, z + D * moved, length, lengths[piece] - length.mid())
+            require(new < old, told)
+        lengths, motion = self.lengths(around(arb_mat([y]).transpose(), moved).entries()), []
+        for piece, ((z, D, *found), length) in enumerate(zip(starts, lengths, strict=True)):
+            motion += self.kept(piece, radii(z.entries()) + D.size @ moved, length, *found)
         return least(motion), -least([(-p, rest, h) for p, rest, h in motion]), sum(lengths, arb(0))
 
-    def kept(self, piece: int, states: Any, length: Any, more: Any) -> list[Any]:
+    def kept(self, piece: int, more: Any, length: Any, middle: Any, points: Any, off: Any) -> list[Any]:
         """Require the conditions of a piece; return the motion: polynomials, what they lack, spans."""
         before, after = self.groups[piece - 1] if piece else [], [*self.groups, []][piece]
-        mode = self.modes[after[0] if after else -1]
-        _, *powers = self.system.flow(mode, length)
-        for power in powers:  # halved and halved again: no stiff piece is stepped through
-            later = (power * states).tolist()
-            states = arb_mat([[*old, *new] for old, new in zip(states.tolist(), later, strict=True)])
+        mode, more, count = self.modes[after[0] if after else -1], more[:, None], len(points) - 1
+        for power in self.system.powers(mode, middle)[0][:-1]:
+            more = np.hstack([more, power.size @ more])
+        begins = zip(points[:-1], (off + more).T * SLACK, strict=True)
+        states = arb_mat([around(*each).entries() for each in begins]).transpose()
         begun = {key: order for k in before for key, order in self.zeros(k)[1].items()}
-        ends, count, degree, motion = {self.zeros(k)[0] for k in after}, states.ncols(), ctx.prec // 4, []
-        spans = [length.mid() / count] * (count - 1) + [length.mid() / count + more]
-        terms, lack = self.system.series(mode, states, spans[0].max(spans[-1]), degree)
-        for key, row in [*self.system.mode(mode)[1].items(), (None, self.system.observe)]:
+        ends, motion, last = {self.zeros(k)[0] for k in after}, [], 1 + (length - middle) / middle * count
+        terms, lack = self.system.series(mode, states, middle / count, last.upper().max(arb(1)))
+        lack, degree = arb_mat([[arb(0, each) for each in row] for row in lack.tolist()]), len(terms)
+        for key, row in [*self.system.mode(mode)[2].items(), (None, self.system.observe)]:
             values = zip(*((row * term).entries() for term in terms), strict=True)
-            for k, (h, value, rest) in enumerate(zip(spans, values, (row * lack).entries(), strict=True)):
-                p = arb_poly(list(value))
+            for k, (value, rest) in enumerate(zip(values, (row * lack).entries(), strict=True), start=1):
+                p, h = arb_poly(list(value)), last if k == count else arb(1)
                 if key is None:
                     motion.append((p, rest, h.upper()))
                     continue
-                order = 0 if k else begun.get(key, 0)  # p, and p' of a double zero, is 0 at 0
+                order = 0 if k > 1 else begun.get(key, 0)  # p, and p' of a double zero, is 0 at 0
                 p, rest = arb_poly(p.coeffs()[order:]), rest / h**order
-                if k == count - 1 and key in ends:  # p is 0 at h
+                if k == count and key in ends:  # p is 0 at h
                     p, rest = arb_poly(p(arb_poly([h, -1])).coeffs()[1:]), rest * (2 * degree) / h
                 if not (p(arb(0).union(h.upper())) + rest) > 0:
                     margin = least([(p, rest, h.upper())], abs(p(h)).upper() / 2**20)

@@ -80,7 +80,7 @@ def _contact(row: Row, ports: Real) -> dict[str, Any]:
     moves = row.normal_port is not None
     return {
         "name": row.name, "row": [] if gap else along, "mu": 0.0 if gap else row.mu,
-        "kt": 0.0 if gap else row.kt, "waves": [] if gap else waves,
+        "kt": 0.0 if gap else None if math.isinf(row.kt) else row.kt, "waves": [] if gap else waves,
         "kn": row.kt if gap else row.kn, "gap": row.gap if gap else 0.0,
         "normal": along if gap else _terms(ports[row.normal_port]) if moves else [],
         "rest": 0.0 if gap else row.rest, "presses": gap or (bool(row.presses) and moves), "varies": False,
@@ -112,7 +112,7 @@ def orbit_of(
     moved, forces = {each["contact"] for each in events}, {}
     for member in piecewise.members:
         at = member.slider
-        if first.state.sliders[at] != FREE:
+        if first.state.sliders[at] != FREE and not piecewise.rigid[at]:
             forces[member.contact] = float(first.mode.forces[at] @ w)
     fixed = {str(j): value for j, value in forces.items() if j not in moved and states[0][j] == "stick"}
     found = {"begins": first.tau, "states": states[0], "events": events, "fixed_forces": fixed}
@@ -127,9 +127,10 @@ def orbit_of(
         del fixed[max(held, key=lambda j: abs(held[j]))]
     stated = System(system, {})
     for _ in range(2):  # those that come to rest together, then those that go on together
+        orbit = CheckedOrbit(stated, found)
         for i in range(1, len(events)):
-            orbit = CheckedOrbit(stated, found)
-            near = times[i] - times[i - 1] < _AT_ONCE and orbit.together(i)
+            if near := times[i] - times[i - 1] < _AT_ONCE:
+                near = (orbit := CheckedOrbit(stated, found)).together(i)
             if near or events[i]["contact"] in orbit.twins:
                 events[i]["at_once"] = True
     values = [*w[:n].tolist(), *(w[n : 2 * n] * omega).tolist()]
@@ -173,7 +174,8 @@ def _way(piecewise: Piecewise, before: FlowPiece, w: Real, j: int, old: str, new
         return [new]
     if old == "stick" and new == "open":
         return ["slip+" if before.mode.forces[slider] @ w > 0.0 else "slip-", new]
-    return ["stick", new] if {old, new} == {"slip+", "slip-"} else [new]
+    turns = {old, new} == {"slip+", "slip-"} and not piecewise.rigid[slider]
+    return ["stick", new] if turns else [new]
 
 
 def _words(piecewise: Piecewise, state: MemberState) -> list[str]:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from solver.certificate.boxes import boxed, claimed, digits, orbit_at, set_out, settled
 
 if TYPE_CHECKING:
@@ -115,9 +117,9 @@ class _Summits:
         def reached(frequency: Any) -> Any:
             orbit = orbit_at(self.raw, frequency_hz=digits(frequency), load_factor=digits(factor))
             self.y, _ = settled(orbit, self.y)
-            parts = enumerate(orbit.shoot(self.y)[2])
-            motion = [each for piece, (z, _, length) in parts
-                      for each in orbit.kept(piece, z, length, length - length.mid())]  # fmt: skip
+            none = np.zeros(orbit.system.d)
+            motion = [each for piece, (_, _, length, *found) in enumerate(orbit.shoot(self.y)[2])
+                      for each in orbit.kept(piece, none, length, length, *found)]  # fmt: skip
             high, low = (-least([(sign * p, rest, h) for p, rest, h in motion]) for sign in (-1, 1))
             return high.max(low).mid()
 

@@ -34,7 +34,7 @@ OTHERWISE: Mapping[str, set[str]] = {
     "quasi-periodic": {"to_hz"}, "posterior": {"varied", "assemblies", "models"},
     "wear": {"parameter", "start", "stop", "factors"},
     "modes": {
-        "start", "stop", "performance", "aero_damping", "motions", "exact_peaks", "disturbance",
+        "start", "stop", "performance", "aero_damping", "motions", "exact_peaks", "disturbance", "certify",
         "phase_resonance",
     },
 }  # fmt: skip

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from protocol import measured, serve, single_response
+from protocol import NotOfferedError, measured, serve, single_response
 
 NEEDS = ("numpy",)  # besides octave-cli
 RUNGS = [
@@ -61,7 +61,7 @@ def solve(case: dict[str, Any], rung: dict[str, Any]) -> dict[str, Any]:
     """Solve at the frequency, by Octave's fsolve, from the linear response with all contacts stuck."""
     m = single_response(case)
     if len(m.M) == 1 and any(row.law == "gap" and row.b[0] < 0.0 for row in m.rows):
-        raise NotImplementedError("in a system of one coordinate its forces have no direction")
+        raise NotOfferedError("in a system of one coordinate its forces have no direction")
     H, n, omega = rung["harmonics"], len(m.M), 2.0 * math.pi * case["asked"]["frequency_hz"]
     force = np.zeros(n, complex)
     for dof, amplitude, phase, _ in m.loads:
@@ -89,7 +89,7 @@ def solve(case: dict[str, Any], rung: dict[str, Any]) -> dict[str, Any]:
 def _octave(task: dict[str, Any]) -> dict[str, Any]:
     octave, source = shutil.which("octave-cli"), sys.argv[sys.argv.index("--source") + 1]
     if octave is None:
-        raise NotImplementedError("octave-cli is not installed")
+        raise NotOfferedError("octave-cli is not installed")
     Path("task.json").write_text(json.dumps(task))
     Path("run.m").write_text(SCRIPT)
     command = [octave, "--norc", "--quiet", "run.m", source]

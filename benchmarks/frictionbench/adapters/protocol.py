@@ -2,7 +2,7 @@
 
 An adapter is a file with `NEEDS` (what pip is to install into its environment), `RUNGS` (settings from cheap
 to dear) and `solve(case, rung) -> {"value": …}`; `estimate` of the error and `points` may stand beside. What
-it does not offer raises NotImplementedError, whose words are shown. It runs in an environment of its own,
+it does not offer raises NotOfferedError, whose words are shown. It runs in an environment of its own,
 NumPy among it; `case_model`, `single_response` and `measured` are for who wants matrices.
 """
 
@@ -23,8 +23,8 @@ import numpy as np
 WHAT, INSTANTS = ("amplitude", "half-peak-to-peak"), 16384
 
 
-def case_model(case: dict[str, Any]) -> Any:
-    """Return `frictionbench.model.model` of a case, loaded by its path: an adapter has no other package."""
+def _loaded() -> Any:
+    """Return `frictionbench.model`, loaded by its path: an adapter has no other package."""
     where = Path(__file__).parents[1] / "model.py"
     spec = importlib.util.spec_from_file_location("frictionbench_model", where)
     assert spec is not None
@@ -32,7 +32,16 @@ def case_model(case: dict[str, Any]) -> Any:
     module = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = module
     spec.loader.exec_module(module)
-    return module.model(case)
+    return module
+
+
+MODEL = _loaded()
+NotOfferedError = MODEL.NotOfferedError
+
+
+def case_model(case: dict[str, Any]) -> Any:
+    """Return `frictionbench.model.model` of a case."""
+    return MODEL.model(case)
 
 
 def single_response(case: dict[str, Any], *, highest: int = 1, gaps: bool = True) -> Any:
@@ -40,7 +49,7 @@ def single_response(case: dict[str, Any], *, highest: int = 1, gaps: bool = True
 
     Raises
     ------
-    NotImplementedError
+    NotOfferedError
         It is another, or has forces above order `highest`, or gaps where the code has none.
     """
     m, asked = case_model(case), case["asked"]
@@ -52,7 +61,7 @@ def single_response(case: dict[str, Any], *, highest: int = 1, gaps: bool = True
         (f"forces go to order {highest}", all(k <= highest for *_, k in m.loads)),
     ):
         if not holds:
-            raise NotImplementedError(why)
+            raise NotOfferedError(why)
     return m
 
 

@@ -23,7 +23,7 @@ def check_proof(
     ],
     as_json: options.Json = False,
 ) -> None:
-    """Check the proofs in a file that `solve`, `peaks` or `design --certify --json` wrote.
+    """Check the proofs in a file that `solve`, `peaks`, `design` or `modes --certify --json` wrote.
 
     By solver/certificate/checker.py, which needs python-flint and nothing of this package.
     """

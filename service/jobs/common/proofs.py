@@ -11,6 +11,7 @@ from service.jobs.common.results import Table
 from service.jobs.study import Answer, Watch
 
 if TYPE_CHECKING:
+    from solver.certificate.certificate import Certificate
     from solver.scene.scene import Scene
 
 Certify = Annotated[
@@ -22,11 +23,11 @@ CERTIFICATES: Any = (
 )
 
 
-def prepare(scene: Scene) -> None:
-    """Refuse what cannot be proved before anything is computed."""
+def prepare(scene: Scene, *, rigid: bool = True) -> None:
+    """Refuse what cannot be proved before anything is computed; `rigid`: friction may be."""
     from solver.certificate.certificate import check_certifiable
 
-    check_certifiable(scene)
+    check_certifiable(scene, rigid=rigid)
 
 
 def with_proofs(
@@ -38,7 +39,11 @@ def with_proofs(
     """
     from solver.certificate.certified_peaks import certified_peaks
 
-    found = certified_peaks(peaks, least_over=least_over, should_stop=watch.should_stop)
+    return beside(answer, certified_peaks(peaks, least_over=least_over, should_stop=watch.should_stop))
+
+
+def beside(answer: Answer, found: Sequence[Certificate]) -> Answer:
+    """Return an answer with proofs; it falls short if one is not reached."""
     missing = [each.status.value for each in found if not each.reached]
     return answer._replace(
         json=answer.json | {"certificates": [each.to_json() for each in found]},

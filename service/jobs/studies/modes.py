@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from pydantic import BaseModel, Field, RootModel
 
 import solver
+from service.jobs.common.proofs import CERTIFICATES, beside, prepare
 from service.jobs.common.results import Table, answered
 from service.jobs.common.scenes import HarmonicRequest, Number, PositiveNumber, check
 from service.jobs.common.sizes import MOST_MOTIONS, POINTS_OF_A_SWEEP, balance_issues
@@ -115,6 +116,7 @@ _Ratio = Annotated[Number, Field(ge=-10.0, le=10.0)]
 
 
 _FURTHER: dict[str, Any] = dict.fromkeys(("performance", "limit_cycles", "motions"), (Table | None, None))
+_FURTHER["certificates"] = CERTIFICATES
 
 
 @cache
@@ -171,6 +173,9 @@ class Modes(Study, HarmonicRequest):
     disturbance: Annotated[PositiveNumber | None, Flag(metavar="A")] = Field(
         default=None, description="Modal amplitude [√kg m] that is to die down: the least loads that do it."
     )
+    certify: Annotated[bool, Field(strict=True)] = Field(
+        default=False, description="Prove the limit cycles, where contacts are piecewise linear."
+    )
     phase_resonance: Annotated[bool, Field(strict=True)] = Field(
         default=False,
         description="In place of the mode the forced responses that lag by 90°: which force each takes.",
@@ -192,6 +197,7 @@ class Modes(Study, HarmonicRequest):
             ("disturbance", self.disturbance is not None and not fed,
              "needs {aero_damping}: without gas that feeds, every disturbance dies down"),
             ("mode_alone", self.mode_alone and not fed, "needs {aero_damping}: it says what the gas feeds"),
+            ("certify", self.certify and not fed, "needs {aero_damping}: limit cycles are what is proved"),
             ("phase_resonance", apart, "is a curve of its own: leave {performance} and {aero_damping} out"),
         )  # fmt: skip
         wrong = [Issue((key,), Naming(said)) for key, bad, said in words if bad]
@@ -207,6 +213,8 @@ class Modes(Study, HarmonicRequest):
         """Follow the mode, or the phase resonances, and answer what else is asked of it."""
         import solver
 
+        if asked.get("certify"):
+            prepare(scene, rigid=False)
         given = {key: asked[key] for key in ("mode", "nodal_diameter", "harmonics") if key in asked}
         given["amplitudes"] = (asked["start"], asked["stop"])
         if asked.get("phase_resonance"):
@@ -226,6 +234,12 @@ class Modes(Study, HarmonicRequest):
         if (ratio := asked.get("aero_damping")) is not None:
             cycles = solver.limit_cycles(found, ratio, mode_alone=asked.get("mode_alone", False))
             answer.json["limit_cycles"] = cycles.to_json(asked.get("disturbance"))
+            if asked.get("certify"):
+                stop = watch.should_stop
+                proofs = [
+                    solver.certify_cycle(scene, each, ratio, should_stop=stop) for each in cycles.cycles
+                ]
+                answer = beside(answer, proofs)
         if asked.get("motions"):
             answer.json["motions"] = motions_of(found)
         return answer

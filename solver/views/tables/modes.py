@@ -7,6 +7,7 @@ from typing import Any
 
 from solver.results import units
 from solver.results.told import Block, ResultTable, Summary
+from solver.views.tables.responses import proved
 
 _MOST_ROWS = 40
 _LEVEL = 1e-9  # relative difference of damping ratios that is none
@@ -54,6 +55,7 @@ def mode(found: Mapping[str, Any]) -> Iterator[Block]:
         at = f"a = {found['amplitude'][best]:.4g} √kg m, {found['frequency'][best]:.6g} Hz"
         pairs.insert(0, ("most damping", f"{ratios[best]:.5g} at {at}"))
     pairs.append(("time", units.duration(found["seconds"])))
+    pairs += proved(found.get("certificates") or ())
     damping = ("damping ratio", "damping_ratio", "{:.5g}".format), ("± by harmonics", "damping_error", _error)
     yield from _curve(found, title, pairs, [_AMPLITUDE, _height(found), _FREQUENCY, *damping])
     if found.get("performance"):

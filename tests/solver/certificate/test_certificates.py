@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import copy
 import json
+import math
 import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -143,6 +145,79 @@ def test_spoilt_certificates_are_rejected(proved: dict[str, Any]) -> None:
             checker.check(_spoilt(proved, rng))
         refused += 1
     assert refused == 100
+
+
+def test_many_events_are_proved_with_states_that_are_unknown_anew() -> None:
+    """36 events with 128 bits; a state that is unknown anew is as little to be changed as the first."""
+    scene, hz = random_scene(38)
+    near = stickslip.solve(scene, frequency_hz=hz, harmonics=21)
+    found = stickslip.certify(near)
+    assert found.reached, found.reason
+    assert (found.events, found.bits) == (36, 128)
+    assert abs(near.max_abs - found.max_abs[0]) <= near.error_estimate
+    raw = json.loads(json.dumps(found.certificate))
+    checker.check(raw)
+    middle, radius = raw["proof"]["unknowns"][-3].split(" +/- ")
+    raw["proof"]["unknowns"][-3] = f"{float(middle) + 1e-9!r} +/- {radius}"
+    with pytest.raises(checker.RejectedError):
+        checker.check(raw)
+    anew = [each for each in raw["orbit"]["events"] if each.pop("anew", False)]
+    assert anew
+    with pytest.raises(checker.RejectedError, match="unknowns"):
+        checker.check(raw)
+
+
+def test_products_of_floats_are_bounded() -> None:
+    """Against rational numbers, of sizes from 1e-100 to 1e100, of long sums that cancel."""
+    rng = np.random.default_rng(5)
+    for _ in range(20):
+        a, b = (
+            checker.Rough(rng.normal(size=size) * 10.0 ** rng.integers(-100, 100), None)
+            for size in ((2, 30), (30, 2))
+        )
+        product, less = a @ b, a - checker.Rough(a.middle * (1.0 + 1e-15))
+        for i, k in np.ndindex(2, 2):
+            true = sum(Fraction(x) * Fraction(y) for x, y in zip(a.middle[i], b.middle[:, k], strict=True))
+            assert abs(true - Fraction(product.middle[i, k])) <= Fraction(product.off[i, k])
+            true = Fraction(a.middle[i, k]) - Fraction(a.middle[i, k] * (1.0 + 1e-15))
+            assert abs(true - Fraction(less.middle[i, k])) <= Fraction(less.off[i, k])
+
+
+@pytest.mark.parametrize(("beta", "count"), [(0.8, 2), (1.5, 2)])
+def test_rigid_friction_is_proved_as_den_hartog_has_it(beta: float, count: int) -> None:
+    """x0² = (1 / (1 - β²))² - (F U)² for P = k = m = 1, U = sin(π/β) / (β (1 + cos(π/β)))."""
+    limit, angle = 0.2, np.pi / beta
+    scene = stickslip.Scene.from_dict({
+        "name": "rigid", "structure": {"kind": "lumped", "masses": {"x": 1.0},
+            "springs": [{"between": ["x", "ground"], "k": 1.0}]},
+        "contacts": [{"name": "f", "law": "coulomb", "between": ["x", "ground"], "kt": "inf", "mu": 1.0,
+                      "N0": limit}],
+        "excitation": [{"dof": "x", "amplitude": 1.0}], "observe": {"dof": "x", "band": [0.1, 0.3]},
+    })  # fmt: skip
+    found = stickslip.certify(stickslip.solve(scene, frequency_hz=beta / (2.0 * np.pi)))
+    assert found.reached, found.reason
+    assert found.events == count
+    U = np.sin(angle) / (beta * (1.0 + np.cos(angle)))
+    assert found.max_abs[0] == pytest.approx(
+        np.sqrt((1.0 / (1.0 - beta**2)) ** 2 - (limit * U) ** 2), rel=1e-12
+    )
+
+
+def test_rigid_friction_that_sticks_is_proved_and_a_force_beyond_its_limit_is_not() -> None:
+    """Two masses, one with rigid friction under a load that varies; a very stiff spring is near that."""
+
+    def scene(kt: Any) -> stickslip.Scene:
+        return stickslip.load_scene("two-dof").with_values({"damper.kt": kt, "damper.N0": 80.0})
+
+    found, near = (stickslip.certify(stickslip.solve(scene(kt), frequency_hz=1.2)) for kt in (math.inf, 1e5))
+    assert found.reached, found.reason
+    assert found.max_abs[0] == pytest.approx(near.max_abs[0], rel=2e-3)
+    raw = json.loads(json.dumps(found.certificate))
+    checker.check(raw)
+    assert "stick" in [each["to"] for each in raw["orbit"]["events"]]
+    raw["system"]["contacts"][0]["mu"] *= 0.999
+    with pytest.raises(checker.RejectedError):
+        checker.check(raw)
 
 
 # What cannot be proved, and what is proved of what is not determined

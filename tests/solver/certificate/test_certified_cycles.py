@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 
 import solver
+from service.jobs.studies.modes import Modes
+from service.jobs.study import Watch
 from solver.certificate import checker
 from tests.cases.mode_cases import one_mass
 
@@ -97,3 +99,15 @@ def test_what_has_no_place_in_a_proof_of_a_cycle_is_refused(
     rigid = scene.with_values({"damper.kt": math.inf})
     with pytest.raises(solver.SettingError, match=r"damper\.kt.*finite"):
         solver.certify_cycle(rigid, cycles.cycles[0], AERO)
+
+
+def test_the_study_of_modes_proves_its_limit_cycles(found: tuple[solver.Scene, solver.LimitCycles]) -> None:
+    scene, cycles = found
+    asked = {"start": 0.3, "stop": 100.0, "harmonics": 31, "aero_damping": AERO, "certify": True}
+    answer = Modes.compute(scene, asked, Watch())
+    assert answer.reached
+    for cycle, proof in zip(cycles.cycles, answer.json["certificates"], strict=True):
+        assert (proof["proves"], proof["certified"]) == ("limit cycle", True)
+        assert abs(cycle.max_abs - proof["max_abs"][0]) <= cycle.max_abs_error
+    body = {"scene": "two-dof", "from": 0.3, "to": 30.0, "certify": True}
+    assert [each.subject for each in Modes.model_validate(body).issues(scene)] == [("certify",)]
