@@ -94,7 +94,7 @@ def test_a_wrong_model_is_doubted(kind: str, seed: int, phase: bool) -> None:
     found, values = identified(seed, kind, phase=phase)
     if found.reached:  # an error of the mass that the data cannot tell from the unknowns does them little
         assert kind == "mass +5"
-        assert all(abs(one.value / values[one.name] - 1.0) < 0.06 for one in found.estimates)
+        assert all(abs(one.value / values[one.name] - 1.0) < 0.07 for one in found.estimates)
     elif found.status is optim.IdentifyStatus.MODEL_DOUBTFUL:
         assert doubted(found)
         assert found.misfit
