@@ -59,7 +59,11 @@ class ViscousContact(FrictionContact):
 
     def shares(self, motions: Real, load: Real) -> Shares | None:
         """Return the shares of the period in stick, slip and separation, at a frequency; else None."""
-        return None if math.isnan(self._omega) else super().shares(self._felt(motions), load)
+        from solver.contacts.segments import segments_of, shares_of
+
+        if math.isnan(self._omega):
+            return None
+        return shares_of(segments_of(self._felt(motions)[0], load, self.kt, self.mu))
 
     def perturbed(self, motions: Real, load: Real) -> tuple[ContactPart, ...] | None:
         """Return None: the stability is not computed."""
