@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import pickle
 from typing import Any
 
 import numpy as np
@@ -98,6 +99,13 @@ def brute(U: np.ndarray, load: np.ndarray, contact: ViscousContact, omega: float
         force[i] = min(max(held[i] - slipped, -bound), bound)
         slipped = held[i] - force[i]
     return force[count:]
+
+
+def test_a_contact_in_another_process_is_the_same() -> None:
+    """Also one given by functions: what neither knows, the frequency, is no NaN, which differs from itself."""
+    dahl = {"name": "e", "law": "dahl", "between": ["a", "ground"], "sigma": 2.0, "limit": 0.4}
+    given = solver.Scene.from_dict({**scene().to_dict(), "contacts": [VISCOUS, dahl]})
+    assert pickle.loads(pickle.dumps(given)) == given
 
 
 @pytest.mark.parametrize("load", [{}, {"N1": 0.9, "N1_phase": 0.4}])
