@@ -102,7 +102,7 @@ def brute(U: np.ndarray, load: np.ndarray, contact: ViscousContact, omega: float
 
 
 def test_a_contact_in_another_process_is_the_same() -> None:
-    """Also one given by functions: what neither knows, the frequency, is no NaN, which differs from itself."""
+    """Also one given by functions, whose class is made; the frequency that neither knows is no NaN."""
     dahl = {"name": "e", "law": "dahl", "between": ["a", "ground"], "sigma": 2.0, "limit": 0.4}
     given = solver.Scene.from_dict({**scene().to_dict(), "contacts": [VISCOUS, dahl]})
     assert pickle.loads(pickle.dumps(given)) == given

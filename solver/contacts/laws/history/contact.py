@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Annotated, ClassVar, Self
+from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
 
 from solver.contacts.fields import LEAST_SAMPLES, Real, Samples
 from solver.contacts.kernels import columns
-from solver.contacts.laws.base import RateContact
+from solver.contacts.laws.base import AnyContact, RateContact
 from solver.contacts.laws.history.definition import HistoryLaw
 from solver.contacts.laws.parts import Follows, RestStiffness, Row
 from solver.errors import SettingError
@@ -33,6 +33,10 @@ class HistoryContact(RateContact):
         "Nodes of a period at which the law is followed; 32 for each harmonic if left out, or 16 where "
         "they begin anew at every reversal.",
     ] = None
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Be sent to another process by the word of its law: the class is made there as it was here."""
+        return _of_law, (self.LAW,), self.__getstate__()
 
     @classmethod
     def prepare(cls) -> None:
@@ -177,3 +181,11 @@ class HistoryContact(RateContact):
                 numbers=tuple(self.numbers.tolist()),
             ),
         )  # fmt: skip
+
+
+def _of_law(word: str) -> AnyContact:
+    """A contact of a law, as yet without numbers."""
+    from solver.contacts.laws.registry import laws
+
+    law = laws()[word]
+    return law.__new__(law)
