@@ -6,7 +6,7 @@ The worst over a response is a maximum over the frequency, so its gradient is th
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -24,28 +24,43 @@ _KEY = "max_friction_work"
 
 def _rows(judged: Judged) -> list[CriterionRow]:
     """A row for every local maximum that competes, of every contact that is limited."""
-    from solver.response.worst_wear import Measure, worst_slopes, worst_wear
+    from solver.response.worst_wear import Measure
 
     bounds = judged.limit(FRICTION_WORK) or {}
-    return [
-        judged.row(
-            FRICTION_WORK, f"friction work of {contact.name} at {worst.at:.6g} Hz", worst.value,
-            None if judged.wear is None else worst_slopes(judged.wear, worst, contact.name).gradient,
-            at_hz=worst.at, bound=bounds[of_sector(contact)],
-            second=second_of(judged, worst, contact.name, Measure.FRICTION_WORK),
-        )
-        for contact in judged.contacts(bounds)
-        for worst in worst_wear(judged.branch, contact.name, Measure.FRICTION_WORK)
-    ]  # fmt: skip
+    each = {name: (bound, 1.0) for name, bound in bounds.items()}
+    return worst_rows(judged, FRICTION_WORK, Measure.FRICTION_WORK, each)
 
 
-def second_of(
-    judged: Judged, worst: WorstWear, contact: str, measure: Measure, factor: float = 1.0
-) -> Callable[[], Real] | None:
-    """Return what computes the second derivatives of a worst work or power, times `factor`, if there are."""
-    if judged.sensitivity is None or not judged.sensitivity.has_second:
-        return None
-    return partial(_times, factor, judged.sensitivity, worst, contact, measure)
+def worst_rows(
+    judged: Judged, criterion: Criterion, measure: Measure,
+    each: Mapping[str, tuple[float | None, float]], weight: float | None = None,
+) -> list[CriterionRow]:  # fmt: skip
+    """Return a row for every local maximum of a measure of contacts that competes.
+
+    Parameters
+    ----------
+    each : contact to its bound and to the factor on the measure.
+    """
+    from solver.response.worst_wear import worst_slopes, worst_wear
+
+    rows, sensitivity = [], judged.sensitivity
+    if sensitivity is not None and not sensitivity.has_second:
+        sensitivity = None
+    for contact in judged.contacts(each):
+        name, (bound, factor) = contact.name, each[of_sector(contact)]
+        for worst in worst_wear(judged.branch, name, measure):
+            slope = second = None
+            if judged.wear is not None:
+                slope = factor * worst_slopes(judged.wear, worst, name, measure).gradient
+            if sensitivity is not None:
+                second = partial(_times, factor, sensitivity, worst, name, measure)
+            rows.append(
+                judged.row(
+                    criterion, f"{criterion.name} of {name} at {worst.at:.6g} Hz", factor * worst.value,
+                    slope, at_hz=worst.at, bound=bound, weight=weight, second=second,
+                )
+            )  # fmt: skip
+    return rows
 
 
 def _times(factor: float, sensitivity: Sensitivity, worst: WorstWear, contact: str, measure: Measure) -> Real:

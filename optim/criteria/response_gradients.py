@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 
@@ -42,7 +43,7 @@ class Sensitivity:
         """Be made anew in another process: what is compiled here is not sent."""
         return Sensitivity, self._of
 
-    @property
+    @cached_property
     def has_second(self) -> bool:
         """Whether the contacts' laws and the paths have second derivatives here."""
         try:

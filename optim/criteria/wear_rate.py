@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from optim.criteria.criterion import Criterion, CriterionContext, CriterionRow, Form, Judged, Key, of_sector
-from optim.criteria.friction_work import by_contact, second_of
+from optim.criteria.criterion import Criterion, CriterionContext, CriterionRow, Form, Judged, Key
+from optim.criteria.friction_work import by_contact, worst_rows
 from optim.criteria.key import number_or_table
 
 _RATE, _COEFFICIENT = "max_wear_rate", "wear_coefficient"
@@ -17,27 +17,11 @@ _RATE, _COEFFICIENT = "max_wear_rate", "wear_coefficient"
 
 def _rows(judged: Judged) -> list[CriterionRow]:
     """A row for every local maximum that competes, of every contact that is limited."""
-    from solver.response.worst_wear import Measure, worst_slopes, worst_wear
+    from solver.response.worst_wear import Measure
 
-    limits: Mapping[str, tuple[float | None, float]] = judged.limit(WEAR_RATE) or {}
     weight = judged.weight(WEAR_RATE) * judged.case.weight
-    rows = []
-    for contact in judged.contacts(limits):
-        bound, coefficient = limits[of_sector(contact)]
-        for worst in worst_wear(judged.branch, contact.name, Measure.FRICTION_POWER):
-            slope = None
-            if judged.wear is not None:
-                found = worst_slopes(judged.wear, worst, contact.name, Measure.FRICTION_POWER)
-                slope = coefficient * found.gradient
-            what = f"wear rate of {contact.name} at {worst.at:.6g} Hz"
-            second = second_of(judged, worst, contact.name, Measure.FRICTION_POWER, coefficient)
-            rows.append(
-                judged.row(
-                    WEAR_RATE, what, coefficient * worst.value, slope, at_hz=worst.at, bound=bound,
-                    weight=weight, second=second,
-                )
-            )  # fmt: skip
-    return rows
+    each = judged.limit(WEAR_RATE) or {}
+    return worst_rows(judged, WEAR_RATE, Measure.FRICTION_POWER, each, weight)
 
 
 def _read(asked: CriterionContext) -> Mapping[str, tuple[float | None, float]]:

@@ -9,7 +9,7 @@ from typing import Annotated
 from optim.errors import DesignError
 from optim.problem.numbers import number_pair, positive, whole
 from solver.errors import Place, SettingError, at
-from solver.scene.scene import Observe, Scene
+from solver.scene.scene import Scene
 
 _KEYS = ("name", "set", "band", "observe", "engine_order", "order", "weight")
 
@@ -144,10 +144,8 @@ def _engine_order(scene: Scene, where: Place, wanted: object) -> Scene:
 
 def _observing(scene: Scene, where: Place, dof: str, band: tuple[float, float] | None) -> Scene:
     """Return the scene with another observed DOF and band."""
-    observe = Observe(
-        dof=dof, band=scene.observe.band if band is None else band, relative=scene.observe.relative
-    )
-    changed = scene.model_copy(update={"observe": observe})
+    given = {"dof": dof} if band is None else {"dof": dof, "band": band}
+    changed = scene.model_copy(update={"observe": scene.observe.model_copy(update=given)})
     # Only another DOF can fail to fit the structure; a large structure is not read again for a band.
     if dof == scene.observe.dof:
         return changed

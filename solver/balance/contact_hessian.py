@@ -19,7 +19,7 @@ from solver.contacts.kernels.system import System
 from solver.contacts.laws.base import without_second
 from solver.contacts.load_derivatives import contradicting
 from solver.errors import SettingError
-from solver.jit.fourier import Complex, Integer, Real
+from solver.jit.fourier import Complex, Integer, Real, coefficient_count
 from solver.scene.scene import Scene
 
 
@@ -107,8 +107,7 @@ class ContactForces:
 
 def contact_forces(system: System, seconds: Integer, u: Real) -> ContactForces:
     """Evaluate all contacts by the kernels `seconds`; FloatingPointError where a law has no answer at `u`."""
-    nc = system.owner.size
-    n = u.size // max(nc, 1)
+    nc, n = system.owner.size, coefficient_count(system.ks)
     table, load, _, _ = contact_values(system, 0.0, 0.0)
     found = ContactForces(
         system=system, seconds=seconds, table=table, load=load, U=u.reshape(nc, n), F=np.empty((nc, n)),

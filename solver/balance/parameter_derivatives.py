@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Annotated
+from typing import Annotated, cast
 
 import numpy as np
 
@@ -21,11 +21,13 @@ from solver.jit.fourier import Complex, Real
 from solver.linear.assembly import linear_model, structure_derivative
 from solver.linear.condensation import reduce_model, term_amplitudes
 from solver.linear.contact_table import port_stiffnesses
-from solver.linear.model import LinearModelDerivative
+from solver.linear.model import ExtraTerms, LinearModelDerivative
 from solver.scene.bodies.paths import FORCE
 from solver.scene.cyclic.annulus import check_in_annulus
 from solver.scene.parameter_paths import AMPLITUDE, parameter_of
 from solver.scene.scene import MatricesStructure, Scene
+
+_SAME = 1e-12  # relative: less is rounding
 
 
 def resolved(balance: Balance, paths: Sequence[str]) -> tuple[Parameter, ...]:
@@ -190,19 +192,39 @@ def matrices_of_paths(
 def check_smooth_structure(scene: Scene, parameters: Sequence[Parameter]) -> None:
     """Raise SettingError where forces or places of contacts have second derivatives by the paths.
 
-    By the speed and by a radius of rotation the centrifugal load has: they are for gradients.
+    By the speed and by a radius of rotation the centrifugal load has: they are for gradients. So are two
+    paths of whose product the matrices are.
     """
     by = {p.path: structure_derivative(scene, p.path) for p in parameters if p.kind is Kind.STRUCTURE}
     bent = [path for path, d in by.items() if _is_bent(d)]
-    lossy = [path for path, d in by.items() if d.extra is not None or d.by_loss_factor]
-    if len(lossy) > 1 and any(d.by_loss_factor for d in by.values()):
-        wanted = "must not have the loss factor beside a stiffness, whose product it is in: only gradients"
-        raise SettingError("paths", lossy, wanted)
+    tied = _multiplied(scene, {path: d.extra for path, d in by.items() if path not in bent})
+    if tied:
+        wanted = "must not be multiplied by another path in the matrices: only gradients"
+        raise SettingError("paths", tied, wanted)
     pulling = [path for path, d in by.items() if d.forces]
     if bent or len([path for path in pulling if not path.endswith(f".{FORCE}")]) > 1:
         raise SettingError(
             "paths", bent or pulling, "must not change loads or places together: only gradients"
         )
+
+
+def _multiplied(scene: Scene, slopes: Mapping[str, ExtraTerms | None]) -> list[str]:
+    """Return the paths whose slopes beside springs and dashpots change with the others' values.
+
+    As of the relaxation time of a branch with its stiffness, of a gyroscopic term with the speed, of a
+    stiffness with the loss factor.
+    """
+    beside = {path: extra for path, extra in slopes.items() if extra is not None}
+    moved = scene
+    for path in beside if len(beside) > 1 else ():
+        moved = moved.with_values({path: 0.5 * scene.value(path) or 1.0})
+
+    def changes(path: str, here: ExtraTerms) -> bool:
+        there = cast(ExtraTerms, structure_derivative(moved, path).extra)
+        pairs = ((here.K, there.K), (here.C, there.C), (here.loss_factor, there.loss_factor))
+        return any(np.abs(a - b).max() > _SAME * np.abs(a).max() for a, b in pairs)
+
+    return [path for path, here in beside.items() if moved is not scene and changes(path, here)]
 
 
 def _is_bent(found: LinearModelDerivative) -> bool:

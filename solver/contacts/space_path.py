@@ -102,15 +102,21 @@ def _stick(path: SpacePath, piece: Row, tau: Real) -> Real:
 
 
 def _slip(path: SpacePath, piece: Row, tau: Real) -> Real:
-    first = piece.first
-    panels = path.panels[first : first + piece.count].view(np.recarray)
-    which = np.clip(np.searchsorted(panels.end, tau), 0, len(panels) - 1)
-    angles = np.empty(tau.size)
-    for i, (at, panel) in enumerate(zip(tau, panels[which], strict=True)):
-        place = min(max((at - panel.begin) / (panel.end - panel.begin), 0.0), 1.0)
-        angles[i] = between(panel.start, np.ascontiguousarray(panel.theta), place)
+    angles = directions(path, piece, tau)
     limit = path.mu * _at(path.load[None], tau)[0]
     return np.asarray(limit * np.array([np.cos(angles), np.sin(angles)]))
+
+
+def directions(path: SpacePath, piece: Row, tau: Real) -> Real:
+    """Return the direction θ of the force at angles within a slip, (n,) [rad]."""
+    panels = path.panels[piece.first : piece.first + piece.count].view(np.recarray)
+    found = np.empty(tau.size)
+    for i, (at, panel) in enumerate(
+        zip(tau, panels[np.clip(np.searchsorted(panels.end, tau), 0, len(panels) - 1)], strict=True)
+    ):
+        place = min(max((at - panel.begin) / (panel.end - panel.begin), 0.0), 1.0)
+        found[i] = between(panel.start, np.ascontiguousarray(panel.theta), place)
+    return found
 
 
 def _at(coefficients: Real, tau: Real) -> Real:

@@ -25,7 +25,7 @@ from solver.matrices.faces import checked_nodes, is_line
 from solver.matrices.sectors.elements import Integer, faces_of
 
 Real = NDArray[np.float64]
-_LEAST = 1e-9  # share of a facet below which what covers it is rounding
+_LEAST = 1e-6  # share of a facet below which what covers it is rounding: decks have some six digits
 _SMALL = 1e-12  # of the largest weight
 _STEPS = 30  # of Newton's method for a place in a quadrangle
 

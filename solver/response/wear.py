@@ -19,6 +19,7 @@ from solver.balance.kernels.residual import contact_values, evaluate
 from solver.balance.parameter import Kind
 from solver.balance.simplifications import Effects, even_harmonics_reason
 from solver.balance.workspace import Workspace
+from solver.contacts.kernels.columns import OMEGA
 from solver.contacts.kernels.system import System, by_reference, evaluation_by_value
 from solver.contacts.segments import Shares
 from solver.errors import SettingError
@@ -186,7 +187,8 @@ def contact_wear(solution: Solution, paths: Sequence[str] = ()) -> dict[str, Con
 
 def period_shares(cycle: ContactCycle, e: int) -> Shares | None:
     """Return the shares of the period in stick, slip and separation; None of a law that knows no such."""
-    contact, ports = cycle.balance.scene.contacts[e].with_numbers(cycle.table[e]), cycle.ports(e)
+    row, ports = cycle.table[e], cycle.ports(e)
+    contact = cycle.balance.scene.contacts[e].with_numbers(row).at_frequency(float(row[OMEGA]))
     return contact.shares(cycle.full(cycle.U[ports.start : ports.stop]), cycle.normal_load(e))
 
 

@@ -60,7 +60,7 @@ class ContactCycle:
     def of(cls, balance: Balance, u: Real, p: float, point: Evaluation) -> ContactCycle:
         """Return the cycle at (u, λ = `p`, inside unit), where `point` was evaluated last."""
         table, load, _, _ = contact_values(balance.system, p, 0.0)
-        U = u.reshape(balance.n_ports, -1).copy()
+        U = u.reshape(balance.n_ports, balance.n_coefficients).copy()
         return cls(balance=balance, U=U, F=point.F.copy(), dF_dU=point.dF_dU.copy(), table=table, load=load)
 
     @property

@@ -100,7 +100,8 @@ class _Reader:
         while self._skip(_BLANK) < len(self._text):
             begin = self._at
             if self._text[begin] != "[":
-                self._statement(table)
+                self._pair(table)
+                self._end_of_line()
                 table.last = self._at
                 continue
             many = self._text.startswith("[[", begin)
@@ -147,18 +148,16 @@ class _Reader:
         for block, following in pairwise(blocks):
             block[1] = following[0]
 
-    def _statement(self, table: TextPlace) -> None:
-        """``key = value`` to the end of its line."""
+    def _pair(self, table: TextPlace) -> None:
+        """``key = value``."""
         begin = self._at
         path = self._key()
         self._at += 1  # the equals sign
         self._skip(_SPACE)
         for word in path[:-1]:
             table = table.keys.setdefault(word, TextPlace(WritingKind.DOTTED, begin, begin, begin))
-        value = self._value()
+        table.keys[path[-1]] = value = self._value()
         value.start = begin
-        table.keys[path[-1]] = value
-        self._end_of_line()
 
     def _key(self) -> list[str]:
         """A key, its words between dots."""
@@ -204,14 +203,7 @@ class _Reader:
         found = TextPlace(WritingKind.INLINE, self._at, self._at, self._at)
         self._at += 1
         while self._text[self._skip(_BLANK)] != "}":
-            begin, table = self._at, found
-            path = self._key()
-            self._at += 1
-            self._skip(_SPACE)
-            for word in path[:-1]:
-                table = table.keys.setdefault(word, TextPlace(WritingKind.DOTTED, begin, begin, begin))
-            table.keys[path[-1]] = value = self._value()
-            value.start = begin
+            self._pair(found)
             if self._text[self._skip(_BLANK)] == ",":
                 self._at += 1
         self._at += 1

@@ -321,20 +321,29 @@ def unknown_dof(place: Place, key: str, text: str, dof: str, known: Sequence[str
     return Issue(place, f"`{key}`: there is no DOF {quoted(text)}; {hint}", named=False)
 
 
+def known_dofs(
+    steps: Place, row: dict[str, Any], keys: tuple[str, ...], dofs: dict[str, None] | None
+) -> Iterator[Issue]:
+    """The DOFs that stand in a table under some keys, alone or in lists, and do not exist."""
+    for key in keys:
+        given = row.get(key)
+        for dof in given if isinstance(given, list) else [given]:
+            if isinstance(dof, str) and dofs is not None and dof not in dofs:
+                yield unknown_dof((*steps, key), key, dof, dof, list(dofs))
+
+
 def _dof_issues(raw: dict[str, Any], dofs: _Known | None, sectors: object) -> Iterator[Issue]:
     if dofs is None:
         return
     recovered = [row.get("name") for _, row in rows_of(raw, "recovery")]
-    for steps, row in [*rows_of(raw, "excitation"), *rows_of(raw, "observe")]:
+    for steps, row in rows_of(raw, "excitation"):
+        yield from known_dofs(steps, row, ("dof",), dofs)
+    for steps, row in rows_of(raw, "observe"):
         dof = row.get("dof")
-        if steps[0] == "observe" and dof in recovered:
-            continue
-        if isinstance(dof, str) and steps[0] == "observe" and isinstance(sectors, int):
-            base, _, sector = dof.rpartition("@")
-            if (base in dofs or base in recovered) and sector.isdecimal() and int(sector[:10]) < sectors:
-                continue
-        if isinstance(dof, str) and dof not in dofs:
-            yield unknown_dof((*steps, "dof"), "dof", dof, dof, list(dofs))
+        base, _, sector = dof.rpartition("@") if isinstance(dof, str) else ("", "", "")
+        there = sector.isdecimal() and isinstance(sectors, int) and int(sector[:10]) < sectors
+        if dof not in recovered and not (there and (base in dofs or base in recovered)):
+            yield from known_dofs(steps, row, ("dof",), dofs)
 
 
 _Named = list[tuple[Place, str]]
@@ -419,7 +428,7 @@ def _issues(raw: dict[str, Any]) -> Iterator[Issue]:
             yield Issue(steps, f"= {point!r} is that of another DOF: give the point a name of its own")
     for steps, row in rows_of(raw, "couplings"):
         kind = kinds.get(kind_of(row), Coupling)
-        yield from _places(steps, row, kind.DOFS, dofs)
+        yield from known_dofs(steps, row, kind.DOFS, dofs)
         if row.get("offset") and not cyclic:
             yield Issue(
                 (*steps, "offset"),
@@ -434,12 +443,12 @@ def _issues(raw: dict[str, Any]) -> Iterator[Issue]:
     for steps, row in rows_of(raw, "excitation"):
         for key in PLACES[1:]:
             keys = tuple(row[key]) if isinstance(row.get(key), dict) else ()
-            yield from _places((*steps, key), dict(zip(keys, keys, strict=True)), keys, dofs)
+            yield from known_dofs((*steps, key), dict(zip(keys, keys, strict=True)), keys, dofs)
     yield from _base_issues(raw, cyclic)
     yield from _speed_issues(raw)
     yield from _recovery_issues(raw, dofs)
     for steps, row in rows_of(raw, "aerodynamics"):
-        yield from _places(steps, row, ("dof",), dofs)
+        yield from known_dofs(steps, row, ("dof",), dofs)
         if not cyclic:
             yield Issue(steps, "acts between the blades of a cyclic structure; this one has no sectors")
     named = named_rows(raw, "aerodynamics", "bodies", "nodes", "loads", "dampers", "contacts")
@@ -469,16 +478,6 @@ def _base_issues(raw: dict[str, Any], cyclic: bool) -> Iterator[Issue]:
                 (*steps, "relative"),
                 "= true needs a base that moves (`ground` or `driven` of the excitation)",
             )
-
-
-def _places(
-    steps: Place, row: dict[str, Any], keys: tuple[str, ...], dofs: dict[str, None] | None
-) -> Iterator[Issue]:
-    for key in keys:
-        given = row.get(key)
-        for dof in given if isinstance(given, list) else [given]:
-            if isinstance(dof, str) and dofs is not None and dof not in dofs:
-                yield unknown_dof((*steps, key), key, dof, dof, list(dofs))
 
 
 def _has_speed(raw: dict[str, Any]) -> bool:

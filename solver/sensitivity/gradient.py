@@ -231,9 +231,9 @@ class Sensitivities:
         self, solution: Real, at_hz: float
     ) -> tuple[WholeMotion, ContactForces, Directions, Responses] | None:
         """Return linear part, contacts and what ω and every path move; None where that is singular."""
-        self.check_second()
-        check_loads(self.balance.system, self._parameters, self._slopes)
         if self._seconds is None:
+            self.check_second()
+            check_loads(self.balance.system, self._parameters, self._slopes)
             self._seconds = second_numbers(self.balance.scene)
         u, omega = np.ascontiguousarray(solution, dtype=np.float64), TWO_PI * at_hz
         try:

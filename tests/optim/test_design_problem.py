@@ -281,3 +281,21 @@ def test_bad_input_names_the_argument_and_the_value(arguments: dict[str, object]
         optim.design(solver.load_scene("two-dof"), **arguments)  # type: ignore[arg-type]
     for word in words:
         assert word in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "cases", [[{"name": "a"}], [{"name": "b", "band": [0.3, 2.5], "set": {"damper.mu": 0.3}}]]
+)
+def test_cases_measure_what_the_scene_does(cases: list[dict[str, object]]) -> None:
+    """Half peak to peak, that of the motion in time, of which the mean is a hundredth."""
+    raw = solver.load_scene("two-dof").to_dict()
+    static = {"dof": "m1", "amplitude": 20.0, "harmonic": 0}
+    observe = {**raw["observe"], "measure": "half_peak_to_peak"}  # type: ignore[dict-item]
+    forces = [raw["excitation"], static]
+    scene = solver.Scene.from_dict({**raw, "observe": observe, "excitation": forces})
+    problem = pose(scene, variables={"damper.N0": (60.0, 80.0)}, cases=cases, harmonics=3)
+    highest = evaluate(problem, {"damper.N0": 70.0}, gradients=False).of(PEAK)[0]
+    there = solver.solve(scene.with_values({"damper.N0": 70.0}), frequency_hz=highest.at_hz, harmonics=3)
+    motion = solver.time_history(there, scene.observe.dof, samples=4096)[1]
+    assert abs(motion.mean()) > 0.005 * np.ptp(motion)
+    assert highest.value == pytest.approx(0.5 * np.ptp(motion), rel=1e-5)

@@ -14,7 +14,7 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self, cast
 
-from pydantic import model_validator
+from pydantic import PrivateAttr, model_validator
 
 from solver.contacts.fields import Between, Element, MemberName, Name, Real
 from solver.contacts.frames import NORMAL, TANGENT_1, TANGENT_2, InSpace
@@ -345,6 +345,25 @@ class AnyContact(Element, InSpace):
         """Return the derivative of the least normal load of a given load by a parameter of its own."""
         del key
         return math.nan
+
+
+class RateContact(AnyContact):
+    """A contact whose force depends on rates: it is known at a frequency."""
+
+    _omega: float = PrivateAttr(default=0.0)  # rad/s; 0 where it is not known
+
+    def at_frequency(self, omega: float) -> Self:
+        """The contact as it answers motions of an angular frequency [rad/s]."""
+        moved = self.model_copy()
+        moved._omega = omega
+        return moved
+
+    @property
+    def omega(self) -> float:
+        """That frequency [rad/s]; SettingError where it is not known."""
+        if not self._omega:
+            raise SettingError("contact", self.name, "must be one `at_frequency`: its law may depend on it")
+        return self._omega
 
 
 def without_second(contacts: Iterable[AnyContact]) -> str:

@@ -22,10 +22,9 @@ from collections.abc import Callable
 import numpy as np
 
 from solver.contacts.fields import Real
-from solver.contacts.kernels.circle.radau import between
 from solver.contacts.kernels.stick_slip_events import SLIP
 from solver.contacts.pieces.piece import SHORTEST, TURN, Rates, StateEntry, StatePiece, spring, steady
-from solver.contacts.space_path import SpacePath
+from solver.contacts.space_path import SpacePath, directions
 from solver.jit import fourier
 from solver.jit.records import Row
 
@@ -50,16 +49,12 @@ class _Motion:
         here = fourier.basis(tau, self._highest) @ self._curves.T
         return here[:, :2], here[:, 2], here[:, 3]
 
-    def direction(self, piece: Row, tau: float) -> float:
-        """Return θ in a slip."""
-        first = piece.first
-        panels = self.path.panels[first : first + piece.count].view(np.recarray)
+    def direction(self, piece: Row, tau: Real) -> Real:
+        """Return θ in a slip at any angles (t,)."""
         here = piece.begin + (tau - piece.begin) % TURN
-        if here - piece.end > 0.5 * (TURN - (piece.end - piece.begin)):
-            here = piece.begin  # rounding has put the begin a period later
-        panel = panels[min(int(np.searchsorted(panels.end, here)), len(panels) - 1)]
-        place = min(max((here - panel.begin) / (panel.end - panel.begin), 0.0), 1.0)
-        return float(between(panel.start, np.ascontiguousarray(panel.theta), place))
+        # Where rounding has put the begin a period later it is the begin.
+        later = here - piece.end > 0.5 * (TURN - (piece.end - piece.begin))
+        return directions(self.path, piece, np.where(later, piece.begin, here))
 
 
 def circle_pieces(path: SpacePath, kn: float | None) -> tuple[StatePiece, ...]:
@@ -135,7 +130,9 @@ def _entry(motion: _Motion, kn: float | None, row: Row, before: Row | None) -> S
         return StateEntry(np.zeros((1, m)), np.eye(1))
     if not slipped and not slips:
         return StateEntry(np.zeros((2, m)), np.eye(2))
-    n, m_way = _ways(motion.direction(row if slips else before, begin if slips else float(before.end)))
+    n, m_way = _ways(
+        motion.direction(row if slips else before, np.array([begin if slips else before.end]))[0]
+    )
     if slips:
         along = float(m_way @ K @ n) / float(n @ K @ n)
         onto = (m_way - along * n) / path.kt[0]
@@ -169,7 +166,7 @@ def _slip_rates(motion: _Motion, kn: float | None, row: Row) -> Callable[[Real],
     more = 1.0 / k2 - 1.0 / k1
 
     def rates(tau: Real) -> Rates:
-        n, m_way = _ways(np.array([motion.direction(row, float(each)) for each in tau]))
+        n, m_way = _ways(motion.direction(row, tau))
         rate, limit, limit_rate = motion.at(tau)
         limit = np.maximum(limit, _LEAST)
         c, s = n.T

@@ -18,6 +18,7 @@ from solver.scene.validation import (
     dofs_of,
     duplicates,
     in_space,
+    known_dofs,
     named_rows,
     no_sector,
     pair_issues,
@@ -87,19 +88,15 @@ def _node_issues(raw: dict[str, Any], structure: dict[str, Any]) -> Iterator[Iss
     own = dofs_of({"structure": structure})
     for steps, row in rows_of(raw, "nodes"):
         dofs = row.get("dofs")
-        pairs = dofs.items() if isinstance(dofs, dict) else ()
-        for component, dof in pairs:
-            if own is not None and isinstance(dof, str) and dof not in own:
-                place = (*steps, "dofs", component)
-                yield unknown_dof(place, str(component), dof, dof, list(own))
+        if isinstance(dofs, dict):
+            yield from known_dofs((*steps, "dofs"), dofs, tuple(dofs), own)
 
 
 def _load_issues(raw: dict[str, Any], dofs: _Dofs) -> Iterator[Issue]:
     known = _places(raw)
     for steps, row in rows_of(raw, "loads"):
-        dof, on = row.get("dof"), row.get("on")
-        if isinstance(dof, str) and dofs is not None and dof not in dofs:
-            yield unknown_dof((*steps, "dof"), "dof", dof, dof, list(dofs))
+        on = row.get("on")
+        yield from known_dofs(steps, row, ("dof",), dofs)
         if isinstance(on, str) and on not in known:
             yield _unknown_place((*steps, "on"), "on", on, known, dofs)
 

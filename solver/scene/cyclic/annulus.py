@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Annotated, TypeVar
+from typing import Annotated, Any, TypeVar
 
 from solver.contacts.laws.harmonics import is_phase
 from solver.errors import SettingError
@@ -207,33 +207,33 @@ def annulus(scene: Scene) -> Scene:
     n, sectors = structure.sector_count, range(structure.sector_count)
     order, standing = scene.engine_order, _standing(scene)
     observed = scene.observe.dof
-    return Scene(
-        name=f"{scene.name}-annulus"[:100],
-        structure=_whole_structure(structure),
-        contacts=tuple(
+    terms = (*scene.couplings, *_gas(scene, n))
+    placed: dict[str, Any] = {
+        "name": f"{scene.name}-annulus"[:100],
+        "structure": _whole_structure(structure),
+        "contacts": tuple(
             _contact(c, j, _turn(order * j, n), standing=standing)
             for j in sectors
             for c in _placed(scene, j, n)
         ),
-        excitation=tuple(
+        "excitation": tuple(
             _force(e, j, _turn(e.harmonic * order * j, n), standing=standing)
             for j in sectors
             for e in scene.excitation
         ),
-        observe=scene.observe.model_copy(
+        "observe": scene.observe.model_copy(
             update={"dof": observed if "@" in observed else _in_sector(observed, 0)}
         ),
-        bodies=tuple(_body(b, j) for j in sectors for b in scene.bodies),
-        nodes=tuple(_node(node, j) for j in sectors for node in scene.nodes),
-        loads=tuple(_load(load, j) for j in sectors for load in scene.loads),
-        speed=scene.speed,
-        speed_order=scene.speed_order,
-        with_speed=scene.with_speed,
-        recovery=tuple(_recovered(r, j) for j in sectors for r in scene.recovery),
-        couplings=tuple(
-            _placed_term(term, j, n) for j in sectors for term in (*scene.couplings, *_gas(scene, n))
-        ),
-    )
+        "bodies": tuple(_body(b, j) for j in sectors for b in scene.bodies),
+        "nodes": tuple(_node(node, j) for j in sectors for node in scene.nodes),
+        "loads": tuple(_load(load, j) for j in sectors for load in scene.loads),
+        "recovery": tuple(_recovered(r, j) for j in sectors for r in scene.recovery),
+        "couplings": tuple(_placed_term(term, j, n) for j in sectors for term in terms),
+        "aerodynamics": (),  # among the couplings
+        "dampers": (),  # bodies and contacts as well
+    }
+    # What has no sectors is as it is.
+    return Scene(**{key: getattr(scene, key) for key in Scene.model_fields} | placed)
 
 
 def _whole_structure(structure: Structure) -> LumpedStructure | MatricesStructure:

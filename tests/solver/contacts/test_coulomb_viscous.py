@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import pickle
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from solver.contacts.kernels.stick_slip_events import SEGMENT
 from solver.contacts.laws.history.coulomb_viscous import ViscousContact
 from solver.jit import fourier
 from solver.jit.trig_polynomial import grid_size, grid_tables
+from solver.response.wear import contact_wear
 
 HZ = 0.2
 VISCOUS: dict[str, Any] = {
@@ -97,6 +99,33 @@ def brute(U: np.ndarray, load: np.ndarray, contact: ViscousContact, omega: float
         force[i] = min(max(held[i] - slipped, -bound), bound)
         slipped = held[i] - force[i]
     return force[count:]
+
+
+def test_a_contact_in_another_process_is_the_same() -> None:
+    """Also one given by functions, whose class is made; the frequency that neither knows is no NaN."""
+    dahl = {"name": "e", "law": "dahl", "between": ["a", "ground"], "sigma": 2.0, "limit": 0.4}
+    given = solver.Scene.from_dict({**scene().to_dict(), "contacts": [VISCOUS, dahl]})
+    assert pickle.loads(pickle.dumps(given)) == given
+
+
+@pytest.mark.parametrize("load", [{}, {"N1": 0.9, "N1_phase": 0.4}])
+def test_shares_of_the_period_are_those_of_small_steps(load: dict[str, float]) -> None:
+    """Those of wear, in which the frequency counts."""
+    given = scene(1.0, **load)
+    found = solver.solve(given, frequency_hz=HZ, harmonics=15)
+    assert found.converged
+    contact, count = given.contacts[0], 40_000
+    assert isinstance(contact, ViscousContact)
+    motions, normal = found.contacts[0].motions, contact.load.coefficients
+    force = brute(motions[0], normal, contact, 2.0 * math.pi * HZ, count)
+    tau = np.linspace(0.0, 2.0 * np.pi, count, endpoint=False)
+    limit = contact.mu * np.maximum(fourier.basis(tau, (normal.size - 1) // 2) @ normal, 0.0)
+    slip, separation = (np.abs(force) >= limit * (1.0 - 1e-9)) & (limit > 0.0), limit == 0.0
+    shares = contact_wear(found)["d"].shares
+    assert shares is not None
+    wanted = (float(np.mean(~slip & ~separation)), float(np.mean(slip)), float(np.mean(separation)))
+    assert 0.0 < wanted[0] < 1.0
+    assert tuple(shares) == pytest.approx(wanted, abs=3e-4)
 
 
 @pytest.mark.parametrize("seed", range(6))

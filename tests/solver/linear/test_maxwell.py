@@ -152,6 +152,52 @@ def test_gradients_are_differences(path: str) -> None:
     assert gradient == pytest.approx((high - low) / (2.0 * step), rel=1e-6)
 
 
+def closed_amplitude(values: dict[str, float]) -> float:
+    """Of b without friction, from the complex matrix."""
+    omega, pads = 2.0 * math.pi * HZ, [{**pad} for pad in PADS]
+    for path, value in values.items():
+        next(pad for pad in pads if pad["name"] == path.split(".")[0])[path.split(".")[1]] = value
+    own = np.array([[1.5 + 0.02j * omega - omega**2, -0.5], [-0.5, 0.5 - 0.7 * omega**2]])
+    for pad, along in zip(pads, ([1.0, 0.0], [1.0, -1.0], [1.0, -1.0]), strict=True):
+        turn = 1j * omega * pad["tau"]
+        own += pad["k"] * turn / (1.0 + turn) * np.outer(along, along)
+    return 0.5 * abs(np.linalg.inv(own)[1, 0])
+
+
+def test_second_derivatives_are_differences_of_the_closed_form() -> None:
+    """Also of a structure that has no contacts."""
+    paths, start = ["pad.tau", "mid.k", "mid_slow.tau"], scene(contacts=[])
+    balance = build(start, harmonics=1)
+    found = Workspace.of(balance).solve(2.0 * math.pi * HZ)
+    hessian = solver.Sensitivities(balance, paths).hessian(found.u, HZ).hessian
+    for i, j in np.ndindex(3, 3):
+        total, steps = 0.0, [1e-3 * start.value(paths[each]) for each in (i, j)]
+        for a, b in np.ndindex(2, 2):
+            moved = {path: start.value(path) for path in paths}
+            moved[paths[i]] += (0.5 - a) * steps[0]
+            moved[paths[j]] += (0.5 - b) * steps[1]
+            total += (-1.0) ** (a + b) * closed_amplitude(moved)
+        assert hessian[i, j] == pytest.approx(total / (steps[0] * steps[1]), rel=1e-5, abs=1e-8)
+
+
+@pytest.mark.parametrize(
+    "paths", [("pad.k", "pad.tau"), ("structure.k", "structure.loss_factor"), ("speed", "rotor.gyroscopic")]
+)
+def test_paths_whose_product_the_matrices_have_are_for_gradients(paths: tuple[str, str]) -> None:
+    """There the second derivative of the matrices by both is not 0, as the Hessian takes it."""
+    rotor = {"name": "rotor", "on": "a", "of": "b", "antisymmetric": True, "gyroscopic": 0.02}
+    structure: Any = lumped({"a": 1.0, "b": 0.7}, ("a", "ground", 1.0, 0.02), ("a", "b", 0.5))
+    structure = {**structure, "loss_factor": 0.03}
+    structure["springs"][0]["name"] = "k"
+    given = scene(structure=structure, couplings=[*PADS, rotor], speed=100.0)
+    balance = build(given, harmonics=3)
+    found = Workspace.of(balance).solve(2.0 * math.pi * HZ)
+    for path in paths:
+        assert np.isfinite(solver.Sensitivities(balance, [path, "d.N0"]).hessian(found.u, HZ).hessian).all()
+    with pytest.raises(solver.SettingError, match="only gradients"):
+        solver.Sensitivities(balance, paths).hessian(found.u, HZ)
+
+
 @pytest.mark.parametrize("path", ["frequency", "pad.tau"])
 def test_the_slope_of_the_balance_is_its_difference(path: str) -> None:
     balance = build(scene(), path, harmonics=7, frequency_hz=None if path == "frequency" else HZ)

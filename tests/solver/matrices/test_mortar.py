@@ -157,6 +157,22 @@ def test_a_face_that_reaches_beyond_the_other_is_joined_where_they_overlap() -> 
     assert sum(pushes(found).values()) == pytest.approx(0.69 * 0.47, rel=1e-11)
 
 
+@pytest.mark.parametrize("beyond", [1e-3, 1e-4, 3e-5, 1e-5, 1e-6])
+def test_slivers_of_facets_do_not_spoil_weights(beyond: float) -> None:
+    """A corner of the second face lies just beyond a facet of the first, as by rounding of their places."""
+    rng = np.random.default_rng(3)
+    first, own = square((3, 3), 1, rng)
+    end = 1.0 / 3.0 + beyond
+    second, other = square((4, 5), 1001, rng, loose=0.2, low=(-0.6, -0.5), high=(end, end))
+    kind = shape_of("S4")
+    found = mortar(Deck(first | second, {}, [(kind, own), (kind, other)]), list(first), list(second), Z)
+    assert found.areas.sum() == pytest.approx(end**2, rel=1e-5)
+    for node, weights in zip(found.nodes, found.weights, strict=True):
+        assert sum(weights.values()) == pytest.approx(1.0, rel=1e-7)
+        there = sum(weight * np.array(second[each]) for each, weight in weights.items())
+        np.testing.assert_allclose(there, first[node], atol=1e-7)
+
+
 def test_faces_that_cannot_be_joined_are_refused() -> None:
     rng = np.random.default_rng(3)
     (first, own), (second, _) = square((2, 2), 1, rng), square((3, 3), 101, rng)

@@ -113,6 +113,12 @@ def test_every_law_has_its_measures() -> None:
             assert min(one.shares) >= -1e-15
 
 
+def test_without_contacts_there_is_no_wear() -> None:
+    raw = {**two_dof().to_dict(), "contacts": []}
+    solution = solve(Scene.from_dict(raw), frequency_hz=1.0, harmonics=3)
+    assert contact_wear(solution) == {}
+
+
 def test_a_spring_on_one_side_sticks_while_it_is_closed() -> None:
     solution = solve(scene(GAP), frequency_hz=0.13)
     _, force = hysteresis_loop(solution, "c0", samples=100_000)

@@ -7,6 +7,7 @@ from scipy.optimize import brentq
 
 import solver
 from solver.errors import SettingError
+from solver.studies.margin_diagram import most_used
 from solver.studies.margin_result import MarginStatus
 
 DAMPERS = {"light": {"slides.N0": 0.5}, "heavy": {"slides.N0": 4.0}}
@@ -103,3 +104,25 @@ def test_what_is_wrong_is_told(keys: dict[str, object], message: str) -> None:
 def test_a_limit_beside_strengths_is_refused() -> None:
     with pytest.raises(SettingError, match="without strengths"):
         solver.margin_diagram(stressed(), start=1.0, stop=2.0, limit=1.0)
+
+
+def test_of_a_disk_that_is_written_out_the_blade_that_is_used_most_counts() -> None:
+    raw = solver.load_scene("bladed-disk").to_dict()
+    steel = {"name": "steel", "fatigue_strength": 2e8, "ultimate_strength": 9e8}
+    terms = {"tip": 5e5, "middle": -4e5}
+    fillet = {"name": "fillet", "unit": "MPa", "terms": terms, "static": 100.0, "material": "steel"}
+    mistuning = {"of": ["tip"], "spread": 0.02}
+    mistuned = {**raw["structure"], "sectors": 3, "mistuning": mistuning}  # type: ignore[dict-item]
+    scene = solver.Scene.from_dict({**raw, "structure": mistuned, "materials": [steel], "recovery": [fillet]})
+    found = most_used(solver.sweep(scene, start=740.0, stop=770.0, harmonics=1))
+    there = solver.solve(scene, frequency_hz=found.peak.at, harmonics=1)
+
+    def used_of(sector: int) -> float:
+        moved = {dof: solver.time_history(there, f"{dof}@{sector}", samples=2048)[1] for dof in terms}
+        stress = 100.0 + sum(factor * moved[dof] for dof, factor in terms.items())
+        mean = 0.5 * (stress.max() + stress.min())
+        return float(0.5 * (stress.max() - stress.min()) / (200.0 * (1.0 - mean / 900.0)))
+
+    shares = [used_of(sector) for sector in range(3)]
+    assert found.row == f"fillet@{int(np.argmax(shares))}"
+    assert found.used == pytest.approx(max(shares), rel=1e-5)

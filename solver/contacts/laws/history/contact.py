@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Annotated, ClassVar, Self
+from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
-from pydantic import PrivateAttr
 
 from solver.contacts.fields import LEAST_SAMPLES, Real, Samples
 from solver.contacts.kernels import columns
-from solver.contacts.laws.base import AnyContact
+from solver.contacts.laws.base import AnyContact, RateContact
 from solver.contacts.laws.history.definition import HistoryLaw
 from solver.contacts.laws.parts import Follows, RestStiffness, Row
 from solver.errors import SettingError
@@ -21,7 +20,7 @@ _SMALL = 1e-9  # m; the motion whose force tells the stiffness at rest
 _FORM = {"steps": 1, "reversals": 2, "alone": 4}  # bits of `solver.contacts.kernels.history.law`
 
 
-class HistoryContact(AnyContact):
+class HistoryContact(RateContact):
     """A law given by functions of the motion and its history."""
 
     DEFINITION: ClassVar[HistoryLaw]
@@ -34,7 +33,10 @@ class HistoryContact(AnyContact):
         "Nodes of a period at which the law is followed; 32 for each harmonic if left out, or 16 where "
         "they begin anew at every reversal.",
     ] = None
-    _omega: float = PrivateAttr(default=math.nan)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Be sent to another process by the word of its law: the class is made there as it was here."""
+        return _of_law, (self.LAW,), self.__getstate__()
 
     @classmethod
     def prepare(cls) -> None:
@@ -117,12 +119,6 @@ class HistoryContact(AnyContact):
             return moved
         return moved.model_copy(update={"samples": int(row[columns.NODES])})
 
-    def at_frequency(self, omega: float) -> Self:
-        """The contact as it answers motions of an angular frequency [rad/s]."""
-        moved = self.model_copy()
-        moved._omega = omega
-        return moved
-
     @property
     def answers_unlike(self) -> str | None:
         """Why it answers a motion and its negative half a period later differently, or None."""
@@ -164,11 +160,9 @@ class HistoryContact(AnyContact):
         from solver.jit import fourier
 
         del load
-        if not math.isfinite(self._omega):
-            raise SettingError("contact", self.name, "must be one `at_frequency`: its law may depend on it")
         row, highest = np.zeros(columns.COLUMNS), (motions.shape[1] - 1) // 2
         self.fill(row, highest)
-        row[columns.OMEGA] = self._omega
+        row[columns.OMEGA] = self.omega
         finer = max(1, math.ceil(4 * self.nodes(highest) / tau.size))
         force = np.empty(finer * tau.size)
         if not history_forces(motions[0], fourier.all_harmonics(highest), row, force.size, force):
@@ -187,3 +181,11 @@ class HistoryContact(AnyContact):
                 numbers=tuple(self.numbers.tolist()),
             ),
         )  # fmt: skip
+
+
+def _of_law(word: str) -> AnyContact:
+    """A contact of a law, as yet without numbers."""
+    from solver.contacts.laws.registry import laws
+
+    law = laws()[word]
+    return law.__new__(law)

@@ -9,17 +9,15 @@ follows it by a step of its own.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from functools import cache
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 import numpy as np
-from pydantic import PrivateAttr
 
 from solver.contacts.fields import NonNegative, Real
 from solver.contacts.kernels import columns
-from solver.contacts.laws.base import AnyContact
+from solver.contacts.laws.base import AnyContact, RateContact
 from solver.contacts.laws.friction import FrictionContact
 from solver.contacts.laws.history.definition import HistoryLaw, LawParameter
 from solver.contacts.laws.parts import Follows, LawQuantity, Row
@@ -32,7 +30,7 @@ if TYPE_CHECKING:
 KT, C, LIMIT = range(3)
 
 
-class ViscousContact(FrictionContact):
+class ViscousContact(RateContact, FrictionContact):
     """A friction contact under a given load whose tangential spring has a dashpot beside it."""
 
     LAW: ClassVar[str] = "coulomb-viscous"
@@ -49,7 +47,6 @@ class ViscousContact(FrictionContact):
     law: Literal["coulomb-viscous"]
     N0: NonNegative
     c: Annotated[NonNegative, "Dashpot beside the tangential spring, which acts while it sticks [N s/m]."]
-    _omega: float = PrivateAttr(default=math.nan)
 
     # What closed forms of the motion itself would say is not that of u + (c/kt) u'.
     friction = AnyContact.friction  # type: ignore[assignment]
@@ -59,7 +56,11 @@ class ViscousContact(FrictionContact):
 
     def shares(self, motions: Real, load: Real) -> Shares | None:
         """Return the shares of the period in stick, slip and separation, at a frequency; else None."""
-        return None if math.isnan(self._omega) else super().shares(self._felt(motions), load)
+        from solver.contacts.segments import segments_of, shares_of
+
+        if not self._omega:
+            return None
+        return shares_of(segments_of(self._felt(motions)[0], load, self.kt, self.mu))
 
     def perturbed(self, motions: Real, load: Real) -> tuple[ContactPart, ...] | None:
         """Return None: the stability is not computed."""
@@ -76,15 +77,9 @@ class ViscousContact(FrictionContact):
         """How its force is found, in the words of a plan."""
         return "elastic Coulomb friction with a dashpot in stick: closed form"
 
-    def at_frequency(self, omega: float) -> Self:
-        """The contact as it answers motions of an angular frequency [rad/s]."""
-        moved = self.model_copy()
-        moved._omega = omega
-        return moved
-
     def _felt(self, motions: Real) -> Real:
         """The coefficients of u + (c/kt) u'."""
-        lead = self._omega * self.c / self.kt * np.arange(1, (motions.shape[1] - 1) // 2 + 1)
+        lead = self.omega * self.c / self.kt * np.arange(1, (motions.shape[1] - 1) // 2 + 1)
         felt = motions.copy()
         felt[:, 1::2] += lead * motions[:, 2::2]
         felt[:, 2::2] -= lead * motions[:, 1::2]
@@ -100,8 +95,6 @@ class ViscousContact(FrictionContact):
         """
         from solver.contacts.segments import force_by_segments
 
-        if math.isnan(self._omega):
-            raise SettingError("contact", self.name, "must be one `at_frequency`: its law depends on it")
         return force_by_segments(self._felt(motions)[0], load, self.kt, self.mu, tau).reshape(1, -1)
 
     def rows(self) -> tuple[Row, ...]:
