@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -39,6 +40,7 @@ SAFETY = 1.7
 # A second step above this share of the first, and a change above this share of the amplitude: the first order
 # does not tell what more harmonics do, and the balance with them is solved.
 _FIRST_ORDER = 0.1
+_NEARER = 2.0 / 3.0  # of the harmonics added: these are looked at without the others too
 # The change of the motion at its worst instant counts with this share: max|x| may change little by accident.
 _ANYWHERE = 0.1
 
@@ -54,17 +56,26 @@ class ErrorEstimate(Piece):
 UNKNOWN = ErrorEstimate(max_abs=math.nan, half_peak_to_peak=math.nan)
 
 
+class _Step(NamedTuple):
+    """A Newton step in the balance with more harmonics."""
+
+    place: tuple[Real, float]  # where it leads, (U, λ)
+    length: float  # of the motions of the contacts [m]
+    change: tuple[float, float]  # of what is measured
+
+
 class ErrorEstimator:
     """Estimates the errors of solutions of one balance.
 
     The closed-form contact force of a solution has coefficients beyond H. Put into the balance with about
     twice the harmonics, they are its residual, beside what Newton's method left on the harmonics kept. One
     Newton step there is the first-order change of the solution, a second one with the same matrix shows what
-    the first order misses. Where that is much, as where a stiff contact stops the motion for a while, that
-    balance is solved at fixed λ and its change counts instead; if no solution is found, the difference from
-    the one with half of the harmonics, if that is less. The estimate is the
-    larger change of the amplitude, at least a tenth of the change
-    of the motion at its worst instant, times `SAFETY`.
+    the first order misses. Harmonic by harmonic the change goes up and down, and its sum may come out near
+    zero by accident: so a step by the residual of the nearer of the harmonics added is looked at too.
+    Where the second step is long, as where a stiff contact stops the motion for a while, that balance is
+    solved at fixed λ and its change counts instead; if no solution is found, the difference from the one with
+    half of the harmonics, if that is less. The estimate is the largest change of the amplitude, at least a
+    tenth of the change of the motion at its worst instant, times `SAFETY`.
 
     Harmonics still beyond are added with coefficients that fall like 1/k², as those of a force with kinks do,
     weighted by the receptance of the structure with the mean stiffness of its contacts, so that a resonance
@@ -81,10 +92,15 @@ class ErrorEstimator:
         self._workspace = workspace
         self._top = highest + max(highest, _LEAST_BEYOND)
         self._larger = Workspace.of(more_harmonics(balance, self._top, multiples=2 * MULTIPLES), workspace)
+        ks = self._larger.balance.system.ks
+        added = ks[~among(balance.system.ks, ks)]
+        # Which unknowns are of harmonics kept or of those added, the farthest left out.
+        nearer = ks < added[int(_NEARER * added.size)] if added.size else ks >= 0
+        self._nearer = np.tile(np.repeat(nearer, 1 + (ks > 0)), balance.n_ports)
         beyond = linear_part(self._larger.balance, _TAIL * self._top)
-        self._is_beyond = ~among(self._larger.balance.system.ks, beyond.ks)
+        self._is_beyond = ~among(ks, beyond.ks)
         self._all_ks, self._beyond_ks = beyond.ks, beyond.ks[self._is_beyond]
-        self._is_fast = is_fast(balance.scene, self._larger.balance.system.ks)
+        self._is_fast = is_fast(balance.scene, ks)
         self._later_is_fast = is_fast(balance.scene, self._beyond_ks)
         self._stiffest = np.array([k for each in balance.scene.contacts for k in each.stiffnesses])
         self._beyond = by_reference(beyond)
@@ -121,25 +137,34 @@ class ErrorEstimator:
         weights = (1.0 / size**2, 1.0 / (p * p if p != 0.0 else 1.0)) if across else (0.0, 0.0)
         if factorise(larger.system, larger.linear, larger.point, tangent, *weights) == 0.0:
             return UNKNOWN
-        changes, steps, start = [], [], U
-        for _ in range(2):
-            step = np.append(point.residual, 0.0) if across else point.residual.copy()
-            step_back(larger.system, larger.point, step)
-            if not np.all(np.isfinite(step)):
-                return UNKNOWN
-            U, p = U - step[: U.size], p - (float(step[-1]) if across else 0.0)
-            after = self._motion(larger, U, p)
-            if after is None:
-                return UNKNOWN
-            changes.append(self._change(x, after))
-            steps.append(float(np.abs(step[: U.size]).max(initial=0.0)))
-        largest = np.max(changes, axis=0)
-        if not across and steps[1] > _FIRST_ORDER * steps[0] and largest[0] > _FIRST_ORDER * self._size(x):
-            largest = self._solved(x, start, p, largest)
-        max_abs, half_range = more * SAFETY * largest + self._per_motion(x) * (tail + self._rounding())
+        residual = point.residual.copy()
+        nearer = self._step(x, U, p, self._nearer * residual, across=across)
+        first = self._step(x, U, p, residual, across=across)
+        second = first and self._step(x, *first.place, point.residual, across=across)
+        if nearer is None or first is None or second is None:
+            return UNKNOWN
+        largest = np.max([nearer.change, first.change, second.change], axis=0)
+        first_order = second.length <= _FIRST_ORDER * first.length
+        if not (across or first_order) and largest[0] > _FIRST_ORDER * self._size(x):
+            largest = self._solved(x, U, p, largest)
+        lost = tail + self._rounding(0.0 if across else p)
+        max_abs, half_range = more * SAFETY * largest + self._per_motion(x) * lost
         if kept.system.centred != FROM_REST:
             max_abs = half_range
         return ErrorEstimate(max_abs=float(max_abs), half_peak_to_peak=float(half_range))
+
+    def _step(self, x: Real, U: Real, p: float, residual: Real, *, across: bool) -> _Step | None:
+        """Take a Newton step from (U, p) with the matrix at hand; None where it leads nowhere."""
+        larger = self._larger
+        step = np.append(residual, 0.0) if across else residual.copy()
+        step_back(larger.system, larger.point, step)
+        if not np.all(np.isfinite(step)):
+            return None
+        place = U - step[: U.size], p - (float(step[-1]) if across else 0.0)
+        after = self._motion(larger, *place, elsewhere=across)
+        if after is None:
+            return None
+        return _Step(place, float(np.abs(step[: U.size]).max(initial=0.0)), self._change(x, after))
 
     def _solved(self, x: Real, U: Real, p: float, largest: Real) -> Real:
         """Return the changes of a motion to the solution with more harmonics near U, or else with fewer.
@@ -180,21 +205,23 @@ class ErrorEstimator:
         used = self._utilisation(high, low)
         return 1.0 if used is None else used[1] + abs(used[2])
 
-    def _rounding(self) -> float:
+    def _rounding(self, p: float) -> float:
         """Return what rounding may do to the observed motion where last evaluated [m].
 
         It is the difference of what the force and what the contacts do; near an undamped resonance both are
-        huge.
+        huge. Resonances are rounded too: at a fixed λ = p that is as if p were. Across a branch p is 0.
         """
         larger = self._larger
         linear, F = receptance_by_value(larger.linear), evaluation_by_value(larger.point).F
-        sizes = np.abs(linear.x_linear[0]) + np.abs(linear.B[0]) @ np.abs(F).max(axis=1, initial=0.0)
-        return _LOST_BITS * float(np.finfo(float).eps * np.max(sizes, initial=0.0))
+        forces = np.abs(F).max(axis=1, initial=0.0)
+        own, slopes = (np.abs(linear.x_linear[i]) + np.abs(linear.B[i]) @ forces for i in (0, 1))
+        return _LOST_BITS * float(np.finfo(float).eps * np.max(own + abs(p) * slopes, initial=0.0))
 
     @staticmethod
-    def _motion(workspace: Workspace, u: Real, p: float) -> Real | None:
+    def _motion(workspace: Workspace, u: Real, p: float, *, elsewhere: bool = True) -> Real | None:
         """Return the observed coefficients at (u, p), the evaluation in the workspace; None if it failed."""
-        receptance(workspace.system, p, workspace.linear)
+        if elsewhere:
+            receptance(workspace.system, p, workspace.linear)
         norm = evaluate(workspace.system, workspace.linear, u, p, 0.0, workspace.point)
         if not math.isfinite(norm):
             return None
