@@ -56,11 +56,19 @@ class ErrorEstimate(Piece):
 UNKNOWN = ErrorEstimate(max_abs=math.nan, half_peak_to_peak=math.nan)
 
 
+class _Seen(NamedTuple):
+    """An observed motion."""
+
+    x: Real  # coefficients
+    high: float  # its largest value
+    low: float  # its least
+
+
 class _Step(NamedTuple):
     """A Newton step in the balance with more harmonics."""
 
     place: tuple[Real, float]  # where it leads, (U, λ)
-    length: float  # of the motions of the contacts [m]
+    length: float  # largest change of the motions of the contacts [m], or of λ
     change: tuple[float, float]  # of what is measured
 
 
@@ -93,10 +101,11 @@ class ErrorEstimator:
         self._top = highest + max(highest, _LEAST_BEYOND)
         self._larger = Workspace.of(more_harmonics(balance, self._top, multiples=2 * MULTIPLES), workspace)
         ks = self._larger.balance.system.ks
-        added = ks[~among(balance.system.ks, ks)]
-        # Which unknowns are of harmonics kept or of those added, the farthest left out.
+        self._added = ~among(balance.system.ks, ks)
+        added = ks[self._added]
+        # Which coefficients are of harmonics kept or of those added, the farthest left out.
         nearer = ks < added[int(_NEARER * added.size)] if added.size else ks >= 0
-        self._nearer = np.tile(np.repeat(nearer, 1 + (ks > 0)), balance.n_ports)
+        self._nearer = np.repeat(nearer, 1 + (ks > 0))
         beyond = linear_part(self._larger.balance, _TAIL * self._top)
         self._is_beyond = ~among(ks, beyond.ks)
         self._all_ks, self._beyond_ks = beyond.ks, beyond.ks[self._is_beyond]
@@ -126,7 +135,7 @@ class ErrorEstimator:
         tangent = self._tangent() if across else np.zeros(self._larger.balance.n_unknowns + 1)
         if before is None or tangent is None:
             return UNKNOWN
-        x = pad(before, kept, larger.balance)
+        x = self._seen(pad(before, kept, larger.balance))
         U = pad(u, kept, larger.balance)
         if self._motion(larger, U, p) is None:
             return UNKNOWN
@@ -138,7 +147,8 @@ class ErrorEstimator:
         if factorise(larger.system, larger.linear, larger.point, tangent, *weights) == 0.0:
             return UNKNOWN
         residual = point.residual.copy()
-        nearer = self._step(x, U, p, self._nearer * residual, across=across)
+        part = (residual.reshape(-1, self._nearer.size) * self._nearer).reshape(-1)
+        nearer = self._step(x, U, p, part, across=across)
         first = self._step(x, U, p, residual, across=across)
         second = first and self._step(x, *first.place, point.residual, across=across)
         if nearer is None or first is None or second is None:
@@ -153,20 +163,19 @@ class ErrorEstimator:
             max_abs = half_range
         return ErrorEstimate(max_abs=float(max_abs), half_peak_to_peak=float(half_range))
 
-    def _step(self, x: Real, U: Real, p: float, residual: Real, *, across: bool) -> _Step | None:
+    def _step(self, x: _Seen, U: Real, p: float, residual: Real, *, across: bool) -> _Step | None:
         """Take a Newton step from (U, p) with the matrix at hand; None where it leads nowhere."""
         larger = self._larger
         step = np.append(residual, 0.0) if across else residual.copy()
         step_back(larger.system, larger.point, step)
-        if not np.all(np.isfinite(step)):
+        length = float(np.abs(step).max(initial=0.0))
+        if not math.isfinite(length):
             return None
         place = U - step[: U.size], p - (float(step[-1]) if across else 0.0)
         after = self._motion(larger, *place, elsewhere=across)
-        if after is None:
-            return None
-        return _Step(place, float(np.abs(step[: U.size]).max(initial=0.0)), self._change(x, after))
+        return None if after is None else _Step(place, length, self._change(x, after))
 
-    def _solved(self, x: Real, U: Real, p: float, largest: Real) -> Real:
+    def _solved(self, x: _Seen, U: Real, p: float, largest: Real) -> Real:
         """Return the changes of a motion to the solution with more harmonics near U, or else with fewer.
 
         The latter are about those of twice the harmonics, if not more; they count if below `largest`.
@@ -188,21 +197,23 @@ class ErrorEstimator:
         x = self._motion(smaller, found.u, p) if found.converged else None
         return None if x is None else pad(x, less, self._larger.balance)
 
-    def _size(self, x: Real) -> float:
+    def _seen(self, x: Real) -> _Seen:
+        """Return observed coefficients of the larger balance with the extremes of their motion."""
+        return _Seen(x, *extremes(self._larger.system, x)[::2])
+
+    def _size(self, x: _Seen) -> float:
         """Return the amplitude of an observed motion [m], or its utilisation."""
-        high, _, low, _ = extremes(self._larger.system, x)
-        used = self._utilisation(high, low)
-        return max(high, -low) if used is None else used[0]
+        used = self._utilisation(x.high, x.low)
+        return max(x.high, -x.low) if used is None else used[0]
 
     def _utilisation(self, high: float, low: float) -> tuple[float, float, float] | None:
         """Return the utilisation of an observed stress with its derivatives; None if it is not measured."""
         system = self._workspace.balance.system
         return utilisation(system.haigh, high, low)[:3] if system.centred == UTILISED else None
 
-    def _per_motion(self, x: Real) -> float:
+    def _per_motion(self, x: _Seen) -> float:
         """Return by how much what is measured may change for a unit of the observed motion."""
-        high, _, low, _ = extremes(self._larger.system, x)
-        used = self._utilisation(high, low)
+        used = self._utilisation(x.high, x.low)
         return 1.0 if used is None else used[1] + abs(used[2])
 
     def _rounding(self, p: float) -> float:
@@ -229,13 +240,14 @@ class ErrorEstimator:
         observed_motion(workspace.system, workspace.linear, u, workspace.point, x)
         return x
 
-    def _change(self, before: Real, after: Real) -> tuple[float, float]:
+    def _change(self, before: _Seen, after: Real) -> tuple[float, float]:
         """Return the changes of max|x| and of (max x − min x)/2, or twice that of the utilisation.
 
         They are at least a tenth of those of the motion.
         """
-        (high, low), (high_after, low_after), (rise, sink) = (
-            extremes(self._larger.system, x)[::2] for x in (before, after, after - before)
+        x, high, low = before
+        (high_after, low_after), (rise, sink) = (
+            extremes(self._larger.system, each)[::2] for each in (after, after - x)
         )
         max_abs = abs(max(high_after, -low_after) - max(high, -low))
         half_range = 0.5 * abs(high_after - low_after - high + low)
@@ -262,12 +274,11 @@ class ErrorEstimator:
         how many times as much as the harmonics that only the larger balance has they move the contacts, at
         least 1.
         """
-        ks, kept = self._larger.balance.system.ks, self._workspace.balance.system.ks
+        ks, added = self._larger.balance.system.ks, self._added
         sizes = np.zeros((F.shape[0], ks.size))
         moving = ks > 0
         pairs = F[:, int(ks[0] == 0) :].reshape(F.shape[0], int(moving.sum()), 2)
         sizes[:, moving] = np.hypot(pairs[..., 0], pairs[..., 1])
-        added = ~among(kept, ks)
         # Of each port at harmonics beyond: of waves of their own, each with its own rate.
         weighted, later = sizes * ks**2, np.zeros((self._beyond_ks.size, F.shape[0]))
         for fast in (False, True):
