@@ -28,7 +28,7 @@ from solver.balance.workspace import Workspace
 from solver.continuation.from_nothing import solve_from_nothing
 from solver.errors import SettingError
 from solver.jit import fourier
-from solver.jit.fourier import Complex, Integer
+from solver.jit.fourier import Complex, Flags, Integer
 from solver.response.quasi_periodic_result import LINES, QuasiPeriodic, QuasiPeriodicStatus
 from solver.response.solution import MEAN_UNDETERMINED, Solution
 from solver.response.solve import describe, solve
@@ -58,6 +58,17 @@ class _Torus:
         """Return x at pairs of angles, (m,)."""
         waves = np.exp(1j * (np.outer(first, self.k) + np.outer(second, self.l)))
         return np.asarray(self.mean + (waves @ self.c).real)
+
+    def low(self, turns: tuple[int, int]) -> Flags:
+        """Return of which waves a curve of so many turns tells what they are beside it, (n,)."""
+        return np.abs(self.k) + np.abs(self.l) <= sum(turns) // 4
+
+    def sizes(self) -> Real:
+        """Return max|x| and (max x - min x) / 2 of all its waves on an even grid of both angles."""
+        grid = np.zeros((_GRID, _GRID), complex)
+        np.add.at(grid, (self.k % _GRID, self.l % _GRID), self.c)
+        x = self.mean + np.fft.ifft2(grid).real * grid.size
+        return np.array([np.abs(x).max(), 0.5 * np.ptp(x)])
 
     def beside(self, other: _Torus, share: float) -> _Torus:
         """Return the motion between this one (share 0) and another one (share 1)."""
@@ -117,9 +128,17 @@ class _LongPeriods:
         return np.array([*self.sizes, math.sqrt(0.5 * float(np.sum(np.abs(torus.c) ** 2))), *tones])
 
     def change(self, other: _LongPeriods) -> float:
-        """Return by how much what is determined differs from that of another look."""
-        first = int(MEAN_UNDETERMINED in self.nearest.flags)
-        return float(np.max(np.abs(self.measures() - other.measures())[first:]))
+        """Return by how much what is determined may be wrong: by what differs from another look, and more.
+
+        Where sums of high order meet a resonance two looks may agree by accident. So waves of an order that
+        curves of so few turns do not tell count by the root of the sum of squares, and half of what the
+        extremes of the curves differ from those of the waves between them.
+        """
+        first, torus = int(MEAN_UNDETERMINED in self.nearest.flags), self.torus
+        high = torus.c[~torus.low(min(self.turns, key=sum))]
+        off = np.abs(self.measures() - other.measures())[first:]
+        between = 0.5 * np.abs(self.sizes - torus.sizes())[first:]
+        return float(max(*off, *between, np.linalg.norm(high)))
 
 
 @shows_progress("quasi-periodic")
@@ -394,7 +413,7 @@ def _sizes(found: Solution, torus: _Torus, turns: tuple[int, int], *, repeats: b
     """
     if repeats:
         return found.max_abs, found.half_peak_to_peak
-    low = np.abs(torus.k) + np.abs(torus.l) <= sum(turns) // 4
+    low = torus.low(turns)
     k, l, c = torus.k[low], torus.l[low], torus.c[low]  # noqa: E741
     grid, line = np.zeros((_GRID, _GRID), complex), np.zeros(_GRID * max(turns), complex)
     np.add.at(grid, (k % _GRID, l % _GRID), c)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -39,6 +40,7 @@ SAFETY = 1.7
 # A second step above this share of the first, and a change above this share of the amplitude: the first order
 # does not tell what more harmonics do, and the balance with them is solved.
 _FIRST_ORDER = 0.1
+_NEARER = 2.0 / 3.0  # of the harmonics added: these are looked at without the others too
 # The change of the motion at its worst instant counts with this share: max|x| may change little by accident.
 _ANYWHERE = 0.1
 
@@ -54,17 +56,34 @@ class ErrorEstimate(Piece):
 UNKNOWN = ErrorEstimate(max_abs=math.nan, half_peak_to_peak=math.nan)
 
 
+class _Seen(NamedTuple):
+    """An observed motion."""
+
+    x: Real  # coefficients
+    high: float  # its largest value
+    low: float  # its least
+
+
+class _Step(NamedTuple):
+    """A Newton step in the balance with more harmonics."""
+
+    place: tuple[Real, float]  # where it leads, (U, λ)
+    length: float  # largest change of the motions of the contacts [m], or of λ
+    change: tuple[float, float]  # of what is measured
+
+
 class ErrorEstimator:
     """Estimates the errors of solutions of one balance.
 
     The closed-form contact force of a solution has coefficients beyond H. Put into the balance with about
     twice the harmonics, they are its residual, beside what Newton's method left on the harmonics kept. One
     Newton step there is the first-order change of the solution, a second one with the same matrix shows what
-    the first order misses. Where that is much, as where a stiff contact stops the motion for a while, that
-    balance is solved at fixed λ and its change counts instead; if no solution is found, the difference from
-    the one with half of the harmonics, if that is less. The estimate is the
-    larger change of the amplitude, at least a tenth of the change
-    of the motion at its worst instant, times `SAFETY`.
+    the first order misses. Harmonic by harmonic the change goes up and down, and its sum may come out near
+    zero by accident: so a step by the residual of the nearer of the harmonics added is looked at too.
+    Where the second step is long, as where a stiff contact stops the motion for a while, that balance is
+    solved at fixed λ and its change counts instead; if no solution is found, the difference from the one with
+    half of the harmonics, if that is less. The estimate is the largest change of the amplitude, at least a
+    tenth of the change of the motion at its worst instant, times `SAFETY`.
 
     Harmonics still beyond are added with coefficients that fall like 1/k², as those of a force with kinks do,
     weighted by the receptance of the structure with the mean stiffness of its contacts, so that a resonance
@@ -81,10 +100,16 @@ class ErrorEstimator:
         self._workspace = workspace
         self._top = highest + max(highest, _LEAST_BEYOND)
         self._larger = Workspace.of(more_harmonics(balance, self._top, multiples=2 * MULTIPLES), workspace)
+        ks = self._larger.balance.system.ks
+        self._added = ~among(balance.system.ks, ks)
+        added = ks[self._added]
+        # Which coefficients are of harmonics kept or of those added, the farthest left out.
+        nearer = ks < added[int(_NEARER * added.size)] if added.size else ks >= 0
+        self._nearer = np.repeat(nearer, 1 + (ks > 0))
         beyond = linear_part(self._larger.balance, _TAIL * self._top)
-        self._is_beyond = ~among(self._larger.balance.system.ks, beyond.ks)
+        self._is_beyond = ~among(ks, beyond.ks)
         self._all_ks, self._beyond_ks = beyond.ks, beyond.ks[self._is_beyond]
-        self._is_fast = is_fast(balance.scene, self._larger.balance.system.ks)
+        self._is_fast = is_fast(balance.scene, ks)
         self._later_is_fast = is_fast(balance.scene, self._beyond_ks)
         self._stiffest = np.array([k for each in balance.scene.contacts for k in each.stiffnesses])
         self._beyond = by_reference(beyond)
@@ -110,7 +135,7 @@ class ErrorEstimator:
         tangent = self._tangent() if across else np.zeros(self._larger.balance.n_unknowns + 1)
         if before is None or tangent is None:
             return UNKNOWN
-        x = pad(before, kept, larger.balance)
+        x = self._seen(pad(before, kept, larger.balance))
         U = pad(u, kept, larger.balance)
         if self._motion(larger, U, p) is None:
             return UNKNOWN
@@ -121,27 +146,36 @@ class ErrorEstimator:
         weights = (1.0 / size**2, 1.0 / (p * p if p != 0.0 else 1.0)) if across else (0.0, 0.0)
         if factorise(larger.system, larger.linear, larger.point, tangent, *weights) == 0.0:
             return UNKNOWN
-        changes, steps, start = [], [], U
-        for _ in range(2):
-            step = np.append(point.residual, 0.0) if across else point.residual.copy()
-            step_back(larger.system, larger.point, step)
-            if not np.all(np.isfinite(step)):
-                return UNKNOWN
-            U, p = U - step[: U.size], p - (float(step[-1]) if across else 0.0)
-            after = self._motion(larger, U, p)
-            if after is None:
-                return UNKNOWN
-            changes.append(self._change(x, after))
-            steps.append(float(np.abs(step[: U.size]).max(initial=0.0)))
-        largest = np.max(changes, axis=0)
-        if not across and steps[1] > _FIRST_ORDER * steps[0] and largest[0] > _FIRST_ORDER * self._size(x):
-            largest = self._solved(x, start, p, largest)
-        max_abs, half_range = more * SAFETY * largest + self._per_motion(x) * (tail + self._rounding())
+        residual = point.residual.copy()
+        part = (residual.reshape(-1, self._nearer.size) * self._nearer).reshape(-1)
+        nearer = self._step(x, U, p, part, across=across)
+        first = self._step(x, U, p, residual, across=across)
+        second = first and self._step(x, *first.place, point.residual, across=across)
+        if nearer is None or first is None or second is None:
+            return UNKNOWN
+        largest = np.max([nearer.change, first.change, second.change], axis=0)
+        first_order = second.length <= _FIRST_ORDER * first.length
+        if not (across or first_order) and largest[0] > _FIRST_ORDER * self._size(x):
+            largest = self._solved(x, U, p, largest)
+        lost = tail + self._rounding(0.0 if across else p)
+        max_abs, half_range = more * SAFETY * largest + self._per_motion(x) * lost
         if kept.system.centred != FROM_REST:
             max_abs = half_range
         return ErrorEstimate(max_abs=float(max_abs), half_peak_to_peak=float(half_range))
 
-    def _solved(self, x: Real, U: Real, p: float, largest: Real) -> Real:
+    def _step(self, x: _Seen, U: Real, p: float, residual: Real, *, across: bool) -> _Step | None:
+        """Take a Newton step from (U, p) with the matrix at hand; None where it leads nowhere."""
+        larger = self._larger
+        step = np.append(residual, 0.0) if across else residual.copy()
+        step_back(larger.system, larger.point, step)
+        length = float(np.abs(step).max(initial=0.0))
+        if not math.isfinite(length):
+            return None
+        place = U - step[: U.size], p - (float(step[-1]) if across else 0.0)
+        after = self._motion(larger, *place, elsewhere=across)
+        return None if after is None else _Step(place, length, self._change(x, after))
+
+    def _solved(self, x: _Seen, U: Real, p: float, largest: Real) -> Real:
         """Return the changes of a motion to the solution with more harmonics near U, or else with fewer.
 
         The latter are about those of twice the harmonics, if not more; they count if below `largest`.
@@ -163,38 +197,42 @@ class ErrorEstimator:
         x = self._motion(smaller, found.u, p) if found.converged else None
         return None if x is None else pad(x, less, self._larger.balance)
 
-    def _size(self, x: Real) -> float:
+    def _seen(self, x: Real) -> _Seen:
+        """Return observed coefficients of the larger balance with the extremes of their motion."""
+        return _Seen(x, *extremes(self._larger.system, x)[::2])
+
+    def _size(self, x: _Seen) -> float:
         """Return the amplitude of an observed motion [m], or its utilisation."""
-        high, _, low, _ = extremes(self._larger.system, x)
-        used = self._utilisation(high, low)
-        return max(high, -low) if used is None else used[0]
+        used = self._utilisation(x.high, x.low)
+        return max(x.high, -x.low) if used is None else used[0]
 
     def _utilisation(self, high: float, low: float) -> tuple[float, float, float] | None:
         """Return the utilisation of an observed stress with its derivatives; None if it is not measured."""
         system = self._workspace.balance.system
         return utilisation(system.haigh, high, low)[:3] if system.centred == UTILISED else None
 
-    def _per_motion(self, x: Real) -> float:
+    def _per_motion(self, x: _Seen) -> float:
         """Return by how much what is measured may change for a unit of the observed motion."""
-        high, _, low, _ = extremes(self._larger.system, x)
-        used = self._utilisation(high, low)
+        used = self._utilisation(x.high, x.low)
         return 1.0 if used is None else used[1] + abs(used[2])
 
-    def _rounding(self) -> float:
+    def _rounding(self, p: float) -> float:
         """Return what rounding may do to the observed motion where last evaluated [m].
 
         It is the difference of what the force and what the contacts do; near an undamped resonance both are
-        huge.
+        huge. Resonances are rounded too: at a fixed λ = p that is as if p were. Across a branch p is 0.
         """
         larger = self._larger
         linear, F = receptance_by_value(larger.linear), evaluation_by_value(larger.point).F
-        sizes = np.abs(linear.x_linear[0]) + np.abs(linear.B[0]) @ np.abs(F).max(axis=1, initial=0.0)
-        return _LOST_BITS * float(np.finfo(float).eps * np.max(sizes, initial=0.0))
+        forces = np.abs(F).max(axis=1, initial=0.0)
+        own, slopes = (np.abs(linear.x_linear[i]) + np.abs(linear.B[i]) @ forces for i in (0, 1))
+        return _LOST_BITS * float(np.finfo(float).eps * np.max(own + abs(p) * slopes, initial=0.0))
 
     @staticmethod
-    def _motion(workspace: Workspace, u: Real, p: float) -> Real | None:
+    def _motion(workspace: Workspace, u: Real, p: float, *, elsewhere: bool = True) -> Real | None:
         """Return the observed coefficients at (u, p), the evaluation in the workspace; None if it failed."""
-        receptance(workspace.system, p, workspace.linear)
+        if elsewhere:
+            receptance(workspace.system, p, workspace.linear)
         norm = evaluate(workspace.system, workspace.linear, u, p, 0.0, workspace.point)
         if not math.isfinite(norm):
             return None
@@ -202,13 +240,14 @@ class ErrorEstimator:
         observed_motion(workspace.system, workspace.linear, u, workspace.point, x)
         return x
 
-    def _change(self, before: Real, after: Real) -> tuple[float, float]:
+    def _change(self, before: _Seen, after: Real) -> tuple[float, float]:
         """Return the changes of max|x| and of (max x − min x)/2, or twice that of the utilisation.
 
         They are at least a tenth of those of the motion.
         """
-        (high, low), (high_after, low_after), (rise, sink) = (
-            extremes(self._larger.system, x)[::2] for x in (before, after, after - before)
+        x, high, low = before
+        (high_after, low_after), (rise, sink) = (
+            extremes(self._larger.system, each)[::2] for each in (after, after - x)
         )
         max_abs = abs(max(high_after, -low_after) - max(high, -low))
         half_range = 0.5 * abs(high_after - low_after - high + low)
@@ -235,12 +274,11 @@ class ErrorEstimator:
         how many times as much as the harmonics that only the larger balance has they move the contacts, at
         least 1.
         """
-        ks, kept = self._larger.balance.system.ks, self._workspace.balance.system.ks
+        ks, added = self._larger.balance.system.ks, self._added
         sizes = np.zeros((F.shape[0], ks.size))
         moving = ks > 0
         pairs = F[:, int(ks[0] == 0) :].reshape(F.shape[0], int(moving.sum()), 2)
         sizes[:, moving] = np.hypot(pairs[..., 0], pairs[..., 1])
-        added = ~among(kept, ks)
         # Of each port at harmonics beyond: of waves of their own, each with its own rate.
         weighted, later = sizes * ks**2, np.zeros((self._beyond_ks.size, F.shape[0]))
         for fast in (False, True):
