@@ -16,7 +16,11 @@ if TYPE_CHECKING:
     from solver.response.exact.flow import FlowPiece
     from solver.response.exact.piecewise import Piecewise
 
-_NEWTON, _WIDER = 12, 4  # steps; boxes tried
+_NEWTON, _BOXES = 12, 4  # steps; boxes tried
+_WIDE, _INFLATED = (
+    4.0,
+    2.0,
+)  # the first box by how far off it may be, others by what Krawczyk's operator needs
 _GROWN = 1e4  # by which a derivative is off more, and a state is unknown anew
 _ANEW_BITS = 128
 _FEW = 100  # instants of events times the size of a state for which none is
@@ -99,13 +103,18 @@ def orbit_at(raw: dict[str, Any], **at: str) -> Orbit:
     return Orbit(counted(raw["system"], at), raw["orbit"])
 
 
-def settled(orbit: Orbit, start: list[Any]) -> tuple[list[Any], float]:
-    """Return the unknowns by Newton's method, and about how far off they are relative to their sizes."""
+def settled(
+    orbit: Orbit, start: list[Any], enough: float = 0.0, near: Any = None
+) -> tuple[list[Any], float, Any]:
+    """Return the unknowns by Newton's method, about how far off they are relative to their sizes, an inverse.
+
+    `near`: the inverse of a derivative not far from here, in floats; `enough`: how far off they may be.
+    """
     from flint import arb, ctx
 
     from solver.certificate.checker import inverse, rough
 
-    y, near, now = [arb(each) for each in start], None, math.inf
+    y, now, own = [arb(each) for each in start], math.inf, near is None
     sizes = np.array(_sizes(orbit, y))
     for _ in range(_NEWTON):
         value, slope, _ = orbit.shoot(y, np.zeros(len(y)) if near is None else None)
@@ -115,28 +124,33 @@ def settled(orbit: Orbit, start: list[Any]) -> tuple[list[Any], float]:
         y = [(each - step).mid() for each, step in zip(y, steps.tolist(), strict=True)]
         before, now = now, float((abs(steps) / sizes).max())
         unsure = float(((abs(near) @ rest.off)[:, 0] / sizes).max())
-        left = max(now * max(now, _LINEAR), unsure)
-        if left <= max(2.0 ** (-ctx.prec * 3 // 5), unsure):  # no step tells more than its rounding
+        gained = max(now, _LINEAR) if own else min(1.0, now / before) if before < math.inf else 1.0
+        left = max(now * gained, unsure)
+        if left <= max(2.0 ** (-ctx.prec * 3 // 5), unsure, enough):  # no step tells more than its rounding
             break
         if now > _SLOW * before:
-            near = None
-    return y, left
+            near, own = None, True
+    return y, left, near
 
 
-def boxed(orbit: Orbit, y: list[Any], now: Any) -> tuple[list[str], tuple[Any, Any, Any]]:
-    """Return a box of the unknowns that holds exactly one orbit, and the extremes of its motion."""
+def boxed(orbit: Orbit, y: list[Any], now: float) -> tuple[list[str], tuple[Any, Any, Any]]:
+    """Return a box of the unknowns that holds exactly one orbit, and the extremes of its motion.
+
+    `now`: about how far off they are relative to their sizes.
+    """
     from flint import arb, ctx
 
     from solver.certificate.checker import RejectedError
 
-    radii = [(arb(2) ** (-ctx.prec * 3 // 5) + now) * size for size in _sizes(orbit, y)]
-    for wider in range(_WIDER):
-        box = [written(each, radius * 4 ** (2 * wider + 1)) for each, radius in zip(y, radii, strict=True)]
+    away = _WIDE * (2.0 ** (-ctx.prec * 3 // 5) + now) * np.array(_sizes(orbit, y))
+    for tried in range(_BOXES):
+        box = [written(each, arb(radius)) for each, radius in zip(y, away.tolist(), strict=True)]
         try:
             return box, orbit.extremes([arb(each) for each in box])
         except RejectedError as error:
-            if wider == _WIDER - 1 or len(error.args) > 1:
+            if tried == _BOXES - 1 or len(error.args) > 1:
                 raise
+            away = np.maximum(away, _INFLATED * orbit.moved(y, away)[0])
     raise AssertionError
 
 

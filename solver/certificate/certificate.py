@@ -268,7 +268,7 @@ def _kept_inward(raw: dict[str, Any], start: list[Any]) -> tuple[Any, Any, Any]:
     for step in range(_MOVES):
         orbit = orbit_at(raw)
         try:
-            start, now = settled(orbit, start)
+            start, now, _ = settled(orbit, start)
             unknowns, extremes = boxed(orbit, start, now)
         except RejectedError as error:
             if not _moved_inward(raw, step, *error.args):

@@ -222,6 +222,7 @@ class Orbit:
         rub, moved = {j for j, c in enumerate(system.contacts) if c["kt"]}, {j for j, *_ in self.events}
         self.known = {n + int(j): value for j, value in known.items()}
         self.known |= [raw["pinned"]] if "pinned" in raw else []
+        self.during = [*(self.modes[group[0]] for group in self.groups), mode]
         self.returns = [*range(n), *(n + j for j in sorted(rub & moved - self.twins.keys()))]
         free = [*self.returns, *(n + j for j in sorted(rub - moved) if mode[j] == STICK)]
         self.unknown = [at for at in free if at not in self.known]  # what sticks returns as its motion does
@@ -296,7 +297,7 @@ class Orbit:
                 own = arb_mat([y[at : at + system.d]]).transpose(), Rough(np.eye(system.d, self.size, at))
                 ends.append(((z, D), own, range(system.d)))
                 z, D = own
-            mode, length, place = self.modes[group[0] if group else -1], lengths[piece], states + piece
+            mode, length, place = self.during[piece], lengths[piece], states + piece
             _, A, rows, span, sums = system.mode(mode)
             points, off = system.march(mode, z, length)
             starts.append((z, D, length.mid(), points, off))
@@ -325,13 +326,18 @@ class Orbit:
         every = (np.vstack([getattr(each, key) for each in slopes]) for key in ("middle", "off"))
         return arb_mat([values]).transpose(), Rough(*every), starts
 
-    def extremes(self, box: list[Any]) -> tuple[Any, Any, Any]:
-        """Require one orbit in the box, and all inequalities; return its extremes and its period."""
-        y, away = [each.mid() for each in box], radii(box)
+    def moved(self, y: list[Any], away: Any) -> tuple[Any, Any]:
+        """Return the radii of what Krawczyk's operator maps the box y ± away to; how pieces begin in it."""
         value, slope, starts = self.shoot(y, away)
         near = inverse(slope, away)
         moved = (Rough(np.eye(self.size)) - near @ slope).size @ away + (near @ rough(value)).size[:, 0]
-        for i, (new, old) in enumerate(zip(moved * SLACK, away, strict=True)):
+        return moved * SLACK, starts
+
+    def extremes(self, box: list[Any]) -> tuple[Any, Any, Any]:
+        """Require one orbit in the box, and all inequalities; return its extremes and its period."""
+        y, away = [each.mid() for each in box], radii(box)
+        moved, starts = self.moved(y, away)
+        for i, (new, old) in enumerate(zip(moved, away, strict=True)):
             told = f"needs a radius of {new:.2e}, the box has {old:.2e}"
             told = f"unknown {i}: Krawczyk's operator {told}: not isolated, or not known so well"
             require(new < old, told)
@@ -343,7 +349,7 @@ class Orbit:
     def kept(self, piece: int, more: Any, length: Any, middle: Any, points: Any, off: Any) -> list[Any]:
         """Require the conditions of a piece; return the motion: polynomials, what they lack, spans."""
         before, after = self.groups[piece - 1] if piece else [], [*self.groups, []][piece]
-        mode, more, count = self.modes[after[0] if after else -1], more[:, None], len(points) - 1
+        mode, more, count = self.during[piece], more[:, None], len(points) - 1
         for power in self.system.powers(mode, middle)[0][:-1]:
             more = np.hstack([more, power.size @ more])
         begins = zip(points[:-1], (off + more).T * SLACK, strict=True)
@@ -387,7 +393,14 @@ def least(parts: list[Any], best: Any = math.inf) -> Any:
     return min([best, *bottom]).union(best)
 
 
-def prove(raw: dict[str, Any], at: dict[str, Any], kind: type[System] = System) -> dict[str, Any]:
+def proved(raw: dict[str, Any], at: dict[str, Any]) -> tuple[Any, Any, Any]:
+    """Return the extremes and the period of an orbit."""
+    orbit, box = Orbit(System(raw["system"], at), raw["orbit"]), [arb(each) for each in at["unknowns"]]
+    require(len(box) == orbit.size, f"there must be {orbit.size} unknowns, got {len(box)}")
+    return orbit.extremes(box)
+
+
+def prove(raw: dict[str, Any], at: dict[str, Any], extremes: Any = proved) -> dict[str, Any]:
     """Return enclosures of what an orbit, a peak or a least peak reaches, and of where that is.
 
     Of three orbits on the branch `over` a range of the frequency that in the middle reaches most: a peak is
@@ -395,12 +408,10 @@ def prove(raw: dict[str, Any], at: dict[str, Any], kind: type[System] = System) 
     frequency `over` all loads: a least peak is between.
     """
     if "unknowns" in at:
-        orbit, box = Orbit(kind(raw["system"], at), raw["orbit"]), [arb(each) for each in at["unknowns"]]
-        require(len(box) == orbit.size, f"there must be {orbit.size} unknowns, got {len(box)}")
-        low, high, period = orbit.extremes(box)
+        (low, high, period), box = extremes(raw, at), [arb(each) for each in at["unknowns"]]
         where = {"load_factor": arb(at.get("load_factor", 1)), "frequency_hz": 1 / period, "box": box}
         return where | {"max_abs": high.max(-low), "half_peak_to_peak": (high - low) / 2}
-    over, *three = (prove(raw, each, kind) for each in (at["over"], *at["three"]))
+    over, *three = (prove(raw, each, extremes) for each in (at["over"], *at["three"]))
     peak = "unknowns" in at["three"][0]
     along, other = ("frequency_hz", "load_factor") if peak else ("load_factor", "frequency_hz")
     places, (left, top, right) = ([each[key] for each in three] for key in (along, "max_abs"))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,9 +15,13 @@ if TYPE_CHECKING:
 
 _PEAK_BITS, _LEAST_BITS = 256, 512
 _PART = 0.27  # of the bits: half the relative width of the range a peak is proved in
-_BESIDE = 1e-16  # likewise of the loads for a least peak, which rises by the square of it
+_BESIDE = 1e-17  # likewise of the loads for a least peak, which rises by the square of it
 _STEP, _TRIES = 1e-4, 60  # of the parabolas, relative
 _FAR = 4.0  # steps gone at once at most
+_FASTER = 1.7  # power of a step that the next one is: a parabola is off by the square, times some number
+_OFF = 1e-3  # of the cube of a step: how well what is reached must be known for that
+_CLOSE = 1e-5  # a step below which events are in the order they had
+_GRID, _NEWTON = 33, 8  # places looked at for the largest of a polynomial; steps from there
 
 
 def peak_proved(
@@ -43,51 +47,20 @@ def least_proved(
 def _in_long_numbers(
     raw: dict[str, Any], piecewise: Piecewise, found: ExactOrbit, what: str, bits: int
 ) -> dict[str, tuple[float, float]]:
-    from flint import arb, ctx
+    from flint import ctx
 
     from solver.certificate.checker import prove
-    from solver.certificate.proof_work import Counted
 
     kept = ctx.prec
     try:
         raw["certifies"], raw["bits"], ctx.prec = what, bits, bits
         summits = _Summits(raw, set_out(raw, piecewise, found.pieces))
-        if what == "peak":
-            raw["proof"] = summits.beside(arb(1))
-        else:
-            at = _turning(lambda factor: -summits.height(factor), arb(1))
-            loads = [at + at * k * arb(_BESIDE) for k in (-1, 0, 1)]
-            raw["proof"] = {"three": [summits.beside(load) for load in loads], "over": summits.over_loads(at)}
-        bounds = prove(raw, raw["proof"], Counted)
         told = ("peak", "frequency_hz") if what == "peak" else ("least_peak", "load_factor", "frequency_hz")
+        raw["proof"] = summits.peak(_STEP) if what == "peak" else summits.least_peak()
+        bounds = prove(raw, raw["proof"], summits.extremes)
         return claimed(raw, {name: bounds[name] for name in told})
     finally:
         ctx.prec = kept
-
-
-def _turning(value: Callable[[Any], Any], at: Any) -> Any:
-    """Return where a function is largest, by parabolas through three values ever nearer to each other."""
-    from solver.certificate.checker import RejectedError
-
-    step = _STEP
-    for _ in range(_TRIES):
-        try:
-            left, top, right = (value((at + at * k * step).mid()) for k in (-1, 0, 1))
-        except RejectedError:  # other events happen there
-            if step < _least_step():
-                raise
-            step /= 8.0
-            continue
-        bends = left - 2 * top + right
-        if not bends < 0:
-            raise RejectedError(f"there is no extreme near {float(at):.9g}: it bends by {float(bends):.1e}")
-        shift = step * (left - right) / (2 * bends)
-        at = (at + at * max(-_FAR * step, min(_FAR * step, shift))).mid()
-        if abs(shift) < _half_width() / 100:
-            return at
-        if abs(shift) < step:
-            step = max(step**1.5, _least_step())
-    raise RejectedError(f"no extreme was found near {float(at):.9g}")
 
 
 def _half_width() -> Any:
@@ -97,54 +70,139 @@ def _half_width() -> Any:
     return arb(2) ** int(-_PART * ctx.prec)
 
 
-def _least_step() -> float:
-    """Return the step at which a parabola is off by less than that, and its values still differ enough."""
-    return float(float(_half_width()) ** 0.65)
-
-
 class _Summits:
-    """Peaks by frequency for factors of the loads; each begins at the unknowns of the one before."""
+    """What is reached over the frequency and a factor of the loads, and where it is largest and least."""
 
     def __init__(self, raw: dict[str, Any], y: list[Any]) -> None:
-        from flint import arb
+        from flint import arb, arb_mat
 
-        self.raw, self.y, self.at = raw, y, arb(raw["system"]["frequency_hz"])
+        self.raw, self.bits, self.proved = raw, raw["bits"], dict[tuple[str, ...], Any]()
+        self.at, self.y = [arb(raw["system"]["frequency_hz"]), arb(1)], arb_mat([y]).transpose()
+        self.rates = [0 * self.y] * 2  # of the unknowns, by frequency and factor
+        self.near: Any = None  # the inverse of a derivative that served last
+        self.top: tuple[int, int] | None = None  # the piece and the span where most is reached
 
-    def height(self, factor: Any) -> Any:
-        """Return the peak for a factor of the loads."""
-        from solver.certificate.checker import least
+    def reached(self, at: list[Any], step: float) -> tuple[Any, Any]:
+        """Return the largest |x|, as well known as parabolas of this step need it, and the unknowns."""
+        from flint import arb_mat, ctx
 
-        def reached(frequency: Any) -> Any:
-            orbit = orbit_at(self.raw, frequency_hz=digits(frequency), load_factor=digits(factor))
-            self.y, _ = settled(orbit, self.y)
-            none = np.zeros(orbit.system.d)
-            motion = [each for piece, (_, _, length, *found) in enumerate(orbit.shoot(self.y)[2])
-                      for each in orbit.kept(piece, none, length, length, *found)]  # fmt: skip
-            high, low = (-least([(sign * p, rest, h) for p, rest, h in motion]) for sign in (-1, 1))
-            return high.max(low).mid()
+        enough = _OFF * step**3
+        with ctx.workprec(min(self.bits, max(128, math.ceil(-math.log2(enough) * 5 / 3)))):
+            orbit, y = self.orbit(at), self.guess(at)
+            found, _, self.near = settled(orbit, y.entries(), enough, self.near)
+            return self.height(orbit, found, checked=step > _CLOSE), arb_mat([found]).transpose()
 
-        self.at = _turning(reached, self.at)
-        return reached(self.at)
+    def orbit(self, at: list[Any]) -> Any:
+        """Return the orbit at a frequency and a factor."""
+        return orbit_at(self.raw, frequency_hz=digits(at[0]), load_factor=digits(at[1]))
 
-    def beside(self, factor: Any) -> dict[str, Any]:
-        """Return orbits over a range about a peak, and below, at and above it."""
-        self.height(factor)
-        width, three = self.at * _half_width(), []
-        over = self._over(digits(factor), f"{digits(self.at)} +/- {(width * 1.01).str(5, radius=False)}")
-        for k in (-1, 0, 1):
-            where = {"load_factor": digits(factor), "frequency_hz": digits(self.at + k * width)}
-            orbit = orbit_at(self.raw, **where)
-            self.y, now = settled(orbit, self.y)
-            three.append(where | {"unknowns": boxed(orbit, self.y, now)[0]})
+    def guess(self, at: list[Any]) -> Any:
+        """Return about what the unknowns are."""
+        return sum(
+            (rate * (new - old) for rate, new, old in zip(self.rates, at, self.at, strict=True)), self.y
+        )
+
+    def height(self, orbit: Any, y: list[Any], *, checked: bool) -> Any:
+        """Return the largest |x| of an orbit, its inequalities required if it is to be `checked`."""
+        from flint import arb, arb_poly
+
+        starts, none = orbit.shoot(y)[2], np.zeros(orbit.system.d)
+        if checked or self.top is None:
+            motion = [(piece, span, each) for piece, (_, _, length, *found) in enumerate(starts)
+                      for span, each in enumerate(orbit.kept(piece, none, length, length, *found))]  # fmt: skip
+            sizes = [np.abs(np.polyval([float(c) for c in p.coeffs()[::-1]], np.linspace(0.0, float(h), _GRID)))
+                     for _, _, (p, _, h) in motion]  # fmt: skip
+            self.top = motion[max(range(len(motion)), key=lambda k: float(sizes[k].max()))][:2]
+        piece, span = self.top
+        _, _, length, points, _ = starts[piece]
+        terms, _ = orbit.system.series(orbit.during[piece], points[span], length / (len(points) - 1))
+        p = arb_poly([(orbit.system.observe * term)[0, 0].mid() for term in terms])
+        places = np.linspace(0.0, 1.0, _GRID)
+        at = arb(float(places[np.abs(np.polyval([float(c) for c in p.coeffs()[::-1]], places)).argmax()]))
+        speed, bend = p.derivative(), p.derivative().derivative()
+        for _ in range(_NEWTON):
+            at = (at - speed(at) / bend(at)).mid()
+        return abs(p(at)).mid()
+
+    def turned(self, count: int, step: float) -> list[Any]:
+        """Return where most is reached over the frequency, of which the load makes the least if it varies.
+
+        `count` of both vary. Parabolas through what is reached at ever smaller steps, all of them relative.
+        """
+        from flint import ctx
+
+        from solver.certificate.checker import RejectedError
+
+        least, at = _OFF * float(_half_width()) ** 0.5, list(self.at)
+        for _ in range(_TRIES):
+            try:
+                slope, bends = self.parabola(at, count, step)
+            except RejectedError:  # other events happen there
+                if step <= least:
+                    raise
+                step /= 8.0
+                continue
+            if not (bends[0, 0] < 0 and (count == 1 or bends.det() < 0)):
+                told = f"it bends by {', '.join(f'{float(bends[i, i]):.1e}' for i in range(count))}"
+                raise RejectedError(f"there is no extreme near {float(at[0]):.9g}: {told}")
+            shift = [-each for each in bends.solve(slope).entries()]
+            far = max(abs(float(each)) for each in shift) / step
+            for i, each in enumerate(shift):
+                at[i] = (at[i] + at[i] * each * min(1.0, _FAR / far if far else 1.0)).mid()
+            if far <= 1.0:
+                if step <= least:
+                    with ctx.workprec(self.bits):
+                        self.y, self.at = self.guess(at), list(at)
+                        return at
+                step = max(step**_FASTER, least)
+        raise RejectedError(f"no extreme was found near {float(at[0]):.9g}")
+
+    def parabola(self, at: list[Any], count: int, step: float) -> tuple[Any, Any]:
+        """Return the slope of what is reached by relative changes of the first `count` places, its bends."""
+        from flint import arb_mat
+
+        def beside(*shift: int) -> tuple[Any, Any]:
+            return self.reached([(x + x * k * step).mid() for x, k in zip(at, shift, strict=True)], step)
+
+        middle, self.y = beside(0, 0)
+        self.at, slope, bends, highs = list(at), arb_mat(count, 1), arb_mat(count, count), list[Any]()
+        for i in range(count):
+            (low, before), (high, after) = (beside(*(way * (i == k) for k in range(2))) for way in (-1, 1))
+            slope[i, 0], bends[i, i] = (high - low) / (2 * step), (low - 2 * middle + high) / step**2
+            self.rates[i] = (after - before) * (1 / (2 * step * at[i]))
+            highs.append(high)
+        if count == 2:
+            bends[0, 1] = bends[1, 0] = (beside(1, 1)[0] - sum(highs) + middle) / step**2
+        return slope, bends
+
+    def peak(self, step: float) -> dict[str, Any]:
+        """Return orbits over a range about a peak for the factor there is, and below, at and above it."""
+        at, factor = self.turned(1, step)
+        half = _half_width()
+        over = self.enclosed([at, factor], [at * half, 0])
+        return {"over": over, "three": [self.enclosed([at + k * at * half, factor]) for k in (-1, 0, 1)]}
+
+    def least_peak(self) -> dict[str, Any]:
+        """Return three peaks whose middle one is the least, and an orbit at its frequency over all loads."""
+        at, factor = self.turned(2, _STEP)
+        three, over = list[Any](), self.enclosed([at, factor], [0, factor * _BESIDE])
+        for beside in (factor - factor * _BESIDE, factor, factor + factor * _BESIDE):
+            self.y, self.at = self.guess([at, beside]), [at, beside.mid()]
+            three.append(self.peak(_BESIDE))
         return {"over": over, "three": three}
 
-    def over_loads(self, factor: Any) -> dict[str, Any]:
-        """Return an orbit at the peak for a factor, over the loads about it."""
-        self.height(factor)
-        width = (factor * _BESIDE * 1.01).str(5, radius=False)
-        return self._over(f"{digits(factor)} +/- {width}", digits(self.at), _BESIDE)
-
-    def _over(self, factor: str, frequency_hz: str, width: Any = None) -> dict[str, Any]:
-        where = {"load_factor": factor, "frequency_hz": frequency_hz}
-        box = boxed(orbit_at(self.raw, **where), self.y, _half_width() if width is None else width)[0]
+    def enclosed(self, at: list[Any], widths: Any = (0, 0)) -> dict[str, Any]:
+        """Return an orbit at a frequency and a factor, or over a range of one of them."""
+        where = {
+            name: digits(place) + (f" +/- {(width * 1.01).str(5, radius=False)}" if width else "")
+            for name, place, width in zip(("frequency_hz", "load_factor"), at, widths, strict=True)
+        }
+        orbit, y, now = orbit_at(self.raw, **where), self.guess(at).entries(), 0.0
+        if not any(widths):
+            y, now, self.near = settled(orbit, y, near=self.near)
+        box, self.proved[tuple(where.values())] = boxed(orbit, y, now)
         return where | {"unknowns": box}
+
+    def extremes(self, _: Any, at: dict[str, str]) -> Any:
+        """Return the extremes and the period of an orbit that is proved."""
+        return self.proved[at["frequency_hz"], at["load_factor"]]

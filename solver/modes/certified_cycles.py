@@ -116,7 +116,7 @@ def _proved(
         nonlocal start
         for _ in range(_ROUNDS):
             orbit = orbit_at(raw)
-            start, now = settled(orbit, start)
+            start, now, _ = settled(orbit, start)
             omega = _PERIOD / float(sum(orbit.lengths(start)))
             gas = 2.0 * aero_damping * omega
             if abs(gas - piecewise.mass_damping) <= _SAME * abs(gas):
