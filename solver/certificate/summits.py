@@ -108,10 +108,15 @@ class _Summits:
 
         starts, none = orbit.shoot(y)[2], np.zeros(orbit.system.d)
         if checked or self.top is None:
-            motion = [(piece, span, each) for piece, (_, _, length, *found) in enumerate(starts)
-                      for span, each in enumerate(orbit.kept(piece, none, length, length, *found))]  # fmt: skip
-            sizes = [np.abs(np.polyval([float(c) for c in p.coeffs()[::-1]], np.linspace(0.0, float(h), _GRID)))
-                     for _, _, (p, _, h) in motion]  # fmt: skip
+            motion = [
+                (piece, span, each)
+                for piece, (_, _, length, *found) in enumerate(starts)
+                for span, each in enumerate(orbit.kept(piece, none, length, length, *found))
+            ]
+            sizes = [
+                np.abs(np.polyval([float(c) for c in p.coeffs()[::-1]], np.linspace(0.0, float(h), _GRID)))
+                for _, _, (p, _, h) in motion
+            ]
             self.top = motion[max(range(len(motion)), key=lambda k: float(sizes[k].max()))][:2]
         piece, span = self.top
         _, _, length, points, _ = starts[piece]
