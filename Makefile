@@ -79,7 +79,7 @@ demo: $(PACKAGES)
 test: style
 	$(BIN)/python -m service.warm_up
 	$(BIN)/mypy & types=$$!; \
-	  PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n 4 --dist loadscope --no-loadscope-reorder $(PYTEST); tests=$$?; \
+	  PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n 3 --dist loadscope --no-loadscope-reorder $(PYTEST); tests=$$?; \
 	  wait $$types && exit $$tests
 
 test-long: dev
