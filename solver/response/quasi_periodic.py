@@ -287,10 +287,7 @@ class Question:
         nearest = int(np.argmin(np.abs(off)))
         exact = abs(off[nearest]) <= _EXACT * wanted
         pairs = list(zip(found, tori, ratios, strict=True))
-        torus, sizes = (
-            tori[0],
-            np.array([_sizes(each, on, turns, repeats=exact) for each, on, turns in pairs]),
-        )
+        torus, sizes = tori[0], np.array([_sizes(*each, repeats=exact) for each in pairs])
         if len(tori) == 2:
             share = off[0] / (off[0] - off[1])
             torus = torus.beside(tori[1], share)

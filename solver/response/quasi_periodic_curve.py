@@ -11,7 +11,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 
 from solver.arrays import Real
-from solver.errors import SettingError
+from solver.errors import SettingError, check_count
 from solver.response.quasi_periodic import Question, TorusWatch, check, respond, second_force
 from solver.response.quasi_periodic_result import QuasiPeriodic, QuasiPeriodicStatus
 from solver.results.base import Drawn
@@ -136,9 +136,7 @@ def curve_points(frequency_hz: float, to_hz: float, points: int) -> Real:
     ends = check_frequency("frequency_hz", frequency_hz), check_frequency("to_hz", to_hz)
     if ends[0] == ends[1]:
         raise SettingError("to_hz", to_hz, "must differ from `frequency_hz`")
-    if isinstance(points, bool) or not isinstance(points, int) or not 2 <= points <= MOST_POINTS:
-        raise SettingError("points", points, f"must be a whole number from 2 to {MOST_POINTS}")
-    return np.linspace(*ends, points)
+    return np.linspace(*ends, check_count("points", points, 2, MOST_POINTS))
 
 
 def _curve(
