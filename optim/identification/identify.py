@@ -150,8 +150,10 @@ def _described(
     estimates = _estimates(runs.scene, unknowns, z, info, doubtful=bool(misfit))
     in_units = covariance * np.outer(slopes, slopes)
     spread = np.sqrt(np.diag(covariance))
-    # Of a model that does not describe the data, contacts that slip or stick say nothing of the rig.
-    missing = () if misfit else untold(runs.scene, unknowns, z, info, best.fitted.states)
+    missing = untold(runs.scene, unknowns, z, info, best.fitted.states)
+    if misfit:
+        # That a contact slips or sticks throughout in a fit that fails says nothing of the rig; products do.
+        missing = tuple(one for one in missing if len(one.names) > 1)
     left_out = _not_reached(runs, best)
     status = IdentifyStatus.UNTOLD if missing else IdentifyStatus.KNOWN
     if left_out:
