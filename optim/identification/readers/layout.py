@@ -66,40 +66,34 @@ def layout_of(text: str, name: str) -> Layout:
         number: [cell.strip() for cell in next(csv.reader([line], delimiter=separator))]
         for number, line in lines.items()
     }
-    numeric = {number: any(map(is_number, row)) for number, row in cells.items()}
-    wide = Counter(_width(row) for number, row in cells.items() if numeric[number])
+    order, rows = list(cells), list(cells.values())
+    numeric = [any(map(is_number, row)) for row in rows]
+    wide = Counter(_width(row) for row, has in zip(rows, numeric, strict=True) if has)
     width = max(wide, key=lambda cells: (wide[cells], cells), default=0)
-    order = list(cells)
-    for at, number in enumerate(order):
-        units = at + 2 < len(order) and all(map(_is_unit, cells[order[at + 1]]))
-        below = at + 1 + units
-        if (
-            below < len(order)
-            and numeric[order[below]]
-            and not numeric[number]
-            and _width(cells[number]) >= width
-        ):
-            heads = cells[number]
-            if units and len(cells[order[at + 1]]) == len(heads):
-                heads = [
-                    f"{head} [{bare(unit)}]" if bare(unit) else head
-                    for head, unit in zip(heads, cells[order[at + 1]], strict=True)
-                ]
-            rows = {line: cells[line] for line in order[below:]}
-            while (
-                heads
-                and not heads[-1]
-                and not any(
-                    row[len(heads) - 1 :] != [""] * len(row[len(heads) - 1 :]) for row in rows.values()
-                )
-            ):
-                heads = heads[:-1]
-            return Layout(separator=separator, head_line=number, heads=tuple(heads), rows=rows)
-    wanted = (
-        "must have a line of column heads, the names of the columns such as frequency,amplitude [mm], and "
-        "rows of numbers below it"
-    )
-    raise DataError(name, f"{len(lines)} lines", wanted, line=next(iter(lines), 1))
+    begins = [
+        at + 1 + (at + 2 < len(rows) and all(map(_is_unit, rows[at + 1]))) for at in range(len(rows) - 1)
+    ]
+    above = [at for at, first in enumerate(begins) if numeric[first] and not numeric[at]]
+    at = next((each for each in above if _width(rows[each]) >= width), next(iter(above), None))
+    if at is None:
+        wanted = (
+            "must have a line of column heads, the names of the columns such as frequency,amplitude [mm], and "
+            "rows of numbers below it"
+        )
+        raise DataError(name, f"{len(lines)} lines", wanted, line=next(iter(lines), 1))
+    units = rows[at + 1] if begins[at] == at + 2 else []
+    told = max(_width(rows[at]), *(_width(row) for row in rows[begins[at] :]))
+    return Layout(
+        separator=separator, head_line=order[at], heads=tuple(_with_units(rows[at], units)[:told]),
+        rows={order[each]: rows[each] for each in range(begins[at], len(rows))},
+    )  # fmt: skip
+
+
+def _with_units(heads: Sequence[str], units: Sequence[str]) -> list[str]:
+    """Return headings with the units of a line below them."""
+    if len(units) != len(heads):
+        return list(heads)
+    return [f"{head} [{bare(unit)}]" if bare(unit) else head for head, unit in zip(heads, units, strict=True)]
 
 
 def _width(row: Sequence[str]) -> int:

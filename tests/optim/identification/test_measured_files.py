@@ -386,6 +386,13 @@ def test_numbers_that_can_be_two_are_asked(tmp_path: Path) -> None:
         read(file)
 
 
+def test_decimal_commas_between_commas_are_told(tmp_path: Path) -> None:
+    file = tmp_path / "rig.csv"
+    file.write_text("frequency,amplitude [mm]\n0,5,1,25\n0,6,1,5\n", encoding="utf-8")
+    with pytest.raises(DataError, match=r"line 2.*decimal commas between commas must stand in quotes"):
+        read(file)
+
+
 def test_units_of_conditions_count(tmp_path: Path) -> None:
     file = tmp_path / "rig.csv"
     rows = "frequency,amplitude,excitation.amplitude [kN],damper.N0 [lbf]\n1,1,0.1,10\n1.1,1,0.1,10\n"
