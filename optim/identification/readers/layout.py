@@ -70,9 +70,8 @@ def layout_of(text: str, name: str) -> Layout:
     numeric = [any(map(is_number, row)) for row in rows]
     wide = Counter(_width(row) for row, has in zip(rows, numeric, strict=True) if has)
     width = max(wide, key=lambda cells: (wide[cells], cells), default=0)
-    begins = [
-        at + 1 + (at + 2 < len(rows) and all(map(_is_unit, rows[at + 1]))) for at in range(len(rows) - 1)
-    ]
+    units_below = [all(map(_is_unit, row)) for row in rows[1:-1]] + [False]
+    begins = [at + 1 + units for at, units in enumerate(units_below[: len(rows) - 1])]
     above = [at for at, first in enumerate(begins) if numeric[first] and not numeric[at]]
     at = next((each for each in above if _width(rows[each]) >= width), next(iter(above), None))
     if at is None:
