@@ -76,8 +76,8 @@ def layout_of(text: str, name: str) -> Layout:
     at = next((each for each in above if _width(rows[each]) >= width), next(iter(above), None))
     if at is None:
         wanted = (
-            "must have a line of column heads, the names of the columns such as frequency,amplitude [mm], and "
-            "rows of numbers below it"
+            "must have a line of column heads, the names of the columns such as frequency,amplitude [mm], "
+            "and rows of numbers below it"
         )
         raise DataError(name, f"{len(lines)} lines", wanted, line=next(iter(lines), 1))
     units = rows[at + 1] if begins[at] == at + 2 else []
