@@ -10,6 +10,7 @@ from inspect import cleandoc, get_annotations
 from typing import TypeVar
 
 Documented = TypeVar("Documented")
+_DECIMAL_COMMA = re.compile(r"(?:^|=)\s*([+-]?\d+,\d+(?:[eE][+-]?\d+)?)\s*(?:[}#]|$)")
 _DESCRIBED = re.compile(r"""Annotated\[(.+?)(?:, Field\(.+\))?, ('(?:[^'\\]|\\.)*'|"(?:[^"\\]|\\.)*")\]""")
 
 
@@ -18,6 +19,12 @@ def nearest(name: str, known: Sequence[str]) -> str:
     few = len(known) <= 300 and len(name) <= 200
     near = difflib.get_close_matches(name, known, n=1, cutoff=0.5) if few else []
     return f"; did you mean `{near[0]}`?" if near else ""
+
+
+def comma_hint(text: str) -> str:
+    """A hint ``; 0,3: a decimal point, as in 0.3`` where a text has, or ends a line with, a decimal comma."""
+    found = _DECIMAL_COMMA.search(text)
+    return f"; {found[1]}: a decimal point, as in {found[1].replace(',', '.')}" if found else ""
 
 
 def listing(known: Sequence[str]) -> str:

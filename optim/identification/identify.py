@@ -151,6 +151,9 @@ def _described(
     in_units = covariance * np.outer(slopes, slopes)
     spread = np.sqrt(np.diag(covariance))
     missing = untold(runs.scene, unknowns, z, info, best.fitted.states)
+    if misfit:
+        # That a contact slips or sticks throughout in a fit that fails says nothing of the rig; products do.
+        missing = tuple(one for one in missing if len(one.names) > 1)
     left_out = _not_reached(runs, best)
     status = IdentifyStatus.UNTOLD if missing else IdentifyStatus.KNOWN
     if left_out:
@@ -179,9 +182,15 @@ def _described(
 
 
 def misfit_of(runs: Runs, best: LocalFit, info: Information, *, robust: bool) -> str:
-    """Return why the model does not describe the data; empty if it does."""
+    """Return why the model does not describe the data, its one likeliest cause; empty if it does."""
     size = _misfit(info.reduced_chi2) if best.level == 1.0 else _scatter(best.level)
-    return f"{size} {doubts(runs, best, robust=robust)}".strip()
+    cause = doubts(runs, best, robust=robust)
+    if size and not cause:
+        cause = (
+            "Look at the fit: another parameter may have to be looked for, other bounds, or the data are of "
+            "another structure, place or unit."
+        )
+    return f"{size} {cause}".strip()
 
 
 def _misfit(reduced_chi2: float) -> str:
@@ -190,8 +199,7 @@ def _misfit(reduced_chi2: float) -> str:
         return ""
     return (
         "The residuals are larger than the noise given: the model does not describe the data, or the noise "
-        "is larger. Intervals are too narrow then. Look at the fit; leave `noise` out to judge by what is "
-        "left over."
+        "is larger (leave `noise` out to judge by what is left over)."
     )
 
 
@@ -201,8 +209,7 @@ def _scatter(level: float) -> str:
         return ""
     return (
         f"The fit leaves {100.0 * level:.3g} % of the responses, far more than measurements scatter: the "
-        "model does not describe the data, and the intervals say nothing. Look at the fit; another parameter "
-        "may have to be looked for, other bounds, or the data are of another structure."
+        "model does not describe the data."
     )
 
 

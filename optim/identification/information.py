@@ -165,7 +165,7 @@ def _why(scene: Scene, unknowns: Unknowns, i: int, seen: Mapping[str, set[int]])
                 f"`{owner}` never slips at any point measured, and while it sticks {key} does not show. "
                 "Measure with more excitation, or less load on it."
             )
-        if codes and key == "kt":
+        if codes and codes != {STUCK} and key == "kt":
             return (
                 f"`{owner}` never sticks for long at any point measured, and while it slips its stiffness "
                 f"hardly "

@@ -47,7 +47,7 @@ class _Direction:
 
 
 def doubts(runs: Runs, best: LocalFit, *, robust: bool) -> str:
-    """Return in sentences why the model does not describe the data; empty if it does.
+    """Return the likeliest reason why the model does not describe the data; empty if it does.
 
     Parameters
     ----------
@@ -64,10 +64,9 @@ def doubts(runs: Runs, best: LocalFit, *, robust: bool) -> str:
     curves = [curve for curve in _curves(runs, rest) if curve.size >= _FEWEST]
     explained = _explanation(runs, best, rest)
     far = "" if robust else _outliers(rest[best.active], len(runs.unknowns))
-    found = [told for told in (_one_sign(curves), _one_side(curves), far, explained) if told]
-    if not found:
-        return ""
-    return " ".join((*found, "The model does not describe the data, and intervals would say nothing."))
+    # What would explain the data says most; the others are signs of what is not named.
+    found = next((told for told in (explained, far, _one_side(curves), _one_sign(curves)) if told), "")
+    return f"{found} Intervals would say nothing." if found else ""
 
 
 def _curves(runs: Runs, rest: Real) -> Iterator[Real]:

@@ -11,14 +11,26 @@ from typing import Any
 import numpy as np
 
 from optim.errors import DataError
-from optim.identification.data.measured import KINDS, DataKind, MeasuredRows
+from optim.identification.data.measured import KINDS, DataKind, MeasuredRows, known_words
 from optim.identification.data.table import Table, check_numbers, runs_of
+from optim.identification.data.units import Dimension, unit_of
 from optim.identification.readers.csv_text import FORMAT as CSV
-from optim.identification.readers.csv_text import FromText, described
-from optim.identification.readers.export import Choice, read_export, text_of
-from optim.identification.readers.registry import Head, read_file, read_head, table_of
+from optim.identification.readers.csv_text import FromText, read_text
+from optim.identification.readers.encodings import text_of
+from optim.identification.readers.headings import Choice
+from optim.identification.readers.registry import (
+    KIND_WORD,
+    Head,
+    complex_apart,
+    format_of,
+    read_file,
+    read_head,
+    table_of,
+)
 from solver.errors import SettingError
+from solver.scene.parameter_paths import find_parameter
 from solver.scene.scene import Scene
+from solver.wording import listing
 
 MOST_RUNS = 200
 MOST_POINTS = 100_000
@@ -92,7 +104,7 @@ def job_tables(scene: Scene, data: Sequence[str], columns: Sequence[str] = ()) -
 
 
 def _split(given: str) -> tuple[Path, dict[str, str]]:
-    """Return the file, and the conditions behind its name."""
+    """Return the file, and what is said behind its name."""
     match = _WITH_HEAD.match(given)
     pairs = match["pairs"].split(",") if match else []
     return Path(match["file"] if match else given), {
@@ -106,11 +118,31 @@ def _is_csv(given: str) -> bool:
 
 def _of_text(scene: Scene, given: str, columns: Sequence[str]) -> FromText:
     """Read a file in CSV, by what its columns are if that is given."""
-    (file, conditions), paths = _split(given), frozenset(scene.parameter_paths())
-    if columns:
-        return read_export(text_of(file), file.name, paths, dict(map(Choice.told, columns)), conditions)
-    head = "".join(f"# {key} = {value}\n" for key, value in conditions.items())
-    return described(head + text_of(file).removeprefix("\ufeff"), file.name, paths)
+    (file, said), paths = _split(given), frozenset(scene.parameter_paths())
+    _said(file, said, paths)
+    choices = dict(map(Choice.told, columns)) if columns else None
+    return read_text(text_of(file), file.name, paths, choices, said)
+
+
+def _said(file: Path, said: Mapping[str, str], paths: frozenset[str]) -> tuple[Head, dict[str, str]]:
+    """Return what is said behind a file's name: of its rows, and to read it by the words of its format.
+
+    Raises
+    ------
+    DataError
+        A word that says nothing.
+    """
+    words = format_of(file).words if said else {}
+    known = (KIND_WORD, *known_words(), *words)
+    for key, value in said.items():
+        if key not in paths and key not in known and "." not in key:
+            wanted = f"`{key}` must be a parameter path, or one of {listing(known)}"
+            raise DataError(f"{file.name}:{key}={value}", key, wanted)
+    pairs = {
+        at: f"{key} = {value}" for at, (key, value) in enumerate(said.items(), start=1) if key not in words
+    }
+    head = read_head(f"{file.name}:…", pairs, paths)
+    return head, {key: value for key, value in said.items() if key in words}
 
 
 def _tables(given: Given, index: int, paths: frozenset[str]) -> list[Table]:
@@ -121,17 +153,14 @@ def _tables(given: Given, index: int, paths: frozenset[str]) -> list[Table]:
         return [_table_of(given, index, paths)]
     if not isinstance(given, (str, Path)):
         raise DataError(f"data[{index}]", given, "must be a file or a table", place=place)
-    match = _WITH_HEAD.match(str(given))
-    file = Path(match["file"] if match else given)
-    pairs = dict(enumerate(match["pairs"].split(","), start=1)) if match else {}
-    head = read_head(f"{file.name}:{match['pairs']}" if match else "", pairs, paths)
-    tables = read_file(file, paths)
+    file, said = _split(str(given))
+    head, words = _said(file, said, paths)
     return [
         replace(
             table, conditions={**table.conditions, **head.conditions}, words={**table.words, **head.words},
             place=place,
         )
-        for table in tables
+        for table in read_file(file, paths, words)
     ]  # fmt: skip
 
 
@@ -152,20 +181,22 @@ def _table_of(given: Mapping[str, Any], index: int, paths: frozenset[str]) -> Ta
         raise DataError(source, lost[0], wanted, place=place)
     heads = [f"{name} [{units[name]}]" if name in units else name for name in columns]
     numbers = [_numbers(source, name, values, place) for name, values in columns.items()]
-    return table_of(source, heads, numbers, head, paths, place=place)
+    heads, parts = complex_apart(source, heads, numbers)
+    return table_of(source, heads, parts, head, paths, place=place)
 
 
 def _numbers(source: str, name: str, values: Any, place: tuple[str | int, ...]) -> np.ndarray:
     for row, value in enumerate(values):
-        if isinstance(value, bool) or not isinstance(value, (int, float, np.number)):
+        if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, float, complex, np.number)):
             wanted = "must be a number: leave the whole row out if it is missing"
             raise DataError(f"{source}, row {row}", value, wanted, column=name, place=(*place, name))
-    return np.array(values, dtype=np.float64)
+    return np.array(values)
 
 
 def _runs(scene: Scene, table: Table, paths: frozenset[str], unknown: frozenset[str]) -> list[MeasuredRows]:
     """Read a table as runs of equal conditions."""
     check_numbers(table)
+    table = _conditions_in_si(scene, table)
     varied = [name for name in table.columns if name in paths]
     for path in (*varied, *table.conditions):
         if path in unknown:
@@ -179,6 +210,25 @@ def _runs(scene: Scene, table: Table, paths: frozenset[str], unknown: frozenset[
             raise run.refusal(error.value, f"condition: {error}") from error
         runs.append(kind.read(scene, run))
     return runs
+
+
+def _conditions_in_si(scene: Scene, table: Table) -> Table:
+    """Return a table whose columns of parameters are in the units of the scene."""
+    columns = dict(table.columns)
+    for path, text in table.path_units.items():
+        found = find_parameter(scene, path)
+        own = found.unit if found is not None else ""
+        forces = (unit_of(Dimension.FORCE, own or "-"), unit_of(Dimension.FORCE, text))
+        if None not in forces:
+            columns[path] = columns[path] * (forces[1].factor if forces[1] else 1.0)
+        elif _plain_unit(text) != _plain_unit(own):
+            raise DataError(table.source, text, f"must be in {own or '1'}", column=path, place=table.place)
+    return replace(table, columns=columns)
+
+
+def _plain_unit(text: str) -> str:
+    plain = re.sub(r"[\s^·*()]", "", text).replace("²", "2")
+    return "" if plain in ("1", "-") else plain
 
 
 def _kind(table: Table, varied: Sequence[str]) -> DataKind:

@@ -18,7 +18,7 @@ from pydantic.fields import FieldInfo
 from optim.criteria.key import Key, Option
 from optim.criteria.registry import criteria, limit_keys
 from optim.identification.data.measured import data_kinds
-from optim.identification.data.table import known_units
+from optim.identification.data.units import known_units
 from optim.identification.readers.registry import data_formats
 from optim.problem.keys import OPTIONS, ROBUST, CaseRequest, DesignKeys, FrontKeys, options
 from optim.problem.words import MethodWord, ScalingWord

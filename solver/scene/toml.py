@@ -13,6 +13,33 @@ from pathlib import Path
 from typing import Any
 
 from solver.errors import SceneError
+from solver.wording import comma_hint
+
+
+class TomlError(ValueError):
+    """A text that is not TOML: the line, and what would be right where that shows."""
+
+
+_LINE = re.compile(r"at line (\d+)")
+
+
+def read_toml(text: str) -> dict[str, Any]:
+    """The tables of a text in TOML, which may begin with a byte order mark.
+
+    Raises
+    ------
+    TomlError
+        It is none.
+    ValueError
+        A number that is too long.
+    """
+    text = text.removeprefix("\ufeff")
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        at = _LINE.search(str(error))
+        line = text.splitlines()[int(at[1]) - 1 : int(at[1])] if at else text.splitlines()[-1:]
+        raise TomlError(f"{error}{comma_hint(line[0] if line else '')}") from error
 
 
 @cache
@@ -46,7 +73,7 @@ def load_raw(name_or_path: object) -> dict[str, object]:
         raise _refusal(f"a scene must be a name or a path, got {name_or_path!r}")
     path = Path(name_or_path)
     try:
-        text = path.read_bytes().decode("utf-8")
+        text = path.read_bytes().decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise _refusal(f"{str(path)!r} is not UTF-8 text (byte {error.start}): not a scene file") from error
     except (OSError, ValueError) as error:
@@ -57,12 +84,12 @@ def load_raw(name_or_path: object) -> dict[str, object]:
 def _parse(text: str, source: str, suffix: str) -> dict[str, object]:
     try:
         if suffix == ".toml":
-            return tomllib.loads(text)
+            return read_toml(text)
         if suffix == ".json":
             raw = json.loads(text, object_pairs_hook=_without_duplicates)
         else:
             raise _refusal(f"{source!r} must end in .toml or .json, got {suffix!r}")
-    except tomllib.TOMLDecodeError as error:
+    except TomlError as error:
         raise _refusal(f"{source!r} is not valid TOML: {error}") from error
     except json.JSONDecodeError as error:
         raise _refusal(f"{source!r} is not valid JSON: {error}") from error

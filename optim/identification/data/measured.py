@@ -13,7 +13,8 @@ from typing import Annotated
 
 import numpy as np
 
-from optim.identification.data.table import Dimension, Table
+from optim.identification.data.table import Table
+from optim.identification.data.units import Dimension
 from optim.problem.variables import Real
 from solver.extensions import Kinds
 from solver.jit.fourier import Integer

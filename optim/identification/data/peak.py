@@ -18,7 +18,8 @@ from optim.errors import DataError
 from optim.identification.data.curve import CurveRun, check_level, columns_of
 from optim.identification.data.measured import Column, DataKind, MeasuredRows, Predicted, RunModel
 from optim.identification.data.response import measured_dof, observing_dof
-from optim.identification.data.table import Dimension, Table
+from optim.identification.data.table import Table
+from optim.identification.data.units import Dimension
 from optim.problem.variables import Real
 from solver.continuation.branch import Branch
 from solver.continuation.branches.sweep import sweep

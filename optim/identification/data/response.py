@@ -18,7 +18,8 @@ import numpy as np
 from optim.errors import DataError
 from optim.identification.data.curve import FLOOR
 from optim.identification.data.measured import Column, DataKind, MeasuredRows, Predicted, RunModel
-from optim.identification.data.table import Dimension, Table, check_monotone, check_sign
+from optim.identification.data.table import Table, check_monotone, check_sign
+from optim.identification.data.units import Dimension
 from optim.problem.variables import Real
 from solver.balance.balance import build
 from solver.balance.simplifications import Effects, even_harmonics_reason
@@ -264,6 +265,11 @@ def read_response(scene: Scene, table: Table) -> MeasuredRows:
     quantity, column, data = _data(table)
     here = scene.with_values(dict(table.conditions))
     unit = table.units.get(column)
+    _check_units(table, column)
+    if unit is not None and unit.per_force and here.excitation[0].base is not None:
+        raise DataError(
+            table.source, column, "is by a force: the scene's base moves", column=column, place=table.place
+        )
     if unit is not None and (unit.order or unit.per_force):
         if quantity in (Quantity.MAX_ABS, Quantity.HALF_PEAK_TO_PEAK):
             wanted = "must be a displacement: velocities and accelerations do for `amplitude`, `real`, `imag`"
@@ -283,6 +289,20 @@ def read_response(scene: Scene, table: Table) -> MeasuredRows:
         source=table.source, conditions=dict(table.conditions), frequency_hz=frequencies, data=data, sd=sd,
         quantity=quantity, harmonic=int(table.number("harmonic", 1.0)), dof=dof,
     )  # fmt: skip
+
+
+def _check_units(table: Table, column: str) -> None:
+    """Refuse parts and deviations of another derivative than what was measured, or by a force alone."""
+    unit = table.units.get(column)
+    for other in ("imag", "sd"):
+        its = table.units.get(other)
+        if (
+            unit is not None
+            and its is not None
+            and (its.order, its.per_force) != (unit.order, unit.per_force)
+        ):
+            wanted = f"must be in a unit as that of `{column}`: both displacements, or both by a force"
+            raise DataError(table.source, other, wanted, column=other, place=table.place)
 
 
 def _check_band(scene: Scene, table: Table) -> None:

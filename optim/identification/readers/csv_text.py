@@ -1,8 +1,12 @@
-"""CSV: lines ``# key = value``, a line of column heads, then rows of numbers."""
+"""CSV and other text: lines ``# key = value``, a line of column heads, then rows of numbers.
+
+Whatever stands between cells, in front of decimals and between thousands is told from the whole; lines above
+the headings and a line of units below them are told apart.
+"""
 
 from __future__ import annotations
 
-import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,26 +15,12 @@ import numpy as np
 
 from optim.errors import DataError
 from optim.identification.data.table import Table, split_head
-from optim.identification.readers.registry import DataFormat, Head, read_head, table_of
-from solver.jit.fourier import Real
-
-_SEPARATORS = (";", "\t", ",")
-_DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
-
-
-def read_csv(path: Path, paths: frozenset[str]) -> list[Table]:
-    """Read a file.
-
-    Raises
-    ------
-    DataError
-        What is wrong, with its line.
-    """
-    try:
-        text = path.read_text("utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise DataError(str(path), str(error), "must be a text file in UTF-8") from error
-    return [read_text(text, path.name, paths).table]
+from optim.identification.readers.encodings import text_of
+from optim.identification.readers.headings import LEFT_OUT, Choice, contradiction
+from optim.identification.readers.layout import Layout, heading_unit, layout_of
+from optim.identification.readers.numbers import COMMA, DECIMAL, POINT, columns_of
+from optim.identification.readers.registry import DataFormat, Head, complex_apart, read_head, table_of
+from optim.problem.variables import Real
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,97 +31,116 @@ class FromText:
     job_table: dict[str, Any]
 
 
-def described(text: str, name: str, paths: frozenset[str]) -> FromText:
-    """Read a text that came under a name.
+def read_csv(path: Path, paths: frozenset[str], words: Mapping[str, str] | None = None) -> list[Table]:
+    """Read a file.
 
     Raises
     ------
     DataError
         What is wrong, with its line.
     """
-    return read_text(text.removeprefix("\ufeff"), name, paths)
+    return [read_text(text_of(path), path.name, paths, said=words or {}).table]
 
 
-def read_text(text: str, name: str, paths: frozenset[str]) -> FromText:
+def read_text(
+    text: str, name: str, paths: frozenset[str], choices: Mapping[str, Choice] | None = None,
+    said: Mapping[str, str] | None = None,
+) -> FromText:  # fmt: skip
     """Read a text.
 
     Parameters
     ----------
-    text : of a file.
-    name : of the file, for messages.
+    text, name : of a file.
     paths : parameter paths of the scene.
+    choices : heading to what it is, with or without its unit; headings that are not there are left out.
+        Without it every heading says itself what it is.
+    said : what is said of the whole besides: keys of a head with their values.
 
     Raises
     ------
     DataError
         What is wrong, with its line.
     """
-    lines = {number: line.strip() for number, line in enumerate(text.splitlines(), start=1) if line.strip()}
-    remarks = {number: line for number, line in lines.items() if line.startswith("#")}
-    rows = {number: line for number, line in lines.items() if not line.startswith("#")}
-    head = read_head(name, remarks, paths)
-    if len(rows) < 2:
-        raise DataError(
-            name, f"{len(rows)} lines", "must have a line of column heads and rows of numbers",
-            line=next(iter(rows), 1),
-        )  # fmt: skip
-    head_line = next(iter(rows))
-    separator = next((one for one in _SEPARATORS if one in rows[head_line]), ",")
-    heads = [text.strip().strip('"') for text in rows.pop(head_line).split(separator)]
-    _check_heads(name, head_line, heads)
-    numbers = np.array([_row(name, line, text, separator, heads) for line, text in rows.items()])
-    at = np.array(list(rows), np.int64)
-    table = table_of(name, heads, list(numbers.T), head, paths, lines=at, head_line=head_line)
-    return FromText(table=table, job_table=_job_table(heads, numbers, head))
+    remarks = {
+        number: line
+        for number, line in enumerate(text.splitlines(), start=1)
+        if line.lstrip().startswith("#")
+    }
+    head = read_head(name, remarks, paths, FORMAT.words)
+    beside = read_head(
+        name, dict(enumerate(f"{key} = {value}" for key, value in (said or {}).items())), paths, FORMAT.words
+    )
+    words = {**head.words, **beside.words}
+    decimal = words.pop(DECIMAL, None)
+    head = Head(conditions={**head.conditions, **beside.conditions}, words=words)
+    layout = layout_of(text, name)
+    chosen = _chosen(layout, name, choices)
+    lines = list(layout.rows)
+    for line, row in layout.rows.items():
+        _check_width(name, layout, line, row, chosen)
+    columns = [(heads, layout.column(index)) for index, heads in chosen.items()]
+    numbers = columns_of(name, columns, lines, decimal=decimal, comma_between=layout.separator == ",")
+    heads, parts = complex_apart(name, list(chosen.values()), numbers)
+    table = table_of(
+        name, heads, parts, head, paths, lines=np.array(lines, np.int64), head_line=layout.head_line
+    )
+    return FromText(table=table, job_table=_job_table(heads, parts, head))
 
 
-def _job_table(heads: list[str], numbers: Real, head: Head) -> dict[str, Any]:
+def _chosen(layout: Layout, name: str, choices: Mapping[str, Choice] | None) -> dict[int, str]:
+    """Return the columns that count, each with its head in the words of files here."""
+    if choices is None:
+        split = [heading_unit(heading) for heading in layout.heads]
+        return {index: _head(*one) for index, one in enumerate(split)}
+    names = [heading_unit(heading)[0] for heading in layout.heads]
+    unknown = [heading for heading in choices if heading not in layout.heads and heading not in names]
+    if unknown:
+        wanted = f"must be a heading: {', '.join(layout.heads)}"
+        raise DataError(name, unknown[0], wanted, line=layout.head_line)
+    chosen = {}
+    for index, heading in enumerate(layout.heads):
+        choice = choices.get(heading, choices.get(names[index]))
+        if choice is None or choice.quantity == LEFT_OUT:
+            continue
+        unit = choice.unit if choice.unit is not None else heading_unit(heading)[1]
+        if wrong := contradiction(heading, choice.quantity, unit):
+            raise DataError(name, choice.quantity, wrong, line=layout.head_line, column=heading)
+        chosen[index] = _head(choice.quantity, unit)
+    return chosen
+
+
+def _head(quantity: str, unit: str | None) -> str:
+    return quantity if unit is None else f"{quantity} [{unit}]"
+
+
+def _check_width(
+    name: str, layout: Layout, line: int, row: list[str] | Any, chosen: Mapping[int, str]
+) -> None:
+    """Refuse a row that ends before a column that counts, or goes on behind the last heading."""
+    wanted = f"must have {len(layout.heads)} numbers, as the heads have columns"
+    if any(row[len(layout.heads) :]):
+        commas = "; decimal commas between commas must stand in quotes" if layout.separator == "," else ""
+        raise DataError(name, f"{len(row)}", wanted + commas, line=line)
+    if any(index >= len(row) for index in chosen):
+        raise DataError(name, f"{len(row)}", wanted, line=line)
+
+
+def _job_table(heads: list[str], numbers: list[Real], head: Head) -> dict[str, Any]:
     """Return the columns as lists with their units, conditions and words beside them."""
     split = [split_head(text) for text in heads]
     return {
         **head.words,
-        **{name: column.tolist() for (name, _), column in zip(split, numbers.T, strict=True)},
+        **{name: column.tolist() for (name, _), column in zip(split, numbers, strict=True)},
         "units": {name: unit for name, unit in split if unit is not None},
         "conditions": dict(head.conditions),
     }
 
 
-def _check_heads(source: str, line: int, heads: list[str]) -> None:
-    """Refuse a first line of numbers: the columns have no names."""
-    try:
-        first = [float(text) for text in heads]
-    except ValueError:
-        return
-    raise DataError(
-        source, first, "must be the names of the columns, such as frequency,amplitude [mm]", line=line
-    )
-
-
-def _row(source: str, line: int, text: str, separator: str, heads: list[str]) -> list[float]:
-    cells = [cell.strip() for cell in text.split(separator)]
-    if len(cells) != len(heads):
-        wanted = f"must have {len(heads)} numbers, as the heads have columns"
-        raise DataError(source, f"{len(cells)}", wanted, line=line)
-    return [_number(source, line, name, cell, separator) for name, cell in zip(heads, cells, strict=True)]
-
-
-def _number(source: str, line: int, column: str, cell: str, separator: str) -> float:
-    try:
-        return float(cell)
-    except ValueError:
-        # Between semicolons or tabs a comma can stand for nothing but decimals.
-        if separator != "," and _DECIMAL_COMMA.fullmatch(cell):
-            return float(cell.replace(",", "."))
-        wanted = "must be a number with a decimal point"
-        if not cell:
-            wanted = "must be a number: leave the whole row out if it is missing"
-        raise DataError(source, cell, wanted, line=line, column=column) from None
-
-
 FORMAT = DataFormat(
     name="CSV",
-    suffixes=(".csv", ".tsv", ".txt"),
+    suffixes=(".csv", ".tsv", ".txt", ".lvm"),
     help="Units in the heads, `amplitude [mm]`; conditions in lines `# shroud.N0 = 200` or in columns of "
-    "that name; commas, semicolons or tabs between.",
+    "that name; commas, semicolons, tabs or bars between.",
     read=read_csv,
+    words={DECIMAL: f"`{POINT}` or `{COMMA}`, where 1.446 can be two numbers."},
 )

@@ -13,6 +13,7 @@ import typer
 from service.errors import InputError
 from solver.errors import SettingError
 from solver.scene.descriptions import DISK_LOAD
+from solver.wording import comma_hint
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
@@ -25,7 +26,7 @@ def number(text: str) -> float:
     try:
         return float(text)
     except ValueError:
-        raise typer.BadParameter(f"must be a number, got {text!r}") from None
+        raise typer.BadParameter(f"must be a number, got {text!r}{comma_hint(text)}") from None
 
 
 def whole_number(text: str) -> int:
@@ -190,7 +191,8 @@ def part(option: str, text: str, word: str) -> float:
     try:
         return float(word)
     except ValueError:
-        raise InputError(f"`{option}` needs a number where {word.strip()!r} stands, got {text!r}") from None
+        wanted = f"`{option}` needs a number where {word.strip()!r} stands, got {text!r}{comma_hint(word)}"
+        raise InputError(wanted) from None
 
 
 def relative(path: Path, target: Path) -> str:

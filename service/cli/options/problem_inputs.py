@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import json
-import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -25,6 +24,7 @@ from service.cli.options.parameters import Command, keyword, parameters_of, with
 from service.errors import InputError
 from service.jobs.common.scenes import UPLOAD, Place, named_files, with_named
 from solver.errors import Issue, SceneError, SettingError
+from solver.scene.toml import TomlError, read_toml
 
 if TYPE_CHECKING:
     from service.client.client import Client
@@ -285,13 +285,11 @@ def _read(file: Path, kind: str) -> dict[str, Any]:
         raise InputError(f"`--problem` must end in {', '.join(SCENE_FILES)}, got {str(file)!r}")
     try:
         data = file.read_bytes()
-        if file.suffix.lower() == ".json":
-            body = strict_json.loads(data)
-        else:
-            body = tomllib.loads(data.decode("utf-8"))
+        is_json = file.suffix.lower() == ".json"
+        body: Any = strict_json.loads(data) if is_json else read_toml(data.decode("utf-8"))
     except OSError as error:
         raise InputError(f"`--problem`: {str(file)!r} cannot be read: {error.strerror}") from error
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+    except (UnicodeDecodeError, TomlError) as error:
         raise InputError(f"`--problem`: {str(file)!r} is not TOML: {error}") from error
     except (InvalidRequestError, MalformedBodyError) as error:
         raise InputError(f"`--problem`: {str(file)!r}: {error}") from error

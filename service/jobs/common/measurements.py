@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import partial
 from typing import Any
 
 from solver.errors import SceneError, SettingError
@@ -29,8 +28,8 @@ def read_measurements(scene: Scene, files: Sequence[Mapping[str, Any]]) -> dict[
     `detail`.
     """
     # Loaded here: it brings SciPy along, which a service that only lists does not need.
-    from optim.identification.readers.csv_text import described
-    from optim.identification.readers.export import Choice, read_export
+    from optim.identification.readers.csv_text import read_text
+    from optim.identification.readers.headings import Choice
     from optim.identification.reading import read_data
 
     paths = frozenset(scene.parameter_paths())
@@ -39,8 +38,7 @@ def read_measurements(scene: Scene, files: Sequence[Mapping[str, Any]]) -> dict[
         name = file["name"]
         try:
             given = {heading: Choice(**told) for heading, told in (file.get("columns") or {}).items()}
-            read_as = partial(read_export, choices=given) if given else described
-            from_text = read_as(file["text"], name, paths)
+            from_text = read_text(file["text"], name, paths, given or None)
             runs = read_data(scene, [from_text])
             read.append({"name": name, "table": from_text.job_table, "runs": [_shown(run) for run in runs]})
         except (SceneError, SettingError) as error:
@@ -64,7 +62,8 @@ def look_at(scene: Scene, files: Sequence[Mapping[str, str]]) -> dict[str, Any]:
     """
     from optim.errors import DataError
     from optim.identification.data.measured import known_columns
-    from optim.identification.readers.export import FORCE, guesses, layout_of, units_for
+    from optim.identification.readers.headings import FORCE, guesses, units_for
+    from optim.identification.readers.layout import layout_of
 
     paths = frozenset(scene.parameter_paths())
     found, issues = [], []

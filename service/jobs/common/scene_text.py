@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import tomllib
 from collections.abc import Mapping
 from typing import Any
 
@@ -15,6 +14,7 @@ from service.jobs.registry import SceneSource
 from service.jobs.strict_json import MOST_DEPTH
 from solver.errors import Issue
 from solver.scene.editing import TextPlace, edited, place_at, places
+from solver.scene.toml import TomlError, read_toml
 
 MOST_OF_TOML = 1_200_000
 """Characters of a text in TOML: a sector of finite elements with the matrices of its nodal diameters has a
@@ -60,8 +60,8 @@ def _toml(text: str) -> object:
         raise MalformedBodyError(f"line {line} is nested too deeply: a key has {MOST_DEPTH} words at most")
     try:
         # Dates are TOML but no JSON.
-        written = json.dumps(tomllib.loads(text), default=str, check_circular=False)
-    except tomllib.TOMLDecodeError as error:
+        written = json.dumps(read_toml(text), default=str, check_circular=False)
+    except TomlError as error:
         raise MalformedBodyError(f"this is not valid TOML: {error}") from error
     except RecursionError as error:
         detail = f"this is nested too deeply for a scene: {MOST_DEPTH} levels are the most"
@@ -107,6 +107,7 @@ def side_by_side(text: str, scene: Mapping[str, Any] | None, source: SceneSource
     text : TOML.
     scene : the tables it is to hold; None: those it holds, None too where it cannot be read.
     """
+    text = text.removeprefix("\ufeff")
     try:
         held = read_text(text, "toml")
     except MalformedBodyError as error:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 import solver
 from optim.errors import DataError
-from optim.identification.readers.export import Choice, guesses, layout_of, read_export, text_of
+from optim.identification.readers.csv_text import read_text
+from optim.identification.readers.encodings import text_of
+from optim.identification.readers.headings import Choice, guesses
+from optim.identification.readers.layout import layout_of
 from optim.identification.reading import read_data, with_columns
 
 SCENE = solver.load_scene("bladed-disk")
@@ -37,7 +39,7 @@ def test_every_layout_gives_the_same_numbers(separator: str, decimal: str) -> No
     guessed = guesses(layout, PATHS)
     assert [one.quantity for one in guessed] == ["frequency", "excitation.amplitude", "max_abs", "phase", ""]
     choices = dict(zip(layout.heads, guessed, strict=True))
-    table = read_export(text, "rig.csv", PATHS, choices).table
+    table = read_text(text, "rig.csv", PATHS, choices).table
     assert table.columns["frequency"].tolist() == HERTZ
     assert table.columns["max_abs"].tolist() == pytest.approx([1e-6 * x for x in MICROMETRES], rel=1e-14)
     assert table.columns["phase"].tolist() == DEGREES
@@ -64,28 +66,29 @@ def test_headings_say_what_they_are(heads: str, found: list[tuple[str, str | Non
 
 
 def test_a_unit_of_a_force_becomes_newtons_and_what_is_wrong_has_its_line() -> None:
-    text = "Hz;kN;mm\n1,0;0,03;2,5\n1,1;0,03;x\n"
+    text = "Hz;kN;mm\n640,0;0,03;2,5\n641,1;0,03;x\n"
     choices = {
         "Hz": Choice("frequency"),
         "kN": Choice("excitation.amplitude", "kN"),
         "mm": Choice("amplitude", "mm"),
     }
     with pytest.raises(DataError, match="line 3") as refused:
-        read_export(text, "rig.csv", PATHS, choices)
+        read_text(text, "rig.csv", PATHS, choices)
     assert "amplitude" in str(refused.value)
-    table = read_export(text.replace("x", "2,6"), "rig.csv", PATHS, choices).table
-    assert np.all(table.columns["excitation.amplitude"] == 30.0)
-    assert table.columns["amplitude"].tolist() == pytest.approx([2.5e-3, 2.6e-3])
+    right = text.replace("x", "2,6")
+    [run] = read_data(SCENE, [read_text(right, "rig.csv", PATHS, choices)])
+    assert run.conditions == {"excitation.amplitude": pytest.approx(30.0, rel=1e-15)}
+    assert run.observations.tolist() == pytest.approx([2.5e-3, 2.6e-3])
     with pytest.raises(DataError, match="must be a heading: Hz, kN, mm"):
-        read_export(text, "rig.csv", PATHS, {"Weg": Choice("amplitude")})
+        read_text(text, "rig.csv", PATHS, {"Weg": Choice("amplitude")})
     wrong = {"Hz": Choice("frequency"), "mm": Choice("amplitude", "kg")}
     with pytest.raises(DataError, match="must be in m, "):
-        read_export(text.replace("x", "2,6"), "rig.csv", PATHS, wrong)
+        read_text(text.replace("x", "2,6"), "rig.csv", PATHS, wrong)
 
 
 def test_a_text_without_headings_or_numbers_is_refused() -> None:
     for text in ("", "a;b\nc;d\n", "1,5;2,5\n1,6;2,6\n"):
-        with pytest.raises(DataError, match="must have a line of headings"):
+        with pytest.raises(DataError, match="must have a line of column heads"):
             layout_of(text, "rig.csv")
 
 

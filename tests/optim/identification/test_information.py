@@ -82,6 +82,20 @@ def test_a_contact_that_hardly_sticks_does_not_tell_its_stiffness() -> None:
     assert "never sticks for long" in found.untold[0].words
 
 
+def test_one_cause_is_said_and_no_two_that_contradict_each_other() -> None:
+    """A contact that sticks throughout in the best fit, with data that no contact here has."""
+    hertz = np.linspace(0.85, 1.6, 16)
+    strange = {"frequency": hertz.tolist(), "amplitude": (1.0 + 0.9 * np.sin(25.0 * hertz)).tolist()}
+    for load in (4.0, 100.0, 5000.0):
+        found = identified([{**strange, "conditions": {"damper.N0": load}}], BOUNDS, harmonics=3)
+        assert found.misfit
+        assert not any("never" in one.words for one in found.untold)
+        assert found.misfit.count("look as if") + found.misfit.count("Look at the fit") <= 1
+    stuck = identified([run({"damper.N0": 5000.0})], {"damper.kt": (32.0, 34.0), "damper.mu": (0.1, 0.6)})
+    words = " ".join(one.words for one in stuck.untold)
+    assert not ("never slips" in words and "never sticks" in words), words
+
+
 def test_friction_and_load_show_as_their_product_only() -> None:
     data = [run({"excitation.amplitude": f}) for f in (60.0, 150.0)]
     found = identified(data, {"damper.mu": (0.1, 0.6), "damper.N0": (30.0, 300.0)})

@@ -113,6 +113,7 @@ BAD_SCENES = {
     "not a number": ("N0 = 100.0", "N0 = nan", ["N0", "nan"]),
     "empty band": ("band = [0.2, 2.6]", "band = [2.6, 0.2]", ["band", "[2.6, 0.2]"]),
     "not TOML": ("[structure]", "[structure", ["scene.toml", "TOML", "line"]),
+    "a decimal comma": ("mu = 0.3", "mu = 0,3", ["scene.toml", "0,3: a decimal point, as in 0.3"]),
 }
 
 
@@ -143,6 +144,7 @@ def test_bad_scenes_are_named(run: Run, tmp_path: Path, command: str, case: str)
         ("solve two-dof --frequency 1 --harmonics -2", ["--harmonics", "-2"]),
         ("solve two-dof --frequency 1 --set damper.N0", ["--set", "damper.N0"]),
         ("solve two-dof --frequency 1 --set damper.N0=much", ["--set", "much"]),
+        ("solve two-dof --frequency 1 --set damper.mu=0,3", ["--set", "0,3: a decimal point, as in 0.3"]),
         ("solve two-dof --frequency 1 --set damper.N0=-5", ["damper.N0", "-5.0"]),
         ("solve two-dof --frequency 1 --set bumper.N0=5", ["--set", "bumper.N0", "damper.N0"]),
         ("solve two-dof --frequency 1 --plot picture.gif", ["--plot", "picture.gif", ".png"]),
@@ -223,6 +225,7 @@ def test_bad_options_are_named(run: Run, tmp_path: Path, arguments: str, words: 
 
 FILES = {
     "not TOML": ("limit = [", ["problem.toml", "TOML"]),
+    "a decimal comma": ("\ufefftolerance = 0,05", ["problem.toml", "0,05: a decimal point, as in 0.05"]),
     "not JSON": ('{"limit": NaN}', ["problem.json", "/limit", "finite"]),
     "no table": ("[1, 2]", ["problem.json", "one table"]),
     "another kind": ('kind = "sweep"', ["/kind", "design", "sweep"]),

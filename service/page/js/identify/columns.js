@@ -32,7 +32,9 @@ export function askColumns(host, layouts, quantities, read) {
 
   function head(i) {
     const { heading, quantity, unit } = chosen[i];
-    const of = units.get(quantity) ?? [];
+    // A unit of the heading that is not in the list, such as mm/lbf or g rms, is offered too: another would scale the data.
+    const its = layout.columns[i].quantity === quantity ? layout.columns[i].unit : null;
+    const of = [...new Set([...(its ? [its] : []), ...(units.get(quantity) ?? [])])];
     if (quantity && of.length && !of.includes(unit)) chosen[i].unit = of[0];
     const what = el("select", { "aria-label": `${heading} is` }, el("option", { value: "" }, "leave out"), quantities.map(({ name, words }) => el("option", { value: name, title: words, selected: name === quantity }, name)));
     const unitOf = el("select", { "aria-label": `Unit of ${heading}`, disabled: !of.length }, of.length ? [] : el("option", { value: "" }, "–"), of.map((each) => el("option", { value: each, selected: each === chosen[i].unit }, each)));

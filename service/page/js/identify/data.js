@@ -33,9 +33,14 @@ function fresh(name) {
   }
 }
 
-// Text in UTF-8, else in the code page of western Windows, as rigs write it.
+// Text in UTF-8 or UTF-16 (a byte order mark, or every other byte zero), else in the code page of western Windows.
 async function textOf(file) {
   const bytes = await file.arrayBuffer();
+  const first = new Uint8Array(bytes.slice(0, 4096));
+  const zeros = (from) => first.filter((byte, i) => i % 2 === from && byte === 0).length > first.length / 4;
+  for (const [name, low, high, from] of [["utf-16le", 0xff, 0xfe, 1], ["utf-16be", 0xfe, 0xff, 0]]) {
+    if (first[0] === low && first[1] === high || zeros(from)) return new TextDecoder(name).decode(bytes);
+  }
   try {
     return new TextDecoder("utf-8", { fatal: true }).decode(bytes);
   } catch {
