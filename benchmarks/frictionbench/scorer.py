@@ -437,6 +437,8 @@ def archive(out: str) -> str:
             if place.parent.name in ("cases", "answers", "proofs"):
                 made.write(place, f"frictionbench/{place.parent.name}/{place.name}")
         made.write(Path(checker.__file__), "frictionbench/checker.py")
-        for name in ("case.schema.json", "CITATION.cff", "README.md", "adapters/protocol.py", "model.py"):
+        for name in ("case.schema.json", "CITATION.cff", "README.md"):
             made.write(HERE / name, f"frictionbench/{name}")
+        made.write(ADAPTERS / "protocol.py", "frictionbench/protocol.py")  # as they lie beside an adapter
+        made.write(HERE / "model.py", "frictionbench/benchmarks/frictionbench/model.py")
     return out
