@@ -12,6 +12,8 @@ import stickslip
 from benchmarks.frictionbench import proofs, scenes
 from benchmarks.frictionbench.closed_forms import FORMS
 from benchmarks.frictionbench.model import HERE, Case, NotOfferedError, load
+from benchmarks.frictionbench.multipliers import SHOWN
+from solver.response.stability.floquet import stability
 
 Answer = dict[str, Any]
 WANTED = 10  # digits in which two ways are to agree
@@ -22,7 +24,7 @@ FIRST, FAR, NEAR, CIRCLES = (
     80,
 )  # harmonics of the balance: the first, the most of few contacts, of optima, of circles
 PATCH, FACE = 12, 60  # contacts in space beyond which the balance is not taken so far, and not marched
-BITS, NONE = 256, "none"
+BITS, NONE, ATTRACTING = 256, "none", "attracting"
 SMALL = 1e-10  # of the value, by which it changes with the last doubling where no more is done
 BESIDE = 1e-4  # of the frequency of a peak, by which its neighbours lie apart
 
@@ -80,12 +82,33 @@ def _told(case: Case, ways: dict[str, Answer], failed: dict[str, str]) -> Answer
     if "at" in best:
         told["at"] = best["at"]
     told["proof"] = ways.get("events", {}).pop("proof", None)
+    told |= attraction(case, ways)
     told |= {"ways": len(order), "agreed_digits": round(agreed, 1), "by": ways}
     if failed := {way: why for way, why in failed.items() if why != NONE}:
         told["not_by"] = failed
     if note := case["asked"].get("which") or SETS.get(case["asked"]["what"]):
         told["set"] = note
     return told
+
+
+def attraction(case: Case, ways: dict[str, Answer]) -> Answer:
+    """Return whether the orbit attracts, with its multipliers: bounds of a proof, else estimates alone."""
+    if "harmonics" in case["asked"] or case["asked"]["what"] == "amplification":
+        closed = ways.get("closed form", {}).pop("attracts", None)
+        return {"attracts": closed, "multipliers": "none: of one harmonic alone, or of no orbit"}
+    found = ways.get("events", {}).pop("multipliers", None)
+    if found is None:
+        one = stability(scenes.solved(scenes.scene(case), case["asked"], CIRCLES // 2))
+        every = [
+            [round(float(part), 9) for part in (each.real, each.imag)] for each in one.multipliers[:SHOWN]
+        ]
+        if one.neutral:
+            raise ArithmeticError(f"{case['name']}: which contacts stick all the time is not known")
+        return {"attracts": one.stable, "multipliers": {"estimates": every, "neutral": []}}
+    low, high = (float(each) for each in found["largest"])
+    if low <= 1.0 <= high:
+        raise ArithmeticError(f"{case['name']}: whether it attracts is not known, a multiplier is about 1")
+    return {"attracts": high < 1.0, "multipliers": found}
 
 
 SETS = {
@@ -104,7 +127,11 @@ def _closed(case: Case) -> Answer:
         raise NotOfferedError(NONE)
     with proofs.precision(BITS):
         found = FORMS[case["name"]](case)
-        return proofs.ball(found["value"]) | ({"at": float(found["at"].mid())} if "at" in found else {})
+        return proofs.ball(found["value"]) | {
+            key: float(value.mid()) if key == "at" else value
+            for key, value in found.items()
+            if key != "value"
+        }
 
 
 def _floats(case: Case) -> Answer:
@@ -120,6 +147,8 @@ def _balance(case: Case, most: int) -> Answer:
         raise NotOfferedError("rigid friction has no balance")
     if asked["what"] == "amplification":
         raise NotOfferedError("a formula")
+    if asked.get("which") == ATTRACTING and asked["what"] == "amplitude":
+        raise NotOfferedError("it leads to the shorter motion, which repels")
     if "harmonics" in asked:
         return {"value": repr(float(scenes.answer(case, asked["harmonics"])["value"]))}
     top, levels, v = min(most, _most(case)), list[int](), list[float]()
@@ -162,12 +191,16 @@ def _most(case: Case) -> int:
 
 
 def _march(case: Case) -> Answer:
-    if case["asked"]["what"] not in ("amplitude", "half-peak-to-peak") or "which" in case["asked"]:
+    asked = case["asked"]
+    if (
+        asked["what"] not in ("amplitude", "half-peak-to-peak")
+        or asked.get("which", ATTRACTING) != ATTRACTING
+    ):
         raise NotOfferedError("a march answers single amplitudes alone")
     if len(case["contacts"]) > FACE:  # of one sector
         raise NotOfferedError("too many contacts in space for a march")
-    found = stickslip.march(scenes.scene(case), frequency_hz=case["asked"]["frequency_hz"])
+    found = stickslip.march(scenes.scene(case), frequency_hz=asked["frequency_hz"])
     if not found.converged:
         raise ArithmeticError(found.status.value)
-    half = case["asked"]["what"] == "half-peak-to-peak"
+    half = asked["what"] == "half-peak-to-peak"
     return {"value": repr(float(found.half_peak_to_peak if half else found.max_abs))}

@@ -54,8 +54,14 @@ def sinha_griffin(case: Case) -> dict[str, Any]:
     for _ in range(200):
         middle = ((low + high) / 2).mid()
         low, high = (low, middle) if lost(middle) > 0 else (middle, high)
-    A = low.union(high)
-    return {"value": A, "at": omega(A) / (2 * arb.pi())}
+    A, wider = low.union(high), 1 + arb("1e-9")
+    # More is lost than fed by a motion that is a little larger, and less by a smaller one: it goes back.
+    returns = {bool(lost(A * wider) > 0 > lost(A / wider)), not lost(A * wider) < 0 < lost(A / wider)}
+    return {
+        "value": A,
+        "at": omega(A) / (2 * arb.pi()),
+        "attracts": returns.pop() if len(returns) == 1 else None,
+    }
 
 
 def whitehead(case: Case) -> dict[str, Any]:

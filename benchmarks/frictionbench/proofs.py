@@ -15,7 +15,7 @@ from typing import Any
 from flint import arb, ctx
 
 import stickslip
-from benchmarks.frictionbench import scenes
+from benchmarks.frictionbench import multipliers, scenes
 from benchmarks.frictionbench.model import Case, NotOfferedError, piecewise_linear
 from solver.certificate.checker import STICK, Orbit, System, around, radii
 from solver.modes.certified_cycles import certify_cycle
@@ -66,6 +66,8 @@ def told(proof: stickslip.solutions.Certificate, asked: Answer) -> Answer:
     if proof.certificate is None:
         raise NotProvedError(proof.reason or proof.status.value)
     known = {"events": proof.events, "held": list(proof.held), "proof": proof.certificate}
+    with precision(proof.bits):
+        known["multipliers"] = multipliers.of_proof(proof.certificate)
     if asked["what"] in ("peak", "limit-cycle"):
         known["at"] = sum(proof.frequency_hz) / 2.0
     if asked["what"] == "loss":

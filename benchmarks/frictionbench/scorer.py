@@ -5,25 +5,23 @@ from __future__ import annotations
 import ast
 import json
 import math
-import os
-import select
+import random
 import subprocess
 import sys
-import tempfile
 import venv
 import zipfile
 from pathlib import Path
 from typing import Any
 
+from benchmarks.frictionbench import fence
+from benchmarks.frictionbench.asking import ADAPTERS, ROOT, Code, Score, scaled
 from benchmarks.frictionbench.model import HERE, load, names
 from solver.certificate import checker
 
-ROOT = HERE.parents[1]
-ADAPTERS, RESULTS, MADE = HERE / "adapters", HERE / "results", ROOT / ".frictionbench"
-ONE_THREAD = {f"{name}_NUM_THREADS": "1" for name in ("OMP", "OPENBLAS", "MKL", "NUMBA")}
+RESULTS, MADE = HERE / "results", ROOT / ".frictionbench"
 MOST = 15.6  # digits of a double
-PATIENCE = 30.0  # times the processor time a case may take, on the wall: machines are shared
-Score = dict[str, Any]
+POWERS, TRIES = range(-4, 5), 3  # of 2, the scales a rung is asked in; in how many of them
+AGAIN_BELOW = 0.2  # of the time a case may take, above which it is asked once
 
 
 class MissingError(Exception):
@@ -31,21 +29,23 @@ class MissingError(Exception):
 
 
 def told(adapter: Path) -> dict[str, Any]:
-    """Return the constants of an adapter (NEEDS, RUNGS), read without running it."""
-    found = {}
+    """Return the constants of an adapter, read without running it; MissingError if it has no RUNGS."""
+    found: dict[str, Any] = {"NEEDS": ()}
     for node in ast.parse(adapter.read_text()).body:
         if not isinstance(node, ast.Assign | ast.AnnAssign) or node.value is None:
             continue
         target = node.targets[0] if isinstance(node, ast.Assign) else node.target
         if isinstance(target, ast.Name) and target.id in ("NEEDS", "RUNGS"):
             found[target.id] = ast.literal_eval(node.value)
+    if "RUNGS" not in found:
+        raise MissingError(f"{adapter} has no RUNGS")
     return found
 
 
-def environment(code: str, needs: tuple[str, ...], source: str | None) -> tuple[str, list[str]]:
-    """Return the interpreter of a code, made if need be, and arguments; `source`: a git address or a folder.
+def environment(code: str, needs: tuple[str, ...], source: str | None) -> tuple[str, str]:
+    """Return the interpreter of a code, made if need be, and the folder of its source to be read, or "".
 
-    A source that pip can install is installed, any other is put on the adapter's path.
+    `source` is a git address or a folder. What pip can install is installed, the rest is told the adapter.
 
     Raises
     ------
@@ -53,7 +53,7 @@ def environment(code: str, needs: tuple[str, ...], source: str | None) -> tuple[
         pip or git did not end well.
     """
     if not needs:
-        return sys.executable, []
+        return sys.executable, ""
     folder = MADE / code
     python = folder / "bin" / "python"
     complete = folder / "complete"  # an installation that was broken off is begun anew
@@ -62,7 +62,7 @@ def environment(code: str, needs: tuple[str, ...], source: str | None) -> tuple[
         _ran([str(python), "-m", "pip", "install", "--quiet", *needs])
         complete.touch()
     if source is None:
-        return str(python), []
+        return str(python), ""
     place = Path(source)
     if not place.exists():
         place = folder / "source"
@@ -70,8 +70,8 @@ def environment(code: str, needs: tuple[str, ...], source: str | None) -> tuple[
             _ran(["git", "clone", "--quiet", "--depth", "1", source, str(place)])
     if any((place / name).exists() for name in ("pyproject.toml", "setup.py")):
         _ran([str(python), "-m", "pip", "install", "--quiet", str(place)])
-        return str(python), []
-    return str(python), ["--source", str(place.resolve())]
+        return str(python), ""
+    return str(python), str(place.resolve())
 
 
 def _ran(command: list[str]) -> None:
@@ -80,65 +80,24 @@ def _ran(command: list[str]) -> None:
         raise MissingError(f"`{' '.join(command)}`: {(done.stderr.strip().splitlines() or ['failed'])[-1]}")
 
 
-class Code:
-    """A process of an adapter that answers questions; begun anew when it ends or takes too long."""
-
-    def __init__(self, command: list[str], seconds: float) -> None:
-        self._command, self._seconds = command, seconds
-        self._process: subprocess.Popen[str] | None = None
-
-    def ask(self, case: dict[str, Any], rung: dict[str, Any]) -> Score:
-        """Return value and seconds, or `not_offered`, or `failed` with words."""
-        if self._process is None or self._process.poll() is not None:
-            self.close()
-            self._folder = tempfile.TemporaryDirectory()
-            self._process = subprocess.Popen(
-                self._command, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-                stderr=subprocess.DEVNULL, text=True,
-                cwd=self._folder.name, env={**os.environ, **ONE_THREAD},
-            )  # fmt: skip
-        process = self._process
-        assert process.stdin is not None
-        assert process.stdout is not None
-        process.stdin.write(
-            json.dumps({"case": case, "rung": rung, "again_below": 0.2 * self._seconds}) + "\n"
-        )
-        process.stdin.flush()
-        line = (
-            process.stdout.readline()
-            if select.select([process.stdout], [], [], PATIENCE * self._seconds)[0]
-            else None
-        )
-        if line:
-            return dict(json.loads(line))
-        self.close()
-        return {"failed": "its process ended" if line == "" else f"no answer within {self._seconds:g} s"}
-
-    def close(self) -> None:
-        """End the process."""
-        if self._process is not None:
-            self._process.kill()
-            self._process.communicate()
-            self._process = None
-            self._folder.cleanup()
-
-
 def run(
     code: str, cases: list[str] | tuple[str, ...], *, source: str | None = None, seconds: float = 60.0
 ) -> int:
     """Let a code answer cases and keep its scores; 1 if it cannot run."""
-    adapter = ADAPTERS / f"{code}.py" if "/" not in code else Path(code)
-    if not adapter.exists() or adapter.stem == "protocol":
-        print(f"no adapter {code!r}; there are {', '.join(sorted(codes()))}")
+    adapter = (ADAPTERS / f"{code}.py" if code in codes() else Path(code)).resolve()
+    if not adapter.is_file():
+        print(f"no adapter {code!r}: there is no file {adapter}; there are {', '.join(sorted(codes()))}")
         return 1
-    wants = told(adapter)
     try:
-        python, more = environment(adapter.stem, wants["NEEDS"], source)
+        wants = told(adapter)
+        python, folder = environment(adapter.stem, wants["NEEDS"], source)
     except MissingError as error:
         print(f"{code} cannot run here: {error}")
         return 1
+    if not fence.offered():
+        print("no Landlock here: the adapter has no answers beside it, but could look for them on the disk")
     known = answered()
-    process, scores = Code([python, str(adapter), *more], seconds), kept(adapter.stem)
+    process, scores = Code(adapter, seconds, python, folder), kept(adapter.stem)
     try:
         for name in (name for name in cases if name in known):
             scores[name] = one(process, name, wants["RUNGS"], seconds)
@@ -168,15 +127,29 @@ def kept(code: str) -> dict[str, list[Score]]:
 
 
 def one(process: Code, name: str, rungs: list[dict[str, Any]], seconds: float) -> list[Score]:
-    """Climb the rungs of a code with one case, until one takes too long."""
+    """Climb the rungs of a code with one case, until one takes too long.
+
+    Every rung is asked in several scales: the first may still have to load or compile, the least time counts,
+    and the worst answer.
+    """
     case, answer = load(name), json.loads((HERE / "answers" / f"{name}.json").read_text())
-    found: list[Score] = []
+    known, found = float(answer["value"]), list[Score]()
     for rung in rungs:
-        score = {"rung": rung, **process.ask(case, rung)}
-        if "value" in score:
-            error = abs(score["value"] - float(answer["value"]))
+        tries = list[Score]()
+        for power in random.sample(POWERS, TRIES):
+            asked, by = scaled(case, 2.0**power)
+            tries.append(again := process.ask(asked, rung))
+            again |= {key: again[key] / by for key in ("value", "estimate") if again.get(key) is not None}
+            if "value" not in again or again["seconds"] > AGAIN_BELOW * seconds:
+                break
+        worst = max(tries, key=lambda one: abs(one["value"] - known) if "value" in one else math.inf)
+        score = {"rung": rung, **worst, "seconds": min(one.get("seconds", math.inf) for one in tries)}
+        if "value" not in score:
+            del score["seconds"]
+        else:
+            error = abs(score["value"] - known)
             score["digits"] = digits(error, answer)
-            if score.get("estimate") is not None:
+            if score["estimate"] is not None:
                 score["covered"] = covers(error, score["estimate"], answer)
         found.append(score)
         if (
@@ -204,13 +177,14 @@ def digits(error: float, answer: dict[str, Any]) -> float:
 
 def covers(error: float, estimate: float, answer: dict[str, Any]) -> bool:
     """Tell whether an error is within a code's own estimate, rounding and the answer's own digits apart."""
-    return bool(error <= estimate + (10.0 ** -cap(answer) + 4e-15) * abs(float(answer["value"])))
+    known = abs(float(answer["value"]))  # an estimate as large as the value says nothing
+    return bool(0.0 <= estimate < known and error <= estimate + (10.0 ** -cap(answer) + 4e-15) * known)
 
 
 def best(scores: list[Score]) -> Score | None:
     """Return the score of most digits, of the cheapest among equals."""
     solved = [score for score in scores if "digits" in score]
-    return max(solved, key=lambda one: (one["digits"], -one["seconds"]), default=None)
+    return max(solved, key=lambda one: (one["digits"], -one.get("seconds", math.inf)), default=None)
 
 
 def words(scores: list[Score]) -> str:
@@ -222,7 +196,7 @@ def words(scores: list[Score]) -> str:
         last = scores[-1]
         return f"– {last['not_offered']}" if "not_offered" in last else f"failed: {last['failed']}"
     wrong = sum("failed" in score for score in scores)
-    told_ = f"{top['digits']:.1f} in {_time(top['seconds'])}"
+    told_ = f"{top['digits']:.1f}" + (f" in {_time(top['seconds'])}" if "seconds" in top else ", not timed")
     return told_ + (f", {wrong} of {len(scores)} failed" if wrong else "")
 
 
@@ -232,7 +206,10 @@ def _time(seconds: float) -> str:
 
 def cheapest(scores: list[Score], wanted: float) -> float | None:
     """Return the least seconds in which so many digits were reached."""
-    return min((one["seconds"] for one in scores if one.get("digits", -1.0) >= wanted), default=None)
+    return min(
+        (one["seconds"] for one in scores if "seconds" in one and one.get("digits", -1.0) >= wanted),
+        default=None,
+    )
 
 
 def summary() -> dict[str, Any]:
@@ -243,7 +220,7 @@ def summary() -> dict[str, Any]:
     for code in rivals:
         for name, scores in kept(code).items():
             top = best(scores)
-            if top is not None and top["digits"] >= 2.0:
+            if top is not None and top["digits"] >= 2.0 and "seconds" in top:
                 mine = cheapest(ours.get(name, []), top["digits"])
                 if mine is None or mine > top["seconds"]:
                     slower.append((name, code, top["digits"], top["seconds"], mine))
@@ -274,6 +251,8 @@ def archive(out: str) -> str:
             if place.parent.name in ("cases", "answers", "proofs"):
                 made.write(place, f"frictionbench/{place.parent.name}/{place.name}")
         made.write(Path(checker.__file__), "frictionbench/checker.py")
-        for name in ("case.schema.json", "CITATION.cff", "README.md", "adapters/protocol.py", "model.py"):
+        for name in ("case.schema.json", "CITATION.cff", "README.md"):
             made.write(HERE / name, f"frictionbench/{name}")
+        made.write(ADAPTERS / "protocol.py", "frictionbench/protocol.py")  # as they lie beside an adapter
+        made.write(HERE / "model.py", "frictionbench/benchmarks/frictionbench/model.py")
     return out

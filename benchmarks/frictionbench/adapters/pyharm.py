@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import sys
 from typing import Any
 
 import numpy as np
@@ -60,6 +59,4 @@ def solve(case: dict[str, Any], rung: dict[str, Any]) -> dict[str, Any]:
 
 
 if __name__ == "__main__":
-    # The script's folder holds a file of the package's name, on file systems that do not tell case apart.
-    sys.path.pop(0)
     serve(solve)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
 from typing import Any
 
 from protocol import serve
+
+from benchmarks.frictionbench import scenes
 
 NEEDS: tuple[str, ...] = ()
 RUNGS = [
@@ -20,14 +20,10 @@ RUNGS = [
 
 def solve(case: dict[str, Any], rung: dict[str, Any]) -> dict[str, Any]:
     """Return the answer of `benchmarks.frictionbench.scenes`."""
-    from benchmarks.frictionbench import scenes
-
     rigid = any(one.get("kt") == "inf" for one in case["contacts"])
     exact = bool(rung.get("exact")) and not rigid
     return scenes.answer(case, rung["harmonics"], exact)
 
 
 if __name__ == "__main__":
-    # The script's folder holds a file of the package's name.
-    sys.path[0] = str(Path(__file__).resolve().parents[3])
     serve(solve)

@@ -59,8 +59,6 @@ def _padded(found: Any) -> tuple[Any, ...]:
 
 
 if __name__ == "__main__":
-    # The script's folder holds a file of the package's name.
-    sys.path.pop(0)
     if "--source" in sys.argv:
         sys.path.insert(0, str(Path(sys.argv[sys.argv.index("--source") + 1])))
     serve(solve)
