@@ -15,7 +15,7 @@ from optim.problem.cases import read_case, read_cases
 from optim.problem.numbers import positive
 from optim.problem.problem import READERS, pose, read_start
 from optim.problem.uncertainty_input import read_uncertain
-from optim.problem.variables import check_variables
+from optim.problem.variables import beside_cases, check_variables
 from solver.errors import Issue, Place, SceneError, SettingError
 from solver.scene.scene import Scene
 
@@ -37,12 +37,12 @@ def problem_issues(scene: Scene, given: Mapping[str, Any]) -> list[Issue]:
         return []
     refused = _refused(_variables(scene, given))
     sound = not refused
-    refused += _refused(_cases(scene, given)) + _refused(_others(scene, given, sound=sound))
+    refused += _refused(_cases(scene, given, sound=sound)) + _refused(_others(scene, given, sound=sound))
     return [issue for error in refused or [whole] for issue in _told(error, given)]
 
 
 def uncertainty_issues(scene: Scene, given: Mapping[str, Any], uncertain: object) -> list[Issue]:
-    """Return what is wrong with the key `uncertain`; nothing if the variables are wrong: it depends on them.
+    """Return what is wrong with the key `uncertain`; nothing if variables or cases are wrong: it depends on them.
 
     Parameters
     ----------
@@ -50,10 +50,11 @@ def uncertainty_issues(scene: Scene, given: Mapping[str, Any], uncertain: object
     given : the other keys.
     uncertain : tables or a list, see `optim.problem.uncertainty_input.read_uncertain`.
     """
-    if _refused(_variables(scene, given)):
+    if _refused(_variables(scene, given)) or _refused(_cases(scene, given, sound=True)):
         return []
     variables = check_variables(scene, given.get("variables"))
-    refused = _refused([(("uncertain",), partial(read_uncertain, scene, variables, uncertain))])
+    cases = read_cases(scene, given.get("cases"), variables)
+    refused = _refused([(("uncertain",), partial(read_uncertain, scene, variables, uncertain, cases))])
     return [issue for error in refused for issue in _told(error, {"uncertain": uncertain})]
 
 
@@ -72,10 +73,12 @@ def _variables(scene: Scene, given: Mapping[str, Any]) -> Iterator[Piece]:
         yield ("variables", name), partial(check_variables, scene, {name: bounds})
 
 
-def _cases(scene: Scene, given: Mapping[str, Any]) -> Iterator[Piece]:
-    """Yield the reading of each case alone."""
+def _cases(scene: Scene, given: Mapping[str, Any], *, sound: bool) -> Iterator[Piece]:
+    """Yield the reading of each case alone, beside the variables if those are `sound`."""
+    bounds = given.get("variables")
+    variables = beside_cases(check_variables(scene, bounds), bounds) if sound else ()
     for index, case in enumerate(given.get("cases", ())):
-        yield ("cases", index), partial(read_case, scene, index, case)
+        yield ("cases", index), partial(read_case, scene, index, case, variables)
 
 
 def _others(scene: Scene, given: Mapping[str, Any], *, sound: bool) -> Iterator[Piece]:
