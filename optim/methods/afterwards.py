@@ -97,7 +97,7 @@ def _level(
     evaluation = plateau.evaluation
     status: DesignStatus = result.status
     model = model_of(
-        evaluation, result.problem.variables, evaluation.objective or 1.0, natural_scales(result.problem)
+        evaluation, result.problem.variables, evaluation.objective, natural_scales(result.problem)
     )
     found = conditions(model, result.problem.variables, feasibility=model.violation > KEPT)
     if status in (DesignStatus.OPTIMAL, DesignStatus.AT_BOUND, DesignStatus.KINK):
