@@ -184,7 +184,7 @@ def _checked(
         checked.append(
             Checked(
                 values=dict(values), harmonics=2 * few, peak=found.peaks[0].value if good else math.nan,
-                objective=found.objective if good else math.nan,
+                objective=found.objective_told if good else math.nan,
                 feasible=good and found.violation(natural_scales(problem)) <= KEPT,
             )
         )  # fmt: skip

@@ -150,7 +150,7 @@ class DesignSearch:
             BestSoFar(
                 values=dict(evaluation.values),
                 peak=evaluation.peaks[0].value if evaluation.peaks else math.nan,
-                objective=evaluation.objective, feasible=violation <= KEPT,
+                objective=evaluation.objective_told, feasible=violation <= KEPT,
                 verified=known is VERIFIED and not ranked, words=FEWER_HARMONICS if ranked else known,
                 evaluations=(self._above or self).count,
             )
@@ -166,7 +166,7 @@ class DesignSearch:
         return [evaluation for evaluation in self.history if evaluation.good]
 
     def model(self, evaluation: DesignEvaluation) -> Model:
-        """Return the model of a good evaluation, relative to the first whose objective is not 0; made once."""
+        """Return the model of a good evaluation, relative to the first objective that is not 0."""
         scale = self._scale or 1.0
         known = self._models.get(id(evaluation))
         if known is None or known[1].unit != scale:

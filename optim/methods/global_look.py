@@ -101,8 +101,8 @@ SMALL = 1e-6  # share of the way along which a slope is taken
 MOST_BEGINS = 4  # designs that the first local searches begin from
 APART = {1: 1.0 / 256.0, 2: 0.02}  # scaled distance from which two designs of a look are two
 APART_MANY = 0.05
-# Before it is said that no design keeps the limits: designs for each variable, designs to begin from, halvings
-# of the range of one variable everywhere, and where the limits may be kept.
+# Before it is said that no design keeps the limits: designs for each variable, designs to begin from, and
+# halvings of the range of one variable everywhere and where the limits may be kept.
 MORE_EACH, BEGINS_EACH, SEED = 64, 4, 7
 COARSE, FINEST = 6, 10
 

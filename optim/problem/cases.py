@@ -101,7 +101,9 @@ def check_names(cases: Sequence[LoadCase]) -> None:
             raise DesignError("cases", name, "must have names of their own, this one is there twice")
 
 
-def displaced(scene: Scene, own: Iterable[str], paths: Collection[str], values: Iterable[float]) -> str | None:
+def displaced(
+    scene: Scene, own: Iterable[str], paths: Collection[str], values: Iterable[float]
+) -> str | None:
     """Return which of a scene's own parameters does not stay where other paths get values; None if all do.
 
     Among them is what is tied to these: N1 to N0 by its ratio, the loads of a damper to its mass.

@@ -42,7 +42,7 @@ def problem_issues(scene: Scene, given: Mapping[str, Any]) -> list[Issue]:
 
 
 def uncertainty_issues(scene: Scene, given: Mapping[str, Any], uncertain: object) -> list[Issue]:
-    """Return what is wrong with the key `uncertain`; nothing if variables or cases are wrong: it depends on them.
+    """Return what is wrong with the key `uncertain`; nothing if variables or cases are: it depends on them.
 
     Parameters
     ----------

@@ -330,7 +330,7 @@ def _nested(matrix: Real) -> tuple[tuple[float, ...], ...]:
 def _check_extent(
     scene: Scene, variables: Sequence[BoundedVariable], cases: Sequence[LoadCase], found: UncertainSet
 ) -> None:
-    """Raise unless every value that may occur is one that its path may have, and leaves cases what is theirs."""
+    """Raise unless every value that may occur is one its path may have, and leaves cases what is theirs."""
     reach = found.reach() if found.coordinates else np.zeros(0)
     ends = [
         (coordinate, middle + sign * wide)

@@ -188,6 +188,7 @@ def _option(name: str, status: OptionStatus, design: DesignResult | None, least:
     """Return an option as it is told."""
     only = None if design is None else design.evaluation
     return CatalogueOption(
-        name=name, status=status, objective=float("inf") if only is None else only.objective, least=least,
+        name=name, status=status, least=least,
+        objective=float("inf") if only is None else only.objective_told,
         values={} if only is None else dict(only.values),
     )  # fmt: skip

@@ -1,4 +1,4 @@
-"""What a case or an option sets is never overwritten without a word: by variables, uncertain values, cases."""
+"""What a case or an option sets is never overwritten without a word."""
 
 from typing import Any
 
@@ -105,7 +105,7 @@ def test_options_leave_nothing_behind_that_is_overwritten() -> None:
     from optim.studies.catalogue import check_options
 
     options = {"tied": {"damper.N1": 20.0}}
-    with pytest.raises(DesignError, match="does not stay as it is beside damper.N1_ratio"):
+    with pytest.raises(DesignError, match=r"does not stay as it is beside damper\.N1_ratio"):
         check_options(SCENE, options, {"variables": {"damper.N1_ratio": (0.1, 0.5)}})
     with pytest.raises(DesignError, match="is set by the case own: it has no value here"):
         check_options(SCENE, options, {"cases": [{"name": "own", "set": {"damper.N1": 5.0}}]})
