@@ -324,7 +324,8 @@ class DesignResult(MadeOfResponses, Drawn):
             newton_iterations=sum(branch.newton_iterations for branch in self.sweeps),
             tried=[{"values": e.values, "peak": e.peaks[0].value, "at": e.peaks[0].at_hz} for e in tried],
             broken=[
-                {**one.to_json(), "by": json_number(one.told - (one.bound_told or 0.0))} for one in self.broken
+                {**row.to_json(), "by": json_number(row.told - (row.bound_told or 0.0))}
+                for row in self.broken
             ],
             **self.stability.to_json(), **evaluation_json(self.evaluation),
         )  # fmt: skip
