@@ -37,12 +37,12 @@ def problem_issues(scene: Scene, given: Mapping[str, Any]) -> list[Issue]:
         return []
     refused = _refused(_variables(scene, given))
     sound = not refused
-    refused += _refused(_cases(scene, given, sound=sound)) + _refused(_others(scene, given, sound=sound))
+    refused += _refused(_cases(scene, given)) + _refused(_others(scene, given, sound=sound))
     return [issue for error in refused or [whole] for issue in _told(error, given)]
 
 
 def uncertainty_issues(scene: Scene, given: Mapping[str, Any], uncertain: object) -> list[Issue]:
-    """Return what is wrong with the key `uncertain`; nothing if variables or cases are: it depends on them.
+    """Return what is wrong with the key `uncertain`; nothing if the variables are wrong: it depends on them.
 
     Parameters
     ----------
@@ -50,10 +50,12 @@ def uncertainty_issues(scene: Scene, given: Mapping[str, Any], uncertain: object
     given : the other keys.
     uncertain : tables or a list, see `optim.problem.uncertainty_input.read_uncertain`.
     """
-    if _refused(_variables(scene, given)) or _refused(_cases(scene, given, sound=True)):
+    read = partial(check_variables, scene, given.get("variables"))
+    if _refused(_variables(scene, given)) or _refusal(("variables",), read) is not None:
         return []
-    variables = check_variables(scene, given.get("variables"))
-    cases = read_cases(scene, given.get("cases"), variables)
+    variables = read()
+    read_all = partial(read_cases, scene, given.get("cases"), variables)
+    cases = read_all() if _refusal(("cases",), read_all) is None else ()
     refused = _refused([(("uncertain",), partial(read_uncertain, scene, variables, uncertain, cases))])
     return [issue for error in refused for issue in _told(error, {"uncertain": uncertain})]
 
@@ -73,10 +75,11 @@ def _variables(scene: Scene, given: Mapping[str, Any]) -> Iterator[Piece]:
         yield ("variables", name), partial(check_variables, scene, {name: bounds})
 
 
-def _cases(scene: Scene, given: Mapping[str, Any], *, sound: bool) -> Iterator[Piece]:
-    """Yield the reading of each case alone, beside the variables if those are `sound`."""
+def _cases(scene: Scene, given: Mapping[str, Any]) -> Iterator[Piece]:
+    """Yield the reading of each case alone, beside the variables if those are right."""
     bounds = given.get("variables")
-    variables = beside_cases(check_variables(scene, bounds), bounds) if sound else ()
+    read = partial(check_variables, scene, bounds)
+    variables = beside_cases(read(), bounds) if _refusal(("variables",), read) is None else ()
     for index, case in enumerate(given.get("cases", ())):
         yield ("cases", index), partial(read_case, scene, index, case, variables)
 

@@ -344,7 +344,9 @@ def _check_extent(
             path = displaced(case.scene, case.own, coordinate.paths, (value,))
             if path is not None:
                 wanted = f"sets {path}, as the case {case.name} does: give a deviation from what that has"
-                raise DesignError((*_WHERE, coordinate.name), value, f'{wanted}, {{"deviation": 0.1}}')
+                raise DesignError(
+                    (*_WHERE, coordinate.name), coordinate.name, f'{wanted}, {{"deviation": 0.1}}'
+                )
 
 
 def check_settings(
