@@ -17,7 +17,8 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 from optim.criteria.key import WORD
 from optim.criteria.key import Form as Form  # with `Criterion` and `Key` all that a criterion is made of
 from optim.criteria.key import Key as Key
-from solver.results.told import Piece
+from solver.arrays import FloatOrNaN
+from solver.results.told import Piece, json_number
 from solver.wording import documented
 
 if TYPE_CHECKING:
@@ -101,6 +102,11 @@ class Criterion:
         "Frequencies [Hz] beyond the band of a case at which it is judged, from what was read; None for "
         "the response over the band.",
     ] = None
+    told: Annotated[
+        Callable[[float], float],
+        "What results say of a value of a row, inf if there is no end to it; a search may count it on.",
+    ] = float
+    endless: Annotated[str, "Why a value is inf, in words."] = ""
     scale: Annotated[
         Callable[[Scene], float], "What an excess over a limit of 0 is relative to, in a scene."
     ] = _unscaled
@@ -135,7 +141,7 @@ class Criterion:
 
     def limit_words(self, row: CriterionRow) -> str:
         """Return the limit of a row in words."""
-        bound = row.bound if row.bound is None or self.smaller_is_better else 0.0 - row.bound
+        bound = row.bound_told if row.bound_told is None or self.smaller_is_better else 0.0 - row.bound_told
         where = f" ({row.what})" if self.with_place else ""
         return f"{self.limit_name or f'{self.name} limit'} of {bound:g} {self.unit}{where}"
 
@@ -194,7 +200,11 @@ class CriterionRow(Piece):
     quantity: Annotated[Criterion, "What it measures."]
     case: Annotated[str, "Name of the load case."]
     what: Annotated[str, "In words, for example ``peak at 753.28 Hz``."]
-    value: Annotated[float, "In the unit of its criterion; the negative where larger is better."]
+    value: Annotated[
+        FloatOrNaN,
+        "In the unit of its criterion; the negative where larger is better. A search may count it on where "
+        "there is no end to it: then it is null in JSON.",
+    ]
     gradient: Annotated[
         Real, "By each variable, per unit of it; NaN where it does not exist, (n_variables,)."
     ]
@@ -206,6 +216,22 @@ class CriterionRow(Piece):
         "Computes the exact second derivatives by the variables, (n_variables, n_variables), NaN where "
         "they do not exist; None where the solver has none.",
     ] = field(default=None, compare=False, repr=False)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return it as one JSON object, value and bound as results say them."""
+        return self._json(value=json_number(self.told), bound=self.bound_told)
+
+    @property
+    def told(self) -> FloatOrNaN:
+        """The value as results say it; inf if there is no end to it, which is null in JSON."""
+        return self.quantity.told(self.value)
+
+    @property
+    def bound_told(self) -> float | None:
+        """The bound as results say it; None without one, and where all that it asks is an end."""
+        if self.bound is None or not math.isfinite(bound := self.quantity.told(self.bound)):
+            return None
+        return bound
 
     def excess(self, scale: float) -> float:
         """Return how far it is above its bound, relative to the bound (to `scale` if that is 0)."""
@@ -255,6 +281,11 @@ class Judged:
         from solver.response.wear import WearSensitivity
 
         return WearSensitivity(self.branch.balance, self.problem.paths) if self.gradients else None
+
+    @property
+    def measured(self) -> str:
+        """What an amplitude is here, in words: max|x| as long as the mean is not free."""
+        return "half peak to peak" if self.branch.balance.scene.observe.centred else "amplitude"
 
     def contacts(self, names: Container[str]) -> list[AnyContact]:
         """Return the contacts of these names, those of every sector of a disk that is written out."""

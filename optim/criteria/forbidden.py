@@ -18,7 +18,7 @@ def _rows(judged: Judged) -> list[CriterionRow]:
     if judged.hertz is None:
         return []
     low, high = judged.hertz
-    what = f"amplitude from {low:g} to {high:g} Hz, highest"
+    what = f"{judged.measured} from {low:g} to {high:g} Hz, highest"
     return maxima(judged, FORBIDDEN, what, bound=judged.problem.limit)
 
 

@@ -97,10 +97,10 @@ def model_of(
     ----------
     evaluation : the design.
     variables : their scaling.
-    scale : the objective of the design that counts as 1.
+    scale : the objective of the design that counts as 1; where that is 0 a unit of it does.
     scales : what an excess over a bound of 0 is relative to, of every criterion in order.
     """
-    by_z, n = slopes(variables, evaluation.values), len(variables)
+    by_z, n, scale = slopes(variables, evaluation.values), len(variables), scale or 1.0
     rows = tuple(row for row in evaluation.rows if row.weight > 0.0)
     limited = tuple(row for row in evaluation.rows if row.bound is not None)
     groups = list(scales)

@@ -7,7 +7,7 @@ each is smooth, only the largest of them is not. That is what the methods of thi
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated
 
@@ -69,10 +69,18 @@ class DesignEvaluation:
 
     @property
     def objective(self) -> float:
-        """What is minimised: for each quantity the largest weighted row, summed."""
+        """What is minimised, as a search counts it: for each quantity the largest weighted row, summed."""
+        return self._summed(lambda row: row.value)
+
+    @property
+    def objective_told(self) -> float:
+        """The same as results say it: inf where there is no end to it."""
+        return self._summed(lambda row: row.told)
+
+    def _summed(self, of: Callable[[CriterionRow], float]) -> float:
         total = 0.0
         for quantity in dict.fromkeys(row.quantity for row in self.rows):
-            weighted = [row.weight * row.value for row in self.of(quantity) if row.weight > 0.0]
+            weighted = [row.weight * of(row) for row in self.of(quantity) if row.weight > 0.0]
             total += max(weighted, default=0.0)
         return total if self.rows else math.inf
 

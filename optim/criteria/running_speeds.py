@@ -32,7 +32,8 @@ def _rows(judged: Judged) -> list[CriterionRow]:
     low, high = judged.hertz
     weight = judged.weight(RUNNING) * judged.case.weight
     bound: float | None = judged.limit(RUNNING).bound
-    return maxima(judged, RUNNING, f"amplitude from {low:g} to {high:g} Hz", bound=bound, weight=weight)
+    what = f"{judged.measured} from {low:g} to {high:g} Hz"
+    return maxima(judged, RUNNING, what, bound=bound, weight=weight)
 
 
 def _read(asked: CriterionContext) -> _Running:

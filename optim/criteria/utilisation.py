@@ -2,7 +2,8 @@
 
 The mean is the static stress of the row with the middle of the motion's range. Where it moves with the
 frequency the peak of the utilisation is not that of the stress; it is looked for as its own, with exact
-gradient and second derivatives (`solver.balance.kernels.haigh`).
+gradient and second derivatives (`solver.balance.kernels.haigh`). Where the mean leaves nothing, rows count
+on: what is minimised alone is then limited to what has an end, and results say inf.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ def _lacking(scene: Scene) -> str:
 def _rows(judged: Judged) -> list[CriterionRow]:
     """A row for every peak of every utilisation that competes."""
     # Loaded here: help of a command, which lists criteria, needs no numbers.
-    from solver.scene.materials import haigh_of
+    from solver.scene.materials import ENDLESS, haigh_of
 
     bounds, scene = judged.limit(UTILISATION) or {}, judged.branch.balance.scene
     rows = _judged(scene)
@@ -42,16 +43,25 @@ def _rows(judged: Judged) -> list[CriterionRow]:
         row
         for one, seen in seen_by(judged, UTILISATION, rows, measures)
         for row in maxima(
-            seen, UTILISATION, f"utilisation of {one.name}", bound=bounds.get(of_row(one)), weight=weight
+            seen, UTILISATION, f"utilisation of {one.name}", weight=weight,
+            bound=bounds.get(of_row(one), ENDLESS),
         )
     ]  # fmt: skip
     return leading(found)
 
 
 def _read(asked: CriterionContext) -> Any:
+    from solver.scene.materials import counted
+
     names = [of_row(one) for one in _judged(asked.scene)]
     margins = by_row(_KEY, asked.values[_KEY], names, _lacking(asked.scene))
-    return {name: 1.0 / margin for name, margin in margins.items()}
+    return {name: counted(1.0 / margin) for name, margin in margins.items()}
+
+
+def _told(value: float) -> float:
+    from solver.scene.materials import utilisation_of
+
+    return utilisation_of(value)
 
 
 UTILISATION = CRITERION = Criterion(
@@ -73,4 +83,6 @@ UTILISATION = CRITERION = Criterion(
     ),
     read=_read,
     lacking=_lacking,
+    told=_told,
+    endless="the mean stress alone reaches the strength",
 )  # fmt: skip

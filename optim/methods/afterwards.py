@@ -97,7 +97,7 @@ def _level(
     evaluation = plateau.evaluation
     status: DesignStatus = result.status
     model = model_of(
-        evaluation, result.problem.variables, evaluation.objective or 1.0, natural_scales(result.problem)
+        evaluation, result.problem.variables, evaluation.objective, natural_scales(result.problem)
     )
     found = conditions(model, result.problem.variables, feasibility=model.violation > KEPT)
     if status in (DesignStatus.OPTIMAL, DesignStatus.AT_BOUND, DesignStatus.KINK):
@@ -184,7 +184,7 @@ def _checked(
         checked.append(
             Checked(
                 values=dict(values), harmonics=2 * few, peak=found.peaks[0].value if good else math.nan,
-                objective=found.objective if good else math.nan,
+                objective=found.objective_told if good else math.nan,
                 feasible=good and found.violation(natural_scales(problem)) <= KEPT,
             )
         )  # fmt: skip

@@ -48,7 +48,7 @@ class DesignSearch:
         self.scouted = 0  # responses of a coarse stage with fewer harmonics
         self._before = 0
         self._most = most
-        self._scale: float | None = None
+        self._scale = 0.0  # the first objective that is not 0
         self._above = above  # the search with all harmonics, for which this one only ranks designs
         self._scout: DesignSearch | None = None
         self._least = (math.inf, math.inf)
@@ -128,8 +128,8 @@ class DesignSearch:
     def keep(self, evaluation: DesignEvaluation) -> None:
         """Add an evaluation to the history and report it."""
         self.history.append(evaluation)
-        if self._scale is None and evaluation.good:
-            self._scale = evaluation.objective or 1.0
+        if not self._scale and evaluation.good:
+            self._scale = evaluation.objective
         if self.on_best is not None and evaluation.good:
             self._compare(evaluation, self.on_best)
         if self.on_progress is not None:
@@ -150,7 +150,7 @@ class DesignSearch:
             BestSoFar(
                 values=dict(evaluation.values),
                 peak=evaluation.peaks[0].value if evaluation.peaks else math.nan,
-                objective=evaluation.objective, feasible=violation <= KEPT,
+                objective=evaluation.objective_told, feasible=violation <= KEPT,
                 verified=known is VERIFIED and not ranked, words=FEWER_HARMONICS if ranked else known,
                 evaluations=(self._above or self).count,
             )
@@ -166,7 +166,7 @@ class DesignSearch:
         return [evaluation for evaluation in self.history if evaluation.good]
 
     def model(self, evaluation: DesignEvaluation) -> Model:
-        """Return the model of a good evaluation, relative to the first one; each is made once."""
+        """Return the model of a good evaluation, relative to the first objective that is not 0."""
         scale = self._scale or 1.0
         known = self._models.get(id(evaluation))
         if known is None or known[1].unit != scale:

@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -30,7 +31,15 @@ from optim.methods.kkt import (
     standing,
     without_limits,
 )
-from optim.methods.surrogate import Taylor, between, candidates, places, promising, taylor_of
+from optim.methods.surrogate import (
+    Taylor,
+    between,
+    candidates,
+    places,
+    promising,
+    quasi_random,
+    taylor_of,
+)
 from optim.problem.variables import Real, scaled, snapped, unscaled
 
 FIRST_STEP = 0.01  # scaled
@@ -92,6 +101,10 @@ SMALL = 1e-6  # share of the way along which a slope is taken
 MOST_BEGINS = 4  # designs that the first local searches begin from
 APART = {1: 1.0 / 256.0, 2: 0.02}  # scaled distance from which two designs of a look are two
 APART_MANY = 0.05
+# Before it is said that no design keeps the limits: designs for each variable, designs to begin from, and
+# halvings of the range of one variable everywhere and where the limits may be kept.
+MORE_EACH, BEGINS_EACH, SEED = 64, 4, 7
+COARSE, FINEST = 6, 10
 
 
 class WholeRange:
@@ -145,6 +158,8 @@ class WholeRange:
             self._starts_given(begins)
             self._rounds()
             self._last()
+            if not self._feasible() and self.search.problem.limits.any:
+                self._everywhere()
         finally:
             if self._scout is not self.search:
                 self.search.scouting_done(self._scout)
@@ -195,6 +210,59 @@ class WholeRange:
                 free = self._local(begin, lambda e: without_limits(self.search.model(e)))
                 self._descend(free)
 
+    def _everywhere(self) -> None:
+        """Look for the least excess over the limits before it is said that no design keeps them."""
+        if self._n == 1:
+            kept = self._between_all()
+        else:
+            more = quasi_random(self._n, 2 ** math.ceil(math.log2(MORE_EACH * self._n)), SEED)
+            self._ahead(more)
+            for z in more:
+                self._look(z)
+            kept = self._least_excess()
+        if kept is not None:
+            self._descend(kept)
+            self._rounds()
+            self._last()
+
+    def _between_all(self) -> DesignEvaluation | None:
+        """Return a design that keeps all limits, of one variable: the range is halved wherever one may lie.
+
+        That is where the slope of the excess at one end of an interval leads to none before the other end.
+        """
+        for _ in range(FINEST):
+            models = sorted(self._models(), key=lambda model: float(model.place[0]))
+            middles = [
+                0.5 * (one.place + other.place)
+                for one, other in pairwise(models)
+                if (wide := float((other.place - one.place)[0])) > 2.0**-FINEST
+                and (wide > 2.0**-COARSE or _may_keep(one, other))
+            ]
+            if not middles:
+                return None
+            self._ahead(middles)
+            for z in middles:
+                self._look(z)
+                last = self._seen[-1]
+                if self.search.model(last).violation <= KEPT:
+                    return last
+        return None
+
+    def _least_excess(self) -> DesignEvaluation | None:
+        """Return a design that keeps all limits, from those of the look that exceed them least."""
+        begun: list[Real] = []
+        for one in sorted(self._seen, key=lambda e: self._scout.model(e).violation):
+            z = scaled(self.search.variables, one.values)
+            if all(np.abs(z - other).max() >= 2.0 * self._apart for other in begun):
+                begun.append(z)
+                for exact in self._exact([one]):
+                    here = self._eased(exact, self.search)
+                    if self.search.model(here).violation <= KEPT:
+                        return here
+            if len(begun) >= BEGINS_EACH * self._n:
+                break
+        return None
+
     def _rounds(self) -> None:
         """Alternate between local searches and further looks until these find nothing."""
         idle, most = 0, max(self.search.problem.basins, min(2 + self._n, MOST_BEGINS))
@@ -227,14 +295,21 @@ class WholeRange:
     def _descend(self, begin: DesignEvaluation) -> None:
         """Search locally from a design, for the limits alone where it ends without keeping them."""
         self._starts.append(scaled(self.search.variables, begin.values))
-        here, ends = begin, []
+        here, ends, watched, joined = begin, list[Local](), _Watched(self), False
         try:
-            if self.search.model(begin).violation > KEPT and not any(local.feasible for local in self.found):
-                here = self._eased(begin)
+            if self.search.model(begin).violation > KEPT and not self._feasible():
+                here = self._eased(begin, watched)
                 ends.append(self._ended(here))
             if not ends or ends[0].feasible:
-                ends.append(self._ended(self._local(here, self.search.model, _Watched(self))))
+                ends.append(self._ended(self._local(here, self.search.model, watched)))
         except JoinedError:
+            joined = True
+        seen = min((begin, here, *watched.best), key=self._standing)
+        known = min([self._best(), *(local.standing for local in ends if not joined)])
+        if self._standing(seen)[0] == 0.0 and _beats(self._standing(seen), known):
+            # What is minimised may lead out of the limits that a design keeps, to an end that breaks them.
+            ends.append(self._strict(seen))
+        elif joined:
             return
         best = min(ends, key=lambda local: local.standing)
         self.found.append(best)
@@ -250,12 +325,25 @@ class WholeRange:
                     self._slack = max(self._slack, self._scout.model(there).violation)
             self._seen.append(there)
 
-    def _eased(self, begin: DesignEvaluation) -> DesignEvaluation:
+    def _feasible(self) -> bool:
+        """Return whether an end keeps all limits."""
+        return any(local.feasible for local in self.found)
+
+    def _standing(self, there: DesignEvaluation) -> tuple[float, float]:
+        return standing(self.search.model(there))
+
+    def _strict(self, begin: DesignEvaluation) -> Local:
+        """Return the end of a search that keeps the limits all the way."""
+        from optim.methods.minimax import thorough_search
+
+        return thorough_search(self.search, self.search.variables, begin, self.search.model, strict=True)
+
+    def _eased(self, begin: DesignEvaluation, evaluate: Evaluate) -> DesignEvaluation:
         """Return the end of a search for a design that keeps all limits: the first that does."""
         from optim.methods.minimax import thorough_search
 
         return thorough_search(
-            _Watched(self), self.search.variables, begin, lambda e: of_limits(self.search.model(e)),
+            evaluate, self.search.variables, begin, lambda e: of_limits(self.search.model(e)),
             enough=1.0 + KEPT,
         ).evaluation  # fmt: skip
 
@@ -402,6 +490,7 @@ class _Watched:
 
     def __init__(self, whole: WholeRange) -> None:
         self._whole, self._best, self._better, self._count = whole, (math.inf, math.inf), 0, 0
+        self.best: list[DesignEvaluation] = []  # the best seen
 
     def __call__(self, values: Mapping[str, float]) -> DesignEvaluation:
         """Evaluate a design.
@@ -417,12 +506,18 @@ class _Watched:
             return found
         here = standing(self._whole.search.model(found))
         if here < self._best:
-            self._best, self._better = here, self._better + 1
+            self._best, self._better, self.best = here, self._better + 1, [found]
             if self._better % LOOK_AHEAD == 0 and self._whole.joins(found):
                 raise JoinedError
         if self._count >= PATIENCE and self._whole.behind(self._best):
             raise JoinedError
         return found
+
+
+def _may_keep(one: Taylor, other: Taylor) -> bool:
+    """Return whether an excess counted from 1 may fall to none between two designs, by value and slopes."""
+    ahead, back = one.at(other.place[None, :])[0], other.at(one.place[None, :])[0]
+    return bool(min(one.value, other.value, ahead, back) <= 1.0 + KEPT)
 
 
 def _falls(model: Taylor, way: Real) -> bool:

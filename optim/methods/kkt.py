@@ -45,7 +45,7 @@ class Local:
 def optimum_at(evaluation: DesignEvaluation, *, settled: bool, feasible: bool) -> LocalOptimum:
     """Return a design whose responses were computed as a local optimum."""
     return LocalOptimum(
-        values=dict(evaluation.values), peak=evaluation.peaks[0].value, objective=evaluation.objective,
+        values=dict(evaluation.values), peak=evaluation.peaks[0].value, objective=evaluation.objective_told,
         settled=settled, feasible=feasible, proven=True,
     )  # fmt: skip
 

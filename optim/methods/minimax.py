@@ -37,7 +37,7 @@ NOTHING = 1e-9  # multipliers below it are rounding of the conic solver
 
 def minimax_search(
     evaluate: Evaluate, variables: tuple[BoundedVariable, ...], begin: DesignEvaluation, model_of: ModelOf, *,
-    ball: bool = False, remembered: int = REMEMBERED, enough: float = -np.inf,
+    ball: bool = False, remembered: int = REMEMBERED, enough: float = -np.inf, strict: bool = False,
 ) -> Local:  # fmt: skip
     """Improve a design until no first-order decrease is left.
 
@@ -50,10 +50,12 @@ def minimax_search(
     ball : whether the trust region is round, otherwise it is a box.
     remembered : designs whose rows are kept as cuts.
     enough : merit from which on nothing better is looked for.
+    strict : whether no step leaves the limits that the design to begin from keeps, however much is gained.
     """
     n = len(variables)
     here, model = begin, model_of(begin)
-    model = replace(model, penalty=min(FIRST_PENALTY * abs(model.objective) or PENALTY, PENALTY))
+    first = PENALTY if strict else min(FIRST_PENALTY * abs(model.objective) or PENALTY, PENALTY)
+    model = replace(model, penalty=first)
     hessian, radius = np.zeros((n, n)), FIRST_RADIUS
     seen: deque[Model] = deque(maxlen=remembered)
     for _ in range(MOST_STEPS):
@@ -98,16 +100,18 @@ def _too_weak(model: Model, step: Step) -> bool:
 
 def thorough_search(
     evaluate: Evaluate, variables: tuple[BoundedVariable, ...], begin: DesignEvaluation, model_of: ModelOf,
-    enough: float = -np.inf,
+    enough: float = -np.inf, *, strict: bool = False,
 ) -> Local:  # fmt: skip
     """Improve a design with cuts, and go on without them where that does not settle.
 
     A row bent over a long step may pass for a new one and hold a search where nothing is.
     """
-    found = minimax_search(evaluate, variables, begin, model_of, enough=enough)
+    found = minimax_search(evaluate, variables, begin, model_of, enough=enough, strict=strict)
     if found.settled or found.merit <= enough:
         return found
-    again = minimax_search(evaluate, variables, found.evaluation, model_of, remembered=0, enough=enough)
+    again = minimax_search(
+        evaluate, variables, found.evaluation, model_of, remembered=0, enough=enough, strict=strict
+    )
     return min(found, again, key=lambda local: (local.standing, not local.settled))
 
 

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+import math
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Annotated
 
 from optim.errors import DesignError
 from optim.problem.numbers import number_pair, positive, whole
+from optim.problem.variables import BoundedVariable
 from solver.errors import Place, SettingError, at
 from solver.scene.scene import Scene
 
 _KEYS = ("name", "set", "band", "observe", "engine_order", "order", "weight")
+SAME = 1e-9  # relative, of a parameter that stays
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -24,6 +27,9 @@ class LoadCase:
     order: Annotated[
         int, "How many times a revolution the excitation repeats; turns speeds into frequencies."
     ]
+    own: Annotated[Mapping[str, float], "Parameter paths it sets, which nothing else may."] = field(
+        default_factory=dict, compare=False, repr=False
+    )
     beside: Annotated[
         str | None,
         "An earlier case that differs in the observed DOF alone, so that one response serves both.",
@@ -46,7 +52,9 @@ def with_engine_order(scene: Scene, engine_order: int) -> Scene:
     return Scene.from_dict(raw)
 
 
-def read_cases(scene: Scene, cases: Sequence[Mapping[str, object]] | None) -> tuple[LoadCase, ...]:
+def read_cases(
+    scene: Scene, cases: Sequence[Mapping[str, object]] | None, variables: Sequence[BoundedVariable] = ()
+) -> tuple[LoadCase, ...]:
     """Return the load cases of a problem; without any, the scene as it is.
 
     Parameters
@@ -55,6 +63,7 @@ def read_cases(scene: Scene, cases: Sequence[Mapping[str, object]] | None) -> tu
     cases : tables with any of `name`, `set` (parameter path to value), `band` ([low, high] in Hz), `observe`
         (a DOF or a list of them: one response each), `engine_order` (cyclic scenes), `order` (excitations a
         revolution; the engine order if left out, else 1), `weight`.
+    variables : what may be chosen: no case may set it, or what it changes.
 
     Raises
     ------
@@ -65,7 +74,7 @@ def read_cases(scene: Scene, cases: Sequence[Mapping[str, object]] | None) -> tu
         return (LoadCase(name=scene.name, scene=scene, weight=1.0, order=max(scene.engine_order, 1)),)
     if not isinstance(cases, Sequence) or isinstance(cases, str) or not cases:
         raise DesignError("cases", cases, "must be a list of at least one table")
-    read = [case for i, table in enumerate(cases) for case in read_case(scene, i, table)]
+    read = [case for i, table in enumerate(cases) for case in read_case(scene, i, table, variables)]
     check_names(read)
     return tuple(replace(case, beside=_served_by(case, read[:i])) for i, case in enumerate(read))
 
@@ -92,7 +101,40 @@ def check_names(cases: Sequence[LoadCase]) -> None:
             raise DesignError("cases", name, "must have names of their own, this one is there twice")
 
 
-def read_case(scene: Scene, index: int, table: object) -> list[LoadCase]:
+def displaced(
+    scene: Scene, own: Iterable[str], paths: Collection[str], values: Iterable[float]
+) -> str | None:
+    """Return which of a scene's own parameters does not stay where other paths get values; None if all do.
+
+    Among them is what is tied to these: N1 to N0 by its ratio, the loads of a damper to its mass.
+    """
+    if (same := next((path for path in own if path in paths), None)) is not None:
+        return same
+    for value in values:
+        there = scene.with_values(dict.fromkeys(paths, value))
+        for path in own:
+            if not math.isclose(there.value(path), scene.value(path), rel_tol=SAME, abs_tol=0.0):
+                return path
+    return None
+
+
+def refuse_displaced(
+    scene: Scene, own: Mapping[str, float], paths: Collection[str], values: Iterable[float], where: Place,
+    words: str = "is a variable",
+) -> None:  # fmt: skip
+    """Raise DesignError at `where` if one of a scene's own parameters does not stay, see `displaced`.
+
+    `words`: what the paths are, as it follows the name of one.
+    """
+    path = displaced(scene, own, paths, values)
+    if path is not None:
+        tied = "" if path in paths else f"does not stay as it is beside {', '.join(paths)}, which "
+        raise DesignError((*where, path), own[path], f"{tied}{words}: it has no value here")
+
+
+def read_case(
+    scene: Scene, index: int, table: object, variables: Sequence[BoundedVariable] = ()
+) -> list[LoadCase]:
     """Return the load cases of one table, one for each DOF it observes; raises like `read_cases`."""
     where: Place = ("cases", index)
     if not isinstance(table, Mapping):
@@ -108,6 +150,9 @@ def read_case(scene: Scene, index: int, table: object) -> list[LoadCase]:
     if not isinstance(values, Mapping):
         raise DesignError((*where, "set"), values, "must be a table of parameter paths and values")
     here = _with_values(here, where, values)
+    for variable in variables:
+        ends = (variable.low, variable.high)
+        refuse_displaced(here, values, variable.paths, ends, (*where, "set"))
     band = _band(where, table.get("band"))
     order = whole((*where, "order"), table.get("order", max(here.engine_order, 1)), least=1)
     weight = positive((*where, "weight"), table.get("weight", 1.0))
@@ -117,7 +162,7 @@ def read_case(scene: Scene, index: int, table: object) -> list[LoadCase]:
         raise DesignError((*where, "observe"), observed, "must be the name of a DOF, or a list of them")
     names = [name if len(dofs) == 1 else f"{name}, {dof}" for dof in dofs]
     return [
-        LoadCase(name=one, scene=_observing(here, where, dof, band), weight=weight, order=order)
+        LoadCase(name=one, scene=_observing(here, where, dof, band), weight=weight, order=order, own=values)
         for one, dof in zip(names, dofs, strict=True)
     ]
 

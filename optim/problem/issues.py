@@ -15,7 +15,7 @@ from optim.problem.cases import read_case, read_cases
 from optim.problem.numbers import positive
 from optim.problem.problem import READERS, pose, read_start
 from optim.problem.uncertainty_input import read_uncertain
-from optim.problem.variables import check_variables
+from optim.problem.variables import beside_cases, check_variables
 from solver.errors import Issue, Place, SceneError, SettingError
 from solver.scene.scene import Scene
 
@@ -50,10 +50,13 @@ def uncertainty_issues(scene: Scene, given: Mapping[str, Any], uncertain: object
     given : the other keys.
     uncertain : tables or a list, see `optim.problem.uncertainty_input.read_uncertain`.
     """
-    if _refused(_variables(scene, given)):
+    read = partial(check_variables, scene, given.get("variables"))
+    if _refused(_variables(scene, given)) or _refusal(("variables",), read) is not None:
         return []
-    variables = check_variables(scene, given.get("variables"))
-    refused = _refused([(("uncertain",), partial(read_uncertain, scene, variables, uncertain))])
+    variables = read()
+    read_all = partial(read_cases, scene, given.get("cases"), variables)
+    cases = read_all() if _refusal(("cases",), read_all) is None else ()
+    refused = _refused([(("uncertain",), partial(read_uncertain, scene, variables, uncertain, cases))])
     return [issue for error in refused for issue in _told(error, {"uncertain": uncertain})]
 
 
@@ -73,9 +76,12 @@ def _variables(scene: Scene, given: Mapping[str, Any]) -> Iterator[Piece]:
 
 
 def _cases(scene: Scene, given: Mapping[str, Any]) -> Iterator[Piece]:
-    """Yield the reading of each case alone."""
+    """Yield the reading of each case alone, beside the variables if those are right."""
+    bounds = given.get("variables")
+    read = partial(check_variables, scene, bounds)
+    variables = beside_cases(read(), bounds) if _refusal(("variables",), read) is None else ()
     for index, case in enumerate(given.get("cases", ())):
-        yield ("cases", index), partial(read_case, scene, index, case)
+        yield ("cases", index), partial(read_case, scene, index, case, variables)
 
 
 def _others(scene: Scene, given: Mapping[str, Any], *, sound: bool) -> Iterator[Piece]:

@@ -127,7 +127,9 @@ class CaseRequest(BaseModel):
 
     name: Name | None = Field(default=None, description="How results call it.")
     set: dict[ParameterPath, Number] = Field(
-        default={}, max_length=1000, description="Values of this case alone, parameter path to value."
+        default={},
+        max_length=1000,
+        description="Values of this case alone, parameter path to value; no variable.",
     )
     band: Pair | None = Field(default=None, description="Frequencies [low, high] [Hz]; the scene's band.")
     observe: Observed | None = Field(default=None, description="DOF whose amplitude counts, or several.")

@@ -13,7 +13,7 @@ from optim.errors import DesignError
 from optim.problem.cases import LoadCase, read_cases
 from optim.problem.keys import BASINS, HARMONICS, MOST_BASINS, TOLERANCE
 from optim.problem.numbers import is_number, positive, word
-from optim.problem.variables import BoundedVariable, check_variables
+from optim.problem.variables import BoundedVariable, beside_cases, check_variables
 from optim.problem.words import Method as Method
 from solver.balance.balance import check_harmonics
 from solver.contacts.laws.base import without_second
@@ -104,7 +104,8 @@ def pose(scene: Scene, **given: Any) -> Problem:
         raise TypeError(f"there is no argument {unknown!r}; there are {', '.join(sorted(known))}")
     keys: dict[str, Any] = {name: given.get(name) for name in known}
     chosen = check_variables(scene, keys["variables"], keys["scaling"])
-    cases, limit = read_cases(scene, keys["cases"]), keys["limit"]
+    cases = read_cases(scene, keys["cases"], beside_cases(chosen, keys["variables"]))
+    limit = keys["limit"]
     if limit is not None:
         positive("limit", limit)
     limits = _limits(scene, cases, limit, keys)

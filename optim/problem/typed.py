@@ -23,7 +23,7 @@ class Case(Mapping[str, object]):
     name : str or None
         How results call it.
     set : mapping or None
-        Values of this case alone, parameter path to value.
+        Values of this case alone, parameter path to value; no variable.
     band : (low, high) or None
         Frequencies [Hz].
     observe : str or list of str or None

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.special import gammaincinv
 
 from optim.errors import DesignError
+from optim.problem.cases import LoadCase, displaced
 from optim.problem.numbers import is_number
 from optim.problem.uncertainty_set import Coordinate, Disk, How, Scenario, UncertainSet, UncertaintyShape
 from optim.problem.variables import BoundedVariable, Real
@@ -28,7 +29,9 @@ _WHERE: Place = ("uncertain",)
 _FORM = "must be a table of intervals, a table of an ellipsoid, or a list of samples"
 
 
-def read_uncertain(scene: Scene, variables: Sequence[BoundedVariable], uncertain: object) -> UncertainSet:
+def read_uncertain(
+    scene: Scene, variables: Sequence[BoundedVariable], uncertain: object, cases: Sequence[LoadCase] = ()
+) -> UncertainSet:
     """Return the set of scenarios of a description.
 
     Parameters
@@ -49,6 +52,7 @@ def read_uncertain(scene: Scene, variables: Sequence[BoundedVariable], uncertain
         Intervals and ellipsoids may have ``mistuning`` on top: ``{"of": …, "spread": 0.01, "seeds": [1, 2]}``
         or ``{"of": …, "values": [[factor of each sector], …]}``. ``{"of": …, "within": 0.03}``, with
         intervals or alone, leaves every blade a factor from 0.97 to 1.03.
+    cases : the load cases: of what one sets only deviations can be uncertain.
 
     Raises
     ------
@@ -61,7 +65,7 @@ def read_uncertain(scene: Scene, variables: Sequence[BoundedVariable], uncertain
         mistuning = uncertain.get("mistuning")
         if isinstance(mistuning, Mapping) and "within" in mistuning:
             found = _free_blades(scene, chosen, uncertain, mistuning)
-            _check_extent(scene, variables, found)
+            _check_extent(scene, variables, cases, found)
             return found
         disks = _disks(scene, mistuning, _WHERE)
         ellipsoid = any(key in uncertain for key in ("half_axes", "shape", "covariance", "centre"))
@@ -71,7 +75,7 @@ def read_uncertain(scene: Scene, variables: Sequence[BoundedVariable], uncertain
         found = UncertainSet(shape=UncertaintyShape.LIST, listed=listed)
     else:
         raise DesignError("uncertain", uncertain, _FORM)
-    _check_extent(scene, variables, found)
+    _check_extent(scene, variables, cases, found)
     return found
 
 
@@ -323,15 +327,26 @@ def _nested(matrix: Real) -> tuple[tuple[float, ...], ...]:
     return tuple(tuple(row) for row in matrix.tolist())
 
 
-def _check_extent(scene: Scene, variables: Sequence[BoundedVariable], found: UncertainSet) -> None:
-    """Raise unless every value that may occur is one that its path may have."""
+def _check_extent(
+    scene: Scene, variables: Sequence[BoundedVariable], cases: Sequence[LoadCase], found: UncertainSet
+) -> None:
+    """Raise unless every value that may occur is one its path may have, and leaves cases what is theirs."""
     reach = found.reach() if found.coordinates else np.zeros(0)
     ends = [
         (coordinate, middle + sign * wide)
         for coordinate, middle, wide in zip(found.coordinates, found.centre, reach.tolist(), strict=True)
         for sign in (-1.0, 1.0)
     ]
-    check_settings(scene, variables, [*ends, *(s for scenario in found.listed for s in scenario.settings)])
+    every = [*ends, *(setting for scenario in found.listed for setting in scenario.settings)]
+    check_settings(scene, variables, every)
+    for case in (case for case in cases if case.own):
+        for coordinate, value in (one for one in every if one[0].how is How.VALUE):
+            path = displaced(case.scene, case.own, coordinate.paths, (value,))
+            if path is not None:
+                wanted = f"sets {path}, as the case {case.name} does: give a deviation from what that has"
+                raise DesignError(
+                    (*_WHERE, coordinate.name), coordinate.name, f'{wanted}, {{"deviation": 0.1}}'
+                )
 
 
 def check_settings(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Annotated
 
 import numpy as np
@@ -16,9 +17,12 @@ from optim.problem.numbers import number_pair, word
 from optim.problem.words import Scaling
 from solver.balance.parameter import Kind, resolve
 from solver.errors import at
+from solver.scene.parameter_paths import AMPLITUDE
 from solver.scene.scene import Scene
 
 Real = NDArray[np.float64]
+NOTHING: Mapping[str, tuple[float, float]] = MappingProxyType({AMPLITUDE: (1.0, 2.0)})
+"""Stands for no variable where nothing but the options of a catalogue is chosen."""
 SNAP = 1e-7  # scaled distance within which a variable is put on its bound
 LOGARITHMIC_FROM = 5.0  # ratio of the bounds from which a variable is scaled logarithmically
 
@@ -58,6 +62,13 @@ class BoundedVariable:
     def bend(self, value: float) -> float:
         """Return d² value / d scaled² at `value`."""
         return value * math.log(self.high / self.low) ** 2 if self.logarithmic else 0.0
+
+
+def beside_cases(
+    chosen: tuple[BoundedVariable, ...], given: Mapping[str, tuple[float, float]] | None
+) -> tuple[BoundedVariable, ...]:
+    """Return the variables that no case may set: those given, unless they stand for none."""
+    return () if given is NOTHING else chosen
 
 
 def parameter_values(variables: Sequence[BoundedVariable], values: Mapping[str, float]) -> dict[str, float]:

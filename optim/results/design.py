@@ -18,7 +18,7 @@ from optim.results.parts import CatalogueOption, Checked, CurveCheck, LocalOptim
 from solver.arrays import FloatOrNaN
 from solver.results.base import Drawn, MadeOfResponses
 from solver.results.known import Known, Stable, Verdict, worst
-from solver.results.told import Piece
+from solver.results.told import Piece, json_number
 from solver.results.views import Views
 
 if TYPE_CHECKING:
@@ -323,7 +323,10 @@ class DesignResult(MadeOfResponses, Drawn):
             looked_at=[looked_json(one) for one in self.looked_at if one.good],
             newton_iterations=sum(branch.newton_iterations for branch in self.sweeps),
             tried=[{"values": e.values, "peak": e.peaks[0].value, "at": e.peaks[0].at_hz} for e in tried],
-            broken=[{**row.to_json(), "by": row.value - (row.bound or 0.0)} for row in self.broken],
+            broken=[
+                {**row.to_json(), "by": json_number(row.told - (row.bound_told or 0.0))}
+                for row in self.broken
+            ],
             **self.stability.to_json(), **evaluation_json(self.evaluation),
         )  # fmt: skip
 

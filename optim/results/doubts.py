@@ -39,11 +39,19 @@ def doubts_of(
     if evaluation is None:
         return ()
     return (
+        *_endless(evaluation),
         *_few_harmonics(evaluation, harmonics),
         *_checked(checked, optimum, feasible=feasible),
         *open_peaks(evaluation),
         *_flags(evaluation),
     )
+
+
+def _endless(evaluation: DesignEvaluation) -> list[str]:
+    """What there is no end to, and why."""
+    rows = (row for row in evaluation.rows if math.isinf(row.told))
+    found = {f"{row.what.partition(' at ')[0]} is infinite: {row.quantity.endless}" for row in rows}
+    return sorted(found)
 
 
 def open_peaks(evaluation: DesignEvaluation) -> list[str]:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from solver.results.told import json_number
+
 if TYPE_CHECKING:
     from optim.criteria.linearised import Conditions
     from optim.criteria.rows import DesignEvaluation
@@ -39,7 +41,7 @@ def evaluation_json(evaluation: DesignEvaluation | None) -> dict[str, object]:
     return {
         "peaks": [{"value": peak.value, "at": peak.at_hz, "case": peak.case} for peak in evaluation.peaks],
         "bands": bands_json(evaluation),
-        "objective": evaluation.objective if rows else None,
+        "objective": json_number(evaluation.objective_told) if rows else None,
         "rows": [row.to_json() for row in rows],
         "errors": [
             {"case": case, "peak": known.value, **known.to_json()} for case, known in known_parts(evaluation)
@@ -56,7 +58,7 @@ def looked_json(one: DesignEvaluation) -> dict[str, object]:
     """Return a design of the look over the whole range."""
     kept = all(row.bound is None or row.value <= row.bound for row in one.rows)
     return {
-        "values": dict(one.values), "objective": one.objective, "feasible": kept,
+        "values": dict(one.values), "objective": json_number(one.objective_told), "feasible": kept,
         "n_harmonics": one.harmonics or None,
     }  # fmt: skip
 

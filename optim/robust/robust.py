@@ -165,7 +165,7 @@ def robust_design(
     posed = pose(scene, **with_limits(problem, limits))
     if posed.method is Method.PERFORMANCE_CURVE:
         raise DesignError("method", posed.method.value, "must be another one: a curve knows no uncertainty")
-    over = read_uncertain(scene, posed.variables, uncertain)
+    over = read_uncertain(scene, posed.variables, uncertain, posed.cases)
     search = RobustSearch(
         posed, over, word("aim", aim, Aim), _quantile(quantile), on_progress, should_stop, on_best
     )

@@ -54,7 +54,7 @@ class RobustSearch:
         self._known: tuple[tuple[int, int], tuple[float, float]] | None = (
             None  # over what, standing of the best
         )
-        self._scale: float | None = None
+        self._scale = 0.0
 
     @property
     def variables(self) -> tuple[BoundedVariable, ...]:
@@ -68,7 +68,7 @@ class RobustSearch:
 
     @property
     def scale(self) -> float:
-        """The objective that counts as 1: that of the first design."""
+        """The objective that counts as 1: that of the first design whose objective is not 0."""
         return self._scale or 1.0
 
     def outcome(self, values: Mapping[str, float], scenario: Scenario, *, gradients: bool = True) -> Outcome:
@@ -140,8 +140,8 @@ class RobustSearch:
             if not found[-1].good:
                 break
         evaluation = together(values, found)
-        if self._scale is None and evaluation.good:
-            self._scale = evaluation.objective or 1.0
+        if not self._scale and evaluation.good:
+            self._scale = evaluation.objective
         return evaluation
 
     def model(self, evaluation: DesignEvaluation, count: int) -> Model:

@@ -17,16 +17,16 @@ from optim.criteria.evaluation import evaluate, natural_scales
 from optim.criteria.mass import MASS
 from optim.errors import DesignError
 from optim.methods.kkt import KEPT
+from optim.problem.cases import refuse_displaced
 from optim.problem.problem import Problem, pose
-from optim.problem.variables import parameter_values
+from optim.problem.variables import NOTHING, parameter_values
 from optim.problem.words import Method
 from optim.results.design import DesignResult, DesignStatus
 from optim.results.parts import CatalogueOption, OptionStatus
 from optim.search import solve_problem
-from solver.errors import at
+from solver.errors import Place, at
 from solver.results.told import Piece
 from solver.results.watch import OnProgress, ShouldStop
-from solver.scene.parameter_paths import AMPLITUDE
 from solver.scene.scene import Scene
 
 
@@ -117,15 +117,18 @@ def check_options(
         posed[name] = pose(here, **with_variables(problem))
         if problem.get("variables") == {}:
             posed[name] = replace(posed[name], variables=())
-        for path in values:
-            if path in posed[name].paths:
-                raise DesignError(("options", name, path), values[path], "is a variable: it has no value")
+        where: Place = ("options", name)
+        for variable in posed[name].variables:
+            refuse_displaced(here, values, variable.paths, (variable.low, variable.high), where)
+        for case in posed[name].cases:
+            for path, value in case.own.items():
+                refuse_displaced(here, values, (path,), (value,), where, f"is set by the case {case.name}")
     return posed
 
 
 def with_variables(problem: Mapping[str, Any]) -> dict[str, Any]:
     """Return the keys of a problem with a variable that stands for none where ``variables`` is empty."""
-    return dict(problem) | ({"variables": {AMPLITUDE: (1.0, 2.0)}} if problem.get("variables") == {} else {})
+    return dict(problem) | ({"variables": NOTHING} if problem.get("variables") == {} else {})
 
 
 def _share(on_progress: OnProgress, count: int, of: int) -> OnProgress:
@@ -185,6 +188,7 @@ def _option(name: str, status: OptionStatus, design: DesignResult | None, least:
     """Return an option as it is told."""
     only = None if design is None else design.evaluation
     return CatalogueOption(
-        name=name, status=status, objective=float("inf") if only is None else only.objective, least=least,
+        name=name, status=status, least=least,
+        objective=float("inf") if only is None else only.objective_told,
         values={} if only is None else dict(only.values),
     )  # fmt: skip

@@ -8,6 +8,7 @@ Bannantine, Comer, Handrock, Fundamentals of Metal Fatigue Analysis (Prentice Ha
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Any, Literal, NamedTuple, Self
 
 from pydantic import model_validator
@@ -19,6 +20,10 @@ from solver.results.units import STRESS_UNITS
 LINES = ("goodman", "gerber", "soderberg")
 BENT = LINES.index("gerber")
 """The number of the line that is a parabola."""
+STEEP = 1e3
+"""The utilisation from which a search counts on, see `solver.balance.kernels.haigh`."""
+ENDLESS = 2.0 * STEEP * (1.0 - 1e-9)
+"""What it counts just before the mean stress leaves nothing."""
 
 
 class Material(Part):
@@ -72,6 +77,19 @@ def haigh_of(scene: Any, name: str) -> Haigh:
         line=LINES.index(material.line), fatigue=material.fatigue_strength / unit,
         strength=material.strength / unit, static=row.static or 0.0,
     )  # fmt: skip
+
+
+def utilisation_of(counted: float) -> float:
+    """Return the utilisation that a search counts as so much; inf where the mean stress leaves nothing."""
+    if counted <= STEEP:
+        return counted
+    margin = (2.0 - counted / STEEP) / STEEP
+    return 1.0 / margin if margin > 0.0 else math.inf
+
+
+def counted(utilisation: float) -> float:
+    """Return what a search counts a utilisation as: the inverse of `utilisation_of`."""
+    return utilisation if utilisation <= STEEP else STEEP * (2.0 - STEEP / utilisation)
 
 
 def strength_issue(place: Place, row: dict[str, Any], materials: dict[str, dict[str, Any]]) -> Issue | None:

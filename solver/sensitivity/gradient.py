@@ -271,13 +271,13 @@ class Sensitivities:
         if system.centred == FROM_REST:
             return self._turns[:1].copy(), np.ones(1), np.zeros((1, 1))
         turns = self._tops[:, SIGN, None] * np.exp(1j * np.outer(self._tops[:, TAU], system.ks))
-        by_half, by_mean, mixed, twice = 1.0, 0.0, 0.0, 0.0
+        by_half, by_mean, seconds = 1.0, 0.0, (0.0, 0.0, 0.0)
         if system.centred == UTILISED:
             high, low = (turns @ self._amplitudes.of(self._x)).real
-            _, by_half, by_mean, mixed, twice = utilisation(system.haigh, high, -low)
+            _, by_half, by_mean, *seconds = utilisation(system.haigh, high, -low)
         both = 0.5 * np.array([[1.0, 1.0], [1.0, -1.0]])  # half the range, and the mean, of max x and −min x
         by = np.array([by_half, by_mean]) @ both
-        return turns, by, both.T @ np.array([[0.0, mixed], [mixed, twice]]) @ both
+        return turns, by, both.T @ np.array(seconds)[[[0, 1], [1, 2]]] @ both
 
     def _directions(self) -> Directions:
         """Return what ω and every path change."""

@@ -22,7 +22,7 @@ from solver.continuation.peaks import Peak
 from solver.errors import SettingError, at
 from solver.results.units import STRESS_UNITS
 from solver.results.watch import OnProgress, ShouldStop, shows_progress
-from solver.scene.materials import haigh_of
+from solver.scene.materials import haigh_of, utilisation_of
 from solver.scene.parameter_paths import AMPLITUDE, parameter_of
 from solver.scene.scene import Scene
 from solver.sensitivity.gradient import Sensitivities
@@ -36,7 +36,7 @@ _MOST = 40  # responses to find an allowed excitation
 
 
 class Used(NamedTuple):
-    """What is used most of what is allowed in one response."""
+    """What is used most of what is allowed in one response; inf where the mean stress leaves nothing."""
 
     used: float
     row: str
@@ -53,7 +53,7 @@ def judged_rows(scene: Scene) -> tuple[str, ...]:
 def most_used(branch: Branch) -> Used:
     """Return what is used most, of the stresses of a completed response that have a material."""
     scene = branch.balance.scene
-    return max((_of_row(branch, row) for row in judged_rows(scene)), key=lambda one: one.used)
+    return max((_of_row(branch, row) for row in judged_rows(scene)), key=lambda one: one.peak.value)
 
 
 def _of_row(branch: Branch, row: str) -> Used:
@@ -63,7 +63,7 @@ def _of_row(branch: Branch, row: str) -> Used:
     peak = seen.peaks[0]
     stress = observing(branch, row, measure="half_peak_to_peak", peaks_alone=True).peaks[0].value
     unit = next(one.unit for one in scene.recovery if one.name == row)
-    return Used(peak.value, row, peak, seen, stress * STRESS_UNITS[unit])
+    return Used(utilisation_of(peak.value), row, peak, seen, stress * STRESS_UNITS[unit])
 
 
 class _DamperResponses:

@@ -60,7 +60,11 @@ class MarginDiagram(MadeOfResponses, Drawn):
     level: Annotated[Real, "Excitation amplitudes, (n,)."]
     level_unit: Annotated[str, "Their unit."]
     stress: Annotated[Real, "Alternating stress, or amplitude, of what is used most, (D, n)."]
-    used: Annotated[Real, "Its share of what is allowed; NaN where nothing says what is, (D, n)."]
+    used: Annotated[
+        Real,
+        "Its share of what is allowed; NaN where nothing says what is, inf, which is null in JSON beside a "
+        "stress, where the mean stress alone reaches the strength, (D, n).",
+    ]
     allowed: Annotated[tuple[AllowedExcitation, ...], "What each damper allows, (D,)."]
     n_harmonics: Annotated[int, "Highest harmonic kept."]
     highest: Annotated[tuple[Known, ...], "How well the responses at the levels are known."]

@@ -1,10 +1,12 @@
 """Stresses and their margins as what designs are judged by, against dense responses and differences."""
 
+import math
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
 import pytest
-from cases.stress_scenes import TERMS, stressed
+from cases.stress_scenes import STEEL, TERMS, stressed
 
 import optim
 import solver
@@ -13,6 +15,9 @@ from optim.criteria.stress import STRESS
 from optim.criteria.utilisation import UTILISATION
 from optim.errors import DesignError
 from optim.problem.problem import pose
+from optim.results.design import DesignStatus
+from solver.balance.kernels.haigh import utilisation
+from solver.scene.materials import counted, utilisation_of
 from solver.scene.scene import Scene
 
 HARMONICS = 7
@@ -134,3 +139,81 @@ def test_a_scene_without_a_stress_has_none_to_judge() -> None:
     for keys in ({"weights": {"utilisation": 1.0}}, {"min_margin": 1.5}):
         with pytest.raises(DesignError, match="needs a stress in `recovery` with a `material`"):
             pose(scene, **keys)
+
+
+def beyond(mean: float, *, line: str = "goodman", force: float = 1.0) -> Scene:
+    """One mass on a spring of 1 N/m: a constant force that is its mean stress [GPa] beside the vibration."""
+    return Scene.from_dict({
+        "name": "pulled", "structure": {"kind": "lumped", "masses": {"a": 1.0}, "springs": [
+            {"between": ["a", "ground"], "k": 1.0, "c": 0.06},
+        ]},
+        "contacts": [{"name": "d", "between": ["a", "ground"], "kt": 0.6, "mu": 0.5, "N0": 0.8}],
+        "excitation": [
+            {"dof": "a", "amplitude": 1e-4 * force}, {"dof": "a", "amplitude": mean, "harmonic": 0},
+        ],
+        "observe": {"dof": "a", "band": [0.12, 0.3]},
+        "recovery": [
+            {"name": "root", "unit": "MPa", "terms": {"a": 1000.0}, "static": 0.0, "material": "steel"},
+        ],
+        "materials": [{**STEEL, "line": line}],
+    })  # fmt: skip
+
+
+ENDS = {"goodman": 0.9, "gerber": 0.9, "soderberg": 0.7}
+
+
+@pytest.mark.few(3)
+@pytest.mark.parametrize("line", ENDS)
+@pytest.mark.parametrize("share", [1.01, 1.5, 5.0])
+def test_a_mean_beyond_the_strength_leaves_no_margin(line: str, share: float) -> None:
+    # The spring alone carries the force once the contact slides: its mean is that of the force or below.
+    scene = beyond(share * ENDS[line], line=line)
+    bounds = {"d.N0": (0.001, 0.002)}
+    found = optim.design(scene, variables=bounds, min_margin=1e-6, harmonics=3)
+    assert found.status is DesignStatus.INFEASIBLE
+    assert all(math.isinf(row.told) for row in found.evaluation.of(UTILISATION))  # type: ignore[union-attr]
+    told = found.to_json()
+    assert [row["value"] for row in told["rows"] if row["quantity"] == "utilisation"] == [None]
+    assert any("the mean stress alone reaches the strength" in words for words in found.warnings)
+    assert "infinite" in str(found)
+    goal = optim.design(scene, variables=bounds, weights={"utilisation": 1.0}, harmonics=3)
+    assert goal.status is DesignStatus.INFEASIBLE
+    assert goal.to_json()["objective"] is None
+    light = {"light": {"d.N0": 1e-3}}
+    diagram = solver.margin_diagram(scene, start=1e-3, stop=1e-2, points=2, dampers=light, harmonics=3)
+    assert np.isinf(diagram.used).all()
+    assert [one.end for one in diagram.allowed] == ["below"]
+    assert "infinite" in str(diagram)
+    assert "the mean stress alone reaches the strength" in str(diagram)
+
+
+def test_what_a_search_counts_is_the_utilisation_and_continues_it() -> None:
+    haigh = np.array([0.0, 300.0, 900.0, 0.0])
+    rng = np.random.default_rng(3)
+    for line in (0.0, 1.0):
+        haigh[0] = line
+        seen = []
+        for amplitude, mean in zip(
+            10.0 ** rng.uniform(-9, 4, 400), rng.uniform(-500, 1500, 400), strict=True
+        ):
+            counts = utilisation(haigh, mean + amplitude, mean - amplitude)
+            left = Fraction(1) - (Fraction(max(mean, 0.0)) / 900) ** (1 + int(line))
+            exact = math.inf if left <= 0 else float(Fraction(amplitude) / 300 / left)
+            assert utilisation_of(counts[0]) == pytest.approx(exact, rel=1e-9)
+            step = 1e-6 * amplitude
+            up, down = (utilisation(haigh, mean + amplitude + s, mean - amplitude - s) for s in (step, -step))
+            assert counts[1] == pytest.approx((up[0] - down[0]) / (2.0 * step), rel=1e-4, abs=1e-6)
+            assert counts[3] == pytest.approx(
+                (up[1] - down[1]) / (2.0 * step), rel=1e-3, abs=1e-6 * counts[1]
+            )
+            step = 1e-5
+            up, down = (utilisation(haigh, mean + s + amplitude, mean + s - amplitude) for s in (step, -step))
+            if (up[0] - counts[0]) * (counts[0] - down[0]) > 0.0 and up[1] != counts[1]:
+                assert counts[2] == pytest.approx((up[0] - down[0]) / (2.0 * step), rel=1e-2)
+            seen.append((exact, counts[0]))
+        ordered = sorted(seen)
+        assert [x for _, x in ordered if math.isfinite(_)] == sorted(
+            x for _, x in ordered if math.isfinite(_)
+        )
+        assert min(x for e, x in seen if math.isinf(e)) > max(x for e, x in seen if math.isfinite(e))
+        assert all(counted(utilisation_of(x)) == pytest.approx(x, rel=1e-9) for e, x in seen if e < 1e12)

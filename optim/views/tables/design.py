@@ -82,8 +82,10 @@ def values(optimum: Json) -> Pairs:
     return [(path, parameter(path, value)) for path, value in optimum.items()]
 
 
-def amount(value: float, unit: str) -> str:
-    """A number of a row with its unit; lengths in the one that fits."""
+def amount(value: float | None, unit: str) -> str:
+    """A number of a row with its unit; lengths in the one that fits; of a row null has no end."""
+    if value is None:
+        return "infinite"
     return units.length(value) if unit == "m" else f"{units.number(value)} {unit}"
 
 
@@ -93,7 +95,7 @@ def _pairs(found: Json) -> Pairs:
     peaks: Sequence[Json] = found.get("peaks") or ([found["peak"]] if found["peak"] else [])
     several = len({peak.get("case") for peak in peaks}) > 1
     if any(row["weight"] > 0.0 and row["quantity"] != "peak" for row in found.get("rows", ())):
-        pairs.append(("objective", units.number(found["objective"], 6)))
+        pairs.append(("objective", amount(found["objective"], "").strip()))
     for index, peak in enumerate(peaks):
         of = f" ({peak['case']})" if several else ""
         name = "further peak" if index else "peak"
@@ -151,9 +153,15 @@ def further(found: Json) -> list[Json]:
     """The largest row of each criterion that is minimised besides peak and band."""
     rows = [row for row in found.get("rows", ()) if row["weight"] > 0.0]
     largest: dict[str, Json] = {}
-    for row in sorted(rows, key=lambda row: row["weight"] * row["value"]):
+    for row in sorted(rows, key=lambda row: row["weight"] * height(row)):
         largest[row["quantity"]] = row
     return [row for name, row in largest.items() if name not in ("peak", "band")]
+
+
+def height(row: Json) -> float:
+    """The value of a row; null has no end."""
+    value = row["value"]
+    return math.inf if value is None else float(value)
 
 
 def _plateau(found: Json) -> Pairs:
@@ -220,16 +228,17 @@ def _limits(found: Json) -> ResultTable | None:
         if row["bound"] is None:
             continue
         key = (row["quantity"], row["case"], row["what"].partition(" at ")[0], row["bound"])
-        if key not in worst or row["value"] > worst[key]["value"]:
+        if key not in worst or height(row) > height(worst[key]):
             worst[key] = row
     if not worst:
         return None
     several, kept = len({row["case"] for row in worst.values()}) > 1, _kept(found)
     rows: list[tuple[str, ...]] = []
-    for row in sorted(worst.values(), key=lambda row: row["bound"] - row["value"]):
-        left, unit = row["bound"] - row["value"], row["unit"]
+    for row in sorted(worst.values(), key=lambda row: row["bound"] - height(row)):
+        left, unit = row["bound"] - height(row), row["unit"]
         left = max(left, 0.0) if kept else left
-        holds = f"{amount(left, unit)} left" if left >= 0.0 else f"broken by {amount(-left, unit)}"
+        by = "" if row["value"] is None else f" by {amount(-left, unit)}"
+        holds = f"{amount(left, unit)} left" if left >= 0.0 else f"broken{by}"
         what = f"{row['what']} ({row['case']})" if several else row["what"]
         asked, reached = f"≤ {amount(row['bound'], unit)}", amount(row["value"], unit)
         # A row is kept from above: where larger is better its sign is turned. Older results do not say it.

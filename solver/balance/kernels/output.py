@@ -146,7 +146,7 @@ def measure_motion(system: System, point: Evaluation, x: Real, dx: Real, out: Re
     if system.centred != FROM_REST:
         value, by_half, by_mean = out[HALF_RANGE], 1.0, 0.0
         if system.centred == UTILISED:
-            value, by_half, by_mean, _, _ = utilisation(system.haigh, high, low)
+            value, by_half, by_mean, _, _, _ = utilisation(system.haigh, high, low)
         rise = by_half * out[RANGE_SLOPE] + by_mean * 0.5 * (rise + sink)
         high, low, sink = value, -value, -rise
     out[HIGH], out[LOW], out[HIGH_SLOPE], out[LOW_SLOPE] = high, -low, rise, -sink

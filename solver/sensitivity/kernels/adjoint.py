@@ -84,7 +84,7 @@ def amplitude_slopes(
     if of_both:
         count, tops[0, AMPLITUDE], by_half, by_mean = 1, 0.5 * (high - low), 1.0, 0.0
         if system.centred == UTILISED:
-            tops[0, AMPLITUDE], by_half, by_mean, _, _ = utilisation(system.haigh, high, low)
+            tops[0, AMPLITUDE], by_half, by_mean, _, _, _ = utilisation(system.haigh, high, low)
         for i in range(system.ks.size):
             up, down = turns[0, i], turns[1, i]
             turns[0, i] = 0.5 * (by_half * (up + down) + by_mean * (up - down))

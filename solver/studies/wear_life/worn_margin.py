@@ -22,7 +22,7 @@ from scipy.optimize import brentq
 
 from solver.arrays import Real
 from solver.continuation.branches.observation import observed_balance
-from solver.scene.materials import haigh_of
+from solver.scene.materials import haigh_of, utilisation_of
 from solver.sensitivity.gradient import Sensitivities
 from solver.sensitivity.nonsmooth import peak_gradient
 from solver.studies.margin_diagram import judged_rows, most_used
@@ -40,7 +40,7 @@ class WornMargin:
 
 def worn_margin(course: WearCourse, rows: Sequence[Here]) -> WornMargin:
     """Return what of the stresses allowed is used at instants of a life; errors as `swept`."""
-    used = np.array([_used(course, row.depths)[0] for row in rows])
+    used = np.array([utilisation_of(_used(course, row.depths)[0]) for row in rows])
     nothing = np.full(len(course.paths), math.nan)
     over = next((i for i, one in enumerate(used) if one >= 1.0), None)
     if over is None:
@@ -62,11 +62,11 @@ def worn_margin(course: WearCourse, rows: Sequence[Here]) -> WornMargin:
 
 
 def _used(course: WearCourse, depths: Real, paths: Sequence[str] = ()) -> tuple[float, Real]:
-    """Return what is used most at depths, over the band or where it runs, with derivatives."""
+    """Return what is used most at depths, counted on, over the band or where it runs, with derivatives."""
     scene, conditions = course.wearing.at(depths), course.conditions
     if conditions.blocks is None:
         most = most_used(conditions.swept(scene))
-        return most.used, peak_gradient(Sensitivities(most.branch.balance, paths), most.peak).gradient
+        return most.peak.value, peak_gradient(Sensitivities(most.branch.balance, paths), most.peak).gradient
     found = []
     for hertz, _ in conditions.blocks:
         balance, motion = conditions.at_frequency(scene, hertz)

@@ -256,10 +256,11 @@ def wear_life(found: Json) -> Iterator[Block]:
         met = found["hours_to_limit"]
         said = "not reached" if met is None else f"reached after {units.number(met)} h"
         pairs.append((f"limit {units.length(found['limit'])}", said))
-    used = [one for one in found.get("used", ()) if one is not None]
-    if used:
-        met = found["hours_to_margin"]
-        share = f"{units.number(used[0], 4)} at the beginning, {units.number(used[-1], 4)} at the end"
+    used, met = found.get("used", ()), found.get("hours_to_margin")
+    if met is not None or any(one is not None for one in used):
+        # Beside a margin that is known, null is a mean stress that leaves nothing.
+        first, last = ("infinite" if one is None else units.number(one, 4) for one in (used[0], used[-1]))
+        share = f"{first} at the beginning, {last} at the end"
         pairs.append(("of the stress allowed", share))
         pairs.append(("margin 1", "kept" if met is None else f"reached after {units.number(met)} h"))
     for one in found["switches"]:

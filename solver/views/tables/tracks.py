@@ -56,6 +56,14 @@ def margin(found: Json) -> Iterator[Block]:
     pairs = [("time", units.duration(found["seconds"]))]
     if found["judged_by"] == "amplitude" and all(one is None for row in found["used"] for one in row):
         pairs.insert(0, ("note", "nothing says what is allowed: give stresses a material, or a limit"))
+    endless = {
+        (d, i)
+        for d, (stresses, shares) in enumerate(zip(found["stress"], found["used"], strict=True))
+        for i, (stress, share) in enumerate(zip(stresses, shares, strict=True))
+        if found["judged_by"] == "utilisation" and stress is not None and share is None
+    }
+    if endless:
+        pairs.insert(0, ("note", "the share is infinite where the mean stress alone reaches the strength"))
     yield Summary(f"{title}, {found['n_harmonics']} harmonics", pairs)
     allowed = [
         (
@@ -69,8 +77,18 @@ def margin(found: Json) -> Iterator[Block]:
     names = [one["name"] for one in found["allowed"]]
     for key, title in (("stress", f"{what} [{found['unit']}]"), ("used", "share of what is allowed")):
         rows = [
-            (f"{each:.4g}", *("–" if one is None else f"{one:.4g}" for one in row))
-            for each, *row in zip(level, *found[key], strict=True)
+            (
+                f"{each:.4g}",
+                *(
+                    f"{one:.4g}"
+                    if one is not None
+                    else "infinite"
+                    if key == "used" and (d, i) in endless
+                    else "–"
+                    for d, one in enumerate(row)
+                ),
+            )
+            for i, (each, *row) in enumerate(zip(level, *found[key], strict=True))
         ]
         yield ResultTable(title, (f"excitation [{unit}]", *names), rows)
 

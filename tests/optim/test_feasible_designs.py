@@ -1,0 +1,46 @@
+"""Where designs keep all limits one is found: random limits of every kind beside brute force."""
+
+from typing import Any
+
+import pytest
+from cases.limited_designs import KEPT, brute_force, limited_design
+
+import optim
+import solver
+from optim.criteria.evaluation import evaluate, natural_scales
+from optim.results.design import DesignStatus
+
+WORSE = 1e-3  # relative, of what is minimised, than the best of the grid
+TWO_DOF: dict[str, Any] = {
+    "running_rpm": [[55.0, 66.0]], "max_running_amplitude": 2.3, "harmonics": 3,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "more", [{}, {"start": {"damper.N0": 400.0}}, {"forbidden_hz": [[0.917, 1.1]], "limit": 2.3}]
+)
+def test_limits_kept_on_a_plateau_in_another_basin_are_found(more: dict[str, Any]) -> None:
+    scene = solver.load_scene("two-dof")
+    found = optim.design(scene, variables={"damper.N0": (20.0, 500.0)}, **TWO_DOF | more)
+    assert found.status is DesignStatus.OPTIMAL
+    # By sweeps of their own: the least load from which the contact sticks at these speeds.
+    assert found.optimum["damper.N0"] == pytest.approx(327.386, rel=1e-4)
+    for load, kept in ((326.0, False), (328.0, True), (500.0, True)):
+        branch = solver.sweep(scene.with_values({"damper.N0": load}), start=55 / 60, stop=1.1, harmonics=3)
+        assert branch.peak is not None
+        assert (branch.peak.value <= 2.3) is kept
+
+
+@pytest.mark.few(keep=(2,))
+@pytest.mark.parametrize("seed", range(200))
+def test_infeasible_is_never_said_where_a_grid_keeps_all_limits(seed: int) -> None:
+    asked = limited_design(seed)
+    found = optim.design(**asked)
+    dense = brute_force(found.problem)
+    if found.status is DesignStatus.INFEASIBLE:
+        assert dense.kept == 0
+    if not found.reached:
+        return
+    there = evaluate(found.problem, found.optimum, gradients=False, errors=False)
+    assert there.violation(natural_scales(found.problem)) <= KEPT * (1.0 + 1e-3)
+    assert there.objective <= dense.least * (1.0 + WORSE) + 1e-12
