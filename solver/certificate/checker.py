@@ -14,6 +14,7 @@ import json
 import math
 import re
 import sys
+from collections import Counter
 from functools import reduce
 from itertools import pairwise
 from typing import Any
@@ -44,14 +45,17 @@ PRODUCTS, NUMBERS, HALVINGS = (
     10**5,
 )  # of balls of 128 bits; in one polynomial; for extremes: at most
 WIDER = 8  # boxes tried
-PLAIN = r"-?[0-9]{1,400}(\.[0-9]{1,400})?([eE][+-]?[0-9]{1,3})?"
-BALL = rf"{PLAIN}( \+/- {PLAIN})?|\[{PLAIN} \+/- {PLAIN}\]"
+SIZE = r"[0-9]{1,400}(\.[0-9]{1,400})?([eE][+-]?[0-9]{1,3})?"
+PLAIN, BALL = f"-?{SIZE}", rf"-?{SIZE}( \+/- {SIZE})?|\[-?{SIZE} \+/- {SIZE}\]"
 REACH, TERMS = 2, 18  # halvings of a span for its exponential in floats; powers in that
 ROUNDING, SLACK, TINY = 2.0**-53, 1.0 + 1e-9, 1e-290  # of a float; what bounds lack by their own rounding
 
 
 class RejectedError(Exception):
     """The certificate proves nothing: which inequality fails; its contact, what follows, by how much."""
+
+    def __str__(self) -> str:
+        return str(self.args[0])
 
 
 def require(holds: Any, *told: Any) -> None:
@@ -146,8 +150,8 @@ def waves(value: Any, place: str, least: int, highest: int) -> None:
 
 def once(every: list[Any], place: str) -> None:
     """Look at what may not be there twice."""
-    twice = {repr(each) for each in every if every.count(each) > 1} if len(set(every)) < len(every) else ()
-    require(not twice, f"{place} has {', '.join(sorted(twice)[:5])} twice")
+    twice = sorted(repr(each)[:60] for each, count in Counter(every).items() if count > 1)
+    require(not twice, f"{place} has {', '.join(twice[:5])} twice")
 
 
 def kind_of(contact: Any) -> str:
@@ -278,9 +282,8 @@ def state_proof(raw: Any, driven: bool) -> None:
         for at, each in peaks if least else [("proof", proof)]:
             fields(each, at, "over three")
             orbits = [(f"{at}.over", each["over"]), *many(each["three"], f"{at}.three", 3, 3)]
-            for where, one in orbits:
-                place = BALL if one is each["over"] else PLAIN
-                state_box(one, where, {"frequency_hz": place}, {"load_factor": PLAIN})
+            for k, (where, one) in enumerate(orbits):
+                state_box(one, where, {"frequency_hz": PLAIN if k else BALL}, {"load_factor": PLAIN})
             same = len({one.get("load_factor", "1") for _, one in orbits}) == 1
             require(same, f"{at}: a peak over the frequency must have one load_factor in its four orbits")
         if not least and "load_factor" in proof["over"]:
@@ -825,5 +828,5 @@ if __name__ == "__main__":
         with open(sys.argv[1], "rb") as file:
             check(certificate := read(file.read()))
     except (OSError, IndexError, RejectedError) as error:
-        sys.exit(f"rejected: {error.args[0] if isinstance(error, RejectedError) else error}")
+        sys.exit(f"rejected: {error}")
     sys.stdout.write(f"accepted: {certificate['claims']}\n")
