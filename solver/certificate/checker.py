@@ -39,11 +39,7 @@ NEXT = {  # the states after each state
 }  # fmt: skip
 LARGE, SMALL = 1e100, 1e-100  # numbers are below, and what must be positive is above
 COORDINATES, CONTACTS, ORDER, EVENTS, UNKNOWNS = 300, 500, 1000, 20_000, 100_000  # at most
-PRODUCTS, NUMBERS, HALVINGS = (
-    5e9,
-    2e7,
-    10**5,
-)  # of balls of 128 bits; in one polynomial; for extremes: at most
+PRODUCTS, NUMBERS, HALVINGS = 2e9, 2e7, 20_000  # of balls of 128 bits; in polynomials; for extremes: at most
 WIDER = 8  # boxes tried
 SIZE = r"[0-9]{1,400}(\.[0-9]{1,400})?([eE][+-]?[0-9]{1,3})?"
 PLAIN, BALL = f"-?{SIZE}", rf"-?{SIZE}( \+/- {SIZE})?|\[-?{SIZE} \+/- {SIZE}\]"
@@ -70,12 +66,10 @@ def require(holds: Any, *told: Any) -> None:
 def meant(holds: Any, place: str, value: Any, right: str) -> None:
     """Reject a value that means nothing at its place, and say what would."""
     if not holds:
-        told = f"a {type(value).__name__}"
+        told, small = f"a {type(value).__name__}", not isinstance(value, int) or abs(value) < LARGE
         if isinstance(value, list | dict):
             told += f" of {len(value)}"
-        elif (
-            value is None or isinstance(value, str | float) or (isinstance(value, int) and abs(value) < LARGE)
-        ):
+        elif small and isinstance(value, str | float | int | None):
             told = repr(value)[:60]
         raise RejectedError(f"{place} is {told}, it must be {right}")
 
@@ -103,13 +97,8 @@ def whole(value: Any, place: str, low: int, high: int) -> None:
 
 def number(value: Any, place: str, low: float = -LARGE) -> None:
     """Look at a number, which means its binary value."""
-    right = f"a number from {low:g} to {LARGE:g}"
-    meant(
-        isinstance(value, int | float) and type(value) is not bool and low <= value <= LARGE,
-        place,
-        value,
-        right,
-    )
+    good = isinstance(value, int | float) and type(value) is not bool and low <= value <= LARGE
+    meant(good, place, value, f"a number from {low:g} to {LARGE:g}")
 
 
 def written(value: Any, place: str, pattern: str = PLAIN) -> None:
@@ -120,7 +109,7 @@ def written(value: Any, place: str, pattern: str = PLAIN) -> None:
 
 def words(value: Any, place: str, known: Any) -> None:
     """Look at a word."""
-    meant(type(value) in (str, bool) and value in known, place, value, f"one of {', '.join(map(str, known))}")
+    meant(type(value) is str and value in known, place, value, f"one of {', '.join(map(str, known))}")
 
 
 def named(value: Any, place: str) -> None:
@@ -179,14 +168,9 @@ def state_system(raw: Any) -> None:
     for i, (at, line) in enumerate(many(raw["mass"], "system.mass", n, n)):
         for k, (where, each) in enumerate(many(line, at, n, n)):
             number(each, where, SMALL if i == k else -LARGE)
-    M, scale = (
-        np.array(raw["mass"], float),
-        2.0 ** -np.round(np.log2(np.diag(np.array(raw["mass"], float))) / 2),
-    )
-    require(
-        raw["mass"] == [list(column) for column in zip(*raw["mass"], strict=True)],
-        "system.mass is not symmetric",
-    )
+    M, columns = np.array(raw["mass"], float), zip(*raw["mass"], strict=True)
+    require(raw["mass"] == list(map(list, columns)), "system.mass is not symmetric")
+    scale = 2.0 ** -np.round(np.log2(np.diag(M)) / 2)
     try:  # that it is done for a little less shows it of the matrix (Rump, BIT 46 (2006) 433)
         less = 8 * (n + 2) ** 2 * ROUNDING * np.eye(n)
         heavy = np.isfinite(np.linalg.cholesky(M * scale * scale[:, None] - less)).all()
@@ -235,9 +219,8 @@ def state_orbit(raw: Any, contacts: list[Any], n: int) -> None:
     """Look at the order of events: each contact goes on as its kind can, and ends as it began."""
     fields(raw, "orbit", "begins states events fixed_forces", "pinned")
     number(raw["begins"], "orbit.begins")
-    for c, (at, word) in zip(
-        contacts, many(raw["states"], "orbit.states", *[len(contacts)] * 2), strict=True
-    ):
+    states = many(raw["states"], "orbit.states", len(contacts), len(contacts))
+    for c, (at, word) in zip(contacts, states, strict=True):
         words(word, at, NEXT[kind_of(c)])
     now, moved = list(raw["states"]), set()
     for at, each in many(raw["events"], "orbit.events", 0, EVENTS):
@@ -383,8 +366,8 @@ class System:
         self.d, frequency = self.one + 2 * len(self.orders), at.get("frequency_hz", raw["frequency_hz"])
         self.frequency = None if frequency is None else arb(frequency)  # None: nothing drives it
         self.period = None if frequency is None else 1 / self.frequency
-        push, self.pull, self.free = (arb_mat(self.d, self.d) for _ in range(3))
         self.work.spend(self.d**3 + len(raw["forces"]) * self.d**2)
+        push, self.pull, self.free = (arb_mat(self.d, self.d) for _ in range(3))
         self.work.spend(sum(len(ends) * len(terms) for ends, terms, *_ in raw["springs"]))
         for ends, terms, k, c in raw["springs"]:
             for (i, one), (j, other) in ((end, term) for end in ends for term in terms):

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from functools import cache
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -126,7 +127,7 @@ class Motion:
                 if not (gap and wrong == "goes through") and wrong != "stays open":
                     found.append((j, "closes", -load / size))
                 continue
-            if not (wrong == "pulls"):
+            if wrong != "pulls":
                 found.append((j, OPEN, load / size))
             if gap:
                 continue
@@ -225,7 +226,7 @@ class Motion:
 def extremes(seen: list[Any]) -> tuple[float, float]:
     """Return the least and the most of a motion from values and speeds, by cubics between."""
     low, high = (turn(each[0] for each in seen) for turn in (min, max))
-    for (a, va, s), (b, vb, t) in zip(seen, seen[1:], strict=False):
+    for (a, va, s), (b, vb, t) in pairwise(seen):
         if va * vb < 0.0 and t > s:
             at = np.linspace(0.0, 1.0, 33)
             h00, h10 = (1 + 2 * at) * (1 - at) ** 2, at * (1 - at) ** 2
@@ -241,7 +242,7 @@ def middle(text: str) -> float:
 
 
 def judged(raw: dict[str, Any], within: float = 1e-5) -> str:
-    """Return what is false of a certificate, marched for one period from where its orbit begins, or nothing."""
+    """Return what is false of a certificate, marched for a period from where its orbit begins, or nothing."""
     system, orbit, proof, factor = raw["system"], raw["orbit"], raw["proof"], 1.0
     while "three" in proof:
         proof = proof["three"][1]

@@ -46,15 +46,13 @@ def honest(name: str) -> dict[str, Any]:
 
 def refused(raw: Any) -> str:
     """Return why a certificate is refused, which takes bounded time; nothing where it is accepted."""
-    begun = time.process_time()
+    begun, told = time.process_time(), ""
     try:
         checker.check(raw)
     except checker.RejectedError as error:
-        assert len(error.args[0]) > 10
-        return str(error.args[0])
-    finally:
-        assert time.process_time() - begun < MOST_SECONDS
-    return ""
+        told = str(error)
+    assert time.process_time() - begun < MOST_SECONDS
+    return told
 
 
 @pytest.mark.parametrize("name", [p.stem for p in sorted(PROOFS.glob("*.json")) if p.stat().st_size < 4000])
@@ -76,7 +74,7 @@ VARYING = SPRING | {"waves": [[0, 0.8, 0.0], [1, 0.4, 0.5]]}
 OPENING = SPRING | {"waves": [[0, 0.3, 0.0], [1, 0.8, 0.5]]}
 RIGID, RIGID_OPENING = SPRING | {"kt": None}, OPENING | {"kt": None}
 STOP = NOTHING | {"kn": 2.0, "gap": 0.4, "normal": X, "presses": True}
-FACE = SPRING | {"mu": 0.4, "waves": [[0, 0.3, 0.0]], "kn": 0.8, "normal": [[1, 1.0]], "presses": True}
+FACE = SPRING | {"mu": 0.4, "waves": [[0, 0.02, 0.0]], "kn": 0.8, "normal": [[1, 1.0]], "presses": True}
 
 
 def system(contact: dict[str, Any], hertz: float = 0.15, masses: int = 1) -> dict[str, Any]:
@@ -240,8 +238,8 @@ def test_peaks_of_other_branches_make_no_least_peak() -> None:
 # Ten thousand mutations
 
 ODD = [
-    None, True, False, -1, 0, 1, 2, 0.5, -0.5, 1e308, -1e-300, math.nan, math.inf, "", "x", "1", "nan", [], {},
-    [[]], 10**30, 10**400, "slip+", "stick", "open", [0, 1.0], "1 +/- 1e3", "1e9999", 3.0,
+    None, True, False, -1, 0, 1, 2, 0.5, -0.5, 1e308, -1e-300, math.nan, math.inf, "", "x", "1", "nan", [],
+    {}, [[]], 10**30, 10**400, "slip+", "stick", "open", [0, 1.0], "1 +/- 1e3", "1e9999", 3.0,
 ]  # fmt: skip
 
 
