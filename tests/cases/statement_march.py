@@ -17,7 +17,7 @@ from scipy.linalg import expm
 OPEN, STICK = "open", "stick"
 SIGN = {"slip+": 1.0, "slip-": -1.0}
 WAY = {1.0: "slip+", -1.0: "slip-"}
-STEPS, CHANGES, HARDLY = 200, 400, 1e-12
+STEPS, CHANGES, HARDLY = 200, 60, 1e-12
 
 Guard = tuple[float, str, bool]
 

@@ -21,7 +21,7 @@ from service.cli import main
 from solver.certificate import checker
 from solver.certificate.boxes import boxed, orbit_at, settled
 from solver.certificate.proof_work import ProofHaltedError, allowed
-from tests.cases.statement_march import LostError, forged, judged
+from tests.cases.statement_march import forged, judged
 
 PROOFS = Path(__file__).parents[3] / "benchmarks" / "frictionbench" / "proofs"
 HONEST = (
@@ -91,15 +91,14 @@ def system(contact: dict[str, Any], hertz: float = 0.15, masses: int = 1) -> dic
 
 WRONG = [
     ("never slips", system(SPRING)), ("never slips", system(RIGID, 0.06)),
-    ("slips early", system(SPRING)), ("slips early", system(RIGID, 0.06)),
-    ("slips on", system(SPRING)), ("slips on", system(FACE, masses=2)),
-    ("turns at once", system(SPRING)), ("turns at once", system(RIGID, 0.06)),
-    ("forgets", system(SPRING)), ("friction drives", system(RIGID | {"mu": 0.02})),
-    ("steady load", system(VARYING)), ("holds while open", system(OPENING)),
-    ("stays open", system(OPENING)), ("stays open", system(RIGID_OPENING)),
-    ("stays open", system(FACE, masses=2)), ("pulls", system(OPENING)), ("pulls", system(STOP)),
-    ("pulls", system(FACE, masses=2)), ("goes through", system(STOP)), ("bounces", system(STOP)),
-    ("no reaction", system(STOP)), ("no reaction", system(FACE, masses=2)),
+    ("never slips", system(FACE, masses=2)), ("slips early", system(SPRING)),
+    ("slips early", system(VARYING)), ("slips on", system(SPRING)), ("slips on", system(FACE, masses=2)),
+    ("turns at once", system(SPRING)), ("forgets", system(SPRING)), ("forgets", system(VARYING)),
+    ("friction drives", system(RIGID | {"mu": 0.02})), ("steady load", system(VARYING)),
+    ("steady load", system(VARYING | {"kt": None})), ("stays open", system(OPENING)),
+    ("stays open", system(RIGID_OPENING)), ("stays open", system(FACE, masses=2)),
+    ("pulls", system(STOP)), ("pulls", system(RIGID_OPENING)), ("goes through", system(STOP)),
+    ("bounces", system(STOP)), ("no reaction", system(STOP)), ("no reaction", system(FACE, masses=2)),
     ("rest without force", system(RIGID_OPENING)), ("rest without force", system(RIGID, 0.06)),
 ]  # fmt: skip
 RIGHT = [
@@ -118,11 +117,9 @@ def test_who_forges_by_the_right_laws_is_believed(right: dict[str, Any]) -> None
 
 @pytest.mark.parametrize(("wrong", "right"), WRONG)
 def test_a_law_violated_once_is_refused(wrong: str, right: dict[str, Any]) -> None:
-    try:
-        raw = forged(right, wrong)
-    except (LostError, IndexError, FloatingPointError):
-        return  # no motion repeats under such a law
+    raw = forged(right, wrong)
     assert refused(raw)
+    assert judged(raw)
 
 
 # Statements without a meaning
@@ -226,13 +223,17 @@ def test_a_load_that_is_a_wave_alone_is_no_constant_one() -> None:
 
 
 def test_peaks_of_other_branches_make_no_least_peak() -> None:
-    raw = honest("optimum-1")
-    assert refused(raw) == ""
-    three = raw["proof"]["three"]
-    for orbit in [three[0]["over"], *three[0]["three"]]:
-        middle, *_ = orbit["frequency_hz"].split(" +/- ")
-        orbit["frequency_hz"] = orbit["frequency_hz"].replace(middle, f"{float(middle) * 1.01!r}")
-    assert refused(raw)
+    """A peak that is higher elsewhere does not make the one here the least."""
+    proof = (raw := honest("optimum-1"))["proof"]
+    orbits = [proof["over"], *(each["over"] for each in proof["three"])]
+    with checker.ctx.workprec(raw["bits"]):
+        checker.one_branch(checker.Work(), raw, orbits)
+        for key, other in (("frequency_hz", "0.19"), ("load_factor", "1.001")):
+            with pytest.raises(checker.RejectedError):
+                checker.one_branch(checker.Work(), raw, [*orbits[:3], orbits[3] | {key: other}])
+        beside = [each.replace("-2.0", "-2.1") for each in orbits[3]["unknowns"]]
+        with pytest.raises(checker.RejectedError):
+            checker.one_branch(checker.Work(), raw, [*orbits[:3], orbits[3] | {"unknowns": beside}])
 
 
 # Ten thousand mutations
