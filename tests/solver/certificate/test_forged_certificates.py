@@ -271,7 +271,7 @@ def _mutated(raw: dict[str, Any], rng: np.random.Generator) -> dict[str, Any]:
             holder[last], holder[other] = holder[other], holder[last]
         elif way == 3 and isinstance(holder, dict):
             holder[f"{last}s" if rng.random() < 0.5 else "extra"] = value
-        elif way in (4, 5) and type(value) in (int, float):
+        elif way in (4, 5) and type(value) in (int, float) and not abs(value) > 1e99:
             change = float(10.0 ** rng.uniform(-15.0, 1.0)) * float(rng.choice([-1.0, 1.0]))
             holder[last] = [-value, value * (1.0 + change), value + 1, value / 2][int(rng.integers(4))]
         elif way in (4, 5) and isinstance(value, str) and value[:1] in "-0123456789":
