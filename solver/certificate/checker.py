@@ -364,8 +364,7 @@ class System:
         waves = [wave for each in [*raw["forces"], *self.contacts] for wave in each["waves"]]
         self.n, self.one, self.orders = n, 2 * n + len(self.contacts), sorted({0, *(k for k, *_ in waves)})
         self.d, frequency = self.one + 2 * len(self.orders), at.get("frequency_hz", raw["frequency_hz"])
-        self.frequency = None if frequency is None else arb(frequency)  # None: nothing drives it
-        self.period = None if frequency is None else 1 / self.frequency
+        self.period = None if frequency is None else 1 / arb(frequency)  # None: nothing drives it
         self.work.spend(self.d**3 + len(raw["forces"]) * self.d**2)
         push, self.pull, self.free = (arb_mat(self.d, self.d) for _ in range(3))
         self.work.spend(sum(len(ends) * len(terms) for ends, terms, *_ in raw["springs"]))

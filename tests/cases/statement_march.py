@@ -247,7 +247,7 @@ def judged(raw: dict[str, Any], within: float = 1e-5) -> str:
     while "three" in proof:
         proof = proof["three"][1]
     claims = {key: [float(end) for end in span] for key, span in raw["claims"].items()}
-    hertz = system["frequency_hz"] or 0.5 * sum(claims["frequency_hz"])
+    hertz = system["frequency_hz"] or 1.0
     if "frequency_hz" in proof and "unknowns" not in raw["proof"]:
         hertz, factor = middle(proof["frequency_hz"]), middle(proof.get("load_factor", "1"))
     motion = Motion(system, hertz, factor)
@@ -268,6 +268,9 @@ def judged(raw: dict[str, Any], within: float = 1e-5) -> str:
             a = _follows(contacts, orbit["events"], j)[0]
             same = contacts[a]["row"] == contacts[j]["row"]
             start[2 * n + j] = start[2 * n + a] * (1.0 if same else -1.0)
+    if system["frequency_hz"] is None:
+        hertz = 1.0 / sum(middle(each) for each in proof["unknowns"][at:])
+        motion.omega = 2.0 * math.pi * hertz
     w = motion.first(start[:n], start[n : 2 * n], start[2 * n :], orbit["begins"])
     states, size = tuple(orbit["states"]), np.abs(start).max()
     if (worst := motion.least(w, states))[2] < -1e-7:
