@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections import Counter
 from collections.abc import Sequence
@@ -186,11 +187,17 @@ def written(middle: Any, radius: Any) -> str:
 
 
 def claimed(raw: dict[str, Any], found: dict[str, Any]) -> dict[str, tuple[float, float]]:
-    """Put what is proved into the certificate; return it as floats; all rounded outward."""
+    """Put what is proved into the certificate, and see that it can be read; return it as floats.
+
+    All are rounded outward.
+    """
+    from solver.certificate.checker import stated
+
     raw["claims"] = {
         name: [_decimal(each.lower(), ROUND_FLOOR), _decimal(each.upper(), ROUND_CEILING)]
         for name, each in found.items()
     }
+    stated(json.loads(json.dumps(raw)))
     return {
         name: (math.nextafter(float(each.lower()), -math.inf), math.nextafter(float(each.upper()), math.inf))
         for name, each in found.items()

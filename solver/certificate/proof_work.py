@@ -15,7 +15,6 @@ from solver.certificate.checker import System
 UNIT = 1e6  # products of balls
 _BITS = 128.0  # of which a product counts as one
 _EVERY = 0.1  # s between two questions to the caller
-_EXPONENTIAL = 20  # products of matrices in one, about
 
 
 class ProofHaltedError(Exception):
@@ -31,7 +30,7 @@ class ProofAllowance:
 
     def __init__(self, most: float, should_stop: Callable[[], bool] | None) -> None:
         self.most, self.done, self._should_stop = most, 0.0, should_stop
-        self.last: tuple[Any, Counted] | None = None
+        self.last: tuple[Any, System] | None = None
         self._asked = time.perf_counter()
 
     def spend(self, products: float) -> None:
@@ -50,7 +49,7 @@ _ALLOWED: ContextVar[ProofAllowance] = ContextVar("work allowed to a proof")
 
 @contextmanager
 def allowed(most: float, should_stop: Callable[[], bool] | None) -> Iterator[ProofAllowance]:
-    """Count what systems of the class `Counted` do inside."""
+    """Count what systems do inside."""
     allowance = ProofAllowance(most, should_stop)
     token = _ALLOWED.set(allowance)
     try:
@@ -59,23 +58,14 @@ def allowed(most: float, should_stop: Callable[[], bool] | None) -> Iterator[Pro
         _ALLOWED.reset(token)
 
 
-def counted(raw: dict[str, Any], at: dict[str, str]) -> Counted:
+def counted(raw: dict[str, Any], at: dict[str, str]) -> System:
     """Return a system whose work is counted, the last one again where it is asked for again."""
     allowance, key = _ALLOWED.get(), (id(raw), at, ctx.prec)
     if allowance.last is None or allowance.last[0] != key:
-        allowance.last = key, Counted(raw, at)
+        allowance.last = key, System(raw, at, allowance)
     return allowance.last[1]
 
 
-class Counted(System):
-    """A system whose Taylor polynomials and matrix exponentials are counted."""
-
-    def series(self, mode: tuple[int, ...], states: Any, h: Any, most: Any = 1) -> Any:
-        """As that of a system."""
-        _ALLOWED.get().spend(self.d**2 * states.ncols() * (ctx.prec // 4 + 22))
-        return super().series(mode, states, h, most)
-
-    def march(self, mode: tuple[int, ...], z: Any, length: Any) -> tuple[list[Any], Any]:
-        """As that of a system."""
-        _ALLOWED.get().spend(self.d**3)
-        return super().march(mode, z, length)
+def allowance() -> ProofAllowance:
+    """Return what is counted now."""
+    return _ALLOWED.get()

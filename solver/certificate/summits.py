@@ -50,6 +50,7 @@ def _in_long_numbers(
     from flint import ctx
 
     from solver.certificate.checker import prove
+    from solver.certificate.proof_work import allowance
 
     kept = ctx.prec
     try:
@@ -57,7 +58,7 @@ def _in_long_numbers(
         summits = _Summits(raw, set_out(raw, piecewise, found.pieces))
         told = ("peak", "frequency_hz") if what == "peak" else ("least_peak", "load_factor", "frequency_hz")
         raw["proof"] = summits.peak(_STEP) if what == "peak" else summits.least_peak()
-        bounds = prove(raw, raw["proof"], summits.extremes)
+        bounds = prove(raw, raw["proof"], allowance(), summits.extremes)
         return claimed(raw, {name: bounds[name] for name in told})
     finally:
         ctx.prec = kept
@@ -111,7 +112,7 @@ class _Summits:
             motion = [
                 (piece, span, each)
                 for piece, (_, _, length, *found) in enumerate(starts)
-                for span, each in enumerate(orbit.kept(piece, none, length, length, *found))
+                for span, each in enumerate(orbit.kept(piece, none, length, length, *found, near=True))
             ]
             sizes = [
                 np.abs(np.polyval([float(c) for c in p.coeffs()[::-1]], np.linspace(0.0, float(h), _GRID)))
@@ -208,6 +209,6 @@ class _Summits:
         box, self.proved[tuple(where.values())] = boxed(orbit, y, now)
         return where | {"unknowns": box}
 
-    def extremes(self, _: Any, at: dict[str, str]) -> Any:
+    def extremes(self, _work: Any, _raw: Any, at: dict[str, str]) -> Any:
         """Return the extremes and the period of an orbit that is proved."""
         return self.proved[at["frequency_hz"], at["load_factor"]]

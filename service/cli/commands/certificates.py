@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import json
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -32,23 +32,21 @@ def check_proof(
     except ImportError as error:
         raise MissingExtraError("python-flint", "proof") from error
     try:
-        proofs = _proofs(json.loads(file.read_text(encoding="utf-8")))
-        claims = [
-            {name: [float(end) for end in span] for name, span in raw["claims"].items()} for raw in proofs
-        ]
+        proofs = list(_proofs(checker.read(file.read_bytes())))
         if not proofs:
             raise ValueError("nothing is proved in it")
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        raise InputError(f"`FILE`: {str(file)!r} must be a certificate in JSON, got {error!r}") from error
+        for raw in proofs:
+            checker.stated(raw)
+    except (OSError, ValueError, RecursionError, checker.RejectedError) as error:
+        wanted = "must be a certificate in JSON, as this version writes it"
+        raise InputError(f"`FILE`: {str(file)!r} {wanted}, got: {error}") from error
+    claims = [{name: [float(end) for end in span] for name, span in raw["claims"].items()} for raw in proofs]
     reasons = []
     for raw in proofs:
         try:
             checker.check(raw)
         except checker.RejectedError as error:
             reasons.append(error.args[0])
-        except (KeyError, IndexError, TypeError, ValueError) as error:
-            wanted = "must be a certificate as this version writes it"
-            raise InputError(f"`FILE`: {str(file)!r} {wanted}, got {error!r}") from error
     reason = "; ".join(reasons)
     if as_json:
         print_json(
@@ -60,9 +58,13 @@ def check_proof(
     end(not reason, f"The certificate is rejected: {reason}.")
 
 
-def _proofs(raw: dict[str, Any]) -> list[dict[str, Any]]:
+def _proofs(raw: Any) -> Iterator[Any]:
     """Return the certificates of an answer, those of peaks behind each other, or the one that it is."""
-    found = raw.get("certificates", [raw.get("certificate")])
-    if found == [None]:
-        return [raw]
-    return [proof for each in found if each for proof in _proofs(each)]
+    if isinstance(raw, dict) and "certificates" in raw and isinstance(raw["certificates"], list):
+        for each in raw["certificates"]:
+            yield from _proofs(each)
+    elif isinstance(raw, dict) and "certificate" in raw:
+        if raw["certificate"] is not None:
+            yield from _proofs(raw["certificate"])
+    else:
+        yield raw
