@@ -15,6 +15,7 @@ from optim.problem.words import Aim
 from solver.arrays import FloatOrNaN
 from solver.results.base import Drawn, MadeOfResponses
 from solver.results.known import NOTHING_KNOWN, Known
+from solver.results.notes import Note
 from solver.results.order_statistics import quantile_json
 from solver.results.told import Piece, json_number
 from solver.results.views import Views
@@ -230,6 +231,11 @@ class RobustResult(MadeOfResponses, Drawn):
     def known_parts(self) -> Iterable[Known]:
         """The robust optimum, nominal and in its worst scenario; the nominal one where there is no other."""
         return self.design.known_parts() if self.robust is None else (self.robust.known,)
+
+    @property
+    def of_scene(self) -> tuple[Note, ...]:
+        """What of the scene is hardly meant."""
+        return self.design.of_scene
 
     def to_json(self) -> dict[str, Any]:
         """Return the result as one JSON object."""

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 from solver.arrays import FloatOrNaN, Real
 from solver.results.base import Drawn, MadeOfResponses, Shown
 from solver.results.known import NOTHING_KNOWN, Known
+from solver.results.notes import Note
 from solver.results.told import Piece
 from solver.results.views import Data, Views
 from solver.scene.scene import Scene
@@ -133,7 +134,7 @@ class Plan(Shown):
     JSON: ClassVar = (
         "scene effects unknowns linear_dofs contacts n_harmonics=harmonics"
         " estimated_seconds_a_point=seconds_a_point estimated_seconds_of_stability=seconds_of_stability"
-        " estimated_dense_bytes=dense_bytes performance_curve"
+        " estimated_dense_bytes=dense_bytes performance_curve notes"
     )
 
     scene: Annotated[str, "Name of the scene."]
@@ -153,6 +154,7 @@ class Plan(Shown):
         "Estimated cost of the Floquet multipliers of a response [s], infinite (null in JSON) where it is "
         "not known; answers have them by themselves below a second.",
     ] = 0.0
+    notes: Annotated[tuple[Note, ...], "What of the scene is hardly meant."] = ()
 
 
 class InterferenceStatus(Enum):

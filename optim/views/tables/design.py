@@ -9,6 +9,7 @@ from typing import Any
 from optim.views.tables.robust import robust
 from solver.results import units
 from solver.results.known import known_pairs
+from solver.results.notes import note_pairs
 from solver.results.told import Block, ResultTable, Summary
 from solver.scene.parameter_paths import parameter
 from solver.views.tables.responses import proved
@@ -174,7 +175,9 @@ def _errors(found: Json) -> Pairs:
     pairs = [pair for pair in known_pairs(found, besides=("peaks_open",)) if pair[0] != "note"] or pairs
     if "stable" in found:
         pairs.append(("stable", f"{found['stable']}: {found['stable_ground']}"))
-    return pairs + [("warning", words) for words in found.get("warnings", ())]
+    warnings = found.get("warnings", ())
+    pairs += [("warning", words) for words in warnings]
+    return pairs + [pair for pair in note_pairs(found) if pair[1] not in warnings]
 
 
 def _checked(found: Json) -> ResultTable | None:

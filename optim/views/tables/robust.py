@@ -50,8 +50,9 @@ def effort_pairs(found: Json) -> list[tuple[str, str]]:
         pairs.append(("gap of the cuts", f"{found['gap']:.1e}{whole}"))
     if found["optimality"] is not None:
         pairs.append(("KKT residual", f"{found['optimality']:.1e}"))
-    pairs += known_pairs(found)
-    pairs += [("warning", words) for words in found.get("warnings", ())]
+    pairs += (known := known_pairs(found))
+    said = {words for _, words in known}
+    pairs += [("warning", words) for words in found.get("warnings", ()) if words not in said]
     if found["unknown"] is not None:
         pairs.append(("no response", found["unknown"]["words"]))
     effort = f"{found['designs']} designs, {found['responses']} frequency responses"

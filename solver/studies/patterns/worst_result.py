@@ -9,6 +9,7 @@ from typing import Annotated, ClassVar
 
 from solver.arrays import FloatOrNaN
 from solver.results.base import Drawn
+from solver.results.notes import Note
 from solver.results.told import Piece
 from solver.results.views import Data, Views
 from solver.studies.mistuning_result import MistuningStatus
@@ -80,7 +81,8 @@ class WorstMistuning(Drawn):
     )  # fmt: skip
     JSON: ClassVar = (
         "scene dof of within rms detuning contacts tuned_peak tuned_at_hz worst residual whitehead martel"
-        " power_bound starts climbs alike climbed patterns best n_harmonics seconds completed=reached status"
+        " power_bound starts climbs alike climbed patterns best n_harmonics notes seconds completed=reached"
+        " status"
     )
 
     scene: Annotated[str, "Its name."]
@@ -114,6 +116,9 @@ class WorstMistuning(Drawn):
     ]
     climbed: Annotated[int, "Responses with the contacts solved that were computed to climb on."] = 0
     patterns: Annotated[tuple[IntentionalPattern, ...], "Intentional patterns, the best first."] = ()
+    notes: Annotated[
+        tuple[Note, ...], "A highest amplitude, of the tuned disk or the worst, at an end of the band."
+    ] = ()
     n_harmonics: int
     status: WorstMistuningStatus
     seconds: float

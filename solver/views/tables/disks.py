@@ -7,6 +7,7 @@ from typing import Any
 
 from solver.results import units
 from solver.results.known import known_pairs
+from solver.results.notes import note_pairs
 from solver.results.order_statistics import quantile_words
 from solver.results.told import Block, ResultTable, Summary
 
@@ -112,6 +113,7 @@ def worst_mistuning(found: Mapping[str, Any]) -> Iterator[Block]:
     pairs.append(("climbs", f"{climbs}, of which {found['alike']} ended at the same height"))
     if found["climbed"]:
         pairs.append(("responses solved", str(found["climbed"])))
+    pairs += note_pairs(found)
     pairs.append(("time", units.duration(found["seconds"])))
     yield Summary(f"{found['scene']}, contacts {found['contacts']}, {size}", pairs)
     if found["patterns"]:

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from solver.results import units
-from solver.results.notes import BAND_OPEN, FLAGS, between_points, drift_words, flag_words
+from solver.results.notes import BAND_OPEN, FLAGS, between_points, drift_words, flag_words, note_pairs
 from solver.results.told import Block, ResultTable, Summary
 from solver.scene.parameter_paths import parameter
 
@@ -37,6 +37,7 @@ def plan(found: Json) -> Iterator[Block]:
             ("performance curve", found["performance_curve"]),
             ("estimated cost", f"{units.duration(found['estimated_seconds_a_point'])} a point of a branch"),
             ("stability", stability),
+            *note_pairs(found),
         ],
     )
 
@@ -48,8 +49,7 @@ def solution(found: Json) -> Iterator[Block]:
         return
     title = f"{found['scene']} at {found['frequency_hz']:g} Hz, {found['n_harmonics']} harmonics"
     if not found["converged"]:
-        notes = [("note", words) for words in flag_words(found["flags"])]
-        yield Summary(title, [("converged", "no"), *_drift(found), *notes])
+        yield Summary(title, [("converged", "no"), *_drift(found), *_notes(found)])
         return
     pairs = _amplitudes(found)
     if found["error_estimate"] is not None:
@@ -62,12 +62,17 @@ def solution(found: Json) -> Iterator[Block]:
         pairs.append(("stable", f"{found['stable']}: {found['stable_ground']}"))
     if "unique" in found:
         pairs.append(("one response alone", f"{found['unique']}: {found['unique_ground']}"))
-    pairs += [("note", words) for words in flag_words(found["flags"])]
+    pairs += _notes(found)
     low, high = found.get("mean_range", (None, None))
     if low is not None and high is not None:
         pairs.append(("mean, any history", f"{units.length(low)} to {units.length(high)}"))
     pairs += [("residual", f"{found['residual']:.1e}"), ("time", units.duration(found["seconds"]))]
     yield Summary(title, pairs)
+
+
+def _notes(found: Json) -> Pairs:
+    """What a response says of itself by flags, and its notes."""
+    return [("note", words) for words in flag_words(found.get("flags", ()))] + note_pairs(found)
 
 
 def _harmonics(amplitudes: Sequence[float]) -> str:
@@ -140,8 +145,7 @@ def branch(found: Json) -> Iterator[Block]:
     effort = f"{found['newton_iterations']} Newton iterations, {found['rejected_steps']} steps rejected"
     pairs += sure_of(found)
     pairs += _drift(found)
-    pairs += [("note", words) for words in flag_words(found.get("flags", ()))]
-    pairs += _marks(found, path)
+    pairs += _notes(found) + _marks(found, path)
     pairs.append(("points", f"{found['points']} ({effort}, {found['folds']} folds)"))
     pairs.append(("time", units.duration(found["seconds"])))
     yield Summary(title_over(found), pairs)
