@@ -18,6 +18,7 @@ from optim.results.parts import CatalogueOption, Checked, CurveCheck, LocalOptim
 from solver.arrays import FloatOrNaN
 from solver.results.base import Drawn, MadeOfResponses
 from solver.results.known import Known, Stable, Verdict, worst
+from solver.results.measures import Measured
 from solver.results.notes import Note
 from solver.results.told import Piece
 from solver.results.views import Views, on_demand
@@ -117,10 +118,10 @@ class DesignResult(MadeOfResponses, Drawn):
 
     VIEWS: ClassVar = Views("optim.views", "design:design", "of_design", "design_dataset")
     JSON: ClassVar = (
-        "scene method optimum peak n_harmonics=problem.harmonics peaks band_hz limit bands objective rows"
-        " held_by error_estimate stable stable_ground errors warnings plateau chosen_by certainty checked"
-        " curve looked_at evaluations newton_iterations tried basins seconds work active optimality"
-        " multipliers conditions broken options reached status"
+        "scene measured method optimum peak n_harmonics=problem.harmonics peaks band_hz limit bands"
+        " objective rows held_by error_estimate stable stable_ground errors warnings plateau chosen_by"
+        " certainty checked curve looked_at evaluations newton_iterations tried basins seconds work"
+        " active optimality multipliers conditions broken options reached status"
     )
 
     problem: Annotated[Problem, "What was asked."]
@@ -160,6 +161,11 @@ class DesignResult(MadeOfResponses, Drawn):
     def scene(self) -> str:
         """Name of the scene."""
         return self.problem.scene.name
+
+    @property
+    def measured(self) -> Measured:
+        """What its peaks and limits are of; half peak to peak where the mean of the responses is free."""
+        return self.problem.cases[0].scene.measured
 
     @property
     def optimum(self) -> Mapping[str, float]:

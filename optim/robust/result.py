@@ -183,8 +183,8 @@ class RobustResult(MadeOfResponses, Drawn):
 
     VIEWS: ClassVar = Views("optim.views", "robust:robust", "designs:robust_figure", "robust_dataset")
     JSON: ClassVar = (
-        "scene=problem.scene.name aim quantile uncertain optimum nominal robust objective gain cuts gap"
-        " inner_look optimality=conditions.residual"
+        "scene=problem.scene.name measured=design.measured aim quantile uncertain optimum nominal robust"
+        " objective gain cuts gap inner_look optimality=conditions.residual"
         " violation=conditions.violation unknown designs responses seconds nominal_status=design.status"
         " warnings=design.warnings reached status"
     )

@@ -118,8 +118,8 @@ class AnyBranch(Drawn):
 
     VIEWS: ClassVar = Views("solver.views", "responses:branch", "of_branch", "branch_dataset")
     JSON: ClassVar = (
-        "scene parameter=values parameter_path=parameter unit speed_rpm=speeds_rpm amplitude"
-        " half_peak_to_peak mean peak peaks=interior_peaks stable=highest_stability.stable"
+        "scene measured=scene.measured parameter=values parameter_path=parameter unit speed_rpm=speeds_rpm"
+        " amplitude half_peak_to_peak mean peak peaks=interior_peaks stable=highest_stability.stable"
         " stable_ground=highest_stability.ground peaks_stable band_hz=band.width band_limit=band.limit"
         " band_intervals_hz=band.intervals band_known peak_certificate drift_per_period points=values.size"
         " n_harmonics error_estimate newton_iterations rejected_steps folds unstable marks"

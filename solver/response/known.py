@@ -12,7 +12,8 @@ from solver.continuation.extrema.error_estimate import ErrorEstimator
 from solver.response import band_end
 from solver.response.solution import HISTORY_DEPENDENT, MEAN_UNDETERMINED, Solution
 from solver.response.solve import peak_response
-from solver.results.known import HALF_PEAK_TO_PEAK, Known
+from solver.results.known import Known
+from solver.results.measures import HALF_PEAK_TO_PEAK
 
 _OPEN = (MEAN_UNDETERMINED, HISTORY_DEPENDENT)
 

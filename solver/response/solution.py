@@ -74,9 +74,10 @@ class Solution(Drawn):
 
     VIEWS: ClassVar = Views("solver.views", "responses:solution", "of_solution", "solution_dataset")
     JSON: ClassVar = (
-        "scene frequency_hz converged status max_abs half_peak_to_peak mean harmonics flags notes contacts"
-        " stable=stability.stable stable_ground=stability.ground unique unique_ground residual error_estimate"
-        " n_harmonics newton_iterations seconds drift_per_period mean_range"
+        "scene measured=scene.measured frequency_hz converged status max_abs half_peak_to_peak mean"
+        " harmonics flags notes contacts stable=stability.stable stable_ground=stability.ground"
+        " unique unique_ground residual error_estimate n_harmonics newton_iterations seconds"
+        " drift_per_period mean_range"
     )
 
     scene: Annotated[Scene, "What vibrates."]

@@ -10,10 +10,9 @@ from typing import Annotated, Any, ClassVar
 
 from solver.arrays import FloatOrNaN
 from solver.results import units
+from solver.results.measures import HALF_PEAK_TO_PEAK, MAX_ABS, WORDS
 from solver.results.notes import Note, flag_words, note_pairs, notes_of_all
 from solver.results.told import Piece, json_keys
-
-MAX_ABS, HALF_PEAK_TO_PEAK = "max_abs", "half_peak_to_peak"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
@@ -114,8 +113,8 @@ def known_pairs(found: Mapping[str, Any], *, besides: Sequence[str] = ()) -> lis
     pairs: list[tuple[str, str]] = []
     if "error_estimate" not in besides:
         for error, size, of in (
-            (found["error_estimate"], found["peak_max_abs"], "max|x|"),
-            (found["half_peak_to_peak_error"], found["peak_half_peak_to_peak"], "half peak to peak"),
+            (found["error_estimate"], found["peak_max_abs"], WORDS[MAX_ABS]),
+            (found["half_peak_to_peak_error"], found["peak_half_peak_to_peak"], WORDS[HALF_PEAK_TO_PEAK]),
         ):
             if error is not None:
                 share = f", {units.number(100.0 * error / size, 2)} %" if size else ""

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 from solver.arrays import FloatOrNaN, Real
 from solver.results.base import Drawn, MadeOfResponses, Shown
 from solver.results.known import NOTHING_KNOWN, Known
+from solver.results.measures import OF_X, Measured
 from solver.results.notes import Note
 from solver.results.told import Piece
 from solver.results.views import Data, Views
@@ -89,7 +90,7 @@ class ResponseMap(MadeOfResponses, Drawn):
         "parameter=parameter_path harmonics=n_harmonics", scene="given", rows=("parameter", "frequency"),
     )  # fmt: skip
     JSON: ClassVar = (
-        "scene parameter parameter_path unit frequency amplitude half_peak_to_peak ridge n_harmonics"
+        "scene measured parameter parameter_path unit frequency amplitude half_peak_to_peak ridge n_harmonics"
         " newton_iterations largest_residual seconds completed=reached status"
     )
 
@@ -110,6 +111,11 @@ class ResponseMap(MadeOfResponses, Drawn):
         Scene | None, "What it is of, with the values that stayed fixed; None if read from a file."
     ] = None
     highest: Annotated[Known, "How well the highest point of the grid is known."] = NOTHING_KNOWN
+
+    @property
+    def measured(self) -> Measured:
+        """What the amplitudes are of."""
+        return OF_X if self.given is None else self.given.measured
 
     def known_parts(self) -> Iterable[Known]:
         """The highest point of the grid, and the sweeps of the ridge."""

@@ -9,6 +9,7 @@ from typing import Any
 from optim.views.tables.robust import robust
 from solver.results import units
 from solver.results.known import known_pairs
+from solver.results.measures import Measured
 from solver.results.notes import note_pairs
 from solver.results.told import Block, ResultTable, Summary
 from solver.scene.parameter_paths import parameter
@@ -63,7 +64,7 @@ def front(found: Json) -> Iterator[Block]:
     pairs = [("not found", f"band of {units.number(width)} Hz") for width in found["missed"]]
     pairs += [("end", end["status"]) for end in found["ends"] if not end["reached"]]
     effort = f"{found['evaluations']} designs in {units.duration(found['seconds'])}"
-    yield Summary("", [*pairs, *known_pairs(found), ("effort", effort)])
+    yield Summary("", [*Measured.of_result(found).pairs, *pairs, *known_pairs(found), ("effort", effort)])
 
 
 def _error(point: Json) -> str:
@@ -90,7 +91,7 @@ def amount(value: float, unit: str) -> str:
 
 def _pairs(found: Json) -> Pairs:
     """What the design is and what it came to."""
-    pairs = [*values(found["optimum"]), *_plateau(found)]
+    pairs = [*values(found["optimum"]), *_plateau(found), *Measured.of_result(found).pairs]
     peaks: Sequence[Json] = found.get("peaks") or ([found["peak"]] if found["peak"] else [])
     several = len({peak.get("case") for peak in peaks}) > 1
     if any(row["weight"] > 0.0 and row["quantity"] != "peak" for row in found.get("rows", ())):

@@ -121,7 +121,8 @@ def worst_mistuning(
         on_progress(1.0, searched.done)
     places = [found["tuned_at_hz"], *([] if found["worst"] is None else [found["worst"].at_hz])]
     return WorstMistuning(
-        scene=scene.name, dof=dof, of=names, within=within, rms=rms, detuning=intentional.detuning,
+        scene=scene.name, dof=dof, measured=replace(scene.measured, dof=dof), of=names, within=within,
+        rms=rms, detuning=intentional.detuning,
         contacts=how.value, whitehead=whitehead(len(blades)), starts=search.starts,
         climbs=search.climbs if how in _SOLVED else 0, n_harmonics=harmonics, **found,
         notes=notes_of_all(of_frequency(searched.scene, at, band) for at in places),

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from solver.results import units
+from solver.results.measures import HALF_PEAK_TO_PEAK, MAX_ABS, WORDS, Measured
 from solver.results.notes import BAND_OPEN, FLAGS, between_points, drift_words, flag_words, note_pairs
 from solver.results.told import Block, ResultTable, Summary
 from solver.scene.parameter_paths import parameter
@@ -53,7 +54,7 @@ def solution(found: Json) -> Iterator[Block]:
         return
     pairs = _amplitudes(found)
     if found["error_estimate"] is not None:
-        of = "half peak to peak" if "mean_undetermined" in found["flags"] else "max|x|"
+        of = WORDS[HALF_PEAK_TO_PEAK if "mean_undetermined" in found["flags"] else MAX_ABS]
         pairs.append(("estimated error", f"{units.length(found['error_estimate'])} of {of}"))
     pairs += proved([found["certificate"]] if found.get("certificate") else [])
     pairs.append(("harmonics 1 to 5", _harmonics(found["harmonics"])))
@@ -90,7 +91,7 @@ def proved(proofs: Iterable[Json]) -> Pairs:
             pairs.append(("proved", f"no {of}: {proof['reason'] or proof['status']}"))
             continue
         held = of == "response" and proof["held"]
-        what = "half peak to peak" if held else "max|x|" if of == "response" else of
+        what = WORDS[HALF_PEAK_TO_PEAK if held else MAX_ABS] if of == "response" else of
         low, high = proof["half_peak_to_peak" if held else "max_abs"]
         at = "" if of == "response" else f" at {proof['frequency_hz'][0]:.12g} Hz"
         factor = proof["load_factor"]
@@ -133,7 +134,7 @@ def _all_solutions(found: Json) -> Iterator[Block]:
 def branch(found: Json) -> Iterator[Block]:
     """A branch: its peaks and its band."""
     path = found["parameter_path"]
-    pairs = _peaks(found, path)
+    pairs = [*Measured.of_result(found).pairs, *_peaks(found, path)]
     if found["error_estimate"] is not None:
         pairs.append(("estimated error", f"{units.length(found['error_estimate'])} of the highest"))
     if found.get("stable"):
@@ -324,10 +325,9 @@ def _force(value: float | None) -> str:
 
 
 def _amplitudes(found: Json) -> Pairs:
-    names = {"max_abs": "max|x|", "half_peak_to_peak": "half peak to peak", "mean": "mean"}
-    known = {key: found[key] for key in names if found[key] is not None}
+    known = {key: found[key] for key in WORDS if found[key] is not None}
     show = units.length_unit(max((abs(value) for value in known.values()), default=0.0)).show
-    return [(names[key], show(value)) for key, value in known.items()]
+    return [(WORDS[key], show(value)) for key, value in known.items()]
 
 
 def _peaks(found: Json, path: str) -> Pairs:
