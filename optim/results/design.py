@@ -19,7 +19,7 @@ from solver.arrays import FloatOrNaN
 from solver.results.base import Drawn, MadeOfResponses
 from solver.results.known import Known, Stable, Verdict, worst
 from solver.results.measures import Measured
-from solver.results.notes import Note
+from solver.results.notes import Note, notes_of_all
 from solver.results.told import Piece
 from solver.results.views import Views, on_demand
 
@@ -234,9 +234,9 @@ class DesignResult(MadeOfResponses, Drawn):
     @property
     def of_scene(self) -> tuple[Note, ...]:
         """What of the scene is hardly meant, with the values of the optimum."""
-        whole = self.problem.scene if self.evaluation is None else self.evaluation.responses[0].branch.scene
-        found: tuple[Note, ...] = on_demand("solver.response.plausibility:plausibility")(whole)
-        return found
+        whole = self.evaluation
+        scenes = [self.problem.scene] if whole is None else [one.scene for one in over_bands(whole).values()]
+        return notes_of_all(map(on_demand("solver.response.plausibility:plausibility"), scenes))
 
     @property
     def warnings(self) -> tuple[str, ...]:
