@@ -78,7 +78,9 @@ def test_a_family_is_in_order_with_the_optimum_and_both_limits_marked() -> None:
 
 def test_the_peak_over_a_load_has_the_optimum_marked() -> None:
     loads, peaks = np.array([20.0, 100.0, 300.0, 1000.0]), np.array([4e-3, 1.1e-4, 1.05e-4, 2e-4])
-    page = peak_figure("made-up", "shroud.N0", loads, peaks, optimum=(190.0, 1e-4), measured=Measured(dof="tip"))
+    page = peak_figure(
+        "made-up", "shroud.N0", loads, peaks, optimum=(190.0, 1e-4), measured=Measured(dof="tip")
+    )
     (axes,) = page.axes
     curve, dot = axes.lines
     assert axes.get_xlabel() == "shroud.N0 [N]"
