@@ -13,13 +13,15 @@ from optim.criteria.criterion import CriterionRow
 from optim.criteria.peak import PEAK
 from optim.problem.words import Method
 from optim.results.doubts import doubts_of
-from optim.results.json import conditions_json, evaluation_json, known_parts, looked_json
+from optim.results.json import conditions_json, evaluation_json, known_parts, looked_json, over_bands
 from optim.results.parts import CatalogueOption, Checked, CurveCheck, LocalOptimum
 from solver.arrays import FloatOrNaN
 from solver.results.base import Drawn, MadeOfResponses
 from solver.results.known import Known, Stable, Verdict, worst
+from solver.results.measures import Measured
+from solver.results.notes import Note, notes_of_all
 from solver.results.told import Piece, json_number
-from solver.results.views import Views
+from solver.results.views import Views, on_demand
 
 if TYPE_CHECKING:
     from optim.criteria.linearised import Conditions
@@ -94,6 +96,9 @@ class Certainty(Enum):
 
     CLOSED = "closed: the peaks followed over the whole range are nowhere lower"
     SAMPLED = "sampled: between the designs looked at a better one may lie that shows in no slope around"
+    BAND_END = (
+        "no: the highest amplitude of every case is at an end of its band, which any resonance beyond exceeds"
+    )
 
 
 _PROVEN = (DesignStatus.OPTIMAL, DesignStatus.AT_BOUND)
@@ -113,10 +118,10 @@ class DesignResult(MadeOfResponses, Drawn):
 
     VIEWS: ClassVar = Views("optim.views", "design:design", "of_design", "design_dataset")
     JSON: ClassVar = (
-        "scene method optimum peak n_harmonics=problem.harmonics peaks band_hz limit bands objective rows"
-        " held_by error_estimate stable stable_ground errors warnings plateau chosen_by certainty checked"
-        " curve looked_at evaluations newton_iterations tried basins seconds work active optimality"
-        " multipliers conditions broken options reached status"
+        "scene measured method optimum peak n_harmonics=problem.harmonics peaks band_hz limit bands"
+        " objective rows held_by error_estimate stable stable_ground errors warnings plateau chosen_by"
+        " certainty checked curve looked_at evaluations newton_iterations tried basins seconds work"
+        " active optimality multipliers conditions broken options reached status"
     )
 
     problem: Annotated[Problem, "What was asked."]
@@ -156,6 +161,11 @@ class DesignResult(MadeOfResponses, Drawn):
     def scene(self) -> str:
         """Name of the scene."""
         return self.problem.scene.name
+
+    @property
+    def measured(self) -> Measured:
+        """What its peaks and limits are of; half peak to peak where the mean of the responses is free."""
+        return self.problem.cases[0].scene.measured
 
     @property
     def optimum(self) -> Mapping[str, float]:
@@ -210,9 +220,23 @@ class DesignResult(MadeOfResponses, Drawn):
 
     @property
     def certainty(self) -> Certainty:
-        """Whether the range is closed by peaks that were followed over all of it, or only sampled."""
+        """Whether the range is closed by peaks that were followed over all of it, or only sampled.
+
+        It is neither where the response of every case is highest at an end of its band: what is least there
+        is no peak.
+        """
+        branches = () if self.evaluation is None else tuple(over_bands(self.evaluation).values())
+        if branches and all(map(on_demand("solver.response.band_end:is_band_end"), branches)):
+            return Certainty.BAND_END
         followed = self.method is Method.TRACKED and bool(self.basins) and self.basins[0].proven
         return Certainty.CLOSED if followed and self.status in _PROVEN else Certainty.SAMPLED
+
+    @property
+    def of_scene(self) -> tuple[Note, ...]:
+        """What of the scene is hardly meant, with the values of the optimum."""
+        whole = self.evaluation
+        scenes = [self.problem.scene] if whole is None else [one.scene for one in over_bands(whole).values()]
+        return notes_of_all(map(on_demand("solver.response.plausibility:plausibility"), scenes))
 
     @property
     def warnings(self) -> tuple[str, ...]:

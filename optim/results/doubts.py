@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from optim.results.json import known_parts
 from optim.results.parts import Checked
 from solver.results.known import Known
-from solver.results.notes import flag_words
+from solver.results.notes import flag_words, notes_of_all
 
 if TYPE_CHECKING:
     from optim.criteria.rows import DesignEvaluation
@@ -44,6 +44,7 @@ def doubts_of(
         *_checked(checked, optimum, feasible=feasible),
         *open_peaks(evaluation),
         *_flags(evaluation),
+        *(note.words for note in notes_of_all(known.notes for _, known in known_parts(evaluation))),
     )
 
 

@@ -15,6 +15,7 @@ from optim.problem.words import Aim
 from solver.arrays import FloatOrNaN
 from solver.results.base import Drawn, MadeOfResponses
 from solver.results.known import NOTHING_KNOWN, Known
+from solver.results.notes import Note
 from solver.results.order_statistics import quantile_json
 from solver.results.told import Piece, json_number
 from solver.results.views import Views
@@ -182,8 +183,8 @@ class RobustResult(MadeOfResponses, Drawn):
 
     VIEWS: ClassVar = Views("optim.views", "robust:robust", "designs:robust_figure", "robust_dataset")
     JSON: ClassVar = (
-        "scene=problem.scene.name aim quantile uncertain optimum nominal robust objective gain cuts gap"
-        " inner_look optimality=conditions.residual"
+        "scene=problem.scene.name measured=design.measured aim quantile uncertain optimum nominal robust"
+        " objective gain cuts gap inner_look optimality=conditions.residual"
         " violation=conditions.violation unknown designs responses seconds nominal_status=design.status"
         " warnings=design.warnings reached status"
     )
@@ -230,6 +231,11 @@ class RobustResult(MadeOfResponses, Drawn):
     def known_parts(self) -> Iterable[Known]:
         """The robust optimum, nominal and in its worst scenario; the nominal one where there is no other."""
         return self.design.known_parts() if self.robust is None else (self.robust.known,)
+
+    @property
+    def of_scene(self) -> tuple[Note, ...]:
+        """What of the scene is hardly meant."""
+        return self.design.of_scene
 
     def to_json(self) -> dict[str, Any]:
         """Return the result as one JSON object."""

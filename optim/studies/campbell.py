@@ -25,9 +25,9 @@ from solver.continuation.extrema.error_estimate import ErrorEstimator
 from solver.continuation.peaks import Peak
 from solver.errors import Place
 from solver.jit.fourier import Real
+from solver.linear.natural_frequencies import natural_frequencies
 from solver.results.watch import OnProgress, ShouldStop, part_of, shows_progress
 from solver.scene.scene import Scene
-from solver.studies.natural_frequencies import natural_frequencies
 
 _MOST_ORDERS = 100
 _ROUNDING = 1e-9

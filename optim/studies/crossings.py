@@ -86,7 +86,10 @@ class CampbellDiagram(MadeOfResponses, Drawn):
     """Orders of a running speed against the resonances of a scene."""
 
     VIEWS: ClassVar = Views("optim.views", "studies:campbell", "of_campbell", "campbell_dataset")
-    JSON: ClassVar = "scene speeds_rpm limit clear orders n_harmonics seconds completed=reached status"
+    JSON: ClassVar = (
+        "scene measured=scene.measured speeds_rpm limit clear orders n_harmonics seconds completed=reached"
+        " status"
+    )
 
     scene: Annotated[Scene, "With the values all responses share."]
     speeds_rpm: Annotated[Ranges, "The running speeds [1/min]."]

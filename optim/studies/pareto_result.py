@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple
 
 from solver.results.base import Drawn, MadeOfResponses
 from solver.results.known import Known
+from solver.results.measures import Measured
 from solver.results.told import Piece
 from solver.results.views import Views
 
@@ -98,8 +99,8 @@ class ParetoResult(MadeOfResponses, Drawn):
 
     VIEWS: ClassVar = Views("optim.views", "design:front", "designs:pareto_figure", "front_dataset")
     JSON: ClassVar = (
-        "scene=problem.scene.name dof=problem.scene.observe.dof limit=problem.limit points knee dominated"
-        " missed ends=ended evaluations seconds reached status"
+        "scene=problem.scene.name dof=problem.scene.observe.dof measured limit=problem.limit points knee"
+        " dominated missed ends=ended evaluations seconds reached status"
     )
 
     problem: Annotated[Problem, "What was asked."]
@@ -115,6 +116,11 @@ class ParetoResult(MadeOfResponses, Drawn):
     def reached(self) -> bool:
         """Whether the whole front was found."""
         return self.status in (ParetoStatus.COMPLETE, ParetoStatus.NO_TRADE_OFF)
+
+    @property
+    def measured(self) -> Measured:
+        """What the peaks are of."""
+        return self.ends[0].measured if self.ends else self.problem.scene.measured
 
     @property
     def ended(self) -> tuple[FrontEndStatus, ...]:

@@ -39,7 +39,7 @@ function draw(svg, curve, before) {
     svg.append(text(told(at), { x: LEFT - 6, y: y(at) + 4, "text-anchor": "end" }));
   }
   svg.append(text("frequency [Hz]", { x: (LEFT + WIDTH) / 2, y: HEIGHT - 4, "text-anchor": "middle" }));
-  svg.append(text("max|x| [mm]", { x: 4, y: TOP }));
+  svg.append(text(`${curve.name} [mm]`, { x: 4, y: TOP }));
   const line = ({ hertz, amplitude }) => hertz.map((at, i) => `${i ? "L" : "M"}${x(at)} ${y(1e3 * amplitude[i])}`).join("");
   svg.append(node("path", { d: line(before), fill: "none", stroke: "currentColor", opacity: 0.35, "stroke-dasharray": "4 3" }));
   svg.append(node("path", { d: line(curve), fill: "none", stroke: "#0072b2", "stroke-width": 2, class: "curve" }));

@@ -66,7 +66,8 @@ class Explorer(anywidget.AnyWidget):
         self.curve = {
             "hertz": branch.values.tolist(), "amplitude": branch.amplitude.tolist(),
             "peak": None if peak is None else [peak.at, peak.value],
-            "told": "" if branch.reached else branch.status.value, "turn": self._turn,
+            "name": scene.measured.name, "told": "" if branch.reached else branch.status.value,
+            "turn": self._turn,
         }  # fmt: skip
 
 

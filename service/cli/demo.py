@@ -169,7 +169,7 @@ def _draw(folder: Path, case: DemoCase, optimum: float, stored: Sequence[SweepDe
         np.array(list(peaks)),
         np.array(list(peaks.values())),
         optimum=(optimum, peaks[optimum]),
-        dof=family.dof,
+        measured=family.measured,
     )
     pictures = (folder / f"{case.scene}-responses.png", folder / f"{case.scene}-peak.png")
     save(family_figure(family), pictures[0])
@@ -184,13 +184,16 @@ def _select(
     loads = [sweep.contacts[case.contact].N0 for sweep in stored]
     by_load = {load: sweep for load, sweep in zip(loads, stored, strict=True) if load is not None}
     low, high = case.bounds
+    measured = solver.load_scene(case.scene).measured
     family = Family(
         variable=case.variable,
-        members=tuple((load, response_of(by_load[load])) for load in sorted({*case.shown, optimum})),
+        members=tuple(
+            (load, response_of(by_load[load], measured)) for load in sorted({*case.shown, optimum})
+        ),
         optimum=optimum,
-        free=response_of(by_load[REMOVED]),
-        stuck=response_of(by_load[STUCK]),
-        dof=solver.load_scene(case.scene).observe.dof,
+        free=response_of(by_load[REMOVED], measured),
+        stuck=response_of(by_load[STUCK], measured),
+        measured=measured,
     )
     inside = {load: by_load[load].peak for load in sorted(by_load) if low <= load <= high}
     return family, {load: peak.value for load, peak in inside.items() if peak is not None}

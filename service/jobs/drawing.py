@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from service.jobs.registry import Json, NothingToDrawError, ReadSweep, Registry, StoredCurve, StoredSweep
+from solver.results.measures import Measured
 from solver.views.plots.curves import Response, above, with_peak
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def response_of(sweep: StoredCurve) -> Response:
+def response_of(sweep: StoredCurve, measured: Measured) -> Response:
     """The curve of a stored sweep with at least one point; its band is that of the polyline."""
     peak = None if sweep.peak is None else (sweep.peak.at, sweep.peak.value)
     values = np.asarray(sweep.arrays["parameter"], dtype=np.float64)
@@ -28,6 +29,7 @@ def response_of(sweep: StoredCurve) -> Response:
         parameter=sweep.parameter,
         values=values,
         amplitude=amplitude,
+        measured=measured,
         peak=peak,
         limit=limit,
         intervals=() if limit is None else above(values, amplitude, limit),
@@ -65,7 +67,7 @@ def best_sweep_figure(result: Json, sweeps: Sequence[StoredSweep], read: ReadSwe
     if not sweeps or peak is None:
         raise NothingToDrawError("it stored no sweep to draw")
     best = min(sweeps, key=lambda s: abs(s.peak.value - peak["value"]) if s.peak else math.inf)
-    return response_figure(response_of(read(best.id)))
+    return response_figure(response_of(read(best.id), Measured.of_result(result)))
 
 
 def harmonics_of(result: Json) -> Figure:
@@ -76,4 +78,6 @@ def harmonics_of(result: Json) -> Figure:
     if not np.isfinite(heights).any():
         raise NothingToDrawError("no response was found")
     place = f" at {result['frequency_hz']:.6g} Hz" if "frequency_hz" in result else ""
-    return harmonics_figure(heights, f"{result.get('scene', 'last period')}{place}")
+    return harmonics_figure(
+        heights, f"{result.get('scene', 'last period')}{place}", dof=Measured.of_result(result).dof
+    )  # fmt: skip

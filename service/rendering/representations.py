@@ -16,6 +16,7 @@ from service.jobs.strict_json import digest
 from service.schemas.answers import SweepDetail
 from solver.results.dataset import Dataset
 from solver.results.files import csv_text
+from solver.results.measures import OF_X
 from solver.scene.parameter_paths import find_parameter, parameter_unit
 from solver.scene.scene import Scene
 from solver.views.io import written
@@ -127,16 +128,25 @@ def sweep_body(
     return written(sweep_dataset(row, repository, scene), f".{SUFFIXES[media]}")
 
 
-def sweep_picture(row: SweepRecord, suffix: str, repository: ResultRepository) -> bytes:
-    """The curve of a stored sweep as `svg` or `png`; its peak is marked, its band shaded."""
+def sweep_picture(
+    row: SweepRecord, suffix: str, repository: ResultRepository, scene: Mapping[str, Any] | None = None
+) -> bytes:
+    """The curve of a stored sweep as `svg` or `png`; its peak is marked, its band shaded.
+
+    Parameters
+    ----------
+    scene : that of its job; it names the axis only if it is the one that was swept.
+    """
     from service.jobs.drawing import response_of
     from solver.views.plots import style
     from solver.views.plots.responses import response_figure
 
     sweep = SweepDetail.load(row, repository)
+    same = scene is not None and digest(dict(scene)) == row.scene_hash
+    measured = Scene.from_dict(scene).measured if same and scene is not None else OF_X
     # Matplotlib's settings belong to the process.
     with _drawing:
-        return style.written(response_figure(response_of(sweep)), suffix)
+        return style.written(response_figure(response_of(sweep, measured)), suffix)
 
 
 def csv_of_items(items: Iterable[Mapping[str, Any]]) -> bytes:

@@ -16,6 +16,7 @@ from solver.continuation.certificate import PeakCertificate
 from solver.continuation.peaks import Band, Peak
 from solver.results.base import Drawn
 from solver.results.known import Known, Stable, Verdict
+from solver.results.notes import Note
 from solver.results.views import Views, on_demand
 from solver.scene.scene import Scene
 
@@ -117,12 +118,12 @@ class AnyBranch(Drawn):
 
     VIEWS: ClassVar = Views("solver.views", "responses:branch", "of_branch", "branch_dataset")
     JSON: ClassVar = (
-        "scene parameter=values parameter_path=parameter unit speed_rpm=speeds_rpm amplitude"
-        " half_peak_to_peak mean peak peaks=interior_peaks stable=highest_stability.stable"
+        "scene measured=scene.measured parameter=values parameter_path=parameter unit speed_rpm=speeds_rpm"
+        " amplitude half_peak_to_peak mean peak peaks=interior_peaks stable=highest_stability.stable"
         " stable_ground=highest_stability.ground peaks_stable band_hz=band.width band_limit=band.limit"
         " band_intervals_hz=band.intervals band_known peak_certificate drift_per_period points=values.size"
         " n_harmonics error_estimate newton_iterations rejected_steps folds unstable marks"
-        " stability_known_by mean_undetermined largest_residual seconds flags completed=reached status"
+        " stability_known_by mean_undetermined largest_residual seconds flags notes completed=reached status"
     )
 
     status: Annotated[BranchStatus, "How it ended."]
@@ -180,6 +181,12 @@ class AnyBranch(Drawn):
     @abstractmethod
     def known(self) -> Known:
         """How well the highest peak is known; what is made of branches passes it on."""
+
+    @property
+    def notes(self) -> tuple[Note, ...]:
+        """A highest amplitude at an end of the band, and what of the scene is hardly meant."""
+        of_scene = on_demand("solver.response.plausibility:plausibility")(self.scene)
+        return (*on_demand("solver.response.band_end:of_branch")(self), *of_scene)
 
     @property
     @abstractmethod

@@ -9,9 +9,11 @@ from solver.balance.workspace import Workspace
 from solver.continuation.branch import Branch
 from solver.continuation.certificate import unsettled
 from solver.continuation.extrema.error_estimate import ErrorEstimator
+from solver.response import band_end
 from solver.response.solution import HISTORY_DEPENDENT, MEAN_UNDETERMINED, Solution
 from solver.response.solve import peak_response
-from solver.results.known import HALF_PEAK_TO_PEAK, Known
+from solver.results.known import Known
+from solver.results.measures import HALF_PEAK_TO_PEAK
 
 _OPEN = (MEAN_UNDETERMINED, HISTORY_DEPENDENT)
 
@@ -29,7 +31,7 @@ def known_of(branch: Branch) -> Known:
     known = Known(
         peak_max_abs=peak.value, error_estimate=branch.error_estimate,
         flags=tuple(dict.fromkeys((*branch.flags, *(flag for flag in there.flags if flag in _OPEN)))),
-        peaks_open=tuple(unsettled([branch.peak_certificate])),
+        notes=band_end.of_branch(branch), peaks_open=tuple(unsettled([branch.peak_certificate])),
     )  # fmt: skip
     if branch.balance.scene.observe.centred:
         return replace(

@@ -13,6 +13,7 @@ from solver.arrays import FloatOrNaN, Real
 from solver.errors import SettingError
 from solver.results.base import Drawn
 from solver.results.known import Stable, Verdict
+from solver.results.notes import Note
 from solver.results.views import Views, on_demand
 from solver.scene.scene import Scene
 
@@ -73,9 +74,10 @@ class Solution(Drawn):
 
     VIEWS: ClassVar = Views("solver.views", "responses:solution", "of_solution", "solution_dataset")
     JSON: ClassVar = (
-        "scene frequency_hz converged status max_abs half_peak_to_peak mean harmonics flags contacts"
-        " stable=stability.stable stable_ground=stability.ground unique unique_ground residual error_estimate"
-        " n_harmonics newton_iterations seconds drift_per_period mean_range"
+        "scene measured=scene.measured frequency_hz converged status max_abs half_peak_to_peak mean"
+        " harmonics flags notes contacts stable=stability.stable stable_ground=stability.ground"
+        " unique unique_ground residual error_estimate n_harmonics newton_iterations seconds"
+        " drift_per_period mean_range"
     )
 
     scene: Annotated[Scene, "What vibrates."]
@@ -143,6 +145,12 @@ class Solution(Drawn):
     def highest_harmonic(self) -> int:
         """The last one in `harmonics`, H of every (2H + 1,) array."""
         return int(self.harmonics.size) - 1
+
+    @property
+    def notes(self) -> tuple[Note, ...]:
+        """What of the scene is hardly meant."""
+        found: tuple[Note, ...] = on_demand("solver.response.plausibility:plausibility")(self.scene)
+        return found
 
     @property
     def uniqueness(self) -> Uniqueness:

@@ -9,6 +9,7 @@ from enum import Enum
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from solver.results.known import Known, worst_of
+from solver.results.notes import Note
 from solver.results.told import Block, Summary, Told
 from solver.results.views import Data, Views
 
@@ -89,9 +90,15 @@ class MadeOfResponses(Shown):
         """How well each of the responses is known that the numbers stand on."""
 
     @property
+    def of_scene(self) -> tuple[Note, ...]:
+        """What of the scene is hardly meant, where a study is the first to be asked of one."""
+        return ()
+
+    @property
     def known(self) -> Known:
         """How well the numbers are known: the largest error of a response relative to its peak, all flags."""
-        return worst_of(self.known_parts())
+        found = worst_of(self.known_parts())
+        return replace(found, notes=(*found.notes, *self.of_scene))
 
     def blocks(self) -> Sequence[Block]:
         """What people read of it: names with values, and tables."""
@@ -105,12 +112,17 @@ class MadeOfResponses(Shown):
         found = super().to_dataset()
         told = {name: value for name, value in self.known.to_json().items() if value is not None}
         notes: dict[str, Any] = {
-            name: " ".join(value) if isinstance(value, list) else value for name, value in told.items()
+            name: _in_words(value) if isinstance(value, list) else value for name, value in told.items()
         }
         return replace(found, attributes={**found.attributes, **notes})
 
     def _json(self, **others: object) -> dict[str, Any]:
         return super()._json(**others) | self.known.to_json()
+
+
+def _in_words(several: Sequence[Any]) -> str:
+    """Flags, notes or reasons as an attribute."""
+    return " ".join(one["words"] if isinstance(one, dict) else one for one in several)
 
 
 class Drawn(Shown):

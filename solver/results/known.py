@@ -10,10 +10,9 @@ from typing import Annotated, Any, ClassVar
 
 from solver.arrays import FloatOrNaN
 from solver.results import units
-from solver.results.notes import flag_words
+from solver.results.measures import HALF_PEAK_TO_PEAK, MAX_ABS, WORDS
+from solver.results.notes import Note, flag_words, note_pairs, notes_of_all
 from solver.results.told import Piece, json_keys
-
-MAX_ABS, HALF_PEAK_TO_PEAK = "max_abs", "half_peak_to_peak"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
@@ -22,7 +21,7 @@ class Known(Piece):
 
     JSON: ClassVar = (
         "measure peak_max_abs error_estimate peak_half_peak_to_peak half_peak_to_peak_error"
-        " relative_error=relative flags peaks_open"
+        " relative_error=relative flags notes peaks_open"
     )
 
     measure: Annotated[
@@ -40,6 +39,11 @@ class Known(Piece):
     )
     flags: Annotated[
         tuple[str, ...], "What the responses assume or leave open, see `solver.results.notes.FLAGS`."
+    ] = ()
+    notes: Annotated[
+        tuple[Note, ...],
+        "What is to be known before they are gone by: a highest amplitude at an end of the band, what of the "
+        "scene is hardly meant.",
     ] = ()
     peaks_open: Annotated[
         tuple[str, ...],
@@ -69,7 +73,7 @@ class Known(Piece):
     @classmethod
     def of_result(cls, found: Mapping[str, Any]) -> Known:
         """Return what the JSON of a result says of it."""
-        return cls.from_json({key: found[key] for key in json_keys(cls)})
+        return cls.from_json({key: found[key] for key in json_keys(cls) if key in found})
 
     def pairs(self) -> list[tuple[str, str]]:
         """Return it in words, name and value a line."""
@@ -86,14 +90,14 @@ def _relative(error: float, value: float) -> float:
 
 
 def worst_of(parts: Iterable[Known]) -> Known:
-    """Return the record of what is least known, with the flags and the reasons of all."""
+    """Return the record of what is least known, with the flags, the notes and the reasons of all."""
     every = list(parts)
     if not every:
         return NOTHING_KNOWN
     worst = max(every, key=lambda one: one.relative)
     flags = tuple(dict.fromkeys(flag for one in every for flag in one.flags))
     reasons = tuple(dict.fromkeys(reason for one in every for reason in one.peaks_open))
-    return replace(worst, flags=flags, peaks_open=reasons)
+    return replace(worst, flags=flags, notes=notes_of_all(one.notes for one in every), peaks_open=reasons)
 
 
 def known_pairs(found: Mapping[str, Any], *, besides: Sequence[str] = ()) -> list[tuple[str, str]]:
@@ -109,15 +113,15 @@ def known_pairs(found: Mapping[str, Any], *, besides: Sequence[str] = ()) -> lis
     pairs: list[tuple[str, str]] = []
     if "error_estimate" not in besides:
         for error, size, of in (
-            (found["error_estimate"], found["peak_max_abs"], "max|x|"),
-            (found["half_peak_to_peak_error"], found["peak_half_peak_to_peak"], "half peak to peak"),
+            (found["error_estimate"], found["peak_max_abs"], WORDS[MAX_ABS]),
+            (found["half_peak_to_peak_error"], found["peak_half_peak_to_peak"], WORDS[HALF_PEAK_TO_PEAK]),
         ):
             if error is not None:
                 share = f", {units.number(100.0 * error / size, 2)} %" if size else ""
                 pairs.append(("estimated error", f"{units.length(error)} of {of}{share}"))
         if found["relative_error"] is None:
             pairs.append(("estimated error", "not known"))
-    pairs += [("note", words) for words in flag_words(found["flags"])]
+    pairs += [("note", words) for words in flag_words(found["flags"])] + note_pairs(found)
     if "peaks_open" not in besides:
         pairs += [
             ("warning", f"a response may have a higher peak. {reason}") for reason in found["peaks_open"]

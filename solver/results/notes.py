@@ -1,12 +1,15 @@
-"""What a result says of itself beside its numbers, in words: flags, and what is known between points."""
+"""What a result says of itself beside its numbers, in words: flags, notes, what is known between points."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 from types import MappingProxyType
+from typing import Annotated, Any
 
 from solver.results import units
+from solver.results.told import Piece
 
 ABOVE_FRICTION = "mean_load_above_friction"
 FLAGS: Mapping[str, str] = MappingProxyType(
@@ -36,6 +39,37 @@ NONE_HIGHER = "known, none is higher than those listed"
 def flag_words(flags: Iterable[str]) -> list[str]:
     """What each flag says; one of a newer version as it is."""
     return [FLAGS.get(flag, flag.replace("_", " ")) for flag in flags]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Note(Piece):
+    """What is to be known before numbers are gone by: of the peak of a response, or of a scene."""
+
+    name: Annotated[str, "What it is of, in one word for programs, such as ``band_end``."]
+    words: Annotated[str, "What people read."]
+    numbers: Annotated[Mapping[str, float], "The numbers in the words, by name, in Hz, m, N/m or 1."]
+
+
+_SOME = "in some of the responses "
+
+
+def notes_of_all(parts: Iterable[Iterable[Note]]) -> tuple[Note, ...]:
+    """The notes of several responses, one of each name, which says so where not all of them have it."""
+    every = [{note.name: note for note in notes} for notes in parts]
+    first: dict[str, Note] = {}
+    for notes in every:
+        first = {**notes, **first}
+    return tuple(
+        note
+        if note.words.startswith(_SOME) or all(name in notes for notes in every)
+        else replace(note, words=_SOME + note.words)
+        for name, note in first.items()
+    )
+
+
+def note_pairs(found: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """The notes in the JSON of a result as names with values; none of one of an earlier version."""
+    return [("note", one["words"]) for one in found.get("notes") or ()]
 
 
 def drift_words(drift: float | None, flags: Iterable[str]) -> str:

@@ -32,6 +32,7 @@ from solver.contacts.fields import (
 from solver.contacts.laws.base import AnyContact
 from solver.contacts.laws.registry import DEFAULT, laws
 from solver.errors import SettingError
+from solver.results.measures import HALF_PEAK_TO_PEAK
 from solver.scene.cyclic.sector_tables import CyclicBoundary as CyclicBoundary
 from solver.scene.cyclic.sector_tables import Mistuning as Mistuning
 from solver.scene.cyclic.sector_tables import Sectors
@@ -211,14 +212,9 @@ class Observe(Part):
             raise SettingError("observe.harmonic", self.harmonic, wanted)
 
     @property
-    def measured(self) -> str:
-        """What drawings name as that whose amplitude is shown: the DOF, or one harmonic of it."""
-        return self.dof if self.harmonic is None else f"harmonic {self.harmonic} of {self.dof}"
-
-    @property
     def centred(self) -> bool:
         """Whether the motion counts from the middle of its range."""
-        return self.measure == "half_peak_to_peak"
+        return self.measure == HALF_PEAK_TO_PEAK
 
     @field_validator("band")
     @classmethod

@@ -25,6 +25,7 @@ from solver.contacts.laws.gap import GapSpring
 from solver.contacts.laws.polynomial import PolynomialSpring
 from solver.errors import Issue, SceneError, SettingError
 from solver.extensions import on_change
+from solver.results.measures import Measured
 from solver.results.told import Summary, html_of
 from solver.results.units import number
 from solver.scene import parameter_paths as scene_paths
@@ -304,6 +305,14 @@ class Scene(Part):
         if name in self.dofs:
             return ((name, 1.0),)
         return next((each.terms for each in self.recovery if each.name == name), None)
+
+    @property
+    def measured(self) -> Measured:
+        """What amplitudes, peaks and limits are of, with its name and unit."""
+        seen = self.observe
+        return Measured(
+            dof=seen.dof, measure=seen.measure, harmonic=seen.harmonic, unit=self.observed_unit
+        )  # fmt: skip
 
     @property
     def observed_unit(self) -> str:

@@ -23,6 +23,7 @@ from solver.response.solution import Solution
 from solver.response.time_history import motion
 from solver.results.base import Drawn, MadeOfResponses
 from solver.results.known import NOTHING_KNOWN, Known
+from solver.results.measures import OF_X, Measured
 from solver.results.views import Data, Views
 from solver.results.watch import shows_progress
 from solver.scene.cyclic.annulus import annulus, sectors_needed
@@ -72,7 +73,7 @@ class BladePeaks(MadeOfResponses, Drawn):
         "blade-peaks", {"sector": "peak=value frequency=at_hz status"}, status="solved", scene="",
         index="sector",
     )  # fmt: skip
-    JSON: ClassVar = "dof peaks=value at_hz status"
+    JSON: ClassVar = "dof measured peaks=value at_hz status"
 
     dof: Annotated[str, "Its name in one sector."]
     value: Annotated[
@@ -87,6 +88,7 @@ class BladePeaks(MadeOfResponses, Drawn):
         "that may be it.",
     ]
     highest: Annotated[Known, "How well the highest peak of all is known."] = NOTHING_KNOWN
+    measured: Annotated[Measured, "What the peaks are of."] = OF_X
 
     @property
     def reached(self) -> bool:
@@ -176,7 +178,7 @@ def blade_peaks(
         return BladePeaks(
             dof=name, value=np.array([peak.value for peak in peaks]),
             at_hz=np.array([peak.at for peak in peaks]), status=(branch.status,) * len(names),
-            branches=(highest,), highest=highest.known,
+            branches=(highest,), highest=highest.known, measured=replace(scene.measured, dof=name),
         )  # fmt: skip
     return _of_every_blade(name, names, branch, repeats, on_progress, should_stop)
 
@@ -211,6 +213,7 @@ def _of_every_blade(
         at_hz=np.array([math.nan if peak is None else peak.at for peak in known]),
         status=tuple(each.status for each in branches) + (BranchStatus.STOPPED,) * missing,
         branches=tuple(branches),
+        measured=replace(branch.scene.measured, dof=name),
     )
     worst = found.worst_branch
     return found if worst is None else replace(found, highest=worst.known)

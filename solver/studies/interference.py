@@ -22,11 +22,11 @@ import numpy as np
 
 from solver.errors import SettingError, check_count
 from solver.linear.extra_terms import depends_on_speed
+from solver.linear.natural_frequencies import natural_frequencies
 from solver.modes.nonlinear_mode import at_nodal_diameter
 from solver.results.watch import OnProgress, ShouldStop, shows_progress
 from solver.scene.scene import MatricesStructure, Scene
 from solver.studies.mistuning import without_mistuning
-from solver.studies.natural_frequencies import natural_frequencies
 from solver.studies.study_results import (
     DiameterFrequencies,
     FoldedOrder,

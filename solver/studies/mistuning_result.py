@@ -80,8 +80,8 @@ class MistuningStudy(MadeOfResponses, Drawn):
         "spread of harmonics=n_harmonics tuned_peak=tuned.largest", index="sector",
     )  # fmt: skip
     JSON: ClassVar = (
-        "scene dof=tuned.dof of spread tuned=tuned_peak samples=disks mean mean_error standard_error"
-        " deviation quantiles worst n_harmonics seconds completed=reached status"
+        "scene dof=tuned.dof measured=tuned.measured of spread tuned=tuned_peak samples=disks mean mean_error"
+        " standard_error deviation quantiles worst n_harmonics seconds completed=reached status"
     )
 
     scene: Annotated[str, "Its name."]

@@ -17,6 +17,7 @@ from solver.contacts.kernels.system import (
 from solver.jit.fourier import Flags, Real
 from solver.linear.kernels.receptance import PAIRS_UP_TO, receptance
 from solver.linear.leading_ports import FEWEST_PORTS
+from solver.response.plausibility import plausibility
 from solver.response.stability.cost import forecast
 from solver.scene.bodies.kinematics import static_forces
 from solver.scene.cyclic.annulus import sectors_needed
@@ -178,6 +179,7 @@ def plan(scene: Scene, *, harmonics: int = 11, effects: Effects | None = None) -
         dense_bytes=dense_bytes(scene, harmonics, every_sector=asked.every_sector).total,
         performance_curve=performance_curve_words(balance.scene),
         seconds_of_stability=forecast(balance.scene),
+        notes=plausibility(scene),
     )
 
 

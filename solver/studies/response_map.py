@@ -16,6 +16,7 @@ from solver.balance.workspace import Workspace
 from solver.continuation.parameter_scale import Scale, scale_of
 from solver.errors import SettingError, check_count
 from solver.jit.fourier import Integer, Real
+from solver.response import band_end
 from solver.response.known import known_of_solution
 from solver.response.solution import MEAN_UNDETERMINED
 from solver.response.solve import solve
@@ -204,7 +205,8 @@ class MapGrid:
         point = solve(here, frequency_hz=hertz, harmonics=self.harmonics, effects=self.effects)
         known, height = known_of_solution(point), float(amplitude[row, column])
         same = abs(point.max_abs - height) <= _SAME * height or MEAN_UNDETERMINED in known.flags
-        return known if same else Known(flags=known.flags)
+        at_end = band_end.of_frequency(here, hertz, (float(self.band[0]), float(self.band[-1])))
+        return replace(known if same else Known(flags=known.flags), notes=at_end)
 
 
 def map_grid(

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 from solver.arrays import FloatOrNaN, Real
 from solver.results.base import Drawn, MadeOfResponses, Shown
 from solver.results.known import NOTHING_KNOWN, Known
+from solver.results.measures import OF_X, Measured
+from solver.results.notes import Note
 from solver.results.told import Piece
 from solver.results.views import Data, Views
 from solver.scene.scene import Scene
@@ -88,7 +90,7 @@ class ResponseMap(MadeOfResponses, Drawn):
         "parameter=parameter_path harmonics=n_harmonics", scene="given", rows=("parameter", "frequency"),
     )  # fmt: skip
     JSON: ClassVar = (
-        "scene parameter parameter_path unit frequency amplitude half_peak_to_peak ridge n_harmonics"
+        "scene measured parameter parameter_path unit frequency amplitude half_peak_to_peak ridge n_harmonics"
         " newton_iterations largest_residual seconds completed=reached status"
     )
 
@@ -109,6 +111,11 @@ class ResponseMap(MadeOfResponses, Drawn):
         Scene | None, "What it is of, with the values that stayed fixed; None if read from a file."
     ] = None
     highest: Annotated[Known, "How well the highest point of the grid is known."] = NOTHING_KNOWN
+
+    @property
+    def measured(self) -> Measured:
+        """What the amplitudes are of."""
+        return OF_X if self.given is None else self.given.measured
 
     def known_parts(self) -> Iterable[Known]:
         """The highest point of the grid, and the sweeps of the ridge."""
@@ -133,7 +140,7 @@ class Plan(Shown):
     JSON: ClassVar = (
         "scene effects unknowns linear_dofs contacts n_harmonics=harmonics"
         " estimated_seconds_a_point=seconds_a_point estimated_seconds_of_stability=seconds_of_stability"
-        " estimated_dense_bytes=dense_bytes performance_curve"
+        " estimated_dense_bytes=dense_bytes performance_curve notes"
     )
 
     scene: Annotated[str, "Name of the scene."]
@@ -153,6 +160,7 @@ class Plan(Shown):
         "Estimated cost of the Floquet multipliers of a response [s], infinite (null in JSON) where it is "
         "not known; answers have them by themselves below a second.",
     ] = 0.0
+    notes: Annotated[tuple[Note, ...], "What of the scene is hardly meant."] = ()
 
 
 class InterferenceStatus(Enum):

@@ -10,6 +10,7 @@ import numpy as np
 
 from solver.continuation.branch import BranchStatus
 from solver.results import units
+from solver.results.measures import Measured
 from solver.results.told import Summary
 
 if TYPE_CHECKING:
@@ -71,7 +72,7 @@ def of_amplitudes(blades: BladeAmplitudes) -> Iterator[Summary]:
         ("smallest", units.length(float(blades.max_abs.min()))),
         ("blades", str(blades.max_abs.size)),
     )
-    yield Summary(f"max|x| of {blades.dof}", pairs)
+    yield Summary(Measured(dof=blades.dof).name, pairs)
 
 
 def of_stability(found: Stability) -> Iterator[Summary]:

@@ -16,7 +16,7 @@ from service.errors import InvalidRequestError
 from service.rendering.docs_tables import kinds_table
 from service.settings.kinds import registry_of
 from service.settings.settings import load_settings
-from solver.studies.natural_frequencies import natural_frequencies
+from solver.linear.natural_frequencies import natural_frequencies
 
 ROOT = Path(__file__).parents[2]
 KINDS = ("a_recipe:Frequencies",)

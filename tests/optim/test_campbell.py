@@ -13,7 +13,7 @@ from optim import CampbellStatus, DesignError, campbell_diagram, forbidden_hz
 from optim.problem.cases import with_engine_order
 from service.cli import main
 from solver.errors import SettingError
-from solver.studies.natural_frequencies import natural_frequencies
+from solver.linear.natural_frequencies import natural_frequencies
 
 DISK = [
     "campbell",

@@ -14,6 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator
 
 from solver.results import units
+from solver.results.measures import Measured
 from solver.views.plots import style
 from solver.views.plots.curves import Response
 from solver.views.plots.style import Into
@@ -152,7 +153,7 @@ def _draw_responses(axes: Axes, answer: Json, shown: list[_Order]) -> None:
     style.plain_log(axes.xaxis)
     if least < _DECADES * top:
         axes.xaxis.set_major_locator(LogLocator())
-    axes.set_xlabel(f"max |{shown[0].curve.dof}| [{unit.name}]")
+    axes.set_xlabel(Measured.of_result(answer).label("", unit))
     if len(shown) > 1:
         axes.legend(loc="best")
 

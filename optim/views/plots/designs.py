@@ -16,6 +16,7 @@ from optim.criteria.forbidden import FORBIDDEN
 from optim.criteria.peak import PEAK
 from solver.jit.fourier import Real
 from solver.results import units
+from solver.results.measures import Measured
 from solver.results.units import LengthUnit
 from solver.views.plots import style
 from solver.views.plots.curves import Response
@@ -150,14 +151,15 @@ def pareto_figure(answer: Mapping[str, Any], *, ax: Into = None) -> Figure:
     answer : the JSON of `optim.ParetoResult`, with at least one point.
     """
     points: Sequence[Point] = answer["points"]
-    unit = units.length_unit(min(point["peak"] for point in points))
+    measured = Measured.of_result(answer)
+    unit = measured.unit_for(min(point["peak"] for point in points))
     with style.styled():
         page, (front, risk) = style.figure(9.2, 3.7, columns=2, into=ax)
         _draw_front(front, answer, unit)
         _draw_risk(risk, points, unit)
-        dof = answer["dof"]
-        style.label(front, "resonance band [Hz]", f"highest peak, max |{dof}| [{unit.name}]")
-        style.label(risk, "frequency [Hz]", f"highest peak, max |{dof}| [{unit.name}]")
+        named = measured.label("highest peak", unit)
+        style.label(front, "resonance band [Hz]", named)
+        style.label(risk, "frequency [Hz]", named)
         limit = "half power" if answer["limit"] is None else units.length(answer["limit"])
         front.set_title(f"{answer['scene']}, band above {limit}")
         risk.set_title("frequencies at risk")

@@ -9,6 +9,8 @@ from typing import Any
 from optim.views.tables.robust import robust
 from solver.results import units
 from solver.results.known import known_pairs
+from solver.results.measures import Measured
+from solver.results.notes import note_pairs
 from solver.results.told import Block, ResultTable, Summary
 from solver.scene.parameter_paths import parameter
 from solver.views.tables.responses import proved
@@ -62,7 +64,7 @@ def front(found: Json) -> Iterator[Block]:
     pairs = [("not found", f"band of {units.number(width)} Hz") for width in found["missed"]]
     pairs += [("end", end["status"]) for end in found["ends"] if not end["reached"]]
     effort = f"{found['evaluations']} designs in {units.duration(found['seconds'])}"
-    yield Summary("", [*pairs, *known_pairs(found), ("effort", effort)])
+    yield Summary("", [*Measured.of_result(found).pairs, *pairs, *known_pairs(found), ("effort", effort)])
 
 
 def _error(point: Json) -> str:
@@ -91,7 +93,7 @@ def amount(value: float | None, unit: str) -> str:
 
 def _pairs(found: Json) -> Pairs:
     """What the design is and what it came to."""
-    pairs = [*values(found["optimum"]), *_plateau(found)]
+    pairs = [*values(found["optimum"]), *_plateau(found), *Measured.of_result(found).pairs]
     peaks: Sequence[Json] = found.get("peaks") or ([found["peak"]] if found["peak"] else [])
     several = len({peak.get("case") for peak in peaks}) > 1
     if any(row["weight"] > 0.0 and row["quantity"] != "peak" for row in found.get("rows", ())):
@@ -182,7 +184,9 @@ def _errors(found: Json) -> Pairs:
     pairs = [pair for pair in known_pairs(found, besides=("peaks_open",)) if pair[0] != "note"] or pairs
     if "stable" in found:
         pairs.append(("stable", f"{found['stable']}: {found['stable_ground']}"))
-    return pairs + [("warning", words) for words in found.get("warnings", ())]
+    warnings = found.get("warnings", ())
+    pairs += [("warning", words) for words in warnings]
+    return pairs + [pair for pair in note_pairs(found) if pair[1] not in warnings]
 
 
 def _checked(found: Json) -> ResultTable | None:

@@ -7,6 +7,7 @@ from typing import Any
 
 from solver.results import units
 from solver.results.known import known_pairs
+from solver.results.measures import Measured
 from solver.results.order_statistics import quantile_words
 from solver.results.told import Block, ResultTable, Summary
 from solver.scene.parameter_paths import parameter
@@ -29,7 +30,7 @@ def robust(found: Json) -> Iterator[Block]:
     columns = ("", *(f"{name} optimum" for name, _ in sides))
     yield ResultTable(title, columns, rows)
     said = "; ".join(f"{name} {what}" for name, what in uncertain_rows(found["uncertain"]))
-    yield Summary("", [("uncertain", said), *effort_pairs(found)])
+    yield Summary("", [*Measured.of_result(found).pairs, ("uncertain", said), *effort_pairs(found)])
     held = [cut for cut in found["cuts"] if abs(cut["multiplier"]) > 1e-6]
     if held:
         yield ResultTable(
@@ -50,8 +51,9 @@ def effort_pairs(found: Json) -> list[tuple[str, str]]:
         pairs.append(("gap of the cuts", f"{found['gap']:.1e}{whole}"))
     if found["optimality"] is not None:
         pairs.append(("KKT residual", f"{found['optimality']:.1e}"))
-    pairs += known_pairs(found)
-    pairs += [("warning", words) for words in found.get("warnings", ())]
+    pairs += (known := known_pairs(found))
+    said = {words for _, words in known}
+    pairs += [("warning", words) for words in found.get("warnings", ()) if words not in said]
     if found["unknown"] is not None:
         pairs.append(("no response", found["unknown"]["words"]))
     effort = f"{found['designs']} designs, {found['responses']} frequency responses"

@@ -7,6 +7,7 @@ from typing import Any
 
 from solver.results import units
 from solver.results.known import known_pairs
+from solver.results.measures import Measured
 from solver.results.told import Block, ResultTable, Summary
 
 
@@ -24,7 +25,7 @@ def campbell(found: Mapping[str, Any]) -> Iterator[Block]:
         for crossing in order["crossings"]
     ]  # fmt: skip
     yield ResultTable(title, ("order", "crossing [rpm]", "peak [Hz]", "amplitude", ""), rows)
-    pairs = []
+    pairs = [*Measured.of_result(found).pairs]
     for order in found["orders"]:
         pairs.append((f"order {order['order']}", _running(order)))
         for what, name in (("stuck_hz", "all stuck"), ("open_hz", "all open")):

@@ -107,7 +107,8 @@ def plot_png(sweep_id: str, context: InContext) -> Response:
 
 
 def _picture(sweep: SweepRecord, suffix: str, context: Context) -> Response:
-    picture = sweep_picture(sweep, suffix, context.service.stored)
+    scene = context.service.jobs.spec(sweep.job_id).get("scene")
+    picture = sweep_picture(sweep, suffix, context.service.stored, scene)
     return tagged(context.request, picture, _PICTURE_TYPES[suffix])
 
 

@@ -92,8 +92,10 @@ class Campbell(Study, HarmonicRequest):
         """Return each order with the stored response whose highest peak is its own."""
         from optim.views.plots.campbell import campbell_figure
         from service.jobs.drawing import response_of
+        from solver.results.measures import Measured
 
-        curves = [response_of(read(sweep.id)) for sweep in sweeps if sweep.points]
+        measured = Measured.of_result(result)
+        curves = [response_of(read(sweep.id), measured) for sweep in sweeps if sweep.points]
         if not curves:
             raise NothingToDrawError(cls.EMPTY[1])
 

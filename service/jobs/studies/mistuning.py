@@ -205,7 +205,7 @@ def run_part(
     status = [[each.name for each in peaks.status] for peaks in found]
     return PartOutput(
         result={
-            "dof": found[0].dof, "status": status, "sweeps": sweeps,
+            "dof": found[0].dof, "measured": found[0].measured.to_json(), "status": status, "sweeps": sweeps,
             "known": [peaks.highest.to_json() for peaks in found],
             "largest": 0.0 if worst is None else worst.largest, "seconds": time.perf_counter() - begun,
         },
@@ -241,12 +241,14 @@ def _peaks(part: PartOutput) -> list[BladePeaks]:
     """The peaks that a part found, a disk each."""
     import solver
     from solver.results.known import Known
+    from solver.results.measures import Measured
 
     value, at_hz = (part.arrays[key].array() for key in _OF_THE_PEAKS)
     return [
         solver.BladePeaks(
             dof=part.result["dof"], value=value[i], at_hz=at_hz[i], branches=(),
             status=tuple(solver.BranchStatus[name] for name in names), highest=Known.from_json(known),
+            measured=Measured.of_result(part.result),
         )
         for i, (names, known) in enumerate(zip(part.result["status"], part.result["known"], strict=True))
     ]  # fmt: skip

@@ -53,7 +53,7 @@ def design_report(given: Designed) -> str:
         ReportLine(name="as given", branch=sweeps.of(scene), color=style.BLUE),
         ReportLine(name="optimum", branch=sweeps.of(after), color=style.VERMILION, width=2.0),
     ]
-    words = f"Amplitude of {scene.observe.measured} over frequency, as given and at the optimum{case.where}"
+    words = f"Amplitude, {scene.measured.name}, over frequency, as given and at the optimum{case.where}"
     parts = [
         title_section(given, f"Damper of {given.scene.name}", chosen["status"]),
         optimum_section(given, {"optimum": chosen["optimum"]}),

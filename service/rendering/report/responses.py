@@ -15,7 +15,6 @@ from optim.problem.uncertainty_set import Coordinate, Disk, How
 from service.jobs.common.scenes import linear_limit
 from solver.continuation.branch import AnyBranch, Branch
 from solver.continuation.branches.observation import observing
-from solver.results import units
 from solver.scene.parts import LumpedStructure
 from solver.scene.scene import Scene
 from solver.views.plots import style
@@ -129,7 +128,7 @@ def comparison_figure(scene: Scene, lines: Sequence[ReportLine]) -> Figure:
     """The responses on a logarithmic scale; at least one has a point."""
     curves = [(line, Response.of_branch(line.branch)) for line in lines if line.branch is not None]
     mine = [curve for line, curve in curves if not line.linear] or [curve for _, curve in curves]
-    unit = units.length_unit(float(np.median([curve.amplitude.max() for curve in mine])))
+    unit = scene.measured.unit_for(float(np.median([curve.amplitude.max() for curve in mine])))
     with style.styled():
         page, (axes,) = style.figure(6.6, 4.0)
         for line, curve in curves:
@@ -140,7 +139,7 @@ def comparison_figure(scene: Scene, lines: Sequence[ReportLine]) -> Figure:
         axes.set_yscale("log")
         style.plain_log(axes.yaxis)
         axes.margins(x=0.0)
-        style.label(axes, "frequency [Hz]", f"amplitude, max |{scene.observe.measured}| [{unit.name}]")
+        style.label(axes, "frequency [Hz]", scene.measured.label("amplitude", unit))
         axes.set_title(scene.name)
         columns = 4 if len(curves) <= 4 else 3
         axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=columns)

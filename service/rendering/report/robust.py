@@ -52,8 +52,7 @@ def robust_report(given: Designed) -> str:
     after = scene.with_values(optimum)
     linear, lines = linear_lines(after, tuple(optimum)), _lines(scene, found, sweeps)
     words = (
-        f"Amplitude of {scene.observe.measured} over frequency: as given, and both optima "
-        "with nothing uncertain"
+        f"Amplitude, {scene.measured.name}, over frequency: as given, and both optima with nothing uncertain"
     )
     if any("worst" in line.name for line in lines):
         words += " and in the scenario that is worst for each"

@@ -149,7 +149,7 @@ def scene_section(scene: Scene) -> str:
             ("base" if e.base else "force", f"{e.amplitude:g} {e.unit} on {e.place}")
             for e in scene.excitation
         ),
-        ("observed", f"{scene.observe.measured}, {low:g} to {high:g} Hz"),
+        ("observed", f"{scene.measured.name}, {low:g} to {high:g} Hz"),
     ]
     drawing = scene_figure(scene)
     words = f"What {scene.name} consists of: springs, contacts that rub, the force, the double ring observed"

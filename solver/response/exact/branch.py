@@ -14,6 +14,7 @@ from solver.continuation.branch import AnyBranch
 from solver.continuation.marks import Bifurcations, Mark, MarkKind
 from solver.continuation.peaks import Peak
 from solver.jit.fourier import Real
+from solver.response import band_end
 from solver.response.exact.answer import solve_beside
 from solver.response.exact.orbit import Orbit
 from solver.response.known import known_of_solution
@@ -112,7 +113,9 @@ class ExactBranch(AnyBranch):
         if self.highest is None:
             return Known(flags=self.flags)
         found = known_of_solution(self.highest)
-        return replace(found, peaks_open=(self.peak_certificate.reason,))
+        return replace(
+            found, notes=band_end.of_branch(self), peaks_open=(self.peak_certificate.reason,)
+        )  # fmt: skip
 
     @property
     def peak_stability(self) -> tuple[Verdict, ...]:

@@ -17,6 +17,8 @@ import numpy as np
 
 from solver.arrays import Real
 from solver.errors import SettingError
+from solver.response.band_end import of_frequency
+from solver.results.notes import notes_of_all
 from solver.results.watch import OnProgress, ShouldStop, shows_progress
 from solver.scene.scene import Scene
 from solver.studies.blades import blade_rows, mistuned
@@ -117,10 +119,13 @@ def worst_mistuning(
         found = _linear(searched, how)
     if on_progress is not None and not searched.stopped:
         on_progress(1.0, searched.done)
+    places = [found["tuned_at_hz"], *([] if found["worst"] is None else [found["worst"].at_hz])]
     return WorstMistuning(
-        scene=scene.name, dof=dof, of=names, within=within, rms=rms, detuning=intentional.detuning,
+        scene=scene.name, dof=dof, measured=replace(scene.measured, dof=dof), of=names, within=within,
+        rms=rms, detuning=intentional.detuning,
         contacts=how.value, whitehead=whitehead(len(blades)), starts=search.starts,
         climbs=search.climbs if how in _SOLVED else 0, n_harmonics=harmonics, **found,
+        notes=notes_of_all(of_frequency(searched.scene, at, band) for at in places),
         seconds=time.perf_counter() - begun,
     )  # fmt: skip
 

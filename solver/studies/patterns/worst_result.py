@@ -9,6 +9,8 @@ from typing import Annotated, ClassVar
 
 from solver.arrays import FloatOrNaN
 from solver.results.base import Drawn
+from solver.results.measures import OF_X, Measured
+from solver.results.notes import Note
 from solver.results.told import Piece
 from solver.results.views import Data, Views
 from solver.studies.mistuning_result import MistuningStatus
@@ -79,12 +81,14 @@ class WorstMistuning(Drawn):
         index="sector",
     )  # fmt: skip
     JSON: ClassVar = (
-        "scene dof of within rms detuning contacts tuned_peak tuned_at_hz worst residual whitehead martel"
-        " power_bound starts climbs alike climbed patterns best n_harmonics seconds completed=reached status"
+        "scene dof measured of within rms detuning contacts tuned_peak tuned_at_hz worst residual whitehead"
+        " martel power_bound starts climbs alike climbed patterns best n_harmonics notes seconds"
+        " completed=reached status"
     )
 
     scene: Annotated[str, "Its name."]
     dof: Annotated[str, "The DOF in one sector whose amplitude counts."]
+    measured: Annotated[Measured, "What the peaks are of."] = OF_X
     of: Annotated[tuple[str, ...], "The parts that have factors."]
     within: Annotated[float, "Largest deviation of a factor."]
     rms: Annotated[float | None, "Largest root mean square of the deviations; none."]
@@ -114,6 +118,9 @@ class WorstMistuning(Drawn):
     ]
     climbed: Annotated[int, "Responses with the contacts solved that were computed to climb on."] = 0
     patterns: Annotated[tuple[IntentionalPattern, ...], "Intentional patterns, the best first."] = ()
+    notes: Annotated[
+        tuple[Note, ...], "A highest amplitude, of the tuned disk or the worst, at an end of the band."
+    ] = ()
     n_harmonics: int
     status: WorstMistuningStatus
     seconds: float

@@ -12,6 +12,7 @@ from solver.continuation.certificate import unsettled
 from solver.errors import SettingError
 from solver.results.base import Drawn, MadeOfResponses
 from solver.results.known import Known
+from solver.results.measures import OF_X, Measured
 from solver.results.told import Piece
 from solver.results.views import Data, Views
 
@@ -180,8 +181,8 @@ class PeakTrack(MadeOfResponses, Drawn):
         scene="given",
     )  # fmt: skip
     JSON: ClassVar = (
-        "scene parameter parameter_path unit peak frequency slope optimum exchanges competing peaks_open"
-        " n_harmonics sweeps seconds completed=reached status"
+        "scene measured parameter parameter_path unit peak frequency slope optimum exchanges competing"
+        " peaks_open n_harmonics sweeps seconds completed=reached status"
     )
 
     scene: Annotated[str, "Name of the scene."]
@@ -202,6 +203,11 @@ class PeakTrack(MadeOfResponses, Drawn):
     given: Annotated[
         Scene | None, "What it is of, with the values that stayed fixed; None if read from a file."
     ] = None
+
+    @property
+    def measured(self) -> Measured:
+        """What the heights are of."""
+        return OF_X if self.given is None else self.given.measured
 
     @property
     def peaks_open(self) -> tuple[str, ...]:

@@ -142,7 +142,8 @@ def _result(course: WearCourse, scene: Scene, limit: float | None, points: int, 
     known = course.paths and course.smooth
     ends = [_known(course, one) for one in (rows[0], rows[-1])] if rows else [NOTHING_KNOWN] * 2
     return WearLife(
-        scene=scene.name, dof=scene.observe.dof, status=course.status, ended_by=course.why,
+        scene=scene.name, dof=scene.observe.dof, measured=scene.measured, status=course.status,
+        ended_by=course.why,
         contacts=wearing.names, hours=np.array([row.hours for row in rows]),
         amplitude=np.array([row.amplitude for row in rows]),
         frequency_hz=np.array([row.motion.hertz for row in rows]),

@@ -10,6 +10,7 @@ from typing import Annotated, ClassVar
 from solver.arrays import FloatOrNaN, Real
 from solver.results.base import Drawn, MadeOfResponses
 from solver.results.known import Known
+from solver.results.measures import OF_X, Measured
 from solver.results.views import Data, Views
 
 
@@ -47,14 +48,15 @@ class WearLife(MadeOfResponses, Drawn):
         }, "dof highest highest_hours limit hours_to_limit hours_to_margin", scene="scene",
     )  # fmt: skip
     JSON: ClassVar = (
-        "scene dof contacts hours amplitude frequency_hz depths loads power switches highest highest_hours"
-        " limit hours_to_limit used hours_to_margin paths end_slopes highest_slopes limit_slopes"
-        " margin_slopes depth_slopes at_peak n_harmonics steps responses seconds ended_by completed=reached"
-        " status"
+        "scene dof measured contacts hours amplitude frequency_hz depths loads power switches highest"
+        " highest_hours limit hours_to_limit used hours_to_margin paths end_slopes highest_slopes"
+        " limit_slopes margin_slopes depth_slopes at_peak n_harmonics steps responses seconds ended_by"
+        " completed=reached status"
     )
 
     scene: Annotated[str, "Name of the scene."]
     dof: Annotated[str, "The observed DOF."]
+    measured: Annotated[Measured, "What the amplitudes are of."] = OF_X
     status: Annotated[WearLifeStatus, "How it ended."]
     ended_by: Annotated[str, "What ended it, beyond the status; empty if nothing did."]
     contacts: Annotated[tuple[str, ...], "Names of the contacts that wear."]

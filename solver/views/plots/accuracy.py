@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from solver.results import units
+from solver.results.measures import MAX_ABS, WORDS
 from solver.views.plots import style
 from solver.views.plots.style import Into
 
@@ -49,7 +50,9 @@ def accuracy_figure(study: Mapping[str, Any], *, ax: Into = None) -> Figure:
         style.plain_log(axes.xaxis)
         axes.yaxis.set_major_locator(LogLocator(numticks=12))
         axes.yaxis.set_minor_formatter(NullFormatter())
-        style.label(axes, "processor time of a point by Newton's method [ms]", "relative error of max|x|")
+        style.label(
+            axes, "processor time of a point by Newton's method [ms]", f"relative error of {WORDS[MAX_ABS]}"
+        )
         axes.set_title(
             f"{study['scene']} at {study['frequency_hz']:.6g} Hz: {units.length(study['reference'])};"
             " the numbers are harmonics"

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.results.measures import OF_X, Measured
+
 if TYPE_CHECKING:
     from solver.continuation.branch import AnyBranch
 
@@ -23,8 +25,8 @@ class Response:
     scene: Annotated[str, "Its name."]
     parameter: Annotated[str, "Path of the parameter."]
     values: Annotated[FloatArray, "Parameter values in user units, (P,)."]
-    amplitude: Annotated[FloatArray, "max|x| of the observed DOF [m], (P,)."]
-    dof: Annotated[str, "The observed DOF; ``x`` if it is not known."] = "x"
+    amplitude: Annotated[FloatArray, "Of what is measured [m], (P,)."]
+    measured: Annotated[Measured, "What it is of."] = OF_X
     peak: Annotated[
         tuple[float, float] | None,
         "Parameter value and amplitude [m] of the highest peak; it is a point of the curve.",
@@ -48,7 +50,7 @@ class Response:
             parameter=branch.parameter,
             values=values,
             amplitude=amplitude,
-            dof=branch.scene.observe.measured,
+            measured=branch.scene.measured,
             peak=peak,
             limit=None if band is None else band.limit,
             intervals=() if band is None else band.intervals,

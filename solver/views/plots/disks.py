@@ -12,6 +12,7 @@ from matplotlib.ticker import MaxNLocator
 
 from solver.jit.fourier import Real
 from solver.results import units
+from solver.results.measures import Measured
 from solver.views.plots import style
 from solver.views.plots.style import Into
 
@@ -135,7 +136,7 @@ def mistuning_figure(answer: Mapping[str, Any], *, ax: Into = None) -> Figure:
         shares.set_title(f"{answer['scene']}, {factors.size} disks, spread {answer['spread']:g}")
         heights = np.array([np.nan if p is None else p for p in worst["peaks"]]) * unit.per_metre
         _draw_blades(
-            blades, heights, worst["worst_blade"], f"highest peak, max |{answer['dof']}| [{unit.name}]"
+            blades, heights, worst["worst_blade"], Measured.of_result(answer).label("highest peak", unit)
         )
         blades.axhline(tuned * unit.per_metre, color=style.INK, linewidth=0.9, linestyle=(0, (5.0, 2.5)))
         blades.annotate(

@@ -11,6 +11,7 @@ from solver.marching.result import MarchResult
 from solver.modes.peaks.performance import PerformanceCurve
 from solver.response.solution import Solution
 from solver.response.stability.multipliers import Stability
+from solver.results.measures import Measured
 from solver.scene.scene import Scene
 from solver.studies.blades import BladeAmplitudes, BladePeaks
 from solver.studies.peaks.results import PeakTrack
@@ -45,12 +46,12 @@ def of_march(march: MarchResult, ax: Into = None, *, scene: Scene | None = None)
 
 def of_track(track: PeakTrack, ax: Into = None) -> Figure:
     """Draw the peak and its frequency over the parameter."""
-    return track_figure(track.to_json(), dof=_measured(track.given), ax=ax)
+    return track_figure(track.to_json(), ax=ax)
 
 
 def of_map(found: ResponseMap, ax: Into = None) -> Figure:
     """Draw the map with its ridge."""
-    return map_figure(found.to_json(), dof=_measured(found.given), ax=ax)
+    return map_figure(found.to_json(), ax=ax)
 
 
 def of_stability(found: Stability, ax: Into = None) -> Figure:
@@ -65,13 +66,9 @@ def of_performance(curve: PerformanceCurve, ax: Into = None) -> Figure:
 
 def of_amplitudes(blades: BladeAmplitudes, ax: Into = None) -> Figure:
     """Draw the amplitude of every blade."""
-    return blades_figure(blades.max_abs, f"max |{blades.dof}|", ax=ax)
+    return blades_figure(blades.max_abs, Measured(dof=blades.dof).name, ax=ax)
 
 
 def of_blade_peaks(peaks: BladePeaks, ax: Into = None) -> Figure:
     """Draw the highest peak of every blade."""
-    return blades_figure(peaks.value, f"highest peak, max |{peaks.dof}|", ax=ax)
-
-
-def _measured(scene: Scene | None) -> str:
-    return "x" if scene is None else scene.observe.measured
+    return blades_figure(peaks.value, f"highest peak, {peaks.measured.name}", ax=ax)

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from solver.results import units
+from solver.results.measures import Measured
 from solver.views.plots import style
 from solver.views.plots.style import Into
 
@@ -57,7 +58,7 @@ def performance_figure(answer: Mapping[str, Any], *, dof: str = "x", ax: Into = 
     with style.styled():
         page, (axes,) = style.figure(5.0, 3.3, into=ax)
         axes.loglog(places[good], heights[good] * unit.per_metre, color=style.BLUE, label="one mode")
-        style.label(axes, f"factor on the {over}", f"peak of max |{dof}| [{unit.name}]")
+        style.label(axes, f"factor on the {over}", f"peak of {Measured(dof=dof).label('', unit)}")
     return page
 
 

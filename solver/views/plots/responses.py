@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from solver.results import units
+from solver.results.measures import Measured
 from solver.scene.parameter_paths import parameter_unit
 from solver.views.plots import style
 from solver.views.plots.curves import FloatArray, Response
@@ -33,7 +34,7 @@ class Family:
     optimum: Annotated[float, "The best value."]
     free: Annotated[Response, "The linear limit with the contact removed."]
     stuck: Annotated[Response, "That with it stuck throughout."]
-    dof: Annotated[str, "The observed DOF."]
+    measured: Annotated[Measured, "What the amplitudes are of."]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,7 +64,7 @@ def response_figure(
     title : the scene's name if left out.
     """
     asked = asked or Demands()
-    unit = units.length_unit(float(response.amplitude.max()))
+    unit = response.measured.unit_for(float(response.amplitude.max()))
     with style.styled():
         page, (axes,) = style.figure(6.0, 3.4, into=ax)
         for low, high in response.intervals:
@@ -71,7 +72,7 @@ def response_figure(
         _draw_stability(axes, response, unit)
         if response.peak is not None:
             _mark_peak(axes, response, response.peak, unit)
-        style.label(axes, axis_name(response.parameter), _amplitude_name("amplitude", response.dof, unit))
+        style.label(axes, axis_name(response.parameter), response.measured.label("amplitude", unit))
         axes.margins(x=0.0, y=0.14)
         axes.set_ylim(bottom=0.0)
         _mark_demands(axes, asked, unit)
@@ -81,7 +82,7 @@ def response_figure(
 
 def family_figure(family: Family) -> Figure:
     """Responses for several values of a variable between the two linear limits, on a logarithmic scale."""
-    unit = units.length_unit(float(np.median([curve.amplitude.max() for _, curve in family.members])))
+    unit = family.measured.unit_for(float(np.median([curve.amplitude.max() for _, curve in family.members])))
     first = family.members[0][1]
     with style.styled():
         page, (axes,) = style.figure(6.6, 4.0)
@@ -95,7 +96,7 @@ def family_figure(family: Family) -> Figure:
         _draw(axes, family.stuck, unit, "stuck (linear)", color=style.GREY, dashes=_DASHED)
         axes.set_yscale("log")
         style.plain_log(axes.yaxis)
-        style.label(axes, axis_name(first.parameter), _amplitude_name("amplitude", family.dof, unit))
+        style.label(axes, axis_name(first.parameter), family.measured.label("amplitude", unit))
         axes.margins(x=0.0)
         axes.set_title(first.scene)
         title = axis_name(family.variable)
@@ -110,7 +111,7 @@ def peak_figure(
     peaks: FloatArray,
     *,
     optimum: tuple[float, float],
-    dof: str,
+    measured: Measured,
 ) -> Figure:
     """Highest peak against a variable, with the optimum marked.
 
@@ -119,9 +120,9 @@ def peak_figure(
     scene, variable : name of the scene, path of the variable.
     values, peaks : (P,) values of the variable, ascending, and the highest peak at each [m].
     optimum : the best value and its peak [m].
-    dof : the observed DOF.
+    measured : what the peak is of.
     """
-    unit = units.length_unit(optimum[1])
+    unit = measured.unit_for(optimum[1])
     best, least = optimum[0], optimum[1] * unit.per_metre
     with style.styled():
         page, (axes,) = style.figure(6.0, 3.4)
@@ -140,7 +141,7 @@ def peak_figure(
         low, high = min(least, float(peaks.min()) * unit.per_metre), float(peaks.max()) * unit.per_metre
         # Room for the two lines of text below the curve, as a share of the logarithmic height.
         axes.set_ylim(low * (low / high) ** 0.35, high * (high / low) ** 0.06)
-        style.label(axes, axis_name(variable), _amplitude_name("highest peak", dof, unit))
+        style.label(axes, axis_name(variable), measured.label("highest peak", unit))
         axes.set_title(scene)
     return page
 
@@ -149,10 +150,6 @@ def axis_name(path: str) -> str:
     """A parameter path with its unit."""
     unit = parameter_unit(path)
     return f"{path} [{unit}]" if unit else path
-
-
-def _amplitude_name(what: str, dof: str, unit: units.LengthUnit) -> str:
-    return f"{what}, max |{dof}| [{unit.name}]"
 
 
 def _shades(count: int) -> Sequence[tuple[float, float, float, float]]:

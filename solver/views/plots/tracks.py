@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 
 from solver.jit.fourier import Real
 from solver.results import units
+from solver.results.measures import Measured
 from solver.views.plots import style
 from solver.views.plots.responses import axis_name
 from solver.views.plots.style import Into
@@ -23,16 +24,16 @@ _COLOURS = (style.BLUE, style.VERMILION, style.GREEN, style.SKY, style.INK, styl
 _SAME_FREQUENCY = 2e-3  # relative distance from a tracked peak within which a point lies on it
 
 
-def track_figure(track: Json, *, dof: str = "x", ax: Into = None) -> Figure:
+def track_figure(track: Json, *, ax: Into = None) -> Figure:
     """The highest peak and its frequency over the parameter, competing peaks thin, the optimum marked.
 
     Parameters
     ----------
     track : as its `to_json` gives it, with at least one point.
-    dof : the observed DOF.
     """
     parameter, peak = numbers(track["parameter"]), numbers(track["peak"])
-    unit = units.length_unit(float(peak.min()))
+    measured = Measured.of_result(track)
+    unit = measured.unit_for(float(peak.min()))
     with style.styled():
         page, (heights, places) = style.figure(9.2, 3.6, columns=2, into=ax)
         for line in track["competing"]:
@@ -59,24 +60,24 @@ def track_figure(track: Json, *, dof: str = "x", ax: Into = None) -> Figure:
         style.plain_log(heights.yaxis)
         low, high = peak.min() * unit.per_metre, peak.max() * unit.per_metre
         heights.set_ylim(low * (low / high) ** 0.35, high * (high / low) ** 0.06)
-        style.label(heights, axis_name(track["parameter_path"]), f"highest peak, max |{dof}| [{unit.name}]")
+        style.label(heights, axis_name(track["parameter_path"]), measured.label("highest peak", unit))
         style.label(places, axis_name(track["parameter_path"]), "frequency of the peak [Hz]")
         heights.set_title(track["scene"])
     return page
 
 
-def map_figure(found: Json, *, dof: str = "x", ax: Into = None) -> Figure:
+def map_figure(found: Json, *, ax: Into = None) -> Figure:
     """The amplitude in colours over frequency and parameter; the ridge of the highest peak on it.
 
     Parameters
     ----------
     found : as its `to_json` gives it, with at least one solved point.
-    dof : the observed DOF.
     """
     parameter, frequency = numbers(found["parameter"]), numbers(found["frequency"])
     amplitude = numbers(found["amplitude"])
     known = amplitude[np.isfinite(amplitude) & (amplitude > 0.0)]
-    unit = units.length_unit(float(np.median(known)))
+    measured = Measured.of_result(found)
+    unit = measured.unit_for(float(np.median(known)))
     scale = LogNorm(float(known.min()) * unit.per_metre, float(known.max()) * unit.per_metre)
     with style.styled():
         page, (axes,) = style.figure(6.8, 4.2, into=ax)
@@ -95,7 +96,7 @@ def map_figure(found: Json, *, dof: str = "x", ax: Into = None) -> Figure:
         axes.set_xlim(float(frequency[0]), float(frequency[-1]))
         style.label(axes, axis_name("frequency"), axis_name(found["parameter_path"]))
         bar = page.colorbar(mesh, ax=axes)
-        bar.set_label(f"amplitude, max |{dof}| [{unit.name}]")
+        bar.set_label(measured.label("amplitude", unit))
         axes.set_title(found["scene"])
     return page
 

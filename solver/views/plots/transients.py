@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from solver.results import units
+from solver.results.measures import MAX_ABS, WORDS, Measured
 from solver.views.plots import style
 from solver.views.plots.style import Into
 from solver.views.plots.tracks import numbers
@@ -45,7 +46,9 @@ def transient_figure(found: Mapping[str, Any], *, ax: Into = None) -> Figure:
         over_time.set_title(found["scene"])
         over_frequency.set_title(f"largest {unit.show(found['max_abs'])} at {found['at_hz']:.5g} Hz")
         style.label(over_time, "time [s]", f"{found['dof']} [{unit.name}]")
-        style.label(over_frequency, "frequency [Hz]", f"max |{found['dof']}| in a turn [{unit.name}]")
+        style.label(
+            over_frequency, "frequency [Hz]", f"{Measured(dof=found['dof']).name} in a turn [{unit.name}]"
+        )
     return page
 
 
@@ -83,7 +86,8 @@ def wear_life_figure(found: Mapping[str, Any], *, ax: Into = None) -> Figure:
     The result is as its `to_json` gives it, with at least one instant.
     """
     hours, amplitude = numbers(found["hours"]), numbers(found["amplitude"])
-    length, depths = units.length_unit(float(amplitude.max())), np.array(found["depths"])
+    measured, depths = Measured.of_result(found), np.array(found["depths"])
+    length = measured.unit_for(float(amplitude.max()))
     depth = units.length_unit(float(depths.max()))
     with style.styled():
         page, (response, loads, worn) = style.figure(10.5, 3.4, columns=3, into=ax)
@@ -105,7 +109,7 @@ def wear_life_figure(found: Mapping[str, Any], *, ax: Into = None) -> Figure:
             loads.plot(hours, numbers(load), label=name)
             worn.plot(hours, deep * depth.per_metre)
         loads.legend()
-        style.label(response, "running time [h]", f"max |{found['dof']}| [{length.name}]")
+        style.label(response, "running time [h]", measured.label("", length))
         style.label(loads, "running time [h]", "normal load [N]")
         style.label(worn, "running time [h]", f"depth [{depth.name}]")
     return page
@@ -131,7 +135,9 @@ def torus_curve_figure(found: Mapping[str, Any], *, ax: Into = None) -> Figure:
     )
     with style.styled():
         page, (axes,) = style.figure(5.6, 3.6, columns=1, into=ax)
-        axes.plot(hertz, largest * unit.per_metre, "o-", color=style.BLUE, markersize=2.8, label="max|x|")
+        axes.plot(
+            hertz, largest * unit.per_metre, "o-", color=style.BLUE, markersize=2.8, label=WORDS[MAX_ABS]
+        )
         for key, colour, words in tones:
             axes.plot(hertz, numbers(found[key]) * unit.per_metre, color=colour, label=f"amplitude {words}")
         axes.axvline(found["second_hz"], color=style.GREY, linewidth=0.8, linestyle=":")

@@ -7,6 +7,8 @@ from typing import Any
 
 from solver.results import units
 from solver.results.known import known_pairs
+from solver.results.measures import Measured
+from solver.results.notes import note_pairs
 from solver.results.order_statistics import quantile_words
 from solver.results.told import Block, ResultTable, Summary
 
@@ -68,7 +70,7 @@ def mistuning(found: Mapping[str, Any]) -> Iterator[Block]:
     pairs = []
     if tuned["peak"] is not None:
         height = units.length(tuned["peak"])
-        pairs.append((f"tuned, max |{found['dof']}|", f"{height} at {tuned['at_hz']:.6g} Hz"))
+        pairs.append((f"tuned, {Measured.of_result(found).name}", f"{height} at {tuned['at_hz']:.6g} Hz"))
     if found["mean"] is not None:
         pairs.append(("magnification", f"{found['mean']:.4g} in the mean{_errors(found)}"))
         if found["deviation"] is not None:
@@ -99,7 +101,9 @@ def worst_mistuning(found: Mapping[str, Any]) -> Iterator[Block]:
     pairs = []
     if found["tuned_peak"] is not None:
         height = units.length(found["tuned_peak"])
-        pairs.append((f"tuned, max |{found['dof']}|", f"{height} at {found['tuned_at_hz']:.6g} Hz"))
+        pairs.append(
+            (f"tuned, {Measured.of_result(found).name}", f"{height} at {found['tuned_at_hz']:.6g} Hz")
+        )
     if worst is not None:
         place = f"blade {worst['blade']} at {worst['at_hz']:.6g} Hz"
         pairs.append(("worst", f"{worst['magnification']:.4g}: {units.length(worst['peak'])}, {place}"))
@@ -112,6 +116,7 @@ def worst_mistuning(found: Mapping[str, Any]) -> Iterator[Block]:
     pairs.append(("climbs", f"{climbs}, of which {found['alike']} ended at the same height"))
     if found["climbed"]:
         pairs.append(("responses solved", str(found["climbed"])))
+    pairs += note_pairs(found)
     pairs.append(("time", units.duration(found["seconds"])))
     yield Summary(f"{found['scene']}, contacts {found['contacts']}, {size}", pairs)
     if found["patterns"]:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 from solver.results import units
+from solver.results.measures import Measured
 from solver.results.told import Block, ResultTable, Summary
 from solver.views.tables.responses import proved
 
@@ -65,7 +66,7 @@ def mode(found: Mapping[str, Any]) -> Iterator[Block]:
 
 
 def _height(found: Mapping[str, Any]) -> _Column:
-    return f"max |{found['dof']}|", "max_abs", units.length
+    return Measured(dof=found["dof"]).name, "max_abs", units.length
 
 
 def _curve(
@@ -104,16 +105,14 @@ def _performance(curve: Mapping[str, Any], dof: str) -> Iterator[Block]:
 
 def _cycles(found: Mapping[str, Any], dof: str) -> Summary:
     """Limit cycles, and the most the damper holds."""
-    pairs = []
+    pairs, named = [], Measured(dof=dof).name
     if found["most_damping"] is not None:
         most = f"ζ = {found['most_damping']:.5g} ± {_error(found['most_error'])}"
         end = ", the end of the curve: more may be held beyond" if found["most_at_end"] else ""
         pairs.append(("most that is held", f"{most} at a = {found['most_at']:.4g} √kg m{end}"))
     for cycle in found["cycles"]:
         name = {True: "stable cycle", False: "unstable cycle", None: "cycle"}[cycle["stable"]]
-        size = (
-            f"max |{dof}| {units.length(cycle['max_abs'])} ± {_error(cycle['max_abs_error'], units.length)}"
-        )
+        size = f"{named} {units.length(cycle['max_abs'])} ± {_error(cycle['max_abs_error'], units.length)}"
         at = f"{cycle['frequency']:.6g} ± {_error(cycle['frequency_error'])} Hz"
         pairs.append((name, f"a = {cycle['amplitude']:.6g} √kg m, {size}, {at}"))
         if cycle["stable"] is None:

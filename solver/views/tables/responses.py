@@ -6,7 +6,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from solver.results import units
-from solver.results.notes import BAND_OPEN, FLAGS, between_points, drift_words, flag_words
+from solver.results.measures import HALF_PEAK_TO_PEAK, MAX_ABS, WORDS, Measured
+from solver.results.notes import BAND_OPEN, FLAGS, between_points, drift_words, flag_words, note_pairs
 from solver.results.told import Block, ResultTable, Summary
 from solver.scene.parameter_paths import parameter
 
@@ -37,6 +38,7 @@ def plan(found: Json) -> Iterator[Block]:
             ("performance curve", found["performance_curve"]),
             ("estimated cost", f"{units.duration(found['estimated_seconds_a_point'])} a point of a branch"),
             ("stability", stability),
+            *note_pairs(found),
         ],
     )
 
@@ -48,12 +50,11 @@ def solution(found: Json) -> Iterator[Block]:
         return
     title = f"{found['scene']} at {found['frequency_hz']:g} Hz, {found['n_harmonics']} harmonics"
     if not found["converged"]:
-        notes = [("note", words) for words in flag_words(found["flags"])]
-        yield Summary(title, [("converged", "no"), *_drift(found), *notes])
+        yield Summary(title, [("converged", "no"), *_drift(found), *_notes(found)])
         return
     pairs = _amplitudes(found)
     if found["error_estimate"] is not None:
-        of = "half peak to peak" if "mean_undetermined" in found["flags"] else "max|x|"
+        of = WORDS[HALF_PEAK_TO_PEAK if "mean_undetermined" in found["flags"] else MAX_ABS]
         pairs.append(("estimated error", f"{units.length(found['error_estimate'])} of {of}"))
     pairs += proved([found["certificate"]] if found.get("certificate") else [])
     pairs.append(("harmonics 1 to 5", _harmonics(found["harmonics"])))
@@ -62,12 +63,17 @@ def solution(found: Json) -> Iterator[Block]:
         pairs.append(("stable", f"{found['stable']}: {found['stable_ground']}"))
     if "unique" in found:
         pairs.append(("one response alone", f"{found['unique']}: {found['unique_ground']}"))
-    pairs += [("note", words) for words in flag_words(found["flags"])]
+    pairs += _notes(found)
     low, high = found.get("mean_range", (None, None))
     if low is not None and high is not None:
         pairs.append(("mean, any history", f"{units.length(low)} to {units.length(high)}"))
     pairs += [("residual", f"{found['residual']:.1e}"), ("time", units.duration(found["seconds"]))]
     yield Summary(title, pairs)
+
+
+def _notes(found: Json) -> Pairs:
+    """What a response says of itself by flags, and its notes."""
+    return [("note", words) for words in flag_words(found.get("flags", ()))] + note_pairs(found)
 
 
 def _harmonics(amplitudes: Sequence[float]) -> str:
@@ -85,7 +91,7 @@ def proved(proofs: Iterable[Json]) -> Pairs:
             pairs.append(("proved", f"no {of}: {proof['reason'] or proof['status']}"))
             continue
         held = of == "response" and proof["held"]
-        what = "half peak to peak" if held else "max|x|" if of == "response" else of
+        what = WORDS[HALF_PEAK_TO_PEAK if held else MAX_ABS] if of == "response" else of
         low, high = proof["half_peak_to_peak" if held else "max_abs"]
         at = "" if of == "response" else f" at {proof['frequency_hz'][0]:.12g} Hz"
         factor = proof["load_factor"]
@@ -128,7 +134,7 @@ def _all_solutions(found: Json) -> Iterator[Block]:
 def branch(found: Json) -> Iterator[Block]:
     """A branch: its peaks and its band."""
     path = found["parameter_path"]
-    pairs = _peaks(found, path)
+    pairs = [*Measured.of_result(found).pairs, *_peaks(found, path)]
     if found["error_estimate"] is not None:
         pairs.append(("estimated error", f"{units.length(found['error_estimate'])} of the highest"))
     if found.get("stable"):
@@ -140,8 +146,7 @@ def branch(found: Json) -> Iterator[Block]:
     effort = f"{found['newton_iterations']} Newton iterations, {found['rejected_steps']} steps rejected"
     pairs += sure_of(found)
     pairs += _drift(found)
-    pairs += [("note", words) for words in flag_words(found.get("flags", ()))]
-    pairs += _marks(found, path)
+    pairs += _notes(found) + _marks(found, path)
     pairs.append(("points", f"{found['points']} ({effort}, {found['folds']} folds)"))
     pairs.append(("time", units.duration(found["seconds"])))
     yield Summary(title_over(found), pairs)
@@ -321,10 +326,9 @@ def _force(value: float | None) -> str:
 
 
 def _amplitudes(found: Json) -> Pairs:
-    names = {"max_abs": "max|x|", "half_peak_to_peak": "half peak to peak", "mean": "mean"}
-    known = {key: found[key] for key in names if found[key] is not None}
+    known = {key: found[key] for key in WORDS if found[key] is not None}
     show = units.length_unit(max((abs(value) for value in known.values()), default=0.0)).show
-    return [(names[key], show(value)) for key, value in known.items()]
+    return [(WORDS[key], show(value)) for key, value in known.items()]
 
 
 def _peaks(found: Json, path: str) -> Pairs:

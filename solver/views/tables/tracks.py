@@ -7,6 +7,7 @@ from typing import Any
 
 from solver.results import units
 from solver.results.known import known_pairs
+from solver.results.measures import Measured
 from solver.results.told import Block, ResultTable, Summary
 from solver.scene.parameter_paths import parameter
 from solver.views.tables.responses import proved, title_over
@@ -18,7 +19,13 @@ ON_THE_GRID = "resonances narrower than the grid are not on it: the tracked peak
 
 def track(found: Json) -> Iterator[Block]:
     """The highest peak over a parameter: both ends, the exchanges, the least."""
-    pairs = [*_ridge(found), *_plateau(found), *_sure(found), *proved(found.get("certificates") or ())]
+    pairs = [
+        *Measured.of_result(found).pairs,
+        *_ridge(found),
+        *_plateau(found),
+        *_sure(found),
+        *proved(found.get("certificates") or ()),
+    ]
     pairs.append(("points", f"{len(found['parameter'])}, {found['sweeps']} sweeps"))
     pairs.append(("time", units.duration(found["seconds"])))
     yield Summary(title_over(found), pairs)
@@ -35,6 +42,7 @@ def response_map(found: Json) -> Iterator[Block]:
     ]
     size = f"{len(found['parameter'])} × {len(found['frequency'])}"
     pairs = [("points", f"{size}, {len(known)} solved, largest residual {found['largest_residual']:.1e}")]
+    pairs += Measured.of_result(found).pairs
     if known:
         value, frequency, at = max(known)
         place = f"{frequency:.6g} Hz, {path} {parameter(path, at)}"

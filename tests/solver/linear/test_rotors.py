@@ -10,9 +10,9 @@ import solver
 from solver.balance.balance import build
 from solver.balance.workspace import Workspace
 from solver.errors import SceneError, SettingError
+from solver.linear.natural_frequencies import natural_frequencies
 from solver.scene.scene import Scene
 from solver.sensitivity.gradient import Sensitivities
-from solver.studies.natural_frequencies import natural_frequencies
 
 JT, JP, K_TILT, ZETA = 0.02, 0.03, 4000.0, 0.01  # kg m², kg m², N m, 1
 CONTACT = {"name": "rub", "between": ["a", "ground"], "kt": 800.0, "mu": 0.3, "N0": 0.4}

@@ -14,9 +14,9 @@ from solver.balance.workspace import Workspace
 from solver.contacts.kernels.system import MODES
 from solver.linear.assembly import linear_model, structure_derivative
 from solver.linear.modal import decompose, matrices_of
+from solver.linear.natural_frequencies import natural_frequencies
 from solver.scene.cyclic.annulus import annulus
 from solver.sensitivity.gradient import Sensitivities
-from solver.studies.natural_frequencies import natural_frequencies
 
 LUMPED = load_scene("bladed-disk").to_dict()
 HZ = 690.0

@@ -13,9 +13,9 @@ from solver.balance.more_harmonics import more_harmonics
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.columns import N0
 from solver.errors import SceneError, SettingError
+from solver.linear.natural_frequencies import natural_frequencies
 from solver.scene.scene import Scene
 from solver.sensitivity.gradient import Sensitivities
-from solver.studies.natural_frequencies import natural_frequencies
 
 JT, JP, K = 0.02, 0.03, 4000.0
 ORDER = 3.0

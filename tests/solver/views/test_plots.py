@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 import solver
 from solver.results import units
 from solver.results.files import whole
+from solver.results.measures import Measured
 from solver.scene.parameter_paths import parameter
 from solver.views.plots import SUFFIXES, html, style
 from solver.views.plots.curves import Response, above, with_peak
@@ -29,7 +30,7 @@ def bump(height: float, at: float = 2.0) -> Response:
         parameter="frequency",
         values=values,
         amplitude=amplitude,
-        dof="tip",
+        measured=Measured(dof="tip"),
         peak=(at, height),
         limit=0.8 * height,
         intervals=((at - 0.5, at + 0.5),),
@@ -63,7 +64,7 @@ def test_a_family_is_in_order_with_the_optimum_and_both_limits_marked() -> None:
         optimum=185.46,
         free=bump(1e-2),
         stuck=bump(5e-4),
-        dof="tip",
+        measured=Measured(dof="tip"),
     )
     page = family_figure(family)
     (axes,) = page.axes
@@ -77,7 +78,9 @@ def test_a_family_is_in_order_with_the_optimum_and_both_limits_marked() -> None:
 
 def test_the_peak_over_a_load_has_the_optimum_marked() -> None:
     loads, peaks = np.array([20.0, 100.0, 300.0, 1000.0]), np.array([4e-3, 1.1e-4, 1.05e-4, 2e-4])
-    page = peak_figure("made-up", "shroud.N0", loads, peaks, optimum=(190.0, 1e-4), dof="tip")
+    page = peak_figure(
+        "made-up", "shroud.N0", loads, peaks, optimum=(190.0, 1e-4), measured=Measured(dof="tip")
+    )
     (axes,) = page.axes
     curve, dot = axes.lines
     assert axes.get_xlabel() == "shroud.N0 [N]"

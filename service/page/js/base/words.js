@@ -13,8 +13,11 @@ const FLAGS = {
   travelling_wave_assumed: "the response is assumed to be the travelling wave: compare with every sector",
 };
 
-// A flag of a newer version as it is.
-export const notes = (flags) => (flags ?? []).map((flag) => ["note", FLAGS[flag] ?? flag.replaceAll("_", " ")]);
+// The flags of a result, one of a newer version as it is, and its notes, without what its warnings say.
+export const notes = ({ flags, notes: said, mean_undetermined: free, warnings = [] }) => [
+  ...new Set([...(free ? ["mean_undetermined"] : []), ...(flags ?? [])].map((flag) => FLAGS[flag] ?? flag.replaceAll("_", " "))),
+  ...(said ?? []).map(({ words }) => words),
+].filter((words) => !warnings.includes(words)).map((words) => ["note", words]);
 
 // Nothing of what an earlier version computed.
 export function betweenPoints({ peak, peak_certificate: found, band_known: band }) {

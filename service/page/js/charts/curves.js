@@ -1,7 +1,6 @@
 // A response as a chart: its curve through its polished peak, stable and not, its band.
 
 import { length, lengthUnit, number } from "../base/format.js";
-import { current } from "../scene/scenes.js";
 
 // The amplitudes of the points that are stable, and of those that are not with their neighbours; null elsewhere.
 function byStability({ amplitude, unstable }) {
@@ -38,10 +37,10 @@ export function responseOf(answer, more = []) {
   const up = (values) => values.map((v) => (v === null ? null : v * scale.perMetre));
   const points = throughPeak(answer);
   const parts = byStability(points);
-  const { dof } = current.body.observe;
+  const name = answer.measured?.name ?? "amplitude";
   return {
     x: { name: "frequency [Hz]" },
-    y: { name: `max |${dof}| [${scale.name}]`, unit: scale, zero: true, low: 0, pad: 0.14 },
+    y: { name: `${name} [${scale.name}]`, unit: scale, zero: true, low: 0, pad: 0.14 },
     series: [
       { name: more.length ? "with friction" : parts.unstable ? "stable" : "", x: points.parameter, y: up(parts.stable), colour: 1 },
       ...(parts.unstable ? [{ name: "not stable", x: points.parameter, y: up(parts.unstable), colour: 1, dash: "dashed" }] : []),

@@ -5,6 +5,7 @@ import { state } from "../base/address.js";
 import { byId, el, facts, say, show } from "../base/dom.js";
 import { on, tell } from "../base/events.js";
 import { length, number, quantity, seconds } from "../base/format.js";
+import { notes } from "../base/words.js";
 import { putAll } from "./live.js";
 import { asked } from "../scene/scenes.js";
 import { basinsOf, conditionsOf, limitsOf, robustOf } from "./held.js";
@@ -45,6 +46,7 @@ export const designView = {
         ...(result.chosen_by ? [["chosen by", result.chosen_by]] : []),
         ...(typeof result.error_estimate === "number" ? [["estimated error", length(result.error_estimate)]] : []),
         ...(result.warnings ?? []).map((words) => ["warning", el("span", { class: "bad" }, words)]),
+        ...notes({ notes: result.notes, warnings: result.warnings }),
         ["resonance band", result.band_hz === null ? "–" : `${number(result.band_hz)} Hz above ${length(result.limit)}`],
         ...furtherOf(result).map(({ quantity: name, value, unit, what }) => [name, `${unit === "m" ? length(value) : `${number(value)} ${unit}`}: ${what}`]),
         ["held by", `${(result.active ?? []).join(", ") || "nothing"}${heldIn(result)}`],

@@ -57,7 +57,7 @@ function wear(result) {
     {
       label: "Amplitude over the life", file: "wear",
       draw: {
-        x, y: { name: `max |${result.dof}| [${height.name}]`, unit: height.unit, pad: 0.1 },
+        x, y: { name: `${result.measured?.name ?? result.dof} [${height.name}]`, unit: height.unit, pad: 0.1 },
         series: [{ x: result.hours, y: result.amplitude.map(times(height.factor)), colour: 1 }],
         limits: [
           ...(result.limit === null ? [] : [{ y: result.limit * height.factor, name: "limit" }]),

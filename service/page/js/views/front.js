@@ -10,6 +10,7 @@ const FAR_APART = 8;
 let plot = null;
 let points = [];
 let request = null;
+let of = null; // what the peaks are of
 
 let chosen = null;
 
@@ -33,6 +34,7 @@ export const frontView = {
   progress: ({ took, points: count }) => say("front-status", `Front:${took}, ${count} evaluations.`),
   result(result, _sweeps, job) {
     ({ request } = job);
+    of = result.measured;
     points = [...result.points].sort((a, b) => a.band_hz - b.band_hz);
     if (!points.length) return say("front-status", result.status, true);
     chosen = null;
@@ -62,7 +64,7 @@ function draw() {
   const limit = request.limit ?? null;
   plot.draw({
     x: { name: "resonance band [Hz]", pad: 0.06 },
-    y: { name: `highest peak [${unit.name}]`, unit, log, pad: 0.12 },
+    y: { name: `highest peak, ${of?.name ?? "amplitude"} [${unit.name}]`, unit, log, pad: 0.12 },
     series: [{ name: "front", x: points.map((p) => p.band_hz), y: points.map((p) => p.peak * unit.perMetre), colour: 1, shape: "circle", size: 4.5 }],
     limits: limit !== null && limit >= 0.5 * Math.min(...peaks) && limit <= 2 * Math.max(...peaks) ? [{ y: limit * unit.perMetre, name: "the band is measured here" }] : [],
     marks: chosen === null ? [] : [{ x: points[chosen].band_hz, y: points[chosen].peak * unit.perMetre, shape: "diamond", colour: 2, text: "loaded" }],

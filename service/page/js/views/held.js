@@ -2,6 +2,7 @@
 
 import { el, facts, table } from "../base/dom.js";
 import { length, number, quantity, seconds } from "../base/format.js";
+import { notes } from "../base/words.js";
 
 const measured = (value, unit) => (unit === "m" ? length(value) : `${number(value)} ${unit}`);
 
@@ -46,7 +47,7 @@ export function robustOf(result) {
   return [
     facts([["what is minimised", result.aim], ["designs and responses", `${result.designs} and ${result.responses} in ${seconds(result.seconds)}`],
       ["gain in the worst case", result.gain === null ? "–" : `${number(100 * result.gain, 3)} %`], ["gap", result.gap === null ? "–" : `${number(100 * result.gap, 2)} % could still be missed`],
-      ...result.warnings.map((text) => ["warning", el("span", { class: "bad" }, text)])]),
+      ...result.warnings.map((text) => ["warning", el("span", { class: "bad" }, text)]), ...notes({ notes: result.notes, warnings: result.warnings })]),
     scrolled("Nominal and robust design", table(["", "design", { text: "peak, all nominal", number: true }, { text: "worst peak", number: true }, { text: "mean of samples", number: true }, "worst with"],
       [["robust", result.robust], ["nominal", result.nominal]].filter(([, found]) => found).map(([name, found]) => side(name, found)), "Nominal and robust design")),
   ];

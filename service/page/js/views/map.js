@@ -5,7 +5,7 @@ import { on, tell } from "../base/events.js";
 import { length, number, quantity, seconds, withUnit } from "../base/format.js";
 import { heatmap, shadeStrip } from "../charts/heatmap.js";
 import { load } from "./design.js";
-import { warnings } from "../base/words.js";
+import { notes, warnings } from "../base/words.js";
 
 let plot = null;
 let last = null;
@@ -71,7 +71,7 @@ function draw() {
   const rows = [["ridge", ridge ? "solid: the highest peak; dashed: peaks that compete" : "not tracked"]];
   if (at) rows.push(["least peak", `${length(at.peak)} at ${quantity(path, at.at)}`]);
   if (ridge?.optimum?.plateau) rows.push(["as good", ridge.optimum.plateau.map((v) => quantity(path, v)).join(" to ")], ["chosen by", ridge.optimum.chosen_by]);
-  rows.push(...warnings((ridge?.peaks_open ?? []).map((reason) => ({ known: false, reason }))));
+  rows.push(...notes({ notes: last.notes }), ...warnings((ridge?.peaks_open ?? []).map((reason) => ({ known: false, reason }))));
   show(byId("map-facts"), shadeStrip(plot.range), facts(rows),
     el("p", { class: "note" }, "A click loads the load there and shows its loops at that frequency. A rectangle drawn with the mouse is zoomed, Shift and a drag move the map."));
 }

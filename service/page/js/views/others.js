@@ -6,6 +6,7 @@ import { byId, el, facts, say, show, table } from "../base/dom.js";
 import { on } from "../base/events.js";
 import { saveText } from "../base/exports.js";
 import { number } from "../base/format.js";
+import { notes } from "../base/words.js";
 import { chart } from "../charts/chart.js";
 import { schemaForm } from "../forms/form.js";
 import { resume, run } from "../network/jobs.js";
@@ -71,7 +72,7 @@ const othersView = (name) => ({
     say("others-status", sweeps.length ? `${name} is done; its sweeps are stored with it.` : `${name} is done.`);
     const drawings = DRAWINGS[name]?.(result) ?? [];
     const figures = drawings.map(() => el("div", { class: "figure" }));
-    show(byId("others-result"), ...drawings.map(({ label }, i) => el("div", {}, el("h3", {}, label), figures[i])), facts(scalars(result)), columns(result),
+    show(byId("others-result"), ...drawings.map(({ label }, i) => el("div", {}, el("h3", {}, label), figures[i])), facts([...scalars(result), ...notes({ notes: result.notes })]), columns(result),
       el("button", { type: "button", onclick: () => saveText(JSON.stringify(result, null, 1), `${name}.json`, "application/json") }, "Save as JSON"));
     // Drawn where they stand: a chart is as wide as its place.
     drawings.forEach(({ label, file, draw }, i) => chart(figures[i], { label, file, height: 300 }).draw(draw));

@@ -65,7 +65,7 @@ function arrived(answer) {
   const states = answer.period.contacts.map((c) => [c.name, c.shares ? `${c.state}: ${shares(c.shares)}` : c.state]);
   show(
     byId("point-facts"),
-    facts([["max |x|", length(answer.max_abs)], ["half peak to peak", length(answer.half_peak_to_peak)], ["mean", length(answer.mean)], ...states, ...notes(answer.flags)]),
+    facts([["max |x|", length(answer.max_abs)], ["half peak to peak", length(answer.half_peak_to_peak)], ["mean", length(answer.mean)], ...states, ...notes(answer)]),
     el("button", { type: "button", onclick: () => referee() }, "Compare with the time march"),
   );
   tell("states", { states: Object.fromEntries(answer.period.contacts.map((c) => [c.name, c.state])), at: answer.frequency_hz });

@@ -4,7 +4,7 @@ import { chart } from "../charts/chart.js";
 import { byId, facts, say, show } from "../base/dom.js";
 import { on, tell } from "../base/events.js";
 import { length, number } from "../base/format.js";
-import { warnings } from "../base/words.js";
+import { notes, warnings } from "../base/words.js";
 
 let costs = null;
 let speeds = null;
@@ -72,7 +72,7 @@ export const campbellView = {
     say("campbell-status", `Shaded: speeds at which the amplitude is above ${result.limit === null ? "half power of the order's peak" : length(result.limit)}.`);
     show(byId("campbell-facts"), facts([
       ...crossings.map((c) => [`order ${c.order}`, `${length(c.amplitude)} at ${number(c.speed_rpm, 5)} /min, ${number(c.frequency_hz, 5)} Hz`]),
-      ...warnings(result.orders.map((o) => o.peak_certificate)),
+      ...notes({ notes: result.notes }), ...warnings(result.orders.map((o) => o.peak_certificate)),
     ]));
   },
   failed: (text) => say("campbell-status", text, true),

@@ -1,39 +1,80 @@
-"""Undamped natural frequencies of a scene between the states friction moves it through: open and stuck."""
+"""Undamped natural frequencies of a scene between the states friction moves it through: open and stuck.
+
+They are where its linear resonances are, from which friction takes those that a response shows.
+"""
 
 from __future__ import annotations
 
 import math
+from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
-from solver.jit.fourier import Complex, Real
+from solver.jit.fourier import Complex, Integer, Real
 from solver.linear.assembly import linear_model
-from solver.linear.model import LinearModel
+from solver.linear.model import Identity, LinearModel
 from solver.matrices.normal_modes import undamped_modes
 from solver.scene.cyclic.annulus import written_out
 from solver.scene.scene import Scene
 
+RIGID = 1e6  # times the structure's stiffness: what a rigid contact counts as
+LARGE = 300  # coordinates from which modes cost more than a small study
+_AT_REST = 1e-6  # of the highest natural frequency: below it a part moves as a rigid body
 
-def natural_frequencies(scene: Scene, *, stuck: bool) -> Real:
+
+class Resonances(NamedTuple):
+    """Excitation frequencies [Hz], ascending, at which a harmonic of the excitation meets a linear mode."""
+
+    open_hz: Real
+    stuck_hz: Real
+
+
+def resonances(scene: Scene) -> Resonances | None:
+    """Return the linear resonances of a scene, all contacts open and all stuck; None of one too large.
+
+    Harmonics are those of the forces, and that which is observed alone; motions as a rigid body are left out.
+    """
+    return _resonances(Identity(scene))
+
+
+@lru_cache(maxsize=4)
+def _resonances(of: Identity[Scene]) -> Resonances | None:
+    scene = of.it
+    if linear_model(scene).n_coordinates > LARGE:
+        return None
+    waves = {force.harmonic for force in scene.excitation} | {scene.observe.harmonic or 0}
+    found = []
+    for stuck in (False, True):
+        each = [natural_frequencies(scene, stuck=stuck, harmonic=k) / k for k in sorted(waves - {0} or {1})]
+        every = np.concatenate(each)
+        found.append(np.sort(every[every > _AT_REST * every.max(initial=0.0)]))
+    return Resonances(*found)
+
+
+def natural_frequencies(scene: Scene, *, stuck: bool, harmonic: int = 1) -> Real:
     """Return the undamped natural frequencies [Hz], ascending, of the nodal diameter that is excited.
 
     Parameters
     ----------
     scene : its dashpots and forces do not count, gyroscopic terms at its speed do. Along an engine-order line
         they are where the order meets them.
-    stuck : with all contacts closed and stuck, so that each is its springs; otherwise with all open.
+    stuck : with all contacts closed and stuck, so that each is its springs; otherwise with all open. A rigid
+        one is as stiff as rounding lets be told.
+    harmonic : of the excitation; of a disk its nodal diameter depends on that.
     """
     scene = written_out(scene)
     model = linear_model(scene)
-    one = np.ones(1, np.int64)
-    n = model.diameters(one)
-    (K,), _, (M,) = model.at(n, one > 0)
+    k = np.full(1, harmonic, np.int64)
+    n = model.diameters(k)
+    (K,), _, (M,) = model.at(n, k > 0)
     (L,) = model.ports_at(n)
     if stuck:
         stiffness = np.array([k for contact in scene.contacts for k in contact.stiffnesses])
-        K = K + L.conj().T @ (stiffness[:, None] * L)
+        rigid = RIGID * float(np.abs(np.diag(K)).max(initial=0.0))
+        K = K + L.conj().T @ (np.where(np.isinf(stiffness), rigid, stiffness)[:, None] * L)
     if model.line is not None:
-        return _along_line(K, model)
+        return _along_line(K, model, k)
     if model.extra is not None:
         C = model.extra.at(model.turns(n), np.ones(1, np.bool_), lambda: model.plain(n)[0])[1][0]
         free = model.free
@@ -42,14 +83,13 @@ def natural_frequencies(scene: Scene, *, stuck: bool) -> Real:
     return np.sort(np.sqrt(np.maximum(modes.omega2, 0.0))) / (2.0 * math.pi)
 
 
-def _along_line(K: Complex, model: LinearModel) -> Real:
+def _along_line(K: Complex, model: LinearModel, k: Integer) -> Real:
     """Return the frequencies [Hz], ascending, at which an order meets K + Ω² K₂ + iω Ω G − ω² M, Ω = ω / e.
 
     With the inertia M − K₂/e² − i G/e, Hermitian but perhaps not definite, ω² are those of its inverse
     problem that are positive: an order of a stiffening rotor may meet none.
     """
-    one = np.ones(1, np.int64)
-    inertia, free = model.inertia(model.diameters(one), one)[0], model.free
+    inertia, free = model.inertia(model.diameters(k), k)[0], model.free
     even = 0.5 * (K + K.conj().T)[free][:, free]
     mu = np.linalg.eigvals(np.linalg.solve(even, inertia[free][:, free])).real
     return np.sort(1.0 / np.sqrt(mu[mu > 0.0])) / (2.0 * math.pi)
