@@ -14,6 +14,7 @@ from solver.balance.kernels.jacobian import factorise, step_back
 from solver.balance.kernels.output import extremes, observed_motion
 from solver.balance.kernels.residual import evaluate
 from solver.balance.more_harmonics import less_harmonics, linear_part, more_harmonics, pad
+from solver.balance.rounding import amplitudes, observed_rounding
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.system import (
     FROM_REST,
@@ -34,7 +35,6 @@ _LEAST_BEYOND = 8
 # How much farther the receptance is looked at, and entries of it that are held at once.
 _TAIL = 4
 _AT_ONCE = 2**21
-_LOST_BITS = 16.0  # of the sums behind a motion, in units of their rounding
 # Fitted to 600 random scenes, see docs/accuracy.md: 98 % of the true errors are below the estimate.
 SAFETY = 1.7
 # A second step above this share of the first, and a change above this share of the amplitude: the first order
@@ -141,6 +141,7 @@ class ErrorEstimator:
             return UNKNOWN
         point = evaluation_by_value(larger.point)
         tail, more = self._tail(point.F, p)
+        rounding = observed_rounding(larger, U, p, across=across)
         # Across the branch, u and λ each count relative to their size.
         size = max(float(np.abs(u).max(initial=0.0)), 1e-150)
         weights = (1.0 / size**2, 1.0 / (p * p if p != 0.0 else 1.0)) if across else (0.0, 0.0)
@@ -157,8 +158,10 @@ class ErrorEstimator:
         first_order = second.length <= _FIRST_ORDER * first.length
         if not (across or first_order) and largest[0] > _FIRST_ORDER * self._size(x):
             largest = self._solved(x, U, p, largest)
-        lost = tail + self._rounding(0.0 if across else p)
-        max_abs, half_range = more * SAFETY * largest + self._per_motion(x) * lost
+        changes, rounding = more * SAFETY * largest, self._per_motion(x) * rounding
+        # Changes within the rounding are rounding.
+        changes = np.where(changes <= rounding, 0.0, changes)
+        max_abs, half_range = changes + rounding + self._per_motion(x) * tail
         if kept.system.centred != FROM_REST:
             max_abs = half_range
         return ErrorEstimate(max_abs=float(max_abs), half_peak_to_peak=float(half_range))
@@ -168,9 +171,11 @@ class ErrorEstimator:
         larger = self._larger
         step = np.append(residual, 0.0) if across else residual.copy()
         step_back(larger.system, larger.point, step)
-        length = float(np.abs(step).max(initial=0.0))
-        if not math.isfinite(length):
+        if not np.all(np.isfinite(step)):
             return None
+        moved = step[: U.size].reshape(-1, larger.balance.n_coefficients)
+        lengths = np.abs(amplitudes(larger.balance.system, moved))  # whenever the clock is started
+        length = float(lengths.max(initial=abs(step[-1]) if across else 0.0))
         place = U - step[: U.size], p - (float(step[-1]) if across else 0.0)
         after = self._motion(larger, *place, elsewhere=across)
         return None if after is None else _Step(place, length, self._change(x, after))
@@ -215,18 +220,6 @@ class ErrorEstimator:
         """Return by how much what is measured may change for a unit of the observed motion."""
         used = self._utilisation(x.high, x.low)
         return 1.0 if used is None else used[1] + abs(used[2])
-
-    def _rounding(self, p: float) -> float:
-        """Return what rounding may do to the observed motion where last evaluated [m].
-
-        It is the difference of what the force and what the contacts do; near an undamped resonance both are
-        huge. Resonances are rounded too: at a fixed λ = p that is as if p were. Across a branch p is 0.
-        """
-        larger = self._larger
-        linear, F = receptance_by_value(larger.linear), evaluation_by_value(larger.point).F
-        forces = np.abs(F).max(axis=1, initial=0.0)
-        own, slopes = (np.abs(linear.x_linear[i]) + np.abs(linear.B[i]) @ forces for i in (0, 1))
-        return _LOST_BITS * float(np.finfo(float).eps * np.max(own + abs(p) * slopes, initial=0.0))
 
     @staticmethod
     def _motion(workspace: Workspace, u: Real, p: float, *, elsewhere: bool = True) -> Real | None:
