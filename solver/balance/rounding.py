@@ -15,7 +15,6 @@ damped: ζ below some ε.
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -33,13 +32,16 @@ from solver.contacts.kernels.system import (
     receptance_by_value,
 )
 from solver.jit.fourier import Complex, Flags, Real
+from solver.linear.assembly import linear_model
 from solver.linear.kernels.receptance import excitation
+from solver.matrices.normal_modes import hermitian, undamped_modes
 
 # What the entries of the matrices are off by, and sums of what cancels, found on random scenes.
 LOST_BITS = 4.0 * float(np.finfo(float).eps)
 _LOST_SUMS = 16.0  # in units of the former
 _TINY = 1e-300
-_SEEN = 1e-12  # share of a mode's motion below which a contact does not see it
+_SEEN = 1e-12  # share of a motion, relative to that in other modes, below which it is rounding
+_SAME = 1e-9  # relative distance of frequencies below which modes may be turned into each other
 
 
 class _Chains(NamedTuple):
@@ -63,7 +65,8 @@ def observed_rounding(workspace: Workspace, u: Real, p: float, *, across: bool) 
     balance = workspace.balance
     system, point = balance.system, evaluation_by_value(workspace.point)
     linear = of_all_ports(system, receptance_by_value(workspace.linear))
-    forces = amplitudes(system, point.F) - system.shift[:, None] * amplitudes(system, u.reshape(point.F.shape))
+    motions = amplitudes(system, u.reshape(point.F.shape))
+    forces = amplitudes(system, point.F) - system.shift[:, None] * motions
     loop = linear.B[0] if not point.F.shape[0] else _through_contacts(workspace, linear.A[0], linear.B[0])
     chains = _chains(balance, forces.T, loop, p)
     pushed, free = np.abs(forces.T), linear.x_linear[0]
@@ -158,7 +161,7 @@ def _changes(balance: Balance, chains: _Chains, observed: Real, p: float, *, acr
     omega = p if balance.parameter.kind is Kind.FREQUENCY else system.omega
     k = np.maximum(system.ks, int(system.form == DENSE))[:, None] * omega
     by = balance.sizes[:, :, system.which]
-    left, right = (np.sqrt(each[0] + k * each[1] + k**2 * each[2]) for each in by)
+    left, right = (_weights(each, k) for each in by)
     whole = _norm(left * seen) * _norm(right * moved)
     if across:
         # Entries of Z are real but for damping: what they do along the slope by ω moves the resonance alone.
@@ -173,5 +176,98 @@ def _changes(balance: Balance, chains: _Chains, observed: Real, p: float, *, acr
     return np.where(kept, whole, 0.0)
 
 
+def _weights(sizes: Real, omega: Real | float) -> Real:
+    """Return the weights of modes or coordinates at a frequency, see `solver.linear.modal.sizes_of`."""
+    return np.sqrt(sizes[0] + omega * sizes[1] + omega**2 * sizes[2])  # type: ignore[no-any-return]
+
+
 def _norm(rows: Real | Complex) -> Real:
     return np.sqrt((np.abs(rows) ** 2).sum(axis=1))
+
+
+def resonates_undamped(balance: Balance, low: float, high: float, *, near: float = 0.0) -> bool:
+    """Return whether a resonance that nothing damps lies between two λ, driven and observed.
+
+    Nothing damps a mode whose damping is rounding and in which no contact moves: friction holds a resonance
+    only where it rubs.
+
+    Parameters
+    ----------
+    low, high : of the frequency [rad/s]; where that is fixed it is looked at there.
+    near : so far outside, relative to the frequency, it counts too.
+    """
+    system = balance.system
+    if balance.parameter.kind is not Kind.FREQUENCY:
+        low = high = system.omega
+    ends = min(low, high) * (1.0 - near), max(low, high) * (1.0 + near)
+    forced = system.ks > 0 if system.form == DENSE else np.any(system.modal_forces, axis=1) & (system.ks > 0)
+    for i in np.flatnonzero(forced & ((system.only < 0) | (system.ks == system.only))):
+        k, modes = int(system.ks[i]), _undamped_modes(balance, int(i))
+        if modes is None:
+            continue
+        inside = (modes.natural >= k * ends[0]) & (modes.natural <= k * ends[1])
+        if any(_grows(modes, natural) for natural in modes.natural[inside]):
+            return True
+    return False
+
+
+class _Undamped(NamedTuple):
+    """Modes m without damping, as a harmonic of the forces drives them."""
+
+    natural: Real  # (m,) [rad/s]
+    contacts: Complex  # (nc, m) relative to the largest of each contact
+    observed: Complex  # (m,) relative to the largest
+    forces: Complex  # (m,) likewise
+
+
+def _undamped_modes(balance: Balance, i: int) -> _Undamped | None:
+    """Return the modes of harmonic number i whose damping is rounding; None without any."""
+    system, s = balance.system, int(balance.system.which[i])
+    if system.form == DENSE:
+        return _undamped_of_matrices(balance, i)
+    values = system.eigenvalues[s]
+    natural = np.sqrt(np.maximum(values.real, 0.0)) if system.form == MODES else values.imag
+    loss = natural * system.dampings[s] if system.form == MODES else values.real
+    left, right = (_weights(each, np.abs(natural)) for each in balance.sizes[:, :, s])
+    none = (natural > 0.0) & (np.abs(loss) <= LOST_BITS * left * right)
+    if not none.any():
+        return None
+    return _Undamped(
+        natural[none],
+        *(
+            _relative(each)[..., none]
+            for each in (system.contact_modes[s], system.observe_modes[s], system.modal_forces[i])
+        ),
+    )
+
+
+def _undamped_of_matrices(balance: Balance, i: int) -> _Undamped | None:
+    """Return the same of matrices without any damping, whose bases do not move."""
+    system, s, free = balance.system, int(balance.system.which[i]), linear_model(balance.scene).free
+    K, C, M = (each[s][np.ix_(free, free)] for each in (system.K, system.C, system.M))
+    if np.any(hermitian(C)) or np.any(K - hermitian(K)) or not np.any(M):
+        return None
+    found = undamped_modes(K, hermitian(M))
+    others, natural = ~free, np.sqrt(np.maximum(found.omega2, 0.0))
+    pushed = found.phi.conj().T @ system.forces[i][free]
+    if others.any():  # the base moves as it does when what is free stands still
+        Z = system.K[s] - (natural[:, None, None] ** 2) * system.M[s]
+        held = np.linalg.lstsq(system.K[s][np.ix_(others, others)], system.forces[i][others], rcond=None)[0]
+        pushed = pushed - np.einsum("fm,mfo,o->m", found.phi.conj(), Z[:, free][:, :, others], held)
+    return _Undamped(
+        natural, *map(_relative, (system.L[s][:, free] @ found.phi, system.observe[free] @ found.phi, pushed))
+    )
+
+
+def _relative(modes: Complex) -> Complex:
+    return modes / np.maximum(np.abs(modes).max(axis=-1, keepdims=True, initial=0.0), _TINY)
+
+
+def _grows(modes: _Undamped, natural: float) -> bool:
+    """Return whether modes at one frequency are driven and seen in a motion in which no contact moves."""
+    same = np.abs(modes.natural - natural) <= _SAME * natural
+    motions = modes.contacts[:, same]
+    _, sizes, rows = np.linalg.svd(motions, full_matrices=False)
+    rows = rows[sizes > _SEEN]
+    forces = modes.forces[same] - rows.conj().T @ (rows @ modes.forces[same])
+    return bool(abs(modes.observed[same] @ forces) > _SEEN)

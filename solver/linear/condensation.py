@@ -20,7 +20,15 @@ from solver.jit.fourier import Complex, Flags, Integer, Real
 from solver.linear.assembly import linear_model
 from solver.linear.contact_table import port_stiffnesses
 from solver.linear.leading_ports import every_port, leading_ports
-from solver.linear.modal import Decomposition, HeldMatrices, decompose, held_alone, held_by, matrices_of, sizes_of
+from solver.linear.modal import (
+    Decomposition,
+    HeldMatrices,
+    decompose,
+    held_alone,
+    held_by,
+    matrices_of,
+    sizes_of,
+)
 from solver.linear.model import ForceTerm, LinearModel, LinearModelDerivative
 from solver.matrices.normal_modes import hermitian, least_stiffness
 from solver.scene.scene import Scene
