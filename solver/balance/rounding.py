@@ -89,6 +89,16 @@ def amplitudes(system: System, coefficients: Real) -> Complex:
     return found
 
 
+def coefficients(system: System, found: Complex) -> Real:
+    """Return the coefficients (..., n) of complex amplitudes (..., nk) of the harmonics kept."""
+    odd = int(system.ks[0] == 0)
+    kept = np.empty((*found.shape[:-1], 2 * system.ks.size - odd))
+    kept[..., :odd], kept[..., odd::2], kept[..., odd + 1 :: 2] = (
+        found[..., :odd].real, found[..., odd:].real, -found[..., odd:].imag,
+    )  # fmt: skip
+    return kept
+
+
 def _through_contacts(workspace: Workspace, A: Complex, B: Complex) -> Complex:
     """Return B κ (1 + A κ)⁻¹, (nk, nc): the observed motion for a unit of rounding of each contact's."""
     system = workspace.balance.system
@@ -186,7 +196,7 @@ def _norm(rows: Real | Complex) -> Real:
 
 
 def resonates_undamped(balance: Balance, low: float, high: float, *, near: float = 0.0) -> bool:
-    """Return whether a resonance that nothing damps lies between two λ, driven and observed.
+    """Return whether a resonance that nothing damps lies between two λ and is driven.
 
     Nothing damps a mode whose damping is rounding and in which no contact moves: friction holds a resonance
     only where it rubs.
@@ -201,7 +211,7 @@ def resonates_undamped(balance: Balance, low: float, high: float, *, near: float
         low = high = system.omega
     ends = min(low, high) * (1.0 - near), max(low, high) * (1.0 + near)
     forced = system.ks > 0 if system.form == DENSE else np.any(system.modal_forces, axis=1) & (system.ks > 0)
-    for i in np.flatnonzero(forced & ((system.only < 0) | (system.ks == system.only))):
+    for i in np.flatnonzero(forced):
         k, modes = int(system.ks[i]), _undamped_modes(balance, int(i))
         if modes is None:
             continue
@@ -216,8 +226,7 @@ class _Undamped(NamedTuple):
 
     natural: Real  # (m,) [rad/s]
     contacts: Complex  # (nc, m) relative to the largest of each contact
-    observed: Complex  # (m,) relative to the largest
-    forces: Complex  # (m,) likewise
+    forces: Complex  # (m,) relative to the largest
 
 
 def _undamped_modes(balance: Balance, i: int) -> _Undamped | None:
@@ -234,29 +243,29 @@ def _undamped_modes(balance: Balance, i: int) -> _Undamped | None:
         return None
     return _Undamped(
         natural[none],
-        *(
-            _relative(each)[..., none]
-            for each in (system.contact_modes[s], system.observe_modes[s], system.modal_forces[i])
-        ),
+        *(_relative(each)[..., none] for each in (system.contact_modes[s], system.modal_forces[i])),
     )
 
 
 def _undamped_of_matrices(balance: Balance, i: int) -> _Undamped | None:
     """Return the same of matrices without any damping, whose bases do not move."""
-    system, s, free = balance.system, int(balance.system.which[i]), linear_model(balance.scene).free
+    system, s, model = balance.system, int(balance.system.which[i]), linear_model(balance.scene)
+    free = model.free
     K, C, M = (each[s][np.ix_(free, free)] for each in (system.K, system.C, system.M))
-    if np.any(hermitian(C)) or np.any(K - hermitian(K)) or not np.any(M):
+    if model.line is not None or np.any(hermitian(C)) or np.any(K - hermitian(K)):
         return None
-    found = undamped_modes(K, hermitian(M))
+    try:
+        found = undamped_modes(K, M)
+    except np.linalg.LinAlgError:  # neither stiffness nor inertia holds some coordinate
+        return None
     others, natural = ~free, np.sqrt(np.maximum(found.omega2, 0.0))
     pushed = found.phi.conj().T @ system.forces[i][free]
     if others.any():  # the base moves as it does when what is free stands still
-        Z = system.K[s] - (natural[:, None, None] ** 2) * system.M[s]
-        held = np.linalg.lstsq(system.K[s][np.ix_(others, others)], system.forces[i][others], rcond=None)[0]
-        pushed = pushed - np.einsum("fm,mfo,o->m", found.phi.conj(), Z[:, free][:, :, others], held)
-    return _Undamped(
-        natural, *map(_relative, (system.L[s][:, free] @ found.phi, system.observe[free] @ found.phi, pushed))
-    )
+        omega = np.where(natural > 0.0, natural, 1.0)[:, None, None]
+        Z = system.K[s] + 1j * omega * system.C[s] - omega**2 * system.M[s]
+        held = np.linalg.solve(Z[:, others][:, :, others], system.forces[i][others][:, None])
+        pushed = pushed - np.einsum("fm,mfo,mo->m", found.phi.conj(), Z[:, free][:, :, others], held[..., 0])
+    return _Undamped(natural, *map(_relative, (system.L[s][:, free] @ found.phi, pushed)))
 
 
 def _relative(modes: Complex) -> Complex:
@@ -264,10 +273,10 @@ def _relative(modes: Complex) -> Complex:
 
 
 def _grows(modes: _Undamped, natural: float) -> bool:
-    """Return whether modes at one frequency are driven and seen in a motion in which no contact moves."""
+    """Return whether modes at one frequency are driven in a motion in which no contact moves."""
     same = np.abs(modes.natural - natural) <= _SAME * natural
     motions = modes.contacts[:, same]
     _, sizes, rows = np.linalg.svd(motions, full_matrices=False)
     rows = rows[sizes > _SEEN]
     forces = modes.forces[same] - rows.conj().T @ (rows @ modes.forces[same])
-    return bool(abs(modes.observed[same] @ forces) > _SEEN)
+    return bool(np.abs(forces).max(initial=0.0) > _SEEN)

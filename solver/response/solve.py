@@ -119,9 +119,8 @@ def describe(
     balance = workspace.balance
     omega = 2.0 * math.pi * frequency_hz
     if resonates_undamped(balance, omega, omega, near=AT_RESONANCE):
-        return replace(
-            _failure(balance, frequency_hz, found, time.perf_counter() - begun), status=SolutionStatus.UNDAMPED
-        )
+        failed = _failure(balance, frequency_hz, found, time.perf_counter() - begun)
+        return replace(failed, status=SolutionStatus.UNDAMPED)
     error = truncation_error(workspace, found.u, omega) if estimated else UNKNOWN
     measures = workspace.measure(found.u, omega)
     if measures is None:

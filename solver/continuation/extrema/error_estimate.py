@@ -14,7 +14,7 @@ from solver.balance.kernels.jacobian import factorise, step_back
 from solver.balance.kernels.output import extremes, observed_motion
 from solver.balance.kernels.residual import evaluate
 from solver.balance.more_harmonics import less_harmonics, linear_part, more_harmonics, pad
-from solver.balance.rounding import amplitudes, observed_rounding
+from solver.balance.rounding import amplitudes, coefficients, observed_rounding
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.system import (
     FROM_REST,
@@ -40,6 +40,7 @@ SAFETY = 1.7
 # A second step above this share of the first, and a change above this share of the amplitude: the first order
 # does not tell what more harmonics do, and the balance with them is solved.
 _FIRST_ORDER = 0.1
+_INSTANTS = 512  # of a period, at which the force of a law is compared with that of a finer one
 _NEARER = 2.0 / 3.0  # of the harmonics added: these are looked at without the others too
 # The change of the motion at its worst instant counts with this share: max|x| may change little by accident.
 _ANYWHERE = 0.1
@@ -111,6 +112,8 @@ class ErrorEstimator:
         self._all_ks, self._beyond_ks = beyond.ks, beyond.ks[self._is_beyond]
         self._is_fast = is_fast(balance.scene, ks)
         self._later_is_fast = is_fast(balance.scene, self._beyond_ks)
+        ports = zip(balance.system.first_port.tolist(), balance.scene.contacts, strict=False)
+        self._discretised = [(port, contact) for port, contact in ports if contact.DISCRETISED]
         self._stiffest = np.array([k for each in balance.scene.contacts for k in each.stiffnesses])
         self._beyond = by_reference(beyond)
         self._beyond_linear = new_receptance(self._beyond)
@@ -152,7 +155,8 @@ class ErrorEstimator:
         nearer = self._step(x, U, p, part, across=across)
         first = self._step(x, U, p, residual, across=across)
         second = first and self._step(x, *first.place, point.residual, across=across)
-        if nearer is None or first is None or second is None:
+        of_laws = self._of_laws(x, U, p, across=across)
+        if nearer is None or first is None or second is None or of_laws is None:
             return UNKNOWN
         largest = np.max([nearer.change, first.change, second.change], axis=0)
         first_order = second.length <= _FIRST_ORDER * first.length
@@ -160,11 +164,36 @@ class ErrorEstimator:
             largest = self._solved(x, U, p, largest)
         changes, rounding = more * SAFETY * largest, self._per_motion(x) * rounding
         # Changes within the rounding are rounding.
-        changes = np.where(changes <= rounding, 0.0, changes)
+        changes = np.where(changes <= rounding, 0.0, changes) + SAFETY * of_laws
         max_abs, half_range = changes + rounding + self._per_motion(x) * tail
         if kept.system.centred != FROM_REST:
             max_abs = half_range
         return ErrorEstimate(max_abs=float(max_abs), half_peak_to_peak=float(half_range))
+
+    def _of_laws(self, x: _Seen, U: Real, p: float, *, across: bool) -> Real | None:
+        """Return the changes by what the laws' own discretisations leave out; None where they lead nowhere.
+
+        It is a force beside that of the contacts, put into the balance along the motion found.
+        """
+        if not self._discretised:
+            return np.zeros(2)
+        system, linear = self._larger.balance.system, self._larger.receptance(p)
+        angles = 2.0 * np.pi / _INSTANTS * np.arange(_INSTANTS)[:, None] * system.ks
+        turns = np.exp(1j * angles)
+        motions = np.real(amplitudes(system, U.reshape(system.owner.size, -1)) @ turns.T)
+        forces = np.zeros((system.ks.size, system.owner.size), np.complex128)
+        for first, contact in self._discretised:
+            left = contact.unresolved(motions[first])
+            if left is not None:
+                forces[:, first] = 2.0 / _INSTANTS * (left @ turns.conj())
+        forces[system.ks == 0] *= 0.5
+        pushed = np.matmul(linear.A[0], forces[:, :, None])[:, :, 0]
+        moved = self._step(x, U, p, coefficients(system, pushed.T).reshape(-1), across=across)
+        if moved is None:
+            return None
+        seen = -coefficients(system, (linear.B[0] * forces).sum(axis=1))
+        after = self._motion(self._larger, *moved.place, elsewhere=across)
+        return None if after is None else np.array(self._change(x, after + seen))
 
     def _step(self, x: _Seen, U: Real, p: float, residual: Real, *, across: bool) -> _Step | None:
         """Take a Newton step from (U, p) with the matrix at hand; None where it leads nowhere."""

@@ -240,6 +240,10 @@ def transient(found: Json) -> Iterator[Block]:
     yield Summary(f"{found['scene']} from {begin} to {end} Hz", pairs)
 
 
+def _reached(hours: float) -> str:
+    return f"reached after {units.number(hours)} h" if hours > 0.0 else "exceeded from the beginning"
+
+
 def wear_life(found: Json) -> Iterator[Block]:
     """What contacts lose over hours, and what the response comes to."""
     hours, amplitude, pairs = found["hours"], found["amplitude"], _chosen(found.get("chosen"))
@@ -254,14 +258,14 @@ def wear_life(found: Json) -> Iterator[Block]:
         )
     if found["limit"] is not None:
         met = found["hours_to_limit"]
-        said = "not reached" if met is None else f"reached after {units.number(met)} h"
+        said = "not reached" if met is None else _reached(met)
         pairs.append((f"limit {units.length(found['limit'])}", said))
     used = [one for one in found.get("used", ()) if one is not None]
     if used:
         met = found["hours_to_margin"]
         share = f"{units.number(used[0], 4)} at the beginning, {units.number(used[-1], 4)} at the end"
         pairs.append(("of the stress allowed", share))
-        pairs.append(("margin 1", "kept" if met is None else f"reached after {units.number(met)} h"))
+        pairs.append(("margin 1", "kept" if met is None else _reached(met)))
     for one in found["switches"]:
         pairs.append(("another peak is highest", f"from {units.number(one)} h on"))
     if found["ended_by"]:
