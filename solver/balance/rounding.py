@@ -41,6 +41,8 @@ LOST_BITS = 4.0 * float(np.finfo(float).eps)
 _LOST_SUMS = 16.0  # in units of the former
 _TINY = 1e-300
 _SEEN = 1e-12  # share of a motion, relative to that in other modes, below which it is rounding
+_DRIVEN = 1e-14  # the same of what drives a mode
+_DAMPED = 1e-4  # damping ratios that are more than rounding, whatever the matrices are
 _SAME = 1e-9  # relative distance of frequencies below which modes may be turned into each other
 
 
@@ -105,6 +107,9 @@ def _through_contacts(workspace: Workspace, A: Complex, B: Complex) -> Complex:
     springs = np.empty((system.ks.size, int(system.first_block[-1])), np.complex128)
     fill_springs(workspace.system, workspace.point, springs)
     ports = np.diff(system.first_port)[system.owner]
+    if ports.size == 1:
+        kappa = springs[:, :1] - system.shift
+        return B * kappa / (1.0 + A[:, 0] * kappa)
     row = np.repeat(np.arange(system.owner.size), ports)
     port = np.arange(row.size) - np.repeat(np.cumsum(ports) - ports, ports)
     first = system.first_port[system.owner][row]
@@ -122,7 +127,8 @@ def _chains(balance: Balance, forces: Complex, loop: Complex, p: float) -> _Chai
     """Return how the excitation and the forces (nk, nc) of the contacts move what is observed."""
     system = balance.system
     omega = p if balance.parameter.kind is Kind.FREQUENCY else system.omega
-    level = np.array([excitation.py_func(system, p, int(k))[0] for k in system.ks])[:, None]
+    still, level = (excitation.py_func(system, p, k)[0] for k in (0, 1))
+    level = np.where(system.ks == 0, still, level)[:, None]
     ks, which = system.ks[:, None], system.which
     kept = np.ones(system.ks.size, np.bool_) if system.only < 0 else system.ks == system.only
     if system.form == DENSE:
@@ -171,18 +177,19 @@ def _changes(balance: Balance, chains: _Chains, observed: Real, p: float, *, acr
     omega = p if balance.parameter.kind is Kind.FREQUENCY else system.omega
     k = np.maximum(system.ks, int(system.form == DENSE))[:, None] * omega
     by = balance.sizes[:, :, system.which]
-    left, right = (_weights(each, k) for each in by)
-    whole = _norm(left * seen) * _norm(right * moved)
-    if across:
-        # Entries of Z are real but for damping: what they do along the slope by ω moves the resonance alone.
-        # Turned so that the largest parts of x, and of g against the slope, are real, the rest counts.
-        turn = np.exp(-0.5j * np.angle(((right * moved) ** 2).sum(axis=1)))
-        other = np.exp(-1j * np.angle(slope)) / turn
-        x, g = moved * turn[:, None], seen * other[:, None]
-        aside = _norm(left * g.real) * _norm(right * x.imag) + _norm(left * g.imag) * _norm(right * x.real)
-        lost = k[:, 0] * _norm(np.sqrt(by[0, 1]) * seen) * _norm(np.sqrt(by[1, 1]) * moved)
-        far = LOST_BITS * whole**2 / np.maximum(observed, _TINY)  # where it moves by more than it is wide
-        whole = np.minimum(aside + lost + far, whole)
+    ways = np.array([seen, moved])
+    rows = _weights(by.swapaxes(0, 1), k) * ways
+    if not across:
+        return np.where(kept, _norms(rows).prod(axis=0), 0.0)
+    # Entries of Z are real but for damping: what they do along the slope by ω moves the resonance alone.
+    # Turned so that the largest parts of x, and of g against the slope, are real, the rest counts.
+    turn = np.exp(-0.5j * np.angle((rows[1] ** 2).sum(axis=1)))
+    rows = rows * np.array([np.exp(-1j * np.angle(slope)) / turn, turn])[:, :, None]
+    (g, x), (g_aside, x_aside) = real, imag = _norms(rows.real), _norms(rows.imag)
+    whole = np.hypot(real, imag).prod(axis=0)
+    lost = 0.0 if not by[:, 1].any() else k[:, 0] * _norms(np.sqrt(by[:, 1]) * np.abs(ways)).prod(axis=0)
+    far = LOST_BITS * whole**2 / np.maximum(observed, _TINY)  # where it moves by more than it is wide
+    whole = np.minimum(g * x_aside + g_aside * x + lost + far, whole)
     return np.where(kept, whole, 0.0)
 
 
@@ -191,8 +198,8 @@ def _weights(sizes: Real, omega: Real | float) -> Real:
     return np.sqrt(sizes[0] + omega * sizes[1] + omega**2 * sizes[2])  # type: ignore[no-any-return]
 
 
-def _norm(rows: Real | Complex) -> Real:
-    return np.sqrt((np.abs(rows) ** 2).sum(axis=1))
+def _norms(rows: Real | Complex) -> Real:
+    return np.sqrt((np.abs(rows) ** 2).sum(axis=-1))  # type: ignore[no-any-return]
 
 
 def resonates_undamped(balance: Balance, low: float, high: float, *, near: float = 0.0) -> bool:
@@ -237,6 +244,8 @@ def _undamped_modes(balance: Balance, i: int) -> _Undamped | None:
     values = system.eigenvalues[s]
     natural = np.sqrt(np.maximum(values.real, 0.0)) if system.form == MODES else values.imag
     loss = natural * system.dampings[s] if system.form == MODES else values.real
+    if np.all(np.abs(loss) > _DAMPED * np.abs(natural)):
+        return None
     left, right = (_weights(each, np.abs(natural)) for each in balance.sizes[:, :, s])
     none = (natural > 0.0) & (np.abs(loss) <= LOST_BITS * left * right)
     if not none.any():
@@ -279,4 +288,4 @@ def _grows(modes: _Undamped, natural: float) -> bool:
     _, sizes, rows = np.linalg.svd(motions, full_matrices=False)
     rows = rows[sizes > _SEEN]
     forces = modes.forces[same] - rows.conj().T @ (rows @ modes.forces[same])
-    return bool(np.abs(forces).max(initial=0.0) > _SEEN)
+    return bool(np.abs(forces).max(initial=0.0) > _DRIVEN)

@@ -6,7 +6,7 @@ from typing import Any
 import flint
 import numpy as np
 import pytest
-from exact_linear import Exact, chain, natural_hz
+from exact_linear import Exact, chain, matrices, natural_hz
 
 import solver
 from solver import Scene
@@ -31,6 +31,15 @@ def near_a_mode(seed: int, ratio: float) -> tuple[dict[str, Any], float]:
     return raw, mode
 
 
+def hardly_driven(raw: dict[str, Any], mode: float) -> bool:
+    """Whether the force moves a mode by less than rounding."""
+    K, M = matrices(raw)
+    scale = 1.0 / np.sqrt(np.diag(M))
+    _, modes = np.linalg.eigh(scale[:, None] * K * scale)
+    at = list(raw["structure"]["masses"]).index(raw["excitation"]["dof"])
+    return bool(np.abs(modes[at, np.argmin(np.abs(natural_hz(raw) - mode))]) < 1e-12)
+
+
 @pytest.mark.parametrize("ratio", RATIOS)
 @pytest.mark.parametrize("seeds", [range(6), pytest.param(range(6, 100), marks=pytest.mark.long)])
 def test_a_peak_has_no_number_or_one_that_is_known(ratio: float, seeds: range) -> None:
@@ -42,10 +51,13 @@ def test_a_peak_has_no_number_or_one_that_is_known(ratio: float, seeds: range) -
             assert branch.peaks == ()
             assert branch.band is None
             continue
-        assert ratio > 0.0
+        assert ratio > 0.0 or hardly_driven(raw, mode), seed
         assert branch.reached
+        if ratio == 0.0:
+            continue
         assert branch.peak is not None
-        top = Exact(raw).peak(branch.peak.at, ratio * mode)
+        exact, at = Exact(raw), branch.peak.at
+        top = exact.peak(at, ratio * mode) if branch.peak.interior else float(exact.amplitude(at))
         assert abs(branch.peak.value - top) <= branch.error_estimate
         told += branch.error_estimate < 0.1 * top
     assert ratio == 0.0 or told >= 0.3 * len(seeds)
