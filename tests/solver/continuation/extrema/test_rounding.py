@@ -62,7 +62,7 @@ def shifted(scene: Scene, angle: float) -> Scene:
 
 @pytest.mark.parametrize("seeds", [range(30), pytest.param(range(30, 300), marks=pytest.mark.long)])
 def test_the_estimate_does_not_depend_on_the_origin_of_time(seeds: range) -> None:
-    """Within 1 %, but where it is above the amplitude: no longer a number."""
+    """Within 1 %, but where it is above half of the amplitude: hardly a number."""
     for seed in seeds:
         scene, hertz, harmonics = random_scene(seed)
         told = []
@@ -75,7 +75,7 @@ def test_the_estimate_does_not_depend_on_the_origin_of_time(seeds: range) -> Non
             assert measures is not None
             told.append((error.max_abs, error.half_peak_to_peak, *measures.values[:2]))
         estimates, amplitudes = np.array(told)[:, :2], np.array(told)[:, 2:]
-        few = estimates.max(axis=0) < amplitudes.max(axis=0)
+        few = estimates.max() < 0.5 * amplitudes.max(axis=0)
         assert np.all((np.ptp(estimates, axis=0) <= 0.01 * estimates.min(axis=0))[few]), seed
 
 
