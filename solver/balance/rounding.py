@@ -127,7 +127,8 @@ def _chains(balance: Balance, forces: Complex, loop: Complex, p: float) -> _Chai
     """Return how the excitation and the forces (nk, nc) of the contacts move what is observed."""
     system = balance.system
     omega = p if balance.parameter.kind is Kind.FREQUENCY else system.omega
-    still, level = (excitation.py_func(system, p, k)[0] for k in (0, 1))
+    plain = getattr(excitation, "py_func", excitation)
+    still, level = (plain(system, p, k)[0] for k in (0, 1))
     level = np.where(system.ks == 0, still, level)[:, None]
     ks, which = system.ks[:, None], system.which
     kept = np.ones(system.ks.size, np.bool_) if system.only < 0 else system.ks == system.only
