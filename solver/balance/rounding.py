@@ -165,8 +165,8 @@ def _dense_chains(
     L = system.L[which]
     pushed = pushed * level - np.matmul(forces[:, None, :], L.conj())[:, 0]
     seen = system.observe - np.matmul(loop[:, None, :], L)[:, 0]
-    moved = np.linalg.solve(Z, pushed[:, :, None])[:, :, 0]
-    seen = np.linalg.solve(Z.transpose(0, 2, 1), seen[:, :, None])[:, :, 0]
+    moved: Complex = np.asarray(np.linalg.solve(Z, pushed[:, :, None])[:, :, 0], np.complex128)
+    seen = np.asarray(np.linalg.solve(Z.transpose(0, 2, 1), seen[:, :, None])[:, :, 0], np.complex128)
     turned = np.matmul(1j * ks * C[which] - 2.0 * ks**2 * omega * M[which], moved[:, :, None])[:, :, 0]
     return _Chains(seen, moved, -(seen * turned).sum(axis=1), kept)
 
@@ -279,7 +279,8 @@ def _undamped_of_matrices(balance: Balance, i: int) -> _Undamped | None:
 
 
 def _relative(modes: Complex) -> Complex:
-    return modes / np.maximum(np.abs(modes).max(axis=-1, keepdims=True, initial=0.0), _TINY)
+    largest = np.abs(modes).max(axis=-1, keepdims=True, initial=0.0)
+    return np.asarray(modes / np.maximum(largest, _TINY), np.complex128)
 
 
 def _grows(modes: _Undamped, natural: float) -> bool:
