@@ -13,7 +13,7 @@ from solver.balance.simplifications import Effects, even_harmonics_reason
 from solver.balance.speed_line import numbers_along_line, speed_line
 from solver.contacts.kernels.system import System
 from solver.errors import SettingError, check_count
-from solver.jit.fourier import Integer
+from solver.jit.fourier import Integer, Real
 from solver.jit.trig_polynomial import grid_size, grid_tables
 from solver.linear.assembly import linear_model, structure_derivative
 from solver.linear.condensation import reduce_model
@@ -40,6 +40,9 @@ class Balance:
         "`solver.scene.harmonics.kept_harmonics`.",
     ]
     effects: Annotated[Effects, "What is paid for though the scene does not call for it."]
+    sizes: Annotated[
+        Real, "What rounding of the matrices is relative to, see `solver.balance.rounding`, (2, 3, ns, ·)."
+    ]
 
     @property
     def highest_harmonic(self) -> int:
@@ -108,8 +111,10 @@ def build(
         check_level(scene)
     if parameter.kind is Kind.LEVEL and scene.value("excitation.amplitude") == 0.0:
         scene = scene.with_values({"excitation.amplitude": 1.0})
-    system = _system(scene, parameter, ks, omega, effects, poles=poles)
-    return Balance(scene=scene, parameter=parameter, system=system, n_harmonics=harmonics, effects=effects)
+    system, sizes = _system(scene, parameter, ks, omega, effects, poles=poles)
+    return Balance(
+        scene=scene, parameter=parameter, system=system, n_harmonics=harmonics, effects=effects, sizes=sizes
+    )
 
 
 def _harmonics(scene: Scene, path: str, highest: int, effects: Effects) -> Integer:
@@ -137,14 +142,15 @@ def for_parameter(balance: Balance, path: str, frequency_hz: float) -> Balance:
     reason = even_harmonics_reason(balance.scene, (path,))
     if reason is not None and balance.system.ks[0] != 0:
         raise SettingError("parameter", path, f"needs a balance with even harmonics: {reason}")
+    sizes = balance.sizes
     if parameter.kind is Kind.STRUCTURE or balance.parameter.kind is Kind.STRUCTURE:
-        system = _system(balance.scene, parameter, balance.system.ks, omega, balance.effects)
+        system, sizes = _system(balance.scene, parameter, balance.system.ks, omega, balance.effects)
     else:
         system = balance.system._replace(
             kind=parameter.code, active=parameter.active, omega=omega,
             level_reference=_level(balance.scene), phase_reference=balance.scene.value("excitation.phase"),
         )  # fmt: skip
-    return replace(balance, parameter=parameter, system=system)
+    return replace(balance, parameter=parameter, system=system, sizes=sizes)
 
 
 def fewer_harmonics(balance: Balance, count: int) -> Balance:
@@ -193,8 +199,8 @@ def _level(scene: Scene) -> float:
 
 def _system(
     scene: Scene, parameter: Parameter, ks: Integer, omega: float, effects: Effects, *, poles: bool = True
-) -> System:  # fmt: skip
-    """Put the arrays of the compiled loops together."""
+) -> tuple[System, Real]:  # fmt: skip
+    """Put the arrays of the compiled loops together; with them what rounding is relative to."""
     model = linear_model(scene)
     derivative = structure_derivative(scene, parameter.path) if parameter.kind is Kind.STRUCTURE else None
     if derivative is not None and derivative.contact_here is not None:
@@ -208,7 +214,7 @@ def _system(
     highest = max(int(ks[-1]), load_order)
     cos_table, sin_table = grid_tables(grid_size(highest), highest)
     line = speed_line(scene)
-    return System(
+    system = System(
         ks=ks, load_ks=np.arange(load_order + 1, dtype=np.int64), which=reduced.which, cos_table=cos_table,
         sin_table=sin_table, **contact_set(scene)._asdict(), contacts=numbers_along_line(scene, int(ks[-1])),
         samples=0, condense=0 if effects.every_contact else 1,
@@ -227,6 +233,7 @@ def _system(
         observe=reduced.observe,
         forces=reduced.forces, dforces=reduced.dforces, constant_mean=int(bool(static_forces(scene))),
     )  # fmt: skip
+    return system, reduced.sizes
 
 
 def contact_index(scene: Scene, contact: str) -> int:

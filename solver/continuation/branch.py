@@ -55,7 +55,7 @@ class BranchStatus(Enum):
         "it by a spring."
     )
     UNDAMPED = (
-        "Beyond the last point there is a resonance and no damping, so that nothing bounds the "
+        "In the range there is a resonance and no damping, so that nothing bounds the "
         "response: give the structure some (damping_ratio = 0.001, say)."
     )
     POWER_LOST = (

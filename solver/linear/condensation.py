@@ -20,7 +20,15 @@ from solver.jit.fourier import Complex, Flags, Integer, Real
 from solver.linear.assembly import linear_model
 from solver.linear.contact_table import port_stiffnesses
 from solver.linear.leading_ports import every_port, leading_ports
-from solver.linear.modal import Decomposition, HeldMatrices, decompose, held_alone, held_by, matrices_of
+from solver.linear.modal import (
+    Decomposition,
+    HeldMatrices,
+    decompose,
+    held_alone,
+    held_by,
+    matrices_of,
+    sizes_of,
+)
 from solver.linear.model import ForceTerm, LinearModel, LinearModelDerivative
 from solver.matrices.normal_modes import hermitian, least_stiffness
 from solver.scene.scene import Scene
@@ -75,7 +83,7 @@ CANCELLED = 1e-3  # a relative residual of 1e-11 of this share of what cancels i
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CondensedStructure:
     """The linear part in the form the loops take; see `solver.contacts.kernels.system.System` for the
-    sizes. `shapes` the loops do without."""
+    sizes. The loops do without the last two."""
 
     which: Integer
     shift: Real
@@ -90,7 +98,6 @@ class CondensedStructure:
     contact_duals: Complex
     observe_modes: Complex
     modal_forces: Complex
-    shapes: Complex  # (ns, n, nm) the modes in the coordinates of the matrices
     K: Complex
     C: Complex
     M: Complex
@@ -102,6 +109,8 @@ class CondensedStructure:
     observe: Complex
     forces: Complex
     dforces: Complex
+    shapes: Complex  # (ns, n, nm) the modes in the coordinates of the matrices
+    sizes: Real  # (2, 3, ns, nm or n) of modes, or of coordinates, as in `solver.linear.modal.Decomposition`
 
 
 def reduce_model(
@@ -152,6 +161,8 @@ def reduce_model(
         modes, least, seen = _no_modes(diameters.size, ks.size, kt.size), 0.0, (L, L.conj())
         dense = _dense(held, diameters, moving, L, model, forces, derivative)
         dense |= _of_harmonics(model, ks, which, diameters, moving, derivative)
+        every = np.broadcast_to(np.eye(held.K.shape[1]), held.K.shape)
+        modes["sizes"] = np.array([sizes_of(held, every)] * 2)
     else:
         modes, least = (
             _projected(found, L, model.observe, forces, which),
@@ -284,6 +295,7 @@ def _projected(
         "observe_modes": kept(observe_modes),
         "modal_forces": kept(modal_forces),
         "shapes": kept(found.right),
+        "sizes": found.sizes[..., seen],
     }
 
 

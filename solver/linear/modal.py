@@ -61,6 +61,7 @@ class Decomposition:
     dampings: Annotated[Real, "Likewise, (ns, nm)."]
     right: Annotated[NDArray[Any], "Mass-normalised modes, or residues of the poles, (ns, n, nm)."]
     left: Annotated[NDArray[Any], "Their conjugates, or residues of the poles, (ns, n, nm)."]
+    sizes: Annotated[Real, "Of what stands left and right, by K, C and M, as `sizes_of`, (2, 3, ns, nm)."]
 
 
 def matrices_of(model: LinearModel, diameters: Integer, moving: Flags) -> HeldMatrices:
@@ -113,6 +114,26 @@ def held_by(held: HeldMatrices, L: Complex, kt: Real) -> HeldMatrices:
     return HeldMatrices(held.K + extra, held.C, held.M, (held.key, L.tobytes(), kt.tobytes()))
 
 
+def sizes_of(held: HeldMatrices, shapes: NDArray[Any]) -> Real:
+    """Return Σ_i max_j |X_ij| |x_i|² of shapes x (ns, n, m) for X = K, C and M, (3, ns, m).
+
+    The entries of the matrices are rounded, and sums of them are. With w² = the first + kω times the second +
+    (kω)² times the third, |x| Z_k |y| is known to w_x w_y units of rounding, whatever cancels in it.
+    """
+    each: list[NDArray[Any]] = [np.abs(X).max(axis=2, initial=0.0) for X in (held.K, held.C, held.M)]
+    squares = np.abs(shapes) ** 2
+    return np.array([np.einsum("si,sim->sm", rows, squares) for rows in each])
+
+
+def _flexible(undamped: UndampedModes, shapes: NDArray[Any], K: NDArray[Any], M: NDArray[Any]) -> Real:
+    """Return what rounding of the flexibility adds to the third of the sizes of shapes (n, m), (m,).
+
+    Modes are found to the rounding of the largest μ.
+    """
+    energies = (shapes.conj() * ((K + undamped.sigma * M) @ shapes)).sum(axis=0).real
+    return undamped.mu.max(initial=0.0) * energies  # type: ignore[no-any-return]
+
+
 @lru_cache(maxsize=32)
 def decompose(held: HeldMatrices, *, poles: bool = True) -> Decomposition | None:
     """Return modes if the damping is classical, else `poles`; None if neither gives Z⁻¹ to rounding.
@@ -134,12 +155,15 @@ def decompose(held: HeldMatrices, *, poles: bool = True) -> Decomposition | None
         _classical(D, each) for D, each in zip(damping, rounding, strict=True)
     ):
         phi = np.array([u.phi for u in undamped])
+        sizes = sizes_of(held, phi)
+        sizes[2] += [u.mu.max(initial=0.0) / u.mu for u in undamped]
         return Decomposition(
             form=MODES,
             eigenvalues=np.array([u.omega2 for u in undamped], dtype=np.complex128),
             dampings=np.array([np.diag(D).real / u.mu for u, D in zip(undamped, damping, strict=True)]),
             right=phi,
             left=phi.conj(),
+            sizes=np.array([sizes, sizes]),
         )
     if not poles:
         return None
@@ -150,14 +174,15 @@ def decompose(held: HeldMatrices, *, poles: bool = True) -> Decomposition | None
     found = [each for each in tried if each is not None]
     if len(found) < len(tried):
         return None
-    values = np.array([each[0] for each in found], dtype=np.complex128)
+    values, right, left = (np.array([each[i] for each in found]) for i in range(3))
+    sizes = np.array([sizes_of(held, left), sizes_of(held, right)])
+    for s, (u, K, M) in enumerate(zip(undamped, even, held.M, strict=True)):
+        sizes[0, 2, s] += _flexible(u, left[s].conj(), K, M)
+        sizes[1, 2, s] += _flexible(u, right[s], K, M)
     return Decomposition(
-        form=POLES,
-        eigenvalues=values,
-        dampings=np.zeros(values.shape),
-        right=np.array([each[1] for each in found]),
-        left=np.array([each[2] for each in found]),
-    )
+        form=POLES, eigenvalues=values.astype(np.complex128), dampings=np.zeros(values.shape), right=right,
+        left=left, sizes=sizes,
+    )  # fmt: skip
 
 
 def _rounding(undamped: UndampedModes, K: NDArray[Any], M: NDArray[Any]) -> float:

@@ -13,6 +13,7 @@ from solver.balance.balance import Balance, build, check_harmonics
 from solver.balance.kernels.gauge import FREE
 from solver.balance.kernels.output import HALF_RANGE, MEAN, extremes
 from solver.balance.parameter import Kind
+from solver.balance.rounding import resonates_undamped
 from solver.balance.simplifications import Effects
 from solver.balance.workspace import PointSolution, Workspace
 from solver.contacts.kernels.stick_slip_events import STUCK
@@ -35,6 +36,7 @@ from solver.scene.scene import Scene
 if TYPE_CHECKING:
     from solver.continuation.branch import Branch
 
+AT_RESONANCE = 1e-14  # of a frequency: nearer to one without damping the response is rounding
 NEARBY = 0.9  # of a frequency: there, an undamped resonance is no reason for a large receptance
 
 
@@ -116,6 +118,9 @@ def describe(
     """Turn a converged point of a frequency balance into a `Solution`, with its error estimate or without."""
     balance = workspace.balance
     omega = 2.0 * math.pi * frequency_hz
+    if resonates_undamped(balance, omega, omega, near=AT_RESONANCE):
+        failed = _failure(balance, frequency_hz, found, time.perf_counter() - begun)
+        return replace(failed, status=SolutionStatus.UNDAMPED)
     error = truncation_error(workspace, found.u, omega) if estimated else UNKNOWN
     measures = workspace.measure(found.u, omega)
     if measures is None:

@@ -116,7 +116,7 @@ def known_pairs(found: Mapping[str, Any], *, besides: Sequence[str] = ()) -> lis
             (found["error_estimate"], found["peak_max_abs"], WORDS[MAX_ABS]),
             (found["half_peak_to_peak_error"], found["peak_half_peak_to_peak"], WORDS[HALF_PEAK_TO_PEAK]),
         ):
-            if error is not None:
+            if error is not None and found["relative_error"] is not None:
                 share = f", {units.number(100.0 * error / size, 2)} %" if size else ""
                 pairs.append(("estimated error", f"{units.length(error)} of {of}{share}"))
         if found["relative_error"] is None:

@@ -42,9 +42,12 @@ def of_least(best: LeastPeak) -> Iterator[Summary]:
     if best.plateau is not None:
         low, high = best.plateau
         pairs.append(("the same from", f"{low:.6g} to {high:.6g}, chosen by: {best.chosen_by}"))
-    others = [f"{units.length(basin.peak)} at {basin.at:.6g}" for basin in best.basins[1:]]
-    if others:
-        pairs.append(("other minima", "; ".join(others)))
+    # Of what is not proven a peak was followed to there, and a higher one may stand beside it.
+    for proven, name, bound in ((True, "other minima", ""), (False, "perhaps other minima", "at least ")):
+        others = [one for one in best.basins[1:] if one.proven is proven]
+        if others:
+            told = [f"{bound}{units.length(one.peak)} at {one.at:.6g}" for one in others]
+            pairs.append((name, "; ".join(told)))
     pairs += [("responses", f"{best.sweeps}, the work of {best.work:.3g}")]
     pairs.append(("time", units.duration(best.seconds)))
     scene = "" if best.branch is None else f"of {best.branch.scene.name}"

@@ -53,6 +53,8 @@ class AnyContact(Element, InSpace):
     HELD: ClassVar[tuple[RestStiffness, ...]]
     """What each port begins with at rest."""
 
+    DISCRETISED: ClassVar[bool] = False
+    """Whether it stands for a law that it meets only nearly, see `unresolved`."""
     JENKINS: ClassVar[bool] = False
     """Whether the force is that of one spring kt and one slider μN under the given load (`friction`).
 
@@ -305,6 +307,16 @@ class AnyContact(Element, InSpace):
     def shares(self, motions: Real, load: Real) -> Shares | None:
         """Return the shares of the period in stick, slip and separation; None where it knows no such."""
         del motions, load
+        return None
+
+    def unresolved(self, motion: Real) -> Real | None:
+        """Return what its own discretisation leaves out of the force [N]; None of a law without one.
+
+        Parameters
+        ----------
+        motion : (N,) of its first port at evenly spaced instants of a period [m].
+        """
+        del motion
         return None
 
     def perturbed(self, motions: Real, load: Real) -> tuple[ContactPart, ...] | None:

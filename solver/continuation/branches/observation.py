@@ -13,9 +13,10 @@ from solver.balance.balance import Balance, build
 from solver.balance.kernels.observers import measure_through_modes
 from solver.balance.kernels.output import measure
 from solver.balance.kernels.residual import evaluate
+from solver.balance.rounding import resonates_undamped
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.system import DENSE, UTILISED
-from solver.continuation.branch import Branch, Points
+from solver.continuation.branch import Branch, BranchStatus, Points
 from solver.continuation.branches.sweep import surveyed, with_error, with_points
 from solver.continuation.extrema.extrema import Survey
 from solver.continuation.extrema.node_table import PointRow
@@ -53,6 +54,10 @@ def observing(
     workspace = _workspaces(branch, [dof], measure)[0]
     x, measures = _measured([workspace], branch.solutions, branch.tangents, branch.measures)
     seen = replace(branch, balance=workspace.balance, error_estimate=math.nan, newton_iterations=0)
+    inside = workspace.balance.parameter.inside
+    if resonates_undamped(workspace.balance, inside(branch.start), inside(branch.stop)):
+        points = Points.of(branch, observed=x[0], measures=measures[0])
+        return replace(with_points(seen, points), status=BranchStatus.UNDAMPED, peaks=(), band=None)
     survey = Survey.of(workspace, Points.of(branch, observed=x[0], measures=measures[0]))
     if peaks_alone:
         return replace(

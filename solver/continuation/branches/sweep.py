@@ -16,6 +16,7 @@ import numpy as np
 from solver.balance.balance import Balance, build
 from solver.balance.kernels.output import MAX_ABS
 from solver.balance.parameter import Kind
+from solver.balance.rounding import resonates_undamped
 from solver.balance.simplifications import Effects
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.system import is_spanned
@@ -259,6 +260,10 @@ def _finish(
         at_end = balance.parameter.outside(float(whole.solutions[-1, -1])) if len(whole.solutions) else start
         if undamped_resonance(balance.scene, at_end, balance.system.ks):
             status = BranchStatus.UNDAMPED
+    inside = balance.parameter.inside
+    if resonates_undamped(balance, inside(start), inside(stop)):
+        status = BranchStatus.UNDAMPED
+    peaks = peaks and status is not BranchStatus.UNDAMPED
     branch = replace(
         without_peaks(balance, whole, status, start, stop), newton_iterations=whole.newton_iterations,
         rejected_steps=whole.rejected_steps, stepped_over=whole.stepped_over,

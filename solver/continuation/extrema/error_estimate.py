@@ -14,6 +14,7 @@ from solver.balance.kernels.jacobian import factorise, step_back
 from solver.balance.kernels.output import extremes, observed_motion
 from solver.balance.kernels.residual import evaluate
 from solver.balance.more_harmonics import less_harmonics, linear_part, more_harmonics, pad
+from solver.balance.rounding import amplitudes, coefficients, observed_rounding
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.system import (
     FROM_REST,
@@ -34,12 +35,12 @@ _LEAST_BEYOND = 8
 # How much farther the receptance is looked at, and entries of it that are held at once.
 _TAIL = 4
 _AT_ONCE = 2**21
-_LOST_BITS = 16.0  # of the sums behind a motion, in units of their rounding
 # Fitted to 600 random scenes, see docs/accuracy.md: 98 % of the true errors are below the estimate.
 SAFETY = 1.7
 # A second step above this share of the first, and a change above this share of the amplitude: the first order
 # does not tell what more harmonics do, and the balance with them is solved.
 _FIRST_ORDER = 0.1
+_INSTANTS = 512  # of a period, at which the force of a law is compared with that of a finer one
 _NEARER = 2.0 / 3.0  # of the harmonics added: these are looked at without the others too
 # The change of the motion at its worst instant counts with this share: max|x| may change little by accident.
 _ANYWHERE = 0.1
@@ -111,6 +112,8 @@ class ErrorEstimator:
         self._all_ks, self._beyond_ks = beyond.ks, beyond.ks[self._is_beyond]
         self._is_fast = is_fast(balance.scene, ks)
         self._later_is_fast = is_fast(balance.scene, self._beyond_ks)
+        ports = zip(balance.system.first_port.tolist(), balance.scene.contacts, strict=False)
+        self._discretised = [(port, contact) for port, contact in ports if contact.DISCRETISED]
         self._stiffest = np.array([k for each in balance.scene.contacts for k in each.stiffnesses])
         self._beyond = by_reference(beyond)
         self._beyond_linear = new_receptance(self._beyond)
@@ -141,6 +144,7 @@ class ErrorEstimator:
             return UNKNOWN
         point = evaluation_by_value(larger.point)
         tail, more = self._tail(point.F, p)
+        rounding = observed_rounding(larger, U, p, across=across)
         # Across the branch, u and λ each count relative to their size.
         size = max(float(np.abs(u).max(initial=0.0)), 1e-150)
         weights = (1.0 / size**2, 1.0 / (p * p if p != 0.0 else 1.0)) if across else (0.0, 0.0)
@@ -151,26 +155,56 @@ class ErrorEstimator:
         nearer = self._step(x, U, p, part, across=across)
         first = self._step(x, U, p, residual, across=across)
         second = first and self._step(x, *first.place, point.residual, across=across)
-        if nearer is None or first is None or second is None:
+        of_laws = self._of_laws(x, U, p, across=across)
+        if nearer is None or first is None or second is None or of_laws is None:
             return UNKNOWN
         largest = np.max([nearer.change, first.change, second.change], axis=0)
         first_order = second.length <= _FIRST_ORDER * first.length
         if not (across or first_order) and largest[0] > _FIRST_ORDER * self._size(x):
             largest = self._solved(x, U, p, largest)
-        lost = tail + self._rounding(0.0 if across else p)
-        max_abs, half_range = more * SAFETY * largest + self._per_motion(x) * lost
+        changes, rounding = more * SAFETY * largest, self._per_motion(x) * rounding
+        # Changes within the rounding are rounding.
+        changes = np.where(changes <= rounding, 0.0, changes) + SAFETY * of_laws
+        max_abs, half_range = changes + rounding + self._per_motion(x) * tail
         if kept.system.centred != FROM_REST:
             max_abs = half_range
         return ErrorEstimate(max_abs=float(max_abs), half_peak_to_peak=float(half_range))
+
+    def _of_laws(self, x: _Seen, U: Real, p: float, *, across: bool) -> Real | None:
+        """Return the changes by what the laws' own discretisations leave out; None where they lead nowhere.
+
+        It is a force beside that of the contacts, put into the balance along the motion found.
+        """
+        if not self._discretised:
+            return np.zeros(2)
+        system, linear = self._larger.balance.system, self._larger.receptance(p)
+        angles = 2.0 * np.pi / _INSTANTS * np.arange(_INSTANTS)[:, None] * system.ks
+        turns = np.exp(1j * angles)
+        motions = np.real(amplitudes(system, U.reshape(system.owner.size, -1)) @ turns.T)
+        forces = np.zeros((system.ks.size, system.owner.size), np.complex128)
+        for first, contact in self._discretised:
+            left = contact.unresolved(motions[first])
+            if left is not None:
+                forces[:, first] = 2.0 / _INSTANTS * (left @ turns.conj())
+        forces[system.ks == 0] *= 0.5
+        pushed = np.matmul(linear.A[0], forces[:, :, None])[:, :, 0]
+        moved = self._step(x, U, p, coefficients(system, pushed.T).reshape(-1), across=across)
+        if moved is None:
+            return None
+        seen = -coefficients(system, (linear.B[0] * forces).sum(axis=1))
+        after = self._motion(self._larger, *moved.place, elsewhere=across)
+        return None if after is None else np.array(self._change(x, after + seen))
 
     def _step(self, x: _Seen, U: Real, p: float, residual: Real, *, across: bool) -> _Step | None:
         """Take a Newton step from (U, p) with the matrix at hand; None where it leads nowhere."""
         larger = self._larger
         step = np.append(residual, 0.0) if across else residual.copy()
         step_back(larger.system, larger.point, step)
-        length = float(np.abs(step).max(initial=0.0))
-        if not math.isfinite(length):
+        if not np.all(np.isfinite(step)):
             return None
+        moved = step[: U.size].reshape(-1, larger.balance.n_coefficients)
+        lengths = np.abs(amplitudes(larger.balance.system, moved))  # whenever the clock is started
+        length = float(lengths.max(initial=abs(step[-1]) if across else 0.0))
         place = U - step[: U.size], p - (float(step[-1]) if across else 0.0)
         after = self._motion(larger, *place, elsewhere=across)
         return None if after is None else _Step(place, length, self._change(x, after))
@@ -215,18 +249,6 @@ class ErrorEstimator:
         """Return by how much what is measured may change for a unit of the observed motion."""
         used = self._utilisation(x.high, x.low)
         return 1.0 if used is None else used[1] + abs(used[2])
-
-    def _rounding(self, p: float) -> float:
-        """Return what rounding may do to the observed motion where last evaluated [m].
-
-        It is the difference of what the force and what the contacts do; near an undamped resonance both are
-        huge. Resonances are rounded too: at a fixed λ = p that is as if p were. Across a branch p is 0.
-        """
-        larger = self._larger
-        linear, F = receptance_by_value(larger.linear), evaluation_by_value(larger.point).F
-        forces = np.abs(F).max(axis=1, initial=0.0)
-        own, slopes = (np.abs(linear.x_linear[i]) + np.abs(linear.B[i]) @ forces for i in (0, 1))
-        return _LOST_BITS * float(np.finfo(float).eps * np.max(own + abs(p) * slopes, initial=0.0))
 
     @staticmethod
     def _motion(workspace: Workspace, u: Real, p: float, *, elsewhere: bool = True) -> Real | None:

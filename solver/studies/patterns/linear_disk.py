@@ -17,6 +17,7 @@ import numpy as np
 from scipy.linalg import eigh
 
 from solver.arrays import Complex, Integer, Real
+from solver.balance.rounding import LOST_BITS
 from solver.errors import SettingError
 from solver.linear.assembly import linear_model, row_of
 from solver.linear.model import LinearModel, dynamic_stiffness
@@ -158,6 +159,20 @@ class LinearDisk:
         natural = np.sqrt(np.maximum(eigh(K, M, eigvals_only=True), 0.0)) / self.harmonic
         inside = natural[(natural >= low) & (natural <= high)]
         return np.sort(np.concatenate([inside, np.geomspace(low, high, _GRID)]))
+
+    @property
+    def undamped(self) -> bool:
+        """Whether a mode of the tuned disk in the band has no damping but rounding."""
+        K, M = (0.5 * (each + each.conj().T) for each in (self.K, self.M))
+        omega2, modes = eigh(K, M)
+        natural = np.sqrt(np.maximum(omega2, 0.0)) / self.harmonic
+        for omega, mode in zip(natural, modes.T, strict=True):
+            if self.band[0] <= omega <= self.band[1]:
+                rows = np.abs(K).max(axis=1) + (self.harmonic * omega) ** 2 * np.abs(M).max(axis=1)
+                taken = float((mode.conj() @ self.loss(omega) @ mode).real)
+                if abs(taken) <= LOST_BITS * float(rows @ np.abs(mode) ** 2):
+                    return True
+        return False
 
     def damped(self, times: float) -> LinearDisk:
         """Return the disk with so many times the damping."""

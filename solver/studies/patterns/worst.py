@@ -176,9 +176,15 @@ class DiskSearch:
         self.done += 1
         return not self.stopped
 
+    def disk(self, contacts: Contacts) -> LinearDisk:
+        """Return the disk in a linear limit."""
+        return linear_disk(self.scene, self.of, contacts, self.band, self.dof)
+
     def limit(self, contacts: Contacts) -> LinearLimit | None:
-        """Return a linear limit; None where its disk does not move."""
-        whole = linear_disk(self.scene, self.of, contacts, self.band, self.dof)
+        """Return a linear limit; None where its disk does not move, or has a resonance without damping."""
+        whole = self.disk(contacts)
+        if whole.undamped:
+            return None
         modes, nothing = tuned_modes(whole), np.zeros(whole.sectors)
         if not np.any(whole.amplitudes(nothing, whole.band[0])):
             return None
@@ -208,7 +214,8 @@ def _linear(search: DiskSearch, how: Contacts) -> dict[str, Any]:
     search.steps = starts + count * (1 + search.worst_of_patterns * (starts // _FEWER))
     limit = search.limit(how)
     if limit is None:
-        return _nothing()
+        undamped = search.disk(how).undamped
+        return _nothing() | ({"status": WorstMistuningStatus.UNDAMPED} if undamped else {})
     N, tuned = limit.whole.sectors, limit.tuned
     climbs = search.worst(limit, np.zeros(N), starts)
 

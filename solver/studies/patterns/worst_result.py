@@ -25,6 +25,10 @@ class WorstMistuningStatus(Enum):
         "use more harmonics or another band."
     )
     NO_RESPONSE = MistuningStatus.NO_RESPONSE.value
+    UNDAMPED = (
+        "A mode of the disk in the band has no damping, so that nothing bounds its peak: give the structure "
+        "some (damping_ratio = 0.001, say)."
+    )
     STOPPED = "The search was stopped by the caller: the worst is that of the patterns so far."
 
 

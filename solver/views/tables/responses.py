@@ -245,6 +245,10 @@ def transient(found: Json) -> Iterator[Block]:
     yield Summary(f"{found['scene']} from {begin} to {end} Hz", pairs)
 
 
+def _reached(hours: float) -> str:
+    return f"reached after {units.number(hours)} h" if hours > 0.0 else "exceeded from the beginning"
+
+
 def wear_life(found: Json) -> Iterator[Block]:
     """What contacts lose over hours, and what the response comes to."""
     hours, amplitude, pairs = found["hours"], found["amplitude"], _chosen(found.get("chosen"))
@@ -259,7 +263,7 @@ def wear_life(found: Json) -> Iterator[Block]:
         )
     if found["limit"] is not None:
         met = found["hours_to_limit"]
-        said = "not reached" if met is None else f"reached after {units.number(met)} h"
+        said = "not reached" if met is None else _reached(met)
         pairs.append((f"limit {units.length(found['limit'])}", said))
     used, met = found.get("used", ()), found.get("hours_to_margin")
     if met is not None or any(one is not None for one in used):
@@ -267,7 +271,7 @@ def wear_life(found: Json) -> Iterator[Block]:
         first, last = ("infinite" if one is None else units.number(one, 4) for one in (used[0], used[-1]))
         share = f"{first} at the beginning, {last} at the end"
         pairs.append(("of the stress allowed", share))
-        pairs.append(("margin 1", "kept" if met is None else f"reached after {units.number(met)} h"))
+        pairs.append(("margin 1", "kept" if met is None else _reached(met)))
     for one in found["switches"]:
         pairs.append(("another peak is highest", f"from {units.number(one)} h on"))
     if found["ended_by"]:

@@ -15,6 +15,9 @@ The state is where every slider stands.
 from __future__ import annotations
 
 import math
+from typing import ClassVar
+
+import numpy as np
 
 from solver.contacts.fields import Real
 from solver.contacts.laws.history.contact import HistoryContact
@@ -26,6 +29,7 @@ LIMIT, K, CHI, BETA = range(4)
 SLIDERS, DECADES = 40, 3.0  # of the density; one more is the S of them
 RATIO = 10.0 ** (-DECADES / SLIDERS)
 LOG = math.log(RATIO)
+_FINER = 8  # times as many sliders tell what these leave out
 
 
 def step(u: float, v: float, du: float, dt: float, last: Real, state: Real, p: Real) -> float:
@@ -93,17 +97,36 @@ def slopes(
 class Sliders(HistoryContact):
     """What springs with sliders side by side answer beyond their functions."""
 
+    DISCRETISED: ClassVar[bool] = True
+
     @property
     def sliders(self) -> tuple[tuple[float, float], ...]:
         """Stiffness [N/m] and strength [N] of every slider."""
+        return self._sliders(1)
+
+    def _sliders(self, finer: int) -> tuple[tuple[float, float], ...]:
+        """Return the same where so many times as many carry the density."""
         limit, k, chi, beta = self.numbers[:4].tolist()
-        mean = (chi + 1.0) / (chi + 2.0)
+        mean, count = (chi + 1.0) / (chi + 2.0), finer * SLIDERS
         top, scale = limit * (1.0 + beta) / (k * (beta + mean)), k / (1.0 + beta)
-        edges = [*(RATIO**i for i in range(SLIDERS)), 0.0]
+        edges = [*(RATIO ** (i / finer) for i in range(count)), 0.0]
         stiff = [edge ** (chi + 1.0) for edge in edges]
         strong = [mean * edge ** (chi + 2.0) for edge in edges]
-        parts = [(stiff[i] - stiff[i + 1], strong[i] - strong[i + 1]) for i in range(SLIDERS)]
+        parts = [(stiff[i] - stiff[i + 1], strong[i] - strong[i + 1]) for i in range(count)]
         return tuple((scale * a, scale * top * b) for a, b in (*parts, (beta, beta)) if a > 0.0)
+
+    def unresolved(self, motion: Real) -> Real:
+        """Return the force of many more sliders less that of these: it falls with their number squared."""
+        total = np.zeros(motion.size)
+        for sliders, sign in ((self._sliders(1), -1.0), (self._sliders(_FINER), 1.0)):
+            stiff, strong = np.array(sliders).T
+            reach, stands = strong / stiff, np.zeros(stiff.size)
+            for again in range(2):  # the first period begins with every slider at rest
+                for i, u in enumerate(motion):
+                    np.clip(stands, u - reach, u + reach, out=stands)
+                    if again:
+                        total[i] += sign * float(stiff @ (u - stands))
+        return total
 
     def rows(self) -> tuple[Row, ...]:
         """Return the rows of the time march: every slider by itself, with its own events."""

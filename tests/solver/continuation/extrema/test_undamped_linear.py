@@ -1,0 +1,107 @@
+"""Linear scenes without damping, or hardly any: a word, or a number with an estimate that holds."""
+
+import math
+from typing import Any
+
+import flint
+import numpy as np
+import pytest
+from exact_linear import Exact, chain, matrices, natural_hz
+
+import solver
+from solver import Scene
+from solver.continuation.branch import BranchStatus
+from solver.response.solution import SolutionStatus
+from solver.studies.blades import blade_peaks
+from solver.studies.patterns.worst import WorstSearch, worst_mistuning
+from solver.studies.patterns.worst_result import WorstMistuningStatus
+
+RATIOS = (0.0, 1e-12)
+
+
+def near_a_mode(seed: int, ratio: float) -> tuple[dict[str, Any], float]:
+    """A chain with a band about one of its modes, of this damping ratio, and its natural frequency [Hz]."""
+    rng = np.random.default_rng(55_000 + seed)
+    raw = chain(rng, 0.0)
+    natural = natural_hz(raw)
+    mode = float(rng.choice(natural))
+    for spring in raw["structure"]["springs"]:
+        spring["c"] = 2.0 * ratio / (2.0 * math.pi * mode) * spring["k"]
+    raw["observe"]["band"] = [0.9 * mode, 1.1 * mode]
+    return raw, mode
+
+
+def hardly_driven(raw: dict[str, Any], mode: float) -> bool:
+    """Whether the force moves a mode by less than rounding."""
+    K, M = matrices(raw)
+    scale = 1.0 / np.sqrt(np.diag(M))
+    _, modes = np.linalg.eigh(scale[:, None] * K * scale)
+    at = list(raw["structure"]["masses"]).index(raw["excitation"]["dof"])
+    return bool(np.abs(modes[at, np.argmin(np.abs(natural_hz(raw) - mode))]) < 1e-12)
+
+
+@pytest.mark.parametrize("ratio", RATIOS)
+@pytest.mark.parametrize("seeds", [range(6), pytest.param(range(6, 100), marks=pytest.mark.long)])
+def test_a_peak_has_no_number_or_one_that_is_known(ratio: float, seeds: range) -> None:
+    told = 0
+    for seed in seeds:
+        raw, mode = near_a_mode(seed, ratio)
+        branch = solver.sweep(Scene.from_dict(raw))
+        if branch.status is BranchStatus.UNDAMPED:
+            assert branch.peaks == ()
+            assert branch.band is None
+            continue
+        assert ratio > 0.0 or hardly_driven(raw, mode), seed
+        assert branch.reached
+        if ratio == 0.0:
+            continue
+        assert branch.peak is not None
+        exact, at = Exact(raw), branch.peak.at
+        top = exact.peak(at, ratio * mode) if branch.peak.interior else float(exact.amplitude(at))
+        assert abs(branch.peak.value - top) <= branch.error_estimate
+        told += branch.error_estimate < 0.1 * top
+    assert ratio == 0.0 or told >= 0.3 * len(seeds)
+
+
+@pytest.mark.parametrize("ratio", RATIOS)
+@pytest.mark.parametrize("seeds", [range(20), pytest.param(range(20, 100), marks=pytest.mark.long)])
+def test_at_a_resonance_a_number_is_known_as_well_as_it_says(ratio: float, seeds: range) -> None:
+    for seed in seeds:
+        raw, mode = near_a_mode(seed, ratio)
+        off = 10.0 ** np.random.default_rng(seed).uniform(-17.0, -8.0)
+        hertz = mode * (1.0 + off)
+        solution = solver.solve(Scene.from_dict(raw), frequency_hz=hertz)
+        if solution.status is not SolutionStatus.UNDAMPED:
+            error = abs(float(flint.arb(solution.max_abs) - Exact(raw).amplitude(hertz)))
+            assert error <= solution.error_estimate or solution.error_estimate > 0.3 * solution.max_abs
+
+
+def test_a_mode_that_no_contact_moves_in() -> None:
+    """Two equal masses, a damper between them: nothing damps the two in phase."""
+    ends = [["a", "ground"], ["b", "ground"]]
+    raw: dict[str, Any] = {
+        "name": "in-phase",
+        "structure": {
+            "kind": "lumped", "masses": {"a": 1.0, "b": 1.0},
+            "springs": [{"between": each, "k": 40.0} for each in ends],
+        },
+        "contacts": [{"name": "d", "between": ["a", "b"], "kt": 20.0, "mu": 0.3, "N0": 100.0}],
+        "excitation": {"dof": "a", "amplitude": 1.0}, "observe": {"dof": "b", "band": [0.5, 1.05]},
+    }  # fmt: skip
+    assert solver.sweep(Scene.from_dict(raw)).status is BranchStatus.UNDAMPED
+    raw["excitation"] = {"forces": {"a": 1.0, "b": -1.0}, "amplitude": 1.0}
+    assert solver.sweep(Scene.from_dict(raw)).status is BranchStatus.COMPLETED, "it is not driven"
+    raw["excitation"] = {"ground": {"a": 1.0, "b": 1.0}, "amplitude": 1.0}
+    assert solver.sweep(Scene.from_dict(raw)).status is BranchStatus.UNDAMPED, "a base drives it"
+
+
+def test_disks_without_damping_have_no_worst_mistuning_and_no_blade_peaks() -> None:
+    raw = solver.load_scene("bladed-disk").to_dict()
+    raw["structure"].pop("stiffness_proportional_damping", None)
+    raw["contacts"] = []
+    scene = Scene.from_dict(raw)
+    found = worst_mistuning(scene, of="middle", search=WorstSearch(starts=2, climbs=1, climb=1, seed=1))
+    assert found.status is WorstMistuningStatus.UNDAMPED
+    assert found.worst is None
+    assert math.isnan(found.tuned_peak)
+    assert np.all(np.isnan(blade_peaks(scene).value))
