@@ -48,21 +48,23 @@ def upgrade() -> None:
         sa.Column("data", sa.LargeBinary(), nullable=False),
         sa.PrimaryKeyConstraint("upload_id", "position", name="pk_upload_piece"),
     )
-    folder = _folder()
-    if folder is not None:
+    uploads, folder = _uploads(), _folder()
+    if folder is not None and uploads:
         folder.mkdir(mode=0o700, exist_ok=True)
     insert = sa.text("INSERT INTO upload_piece VALUES (:upload, :position, :data)")
-    for upload, size in _uploads():
+    for upload, size in uploads:
         if folder is not None:
             (folder / upload).unlink(missing_ok=True)
-            with (folder / upload).open("xb", opener=lambda path, flags: os.open(path, flags, 0o400)) as file:
+            (folder / upload).touch(0o600)
+            with (folder / upload).open("wb") as file:
                 file.writelines(_pieces(upload, size))
                 file.flush()
                 os.fsync(file.fileno())
+            (folder / upload).chmod(0o400)
             continue
         for position, data in enumerate(_pieces(upload, size)):
             op.get_bind().execute(insert, {"upload": upload, "position": position, "data": data})
-    if folder is not None and os.name == "posix":
+    if folder is not None and uploads and os.name == "posix":
         opened = os.open(folder, os.O_RDONLY)
         os.fsync(opened)
         os.close(opened)

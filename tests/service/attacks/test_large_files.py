@@ -153,9 +153,13 @@ def test_parts_or_the_file_are_there_whenever_the_service_is_killed(
         takes = time.monotonic() - begun
         assert found.status_code == 201, found.text
         client.delete(found.headers["location"]).raise_for_status()
-    outcomes = []
-    for kill in range(kills):
+    outcomes: list[str] = []
+    for kill in range(kills + 1):
         with besieged(tmp_path, url=place, **limits) as service, service.client() as client:
+            if kill:
+                outcomes.append(_left(client, ids, digest, rng))
+            if kill == kills:
+                break
             ids = in_parts(client, data, size)
             asked = threading.Thread(target=_hung_up_on, args=(client, ids))
             asked.start()
@@ -163,21 +167,26 @@ def test_parts_or_the_file_are_there_whenever_the_service_is_killed(
             service.process.kill()
             service.process.wait()
             asked.join(60.0)
-        with besieged(tmp_path, url=place, **limits) as service, service.client() as client:
-            there = [client.get(f"/v1/uploads/{one}").status_code == 200 for one in ids]
-            files = [one for one in client.get("/v1/uploads").json()["items"] if one["format"] != "part"]
-            assert all(there) or (not any(there) and [one["sha256"] for one in files] == [digest])
-            outcomes.append("parts" if all(there) else "file")
-            if all(there):
-                assert whole(client, rng.sample(ids, len(ids)) if kill % 2 else ids[::-1]).status_code == 422
-                again = whole(client, ids)
-                assert again.status_code == 201, again.text
-                files = [again.json()]
-            assert files[0]["sha256"] == digest
-            look = client.post("/v1/matrices", json={"uploads": [files[0]["id"]]}, timeout=60.0)
-            assert "missing" in look.text or look.status_code == 200, look.text
-            client.delete(f"/v1/uploads/{files[0]['id']}").raise_for_status()
     print({one: outcomes.count(one) for one in ("parts", "file")})  # noqa: T201
+
+
+def _left(client: httpx.Client, ids: list[str], digest: str, rng: random.Random) -> str:
+    """What a kill left, all `parts` or the `file`, either of them whole; it is deleted."""
+    there = [client.get(f"/v1/uploads/{one}").status_code == 200 for one in ids]
+    files = [one for one in client.get("/v1/uploads").json()["items"] if one["format"] != "part"]
+    assert len(files) == (0 if all(there) else 1), "parts or the file"
+    assert all(there) or not any(there)
+    if all(there):
+        for order in (ids[::-1], [*ids[1:], ids[0]], rng.sample(ids[1:], len(ids) - 1)):
+            assert whole(client, order).status_code == 422
+        again = whole(client, ids)
+        assert again.status_code == 201, again.text
+        files = [again.json()]
+    assert files[0]["sha256"] == digest
+    look = client.post("/v1/matrices", json={"uploads": [files[0]["id"]]}, timeout=60.0)
+    assert "'K.npy' alone must hold M and K" in look.text, "it can be read"
+    client.delete(f"/v1/uploads/{files[0]['id']}").raise_for_status()
+    return "parts" if all(there) else "file"
 
 
 def _hung_up_on(client: httpx.Client, ids: list[str]) -> None:
