@@ -94,8 +94,11 @@ class Uploads:
         parts = self._parts(arrived.parts, caller)
         ids = {part.id: part for part in parts}
         size = sum(part.size for part in parts) if parts else arrived.size
-        self.storage.require(caller, max(0, size - sum(part.size for part in ids.values())))
-        found, sha256 = [], arrived.sha256
+        more = size - sum(part.size for part in ids.values())
+        if more > 0 or not parts:
+            self.storage.require(caller, more)
+        found: list[dict[str, Any]] = []
+        sha256 = arrived.sha256
         if parts:
             for part_id, part in ids.items():
                 self.repository.files.place(part, arrived.path.with_name(part_id))
