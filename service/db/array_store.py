@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import os
 from collections.abc import Collection, Iterator
+from pathlib import Path
 from typing import Any
 
 from service.errors import ConfigurationError, DatabaseError
@@ -54,10 +55,10 @@ class ArrayStore:
         self._files.makedirs(f"{self._root}/{job_id}", exist_ok=True)
         file = self._file(job_id, array.sha256)
         self._files.pipe_file(file, array.data)
-        if self._in_folder and os.name == "posix":
+        if self._in_folder:
             # Its row is to be on disk after it, and with it what names it.
             for path in (file, f"{self._root}/{job_id}", self._root):
-                _to_disk(path)
+                to_disk(path)
         return StoredArray(sha256=array.sha256, data=b"", size=len(array.data))
 
     def get(self, job_id: str, sha256: str) -> bytes:
@@ -95,8 +96,10 @@ class ArrayStore:
         return f"{self._root}/{job_id}/{sha256}.npy"
 
 
-def _to_disk(path: str) -> None:
+def to_disk(path: str | Path) -> None:
     """Wait until a file, or what a folder names, has reached the disk."""
+    if os.name != "posix":
+        return
     opened = os.open(path, os.O_RDONLY)
     try:
         os.fsync(opened)

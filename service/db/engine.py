@@ -15,7 +15,7 @@ import sqlite3
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
@@ -24,13 +24,12 @@ from typing import Any, TypeVar
 from sqlalchemy import Connection, Engine, create_engine, event, func, select, text
 from sqlalchemy.engine import make_url
 from sqlalchemy.engine.interfaces import DBAPIConnection
-from sqlalchemy.exc import DBAPIError
+from sqlalchemy.exc import DBAPIError, IntegrityError
 from sqlalchemy.pool import ConnectionPoolEntry, NullPool
 
 from service.db import postgresql
 from service.db.array_store import ArrayStore
 from service.db.clock import utc_now
-from service.db.group_commit import GroupedWrites
 from service.db.lock import FileLock, make_private
 from service.errors import DatabaseError
 from service.jobs import strict_json
@@ -38,10 +37,6 @@ from service.jobs import strict_json
 BUSY_TIMEOUT_SECONDS = 30.0
 SQLITE_WITHOUT_WAL_BUG = (3, 51, 3)
 CONNECTIONS = 16
-# Of the transactions that threads share: PostgreSQL runs several at a time, and each of these collects what
-# comes while its server answers.
-_LEADERS = 4
-
 _PROBE_SECONDS = 1.0
 _STEPS_BETWEEN_LOOKS = 100_000  # of SQLite's virtual machine: some thousandths of a second
 _DEADLINE = "stickslip deadline"
@@ -70,6 +65,11 @@ def database_path(url: str) -> Path:
     if name is None:
         raise DatabaseError(f"`database` must name a file, got {url!r}")
     return Path(name)
+
+
+def files_beside(path: Path) -> Path:
+    """The folder of what uploads hold, beside the file of an SQLite database."""
+    return path.with_name(f"{path.name}.files")
 
 
 def sqlite_note() -> str | None:
@@ -228,8 +228,6 @@ class Database:
         self._write = write_engine(url, connections, seconds)
         self._read = read_engine(url, seconds) if is_sqlite(url) else postgresql.reading(self._write)
         self._look = self._read if is_sqlite(url) else postgresql.looking(self._write)
-        leaders = 1 if is_sqlite(url) else max(1, min(_LEADERS, connections // 2))
-        self._grouped = GroupedWrites(self.writing, leaders, seconds)
 
     @property
     def backend(self) -> str:
@@ -259,12 +257,12 @@ class Database:
         with self._write.begin() as connection:
             yield connection
 
-    def grouped(self, work: Callable[[Connection], _Written]) -> _Written:
-        """Have `work` done in a transaction that it may share with that of other threads (`GroupedWrites`).
-
-        If another service writes the same row meanwhile the work is done once more and finds it.
-        """
-        return self._grouped.do(work)
+    def written(self, work: Callable[[Connection], _Written]) -> _Written:
+        """Have `work` done in a transaction; once more if another service wrote the same row meanwhile."""
+        with suppress(IntegrityError), self.writing() as connection:
+            return work(connection)
+        with self.writing() as connection:
+            return work(connection)
 
     @contextmanager
     def reading(self) -> Iterator[Connection]:
@@ -347,7 +345,7 @@ class Database:
 
 
 def backup(url: str, target: Path) -> None:
-    """Copy a database to a new file while it may be in use.
+    """Copy a database to a new file, and its uploads to the folder beside that, while it may be in use.
 
     Raises
     ------
@@ -361,6 +359,7 @@ def backup(url: str, target: Path) -> None:
         raise DatabaseError(f"there is no database {source} to back up")
     if target.exists():
         raise DatabaseError(f"{target} exists already: a backup does not overwrite")
+    _copy_files(source, target)
     make_private(target)
     reader = sqlite3.connect(source, timeout=BUSY_TIMEOUT_SECONDS)
     try:
@@ -371,6 +370,19 @@ def backup(url: str, target: Path) -> None:
             writer.close()
     finally:
         reader.close()
+    _copy_files(source, target)  # what came meanwhile
+
+
+def _copy_files(source: Path, target: Path) -> None:
+    """Copy the uploads of a database that are not in the copy yet; they never change."""
+    if not (files := files_beside(source)).exists():
+        return
+    (copies := files_beside(target)).mkdir(mode=0o700, exist_ok=True)
+    for file in files.iterdir():
+        if file.is_file() and not (copies / file.name).exists():
+            # One that is deleted at this moment has no row soon.
+            with suppress(FileNotFoundError):
+                shutil.copy2(file, copies / file.name)
 
 
 def shrink(url: str) -> None:

@@ -198,7 +198,7 @@ class ApiKey(TableBase):
 
 
 class Upload(TableBase):
-    """A file that a client sent, to be referred to by its id."""
+    """A file that a client sent, to be referred to by its id; `UploadFiles` has what it holds."""
 
     __tablename__ = "upload"
 
@@ -206,12 +206,21 @@ class Upload(TableBase):
     owner: Mapped[str] = mapped_column(String(OWNER_LENGTH))
     name: Mapped[str] = mapped_column(String(200))
     format: Mapped[str] = mapped_column(String(32))
-    size: Mapped[int]
+    size: Mapped[int] = mapped_column(BigInteger())
     sha256: Mapped[str] = mapped_column(String(64))
     created: Mapped[datetime]
-    data: Mapped[bytes] = mapped_column(LargeBinary(), deferred=True)
 
     __table_args__ = (Index(None, "owner", "id"),)
+
+
+class UploadPiece(TableBase):
+    """A piece of what an upload holds, in PostgreSQL; it comes before the upload's row and goes after it."""
+
+    __tablename__ = "upload_piece"
+
+    upload_id: Mapped[str] = mapped_column(String(ID_LENGTH), primary_key=True)
+    position: Mapped[int] = mapped_column(primary_key=True)
+    data: Mapped[bytes] = mapped_column(LargeBinary())
 
 
 class StoredScene(TableBase):

@@ -15,6 +15,7 @@ from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from typing import Annotated, Any, BinaryIO, TypeVar
 
+from anyio import to_thread
 from fastapi import Body, Depends, Request, Response
 from fastapi.exceptions import RequestValidationError
 from fastapi.routing import APIRoute
@@ -120,13 +121,27 @@ class BodyTurns:
                 del self._owners[owner]
 
 
+_WRITTEN_BYTES = 1 << 18
+
+
 async def saved(request: Request, file: BinaryIO, limit: int, seconds: float) -> tuple[int, str]:
-    """Write a body to a file; its size and SHA-256. `chunks` lists the errors."""
-    size, found = 0, hashlib.sha256()
+    """Write a body to a file; its size and SHA-256. `chunks` lists the errors.
+
+    The disk may be slow: nobody but this request waits for it.
+    """
+    size, found, held = 0, hashlib.sha256(), bytearray()
+
+    def write() -> None:
+        file.write(held)
+        found.update(held)
+        held.clear()
+
     async for piece in chunks(request, limit, seconds):
-        file.write(piece)
-        found.update(piece)
+        held += piece
         size += len(piece)
+        if len(held) >= _WRITTEN_BYTES:
+            await to_thread.run_sync(write)
+    await to_thread.run_sync(write)
     return size, found.hexdigest()
 
 

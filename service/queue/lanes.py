@@ -22,7 +22,7 @@ from service.queue.meters import Meters
 
 _P = ParamSpec("_P")
 _T = TypeVar("_T")
-_READING, _WRITING, _FILES, _DRAWING, _UPLOADS, _REPORTS = 16, 16, 4, 2, 2, 1
+_READING, _WRITING, _FILES, _DRAWING, _UPLOADS, _REPORTS = 16, 16, 4, 2, 4, 1
 _LINKS = 2  # requests by links at a time, at all services together, but one at each
 _LONG = 3.0
 _RETRY_SECONDS = 2

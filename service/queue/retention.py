@@ -19,6 +19,7 @@ from sqlalchemy.exc import DBAPIError
 
 from service.db.engine import Database, database_name, database_path, is_sqlite, shrink
 from service.db.repositories.jobs import JobRepository
+from service.db.repositories.owned import UploadRepository
 from service.db.repositories.retention import Pruned, RetentionRepository
 from service.db.revisions import off_head
 from service.errors import DatabaseError
@@ -134,9 +135,9 @@ def prune_uploads(
     database: Database, before: datetime, *, pause: Callable[[float], bool] | None = None
 ) -> Pruned:
     """Delete the uploads that came before a time and are not used, one by one; arguments as of `prune`."""
-    repository, paced = RetentionRepository(database), _Paced(database, pause)
-    old = repository.old_uploads(before)
-    return Pruned(uploads=sum(paced.once(partial(repository.delete_upload, one, before)) for one in old))
+    uploads, paced = UploadRepository(database), _Paced(database, pause)
+    old = RetentionRepository(database).old_uploads(before)
+    return Pruned(uploads=sum(paced.once(partial(uploads.delete, one, before)) for one in old))
 
 
 class Retention:
@@ -186,6 +187,7 @@ class Retention:
     def once(self) -> Pruned:
         """Delete what is too old now."""
         found, now = Pruned(), self._now()
+        UploadRepository(self._database).files.sweep(now)
         days, upload_days = self._settings.retention_days, self._settings.retention_upload_days
         if days is not None:
             found += prune(

@@ -7,13 +7,17 @@ ends that process and not the service. It gets a folder and answers with JSON; n
 from __future__ import annotations
 
 import contextlib
+import errno
+import hashlib
 import json
 import multiprocessing as mp
 import os
+import shutil
 import signal
 import threading
 import zipfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
@@ -27,6 +31,9 @@ MEMORY_BYTES = 2 * 1024**3
 _LEAST_BYTES = 512 * 1024**2
 _TIMES = 16
 """Memory of a reader for each byte of its files: lines, and what is read of them, as Python keeps it."""
+_INFLATED, _INFLATED_BYTES = 20, 64 * 1024**2
+"""What an archive may hold for each byte of it, and besides."""
+_PIECE = 1 << 20
 _USUAL_BYTES = 16 * 1024**2
 """Files that are larger together have more time, in proportion."""
 _PATIENCE_SECONDS = 30.0
@@ -34,7 +41,7 @@ _TOO_LONG = (
     "reading it takes longer than {:g} s: raise STICKSLIP_INSPECTION_SECONDS (of each 16 MiB), or reduce "
     "the model first, stickslip import FILES --reduce"
 )
-_DESCRIBE, _RESOLVE, _LOOK = "describe", "resolve", "look"
+_DESCRIBE, _JOIN, _RESOLVE, _LOOK = "describe", "join", "resolve", "look"
 
 
 def contents(file: Path, seconds: float) -> list[dict[str, Any]]:
@@ -49,6 +56,25 @@ def contents(file: Path, seconds: float) -> list[dict[str, Any]]:
     """
     found: list[dict[str, Any]] = _ask(_DESCRIBE, file.parent, file.name, seconds, 1024**2)
     return found
+
+
+def joined(
+    file: Path, parts: Sequence[str], size: int, seconds: float
+) -> tuple[list[dict[str, Any]], str]:
+    """Put a file together of parts beside it; `contents` of it, and its SHA-256.
+
+    Raises
+    ------
+    UnreadableUploadError, QueueFullError
+        As `contents`.
+    OSError
+        If there is no room for so many bytes.
+    """
+    if shutil.disk_usage(file.parent).free < size:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+    asked = {"name": file.name, "parts": list(parts)}
+    found: dict[str, Any] = _ask(_JOIN, file.parent, asked, seconds, 1024**2, writes=size)
+    return found["contents"], found["sha256"]
 
 
 def resolved_structure(
@@ -86,13 +112,16 @@ def look_at(asked: Mapping[str, Any], folder: Path, seconds: float, most_bytes: 
     return found
 
 
-def _ask(task: str, folder: Path, argument: Any, seconds: float, most_bytes: int) -> Any:
-    memory = min(_LEAST_BYTES + _TIMES * _size(folder), MEMORY_BYTES)
+def _ask(
+    task: str, folder: Path, argument: Any, seconds: float, most_bytes: int, writes: int = 0
+) -> Any:
     sent = sum(file.stat().st_size for file in folder.iterdir())  # never what an archive says of itself
+    inside = _INFLATED * sent if any(map(zipfile.is_zipfile, folder.iterdir())) else 0
+    memory = min(_LEAST_BYTES + _TIMES * (sent + inside), MEMORY_BYTES)
     seconds *= max(1.0, sent / _USUAL_BYTES)
     ours, theirs = mp.Pipe(duplex=False)
-    with _budget.taken(memory), ours:
-        process = start(_main, (theirs, task, str(folder), argument, seconds, memory), "reader")
+    with (_budget if sent > _SMALL_BYTES else _budget_of_small).taken(memory), ours:
+        process = start(_main, (theirs, task, str(folder), argument, seconds, memory, writes), "reader")
         theirs.close()
         try:
             if not ours.poll(seconds):
@@ -113,17 +142,6 @@ def _ask(task: str, folder: Path, argument: Any, seconds: float, most_bytes: int
     if "error" in answer:
         raise UnreadableUploadError(answer["error"])
     return answer["found"]
-
-
-def _size(folder: Path) -> int:
-    """Bytes of the files of a folder, of an archive of arrays as they are inside."""
-    found = 0
-    for file in folder.iterdir():
-        found += file.stat().st_size
-        if zipfile.is_zipfile(file):
-            with contextlib.suppress(zipfile.BadZipFile), zipfile.ZipFile(file) as archive:
-                found += sum(member.file_size for member in archive.infolist())
-    return found
 
 
 def _end(code: int | None, seconds: float) -> str:
@@ -163,27 +181,37 @@ class _Budget:
                 self._changed.notify_all()
 
 
-_budget = _Budget(MEMORY_BYTES)
+_budget, _budget_of_small = _Budget(MEMORY_BYTES), _Budget(2 * _LEAST_BYTES)
+_SMALL_BYTES = 1024**2
+"""Files of so much together do not wait for large ones."""
 
 
-def _main(connection: Connection, task: str, folder: str, argument: Any, seconds: float, memory: int) -> None:
+def _main(
+    connection: Connection,
+    task: str,
+    folder: str,
+    argument: Any,
+    seconds: float,
+    memory: int,
+    writes: int,
+) -> None:
     """The life of the process, which may take `memory` beside what it is born with."""
-    limit_process(seconds, address_space() + memory)
+    limit_process(seconds, address_space() + memory, writes)
     os.chdir(folder)
     # The other end may have lost its patience.
     with contextlib.suppress(BrokenPipeError):
         connection.send_bytes(json.dumps(_answer(task, argument), allow_nan=False).encode())
 
 
-def limit_process(seconds: float, memory: int) -> None:
-    """Limit the time [s] and the memory [bytes] of this process; it writes no files."""
+def limit_process(seconds: float, memory: int, writes: int = 0) -> None:
+    """Limit the time [s], the memory and the files it writes [bytes] of this process."""
     import resource
 
     for what, value in (
         (resource.RLIMIT_AS, memory),
         (resource.RLIMIT_CPU, round(seconds) + 1),
         (resource.RLIMIT_CORE, 0),
-        (resource.RLIMIT_FSIZE, 0),
+        (resource.RLIMIT_FSIZE, writes),
     ):
         hard = resource.getrlimit(what)[1]
         limit = value if hard == resource.RLIM_INFINITY else min(value, hard)
@@ -194,7 +222,9 @@ def _answer(task: str, argument: Any) -> dict[str, Any]:
     from solver.errors import SceneError
     from solver.matrices.files import MatrixFileError
 
-    tasks: dict[str, Callable[[Any], Any]] = {_DESCRIBE: _describe, _RESOLVE: _resolve, _LOOK: _look}
+    tasks: dict[str, Callable[[Any], Any]] = {
+        _DESCRIBE: _describe, _JOIN: _join, _RESOLVE: _resolve, _LOOK: _look,
+    }  # fmt: skip
     try:
         return {"found": tasks[task](argument)}
     except SceneError as error:
@@ -214,6 +244,7 @@ def _describe(name: str) -> list[dict[str, Any]]:
     from solver.matrices.sectors.reduction import read_sector
 
     file = Path(name)
+    _refuse_inflating(file)
     if file.suffix.lower() in registry.suffixes("labels"):
         return [{"name": "mapping", "rows": len(labels_of(file)), "columns": 1, "entries": None}]
     if file.suffix.lower() in registry.suffixes("nodes"):
@@ -233,6 +264,34 @@ def _describe(name: str) -> list[dict[str, Any]]:
         rows, columns = (int(count) for count in matrix.shape)
         found.append({"name": key, "rows": rows, "columns": columns, "entries": int(matrix.nnz)})
     return found
+
+
+def _join(asked: dict[str, Any]) -> dict[str, Any]:
+    known = hashlib.sha256()
+    with Path(asked["name"]).open("wb") as whole:
+        for part in asked["parts"]:
+            with Path(part).open("rb") as file:
+                for piece in iter(partial(file.read, _PIECE), b""):
+                    whole.write(piece)
+                    known.update(piece)
+    return {"contents": _describe(asked["name"]), "sha256": known.hexdigest()}
+
+
+def _refuse_inflating(file: Path) -> None:
+    """Refuse an archive that holds far more than it is."""
+    from solver.matrices.files import MatrixFileError
+
+    if not zipfile.is_zipfile(file):
+        return
+    size = file.stat().st_size
+    with zipfile.ZipFile(file) as archive:
+        inside = sum(member.file_size for member in archive.infolist())
+    most = _INFLATED_BYTES + _INFLATED * size
+    if inside > most:
+        raise MatrixFileError(
+            f"{file.name!r} holds {inside} bytes, at most {most} are read of an archive of {size}: save a "
+            "sparse matrix, or without compression"
+        )
 
 
 def _nodes_of(file: Path) -> int:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import hashlib
+import json
 import os
 import shutil
 import sys
@@ -11,7 +11,7 @@ import threading
 from collections import OrderedDict
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from multiprocessing.util import Finalize
 from pathlib import Path
 from typing import Any, TextIO
@@ -22,15 +22,15 @@ from service.db.models import Upload
 from service.db.repositories.owned import UploadRepository, visible
 from service.errors import InvalidRequestError, NotFoundError, UnreadableUploadError
 from service.jobs.common.scenes import UPLOAD, Place, named_files, with_named
-from service.jobs.strict_json import digest
+from service.jobs.strict_json import digest, encoded
 from service.settings.settings import Settings
-from service.uploads.inspection import contents, look_at, resolved_structure
+from service.uploads.inspection import contents, joined, look_at, resolved_structure
 from solver.errors import Issue
 
 PART = "part"
 """The format of a part of a larger file, which is not read."""
-_KEPT = 4
 _LARGEST_STRUCTURE = 16 * 1024 * 1024
+"""As text [bytes]; of those that were resolved last, as many are kept."""
 _REDUCE = (
     ": keep fewer modes in `cyclic.keep_modes`, or reduce the sector with `stickslip import --sectors … "
     "--reduce` and upload its file as `diameters`"
@@ -47,7 +47,7 @@ class Arrived:
     size: int
     sha256: str
     parts: tuple[str, ...] = ()
-    """Uploads of the format `part`, which hold the file in its place."""
+    """Uploads of the format `part`, which hold the file: there is nothing at `path` yet."""
 
 
 def format_of(asked: str | None, name: str, content_type: str) -> str:
@@ -77,7 +77,7 @@ class Uploads:
         self.storage = storage
         self._seconds = settings.inspection_seconds
         self._lock = threading.Lock()
-        self._resolved: OrderedDict[str, dict[str, Any]] = OrderedDict()
+        self._resolved: OrderedDict[str, str] = OrderedDict()
 
     def add(self, arrived: Arrived, caller: Caller = KEYLESS) -> tuple[Upload, list[dict[str, Any]], bool]:
         """Look at a file and store it; what it holds, and whether it is new to its owner.
@@ -92,25 +92,26 @@ class Uploads:
             If a part is not there, or is none.
         """
         parts = self._parts(arrived.parts, caller)
-        if not parts:
-            return self._add(arrived, caller)
-        size, known = 0, hashlib.sha256()
-        with arrived.path.open("wb") as file:
-            for part in parts:
-                data = self.repository.data(part.id)
-                size += file.write(data)
-                known.update(data)
-        for part_id in set(arrived.parts):  # before the file is stored: space for both is not needed
-            self.delete(part_id, caller)
-        return self._add(replace(arrived, size=size, sha256=known.hexdigest()), caller)
-
-    def _add(self, arrived: Arrived, caller: Caller) -> tuple[Upload, list[dict[str, Any]], bool]:
-        self.storage.require(caller, arrived.size)
-        found = [] if arrived.format == PART else contents(arrived.path, self._seconds)
-        row, added = self.repository.add(
-            owner=caller.owner, name=arrived.name, format=arrived.format, size=arrived.size,
-            sha256=arrived.sha256, data=arrived.path.read_bytes(), shared=arrived.format != PART,
-        )  # fmt: skip
+        ids = {part.id: part for part in parts}
+        size = sum(part.size for part in parts) if parts else arrived.size
+        more = size - sum(part.size for part in ids.values())
+        if more > 0 or not parts:
+            self.storage.require(caller, more)
+        found: list[dict[str, Any]] = []
+        sha256 = arrived.sha256
+        if parts:
+            for part_id, part in ids.items():
+                self.repository.files.place(part, arrived.path.with_name(part_id))
+            found, sha256 = joined(arrived.path, [part.id for part in parts], size, self._seconds)
+        elif arrived.format != PART:
+            found = contents(arrived.path, self._seconds)
+        given = Upload(
+            owner=caller.owner, name=arrived.name, format=arrived.format, size=size, sha256=sha256
+        )
+        whole = None if arrived.format == PART else list(ids)
+        row, added = self.repository.add(arrived.path, given, whole)
+        for owner in {part.owner for part in parts}:
+            self.storage.forget(owner)
         return row, found, added
 
     def _parts(self, ids: tuple[str, ...], caller: Caller) -> list[Upload]:
@@ -239,9 +240,12 @@ class Uploads:
     ) -> dict[str, Any]:
         known = _digest(structure, rows, orders)
         with self._lock:
-            if known in self._resolved:
-                self._resolved.move_to_end(known)
-                return self._resolved[known]
+            text = self._resolved.pop(known, None)
+            if text is not None:
+                self._resolved[known] = text
+        if text is not None:
+            kept: dict[str, Any] = json.loads(text)
+            return kept
         names = file_names(rows)
         with self._placed(rows, names) as folder:
             try:
@@ -258,15 +262,16 @@ class Uploads:
     @contextmanager
     def _placed(self, rows: Mapping[Place, Upload], names: Mapping[Place, str]) -> Iterator[Path]:
         """A folder that holds the files of uploads under their names."""
-        with tempfile.TemporaryDirectory(prefix="stickslip-") as folder:
-            for place, row in rows.items():
-                (Path(folder) / names[place]).write_bytes(self.repository.data(row.id))
-            yield Path(folder)
+        with self.repository.files.work() as folder:
+            for name, row in {names[place]: row for place, row in rows.items()}.items():
+                self.repository.files.place(row, folder / name)
+            yield folder
 
     def _remember(self, known: str, found: dict[str, Any]) -> None:
+        text = encoded(found)
         with self._lock:
-            self._resolved[known] = found
-            while len(self._resolved) > _KEPT:
+            self._resolved[known] = text
+            while sum(map(len, self._resolved.values())) > _LARGEST_STRUCTURE:
                 self._resolved.popitem(last=False)
 
 

@@ -90,7 +90,8 @@ def test_every_dependency_is_pinned_with_what_it_needs() -> None:
     extras = PROJECT["project"]["optional-dependencies"]
     first = [*PROJECT["build-system"]["requires"], "numpy", "scipy", "numba", "pydantic"]
     own = [*PROJECT["project"]["dependencies"], *extras["fast"]]
-    image = [*extras["postgresql"], *extras["traces"], *extras["stores"]]
+    named = ("postgresql", "traces", "stores", "oidc", "pdf")
+    image = [one for extra in named for one in extras[extra]]
     names: list[str] = []
     for part, wanted in (("kernels", first), ("package", own), ("image", image), ("dev", extras["dev"])):
         names += pinned(part)

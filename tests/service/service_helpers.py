@@ -18,7 +18,8 @@ from fastapi import FastAPI
 import solver
 from service.db import revisions
 from service.db.engine import Database
-from service.db.repositories import NewJob
+from service.db.models import Upload
+from service.db.repositories import NewJob, UploadRepository
 from service.http.app import create_app
 from service.http.server import _bind, _config, _Server
 from service.jobs.registry import Registry
@@ -206,3 +207,11 @@ def in_order(
 
     wanted = [key for key, record in records.items() if meets(record) and value(record) is not None]
     return sorted(wanted, key=lambda key: (value(records[key]), key), reverse=sort.startswith("-"))
+
+
+def stored_upload(uploads: UploadRepository, data: bytes, **said: Any) -> tuple[Upload, bool]:
+    """Store a file, of which `said` has owner, name, format and digest."""
+    with uploads.files.work() as folder:
+        file = folder / "file"
+        file.write_bytes(data)
+        return uploads.add(file, Upload(size=len(data), **said))

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from service_helpers import MakeSettings, new_job, until
+from service_helpers import MakeSettings, new_job, stored_upload, until
 from sqlalchemy import func, select, text, update
 
 from service.cli import main
@@ -154,9 +154,8 @@ def test_a_service_deletes_what_is_old(make_settings: MakeSettings) -> None:
 
 def uploaded(database: Database, days: float, sha256: str) -> str:
     """An upload that came some days ago."""
-    row, _ = UploadRepository(database).add(
-        owner="", name="M.npz", format="npz", size=3, sha256=sha256, data=b"abc"
-    )
+    said = {"owner": "", "name": "M.npz", "format": "npz", "sha256": sha256}
+    row, _ = stored_upload(UploadRepository(database), b"abc", **said)
     with database.writing() as connection:
         connection.execute(update(Upload).where(Upload.id == row.id).values(created=utc_now() - days * DAY))
     return row.id
@@ -178,7 +177,7 @@ def test_uploads_that_nobody_uses_go(database: Database) -> None:
         jobs.submit(new_job(**naming(ids[name])), queue_limit=10)
     assert jobs.claim("one", utc_now() + DAY) is not None
     assert uploaded(database, 0.0, "again") == ids["again"]
-    assert RetentionRepository(database).delete_upload(ids["again"], before(30)) == 0
+    assert UploadRepository(database).delete(ids["again"], before(30)) == 0
     assert prune_uploads(database, before(30)) == Pruned(uploads=2)
     uploads = UploadRepository(database)
     assert {name for name, one in ids.items() if uploads.get(one) is None} == {"unused", "ended"}

@@ -12,7 +12,7 @@ import httpx
 import numpy as np
 import pytest
 from sector_files import DOFS, SECTORS, TABLES, scene_of, sector_files
-from service_helpers import ServedClient, is_problem
+from service_helpers import ServedClient, is_problem, stored_upload
 from upload_cases import npz, upload
 
 import solver
@@ -203,9 +203,8 @@ def test_no_file_of_the_service_is_read(shipped: ServedClient, ids: dict[str, st
     disguised = sent(shipped, "deck.dof", FILES["ring.dof"])
     row = shipped.service.uploads.repository.get(disguised.removeprefix("upload:"))
     assert row is not None
-    held, _ = shipped.service.uploads.repository.add(
-        owner=row.owner, name="deck.dof", format="dof", size=len(deck), sha256="1" * 64, data=deck
-    )
+    said = {"owner": row.owner, "name": "deck.dof", "format": "dof", "sha256": "1" * 64}
+    held, _ = stored_upload(shipped.service.uploads.repository, deck, **said)
     told = refused(shipped, uploaded(ids, nodes=f"upload:{held.id}"))
     assert "includes another file" in told["/cyclic/nodes"], "whatever format the upload says"
 
@@ -216,8 +215,8 @@ def test_names_never_lead_out_of_the_folder(shipped: ServedClient) -> None:
     for number, (place, name) in enumerate(
         [(("M",), "K.npz"), (("parts", "../../x"), "K.npz"), (("K",), "2-K.npz"), (("C",), "K.npz")]
     ):
-        given = {"name": name, "format": "npz", "size": 1, "sha256": f"{number}" * 64, "data": b"x"}
-        rows[place] = repository.add(owner="names", **given)[0]
+        said = {"owner": "names", "name": name, "format": "npz", "sha256": f"{number}" * 64}
+        rows[place] = stored_upload(repository, b"x", **said)[0]
     names = list(file_names(rows).values())
     assert len(set(names)) == len(names), "each upload its own"
     assert not any("/" in name for name in names)
@@ -228,8 +227,8 @@ def test_what_another_one_uploaded_is_not_there(shipped: ServedClient) -> None:
     theirs = {}
     for number, (name, data) in enumerate(FILES.items()):
         form = name.rpartition(".")[2].replace("mas", "sti")
-        given = {"name": name, "format": form, "size": len(data), "sha256": f"{number}" * 64, "data": data}
-        theirs[name] = f"upload:{uploads.repository.add(owner='ann', **given)[0].id}"
+        said = {"owner": "ann", "name": name, "format": form, "sha256": f"{number}" * 64}
+        theirs[name] = f"upload:{stored_upload(uploads.repository, data, **said)[0].id}"
     ann, ben = (Caller(owner=name, key_id=name) for name in ("ann", "ben"))
     scene = {**scene_of(uploaded(theirs)), "name": "theirs"}
     assert "low_rows" in uploads.resolved(scene, ann)["structure"]["cyclic"]  # type: ignore[index,call-overload]

@@ -16,7 +16,7 @@ from fe_files import coordinate
 from matrix_cases import beam, hb_text, write_scene
 from scipy.io import mmwrite, savemat
 from scipy.sparse import coo_array, save_npz
-from service_helpers import is_problem
+from service_helpers import is_problem, stored_upload
 from upload_cases import npz, saved, upload
 
 import solver
@@ -308,21 +308,25 @@ def test_a_reader_that_takes_too_long_or_dies_is_ended(
 
 def test_uploads_are_kept_by_owner(database: Database) -> None:
     uploads = UploadRepository(database)
-    given = {"name": "M.npz", "format": "npz", "size": 3, "sha256": "0" * 64, "data": b"abc"}
-    mine, new = uploads.add(owner="me", **given)
-    same, again = uploads.add(owner="me", **given)
-    other, other_new = uploads.add(owner="you", **given)
+    given = {"name": "M.npz", "format": "npz", "sha256": "0" * 64}
+    mine, new = stored_upload(uploads, b"abc", owner="me", **given)
+    same, again = stored_upload(uploads, b"abc", owner="me", **given)
+    other, other_new = stored_upload(uploads, b"abc", owner="you", **given)
     assert (new, again, other_new) == (True, False, True)
-    named = ("owner", "name", "format", "size", "sha256")
-    assert [getattr(same, one) for one in named] == ["me", *list(given.values())[:4]]
+    named = ("owner", "size", *given)
+    assert [getattr(same, one) for one in named] == ["me", 3, *given.values()]
     assert same.id == mine.id != other.id
     assert same.created > mine.created
     mine = same
-    assert uploads.data(mine.id) == b"abc"
+    assert list(uploads.files.pieces(mine.id)) == [b"abc"]
+    with uploads.files.work() as folder:
+        uploads.files.place(mine, folder / "M.npz")
+        assert (folder / "M.npz").read_bytes() == b"abc"
     assert [row.id for row in uploads.page(10)] == [other.id, mine.id]
     for found in (uploads.page(10, owner="me"), uploads.page(10, before=other.id)):
         assert [(row.id, row.created) for row in found] == [(mine.id, mine.created)]
     uploads.delete(mine.id)
     assert uploads.get(mine.id) is None
-    with pytest.raises(NotFoundError):
-        uploads.data(mine.id)
+    with uploads.files.work() as folder, pytest.raises(NotFoundError):
+        uploads.files.place(mine, folder / "M.npz")
+    assert list(uploads.files.pieces(mine.id)) == []

@@ -12,9 +12,10 @@ from sqlalchemy.exc import DBAPIError
 
 from service.db.array_store import ArrayStore
 from service.db.engine import database_name, database_path, is_sqlite, read_engine
-from service.db.models import Job, JobResult, JobState, Project, Result, Run, SweepArray
+from service.db.models import Job, JobResult, JobState, Project, Result, Run, SweepArray, Upload
 from service.db.repositories.results import whole
 from service.db.revisions import head_revision, off_head
+from service.db.upload_files import UploadFiles
 from service.errors import DamagedDatabaseError, DatabaseError, WrongRevisionError
 from service.jobs.figures import SWEEP
 
@@ -107,6 +108,19 @@ def unneeded(connection: Connection, store: ArrayStore) -> list[str]:
     return [f"{store.place} has arrays of {gone} jobs that are not there"] if gone else []
 
 
+def damaged_uploads(engine: Engine, url: str) -> Iterator[str]:
+    """Yield what is wrong with uploads, one at a time, wherever they are."""
+    files = UploadFiles(url, engine.connect, engine.connect)
+    with engine.connect() as connection:
+        rows = connection.execute(select(Upload.id, Upload.sha256)).all()
+    for upload_id, sha256 in rows:
+        found = hashlib.sha256()
+        for piece in files.pieces(upload_id):
+            found.update(piece)
+        if found.hexdigest() != sha256:
+            yield f"upload {upload_id}: what it holds is gone or does not match its checksum"
+
+
 def damaged_results(engine: Engine) -> Iterator[str]:
     """Yield what is wrong with results, one at a time; those of earlier versions have no checksum."""
     query = select(JobResult.job_id, JobResult.sha256, cast(JobResult.body, Text)).where(
@@ -129,7 +143,7 @@ def contents(connection: Connection) -> Contents:
 
 
 _AT_ONCE = 500
-MOST_NAMED = 20  # damaged arrays and results that are named one by one
+MOST_NAMED = 20  # damaged arrays, results and uploads that are named one by one
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -192,12 +206,15 @@ def check(url: str, arrays: str | None = None) -> Findings:
             trouble = [*damage(connection), *contradictions(connection)]
             held = contents(connection)
             trouble += [] if store is None else unneeded(connection, store)
-        damaged = [*damaged_arrays(engine, store), *damaged_results(engine)]
+        damaged = [
+            *damaged_arrays(engine, store), *damaged_results(engine), *damaged_uploads(engine, url),
+        ]  # fmt: skip
     except DBAPIError as error:
         raise DamagedDatabaseError(f"{name} cannot be read: {error.orig}") from error
     finally:
         engine.dispose()
-    more = [f"{len(damaged) - MOST_NAMED} more arrays and results"] if len(damaged) > MOST_NAMED else []
+    unnamed = len(damaged) - MOST_NAMED
+    more = [f"{unnamed} more arrays, results and uploads"] if unnamed > 0 else []
     head = head_revision()
     return Findings(
         revision=head,

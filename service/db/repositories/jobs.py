@@ -108,7 +108,7 @@ class JobRepository:
         InvalidRequestError
             The owner has no such project.
         """
-        return self._db.grouped(lambda connection: self._submit(connection, new, queue_limit, waiting_limit))
+        return self._db.written(lambda connection: self._submit(connection, new, queue_limit, waiting_limit))
 
     def _submit(
         self, connection: Connection, new: NewJob, queue_limit: int, waiting_limit: int | None
@@ -211,7 +211,7 @@ class JobRepository:
 
     def claim_several(self, owner: str, lease_until: datetime, most: int) -> list[Attempt]:
         """Take the next waiting jobs for `owner`, in the order in which they are to run."""
-        taken = self._db.grouped(lambda connection: self._claim(connection, owner, lease_until, most))
+        taken = self._db.written(lambda connection: self._claim(connection, owner, lease_until, most))
         return [with_what_was_kept(self._db, attempt) if attempt.points else attempt for attempt in taken]
 
     def _claim(self, connection: Connection, owner: str, lease_until: datetime, most: int) -> list[Attempt]:
@@ -274,7 +274,7 @@ class JobRepository:
             self._store(connection, attempt, placed, finished)
             return True
 
-        return self._db.grouped(write)
+        return self._db.written(write)
 
     def fail(self, attempt: Attempt, failure: JobFailure, output: JobOutput | None = None) -> bool:
         """Commit a failure for good, with what was computed all the same."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping
 from datetime import datetime, timedelta
 from functools import cached_property
+from pathlib import Path
 from typing import Any, Generic, Protocol, TypeVar
 
 from sqlalchemy import (
@@ -29,6 +30,7 @@ from service.db.clock import Clock, new_id, utc_now
 from service.db.engine import Database
 from service.db.models import ApiKey, Job, Project, StoredScene, Upload
 from service.db.tokens import Made, Tokens, digest_of
+from service.db.upload_files import UploadFiles
 from service.errors import ChangedMeanwhileError, ConflictError, NotFoundError, StorageFullError
 from service.jobs.strict_json import encoded
 
@@ -317,7 +319,7 @@ class SceneRepository(Rows[StoredScene]):
             )
             return self._insert(connection, row, body=text), True
 
-        return self._db.grouped(find_or_add)
+        return self._db.written(find_or_add)
 
     def page(self, owner: str | None, after: tuple[str, str] | None, limit: int) -> list[StoredScene]:
         """Scenes of an owner, or of everybody (None), by name, without their tables.
@@ -347,42 +349,48 @@ class UploadRepository(Rows[Upload]):
 
     table = Upload
 
-    def add(
-        self, *, owner: str, name: str, format: str, size: int, sha256: str, data: bytes, shared: bool = True
-    ) -> tuple[Upload, bool]:
-        """Store a file, or find the same one of the same owner and format; whether it was stored.
+    @cached_property
+    def files(self) -> UploadFiles:
+        """What they hold."""
+        return UploadFiles(self._db.url, self._db.reading, self._db.writing)
 
-        One that is there already counts as new from now on: who sent it is about to use it. What is not
-        `shared` has a row of its own: whoever sent it deletes it.
+    def add(self, file: Path, row: Upload, parts: Collection[str] | None = ()) -> tuple[Upload, bool]:
+        """Store a file of `files.work`, or find the same one of the same owner and format; if it was stored.
+
+        One that is there already counts as new from now on: who sent it is about to use it.
+
+        Parameters
+        ----------
+        row : what is said of it; id and time are given here.
+        parts : those it was put together of, which go as it comes; of a part None, which is never the same
+            as another: whoever sent it deletes it.
         """
-        same = (Upload.owner == owner, Upload.sha256 == sha256, Upload.format == format)
+        row.id, row.created = new_id(), self._now()
+        self.files.put(row.id, file)
+        same = (Upload.owner == row.owner, Upload.sha256 == row.sha256, Upload.format == row.format)
+        known_rows = self._select.where(*same).order_by(Upload.id).limit(1)
         with self._db.writing() as connection:
-            now = self._now()
-            known_rows = self._select.where(*same).order_by(Upload.id).limit(1)
-            for known in self._read(connection, known_rows) if shared else ():
-                known.created = now
-                connection.execute(update(Upload).where(Upload.id == known.id).values(created=now))
-                return known, False
-            row = Upload(
-                id=new_id(), owner=owner, name=name, format=format, size=size, sha256=sha256, created=now
-            )
-            return self._insert(connection, row, data=data), True
+            for known in self._read(connection, known_rows) if parts is not None else ():
+                known.created = row.created
+                connection.execute(update(Upload).where(Upload.id == known.id).values(created=row.created))
+                break
+            else:
+                known = self._insert(connection, row)
+            connection.execute(delete(Upload).where(Upload.id.in_(parts or ())))
+        self.files.remove([*(parts or ()), *([row.id] if known is not row else ())])
+        return known, known is row
 
     def page(self, limit: int, before: str | None = None, owner: str | None = None) -> list[Upload]:
         """Uploads, newest first, older than the upload `before`; only those of `owner` if given."""
         return self._newest(limit, before, owner)
 
-    def data(self, upload_id: str) -> bytes:
-        """The bytes of an upload (NotFoundError if it was deleted)."""
-        with self._db.reading() as connection:
-            data = connection.execute(select(Upload.data).where(Upload.id == upload_id)).scalar_one_or_none()
-        if data is None:
-            raise NotFoundError(f"there is no upload {upload_id!r}")
-        return data
-
-    def delete(self, upload_id: str) -> None:
-        """Forget an upload."""
-        self._updated(delete(Upload).where(Upload.id == upload_id))
+    def delete(self, upload_id: str, before: datetime | None = None) -> int:
+        """Forget an upload, unless it was sent again since a time; how many were, 0 or 1."""
+        old = () if before is None else (Upload.created < before,)
+        found = self._updated(delete(Upload).where(Upload.id == upload_id, *old))
+        if found:
+            self.files.remove([upload_id])
+        return int(found)
 
 
 _OWNER: BindParameter[str] = bindparam("owner")

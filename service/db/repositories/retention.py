@@ -157,12 +157,6 @@ class RetentionRepository:
             named = {one for text in requests for one in _NAMED.findall(text)}
         return [one for one in found if one not in named]
 
-    def delete_upload(self, upload: str, before: datetime) -> int:
-        """Delete an upload unless it was sent again since a time; how many were, 0 or 1."""
-        statement = delete(Upload).where(Upload.id == upload, Upload.created < before)
-        with self._db.writing() as connection:
-            return connection.execute(statement).rowcount
-
 
 def _outside(connection: Connection, sweeps: Sequence[str]) -> Sequence[str]:
     """The jobs of those sweeps that have arrays outside of the database."""

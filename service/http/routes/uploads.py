@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import tempfile
 from functools import partial
-from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
 from fastapi import APIRouter, Body, Query, Response
@@ -92,15 +90,18 @@ async def upload(
 
     It is read at once, within limits, and refused if it holds nothing usable. In a scene, `upload:ID` stands
     where `M`, `K`, `C` or `modes` of a structure of kind `matrices` would name a file. A larger file comes in
-    parts, each an upload with `?format=part` that is not read; then a request without a body names them, and
-    they are deleted.
+    parts, each an upload with `?format=part` that is not read; then a request without a body names them. They
+    go as the file is stored: if it is refused they stay.
     """
     request, service, caller = context.request, context.service, context.caller
     media = request.headers.get("content-type", "").split(";")[0].strip().lower()
     known = format_of(form, name, media)
     settings = service.settings
-    with tempfile.TemporaryDirectory(prefix="stickslip-") as folder:
-        path = Path(folder) / file_name(name, known)
+    if part and known == PART:
+        wanted = "is put together to a whole file, whose `format` is wanted"
+        raise InvalidRequestError.of(("part",), wanted, source="query")
+    with service.uploads.repository.files.work() as folder:
+        path = folder / file_name(name, known)
         with path.open("wb") as file:
             try:
                 size, sha256 = await saved(request, file, settings.max_upload_bytes, settings.upload_seconds)
