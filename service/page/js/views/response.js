@@ -67,7 +67,7 @@ function describe() {
   const { result, sweep } = last;
   const linearPeak = (name) => (limits?.[name]?.peak ? `${length(limits[name].peak.value)} at ${number(limits[name].peak.at, 5)} Hz` : "–");
   const rows = [
-    [result.peak && !result.peaks.length ? "highest, at an end" : "highest peak", result.peak ? `${length(result.peak.value)} at ${number(result.peak.at, 6)} Hz` : "–"],
+    [result.peak && !result.peaks.some((peak) => peak.at === result.peak.at) ? "highest, at an end" : "highest peak", result.peak ? `${length(result.peak.value)} at ${number(result.peak.at, 6)} Hz` : "–"],
     ["resonance band", result.band_hz === null ? "–" : `${number(result.band_hz)} Hz above ${length(result.band_limit)}`],
     ["error estimate", result.error_estimate === null ? "–" : length(result.error_estimate)],
     ...betweenPoints(result),
