@@ -15,7 +15,7 @@ from typing import Any
 
 from sqlalchemy.exc import SQLAlchemyError
 
-from service.auth.allowances import Buckets, Shared
+from service.auth.allowances import Buckets
 from service.auth.callers import KEYLESS, NO_LIMITS, Caller, KeyLimits, Scope, included
 from service.db.clock import Clock
 from service.db.models import ApiKey
@@ -122,10 +122,6 @@ class Authenticator:
         self._requests = Buckets(steady=steady)
         self._failures = Buckets(steady=steady)
         self._links = Buckets(steady=steady)
-
-    def shared(self) -> dict[str, Shared]:
-        """What counts at all services of a database together."""
-        return {"requests": self._requests, "failures": self._failures, "by link": self._links}
 
     def known(self, token: str | None) -> bool:
         """Whether `admit` can answer at once, without the database."""

@@ -121,7 +121,6 @@ def _guard(app: FastAPI, service: Service) -> None:
     )
     service.lanes.guard(app.state.connections.require_taken)
     concurrency = ConcurrencyLimits(settings)
-    service.share(app.state.authenticator.shared() | concurrency.shared())
     # The last one added is the outermost.
     app.add_middleware(HeadAsGet)
     app.add_middleware(Admission, authenticator=app.state.authenticator, concurrency=concurrency)

@@ -16,7 +16,7 @@ from starlette.concurrency import run_in_threadpool
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.auth import callers
-from service.auth.allowances import AtATime, Shared, share
+from service.auth.allowances import AtATime, share
 from service.auth.authenticator import REMEMBERED_SECONDS, Authenticator, id_of
 from service.auth.callers import LINK_READERS, Caller
 from service.errors import OriginRefusedError, ServiceError, UnauthorizedError
@@ -42,10 +42,6 @@ class ConcurrencyLimits:
         self._requests = AtATime("requests")
         self._uploads = AtATime("uploads")
         self._streams = AtATime("event streams", settings.streams or None)
-
-    def shared(self) -> dict[str, Shared]:
-        """What counts at all services of a database together."""
-        return {"at a time": self._requests, "uploads": self._uploads, "streams": self._streams}
 
     @contextmanager
     def passed(self, caller: Caller, scope: Scope) -> Iterator[None]:
