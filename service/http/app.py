@@ -115,7 +115,7 @@ def _guard(app: FastAPI, service: Service) -> None:
     app.state.looks = Looks(service)
     app.state.large = LargeAnswers()
     app.state.reports = Reports(service.lanes.reports)
-    app.state.authenticator = Authenticator(service.keys, settings, service.jobs.now)
+    app.state.authenticator = Authenticator(service.keys, service.shares, settings, service.jobs.now)
     app.state.connections = Connections(
         settings.connections, settings.header_seconds, settings.write_seconds, settings.unsent_bytes
     )
@@ -123,7 +123,9 @@ def _guard(app: FastAPI, service: Service) -> None:
     concurrency = ConcurrencyLimits(settings)
     # The last one added is the outermost.
     app.add_middleware(HeadAsGet)
-    app.add_middleware(Admission, authenticator=app.state.authenticator, concurrency=concurrency)
+    app.add_middleware(
+        Admission, authenticator=app.state.authenticator, concurrency=concurrency, reads=service.lanes.reads
+    )
     app.add_middleware(HostCheck, hosts=settings.hosts)
     app.add_middleware(RequestMetrics, metrics=app.state.metrics)
     app.add_middleware(RequestLog)

@@ -188,7 +188,8 @@ def test_wrong_keys_are_limited_and_working_ones_are_not(
     assert wrong not in caplog.text
 
 
-def test_what_answers_with_a_key_carry(guarded: ServedClient) -> None:
+def test_what_answers_with_a_key_carry(guarded: ServedClient, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(guarded.application.state.authenticator, "_failures", Buckets())
     answer = guarded.get("/v1/jobs", headers=bearer(token_of(guarded)))
     assert answer.headers["cache-control"] == "private, no-store"
     assert "Authorization" in answer.headers["vary"]
