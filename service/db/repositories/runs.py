@@ -204,6 +204,12 @@ class Runs(Binned[RunRow]):
         with self._db.reading() as connection:
             return next(iter(_rows(connection, _BY_ID, {"job": job_id})), None)
 
+    def several(self, job_ids: Sequence[str], owners: Sequence[str] | None) -> list[RunRow]:
+        """Those of the runs that there are and that one of these owners has, or anybody (None)."""
+        query = _WHOLE.where(Job.id.in_(job_ids))
+        with self._db.reading() as connection:
+            return _rows(connection, query if owners is None else query.where(Job.owner.in_(owners)))
+
     def page(self, wanted: RunFilter, limit: int, before: str | None = None) -> list[RunRow]:
         """Runs that meet every condition, newest first, older than the run `before`."""
         query = _LISTED.order_by(Job.id.desc()).limit(limit)
