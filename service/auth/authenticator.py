@@ -18,9 +18,9 @@ from sqlalchemy.exc import SQLAlchemyError
 from service.auth.allowances import Buckets
 from service.auth.callers import KEYLESS, NO_LIMITS, Caller, KeyLimits, Scope, included
 from service.db.clock import Clock
-from service.db.models import ApiKey
+from service.db.models import NOBODY, ApiKey
 from service.db.repositories.owned import KEYS, KeyRepository
-from service.db.repositories.runs import RunRow, Shares
+from service.db.repositories.runs import NO_LINK, RunRow, Shares
 from service.db.tokens import Made, digest_of, matches
 from service.errors import (
     ForbiddenError,
@@ -182,10 +182,22 @@ class Authenticator:
             Too many of those came from this address.
         """
         try:
-            return _paying(f"link {digest_of(token)}"), self._shares.run_of(token)
+            run = self._shares.run_of(token)
+            self._require_owner(run.owner)
+            return _paying(f"link {digest_of(token)}"), run
         except NotFoundError as error:
             refused = self._failed(error.detail, address)
             raise error if isinstance(refused, UnauthorizedError) else refused from error
+
+    def _require_owner(self, owner: str) -> None:
+        """Refuse a link (NotFoundError) of an owner whose keys have all ended; who had none needs none.
+
+        The keys of those who log in end every few hours: theirs must have been revoked.
+        """
+        if owner == NOBODY or self._settings.links_outlive_keys:
+            return
+        if not self._keys.usable(None if self._settings.oidc_issuer else self._now(), owner):
+            raise NotFoundError(NO_LINK)
 
     def count(self, caller: Caller) -> None:
         """Count a request: for its key, for its link, and without either for the address it came from.

@@ -36,6 +36,7 @@ _TICK_SECONDS = 0.2
 # Files of a service besides its connections: database, workers, pipes, uploads.
 _OTHER_FILES = 256
 _LEAST_CONNECTIONS = 16
+_HEADER_BYTES = 16 * 1024
 _FORCED = 1
 
 
@@ -134,6 +135,7 @@ def _config(app: FastAPI, settings: Settings) -> uvicorn.Config:
         lifespan="on",
         timeout_graceful_shutdown=max(1, round(settings.shutdown_seconds)),
         server_header=False,
+        h11_max_incomplete_event_size=_HEADER_BYTES,
         proxy_headers=bool(settings.trusted_proxies),
         forwarded_allow_ips=list(settings.trusted_proxies),
     )

@@ -363,6 +363,7 @@ def _sweeps(connection: Connection, jobs: Sequence[str]) -> dict[str, int]:
 
 
 MOST_SHARES = 20
+NO_LINK = "there is no such link, or it has ended"
 _TOKENS = Tokens("share", id_bytes=8)
 
 
@@ -434,5 +435,5 @@ class Shares(Rows[Share]):
         if matches(token, row) and row is not None and (row.expires is None or row.expires > self._now()):
             run = self._runs.get(row.job_id)
         if run is None or run.deleted is not None:
-            raise NotFoundError("there is no such link, or it has ended")
+            raise NotFoundError(NO_LINK)
         return run
