@@ -45,7 +45,7 @@ from service.db.models import (
     RunTag,
     Share,
 )
-from service.db.pagination import Condition, Position, met, owner_condition, plain_conditions
+from service.db.pagination import Condition, Position, met, owner_condition, plain_conditions, refused
 from service.db.repositories.owned import Binned, Rows
 from service.db.repositories.rows import NO_WORDS, JobRow, RunWords
 from service.db.tokens import Made, Tokens, digest_of, matches
@@ -411,7 +411,11 @@ class Shares(Rows[Share]):
         if sees is not None:
             query = query.where(Share.job_id.in_(select(Job.id).where(Job.owner == sees)))
         if after is not None and after[0] is not None:
-            place = (literal(datetime.fromtimestamp(after[0], UTC), Share.created.type), literal(after[1]))
+            try:
+                created = datetime.fromtimestamp(after[0], UTC)
+            except (OverflowError, ValueError, OSError) as error:
+                raise refused(str(after[0])) from error
+            place = (literal(created, Share.created.type), literal(after[1]))
             query = query.where(tuple_(Share.created, Share.id) < tuple_(*place))
         return [(row, (row.created.timestamp(), row.id)) for row in self._all(query)]
 
