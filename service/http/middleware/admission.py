@@ -25,7 +25,7 @@ from service.queue.lanes import Lane
 from service.schemas.problems import AWAY, answered
 from service.settings.settings import Settings
 
-_STREAM = re.compile(r"/v1/.+/events/?")
+STREAM = re.compile(r"/v1/.+/events/?")
 """Event streams of every kind."""
 _UPLOAD = "/v1/uploads"
 
@@ -59,7 +59,7 @@ class ConcurrencyLimits:
         if connection is not None:
             connection.owner = owner
             connection.all_of_them.require_taken(owner)
-        if _STREAM.fullmatch(scope["path"]):
+        if STREAM.fullmatch(scope["path"]):
             with self._streams.taken(owner, share(caller, self._settings, "streams")):
                 yield
             return
