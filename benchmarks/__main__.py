@@ -10,7 +10,7 @@ from solver.results.views import on_demand
 
 GROUPS = {
     "chains": ("chain-8", "chain-32", "one-slider"),
-    "service": ("load", "latency", "requests", "lists", "runs", "figures", "workers", "scale"),
+    "service": ("load", "latency", "requests", "doors", "lists", "runs", "figures", "workers", "scale"),
 }
 CASES = {
     "responses": "responses:responses",
@@ -49,6 +49,7 @@ CASES = {
     "lists": "service_load:lists",
     "runs": "stored_runs:stored_runs",
     "requests": "service_requests:requests",
+    "doors": "service_requests:doors",
     "pruning": "service_pruning:pruning",
     "workers": "service_workers:workers",
     "scale": "users:scale",

@@ -50,9 +50,9 @@ class LightClient:
     def __exit__(self, *_: type[BaseException] | BaseException | TracebackType | None) -> None:
         self._socket.close()
 
-    def get(self, path: str) -> Answer:
-        """Return the answer to a GET."""
-        self._socket.sendall(f"GET {path} HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n".encode())
+    def get(self, path: str, headers: str = "") -> Answer:
+        """Return the answer to a GET; `headers` are whole lines."""
+        self._socket.sendall(f"GET {path} HTTP/1.1\r\nHost: 127.0.0.1\r\n{headers}\r\n".encode())
         return self._answer()
 
     def post(self, path: str, body: Mapping[str, Any], headers: str = "") -> Answer:

@@ -2,18 +2,27 @@
 
 from __future__ import annotations
 
+import asyncio
+import itertools
+import multiprocessing as mp
 import os
 import socket
 import statistics
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from pathlib import Path
 
 from benchmarks.harness import expect, table
 from benchmarks.service_load import small_job
-from benchmarks.service_process import LightClient, serving
+from benchmarks.service_process import LightClient, ServiceProcess, serving
+from service.auth.authenticator import create
+from service.auth.callers import KeyLimits, Scope
+from service.db.clock import utc_now
+from service.db.engine import Database
+from service.db.repositories.owned import KeyRepository
 
 _BARE = """
 import sys, uvicorn
@@ -73,3 +82,114 @@ def requests() -> None:
         ("GET /v1/jobs/{id}", "a bare route", "ratio", "wanted"),
         [(f"{ms[0]:.2f} ms", f"{ms[1]:.2f} ms", f"{ratio:.2f}", "3")],
     )
+
+
+_CONSTANT = (
+    "/openapi.json", "/docs", "/docs/style.css", "/", "/page/0/js/page.js", "/v1/login", "/health/live",
+    "/v1/kinds", "/v1/laws", "/v1/templates", "/v1/scenes-schema",
+)  # fmt: skip
+_FLOODS, _STREAMS = 16, 95
+_SECONDS = float(os.environ.get("SECONDS", "5"))
+_GZIP = "Accept-Encoding: gzip\r\n"
+_NUMBERS = itertools.count()
+
+
+def doors() -> None:
+    """What a constant answer costs; another owner beside floods of each, and beside 95 streams of runs."""
+    with tempfile.TemporaryDirectory() as name:
+        log, database = Path(name) / "log", f"sqlite:///{name}/jobs.db"
+        with serving(database, workers=1, log=log, require_keys="true") as service:
+            ann, bob = (_key(database, owner) for owner in ("ann", "bob"))
+            with service.client() as client:
+                for path in _CONSTANT:
+                    client.get(path, ann)  # the first time, for which it is made
+                costs = [(path, *(_cost(service, client, path, ann + more) for more in ("", _GZIP)))
+                         for path in _CONSTANT]  # fmt: skip
+            rows = [_beside(service, bob, f"{_FLOODS} × {path}", (_FLOODS, path, "")) for path in _CONSTANT]
+            rows.append(_beside(service, bob, f"{_STREAMS} streams", (_STREAMS, "/v1/runs/events", ann)))
+        logged = log.stat().st_size
+    table(
+        "Processor time of the service for a constant answer, wanted 2 ms",
+        ("route", "plain", "compressed"),
+        costs,
+    )
+    table(
+        f"Another owner's GET /v1/jobs, and the jobs that were accepted, beside others in {_SECONDS:g} s",
+        ("beside", "p50", "p99", "control p50", "p99", "jobs", "control"), rows,
+    )  # fmt: skip
+    print(f"The log of all that has {logged / 1e6:.1f} MB.")
+
+
+def _key(database: str, owner: str) -> str:
+    opened, limits = Database(database), KeyLimits(requests_per_minute=1_000_000)
+    try:
+        made = create(KeyRepository(opened), owner, [Scope.SUBMIT], utc_now(), None, limits)
+        return f"Authorization: Bearer {made.token}\r\n"
+    finally:
+        opened.close()
+
+
+def _cost(service: ServiceProcess, client: LightClient, path: str, headers: str, requests: int = 300) -> str:
+    before = service.cpu()
+    for _ in range(requests):
+        answer = client.get(path, headers)
+        expect(f"{path}: answered {answer.status}", answer.status == 200)
+    return f"{1e3 * service.cpu().since(before).service / requests:.2f} ms"
+
+
+def _beside(service: ServiceProcess, key: str, words: str, others: tuple[int, str, str]) -> tuple[str, ...]:
+    """Times of who looks and jobs of who hands in, beside others and alone in the same minute."""
+    attack = mp.get_context("spawn").Process(target=_ask, args=(service.port, *others), daemon=True)
+    alone = _at_work(service, key)
+    attack.start()
+    time.sleep(2.0)
+    beside = _at_work(service, key)
+    attack.terminate()
+    attack.join()
+    time.sleep(1.0)
+    ms = [f"{1e3 * one:.0f} ms" for one in (*beside[:2], *alone[:2])]
+    return (words, *ms, str(beside[2]), str(alone[2]))
+
+
+def _ask(port: int, connections: int, path: str, headers: str) -> None:
+    """The process of those who ask again and again, or read what has no end, and of what comes nothing."""
+    request = f"GET {path} HTTP/1.1\r\nHost: 127.0.0.1\r\n{headers}\r\n".encode()
+
+    async def one() -> None:
+        reader, writer = await asyncio.open_connection("127.0.0.1", port)
+        while True:
+            writer.write(request)
+            head = (await reader.readuntil(b"\r\n\r\n")).decode().lower()
+            if "content-length:" in head:
+                await reader.readexactly(int(head.partition("content-length:")[2].split()[0]))
+            while "event-stream" in head and await reader.read(1 << 16):
+                pass
+
+    async def all_of_them() -> None:
+        await asyncio.gather(*(one() for _ in range(connections)))
+
+    asyncio.run(all_of_them())
+
+
+def _at_work(service: ServiceProcess, key: str) -> tuple[float, float, int]:
+    """Median and 99 % of the times of a GET [s], and how many jobs were accepted beside it."""
+    end, accepted = time.monotonic() + _SECONDS, itertools.count()
+
+    def hand_in() -> None:
+        with service.client() as http:
+            while time.monotonic() < end:
+                answer = http.post("/v1/jobs", small_job(next(_NUMBERS)), key)
+                expect(f"answered {answer.status}", answer.status == 202)
+                next(accepted)
+
+    handing = threading.Thread(target=hand_in)
+    handing.start()
+    seconds = []
+    with service.client() as http:
+        while time.monotonic() < end:
+            begun = time.perf_counter()
+            expect("not answered 200", http.get("/v1/jobs?limit=10", key).status == 200)
+            seconds.append(time.perf_counter() - begun)
+    handing.join()
+    seconds.sort()
+    return seconds[len(seconds) // 2], seconds[int(0.99 * len(seconds))], next(accepted)

@@ -15,13 +15,20 @@ from typing import Any
 
 from sqlalchemy.exc import SQLAlchemyError
 
-from service.auth.allowances import Buckets, Shared
+from service.auth.allowances import Buckets
 from service.auth.callers import KEYLESS, NO_LIMITS, Caller, KeyLimits, Scope, included
 from service.db.clock import Clock
-from service.db.models import ApiKey
+from service.db.models import NOBODY, ApiKey
 from service.db.repositories.owned import KEYS, KeyRepository
+from service.db.repositories.runs import NO_LINK, RunRow, Shares
 from service.db.tokens import Made, digest_of, matches
-from service.errors import ForbiddenError, InvalidRequestError, TooManyRequestsError, UnauthorizedError
+from service.errors import (
+    ForbiddenError,
+    InvalidRequestError,
+    NotFoundError,
+    TooManyRequestsError,
+    UnauthorizedError,
+)
 from service.settings.settings import Settings
 from solver.errors import Issue, Shown
 
@@ -83,9 +90,6 @@ log = logging.getLogger("stickslip.service")
 
 REMEMBERED_SECONDS = 1.0
 """How long a revoked key may still work in a service process."""
-STRANGER = Caller(scopes=frozenset())
-"""Somebody without a key where one is needed."""
-
 _MOST_REMEMBERED = 4096
 _USED_EVERY = timedelta(minutes=1)
 _HALF_OF_IPV6 = 64
@@ -96,8 +100,8 @@ class Authenticator:
 
     Parameters
     ----------
-    keys : KeyRepository
-        The keys.
+    keys, shares : KeyRepository, Shares
+        The keys, and the links to runs.
     settings : Settings
         Whether keys are needed, and how often they may be used or guessed.
     now : callable
@@ -109,11 +113,12 @@ class Authenticator:
     def __init__(
         self,
         keys: KeyRepository,
+        shares: Shares,
         settings: Settings,
         now: Clock,
         steady: Callable[[], float] = time.monotonic,
     ) -> None:
-        self._keys = keys
+        self._keys, self._shares = keys, shares
         self._settings = settings
         self._now = now
         self._steady = steady
@@ -121,11 +126,6 @@ class Authenticator:
         self._lock = threading.Lock()
         self._requests = Buckets(steady=steady)
         self._failures = Buckets(steady=steady)
-        self._links = Buckets(steady=steady)
-
-    def shared(self) -> dict[str, Shared]:
-        """What counts at all services of a database together."""
-        return {"requests": self._requests, "failures": self._failures, "by link": self._links}
 
     def known(self, token: str | None) -> bool:
         """Whether `admit` can answer at once, without the database."""
@@ -143,11 +143,11 @@ class Authenticator:
             Too many keys that do not work came from this address.
         """
         if token is None:
-            return STRANGER if self._settings.keys_required else KEYLESS
+            return _paying(f"from {_neighbourhood(address)}") if self._settings.keys_required else KEYLESS
         key_id = id_of(token)
         row = None if key_id is None else self._look_up(key_id)
         if not matches(token, row) or row is None:
-            raise self._failed("the key is not known", address)
+            raise self._failed("the key is not known: send it as `Authorization: Bearer …`", address)
         if row.revoked is not None:
             raise self._failed("the key was revoked", address)
         if row.expires is not None and row.expires <= self._now():
@@ -166,41 +166,56 @@ class Authenticator:
         """
         if caller.may(scope):
             return
-        if caller is STRANGER:
+        if caller.key_id is None:
             raise UnauthorizedError("this needs a key: send it as `Authorization: Bearer …`")
         has = ", ".join(sorted(caller.scopes)) or "none"
         raise ForbiddenError(f"this needs a key with the scope {scope.value}, this one has {has}")
 
-    def count(self, caller: Caller) -> None:
-        """Count a request with a key.
+    def reader(self, token: str, address: str) -> tuple[Caller, RunRow]:
+        """Who reads by a link, and the run that it is to; each link pays for itself.
 
         Raises
         ------
+        NotFoundError
+            The link is none, or has ended.
         TooManyRequestsError
-            There were as many as the key may make.
+            Too many of those came from this address.
         """
-        if caller.key_id is None:
-            return
-        most = caller.limits.requests_per_minute or self._settings.requests_per_minute
-        wait = self._requests.take(caller.key_id, most)
-        if wait > 0.0:
-            raise TooManyRequestsError(f"the key may make {most} requests a minute", math.ceil(wait))
+        try:
+            run = self._shares.run_of(token)
+            self._require_owner(run.owner)
+            return _paying(f"link {digest_of(token)}"), run
+        except NotFoundError as error:
+            refused = self._failed(error.detail, address)
+            raise error if isinstance(refused, UnauthorizedError) else refused from error
 
-    def count_link(self, token: str, address: str) -> None:
-        """Count a request by a link to a run, of which neither an address nor a link has more than a key.
+    def _require_owner(self, owner: str) -> None:
+        """Refuse a link (NotFoundError) of an owner whose keys have all ended; who had none needs none.
+
+        The keys of those who log in end every few hours: theirs must have been revoked.
+        """
+        if owner == NOBODY or self._settings.links_outlive_keys:
+            return
+        if not self._keys.usable(None if self._settings.oidc_issuer else self._now(), owner):
+            raise NotFoundError(NO_LINK)
+
+    def count(self, caller: Caller) -> None:
+        """Count a request: for its key, for its link, and without either for the address it came from.
+
+        Where no keys are needed everybody is one owner, and nobody would pay for another.
 
         Raises
         ------
         TooManyRequestsError
             There were as many as may be made.
         """
-        most = self._settings.requests_per_minute
-        names = (f"from {_neighbourhood(address)}", f"by {digest_of(token)}")
-        waits = [self._links.take(name, most) for name in names]
-        if max(waits) > 0.0:
-            raise TooManyRequestsError(
-                f"by links {most} requests a minute may be made", math.ceil(max(waits))
-            )
+        if caller is KEYLESS:
+            return
+        most = caller.limits.requests_per_minute or self._settings.requests_per_minute
+        wait = self._requests.take(caller.key_id or caller.owner, most)
+        if wait > 0.0:
+            who = "the key" if caller.key_id else "an address without a key, or a link,"
+            raise TooManyRequestsError(f"{who} may make {most} requests a minute", math.ceil(wait))
 
     def count_login(self, address: str) -> None:
         """Count a log-in, of which an address has as many a minute as keys that do not work.
@@ -211,7 +226,7 @@ class Authenticator:
             There were as many as may be made.
         """
         most = self._settings.failed_keys_per_minute
-        wait = self._links.take(f"log-in from {_neighbourhood(address)}", most)
+        wait = self._failures.take(f"log-in from {_neighbourhood(address)}", most)
         if wait > 0.0:
             raise TooManyRequestsError(f"{most} log-ins a minute may be made", math.ceil(wait))
 
@@ -223,7 +238,9 @@ class Authenticator:
         wait = self._failures.take(_neighbourhood(address), self._settings.failed_keys_per_minute)
         if wait == 0.0:
             return UnauthorizedError(reason, presented=True)
-        return TooManyRequestsError("too many keys that do not work came from this address", math.ceil(wait))
+        return TooManyRequestsError(
+            "too many keys or links that do not work came from this address", math.ceil(wait)
+        )
 
     def _recall(self, key_id: str) -> tuple[ApiKey | None, float] | None:
         with self._lock:
@@ -257,6 +274,11 @@ class Authenticator:
             self._keys.touch(row.id, now)
         except SQLAlchemyError as error:
             log.warning("key %s: its use could not be noted: %s", row.id, type(error).__name__)
+
+
+def _paying(owner: str) -> Caller:
+    """Who may do nothing and is counted, by a name that no owner can have."""
+    return Caller(owner=owner, scopes=frozenset())
 
 
 def _neighbourhood(address: str) -> str:

@@ -174,6 +174,9 @@ def encode(value: float | None, row_id: str) -> str:
     return base64.urlsafe_b64encode(json.dumps([value, row_id]).encode()).decode().rstrip("=")
 
 
+_MOST = 2**62  # of whole numbers, which databases hold
+
+
 def decode(cursor: str) -> Position:
     """The position of a cursor.
 
@@ -185,10 +188,11 @@ def decode(cursor: str) -> Position:
     try:
         padded = cursor + "=" * (-len(cursor) % 4)
         value, row_id = json.loads(base64.urlsafe_b64decode(padded.encode("ascii")))
-    except (ValueError, TypeError, binascii.Error, RecursionError) as error:
+        number = value is None or (isinstance(value, int | float) and math.isfinite(value))
+    except (ValueError, TypeError, OverflowError, binascii.Error, RecursionError) as error:
         raise refused(cursor) from error
-    number = value is None or (isinstance(value, int | float) and math.isfinite(value))
-    if not number or isinstance(value, bool) or not isinstance(row_id, str):
+    large = isinstance(value, int) and abs(value) > _MOST
+    if not number or large or isinstance(value, bool) or not isinstance(row_id, str):
         raise refused(cursor)
     return value, row_id
 

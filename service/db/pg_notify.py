@@ -22,8 +22,8 @@ _SEND = "SELECT pg_notify(%s, notice) FROM unnest(%s::text[]) AS notice"
 _AGAIN_SECONDS = 2.0
 ACCEPTED, ENDED, CANCEL = "accepted", "ended", "cancel"
 """A job waits; one ended, or went back to the queue; the cancel of a running one was asked for."""
-WATCH, LIVE, USED = "watch", "live", "used"
-"""A job is watched here; one that runs here got this far; owners use so much here."""
+WATCH, LIVE = "watch", "live"
+"""A job is watched here; one that runs here got this far."""
 
 
 class Notices:

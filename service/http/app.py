@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections import defaultdict
 from collections.abc import AsyncIterator, MutableMapping
 from contextlib import asynccontextmanager
 from typing import Any
@@ -70,6 +71,7 @@ def create_app(settings: Settings | None = None, registry: Registry | None = Non
         version=SOLVER_VERSION,
         lifespan=lifespan,
         docs_url=None,
+        openapi_url=None,
         generate_unique_id_function=lambda route: route.name,
         redoc_url=None,
         telemetry={
@@ -83,7 +85,11 @@ def create_app(settings: Settings | None = None, registry: Registry | None = Non
     )
     _guard(app, service)
     events.install(app)
+    # What a path that is a route's own may be asked by: a parameter of another route might fit it too.
+    app.state.own = defaultdict(set)
     for router in (jobs.submissions(service.registry), *_ROUTERS):
+        for route in router.routes:
+            app.state.own[route.path] |= route.methods
         app.include_router(router)
     if service.settings.oidc_issuer is not None:
         _offer_login(app, service)
@@ -101,7 +107,7 @@ _ROUTERS = (
     stored.sweeps, scenes.texts,
     forms.templates, scenes.router, uploads.router, uploads.matrices, uploads.measurements, scenes.plans,
     scenes.previews, runs.projects, runs.reports, run_list.router, runs.runs, runs.shares, metrics.router,
-    page.reference, page.router,
+    page.docs, page.router,
 )  # fmt: skip
 
 
@@ -113,18 +119,20 @@ def _guard(app: FastAPI, service: Service) -> None:
     app.state.turns = BodyTurns()
     app.state.probe = Probe(service)
     app.state.looks = Looks(service)
+    app.state.news = run_list.RunNews(service)
     app.state.large = LargeAnswers()
     app.state.reports = Reports(service.lanes.reports)
-    app.state.authenticator = Authenticator(service.keys, settings, service.jobs.now)
+    app.state.authenticator = Authenticator(service.keys, service.shares, settings, service.jobs.now)
     app.state.connections = Connections(
         settings.connections, settings.header_seconds, settings.write_seconds, settings.unsent_bytes
     )
     service.lanes.guard(app.state.connections.require_taken)
     concurrency = ConcurrencyLimits(settings)
-    service.share(app.state.authenticator.shared() | concurrency.shared())
     # The last one added is the outermost.
     app.add_middleware(HeadAsGet)
-    app.add_middleware(Admission, authenticator=app.state.authenticator, concurrency=concurrency)
+    app.add_middleware(
+        Admission, authenticator=app.state.authenticator, concurrency=concurrency, reads=service.lanes.reads
+    )
     app.add_middleware(HostCheck, hosts=settings.hosts)
     app.add_middleware(RequestMetrics, metrics=app.state.metrics)
     app.add_middleware(RequestLog)

@@ -33,6 +33,7 @@ from service.errors import (
     SlowBodyError,
     UnsupportedMediaError,
 )
+from service.http.constant import known_by
 from service.jobs import strict_json
 from service.jobs.strict_json import MOST_TOLD, issues_of
 from service.queue.core import Service
@@ -309,9 +310,8 @@ def tagged(
 ) -> Response:
     """A body with its strong ETag (RFC 9110); 304 without it if the client has the same."""
     tag = f'"{hashlib.sha256(body).hexdigest()}"'
-    known = {one.strip().removeprefix("W/") for one in request.headers.get("if-none-match", "").split(",")}
     kept = {**(headers or {}), "ETag": tag}
-    if tag in known or "*" in known:
+    if known_by(request, tag):
         return Response(status_code=304, headers=kept)
     return Response(body, media_type=media_type, headers=kept)
 

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import json
+import threading
 from typing import Any
 
-from fastapi import FastAPI
+from fastapi import APIRouter, FastAPI, Request, Response
 from pydantic import BaseModel
 
 from service import errors
+from service.http.constant import Constant
 from service.http.middleware.admission import OPEN
+from service.http.routes.forms import constants
+from service.http.routes.page import reference
 from service.http.routes.uploads import upload_media
 from service.jobs.registry import Registry
+from service.queue.core import Service
 from service.schemas.problems import MEDIA_TYPE, STATUS
 from solver.scene.scene import Scene, load_scene
 
@@ -52,16 +58,38 @@ _PROBLEM: dict[str, Any] = {
 
 
 def install(app: FastAPI, registry: Registry) -> None:
-    """Have ``/openapi.json`` describe the request bodies and the problem documents."""
-    gather = app.openapi
+    """Have ``/openapi.json`` describe the request bodies and the problem documents; it and ``/docs``."""
+    gather, making = app.openapi, threading.Lock()
 
     def openapi() -> dict[str, Any]:
-        if app.openapi_schema is None:
-            _complete(gather(), registry)
-        described: dict[str, Any] = app.openapi_schema or gather()
+        with making:
+            described = app.openapi_schema
+            if described is None:
+                _complete(described := gather(), registry)
         return described
 
     app.openapi = openapi  # type: ignore[method-assign]
+    app.state.description = Constant(lambda: json.dumps(openapi()).encode())
+    app.state.reference = reference(openapi)
+    app.include_router(router)
+
+
+router = APIRouter(include_in_schema=False)
+
+
+@router.get("/openapi.json")
+async def description(request: Request) -> Response:
+    """The description for programs."""
+    found: Constant = request.app.state.description
+    return await found.answer(request)
+
+
+def prepare(app: FastAPI) -> None:
+    """Make what the page and strangers ask for first, which is kept."""
+    service: Service = app.state.service
+    asked = (*constants(service.registry), app.state.description, app.state.reference)
+    for made in [one.prepared() for one in asked]:
+        made.result()
 
 
 def _complete(description: dict[str, Any], registry: Registry) -> None:

@@ -23,7 +23,7 @@ from service.db.models import JobState
 from service.errors import ConfigurationError
 from service.http.app import create_app
 from service.http.middleware.connections import Connections
-from service.http.routes.forms import prepare
+from service.http.openapi import prepare
 from service.jobs.registry import Registry
 from service.queue.core import Service
 from service.settings import logs
@@ -36,6 +36,7 @@ _TICK_SECONDS = 0.2
 # Files of a service besides its connections: database, workers, pipes, uploads.
 _OTHER_FILES = 256
 _LEAST_CONNECTIONS = 16
+_HEADER_BYTES = 16 * 1024
 _FORCED = 1
 
 
@@ -77,7 +78,7 @@ def serve(settings: Settings, registry: Registry | None = None) -> None:
             server.should_exit = True
             _end_by_force_after(settings.exit_seconds)
 
-        later = threading.Thread(target=_begin_the_rest, args=(service,), daemon=True)
+        later = threading.Thread(target=_begin_the_rest, args=(app,), daemon=True)
         with _signals(stop), scratch_folder():
             later.start()
             server.run(sockets=[listener])
@@ -134,21 +135,23 @@ def _config(app: FastAPI, settings: Settings) -> uvicorn.Config:
         lifespan="on",
         timeout_graceful_shutdown=max(1, round(settings.shutdown_seconds)),
         server_header=False,
+        h11_max_incomplete_event_size=_HEADER_BYTES,
         proxy_headers=bool(settings.trusted_proxies),
         forwarded_allow_ips=list(settings.trusted_proxies),
     )
 
 
-def _begin_the_rest(service: Service) -> None:
+def _begin_the_rest(app: FastAPI) -> None:
     """Start the processes of answers and previews when a worker is ready; make what the page asks for first.
 
     Nothing is to delay readiness; who asks for either before gets it at once.
     """
+    service: Service = app.state.service
     while not service.queue.status().ready:
         if service.stopping.wait(_TICK_SECONDS):
             return
     service.answers.begin()
-    prepare(service.registry)
+    prepare(app)
     service.previews.begin()
 
 

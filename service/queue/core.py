@@ -14,7 +14,7 @@ from importlib.metadata import version
 from queue import Empty, SimpleQueue
 from typing import Any
 
-from service.auth.allowances import Shared, Storage, highest_priority, share
+from service.auth.allowances import Storage, highest_priority, share
 from service.auth.callers import KEYLESS, Caller
 from service.db import pg_notify, revisions
 from service.db.clock import Clock
@@ -47,7 +47,6 @@ from service.queue.queue import JobQueue
 from service.queue.retention import Retention
 from service.queue.running import Event, Live, Waiters
 from service.queue.scene_store import SceneStore
-from service.queue.together import Together
 from service.settings import traces
 from service.settings.kinds import registry_of
 from service.settings.settings import Settings
@@ -129,7 +128,6 @@ class Service:
         )
         self.retention = Retention(self.database, settings, self.jobs.now)
         self._elsewhere: Elsewhere | None = None
-        self._together: Together | None = None
         self._notices = None if self.database.exclusive else self._make_notices()
         self.stopping = threading.Event()
         self._open = False
@@ -141,21 +139,13 @@ class Service:
                 pg_notify.ENDED: self.waiters.ended_elsewhere, pg_notify.CANCEL: self.queue.cancel_running,
                 pg_notify.WATCH: lambda text: elsewhere.watched(text),
                 pg_notify.LIVE: lambda text: elsewhere.told(text),
-                pg_notify.USED: lambda text: together.heard(text),
             },
         )  # fmt: skip
-        self._together = together = Together(partial(made.tell, pg_notify.USED))
-        self.share(self.lanes.shared() | self.answers.shared())
         ask, tell = partial(made.tell, pg_notify.WATCH), partial(made.tell, pg_notify.LIVE)
         elsewhere = Elsewhere(self.waiters, self.queue.live, ask, tell)
         self._elsewhere = elsewhere
         self.waiters.relay = partial(made.tell, pg_notify.ENDED)
         return made
-
-    def share(self, limits: Mapping[str, Shared]) -> None:
-        """Keep limits together with other services of the database, if it may have any; before `start`."""
-        if self._together is not None:
-            self._together.add(limits)
 
     def open(self) -> None:
         """Lock SQLite's file and check or make the tables; nothing happens if that was done before.
@@ -194,8 +184,6 @@ class Service:
         if self._notices is not None and self._elsewhere is not None:
             self._elsewhere.start()
             self._notices.start()
-        if self._together is not None:
-            self._together.start()
         log.info("database %s, %d workers", self.database.name, self.settings.workers)
 
     def stop(self) -> None:
@@ -205,8 +193,6 @@ class Service:
         self.answers.close()
         self.retention.stop()
         self.queue.stop()
-        if self._together is not None:
-            self._together.stop()
         if self._notices is not None and self._elsewhere is not None:
             self._elsewhere.stop()
             self._notices.stop()

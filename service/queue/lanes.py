@@ -15,7 +15,6 @@ from typing import ParamSpec, TypeVar
 
 from anyio import CapacityLimiter, to_thread
 
-from service.auth.allowances import AtATime, Shared
 from service.auth.callers import LINK_READERS
 from service.errors import OverloadedError, RetryLaterError, TooManyRequestsError
 from service.queue.meters import Meters
@@ -23,7 +22,7 @@ from service.queue.meters import Meters
 _P = ParamSpec("_P")
 _T = TypeVar("_T")
 _READING, _WRITING, _FILES, _DRAWING, _UPLOADS, _REPORTS = 16, 16, 4, 2, 4, 1
-_LINKS = 2  # requests by links at a time, at all services together, but one at each
+_LINKS = 2  # requests by links at a time
 _LONG = 3.0
 _RETRY_SECONDS = 2
 
@@ -59,7 +58,6 @@ class Lane:
         self._threads = threads
         self._share = max(1, threads // 4)
         self._running: Counter[str] = Counter()
-        self.links = AtATime("requests by links")
         self._limiter: CapacityLimiter | None = None
         self._waiting: OrderedDict[str, deque[asyncio.Future[None]]] = OrderedDict()
 
@@ -84,9 +82,7 @@ class Lane:
             self._leave(owner)
 
     def _most(self, owner: str) -> int:
-        if owner != LINK_READERS.owner:
-            return self._share
-        return min(self._share, max(1, _LINKS - self.links.elsewhere(owner)))
+        return min(self._share, _LINKS) if owner == LINK_READERS.owner else self._share
 
     async def _enter(self, owner: str) -> None:
         turn = asyncio.get_running_loop().create_future()
@@ -116,8 +112,6 @@ class Lane:
     def _leave(self, owner: str) -> None:
         self._free += 1
         self._running[owner] -= 1
-        if owner == LINK_READERS.owner:
-            self.links.drop(owner)
         if not self._running[owner]:
             del self._running[owner]
         self._give()
@@ -135,8 +129,6 @@ class Lane:
             if not turn.done():
                 self._free -= 1
                 self._running[owner] += 1
-                if owner == LINK_READERS.owner:
-                    self.links.add(owner, _LINKS)
                 turn.set_result(None)
 
     def _forget(self, owner: str, turn: asyncio.Future[None]) -> None:
@@ -168,7 +160,3 @@ class Lanes:
         """Have `require` refuse owners (by what it raises) before anything is done for them."""
         for lane in self._all.values():
             lane.require = require
-
-    def shared(self) -> dict[str, Shared]:
-        """What counts at all services of a database together."""
-        return {f"links, {name}": lane.links for name, lane in self._all.items()}

@@ -23,6 +23,7 @@ from solver.views.io import written
 from solver.views.to_dataset import attributes, point_variables
 
 _RANGE = re.compile(r"([!#$%&'*+.^_`|~0-9a-z-]+)/([!#$%&'*+.^_`|~0-9a-z-]+)")
+_LONGEST = 1000  # letters of a header; those of browsers have 150
 _QUALITY = re.compile(r"(?:0(?:\.[0-9]{0,3})?|1(?:\.0{0,3})?)")
 
 
@@ -48,7 +49,8 @@ def preferred(accept: str | None, offered: Sequence[str]) -> str | None:
     """
     if accept is None or not accept.strip():
         return offered[0] if offered else None
-    ranges = [found for part in accept.lower().split(",") if (found := _range(part)) is not None]
+    # One that is longer is no wish of anybody.
+    ranges = [found for part in accept[:_LONGEST].lower().split(",") if (found := _range(part)) is not None]
     rated = [(_quality(ranges, media), media) for media in offered]
     best = max(rated, key=lambda pair: pair[0], default=(0.0, ""))
     return best[1] if best[0] > 0.0 else None

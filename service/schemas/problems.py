@@ -206,8 +206,7 @@ async def _http_error(request: Request, error: Exception) -> JSONResponse:
 
 def _allowed(request: Request) -> list[str]:
     """The methods of every route at the path of a request; Starlette names those of the first one only."""
-    # A path that is a route's own, such as /v1/scenes/read, is not one that a parameter of another would fit.
-    own = {method.upper() for method in request.app.openapi()["paths"].get(request.url.path, ())}
+    own = request.app.state.own.get(request.url.path, ())
 
     def possible(method: str) -> bool:
         asked = "GET" if method == "HEAD" else method

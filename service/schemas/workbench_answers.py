@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from datetime import datetime
+from datetime import UTC, datetime
 from typing import Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import AwareDatetime, BaseModel, Field
+from pydantic import AfterValidator, AwareDatetime, BaseModel, Field
 
 from service.db.models import JobState, Project, Share
 from service.db.repositories.runs import RunFilter, RunRow
@@ -213,6 +213,16 @@ ProjectId = Annotated[str, Field(min_length=1, max_length=36)]
 OneTag = Annotated[str, Field(min_length=1, max_length=LONGEST_TAG)]
 
 
+def _in_the_calendar(when: datetime) -> datetime:
+    try:
+        return when.astimezone(UTC)
+    except OverflowError as error:
+        raise ValueError("must be from 0001-01-01 to 9999-12-31 in UTC") from error
+
+
+Time = Annotated[AwareDatetime | None, AfterValidator(lambda when: when and _in_the_calendar(when))]
+
+
 class RunQuery(ListQuery):
     """Which runs to list."""
 
@@ -229,8 +239,8 @@ class RunQuery(ListQuery):
         default=[], max_length=MOST_TAGS, description="Marked with it; repeated: with all of them."
     )
     text: Text = None
-    created_after: AwareDatetime | None = Field(default=None, description="Handed in then or later.")
-    created_before: AwareDatetime | None = Field(default=None, description="Handed in earlier.")
+    created_after: Time = Field(default=None, description="Handed in then or later.")
+    created_before: Time = Field(default=None, description="Handed in earlier.")
     deleted: Binned = False
     limit: Limit = 100
     cursor: Cursor = None

@@ -13,6 +13,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from datetime import UTC, datetime
+from urllib.parse import quote, unquote_to_bytes
 
 _TEXT = "%(asctime)s %(levelname)s %(name)s %(message)s"
 _FIELDS: ContextVar[Mapping[str, object]] = ContextVar("stickslip_log_fields", default={})  # noqa: B039
@@ -35,7 +36,45 @@ CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")
 
 
 # Of a key or a link (`service.db.tokens`): its id may be told, its secret may not, wherever it was written.
-_SECRET = re.compile(r"((?:stickslip|share)_[0-9a-f]+_)[0-9a-f]{8,}")
+_SECRET = re.compile(r"((?:stickslip|share)_[0-9a-f]+_)[0-9a-f]+|[0-9a-f]{48,}", re.IGNORECASE)
+# A percent sign that was encoded itself, however often; ASCII in more bytes than it needs.
+_AGAIN, _OVERLONG = re.compile("%(?:25)+"), re.compile(rb"(?:\xf0\x80|\xe0)?[\x80\x81\xc0\xc1]([\x80-\xbf])")
+_ENDS = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029]")
+_MOST_TIMES = 8
+_LONGEST_PATH = 512
+
+
+def _of_ascii(found: re.Match[bytes]) -> bytes:
+    return bytes([(found[0][-2] & 1) << 6 | found[0][-1] & 0x3F])
+
+
+def masked(text: str) -> str:
+    """A text without secrets; a line in which one is percent-encoded is decoded."""
+    return "\n".join(map(_masked_line, text.split("\n")))
+
+
+def _masked_line(text: str) -> str:
+    text = _SECRET.sub(_kept, text)
+    plain, before, times = text, "", 0
+    while "%" in plain and plain != before and times < _MOST_TIMES:
+        before, times = plain, times + 1
+        data = unquote_to_bytes(_AGAIN.sub("%", plain))
+        plain = _OVERLONG.sub(_of_ascii, data).decode("utf-8", "replace")
+    if times == _MOST_TIMES:
+        return "(encoded too often)"
+    return _ENDS.sub(_escaped, _SECRET.sub(_kept, plain)) if _SECRET.search(plain) else text
+
+
+def _kept(found: re.Match[str]) -> str:
+    return f"{found[1] or ''}***"
+
+
+def path_of(raw: bytes) -> str:
+    """The path of a request as a line may have it: its beginning, as it came, in printable letters."""
+    return masked(quote(raw[:_LONGEST_PATH], safe=_PRINTABLE)[:_LONGEST_PATH])[:_LONGEST_PATH]
+
+
+_PRINTABLE = "%!$&'()*+,/:;=@~?"
 
 
 def _escaped(found: re.Match[str]) -> str:
@@ -52,7 +91,7 @@ class TextFormatter(logging.Formatter):
         """The line of a record."""
         fields = _FIELDS.get()
         shown = "".join(f" [{name} {fields[name]}]" for name in _SHOWN if name in fields)
-        return _SECRET.sub(r"\1***", CONTROL.sub(_escaped, super().format(record) + shown))
+        return CONTROL.sub(_escaped, masked(super().format(record)) + shown)
 
 
 class JsonFormatter(logging.Formatter):
@@ -70,7 +109,8 @@ class JsonFormatter(logging.Formatter):
         }
         if record.exc_info:
             line["exception"] = self.formatException(record.exc_info)
-        return _SECRET.sub(r"\1***", json.dumps(line, default=str))
+        told = {name: masked(value) if isinstance(value, str) else value for name, value in line.items()}
+        return json.dumps(told, default=str)
 
 
 FORMATTERS: Mapping[str, type[logging.Formatter]] = {"text": TextFormatter, "json": JsonFormatter}

@@ -177,6 +177,10 @@ class Settings(ClientLimits):
     failed_keys_per_minute: int = Field(
         default=30, ge=1, le=1_000_000, description="Keys that do not work, a minute and client address."
     )
+    links_outlive_keys: bool = Field(
+        default=False,
+        description="Links to runs go on when every key of their owner was revoked or has expired.",
+    )
     trusted_proxies: tuple[str, ...] = Field(
         default=(),
         description="Addresses or networks of the proxies whose `X-Forwarded-For` and `X-Forwarded-Proto` "

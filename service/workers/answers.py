@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from service.auth.allowances import Buckets, Shared
+from service.auth.allowances import Buckets
 from service.errors import (
     BodyTooLargeError,
     InvalidRequestError,
@@ -66,10 +66,6 @@ class Answers(WarmPool):
         self._settings = settings
         self._budgets = Buckets()
         self._ended_one: set[str] = set()
-
-    def shared(self) -> dict[str, Shared]:
-        """What counts at all services of a database together."""
-        return {"budgets": self._budgets}
 
     async def ask(self, task: str, spec: dict[str, Any], owner: str = "", about: str = "scene") -> Any:
         """What a task finds.

@@ -21,6 +21,8 @@ from service_helpers import ServedClient, serving, until
 from service.auth.authenticator import create
 from service.auth.callers import Scope
 from service.db.clock import utc_now
+from service.http.app import create_app
+from service.http.middleware.admission import STREAM
 
 DEPLOY = Path(__file__).resolve().parents[2] / "deploy"
 HOST = "dampers.example"
@@ -62,6 +64,7 @@ def by_nginx(folder: Path, port: int, plain: int, service: int) -> Started:
     text = text.replace("listen 443 ssl", f"listen 127.0.0.1:{port} ssl").replace(":8000;", f":{service};")
     text = re.sub(r"(ssl_certificate) .*;", rf"\1 {pem};", text)
     text = re.sub(r"(ssl_certificate_key) .*;", rf"\1 {key};", text)
+    text = text.replace("/var/log/nginx/", f"{folder}/")
     temporary = "".join(f"{name}_temp_path {folder}/{name};" for name in ("client_body", "proxy"))
     others = "".join(f"{name}_temp_path {folder}/{name};" for name in ("fastcgi", "uwsgi", "scgi"))
     user = "user root;" if os.geteuid() == 0 else ""
@@ -81,10 +84,9 @@ def by_caddy(folder: Path, port: int, plain: int, service: int) -> Started:
     text = (DEPLOY / "Caddyfile").read_text(encoding="utf-8")
     text = text.replace(f"\n{HOST} {{", f"\nhttps://{HOST}:{port} {{\n\tbind 127.0.0.1\n\ttls {pem} {key}")
     text = text.replace("127.0.0.1:8000", f"127.0.0.1:{service}")
-    options = (
-        f"{{\n\tadmin off\n\thttp_port {plain}\n\thttps_port {port}\n\tauto_https disable_redirects\n}}\n"
-    )
-    (folder / "Caddyfile").write_text(options + text, encoding="utf-8")
+    options = f"{{\n\tadmin off\n\thttp_port {plain}\n\thttps_port {port}\n\tauto_https disable_redirects\n"
+    assert text.count("\n{\n") == 1, "one block of global options"
+    (folder / "Caddyfile").write_text(text.replace("\n{\n", f"\n{options}", 1), encoding="utf-8")
     home = {"XDG_DATA_HOME": str(folder), "XDG_CONFIG_HOME": str(folder), "HOME": str(folder)}
     command = [program, "run", "--config", str(folder / "Caddyfile"), "--adapter", "caddyfile"]
     return command, ssl.create_default_context(cafile=str(pem)), home
@@ -196,3 +198,25 @@ def test_every_metric_that_is_watched_is_there(behind: tuple[ServedClient, str],
     states = set(re.findall(r'stickslip_jobs\{state="(\w+)"\}', text))
     named = set(re.findall(r'stickslip_jobs\{state="(\w+)"', (DEPLOY / name).read_text(encoding="utf-8")))
     assert named <= states
+
+
+def test_every_stream_has_its_place_in_nginx() -> None:
+    text = (DEPLOY / "nginx.conf").read_text(encoding="utf-8")
+    [place] = re.findall(r"location ~ (\S+) {\s+proxy_pass \S+;\s+proxy_buffering off;", text)
+    paths = create_app().openapi()["paths"]
+    streams = [path for path, one in paths.items() if "text/event-stream" in str(one.get("get", ""))]
+    assert len(streams) == 2
+    for path in paths:
+        assert bool(re.search(place, path)) == (path in streams) == bool(STREAM.fullmatch(path))
+
+
+def test_nginx_logs_what_is_plain() -> None:
+    text = (DEPLOY / "nginx.conf").read_text(encoding="utf-8")
+    [pattern] = re.findall(r'"~(\^\(\?<stickslip_plain>.*)" ', text)
+    plain = re.compile(pattern.replace("?<stickslip_plain>", "?P<plain>"))
+    assert plain.match("/v1/jobs/01a2-b?limit=3")["plain"] == "/v1/jobs/01a2-b"
+    assert plain.match("/v1/shared?token=share_1_2")["plain"] == "/v1/shared"
+    for uri in ("/v1/jobs/share_1_2", "/v1/jobs/SHARE%5F1%5F2", "/v1/%73hared/a_b?x", "/" + 300 * "a"):
+        assert plain.match(uri) is None
+    assert "$request " not in text
+    assert text.count("access_log /var/log/nginx/stickslip.log stickslip;") == text.count("server {")

@@ -188,7 +188,8 @@ def test_wrong_keys_are_limited_and_working_ones_are_not(
     assert wrong not in caplog.text
 
 
-def test_what_answers_with_a_key_carry(guarded: ServedClient) -> None:
+def test_what_answers_with_a_key_carry(guarded: ServedClient, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(guarded.application.state.authenticator, "_failures", Buckets())
     answer = guarded.get("/v1/jobs", headers=bearer(token_of(guarded)))
     assert answer.headers["cache-control"] == "private, no-store"
     assert "Authorization" in answer.headers["vary"]
@@ -217,6 +218,39 @@ def test_a_web_page_elsewhere_may_not_change_anything(http: httpx.Client, header
     assert http.get("/v1/jobs", headers=headers).status_code == 200
     own = {"Origin": str(http.base_url).rstrip("/")}
     assert http.post("/v1/jobs", json={"kind": "none"}, headers=own).status_code == 422
+
+
+def test_a_link_ends_with_the_last_key_of_its_owner(
+    guarded: ServedClient, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(guarded.application.state.authenticator, "_failures", Buckets())
+    first, second = (token_of(guarded, owner="leaver") for _ in "ab")
+    job = guarded.post("/v1/jobs", json={"kind": "iteration", "fresh": True}, headers=bearer(first)).json()
+    link = guarded.post(f"/v1/runs/{job['id']}/shares", json={}, headers=bearer(first)).json()["link"]
+
+    def revoke(token: str) -> None:
+        guarded.service.keys.revoke(str(id_of(token)))
+
+    revoke(first)
+    assert guarded.get(link).status_code == 200
+    revoke(second)
+    is_problem(guarded.get(link), 404)
+    held = guarded.application.state.authenticator
+    with monkeypatch.context() as patched:
+        patched.setattr(held, "_settings", held._settings.model_copy(update={"links_outlive_keys": True}))
+        assert guarded.get(link).status_code == 200
+    short = create(
+        guarded.service.keys, "leaver", [Scope.READ], utc_now(), utc_now() + timedelta(minutes=1), KeyLimits()
+    )
+    assert guarded.get(link).status_code == 200, "it was given another one"
+    with monkeypatch.context() as patched:
+        patched.setattr(held, "_now", lambda: utc_now() + timedelta(minutes=2))
+        is_problem(guarded.get(link), 404)
+        login = {"oidc_issuer": "https://login.example.org"}  # who logs in has keys that end every day
+        patched.setattr(held, "_settings", held._settings.model_copy(update=login))
+        assert guarded.get(link).status_code == 200
+        revoke(short.token)
+        is_problem(guarded.get(link), 404)
 
 
 def test_a_bucket_fills_again_in_bounded_memory() -> None:

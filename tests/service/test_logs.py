@@ -4,9 +4,13 @@ import io
 import json
 import logging
 import threading
+from pathlib import Path
+from urllib.parse import unquote
 
 import httpx
 import pytest
+from private_kinds import PRIVATE
+from service_helpers import serving
 
 from service.client.embedded import EmbeddedService
 from service.db.tokens import Tokens
@@ -129,11 +133,77 @@ def test_lines_for_people_hold_no_control_characters() -> None:
     assert TextFormatter().format(record).endswith("a\\x1b[2J\\x00b\\x9b\tc")
 
 
+def encoded(text: str, times: int) -> str:
+    """Every character percent-encoded, and the percent signs of that again."""
+    text = "".join(f"%{ord(one):02x}" for one in text)
+    return text.replace("%", "%" + "25" * (times - 1)) if times else text
+
+
+def overlong(text: str, form: str) -> str:
+    return "".join(
+        form.format(0xC0 | ord(one) >> 6, 0x80 | ord(one) >> 6, 0x80 | ord(one) & 0x3F) for one in text
+    )
+
+
+WRITINGS = {
+    "plain": str,
+    "capitals": str.upper,
+    "once": lambda token: token.replace("_", "%5F"),
+    "twice": lambda token: token.replace("_", "%255f"),
+    "often": lambda token: token.replace("_", "%" + "25" * 30 + "5F"),
+    "every letter": lambda token: encoded(token[:40], 1),
+    "again and again": lambda token: token.replace("_", encoded(encoded("_", 1), 3)),
+    "digits encoded": lambda token: token.replace("_", "%%35%46"),
+    "overlong": lambda token: token[:-64] + overlong(token[-64:], "%{0:02x}%{2:02x}"),
+    "overlong prefix": lambda token: overlong(token[:10], "%e0%{1:02x}%{2:02x}") + token[10:],
+    "without its prefix": lambda token: token[-64:],
+}
+
+
 @pytest.mark.parametrize("formatter", [TextFormatter(), JsonFormatter()], ids=["people", "programs"])
-def test_secrets_are_in_no_line_wherever_they_were_written(formatter: logging.Formatter) -> None:
+@pytest.mark.parametrize("writing", WRITINGS)
+def test_secrets_are_in_no_line_however_they_were_written(formatter: logging.Formatter, writing: str) -> None:
     for prefix, bytes_of_id in (("stickslip", 6), ("share", 8)):
-        row_id, token = Tokens(prefix, bytes_of_id).new()
-        with logs.about(path=f"/v1/jobs/{token}/x", request="r"):
-            text = written(formatter, "no job '%s' and %s", f"{token}y", token.upper().lower(), error=True)
-        assert token.rpartition("_")[2] not in text
-        assert f"{prefix}_{row_id}_***" in text
+        _, token = Tokens(prefix, bytes_of_id).new()
+        shown = WRITINGS[writing](token)
+        path = logs.path_of(f"/v1/jobs/{shown}/x?token={shown}".encode())
+        with logs.about(path=path, request="r"):
+            text = written(formatter, "no job '%s' and %s", f"{shown}y", path, error=True)
+        secret = token.rpartition("_")[2]
+        for part in (text, path):
+            plain = unquote(unquote(part)).lower()
+            assert not any(secret[at : at + 12] in plain for at in range(53)), part
+            assert shown[-24:] not in part
+            assert "***" in part
+            assert "\n" not in path
+
+
+def test_what_is_decoded_ends_no_line() -> None:
+    for line in (f"/a%0Ab/share_{'1' * 16}_{'a' * 64}%0A2026 forged", f"%250d%250Ashare%5F1_{'a' * 64}"):
+        assert "\n" not in logs.masked(line)
+        assert "\r" not in logs.masked(line)
+
+
+def test_a_path_is_short_in_the_log() -> None:
+    for raw in (
+        b"/" + b"a" * 40_000,
+        b"/" + b"\xff" * 40_000,
+        b'/\n"' * 9_000,
+        b"/%" + b"25" * 30_000 + b"5F",
+    ):
+        path = logs.path_of(raw)
+        assert len(path) <= 512
+        assert path.isprintable()
+    assert logs.path_of(b"/v1/jobs/nothing%0Aelse") == "/v1/jobs/nothing%0Aelse"
+    assert logs.path_of(b"/" + b"%2%3" * 9000).startswith("/")
+
+
+@pytest.mark.usefixtures("listening")
+def test_many_refusals_of_one_address_are_few_lines(tmp_path: Path, lines: list[dict[str, object]]) -> None:
+    with serving(tmp_path, PRIVATE, require_keys=True, requests_per_minute=5) as client:
+        lines.clear()
+        statuses = [client.get(f"/{'x' * 3000}").status_code for _ in range(100)]
+        assert statuses.count(429) >= 94
+        assert sum(len(json.dumps(line)) for line in lines) < 100_000
+        client.request("G" * 3000, "/health/live")
+        assert max(len(json.dumps(line)) for line in lines) < 2000

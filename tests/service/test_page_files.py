@@ -6,8 +6,9 @@ from pathlib import Path
 
 import httpx
 import pytest
-from service_helpers import is_problem
+from service_helpers import ServedClient, is_problem
 
+from service.http import constant
 from service.http.routes import page
 from service.rendering.page_bundle import bundle
 from solver.results.notes import FLAGS
@@ -153,3 +154,27 @@ def test_markup_has_no_inline_scripts_or_styles() -> None:
     assert " style=" not in text
     assert not re.search(r"\son[a-z]+=", text)
     assert not re.search(r"<script(?![^>]*\ssrc=)", text)
+
+
+CONSTANT = ["/", "/docs", "/docs/style.css", "/openapi.json", "/v1/kinds", "/v1/laws", "/v1/templates",
+            "/v1/scenes-schema", "/page/0/js/page.js", "/page/0/css/page.css"]  # fmt: skip
+
+
+@pytest.mark.parametrize("path", CONSTANT)
+def test_what_is_constant_is_made_and_packed_once(
+    shipped: ServedClient, path: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plain = shipped.get(path, headers={"Accept-Encoding": "gzip;q=0, br"})
+    assert "content-encoding" not in plain.headers
+    monkeypatch.setattr(constant.Constant, "_whole", None)  # nothing is made anew
+    packed = shipped.get(path)
+    assert packed.content == plain.content
+    if len(plain.content) >= 1000:
+        assert packed.headers["content-encoding"] == "gzip"
+        assert packed.headers["etag"] != plain.headers["etag"]
+        assert "Accept-Encoding" in packed.headers["vary"]
+    for answer in (plain, packed):
+        coding = {"Accept-Encoding": answer.headers.get("content-encoding", "identity")}
+        known = f'"other", W/{answer.headers["etag"]}'
+        again = shipped.get(path, headers={"If-None-Match": known, **coding})
+        assert (again.status_code, again.content) == (304, b"")

@@ -4,14 +4,24 @@ from __future__ import annotations
 
 import json
 import threading
+import time
+from contextlib import ExitStack
+from pathlib import Path
 from typing import Any
 
 import httpx
 import numpy as np
 import pytest
+from private_kinds import PRIVATE
+from service_helpers import serving, until
 
 import optim
 import solver
+from service.auth.authenticator import create
+from service.auth.callers import Scope
+from service.db.clock import utc_now
+from service.http.routes import run_list
+from service.queue.core import Service
 
 
 def computed(shipped: httpx.Client, **body: Any) -> str:
@@ -80,3 +90,60 @@ def test_runs_are_told_as_they_begin_and_end(shipped: httpx.Client) -> None:
     assert not listener.is_alive()
     assert {one["id"] for one in seen} >= {job}
     assert next(one["status"] for one in reversed(seen) if one["id"] == job) == "successful"
+
+
+def test_runs_are_read_once_for_all_who_listen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each hears of their own runs alone, however many listen; streams leave requests alone."""
+    with serving(tmp_path, PRIVATE, require_keys=True, owner_requests=2, owner_streams=8) as client:
+        keys, now = client.service.keys, utc_now()
+        owners = {"ann": Scope.SUBMIT, "bob": Scope.SUBMIT, "chief": Scope.ADMIN}
+        bearers = {
+            owner: {"Authorization": f"Bearer {create(keys, owner, [scope], now).token}"}
+            for owner, scope in owners.items()
+        }
+        read: list[set[str | None]] = []
+
+        def events(service: Service, ids: set[str], heard: set[str | None]) -> Any:
+            read.append(heard)
+            return told(service, ids, heard)
+
+        told, begun = run_list._events, time.monotonic()
+        monkeypatch.setattr(run_list, "_events", events)
+        with ExitStack() as stack:
+            streams = {
+                (owner, n): stack.enter_context(
+                    client.stream("GET", "/v1/runs/events", headers=bearers[owner])
+                )
+                for owner in owners
+                for n in range(4)
+            }
+            jobs = {}
+            for owner in ("ann", "bob"):
+                body = {"kind": "iteration", "fresh": True}
+                answer = client.post("/v1/jobs", json=body, headers={**bearers[owner], "Prefer": "wait=60"})
+                assert answer.status_code == 200, "open streams are no requests of the owner"
+                jobs[owner] = answer.json()["id"]
+            sees = {"ann": {jobs["ann"]}, "bob": {jobs["bob"]}, "chief": set(jobs.values())}
+            for (owner, _), stream in streams.items():
+                assert ended(stream, len(sees[owner])) == sees[owner]
+            until(lambda: not client.application.state.news._heard)  # all of them are closed
+            more = [
+                stack.enter_context(client.stream("GET", path, headers=bearers["ann"])).status_code
+                for path in 8 * ["/v1/runs/events"] + [f"/v1/jobs/{jobs['ann']}/events"]
+            ]
+            assert more == 8 * [200] + [429], "streams of every kind are one"
+        assert {"ann", "bob", None} in read
+        most = 2 + (time.monotonic() - begun) / run_list._LEAST_SECONDS
+        assert len(read) <= most, "one reads for all"
+
+
+def ended(stream: httpx.Response, most: int) -> set[str]:
+    """The runs whose end a stream tells of, as soon as they are so many."""
+    found: set[str] = set()
+    for line in stream.iter_lines():
+        if line.startswith("data:"):
+            run = json.loads(line.removeprefix("data:"))
+            found |= {run["id"]} if run["status"] == "successful" else set()
+        if len(found) >= most:
+            break
+    return found

@@ -18,6 +18,7 @@ from service_helpers import ServedClient, is_problem, serving
 from sqlalchemy import insert
 
 from service.auth import authenticator
+from service.auth.allowances import Buckets
 from service.auth.callers import Scope
 from service.db.clock import new_id, utc_now
 from service.db.models import Job, JobResult, JobState
@@ -267,6 +268,32 @@ def routes_of(routes: Any) -> Iterator[str]:
 def test_the_table_knows_every_route(house: House) -> None:
     app: FastAPI = house.client.application
     assert sorted(set(routes_of(app.routes))) == sorted(TABLE)
+
+
+@pytest.mark.parametrize("role", ["none", "wrong", "submit", "admin", "link"])
+def test_every_route_is_counted(house: House, role: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What an owner or an address may do is used up: whatever the route, nothing is done for it any more."""
+    app: FastAPI = house.client.application
+    held = app.state.authenticator
+    few = held._settings.model_copy(
+        update=dict.fromkeys(("requests_per_minute", "failed_keys_per_minute"), 1)
+    )
+    monkeypatch.setattr(held, "_settings", few)
+    for buckets in ("_requests", "_failures"):
+        monkeypatch.setattr(held, buckets, Buckets(steady=lambda: 0.0))
+    token = house.ids["token"] if role == "link" else "share_no"
+    answered = {}
+    for route in sorted(set(routes_of(app.routes)) | {"GET /nowhere", "GET /v1/shared/nowhere"}):
+        method, path = route.split()
+        linked = path.startswith("/v1/shared")
+        if linked or role != "link":
+            params = {"token": token} if linked else {}
+            address = path.replace(":path", "").format(**house.ids)
+            answer = house.ask("none" if role == "link" else role, method, address, params=params)
+            answered[route] = answer.status_code
+    let_in = {route: status for route, status in answered.items() if status != 429}
+    # The first one, and the first wrong link where links are not what is used up.
+    assert len(let_in) == (1 if role in ("wrong", "link") else 2), let_in
 
 
 @pytest.mark.parametrize("route", TABLE)

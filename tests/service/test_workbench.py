@@ -274,15 +274,18 @@ def test_a_link_shows_its_run_and_nothing_else(http: ServedClient, monkeypatch: 
     assert ask(token=short["token"]).status_code == 200
     assert http.delete(f"{path}/{link['id']}").status_code == 204
     is_problem(ask(), 404)
-    few = http.service.settings.model_copy(update={"requests_per_minute": 5})
-    monkeypatch.setattr(http.application.state.authenticator, "_settings", few)
-    monkeypatch.setattr(
-        http.application.state.authenticator, "_links", Buckets()
-    )  # the tests after it have theirs
-    answers = [ask() for _ in range(6)]
-    assert "Retry-After" in answers[-1].headers
-    is_problem(answers[-1], 429)
+    few = http.service.settings.model_copy(update={"requests_per_minute": 5, "failed_keys_per_minute": 3})
+    authenticator = http.application.state.authenticator
+    monkeypatch.setattr(authenticator, "_settings", few)
+    for buckets in ("_requests", "_failures"):  # the tests after it have theirs
+        monkeypatch.setattr(authenticator, buckets, Buckets())
+    wrong = [ask() for _ in range(4)]
+    assert [one.status_code for one in wrong] == [404, 404, 404, 429]
+    assert "Retry-After" in wrong[-1].headers
     assert http.get("/v1/runs").status_code == 200, "who has no link is not shut out"
+    right = http.post(path, json={}).json()["token"]
+    assert [ask(token=right).status_code for _ in range(6)] == 5 * [200] + [429], "nor is a right one"
+    assert ask(token=http.post(path, json={}).json()["token"]).status_code == 200, "each pays for itself"
 
 
 def test_the_client_has_a_method_for_each(http: ServedClient) -> None:

@@ -432,11 +432,14 @@ class KeyRepository(Rows[ApiKey]):
         """Every key, also those that do not work any more, by owner and age."""
         return self._all(self._select.order_by(ApiKey.owner, ApiKey.created, ApiKey.id))
 
-    def usable(self, now: datetime) -> bool:
-        """Whether any key works."""
-        alive = or_(ApiKey.expires.is_(None), ApiKey.expires > now)
+    def usable(self, now: datetime | None, owner: str | None = None) -> bool:
+        """Whether any key works, or one of an owner; without a time whether one was not revoked."""
+        query = select(ApiKey.id).where(ApiKey.revoked.is_(None)).limit(1)
+        if now is not None:
+            query = query.where(or_(ApiKey.expires.is_(None), ApiKey.expires > now))
+        if owner is not None:
+            query = query.where(ApiKey.owner == owner)
         with self._db.reading() as connection:
-            query = select(ApiKey.id).where(ApiKey.revoked.is_(None), alive).limit(1)
             return connection.execute(query).one_or_none() is not None
 
     def rotate(self, key_id: str) -> Made[ApiKey]:

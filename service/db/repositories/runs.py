@@ -45,7 +45,7 @@ from service.db.models import (
     RunTag,
     Share,
 )
-from service.db.pagination import Condition, Position, met, owner_condition, plain_conditions
+from service.db.pagination import Condition, Position, met, owner_condition, plain_conditions, refused
 from service.db.repositories.owned import Binned, Rows
 from service.db.repositories.rows import NO_WORDS, JobRow, RunWords
 from service.db.tokens import Made, Tokens, digest_of, matches
@@ -204,6 +204,12 @@ class Runs(Binned[RunRow]):
         with self._db.reading() as connection:
             return next(iter(_rows(connection, _BY_ID, {"job": job_id})), None)
 
+    def several(self, job_ids: Sequence[str], owners: Sequence[str] | None) -> list[RunRow]:
+        """Those of the runs that there are and that one of these owners has, or anybody (None)."""
+        query = _WHOLE.where(Job.id.in_(job_ids))
+        with self._db.reading() as connection:
+            return _rows(connection, query if owners is None else query.where(Job.owner.in_(owners)))
+
     def page(self, wanted: RunFilter, limit: int, before: str | None = None) -> list[RunRow]:
         """Runs that meet every condition, newest first, older than the run `before`."""
         query = _LISTED.order_by(Job.id.desc()).limit(limit)
@@ -357,6 +363,7 @@ def _sweeps(connection: Connection, jobs: Sequence[str]) -> dict[str, int]:
 
 
 MOST_SHARES = 20
+NO_LINK = "there is no such link, or it has ended"
 _TOKENS = Tokens("share", id_bytes=8)
 
 
@@ -404,7 +411,11 @@ class Shares(Rows[Share]):
         if sees is not None:
             query = query.where(Share.job_id.in_(select(Job.id).where(Job.owner == sees)))
         if after is not None and after[0] is not None:
-            place = (literal(datetime.fromtimestamp(after[0], UTC), Share.created.type), literal(after[1]))
+            try:
+                created = datetime.fromtimestamp(after[0], UTC)
+            except (OverflowError, ValueError, OSError) as error:
+                raise refused(str(after[0])) from error
+            place = (literal(created, Share.created.type), literal(after[1]))
             query = query.where(tuple_(Share.created, Share.id) < tuple_(*place))
         return [(row, (row.created.timestamp(), row.id)) for row in self._all(query)]
 
@@ -428,5 +439,5 @@ class Shares(Rows[Share]):
         if matches(token, row) and row is not None and (row.expires is None or row.expires > self._now()):
             run = self._runs.get(row.job_id)
         if run is None or run.deleted is not None:
-            raise NotFoundError("there is no such link, or it has ended")
+            raise NotFoundError(NO_LINK)
         return run

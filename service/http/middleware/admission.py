@@ -16,15 +16,17 @@ from starlette.concurrency import run_in_threadpool
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.auth import callers
-from service.auth.allowances import AtATime, Shared, share
+from service.auth.allowances import AtATime, share
 from service.auth.authenticator import REMEMBERED_SECONDS, Authenticator, id_of
 from service.auth.callers import LINK_READERS, Caller
-from service.errors import OriginRefusedError, ServiceError, UnauthorizedError
+from service.errors import OriginRefusedError, ServiceError
 from service.http.middleware.connections import KEY, Connection
+from service.queue.lanes import Lane
 from service.schemas.problems import AWAY, answered
 from service.settings.settings import Settings
 
-_STREAM = re.compile(r"/v1/jobs/[^/]+/events/?")
+STREAM = re.compile(r"/v1/.+/events/?")
+"""Event streams of every kind."""
 _UPLOAD = "/v1/uploads"
 
 
@@ -43,10 +45,6 @@ class ConcurrencyLimits:
         self._uploads = AtATime("uploads")
         self._streams = AtATime("event streams", settings.streams or None)
 
-    def shared(self) -> dict[str, Shared]:
-        """What counts at all services of a database together."""
-        return {"at a time": self._requests, "uploads": self._uploads, "streams": self._streams}
-
     @contextmanager
     def passed(self, caller: Caller, scope: Scope) -> Iterator[None]:
         """Count a request inside the block; a stream counts as a stream alone, it is cheap and lasts.
@@ -61,7 +59,7 @@ class ConcurrencyLimits:
         if connection is not None:
             connection.owner = owner
             connection.all_of_them.require_taken(owner)
-        if _STREAM.fullmatch(scope["path"]):
+        if STREAM.fullmatch(scope["path"]):
             with self._streams.taken(owner, share(caller, self._settings, "streams")):
                 yield
             return
@@ -80,6 +78,8 @@ LOGIN = "/v1/login"
 _PAGE = "/page/"
 _SHARED = "/v1/shared"
 """What a link to a run shows, by the token in the query."""
+LINKED = "linked"
+"""Where a request's state has the run of its link."""
 OWNER = "owner"
 """Where a request's state has whose it is, once that is known."""
 NO_KEY = "(no key)"
@@ -112,8 +112,10 @@ def by_link(path: str) -> bool:
 class Admission:
     """Finds out who asks and refuses who may not."""
 
-    def __init__(self, app: ASGIApp, authenticator: Authenticator, concurrency: ConcurrencyLimits) -> None:
-        self._app = app
+    def __init__(
+        self, app: ASGIApp, authenticator: Authenticator, concurrency: ConcurrencyLimits, reads: Lane
+    ) -> None:
+        self._app, self._reads = app, reads
         self._authenticator = authenticator
         self._concurrency = concurrency
 
@@ -125,17 +127,23 @@ class Admission:
         request = Request(scope, receive)
         with ExitStack() as held:
             try:
-                _refuse_other_pages(request)
                 token = _token(request)
-                caller = await self._admit(request, token)
-                request.scope["state"][OWNER] = (LINK_READERS if by_link(scope["path"]) else caller).owner
+                payer = caller = await self._admit(request, token)
+                scope["state"][OWNER] = caller.owner if caller.scopes else NO_KEY
                 needed = scope_of(scope["method"], scope["path"])
+                link = (
+                    request.query_params.get("token") if needed is None and by_link(scope["path"]) else None
+                )
+                if link is not None:
+                    scope["state"][OWNER] = LINK_READERS.owner
+                    payer, scope["state"][LINKED] = await self._reads.run(
+                        LINK_READERS.owner, self._authenticator.reader, link, address_of(scope)
+                    )
+                held.enter_context(self._concurrency.passed(payer, scope))
+                self._authenticator.count(payer)
+                _refuse_other_pages(request)
                 if needed is not None:
                     self._authenticator.require(caller, needed)
-                    held.enter_context(self._concurrency.passed(caller, scope))
-                elif by_link(scope["path"]):
-                    held.enter_context(self._concurrency.passed(LINK_READERS, scope))
-                self._authenticator.count(caller)
             except (ServiceError, *AWAY) as error:
                 await answered(request, error)(scope, receive, send)
                 return
@@ -188,19 +196,11 @@ def address_of(scope: Scope) -> str:
 
 
 def _token(request: Request) -> str | None:
-    """The key of a request, from `Authorization: Bearer` or `X-API-Key`.
-
-    Raises
-    ------
-    UnauthorizedError
-        For another way to say who one is.
-    """
+    """What a request says to be its key, by `Authorization: Bearer` or `X-API-Key`."""
     given = request.headers.get("authorization")
     if given is None:
         return request.headers.get("x-api-key")
-    if given[: len(_BEARER)].lower() != _BEARER:
-        raise UnauthorizedError("`Authorization` must be `Bearer` and a key", presented=True)
-    return given[len(_BEARER) :].strip()
+    return given[len(_BEARER) :].strip() if given[: len(_BEARER)].lower() == _BEARER else given
 
 
 def _refuse_other_pages(request: Request) -> None:

@@ -13,6 +13,7 @@ from typing import Any
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from service.auth.allowances import Buckets
 from service.http.middleware.admission import address_of, by_link
 from service.settings import logs
 from service.settings.settings import Settings
@@ -79,11 +80,13 @@ class RequestLog:
             try:
                 await self._app(scope, receive, numbered)
             finally:
-                # As it came, percent-encoded: a decoded path could end the line. Without what was asked for.
-                path = scope.get("raw_path", b"").decode("ascii", "replace")
-                seconds = round(time.perf_counter() - begun, 6)
-                with logs.about(method=scope["method"], path=path, status=status, seconds=seconds):
-                    log.info("%s %s %d in %.1f ms", scope["method"], path, status, 1e3 * seconds)
+                # Percent-encoded: a decoded path could end the line. Without what was asked for. What is too
+                # much is told by the audit.
+                if status != _TOO_MANY and log.isEnabledFor(logging.INFO):
+                    method, path = scope["method"][:_LONGEST_METHOD], logs.path_of(scope.get("raw_path", b""))
+                    seconds = round(time.perf_counter() - begun, 6)
+                    with logs.about(method=method, path=path, status=status, seconds=seconds):
+                        log.info("%s %s %d in %.1f ms", method, path, status, 1e3 * seconds)
 
 
 _POLICY = "default-src 'none'; frame-ancestors 'none'"
@@ -98,7 +101,10 @@ _HEADERS = {
 _YEAR = 365 * 24 * 3600
 _KEPT, _NOT_KEPT = "private, no-cache", "private, no-store"
 _AUDITED = frozenset({400, 401, 403, 413, 421, 429})
-_NOT_FOUND = 404
+_NOT_FOUND, _TOO_MANY = 404, 429
+_LONGEST_METHOD = 20
+_TOLD_A_MINUTE = 60
+_told = Buckets()
 _LONGEST = 300
 
 
@@ -144,15 +150,17 @@ def _audit(scope: Scope, state: dict[str, Any], status: int) -> None:
     """Write a refusal as one line of JSON, which escapes every control character; never a key."""
     if status not in _AUDITED and not (status == _NOT_FOUND and state.get("withheld")):
         return
+    if status == _TOO_MANY and _told.take(address_of(scope), _TOLD_A_MINUTE) > 0.0:
+        return
     slug, detail = state.get("problem", ("refused", ""))
     line = {
         "time": datetime.now(UTC).isoformat(timespec="milliseconds"),
         "address": address_of(scope),
         "key": state.get("key_id"),
-        "method": scope["method"][:20],
-        "path": scope["path"][:_LONGEST],
+        "method": scope["method"][:_LONGEST_METHOD],
+        "path": logs.masked(scope["path"][:_LONGEST]),
         "status": status,
         "reason": "of-another" if status == _NOT_FOUND else slug,
-        "detail": detail[:_LONGEST],
+        "detail": logs.masked(detail[:_LONGEST]),
     }
     _audit_log.warning("%s", json.dumps(line))

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import threading
-from functools import cache, lru_cache
+from functools import lru_cache
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Body, Request, Response
 from pydantic import ConfigDict, Field
 
 from service.errors import InvalidRequestError
-from service.http.dependencies import InContext, TypedRoute, tagged
+from service.http.constant import Constant
+from service.http.dependencies import InContext, TypedRoute
 from service.jobs.kinds.bodies import body_model
 from service.jobs.registry import JobKind, Registry
 from service.jobs.strict_json import encoded
@@ -62,18 +62,20 @@ class TemplateScene(AnswerModel):
 
 
 @templates.get("/templates", response_model=TemplateList)
-def list_templates(request: Request) -> Response:
+async def list_templates(request: Request) -> Response:
     """The cases of which scenes can be made, each with its questions."""
-    return tagged(request, _templates())
+    return await _TEMPLATES.answer(request)
 
 
-@cache
 def _templates() -> bytes:
     items = [
         TemplateAnswer(name=name, title=each.TITLE, questions=template_schema(each))
         for name, each in TEMPLATES.items()
     ]
     return TemplateList(items=items).model_dump_json().encode()
+
+
+_TEMPLATES = Constant(_templates)
 
 
 @templates.post("/templates")
@@ -87,53 +89,46 @@ async def fill_template(body: FillBody) -> TemplateScene:
         raise InvalidRequestError([one.below("answers") for one in error.issues]) from error
 
 
-@cache
-def _schema() -> bytes:
-    return encoded(scene_schema()).encode()
+_SCHEMA = Constant(lambda: encoded(scene_schema()).encode())
 
 
 @templates.get("/scenes-schema", response_model=dict[str, Any])
-def schema(request: Request) -> Response:
+async def schema(request: Request) -> Response:
     """The JSON Schema of scenes, as `stickslip schema` prints it, with the laws of this service."""
-    return tagged(request, _schema())
+    return await _SCHEMA.answer(request)
 
 
 laws = APIRouter(prefix="/v1/laws", tags=["scenes"])
 
 
 @lru_cache(maxsize=1)
-def _laws(_known: tuple[str, ...]) -> bytes:
-    return law_list().model_dump_json().encode()
+def _laws(_known: tuple[str, ...]) -> Constant:
+    return Constant(lambda: law_list().model_dump_json().encode())
 
 
 @laws.get("", response_model=LawList)
 async def list_laws(request: Request) -> Response:
     """The contact laws of this service, each with its parameters: unit, words, what a slider covers."""
-    return tagged(request, _laws(tuple(known_laws())))
+    return await _laws(tuple(known_laws())).answer(request)
 
 
 kinds = APIRouter(prefix="/v1/kinds", tags=["jobs"])
 
 
 @lru_cache(maxsize=4)
-def _kinds(registry: Registry) -> bytes:
-    return KindList(items=[_answer(kind) for kind in registry]).model_dump_json().encode()
+def _kinds(registry: Registry) -> Constant:
+    return Constant(lambda: KindList(items=[_answer(kind) for kind in registry]).model_dump_json().encode())
 
 
 @kinds.get("", response_model=KindList)
 async def list_kinds(context: InContext) -> Response:
     """The kinds of job of this service, each with the schema of its body and of its result."""
-    return tagged(context.request, _kinds(context.service.registry))
+    return await _kinds(context.service.registry).answer(context.request)
 
 
-def prepare(registry: Registry) -> None:
-    """Make what the page asks for first: the schemas of all laws and kinds, which are kept."""
-    with _PREPARING:
-        _laws(tuple(known_laws()))
-        _kinds(registry)
-
-
-_PREPARING = threading.Lock()  # they are made once, though both a start and a first visitor want them
+def constants(registry: Registry) -> tuple[Constant, ...]:
+    """The answers of all these routes, those that the page asks for first at the beginning."""
+    return _laws(tuple(known_laws())), _kinds(registry), _TEMPLATES, _SCHEMA
 
 
 def _answer(kind: JobKind) -> KindAnswer:

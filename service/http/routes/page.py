@@ -5,8 +5,8 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections.abc import Iterator
-from functools import cache
+from collections.abc import Callable, Iterator
+from functools import cache, partial
 from html import escape
 from importlib import resources
 from importlib.resources.abc import Traversable
@@ -15,9 +15,10 @@ from typing import Any
 from fastapi import APIRouter, BackgroundTasks, Request, Response
 
 from service.errors import NotFoundError
-from service.http.dependencies import TEXT, InContext, media, tagged
+from service.http.constant import Constant
+from service.http.dependencies import TEXT, InContext, media
 from service.http.middleware.admission import LOGIN
-from service.http.routes.forms import prepare
+from service.http.routes.forms import constants
 from service.rendering.page_bundle import bundle
 
 router = APIRouter(include_in_schema=False)
@@ -70,8 +71,7 @@ def version() -> str:
     return found.hexdigest()[:16]
 
 
-@cache
-def index() -> bytes:
+def _index() -> bytes:
     """The page, with its style sheets and its modules as one file each."""
     html = files()["index.html"].decode()
     sheets = "".join(sheet[0] for sheet in _SHEET.finditer(html))
@@ -79,14 +79,17 @@ def index() -> bytes:
     return html.replace(_ENTRY, _SCRIPT).replace(_VERSION, version()).encode()
 
 
+INDEX = Constant(_index, _TYPES[".html"], {**_HEADERS, "Cache-Control": "no-cache"})
+
+
 @router.get("/")
 async def begun(context: InContext, tasks: BackgroundTasks) -> Response:
     """The page, whose live response is wanted in a moment."""
-    tasks.add_task(prepare, context.service.registry)
+    for constant in constants(context.service.registry):
+        constant.prepared()
     tasks.add_task(context.service.previews.begin)
     tasks.add_task(context.service.answers.begin)
-    headers = {**_HEADERS, "Cache-Control": "no-cache"}
-    return tagged(context.request, index(), _TYPES[".html"], headers)
+    return await INDEX.answer(context.request)
 
 
 @router.get(LOGIN)
@@ -98,15 +101,20 @@ async def ways_in(context: InContext) -> dict[str, str | None]:
 @router.get("/page/{hashed}/{path:path}")
 async def file(hashed: str, path: str, request: Request) -> Response:
     """A file of the page; one asked for by the address of another version is not kept."""
-    data = files().get(path)
-    if data is None or path == "index.html":
+    await INDEX.answer(request)  # the files are read with it
+    found = _constants().get(path)
+    if found is None:
         raise NotFoundError(f"there is nothing at {request.url.path}")
-    keep = _FOR_EVER if hashed == version() else "no-cache"
-    headers = {**_HEADERS, "Cache-Control": keep}
-    return tagged(request, data, _TYPES[path[path.rfind(".") :]], headers)
+    return await found.answer(request, {"Cache-Control": _FOR_EVER if hashed == version() else "no-cache"})
 
 
-reference = APIRouter(prefix="/docs", tags=["health"])
+@cache
+def _constants() -> dict[str, Constant]:
+    made = {path: partial(bytes, data) for path, data in files().items() if path != "index.html"}
+    return {path: Constant(make, _TYPES[path[path.rfind(".") :]], _HEADERS) for path, make in made.items()}
+
+
+docs = APIRouter(prefix="/docs", tags=["health"])
 
 _POLICY = "default-src 'none'; style-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 _REFERENCE_STYLE = """
@@ -122,17 +130,26 @@ summary { cursor: pointer }
 """
 
 
-@reference.get("", response_class=Response, responses={200: media({"text/html": TEXT})})
-def page(request: Request) -> Response:
+def reference(description: Callable[[], dict[str, Any]]) -> Constant:
+    """The reference, made of the description of the API."""
+    headers = {"Content-Security-Policy": _POLICY}
+    return Constant(lambda: "".join(_page(description())).encode(), _TYPES[".html"], headers)
+
+
+@docs.get("", response_class=Response, responses={200: media({"text/html": TEXT})})
+async def page(request: Request) -> Response:
     """This reference."""
-    html = "".join(_page(request.app.openapi()))
-    return Response(html, media_type="text/html", headers={"Content-Security-Policy": _POLICY})
+    found: Constant = request.app.state.reference
+    return await found.answer(request)
 
 
-@reference.get("/style.css", response_class=Response, responses={200: media({"text/css": TEXT})})
-def style() -> Response:
+_STYLE_OF_REFERENCE = Constant(_REFERENCE_STYLE.encode, _TYPES[".css"])
+
+
+@docs.get("/style.css", response_class=Response, responses={200: media({"text/css": TEXT})})
+async def style(request: Request) -> Response:
     """How the reference looks."""
-    return Response(_REFERENCE_STYLE, media_type="text/css")
+    return await _STYLE_OF_REFERENCE.answer(request)
 
 
 def _page(description: dict[str, Any]) -> Iterator[str]:

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import AsyncIterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated
 
-from fastapi import APIRouter, Depends, Query
-from fastapi.sse import EventSourceResponse, ServerSentEvent
+from fastapi import APIRouter, Query, Response
+from fastapi.sse import _SSE_EVENT_SCHEMA, EventSourceResponse, format_sse_event
 
-from service.auth.callers import Caller
 from service.db.models import NOBODY, JobState
-from service.db.repositories.runs import RunFilter, RunRow
-from service.http.dependencies import InContext, TypedRoute
+from service.db.repositories.runs import RunFilter
+from service.http.dependencies import InContext, Responses, TypedRoute
 from service.http.in_lane import reading
 from service.http.middleware.every_answer import HEADERS_ONLY
 from service.queue.core import Service
@@ -25,6 +24,7 @@ router = APIRouter(prefix="/v1/runs", tags=["runs"], route_class=TypedRoute)
 
 _RETRY_MILLISECONDS = 2000
 _LEAST_SECONDS = 0.3
+_STREAMS_A_SECOND = 200.0
 # Jobs that another service of the same database runs tell nothing here: those under way are looked at anew.
 _LOOK_AGAIN_SECONDS = 5.0
 _MOST_AT_ONCE = 100
@@ -44,6 +44,10 @@ class _Changed:
         """A listener of `Waiters`."""
         self._loop.call_soon_threadsafe(self._note, event.job_id)
 
+    def wake(self) -> None:
+        """Somebody new listens."""
+        self._woken.set()
+
     def _note(self, job_id: str) -> None:
         self._ids.add(job_id)
         self._woken.set()
@@ -59,80 +63,120 @@ class _Changed:
         return taken
 
 
-@dataclass(frozen=True, slots=True)
-class _Listened:
-    service: Service
-    caller: Caller
-    sees: str | None
-    headers_only: bool
+@dataclass(eq=False, slots=True)
+class _Listener:
+    """One stream: what it was told of runs that have not ended, and what it is to be told."""
+
+    told: dict[str, bytes] = field(default_factory=dict)
+    news: dict[str, bytes] = field(default_factory=dict)
+    woken: asyncio.Event = field(default_factory=asyncio.Event)
+    new: bool = True
+    over: bool = False
+
+    def tell(self, run: RunAnswer, event: bytes) -> None:
+        """Note an event for it, if it does not know it."""
+        if self.told.get(run.id) != event:
+            self.news[run.id] = self.told[run.id] = event
+            self.woken.set()
+        if run.status.finished:
+            self.told.pop(run.id, None)
 
 
-async def _listened(context: InContext) -> _Listened:
-    """Who listens, known before the answer begins."""
-    request = context.request
-    return _Listened(context.service, context.caller, context.sees, HEADERS_ONLY in request.scope)
+class RunNews:
+    """What happens to runs: read and written out once for all who listen, and told to whom may see it."""
+
+    def __init__(self, service: Service) -> None:
+        self._service = service
+        self._heard: dict[str | None, set[_Listener]] = {}
+        self._changed: _Changed | None = None
+
+    async def stream(self, sees: str | None) -> AsyncIterator[bytes]:
+        """Yield the events of the runs of an owner, or of everybody's (None), until the service stops."""
+        one = _Listener()
+        self._heard.setdefault(sees, set()).add(one)
+        if self._changed is None:
+            self._changed = _Changed()
+            self._task = asyncio.create_task(self._read(self._changed))
+        self._changed.wake()
+        try:
+            yield format_sse_event(comment="runs", retry=_RETRY_MILLISECONDS)
+            while not one.over:
+                try:
+                    await asyncio.wait_for(one.woken.wait(), self._service.settings.heartbeat_seconds)
+                except TimeoutError:
+                    yield format_sse_event(comment="still here")
+                    continue
+                one.woken.clear()
+                news, one.news = one.news, {}
+                if news:
+                    yield b"".join(news.values())
+        finally:
+            self._heard[sees].discard(one)
+            if not self._heard[sees]:
+                del self._heard[sees]
+
+    async def _read(self, changed: _Changed) -> None:
+        """Tell all who listen, as long as there are some; when it ends, they do."""
+        service, loop = self._service, asyncio.get_running_loop()
+        busy, looked = set[str](), -_LOOK_AGAIN_SECONDS
+        try:
+            with service.waiters.listening(EVERY, changed.listen):
+                while self._heard:
+                    ids = await changed.taken(_LOOK_AGAIN_SECONDS)
+                    if service.stopping.is_set():
+                        break
+                    now, asked = loop.time(), set(self._heard)
+                    if now - looked < _LOOK_AGAIN_SECONDS:
+                        asked = {sees for sees in asked if any(one.new for one in self._heard[sees])}
+                    else:
+                        looked, ids, busy = now, ids | busy, set()
+                    for one in (one for sees in asked for one in self._heard[sees]):
+                        one.new = False
+                    busy |= await service.lanes.reads.run(NOBODY, _under_way, service, asked)
+                    await self._tell(ids | busy if asked else ids)
+                    streams = sum(map(len, self._heard.values()))
+                    await asyncio.sleep(max(_LEAST_SECONDS, streams / _STREAMS_A_SECOND))
+        finally:
+            self._changed = None
+            for one in (one for several in self._heard.values() for one in several):
+                one.over = True
+                one.woken.set()
+
+    async def _tell(self, ids: set[str]) -> None:
+        told = await self._service.lanes.reads.run(NOBODY, _events, self._service, ids, set(self._heard))
+        for run, event in told:
+            for sees in (run.owner, None):
+                for one in self._heard.get(sees, ()):
+                    one.tell(run, event)
 
 
-async def run_events(service: Service, sees: str | None) -> AsyncIterator[ServerSentEvent]:
-    """Yield the runs to which something happens, until the service stops.
-
-    Parameters
-    ----------
-    service : that runs the jobs, or shares its database with the one that does.
-    sees : whose runs are told; None for everybody's.
-    """
-    changed, told = _Changed(), dict[str, str]()
-    busy: set[str] = set()
-    loop = asyncio.get_running_loop()
-    looked = said = -_LOOK_AGAIN_SECONDS
-    with service.waiters.listening(EVERY, changed.listen):
-        yield ServerSentEvent(comment="runs", retry=_RETRY_MILLISECONDS)
-        while not service.stopping.is_set():
-            ids = await changed.taken(_LOOK_AGAIN_SECONDS)
-            if service.stopping.is_set():
-                return
-            now = loop.time()
-            if now - looked >= _LOOK_AGAIN_SECONDS:
-                looked = now
-                under_way = await service.lanes.reads.run(NOBODY, _under_way, service, sees)
-                ids |= busy | under_way
-                busy = under_way
-            for answer in await service.lanes.reads.run(NOBODY, _answers, service, ids, sees):
-                data = answer.model_dump_json()
-                if told.get(answer.id) != data:
-                    told[answer.id] = data
-                    said = now
-                    yield ServerSentEvent(event=_RUN, data=answer)
-                if answer.status.finished:
-                    told.pop(answer.id, None)
-            if now - said >= service.settings.heartbeat_seconds:
-                said = now
-                yield ServerSentEvent(comment="still here")
-            await asyncio.sleep(_LEAST_SECONDS)
+def _under_way(service: Service, asked: set[str | None]) -> set[str]:
+    pages = (service.runs.page(RunFilter(sees=one, status=_UNDER_WAY), _MOST_AT_ONCE) for one in asked)
+    return {row.id for page in pages for row in page}
 
 
-def _under_way(service: Service, sees: str | None) -> set[str]:
-    found = service.runs.page(RunFilter(sees=sees, status=_UNDER_WAY), _MOST_AT_ONCE)
-    return {row.id for row in found}
+def _events(service: Service, ids: set[str], heard: set[str | None]) -> list[tuple[RunAnswer, bytes]]:
+    owners = None if None in heard else [one for one in heard if one is not None]
+    rows = service.runs.several(sorted(ids), owners) if ids else []
+    runs = [RunAnswer.of_run(row, service.queue.live_progress(row.id)) for row in rows]
+    return [(run, format_sse_event(event=_RUN, data_str=run.model_dump_json(by_alias=True))) for run in runs]
 
 
-def _answers(service: Service, ids: set[str], sees: str | None) -> list[RunAnswer]:
-    rows = (service.runs.get(job_id) for job_id in sorted(ids) if job_id)
-    seen: list[RunRow] = [row for row in rows if row is not None and (sees is None or row.owner == sees)]
-    return [RunAnswer.of_run(row, service.queue.live_progress(row.id)) for row in seen]
+_EVENTS: Responses = {200: {"content": {EventSourceResponse.media_type: {"itemSchema": _SSE_EVENT_SCHEMA}}}}
 
 
-@router.get("/events", response_class=EventSourceResponse)
-async def run_updates(listened: Annotated[_Listened, Depends(_listened)]) -> AsyncIterator[ServerSentEvent]:
+@router.get("/events", response_class=Response, responses=_EVENTS)
+async def run_updates(context: InContext) -> Response:
     """Follow all runs: an event `run` with the run whenever one is handed in, goes on or ends.
 
     At most three times a second, a comment after a long silence. What is said of a run, and the bin, are not
     told: whoever changes these knows it.
     """
-    if listened.headers_only:
-        return
-    async for event in run_events(listened.service, listened.sees):
-        yield event
+    headers = {"Cache-Control": "no-cache", "X-Accel-Buffering": "no"}
+    if HEADERS_ONLY in context.request.scope:
+        return Response(headers=headers, media_type=EventSourceResponse.media_type)
+    news: RunNews = context.request.app.state.news
+    return EventSourceResponse(news.stream(context.sees), headers=headers)
 
 
 Points = Annotated[int, Query(ge=8, le=2000, description="Of the curve, at most.")]

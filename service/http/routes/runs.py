@@ -16,7 +16,6 @@ from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Body, Depends, Header, Query, Request, Response
 
-from service.auth.authenticator import Authenticator
 from service.auth.callers import KEYLESS, LINK_READERS, Caller, Scope
 from service.db.models import JobState
 from service.db.repositories import JobRow
@@ -36,7 +35,7 @@ from service.http.dependencies import (
     wait_for_end,
 )
 from service.http.in_lane import reading, writing, writing_files
-from service.http.middleware.admission import address_of
+from service.http.middleware.admission import LINKED
 from service.http.reports import Reports
 from service.http.routes.jobs import results_answer
 from service.http.routes.stored import SWEEP_FORMS, SweepForm, sweep_answer
@@ -366,9 +365,7 @@ def end_share(job_id: str, share_id: str, context: InContext) -> None:
 async def _of_link(
     request: Request, token: Annotated[str, Query(max_length=200, description="Of the link.")]
 ) -> Context:
-    """The context of a request by a link, while it may be asked: all who have one take turns as one."""
-    authenticator: Authenticator = request.app.state.authenticator
-    authenticator.count_link(token, address_of(request.scope))
+    """The context of a request by a link: all who have one take turns as one."""
     return Context(request, service_behind(request), LINK_READERS, token)
 
 
@@ -377,7 +374,7 @@ OfLink = Annotated[Context, Depends(_of_link)]
 
 def _shared(context: Context) -> tuple[RunRow, Caller]:
     """The run of a link, and who may read what its owner owns: to be asked for nothing but this run."""
-    run = context.service.shares.run_of(context.token)
+    run: RunRow = context.request.scope["state"][LINKED]  # found on admission
     return run, replace(KEYLESS, owner=run.owner, scopes=frozenset({Scope.READ}))
 
 

@@ -46,7 +46,7 @@ class March(Study):
     steps_per_period: Annotated[_Steps | None, Flag("--steps", "N")] = Field(
         default=None, description="Steps of the finer run; chosen by the solver if left out."
     )
-    tolerance: Annotated[float, Field(strict=True, gt=0.0, lt=1.0), Flag(metavar="E")] = Field(
+    tolerance: Annotated[float, Field(strict=True, ge=1e-13, le=1e-2), Flag(metavar="E")] = Field(
         default=1e-10, description="Largest change over a period, relative."
     )
     max_periods: Annotated[int, Field(strict=True, ge=1, le=1_000_000), Flag(metavar="N")] = Field(
