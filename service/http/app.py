@@ -9,6 +9,7 @@ from contextlib import asynccontextmanager
 from typing import Any
 
 from fastapi import FastAPI
+from fastapi.routing import APIRoute
 from starlette.concurrency import run_in_threadpool
 
 from service.auth.authenticator import Authenticator
@@ -89,7 +90,8 @@ def create_app(settings: Settings | None = None, registry: Registry | None = Non
     app.state.own = defaultdict(set)
     for router in (jobs.submissions(service.registry), *_ROUTERS):
         for route in router.routes:
-            app.state.own[route.path] |= route.methods
+            if isinstance(route, APIRoute):
+                app.state.own[route.path] |= route.methods
         app.include_router(router)
     if service.settings.oidc_issuer is not None:
         _offer_login(app, service)
