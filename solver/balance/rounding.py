@@ -43,6 +43,7 @@ _TINY = 1e-300
 _SEEN = 1e-12  # share of a motion, relative to that in other modes, below which it is rounding
 _DRIVEN = 1e-14  # the same of what drives a mode
 _DAMPED = 1e-4  # damping ratios that are more than rounding, whatever the matrices are
+_AT_RESONANCE = 1e-14  # of a frequency: nearer to one without damping the response is rounding
 _SAME = 1e-9  # relative distance of frequencies below which modes may be turned into each other
 
 
@@ -203,7 +204,7 @@ def _norms(rows: Real | Complex) -> Real:
     return np.sqrt((np.abs(rows) ** 2).sum(axis=-1))  # type: ignore[no-any-return]
 
 
-def resonates_undamped(balance: Balance, low: float, high: float, *, near: float = 0.0) -> bool:
+def resonates_undamped(balance: Balance, low: float, high: float) -> bool:
     """Return whether a resonance that nothing damps lies between two λ and is driven.
 
     Nothing damps a mode whose damping is rounding and in which no contact moves: friction holds a resonance
@@ -211,12 +212,13 @@ def resonates_undamped(balance: Balance, low: float, high: float, *, near: float
 
     Parameters
     ----------
-    low, high : of the frequency [rad/s]; where that is fixed it is looked at there.
-    near : so far outside, relative to the frequency, it counts too.
+    low, high : of the frequency [rad/s]; where that is fixed it is looked at there. A single frequency is
+        at a resonance as near as rounding tells.
     """
     system = balance.system
     if balance.parameter.kind is not Kind.FREQUENCY:
         low = high = system.omega
+    near = _AT_RESONANCE if low == high else 0.0
     ends = min(low, high) * (1.0 - near), max(low, high) * (1.0 + near)
     forced = system.ks > 0 if system.form == DENSE else np.any(system.modal_forces, axis=1) & (system.ks > 0)
     for i in np.flatnonzero(forced):
