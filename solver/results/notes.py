@@ -12,7 +12,7 @@ from solver.results import units
 from solver.results.told import Piece
 
 ABOVE_FRICTION = "mean_load_above_friction"
-UNDAMPED = (
+NOTHING_DAMPS = (
     "In the range there is a resonance and no damping, so that nothing bounds the response: give the "
     "structure some (damping_ratio = 0.001, say)."
 )

@@ -10,7 +10,7 @@ from typing import Annotated, ClassVar
 from solver.arrays import FloatOrNaN, Real
 from solver.results.base import Drawn, MadeOfResponses
 from solver.results.known import Known
-from solver.results.notes import UNDAMPED
+from solver.results.notes import NOTHING_DAMPS
 from solver.results.told import Piece
 from solver.results.views import Data, Views
 
@@ -20,7 +20,7 @@ class MarginStatus(Enum):
 
     COMPLETED = "Every response was computed."
     HOLES = "Some responses do not cover the band and are empty: use more harmonics or a narrower band."
-    UNDAMPED = UNDAMPED
+    UNDAMPED = NOTHING_DAMPS
     STOPPED = "Stopped by the caller: what is empty was not reached."
 
 
